@@ -1,0 +1,3 @@
+//! Proximity queries on a deforming mesh, for hard real-time controllers.
+#![no_std]
+#![deny(unsafe_code)]

@@ -1,0 +1,2 @@
+//! The control logic.
+#![no_std]
