@@ -1,0 +1,24 @@
+//! The surface in its rest shape: positions and triangles.
+
+use glam::Vec3;
+
+/// A triangle mesh: fixed connectivity, and the positions of one frame.
+///
+/// Coordinates are in the mesh's own unit (mm in the examples) and f32, because that is what the
+/// controller sees: geodesics measured on anything else would not bound what it computes with.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// One position a vertex.
+    pub positions: Vec<Vec3>,
+    /// Three vertex numbers a triangle.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// A recorded or generated deformation of a mesh: every frame holds one position a vertex.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Motion {
+    /// The frames, in order of time.
+    pub frames: Vec<Vec<Vec3>>,
+    /// Frames a second; 0 where the file does not say.
+    pub rate: f32,
+}
