@@ -31,8 +31,9 @@ pub struct Proximity {
     pub direction: Vec3,
     /// Where along the tool's axis the pair sits: 0 at its start, 1 at its end; 0 for a sphere.
     pub axis_parameter: f32,
-    /// The triangle of `point_on_surface`, as its row in the tree's triangle table.
-    pub triangle: u32,
+    /// The triangle of `point_on_surface`, as its row in the tree's triangle table. `None` when the
+    /// budget ran out while a pin was still the best point known; `corners` then repeats the pin.
+    pub triangle: Option<u32>,
     /// That triangle's corners, as rows of the vertex table.
     pub corners: [u32; 3],
     /// Weights of the three corners at `point_on_surface`: not negative, sum 1.

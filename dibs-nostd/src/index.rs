@@ -1,0 +1,30 @@
+//! The two widths of vertex indices: one code, chosen by a type parameter.
+
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for u16 {}
+    impl Sealed for u32 {}
+}
+
+/// Width of the vertex indices and radius codes of a tree: `u16` for up to 65,536 vertices, `u32`
+/// for larger meshes. Sealed: the format knows these two.
+pub trait Index: sealed::Sealed + Copy + 'static {
+    /// Bytes an index takes in the tree.
+    const BYTES: usize;
+    /// Largest radius code. The code converts to `f32` without rounding in both widths.
+    const MAX_RADIUS_CODE: u32;
+    /// Vertices that this width can address.
+    const MAX_VERTICES: u32;
+}
+
+impl Index for u16 {
+    const BYTES: usize = 2;
+    const MAX_RADIUS_CODE: u32 = 0xFFFF;
+    const MAX_VERTICES: u32 = 0x1_0000;
+}
+
+impl Index for u32 {
+    const BYTES: usize = 4;
+    const MAX_RADIUS_CODE: u32 = 0x100_0000;
+    const MAX_VERTICES: u32 = 0x1000_0000;
+}

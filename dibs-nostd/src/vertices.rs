@@ -1,0 +1,93 @@
+//! Where the vertices' current positions come from: the traversal is generic over this.
+
+use glam::Vec3;
+
+/// The positions of one frame, by row. Rows are in the tree's vertex order.
+///
+/// A table must not change while a query reads it: one query sees one frame.
+pub trait VertexTable {
+    /// Number of vertices.
+    fn len(&self) -> usize;
+
+    /// Position of one vertex in the mesh's unit (mm), or `None` outside the table.
+    fn position(&self, vertex: u32) -> Option<Vec3>;
+
+    /// Whether the table holds no vertex.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl VertexTable for [Vec3] {
+    fn len(&self) -> usize {
+        <[Vec3]>::len(self)
+    }
+
+    #[inline(always)]
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.get(vertex as usize).copied()
+    }
+}
+
+impl<const N: usize> VertexTable for [Vec3; N] {
+    fn len(&self) -> usize {
+        N
+    }
+
+    #[inline(always)]
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.get(vertex as usize).copied()
+    }
+}
+
+impl<T: VertexTable + ?Sized> VertexTable for &T {
+    fn len(&self) -> usize {
+        (**self).len()
+    }
+
+    #[inline(always)]
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        (**self).position(vertex)
+    }
+}
+
+/// A table of 16-bit positions, 6 bytes a vertex: `position = origin + step * row`.
+///
+/// Against the position that was quantised, each axis is off by at most `step / 2` plus the f32
+/// rounding of the result; that much adds to the accuracy of a separation (in length:
+/// `step.length() / 2`).
+///
+/// ```
+/// use dibs_nostd::{QuantisedVertices, VertexTable, glam::Vec3};
+/// let rows = [[0, 0, 0], [100, 200, 65_535]];
+/// let table = QuantisedVertices::new(&rows, Vec3::new(-10.0, 0.0, 0.0), Vec3::splat(0.01));
+/// assert_eq!(table.position(1), Some(Vec3::new(-9.0, 2.0, 655.35)));
+/// assert_eq!(table.position(2), None);
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct QuantisedVertices<'a> {
+    rows: &'a [[u16; 3]],
+    origin: Vec3,
+    step: Vec3,
+}
+
+impl<'a> QuantisedVertices<'a> {
+    /// A view of quantised rows. `origin` is the box's corner and `step` the size of one unit along
+    /// each axis, both in mm.
+    #[must_use]
+    pub const fn new(rows: &'a [[u16; 3]], origin: Vec3, step: Vec3) -> Self {
+        Self { rows, origin, step }
+    }
+}
+
+impl VertexTable for QuantisedVertices<'_> {
+    fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    #[inline(always)]
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        let &[x, y, z] = self.rows.get(vertex as usize)?;
+        Some(self.origin + self.step * Vec3::new(f32::from(x), f32::from(y), f32::from(z)))
+    }
+}
