@@ -1,0 +1,46 @@
+//! defmt over semihosting, for start-up and the end only: one frame costs more than a tick.
+//!
+//! The crate `defmt-semihosting` panics when it is entered twice. This logger drops the nested
+//! frame instead, because the firmware links only without panic paths.
+
+use cortex_m_semihosting::{debug, hio};
+
+use crate::shared::Exclusive;
+
+static ENCODER: Exclusive<defmt::Encoder> = Exclusive::new(defmt::Encoder::new());
+
+#[defmt::global_logger]
+struct Logger;
+
+// SAFETY: `Exclusive` turns a second entry into a dropped write, so no two frames are open on the
+// encoder at once; only the idle priority logs.
+unsafe impl defmt::Logger for Logger {
+    fn acquire() {
+        ENCODER.with(|encoder| encoder.start_frame(emit));
+    }
+
+    unsafe fn flush() {}
+
+    unsafe fn release() {
+        ENCODER.with(|encoder| encoder.end_frame(emit));
+    }
+
+    unsafe fn write(bytes: &[u8]) {
+        ENCODER.with(|encoder| encoder.write(bytes, emit));
+    }
+}
+
+fn emit(bytes: &[u8]) {
+    // No debugger attached is no reason to stop a robot.
+    if let Ok(mut out) = hio::hstdout() {
+        let _ = out.write_all(bytes);
+    }
+}
+
+/// Ends the emulation with exit code 0 or 1. On real silicon without a debugger: halts.
+pub fn exit(success: bool) -> ! {
+    debug::exit(if success { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
+    loop {
+        cortex_m::asm::wfi();
+    }
+}

@@ -1,0 +1,82 @@
+//! The CMSDK UART: one byte deep in each direction.
+
+use crate::registers::Register;
+
+const TRANSMIT_FULL: u32 = 1 << 0;
+const RECEIVE_FULL: u32 = 1 << 1;
+const RECEIVE_OVERRUN: u32 = 1 << 3;
+const TRANSMIT_ENABLE: u32 = 1 << 0;
+const RECEIVE_ENABLE: u32 = 1 << 1;
+const RECEIVE_INTERRUPT_ENABLE: u32 = 1 << 3;
+const RECEIVE_INTERRUPT: u32 = 1 << 1;
+/// 25 MHz / 16: the fastest. An emulated UART ignores it.
+const DIVISOR: u32 = 16;
+
+/// One of the board's UARTs.
+pub struct Uart {
+    data: Register,
+    state: Register,
+    control: Register,
+    interrupt: Register,
+    divisor: Register,
+}
+
+/// UART 0: vertices arrive here, interrupt 0.
+pub const BUS: Uart = Uart::at(0x4000_4000);
+/// UART 1: telemetry leaves here, polled.
+pub const TELEMETRY: Uart = Uart::at(0x4000_5000);
+
+impl Uart {
+    const fn at(base: usize) -> Self {
+        // SAFETY: called with the addresses of the board's CMSDK UARTs only.
+        unsafe {
+            Self {
+                data: Register::at(base),
+                state: Register::at(base + 4),
+                control: Register::at(base + 8),
+                interrupt: Register::at(base + 12),
+                divisor: Register::at(base + 16),
+            }
+        }
+    }
+
+    pub fn start_receiving(&self) {
+        self.divisor.write(DIVISOR);
+        self.control.write(RECEIVE_ENABLE | RECEIVE_INTERRUPT_ENABLE);
+    }
+
+    pub fn start_sending(&self) {
+        self.divisor.write(DIVISOR);
+        self.control.write(TRANSMIT_ENABLE);
+    }
+
+    /// Acknowledges the receive interrupt. Before `read`: the other order loses interrupts.
+    pub fn acknowledge(&self) {
+        self.interrupt.write(RECEIVE_INTERRUPT);
+    }
+
+    /// The byte that has arrived, if any.
+    pub fn read(&self) -> Option<u8> {
+        let [byte, ..] = if self.state.read() & RECEIVE_FULL == 0 {
+            return None;
+        } else {
+            self.data.read().to_le_bytes()
+        };
+        Some(byte)
+    }
+
+    /// Whether a byte was lost because nobody read the one before; clears the mark.
+    pub fn overrun(&self) -> bool {
+        let overrun = self.state.read() & RECEIVE_OVERRUN != 0;
+        if overrun {
+            self.state.write(RECEIVE_OVERRUN);
+        }
+        overrun
+    }
+
+    /// Sends one byte, after the one before has left.
+    pub fn write(&self, byte: u8) {
+        while self.state.read() & TRANSMIT_FULL != 0 {}
+        self.data.write(u32::from(byte));
+    }
+}
