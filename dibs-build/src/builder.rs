@@ -1,0 +1,237 @@
+//! The builder: what a `build.rs` or the `dibs` program calls.
+
+use dibs_nostd::Index;
+use dibs_nostd::format::{MAX_LEAF_TRIANGLES, PathKind};
+
+use crate::Mesh;
+use crate::construct::{Cluster, Constructor};
+use crate::emit::BuiltTree;
+use crate::error::BuildError;
+use crate::flatten::{Facts, flatten};
+use crate::graph::{Graph, Paths};
+use crate::section::Surface;
+use crate::topology::Topology;
+
+/// How sections are pinned, measured and split.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Construction {
+    /// Geodesic centre, whole-mesh paths over edges and chords, split by two far seeds.
+    #[default]
+    Geodesic,
+    /// The paper's: mid-range pin, edge paths inside the section, split by a plane, orphans swapped,
+    /// one triangle a leaf.
+    Paper,
+}
+
+/// Width of the vertex indices in the tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum IndexWidth {
+    /// 16 bits up to 65,536 vertices, 32 above.
+    #[default]
+    Fitting,
+    /// 16 bits; a larger mesh is an error.
+    Bits16,
+    /// 32 bits.
+    Bits32,
+}
+
+/// Builds trees.
+///
+/// ```
+/// use dibs_build::{Builder, generate};
+/// let (mesh, _motion) = generate::heart(1_000)?;
+/// let tree = Builder::new().stretch(1.5).build(&mesh)?;
+/// assert_eq!(tree.summary().triangles, 1_000);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone)]
+pub struct Builder<'p> {
+    stretch: f32,
+    construction: Construction,
+    paths: Option<Paths>,
+    leaf_triangles: Option<usize>,
+    index: IndexWidth,
+    with_order: bool,
+    with_rest: bool,
+    progress: &'p (dyn Fn(usize) + Sync),
+}
+
+impl std::fmt::Debug for Builder<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Builder")
+            .field("stretch", &self.stretch)
+            .field("construction", &self.construction)
+            .field("paths", &self.paths)
+            .field("leaf_triangles", &self.leaf_triangles)
+            .field("index", &self.index)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Default for Builder<'_> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<'p> Builder<'p> {
+    /// The default construction, for a stretch limit of 1.5.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            stretch: 1.5,
+            construction: Construction::Geodesic,
+            paths: None,
+            leaf_triangles: None,
+            index: IndexWidth::Fitting,
+            with_order: true,
+            with_rest: true,
+            progress: &|_| (),
+        }
+    }
+
+    /// The largest stretch that the tree must cover: a factor of at least 1.
+    #[must_use]
+    pub fn stretch(mut self, limit: f32) -> Self {
+        self.stretch = limit;
+        self
+    }
+
+    /// How sections are pinned, measured and split.
+    #[must_use]
+    pub fn construction(mut self, construction: Construction) -> Self {
+        self.construction = construction;
+        self
+    }
+
+    /// How along-surface distances are measured, and so which stretch the limit is about.
+    #[must_use]
+    pub fn paths(mut self, paths: Paths) -> Self {
+        self.paths = Some(paths);
+        self
+    }
+
+    /// Most triangles in a leaf, 1 to 8.
+    #[must_use]
+    pub fn leaf_triangles(mut self, most: usize) -> Self {
+        self.leaf_triangles = Some(most);
+        self
+    }
+
+    /// Width of the vertex indices.
+    #[must_use]
+    pub fn index(mut self, width: IndexWidth) -> Self {
+        self.index = width;
+        self
+    }
+
+    /// Whether the tree carries the mesh's own vertex numbers (2 or 4 bytes a vertex).
+    #[must_use]
+    pub fn with_vertex_order(mut self, with: bool) -> Self {
+        self.with_order = with;
+        self
+    }
+
+    /// Whether the tree carries the rest shape (12 bytes a vertex), which the stretch measurement
+    /// needs.
+    #[must_use]
+    pub fn with_rest_shape(mut self, with: bool) -> Self {
+        self.with_rest = with;
+        self
+    }
+
+    /// Calls back with the number of triangles done, from whichever thread did them.
+    #[must_use]
+    pub fn progress<'q>(self, report: &'q (dyn Fn(usize) + Sync)) -> Builder<'q>
+    where
+        'p: 'q,
+    {
+        Builder { progress: report, ..self }
+    }
+
+    /// Builds the tree. The same mesh and options give the same bytes, whatever the threads.
+    ///
+    /// Cost: `O(n log^2 n)` for `n` triangles, on all cores.
+    ///
+    /// # Errors
+    /// [`BuildError`] names what is wrong with the mesh or the options.
+    pub fn build(&self, mesh: &Mesh) -> Result<BuiltTree, BuildError> {
+        self.check(mesh)?;
+        match self.index {
+            IndexWidth::Bits16 => self.build_with::<u16>(mesh),
+            IndexWidth::Bits32 => self.build_with::<u32>(mesh),
+            IndexWidth::Fitting if mesh.positions.len() <= u16::MAX_VERTICES as usize => {
+                self.build_with::<u16>(mesh)
+            }
+            IndexWidth::Fitting => self.build_with::<u32>(mesh),
+        }
+    }
+
+    fn build_with<I: Index>(&self, mesh: &Mesh) -> Result<BuiltTree, BuildError> {
+        let vertices = mesh.positions.len();
+        if vertices > I::MAX_VERTICES as usize {
+            let (most, bits) = (I::MAX_VERTICES, 8 * I::BYTES);
+            return Err(BuildError::TooManyVertices { vertices, most, bits });
+        }
+        let paths = self.paths.unwrap_or(match self.construction {
+            Construction::Geodesic => Paths::Surface { crossings: DEFAULT_CROSSINGS },
+            Construction::Paper => Paths::Edges,
+        });
+        let root = self.construct(mesh, paths)?;
+        let kind = match paths {
+            Paths::Edges => PathKind::EdgePath,
+            Paths::Surface { .. } => PathKind::Surface,
+        };
+        let facts = Facts {
+            paths: kind,
+            stretch: self.stretch,
+            with_order: self.with_order,
+            with_rest: self.with_rest,
+        };
+        let (bytes, order) = flatten::<I>(mesh, &root, facts)?;
+        Ok(BuiltTree::new::<I>(bytes, order))
+    }
+
+    fn construct(&self, mesh: &Mesh, paths: Paths) -> Result<Cluster, BuildError> {
+        let leaf_triangles = self.leaf_triangles.unwrap_or(match self.construction {
+            Construction::Geodesic => DEFAULT_LEAF,
+            Construction::Paper => 1,
+        });
+        let topology = Topology::new(mesh);
+        let graph = Graph::new(mesh, &topology, paths);
+        let restricted = self.construction == Construction::Paper;
+        let surface = Surface { mesh, graph: &graph, restricted };
+        Constructor::new(surface, self.construction, leaf_triangles, self.progress).run()
+    }
+
+    fn check(&self, mesh: &Mesh) -> Result<(), BuildError> {
+        if mesh.triangles.is_empty() {
+            return Err(BuildError::NoTriangles);
+        }
+        if !(1.0..=1e6).contains(&self.stretch) {
+            return Err(BuildError::Stretch { stretch: self.stretch });
+        }
+        if let Some(triangles) = self.leaf_triangles
+            && !(1..=MAX_LEAF_TRIANGLES as usize).contains(&triangles)
+        {
+            return Err(BuildError::LeafSize { triangles });
+        }
+        if let Some(vertex) = mesh.positions.iter().position(|p| !p.is_finite()) {
+            return Err(BuildError::Coordinate { vertex });
+        }
+        let vertices = mesh.positions.len();
+        for (triangle, corners) in mesh.triangles.iter().enumerate() {
+            if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices) {
+                return Err(BuildError::Corner { triangle, vertex, vertices });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Triangles a leaf of the default construction.
+const DEFAULT_LEAF: usize = 4;
+
+/// Edges that a chord of the default construction crosses.
+const DEFAULT_CROSSINGS: u32 = 2;

@@ -1,0 +1,119 @@
+//! Top-down construction: from one section of all triangles to the tree of sections.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use crate::error::BuildError;
+use crate::pin::{self, Pin};
+use crate::section::{Searches, Section, Surface};
+use crate::{Construction, paper, split};
+use dibs_nostd::format::MAX_DEPTH;
+
+/// A node before it is flattened.
+#[derive(Debug)]
+pub(crate) struct Cluster {
+    pub pin: u32,
+    pub radius: f64,
+    pub content: Content,
+}
+
+#[derive(Debug)]
+pub(crate) enum Content {
+    Inner(Box<[Cluster; 2]>),
+    Leaf(Vec<u32>),
+}
+
+/// What every step of one construction needs.
+pub(crate) struct Constructor<'a> {
+    pub surface: Surface<'a>,
+    pub construction: Construction,
+    pub leaf_triangles: usize,
+    /// Called with the number of triangles that reached their leaf.
+    pub progress: &'a (dyn Fn(usize) + Sync),
+    done: AtomicUsize,
+    /// Memory for searches that no thread is using.
+    idle: Mutex<Vec<Searches>>,
+}
+
+/// Sections of fewer triangles are built by the thread that has them.
+const PARALLEL_ABOVE: usize = 512;
+
+impl<'a> Constructor<'a> {
+    pub fn new(
+        surface: Surface<'a>,
+        construction: Construction,
+        leaf_triangles: usize,
+        progress: &'a (dyn Fn(usize) + Sync),
+    ) -> Self {
+        let (done, idle) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+        Self { surface, construction, leaf_triangles, progress, done, idle }
+    }
+
+    /// The tree of the whole mesh.
+    pub fn run(&self) -> Result<Cluster, BuildError> {
+        let all = (0..self.surface.mesh.triangles.len() as u32).collect();
+        let section = Section::new(self.surface.mesh, all);
+        let start = section.vertices[0];
+        self.cluster(section, start, 0)
+    }
+
+    fn cluster(&self, section: Section, start: u32, depth: u32) -> Result<Cluster, BuildError> {
+        let mut searches = self.take_searches();
+        searches.enter(&section);
+        let pin = self.pin(&section, &mut searches, start);
+        if !pin.radius.is_finite() {
+            return Err(BuildError::NotConnected { vertex: pin.vertex });
+        }
+        if section.triangles.len() <= self.leaf_triangles {
+            self.give_back(searches);
+            let count = section.triangles.len();
+            (self.progress)(self.done.fetch_add(count, Ordering::Relaxed) + count);
+            let content = Content::Leaf(section.triangles);
+            return Ok(Cluster { pin: pin.vertex, radius: pin.radius, content });
+        }
+        let sides = self.split(&section, &mut searches, depth);
+        let [left, right] = sides.map(|triangles| Section::new(self.surface.mesh, triangles));
+        // A child's search starts at its far border, seen from the seed that it belongs to.
+        let borders = [(&left, 0), (&right, 1)].map(|(side, seed)| {
+            let seen_from = &searches.seeds[seed];
+            let by_distance = |a: &&u32, b: &&u32| {
+                seen_from.get(**a).total_cmp(&seen_from.get(**b)).then(b.cmp(a))
+            };
+            side.vertices.iter().copied().max_by(|a, b| by_distance(&a, &b)).unwrap_or(pin.vertex)
+        });
+        self.give_back(searches);
+        let big = section.triangles.len() > PARALLEL_ABOVE;
+        drop(section);
+        let build_left = || self.cluster(left, borders[0], depth + 1);
+        let build_right = || self.cluster(right, borders[1], depth + 1);
+        let (left, right) =
+            if big { rayon::join(build_left, build_right) } else { (build_left(), build_right()) };
+        let content = Content::Inner(Box::new([left?, right?]));
+        Ok(Cluster { pin: pin.vertex, radius: pin.radius, content })
+    }
+
+    fn pin(&self, section: &Section, searches: &mut Searches, start: u32) -> Pin {
+        match self.construction {
+            Construction::Geodesic => pin::geodesic_centre(&self.surface, section, searches, start),
+            Construction::Paper => paper::mid_range_pin(&self.surface, section, searches),
+        }
+    }
+
+    fn split(&self, section: &Section, searches: &mut Searches, depth: u32) -> [Vec<u32>; 2] {
+        let halvings = section.triangles.len().ilog2() + 1;
+        let even = depth + halvings >= MAX_DEPTH - 1;
+        match self.construction {
+            Construction::Geodesic => split::by_geodesic(&self.surface, section, searches, even),
+            Construction::Paper => paper::split(&self.surface, section, even),
+        }
+    }
+
+    fn take_searches(&self) -> Searches {
+        let idle = self.idle.lock().unwrap_or_else(std::sync::PoisonError::into_inner).pop();
+        idle.unwrap_or_else(|| Searches::new(self.surface.graph.vertices()))
+    }
+
+    fn give_back(&self, searches: Searches) {
+        self.idle.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(searches);
+    }
+}

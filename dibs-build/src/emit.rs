@@ -1,0 +1,195 @@
+//! The built tree, and the two ways out: a blob and Rust source.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use dibs_nostd::format::PathKind;
+use dibs_nostd::{FormatError, Index, Tree};
+
+use crate::error::BuildError;
+use crate::write_atomically;
+
+/// A tree as bytes, with what a host needs to know about it.
+#[derive(Clone, Debug)]
+pub struct BuiltTree {
+    bytes: Vec<u8>,
+    order: Vec<u32>,
+    index_bytes: usize,
+}
+
+/// What a tree is and what it costs.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[non_exhaustive]
+pub struct Summary {
+    /// Triangles.
+    pub triangles: u32,
+    /// Vertices.
+    pub vertices: u32,
+    /// Inner nodes.
+    pub nodes: u32,
+    /// Stack entries that a query needs.
+    pub depth: u32,
+    /// Bits of an index.
+    pub index_bits: u32,
+    /// The stretch limit.
+    pub stretch: f32,
+    /// Whether radii were measured across triangles (else along edges).
+    pub surface_paths: bool,
+    /// Radius of the root at rest, in the mesh's unit.
+    pub root_radius: f32,
+    /// Identity of the mesh, as vertex packets carry it.
+    pub mesh_id: u32,
+    /// Flash that a query reads: nodes and triangles.
+    pub query_bytes: usize,
+    /// The same, for each triangle.
+    pub query_bytes_per_triangle: f64,
+    /// Flash of the whole tree with all its optional sections.
+    pub flash_bytes: usize,
+    /// RAM of the surface: two buffers of f32 positions.
+    pub ram_bytes: usize,
+    /// RAM of one query's stack.
+    pub stack_bytes: usize,
+}
+
+impl BuiltTree {
+    pub(crate) fn new<I: Index>(bytes: Vec<u8>, order: Vec<u32>) -> Self {
+        Self { bytes, order, index_bytes: I::BYTES }
+    }
+
+    /// The tree's bytes, as a `.dibs` file holds them (`docs/format.md`).
+    #[must_use]
+    pub fn blob(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// The mesh vertex of each row of the tree's vertex table.
+    #[must_use]
+    pub fn vertex_order(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// Bits of an index: 16 or 32.
+    #[must_use]
+    pub fn index_bits(&self) -> u32 {
+        8 * self.index_bytes as u32
+    }
+
+    /// The tree, if its indices have the width of `I`.
+    ///
+    /// # Errors
+    /// [`FormatError::Width`] otherwise.
+    pub fn tree<I: Index>(&self) -> Result<Tree<'_, I>, FormatError> {
+        Tree::from_bytes(&self.bytes)
+    }
+
+    /// Puts one value a mesh vertex into the order of the tree's rows.
+    ///
+    /// # Panics
+    /// If `of_mesh` does not have a value for each of the mesh's vertices.
+    #[must_use]
+    pub fn to_rows<T: Copy>(&self, of_mesh: &[T]) -> Vec<T> {
+        self.order.iter().map(|&vertex| of_mesh[vertex as usize]).collect()
+    }
+
+    /// What the tree is and what it costs.
+    #[must_use]
+    pub fn summary(&self) -> Summary {
+        // The builder validated these bytes.
+        let summary = match self.index_bytes {
+            2 => self.tree::<u16>().map(|tree| summarise(&tree, self.bytes.len())),
+            _ => self.tree::<u32>().map(|tree| summarise(&tree, self.bytes.len())),
+        };
+        summary.unwrap_or_else(|error| unreachable!("a built tree is valid: {error}"))
+    }
+
+    /// Writes the blob.
+    ///
+    /// # Errors
+    /// [`BuildError::Write`]; a file of that name is then as it was.
+    pub fn write_blob(&self, path: impl AsRef<Path>) -> Result<(), BuildError> {
+        write(path.as_ref(), &self.bytes)
+    }
+
+    /// Writes Rust source for `include!`: a `static` of the given name, which the compiler validates,
+    /// and `NAME_VERTICES` and `NAME_DEPTH`, the sizes that buffers and queries take.
+    ///
+    /// # Errors
+    /// [`BuildError::Name`] or [`BuildError::Write`]; a file of that name is then as it was.
+    pub fn write_rust(&self, path: impl AsRef<Path>, name: &str) -> Result<(), BuildError> {
+        write(path.as_ref(), self.rust(name)?.as_bytes())
+    }
+
+    /// The Rust source that [`BuiltTree::write_rust`] writes.
+    ///
+    /// # Errors
+    /// [`BuildError::Name`] if `name` is not one for a `static`.
+    pub fn rust(&self, name: &str) -> Result<String, BuildError> {
+        let starts = name.starts_with(|c: char| c.is_ascii_uppercase());
+        let legal = |c: char| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_';
+        if !starts || !name.chars().all(legal) {
+            return Err(BuildError::Name { name: name.to_owned() });
+        }
+        let s = self.summary();
+        let mut literal = String::with_capacity(self.bytes.len() * 4);
+        for (i, byte) in self.bytes.iter().enumerate() {
+            if i % 32 == 0 {
+                literal.push_str("\\\n    ");
+            }
+            // Writing to a String cannot fail.
+            let _ = write!(literal, "\\x{byte:02x}");
+        }
+        let Summary { triangles, vertices, nodes, depth, stretch, mesh_id, .. } = s;
+        let length = self.bytes.len();
+        let bits = self.index_bits();
+        let paths = if s.surface_paths { "surface" } else { "edge" };
+        Ok(format!(
+            r#"// Generated by dibs-build; the layout is specified in docs/format.md. Do not edit.
+// {triangles} triangles, {vertices} vertices, {nodes} nodes, depth {depth}, stretch limit {stretch}, {paths} paths.
+
+/// Vertices of [`{name}`]: rows of its vertex table.
+pub const {name}_VERTICES: usize = {vertices};
+
+/// Stack entries that a query on [`{name}`] needs.
+pub const {name}_DEPTH: usize = {depth};
+
+/// Tree of mesh {mesh_id:08x}, {length} bytes, validated while this is compiled.
+#[allow(long_running_const_eval)]
+pub static {name}: ::dibs_nostd::Tree<'static, u{bits}> = {{
+    #[repr(align(16))]
+    struct Aligned([u8; {length}]);
+    static BYTES: Aligned = Aligned(*b"{literal}");
+    match ::dibs_nostd::Tree::from_bytes(&BYTES.0) {{
+        Ok(tree) => tree,
+        Err(_) => panic!("the generated tree does not pass its validation"),
+    }}
+}};
+"#
+        ))
+    }
+}
+
+fn write(path: &Path, content: &[u8]) -> Result<(), BuildError> {
+    Ok(write_atomically(path, |file| file.write_all(content))?)
+}
+
+/// What a tree is and what it costs, of any validated tree with `length` bytes.
+#[must_use]
+pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
+    let vertices = tree.vertex_count();
+    Summary {
+        triangles: tree.triangle_count(),
+        vertices,
+        nodes: tree.node_count(),
+        depth: tree.depth(),
+        index_bits: 8 * I::BYTES as u32,
+        stretch: tree.stretch(),
+        surface_paths: tree.paths() == PathKind::Surface,
+        root_radius: tree.root().1,
+        mesh_id: tree.mesh_id(),
+        query_bytes: tree.query_bytes(),
+        query_bytes_per_triangle: tree.query_bytes() as f64 / f64::from(tree.triangle_count()),
+        flash_bytes: length,
+        ram_bytes: 2 * 12 * vertices as usize,
+        stack_bytes: 8 * tree.depth() as usize,
+    }
+}

@@ -1,0 +1,82 @@
+//! Why a tree cannot be built or written.
+
+/// Why a tree cannot be built from a mesh, or not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BuildError {
+    /// The mesh has no triangle.
+    #[error("the mesh has no triangles: there is no surface to measure a distance to")]
+    NoTriangles,
+    /// A triangle names a vertex that does not exist.
+    #[error("triangle {triangle} uses vertex {vertex}, the mesh has {vertices} vertices")]
+    Corner {
+        /// The triangle.
+        triangle: usize,
+        /// The vertex it names.
+        vertex: u32,
+        /// Vertices of the mesh.
+        vertices: usize,
+    },
+    /// A vertex has a coordinate that is not finite.
+    #[error("vertex {vertex} has a coordinate that is not a finite number")]
+    Coordinate {
+        /// The vertex.
+        vertex: usize,
+    },
+    /// The mesh has more vertices than the index width can number.
+    #[error(
+        "the mesh has {vertices} vertices, {bits}-bit indices number at most {most}: \
+         use 32-bit indices or a coarser mesh"
+    )]
+    TooManyVertices {
+        /// Vertices of the mesh.
+        vertices: usize,
+        /// Most vertices of this width.
+        most: u32,
+        /// Bits of an index.
+        bits: usize,
+    },
+    /// A stretch limit that is not a number of at least 1.
+    #[error(
+        "a stretch limit of {stretch} makes no sense: it is a factor of at least 1 (at most 1e6)"
+    )]
+    Stretch {
+        /// The limit asked for.
+        stretch: f32,
+    },
+    /// A leaf size outside 1 to 8.
+    #[error("leaves of {triangles} triangles cannot be stored: 1 to 8 are possible")]
+    LeafSize {
+        /// The size asked for.
+        triangles: usize,
+    },
+    /// The mesh falls into several surfaces.
+    #[error(
+        "no path over the surface reaches vertex {vertex}: the mesh has several components, \
+         build a tree for each"
+    )]
+    NotConnected {
+        /// A vertex that some other vertex cannot reach.
+        vertex: u32,
+    },
+    /// The tree does not pass its own validation: a defect of the builder.
+    #[error("the builder made a tree that its own checker rejects ({0}); please report this mesh")]
+    Invalid(#[from] dibs_nostd::FormatError),
+    /// The tree would not fit the format's 32-bit offsets.
+    #[error("the tree takes {bytes} bytes, the format ends at 4 GiB: use a coarser mesh")]
+    TooLarge {
+        /// Bytes of the tree.
+        bytes: u64,
+    },
+    /// A name that cannot name a Rust `static`.
+    #[error(
+        "{name:?} is not a name for a Rust static: use capital letters, digits and underscores"
+    )]
+    Name {
+        /// The name asked for.
+        name: String,
+    },
+    /// A file could not be written.
+    #[error(transparent)]
+    Write(#[from] crate::WriteError),
+}

@@ -1,0 +1,97 @@
+//! Shortest paths from one vertex: Dijkstra's algorithm, stopped once a section is reached.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use crate::graph::Graph;
+
+/// Distances of one search, kept until the next one with the same memory.
+#[derive(Debug)]
+pub(crate) struct Distances {
+    /// Distance and the run it belongs to, a vertex.
+    rows: Vec<(f64, u32)>,
+    run: u32,
+    heap: BinaryHeap<Reverse<(u64, u32)>>,
+    /// Vertices in the order in which they were settled.
+    settled: Vec<u32>,
+}
+
+impl Distances {
+    pub fn new(vertices: usize) -> Self {
+        Self {
+            rows: vec![(f64::INFINITY, 0); vertices],
+            run: 0,
+            heap: BinaryHeap::new(),
+            settled: Vec::new(),
+        }
+    }
+
+    /// Distance of a vertex from the source, infinite where the search did not come.
+    pub fn get(&self, vertex: u32) -> f64 {
+        match self.rows[vertex as usize] {
+            (distance, run) if run == self.run => distance,
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// The vertices whose distances are final, nearest first.
+    pub fn settled(&self) -> &[u32] {
+        &self.settled
+    }
+
+    /// Searches from `source` until `wanted` vertices for which `is_wanted` holds are settled, or all
+    /// that can be reached; `allowed` limits the vertices that paths may use.
+    ///
+    /// Returns the last of the wanted vertices, the farthest, and its distance.
+    pub fn search(
+        &mut self,
+        graph: &Graph,
+        source: u32,
+        wanted: usize,
+        is_wanted: impl Fn(u32) -> bool,
+        allowed: impl Fn(u32) -> bool,
+    ) -> Farthest {
+        self.run = self.run.wrapping_add(1);
+        if self.run == 0 {
+            self.rows.fill((f64::INFINITY, 0));
+            self.run = 1;
+        }
+        self.heap.clear();
+        self.settled.clear();
+        let mut farthest = Farthest { vertex: source, distance: 0.0, reached: 0 };
+        self.rows[source as usize] = (0.0, self.run);
+        self.heap.push(Reverse((0, source)));
+        while let Some(Reverse((bits, vertex))) = self.heap.pop() {
+            // Distances are not negative, so their bits sort as they do.
+            let distance = f64::from_bits(bits);
+            if distance > self.rows[vertex as usize].0 {
+                continue;
+            }
+            self.settled.push(vertex);
+            if is_wanted(vertex) {
+                farthest = Farthest { vertex, distance, reached: farthest.reached + 1 };
+                if farthest.reached == wanted {
+                    break;
+                }
+            }
+            for arc in graph.arcs(vertex) {
+                let through = distance + f64::from(arc.length);
+                let row = &mut self.rows[arc.to as usize];
+                if (row.1 != self.run || through < row.0) && allowed(arc.to) {
+                    *row = (through, self.run);
+                    self.heap.push(Reverse((through.to_bits(), arc.to)));
+                }
+            }
+        }
+        farthest
+    }
+}
+
+/// Where a search ended.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Farthest {
+    pub vertex: u32,
+    pub distance: f64,
+    /// Wanted vertices that were reached.
+    pub reached: usize,
+}

@@ -1,0 +1,151 @@
+//! The graph whose shortest paths bound the distance along the surface from above.
+//!
+//! Its arcs are the mesh's edges and, for [`Paths::Surface`], *chords*: straight lines across a strip
+//! of triangles that is unfolded into a plane. Both are paths on the surface, so no distance is ever
+//! under-estimated.
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use crate::Mesh;
+use crate::topology::Topology;
+
+/// How far along-surface distances look beyond the mesh's edges.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Paths {
+    /// Mesh edges only, as in the paper. The stretch of each edge is what limits the tree.
+    Edges,
+    /// Mesh edges and chords across up to this many edges (1: pairs of triangles). The largest
+    /// singular value of each triangle is what limits the tree.
+    Surface {
+        /// Most edges that a chord crosses.
+        crossings: u32,
+    },
+}
+
+/// Arcs from each vertex, in compressed rows. Weights are lengths at rest, rounded up.
+#[derive(Debug)]
+pub(crate) struct Graph {
+    start: Vec<u32>,
+    arcs: Vec<Arc>,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Arc {
+    pub to: u32,
+    pub length: f32,
+}
+
+impl Graph {
+    pub fn new(mesh: &Mesh, topology: &Topology, paths: Paths) -> Self {
+        let rows: Vec<Vec<Arc>> = (0..mesh.positions.len() as u32)
+            .into_par_iter()
+            .map_init(Vec::new, |found, vertex| {
+                found.clear();
+                Unfolding { mesh, topology, paths, source: vertex, found }.run();
+                found.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+                found.dedup_by_key(|&mut (to, _)| to);
+                found.iter().map(|&(to, length)| Arc { to, length: round_up(length) }).collect()
+            })
+            .collect();
+        let mut start = Vec::with_capacity(rows.len() + 1);
+        let mut arcs = Vec::with_capacity(rows.iter().map(Vec::len).sum());
+        start.push(0);
+        for row in rows {
+            arcs.extend(row);
+            start.push(arcs.len() as u32);
+        }
+        Self { start, arcs }
+    }
+
+    pub fn vertices(&self) -> usize {
+        self.start.len() - 1
+    }
+
+    pub fn arcs(&self, vertex: u32) -> &[Arc] {
+        let v = vertex as usize;
+        &self.arcs[self.start[v] as usize..self.start[v + 1] as usize]
+    }
+}
+
+/// The next f32 above, beyond the f64 rounding of a strip's unfolding.
+fn round_up(length: f64) -> f32 {
+    let raised = length * (1.0 + 1e-12);
+    let near = raised as f32;
+    if f64::from(near) < raised { near.next_up() } else { near }
+}
+
+/// All vertices that one vertex sees across a strip of unfolded triangles.
+struct Unfolding<'a> {
+    mesh: &'a Mesh,
+    topology: &'a Topology,
+    paths: Paths,
+    source: u32,
+    found: &'a mut Vec<(u32, f64)>,
+}
+
+/// An unfolded edge and the part of it that the source sees: the directions from `low` to `high`.
+struct Window {
+    edge: [(u32, DVec2); 2],
+    low: DVec2,
+    high: DVec2,
+    triangle: u32,
+    crossings: u32,
+}
+
+impl Unfolding<'_> {
+    fn run(&mut self) {
+        let topology = self.topology;
+        for &triangle in topology.triangles_at(self.source) {
+            let [a, b] = topology.others(self.mesh, triangle, self.source);
+            let (to_a, to_b) = (self.edge(self.source, a), self.edge(self.source, b));
+            self.found.push((a, to_a.length()));
+            self.found.push((b, to_b.length()));
+            let Paths::Surface { crossings } = self.paths else { continue };
+            let axis = to_a.normalize();
+            let across = to_a.cross(to_b).length() / to_a.length();
+            let (at_a, at_b) = (DVec2::new(to_a.length(), 0.0), DVec2::new(to_b.dot(axis), across));
+            let edge = [(a, at_a), (b, at_b)];
+            self.cross(&Window { edge, low: at_a, high: at_b, triangle, crossings });
+        }
+    }
+
+    fn edge(&self, from: u32, to: u32) -> DVec3 {
+        let at = |v: u32| self.mesh.positions[v as usize].as_dvec3();
+        at(to) - at(from)
+    }
+
+    /// Unfolds the triangles beyond a window's edge into the source's plane.
+    fn cross(&mut self, window: &Window) {
+        if window.crossings == 0 {
+            return;
+        }
+        let [(a, at_a), (b, at_b)] = window.edge;
+        let topology = self.topology;
+        for next in topology.across(self.mesh, window.triangle, a, b) {
+            let apex = topology.apex(self.mesh, next, a, b);
+            let (along, to_apex) = (self.edge(a, b), self.edge(a, apex));
+            let length = along.length();
+            let (x, y) = (to_apex.dot(along) / length, to_apex.cross(along).length() / length);
+            let axis = (at_b - at_a) / (at_b - at_a).length();
+            // The source lies to the left of a -> b seen from outside: the apex goes to the right.
+            let at_apex = at_a + axis * x - axis.perp() * y;
+            let (after_low, before_high) =
+                (window.low.perp_dot(at_apex), at_apex.perp_dot(window.high));
+            if after_low >= 0.0 && before_high >= 0.0 {
+                self.found.push((apex, at_apex.length()));
+            }
+            let crossings = window.crossings - 1;
+            if after_low > 0.0 {
+                let high = if before_high > 0.0 { at_apex } else { window.high };
+                let edge = [(a, at_a), (apex, at_apex)];
+                self.cross(&Window { edge, low: window.low, high, triangle: next, crossings });
+            }
+            if before_high > 0.0 {
+                let low = if after_low > 0.0 { at_apex } else { window.low };
+                let edge = [(apex, at_apex), (b, at_b)];
+                self.cross(&Window { edge, low, high: window.high, triangle: next, crossings });
+            }
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! Where a section's sphere is pinned: the vertex whose farthest vertex of the section is nearest.
+
+use crate::section::{Searches, Section, Surface};
+
+/// A pin and the geodesic radius of the section around it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pin {
+    pub vertex: u32,
+    pub radius: f64,
+}
+
+/// Sections of at most this many vertices try each of them.
+const TRY_ALL: usize = 12;
+
+/// Rounds of moving the centre away from what is farthest.
+const ROUNDS: usize = 2;
+
+/// The geodesic centre, approximately: far seeds first (two sweeps), then the vertex that minimises
+/// the larger distance to them, then again with whatever is farthest from that vertex. Any vertex of
+/// the mesh may be the pin. `start` is a vertex of the section, best one at its border.
+///
+/// Leaves the distances from the two seeds in `searches.seeds`.
+pub(crate) fn geodesic_centre(
+    surface: &Surface<'_>,
+    section: &Section,
+    searches: &mut Searches,
+    start: u32,
+) -> Pin {
+    let first = searches.from_other(surface, section, start).vertex;
+    let second = searches.from_seed(0, surface, section, first).vertex;
+    searches.from_seed(1, surface, section, second);
+    if section.vertices.len() <= TRY_ALL {
+        return best_of(surface, section, searches, &section.vertices);
+    }
+    let mut candidates = between_seeds(searches);
+    let Some(mut centre) = nearest(&candidates) else {
+        return best_of(surface, section, searches, &[first]);
+    };
+    let mut best = evaluate(surface, section, searches, centre);
+    for _ in 0..ROUNDS {
+        let far = searches.from_other(surface, section, centre).vertex;
+        searches.from_other(surface, section, far);
+        for (vertex, worst) in &mut candidates {
+            *worst = worst.max(searches.other.get(*vertex));
+        }
+        match nearest(&candidates) {
+            Some(next) if next != centre => centre = next,
+            _ => break,
+        }
+        let found = evaluate(surface, section, searches, centre);
+        if found.radius < best.radius {
+            best = found;
+        }
+    }
+    best
+}
+
+/// The vertices around the middle between the two seeds, each with its larger distance to them.
+fn between_seeds(searches: &Searches) -> Vec<(u32, f64)> {
+    let [first, second] = &searches.seeds;
+    let larger = |v: u32| first.get(v).max(second.get(v));
+    let least = first.settled().iter().map(|&v| larger(v)).fold(f64::INFINITY, f64::min);
+    let near = first.settled().iter().map(|&v| (v, larger(v)));
+    near.filter(|&(_, distance)| distance <= 1.5 * least).collect()
+}
+
+/// The candidate whose worst distance is least.
+fn nearest(candidates: &[(u32, f64)]) -> Option<u32> {
+    let order = |a: &&(u32, f64), b: &&(u32, f64)| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0));
+    candidates.iter().min_by(order).map(|&(vertex, _)| vertex)
+}
+
+fn best_of(
+    surface: &Surface<'_>,
+    section: &Section,
+    searches: &mut Searches,
+    candidates: &[u32],
+) -> Pin {
+    let mut best = Pin { vertex: candidates[0], radius: f64::INFINITY };
+    for &v in candidates {
+        let found = evaluate(surface, section, searches, v);
+        if found.radius < best.radius {
+            best = found;
+        }
+    }
+    best
+}
+
+/// The radius of the section around a vertex.
+pub(crate) fn evaluate(
+    surface: &Surface<'_>,
+    section: &Section,
+    searches: &mut Searches,
+    vertex: u32,
+) -> Pin {
+    let farthest = searches.from_other(surface, section, vertex);
+    let complete = farthest.reached == section.vertices.len();
+    Pin { vertex, radius: if complete { farthest.distance } else { f64::INFINITY } }
+}

@@ -1,0 +1,38 @@
+//! Dividing a section in two by distance along the surface.
+
+use crate::section::{Searches, Section, Surface};
+
+/// No side of a split gets less than this share of the triangles: it bounds the depth.
+const LEAST_SHARE: f64 = 0.1;
+
+/// Each triangle goes to the nearer of the two far seeds that the pin's search left in `searches`.
+///
+/// Seeds that are far along the surface keep the two walls of a fold apart, which a plane does not:
+/// they are near in space and far along the surface. `even` forces halves.
+pub(crate) fn by_geodesic(
+    surface: &Surface<'_>,
+    section: &Section,
+    searches: &Searches,
+    even: bool,
+) -> [Vec<u32>; 2] {
+    let [first, second] = &searches.seeds;
+    let nearer = |v: u32| first.get(v) - second.get(v);
+    let key = |t: u32| -> f64 { surface.mesh.triangles[t as usize].into_iter().map(nearer).sum() };
+    let keyed = section.triangles.iter().map(|&t| (key(t), t)).collect();
+    let share = if even { 0.5 } else { LEAST_SHARE };
+    at_zero(keyed, share)
+}
+
+/// Divides by the sign of the key, but gives either side at least `least_share` of the triangles.
+pub(crate) fn at_zero(mut keyed: Vec<(f64, u32)>, least_share: f64) -> [Vec<u32>; 2] {
+    keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let count = keyed.len();
+    let least = ((count as f64 * least_share) as usize).clamp(1, count / 2);
+    let at = keyed.partition_point(|&(key, _)| key <= 0.0).clamp(least, count - least);
+    let (left, right) = keyed.split_at(at);
+    [left, right].map(|side| {
+        let mut triangles: Vec<u32> = side.iter().map(|&(_, t)| t).collect();
+        triangles.sort_unstable();
+        triangles
+    })
+}

@@ -1,0 +1,387 @@
+//! Whether bytes are a tree: the well-formedness checker, separate from everything that uses trees.
+
+use core::fmt;
+
+use crate::Index;
+use crate::format::{
+    self, CHECKSUM_AT, CRC, HEADER_BYTES, Link, MAGIC, MAX_DEPTH, PathKind, SECTION_ALIGN,
+    SECTION_BYTES, VERSION, node_bytes, triangle_bytes, u32_at,
+};
+use crate::tree::{Header, SECTIONS, Tree};
+
+/// Why bytes are not a tree that this crate can search.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum FormatError {
+    /// Fewer bytes than a header, or than the header states.
+    Length {
+        /// Bytes needed.
+        expected: u32,
+        /// Bytes given.
+        found: u32,
+    },
+    /// The first four bytes are not `DIBS`.
+    Magic {
+        /// The four bytes.
+        found: [u8; 4],
+    },
+    /// A layout version that this crate does not read.
+    Version {
+        /// The version.
+        found: u16,
+    },
+    /// The index width is not that of the tree type.
+    Width {
+        /// Bytes an index takes in the tree type.
+        expected: u8,
+        /// Bytes an index takes in these bytes.
+        found: u8,
+    },
+    /// The checksum does not match: the bytes changed since they were written.
+    Checksum {
+        /// The checksum in the header.
+        stated: u32,
+        /// The checksum of the bytes.
+        computed: u32,
+    },
+    /// A header field has a value that no builder writes.
+    Field {
+        /// Offset of the field in the header.
+        offset: u8,
+        /// Its value.
+        value: u32,
+    },
+    /// A section is missing, misplaced, or not as long as the counts require.
+    Section {
+        /// The section's kind, see [`format::section`].
+        kind: u32,
+    },
+    /// A node's children do not follow it in depth-first order.
+    NodeOrder {
+        /// Row of the child that is out of place.
+        node: u32,
+    },
+    /// A pin is not a vertex of the mesh.
+    Pin {
+        /// Row of the node record.
+        node: u32,
+        /// The pin.
+        pin: u32,
+    },
+    /// A radius code is larger than its width's largest.
+    Radius {
+        /// Row of the node record.
+        node: u32,
+        /// The radius code.
+        code: u32,
+    },
+    /// A leaf's triangles do not follow the leaf before it, or run beyond the table.
+    Leaf {
+        /// First triangle of the leaf.
+        first: u32,
+    },
+    /// A triangle's corner is not a vertex of the mesh.
+    Corner {
+        /// Row of the triangle.
+        triangle: u32,
+        /// The corner.
+        vertex: u32,
+    },
+    /// A row of the vertex order is not a vertex of the mesh.
+    Order {
+        /// Row of the vertex order.
+        row: u32,
+    },
+    /// The tree is deeper or shallower than the header states.
+    Depth {
+        /// The depth in the header.
+        stated: u32,
+        /// The depth found (or a bound that was passed).
+        found: u32,
+    },
+}
+
+impl fmt::Display for FormatError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Length { expected, found } => {
+                write!(f, "a tree of {expected} bytes expected, {found} bytes found")
+            }
+            Self::Magic { found } => write!(f, "not a tree: starts with {found:02x?}, not DIBS"),
+            Self::Version { found } => {
+                write!(f, "tree format version {found}, this library reads version {VERSION}")
+            }
+            Self::Width { expected, found } => {
+                write!(f, "indices of {found} bytes, the tree type has {expected}")
+            }
+            Self::Checksum { stated, computed } => {
+                write!(f, "checksum {computed:08x}, the header states {stated:08x}")
+            }
+            Self::Field { offset, value } => {
+                write!(f, "header field at {offset} holds {value:#x}, which is not valid")
+            }
+            Self::Section { kind } => write!(f, "section {kind} is missing or has a wrong size"),
+            Self::NodeOrder { node } => write!(f, "node {node} is out of depth-first order"),
+            Self::Pin { node, pin } => write!(f, "node {node} is pinned to missing vertex {pin}"),
+            Self::Radius { node, code } => write!(f, "node {node} has radius code {code}"),
+            Self::Leaf { first } => write!(f, "the leaf at triangle {first} is out of order"),
+            Self::Corner { triangle, vertex } => {
+                write!(f, "triangle {triangle} uses missing vertex {vertex}")
+            }
+            Self::Order { row } => write!(f, "vertex order row {row} is not a vertex"),
+            Self::Depth { stated, found } => {
+                write!(f, "depth {found} found, the header states {stated}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for FormatError {}
+
+/// A header field that every builder writes and this read cannot miss, since the length was checked.
+const fn field(bytes: &[u8], offset: usize) -> Result<u32, FormatError> {
+    match u32_at(bytes, offset) {
+        Some(value) => Ok(value),
+        None => {
+            Err(FormatError::Length { expected: HEADER_BYTES as u32, found: bytes.len() as u32 })
+        }
+    }
+}
+
+macro_rules! tri {
+    ($result:expr) => {
+        match $result {
+            Ok(value) => value,
+            Err(error) => return Err(error),
+        }
+    };
+}
+
+pub(crate) const fn header<I: Index>(bytes: &[u8]) -> Result<Header, FormatError> {
+    let Some(start) = bytes.first_chunk::<HEADER_BYTES>() else {
+        return Err(FormatError::Length {
+            expected: HEADER_BYTES as u32,
+            found: bytes.len() as u32,
+        });
+    };
+    let magic = [start[0], start[1], start[2], start[3]];
+    if u32::from_le_bytes(magic) != u32::from_le_bytes(MAGIC) {
+        return Err(FormatError::Magic { found: magic });
+    }
+    let version = u16::from_le_bytes([start[4], start[5]]);
+    if version != VERSION {
+        return Err(FormatError::Version { found: version });
+    }
+    let (width, path_code) = (start[6], start[7]);
+    if width as usize != I::BYTES {
+        return Err(FormatError::Width { expected: I::BYTES as u8, found: width });
+    }
+    let Some(paths) = PathKind::from_code(path_code) else {
+        return Err(FormatError::Field { offset: 7, value: path_code as u32 });
+    };
+    let length = tri!(field(bytes, 52));
+    if length as usize != bytes.len() {
+        return Err(FormatError::Length { expected: length, found: bytes.len() as u32 });
+    }
+    tri!(checksum(bytes));
+    let header = Header {
+        paths,
+        mesh_id: tri!(field(bytes, 8)),
+        vertices: tri!(field(bytes, 12)),
+        triangles: tri!(field(bytes, 16)),
+        nodes: tri!(field(bytes, 20)),
+        root: tri!(field(bytes, 24)),
+        depth: tri!(field(bytes, 28)),
+        stretch: f32::from_bits(tri!(field(bytes, 32))),
+        radius_unit: f32::from_bits(tri!(field(bytes, 36))),
+        root_pin: tri!(field(bytes, 40)),
+        root_radius_code: tri!(field(bytes, 44)),
+    };
+    let reserved = tri!(field(bytes, 56));
+    let wrong = if header.vertices == 0 || header.vertices > I::MAX_VERTICES {
+        Some((12, header.vertices))
+    } else if header.triangles == 0 || header.triangles >= 1 << 28 {
+        Some((16, header.triangles))
+    } else if header.nodes >= 1 << 28 {
+        Some((20, header.nodes))
+    } else if header.depth > MAX_DEPTH {
+        Some((28, header.depth))
+    } else if !(header.stretch >= 1.0 && header.stretch <= 1e6) {
+        Some((32, header.stretch.to_bits()))
+    } else if !(header.radius_unit >= 0.0 && header.radius_unit <= 1e18) {
+        Some((36, header.radius_unit.to_bits()))
+    } else if header.root_pin >= header.vertices {
+        Some((40, header.root_pin))
+    } else if header.root_radius_code > I::MAX_RADIUS_CODE {
+        Some((44, header.root_radius_code))
+    } else if reserved != 0 {
+        Some((56, reserved))
+    } else {
+        None
+    };
+    match wrong {
+        Some((offset, value)) => Err(FormatError::Field { offset, value }),
+        None => Ok(header),
+    }
+}
+
+const fn checksum(bytes: &[u8]) -> Result<(), FormatError> {
+    let stated = tri!(field(bytes, CHECKSUM_AT));
+    let Some((before, rest)) = bytes.split_at_checked(CHECKSUM_AT) else { return Ok(()) };
+    let Some((_, after)) = rest.split_at_checked(4) else { return Ok(()) };
+    let mut digest = CRC.digest();
+    digest.update(before);
+    digest.update(after);
+    let computed = digest.finalize();
+    if computed == stated { Ok(()) } else { Err(FormatError::Checksum { stated, computed }) }
+}
+
+/// The parts of `bytes` that hold [`SECTIONS`]; an optional section that is absent is empty.
+pub(crate) const fn sections<I: Index>(bytes: &[u8]) -> Result<[&[u8]; 4], FormatError> {
+    let vertices = tri!(field(bytes, 12)) as u64;
+    let triangles = tri!(field(bytes, 16)) as u64;
+    let nodes = tri!(field(bytes, 20)) as u64;
+    let rows = tri!(field(bytes, 48));
+    let expected = [
+        nodes * node_bytes::<I>() as u64,
+        triangles * triangle_bytes::<I>() as u64,
+        vertices * I::BYTES as u64,
+        vertices * 12,
+    ];
+    let mut found: [Option<&[u8]>; 4] = [None; 4];
+    let mut row = 0;
+    while row < rows {
+        let at = HEADER_BYTES + row as usize * SECTION_BYTES;
+        let kind = tri!(field(bytes, at));
+        let offset = tri!(field(bytes, at + 4));
+        let length = tri!(field(bytes, at + 8));
+        let mut slot = 0;
+        while slot < SECTIONS.len() {
+            if SECTIONS[slot] == kind {
+                let part = format::range(bytes, offset, length);
+                let placed = offset as usize % SECTION_ALIGN == 0
+                    && offset as usize >= HEADER_BYTES
+                    && length as u64 == expected[slot];
+                if part.is_none() || !placed || found[slot].is_some() {
+                    return Err(FormatError::Section { kind });
+                }
+                found[slot] = part;
+            }
+            slot += 1;
+        }
+        row += 1;
+    }
+    match found {
+        [Some(nodes), Some(triangles), order, rest] => {
+            Ok([nodes, triangles, or_empty(order), or_empty(rest)])
+        }
+        [None, ..] => Err(FormatError::Section { kind: SECTIONS[0] }),
+        _ => Err(FormatError::Section { kind: SECTIONS[1] }),
+    }
+}
+
+const fn or_empty(part: Option<&[u8]>) -> &[u8] {
+    match part {
+        Some(part) => part,
+        None => &[],
+    }
+}
+
+/// Walks the whole tree once, depth first, near child before far one. Since the array must come out
+/// in exactly that order, meeting rows 0, 1, 2, ... proves that it is a tree and that nothing is left
+/// over, without a mark a node.
+pub(crate) const fn well_formed<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatError> {
+    let header = tree.header();
+    // Links still to visit, each with the inner nodes above it: never more than MAX_DEPTH + 1. The
+    // mask is there so that no index can panic.
+    const SLOTS: usize = (MAX_DEPTH as usize + 1).next_power_of_two();
+    const MASK: usize = SLOTS - 1;
+    let mut stack = [(0u32, 0u32); SLOTS];
+    stack[0] = (header.root, 0);
+    let mut waiting = 1;
+    let mut next_node = 0;
+    let mut next_triangle = 0;
+    let mut deepest = 0;
+    while waiting > 0 {
+        waiting -= 1;
+        let (link, above) = stack[waiting & MASK];
+        match Link::decode(link) {
+            Link::Node(row) => {
+                if row != next_node {
+                    return Err(FormatError::NodeOrder { node: row });
+                }
+                next_node += 1;
+                let depth = above + 1;
+                if depth > header.depth {
+                    return Err(FormatError::Depth { stated: header.depth, found: depth });
+                }
+                if depth > deepest {
+                    deepest = depth;
+                }
+                let Some(node) = tree.node(row) else {
+                    return Err(FormatError::NodeOrder { node: row });
+                };
+                let mut child = 0;
+                while child < 2 {
+                    if node.pin[child] >= header.vertices {
+                        return Err(FormatError::Pin { node: row, pin: node.pin[child] });
+                    }
+                    if node.radius_code[child] > I::MAX_RADIUS_CODE {
+                        return Err(FormatError::Radius {
+                            node: row,
+                            code: node.radius_code[child],
+                        });
+                    }
+                    child += 1;
+                }
+                stack[waiting & MASK] = (node.link[1], depth);
+                stack[(waiting + 1) & MASK] = (node.link[0], depth);
+                waiting += 2;
+            }
+            Link::Leaf { first, count } => {
+                if first != next_triangle || count > header.triangles - next_triangle {
+                    return Err(FormatError::Leaf { first });
+                }
+                next_triangle += count;
+            }
+        }
+    }
+    if next_node != header.nodes {
+        return Err(FormatError::NodeOrder { node: next_node });
+    }
+    if next_triangle != header.triangles {
+        return Err(FormatError::Leaf { first: next_triangle });
+    }
+    if deepest != header.depth {
+        return Err(FormatError::Depth { stated: header.depth, found: deepest });
+    }
+    tables(tree)
+}
+
+/// Whether every index in the triangle and vertex order tables is a vertex.
+const fn tables<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatError> {
+    let header = tree.header();
+    let mut row = 0;
+    while row < header.triangles {
+        let Some(corners) = tree.triangle(row) else {
+            return Err(FormatError::Corner { triangle: row, vertex: 0 });
+        };
+        let mut corner = 0;
+        while corner < 3 {
+            if corners[corner] >= header.vertices {
+                return Err(FormatError::Corner { triangle: row, vertex: corners[corner] });
+            }
+            corner += 1;
+        }
+        row += 1;
+    }
+    let mut row = 0;
+    while row < header.vertices && tree.order_bytes() > 0 {
+        match tree.vertex_number(row) {
+            Some(_) => row += 1,
+            None => return Err(FormatError::Order { row }),
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,241 @@
+//! The tree's bytes: little-endian records at fixed places, read from flash without a parsing pass.
+//!
+//! `docs/format.md` is the specification; this module is its only reader. Everything here is `const`
+//! so that a generated `static` is validated while the firmware compiles, by the code that validates
+//! a blob when it boots.
+
+use crate::Index;
+
+/// First bytes of every tree.
+pub const MAGIC: [u8; 4] = *b"DIBS";
+/// Version of the layout that this crate reads.
+pub const VERSION: u16 = 1;
+/// Bytes of the fixed header; the section table follows it.
+pub const HEADER_BYTES: usize = 64;
+/// Bytes of one row of the section table: kind, offset, length.
+pub const SECTION_BYTES: usize = 12;
+/// Where the checksum stands in the header. It covers every other byte.
+pub const CHECKSUM_AT: usize = 60;
+/// Every section starts at a multiple of this.
+pub const SECTION_ALIGN: usize = 16;
+/// Bound on the records from root to leaf, whatever the tree.
+pub const MAX_DEPTH: u32 = 64;
+/// Most triangles in one leaf.
+pub const MAX_LEAF_TRIANGLES: u32 = 8;
+
+/// CRC-32 (ISO-HDLC) of trees and bus packets: at 2,000 bits or less it detects every burst up to 32
+/// bits and every pattern of up to 5 flipped bits.
+pub const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
+/// What a section holds.
+pub mod section {
+    /// One record an inner node, in depth-first order.
+    pub const NODES: u32 = 1;
+    /// Three vertex rows a triangle, leaf by leaf.
+    pub const TRIANGLES: u32 = 2;
+    /// The mesh's own vertex number of every row (optional: hosts need it, a controller does not).
+    pub const VERTEX_ORDER: u32 = 3;
+    /// Rest position of every row, three `f32` (optional: the stretch measurement needs it).
+    pub const REST: u32 = 4;
+}
+
+/// How geodesic radii were measured, which decides what limits their growth (`design` invariant
+/// "coverage").
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum PathKind {
+    /// Along mesh edges: coverage holds while no edge is longer than `s` times its rest length.
+    EdgePath,
+    /// Across triangle interiors: coverage holds while no triangle's largest singular value
+    /// (deformation gradient against the rest shape) exceeds `s`.
+    Surface,
+}
+
+impl PathKind {
+    /// The byte that stands for this kind in the header.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::EdgePath => 0,
+            Self::Surface => 1,
+        }
+    }
+
+    pub(crate) const fn from_code(code: u8) -> Option<Self> {
+        match code {
+            0 => Some(Self::EdgePath),
+            1 => Some(Self::Surface),
+            _ => None,
+        }
+    }
+}
+
+/// Where a child stands: an inner node's record, or a leaf's run of triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Link {
+    /// Row of the node table.
+    Node(u32),
+    /// Rows `first..first + count` of the triangle table.
+    Leaf {
+        /// First row.
+        first: u32,
+        /// 1 to [`MAX_LEAF_TRIANGLES`].
+        count: u32,
+    },
+}
+
+const LEAF_BIT: u32 = 1 << 31;
+const COUNT_SHIFT: u32 = 28;
+const FIRST_MASK: u32 = (1 << COUNT_SHIFT) - 1;
+
+impl Link {
+    /// The link as it is stored: bit 31 marks a leaf, whose bits 28 to 30 hold `count - 1` and whose
+    /// bits 0 to 27 hold `first`.
+    #[must_use]
+    pub const fn encode(self) -> u32 {
+        match self {
+            Self::Node(row) => row,
+            Self::Leaf { first, count } => {
+                LEAF_BIT | ((count.wrapping_sub(1) & 7) << COUNT_SHIFT) | (first & FIRST_MASK)
+            }
+        }
+    }
+
+    /// The inverse of [`Link::encode`].
+    #[inline(always)]
+    #[must_use]
+    pub const fn decode(word: u32) -> Self {
+        if word & LEAF_BIT == 0 {
+            Self::Node(word)
+        } else {
+            Self::Leaf { first: word & FIRST_MASK, count: ((word >> COUNT_SHIFT) & 7) + 1 }
+        }
+    }
+}
+
+/// An inner node: both children in one record, so that one read serves both tests.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Node {
+    pub pin: [u32; 2],
+    pub radius_code: [u32; 2],
+    pub link: [u32; 2],
+}
+
+/// Bytes of one node record.
+#[must_use]
+pub const fn node_bytes<I: Index>() -> usize {
+    4 * I::BYTES + 8
+}
+
+/// Bytes of one triangle row.
+#[must_use]
+pub const fn triangle_bytes<I: Index>() -> usize {
+    3 * I::BYTES
+}
+
+/// The bytes from row `row` of `stride` bytes onwards; `None` beyond the end.
+#[inline(always)]
+const fn rows_from(bytes: &[u8], row: u32, stride: usize) -> Option<&[u8]> {
+    let Some(at) = (row as usize).checked_mul(stride) else { return None };
+    match bytes.split_at_checked(at) {
+        Some((_, tail)) => Some(tail),
+        None => None,
+    }
+}
+
+#[inline(always)]
+pub(crate) const fn node<I: Index>(nodes: &[u8], row: u32) -> Option<Node> {
+    let Some(tail) = rows_from(nodes, row, node_bytes::<I>()) else { return None };
+    if I::BYTES == 2 {
+        let Some(r) = tail.first_chunk::<16>() else { return None };
+        Some(Node {
+            pin: [short(r[0], r[1]), short(r[2], r[3])],
+            radius_code: [short(r[4], r[5]), short(r[6], r[7])],
+            link: [
+                u32::from_le_bytes([r[8], r[9], r[10], r[11]]),
+                u32::from_le_bytes([r[12], r[13], r[14], r[15]]),
+            ],
+        })
+    } else {
+        let Some(r) = tail.first_chunk::<24>() else { return None };
+        Some(Node {
+            pin: [
+                u32::from_le_bytes([r[0], r[1], r[2], r[3]]),
+                u32::from_le_bytes([r[4], r[5], r[6], r[7]]),
+            ],
+            radius_code: [
+                u32::from_le_bytes([r[8], r[9], r[10], r[11]]),
+                u32::from_le_bytes([r[12], r[13], r[14], r[15]]),
+            ],
+            link: [
+                u32::from_le_bytes([r[16], r[17], r[18], r[19]]),
+                u32::from_le_bytes([r[20], r[21], r[22], r[23]]),
+            ],
+        })
+    }
+}
+
+#[inline(always)]
+pub(crate) const fn triangle<I: Index>(triangles: &[u8], row: u32) -> Option<[u32; 3]> {
+    let Some(tail) = rows_from(triangles, row, triangle_bytes::<I>()) else { return None };
+    if I::BYTES == 2 {
+        let Some(r) = tail.first_chunk::<6>() else { return None };
+        Some([short(r[0], r[1]), short(r[2], r[3]), short(r[4], r[5])])
+    } else {
+        let Some(r) = tail.first_chunk::<12>() else { return None };
+        Some([
+            u32::from_le_bytes([r[0], r[1], r[2], r[3]]),
+            u32::from_le_bytes([r[4], r[5], r[6], r[7]]),
+            u32::from_le_bytes([r[8], r[9], r[10], r[11]]),
+        ])
+    }
+}
+
+#[inline(always)]
+pub(crate) const fn vertex_number<I: Index>(order: &[u8], row: u32) -> Option<u32> {
+    let Some(tail) = rows_from(order, row, I::BYTES) else { return None };
+    if I::BYTES == 2 {
+        let Some(r) = tail.first_chunk::<2>() else { return None };
+        Some(short(r[0], r[1]))
+    } else {
+        u32_at(tail, 0)
+    }
+}
+
+#[inline(always)]
+pub(crate) const fn rest_position(rest: &[u8], row: u32) -> Option<glam::Vec3> {
+    let Some(tail) = rows_from(rest, row, 12) else { return None };
+    let Some(r) = tail.first_chunk::<12>() else { return None };
+    Some(glam::Vec3::new(
+        f32::from_le_bytes([r[0], r[1], r[2], r[3]]),
+        f32::from_le_bytes([r[4], r[5], r[6], r[7]]),
+        f32::from_le_bytes([r[8], r[9], r[10], r[11]]),
+    ))
+}
+
+#[inline(always)]
+const fn short(low: u8, high: u8) -> u32 {
+    u16::from_le_bytes([low, high]) as u32
+}
+
+pub(crate) const fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
+    match bytes.split_at_checked(at) {
+        Some((_, tail)) => match tail.first_chunk::<4>() {
+            Some(r) => Some(u32::from_le_bytes(*r)),
+            None => None,
+        },
+        None => None,
+    }
+}
+
+/// The part of `bytes` that a section table row points at.
+pub(crate) const fn range(bytes: &[u8], offset: u32, length: u32) -> Option<&[u8]> {
+    match bytes.split_at_checked(offset as usize) {
+        Some((_, tail)) => match tail.split_at_checked(length as usize) {
+            Some((part, _)) => Some(part),
+            None => None,
+        },
+        None => None,
+    }
+}

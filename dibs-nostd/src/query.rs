@@ -1,0 +1,520 @@
+//! The traversal: the closest pair between a tool and the surface as it is now.
+
+use core::fmt;
+
+use glam::Vec3;
+
+use crate::format::Link;
+use crate::sqrt::sqrt;
+use crate::stretch::MeasuredStretch;
+use crate::tool::{AxisPair, Tool};
+use crate::{Index, Proximity, Tree, VertexTable};
+
+/// Why a query gave no answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum QueryError {
+    /// The tree is deeper than the query's stack.
+    Depth {
+        /// The tree's depth.
+        needed: u32,
+        /// The stack's entries.
+        available: u32,
+    },
+    /// The vertex table does not have one row for each of the tree's vertices.
+    VertexCount {
+        /// Rows that the tree needs.
+        expected: u32,
+        /// Rows of the table.
+        found: u32,
+    },
+    /// A vertex's position is not a finite number, or so far away that f32 lengths overflow.
+    Position {
+        /// Row of the vertex.
+        vertex: u32,
+    },
+    /// The measured stretch is that of another mesh.
+    Mesh {
+        /// The tree's mesh id.
+        expected: u32,
+        /// The measurement's mesh id.
+        found: u32,
+    },
+    /// A row outside its table: the tree's bytes changed after they were validated.
+    Corrupt {
+        /// The row that is missing.
+        row: u32,
+    },
+}
+
+impl fmt::Display for QueryError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Depth { needed, available } => {
+                write!(f, "the tree needs a stack of {needed} entries, the query has {available}")
+            }
+            Self::VertexCount { expected, found } => {
+                write!(f, "the tree has {expected} vertices, the table {found}")
+            }
+            Self::Position { vertex } => {
+                write!(f, "the position of vertex {vertex} is not finite or too large")
+            }
+            Self::Mesh { expected, found } => {
+                write!(f, "stretch measured on mesh {found:08x}, the tree is of {expected:08x}")
+            }
+            Self::Corrupt { row } => write!(f, "row {row} is missing: the tree's bytes changed"),
+        }
+    }
+}
+
+impl core::error::Error for QueryError {}
+
+/// The most work that one query may do. It bounds its time; an answer that was cut short is still
+/// valid, with a wider interval.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Budget {
+    /// Most sphere bounds evaluated, stored and elastic; the root's, always evaluated, is not counted.
+    pub node_tests: u32,
+    /// Most exact tool-triangle tests.
+    pub triangle_tests: u32,
+}
+
+impl Budget {
+    /// As much as it takes.
+    pub const UNLIMITED: Self = Self { node_tests: u32::MAX, triangle_tests: u32::MAX };
+}
+
+/// What a query may know beforehand. None of it changes what the answer is, only what it costs, except
+/// that a budget may widen the interval.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    budget: Budget,
+    warm_start: Option<u32>,
+    stretch: Option<MeasuredStretch>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Options {
+    /// No budget, no warm start, and the stretch limit that the tree was built for.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { budget: Budget::UNLIMITED, warm_start: None, stretch: None }
+    }
+
+    /// Bounds the work.
+    #[must_use]
+    pub const fn budget(mut self, budget: Budget) -> Self {
+        self.budget = budget;
+        self
+    }
+
+    /// Starts from a triangle, usually the last tick's [`Proximity::triangle`]. A wrong or stale one
+    /// costs one triangle test; `None` starts cold.
+    #[must_use]
+    pub const fn warm_start(mut self, triangle: Option<u32>) -> Self {
+        self.warm_start = triangle;
+        self
+    }
+
+    /// Uses the stretch measured on the frame that is searched instead of the limit of the tree:
+    /// smaller spheres, fewer tests.
+    #[must_use]
+    pub const fn stretch(mut self, measured: MeasuredStretch) -> Self {
+        self.stretch = Some(measured);
+        self
+    }
+}
+
+/// A subtree that waits for its turn.
+#[derive(Clone, Copy, Debug)]
+struct Waiting {
+    /// No point of the subtree is closer to the tool's axis than this.
+    lower: f32,
+    link: u32,
+}
+
+/// A query on one tree, with the fixed stack that its traversal needs: 8 bytes an entry.
+///
+/// `DEPTH` must be at least the tree's depth, checked once, here; [`Tree::depth`] tells it, and the
+/// builder prints it. Make it once, in a `static` or at start-up, and use it at every tick.
+#[derive(Clone, Debug)]
+pub struct Query<'t, I, const DEPTH: usize> {
+    tree: Tree<'t, I>,
+    stack: [Waiting; DEPTH],
+}
+
+/// Slack of the pruning comparison, in units of the query's scale: the f32 rounding of both sides.
+///
+/// With `u = 2^-24`, all lengths in a query are at most the scale `S` (distance to the farthest point
+/// of the root sphere, plus twice the axis). A pin's distance is off by at most `8 u S`, a bound
+/// `d - R` by `10 u S`, a triangle's distance by the kernel's [`crate::ACCURACY`]` S`.
+/// Twice the sum of the largest two covers any comparison between them.
+const SLACK: f32 = 64.0 / 16_777_216.0;
+
+/// What [`Proximity::accuracy`] promises, in units of the scale: the kernel's error plus that of the
+/// pair's last operations.
+const ACCURACY: f32 = 64.0 / 16_777_216.0;
+
+impl<'t, I: Index, const DEPTH: usize> Query<'t, I, DEPTH> {
+    /// A query on `tree`.
+    ///
+    /// # Errors
+    /// [`QueryError::Depth`] if the stack cannot hold the tree's depth.
+    pub const fn new(tree: &Tree<'t, I>) -> Result<Self, QueryError> {
+        if tree.depth() as usize > DEPTH {
+            return Err(QueryError::Depth { needed: tree.depth(), available: DEPTH as u32 });
+        }
+        Ok(Self { tree: *tree, stack: [Waiting { lower: 0.0, link: 0 }; DEPTH] })
+    }
+
+    /// The tree that is searched.
+    #[must_use]
+    pub const fn tree(&self) -> &Tree<'t, I> {
+        &self.tree
+    }
+
+    /// The closest pair between `tool` and the surface whose vertices are `vertices`.
+    ///
+    /// Exact within [`Proximity::accuracy`] as long as the surface keeps to the stretch limit (or to
+    /// the measured stretch in `options`). Pins are vertices of the surface, so their distances are
+    /// upper bounds from the first node on. Near child first; squares are compared, and a root is
+    /// taken only where an order is needed.
+    ///
+    /// Cost: the budget at most; typical counts are in `docs/performance.md`.
+    ///
+    /// # Errors
+    /// [`QueryError`]: a table of the wrong size, a root pin that is not finite, a measurement of
+    /// another mesh, or bytes that changed under the query. Never because the budget ran out.
+    pub fn closest<V: VertexTable + ?Sized, T: Tool>(
+        &mut self,
+        vertices: &V,
+        tool: &T,
+        options: &Options,
+    ) -> Result<Proximity, QueryError> {
+        let mut search = Search::start(&self.tree, vertices, tool, options)?;
+        let header = self.tree.header();
+        let mut waiting = 0usize;
+        let mut next = Some(Waiting { lower: search.root_lower, link: header.root });
+        while let Some(subtree) = next {
+            let deeper = if subtree.lower > search.reach {
+                Step::Done
+            } else {
+                match Link::decode(subtree.link) {
+                    Link::Node(row) => search.expand(row, subtree.lower)?,
+                    Link::Leaf { first, count } => search.leaf(first, count)?,
+                }
+            };
+            next = match deeper {
+                Step::One(near) => Some(near),
+                Step::Two(near, far) => {
+                    let slot =
+                        self.stack.get_mut(waiting).ok_or(QueryError::Corrupt { row: far.link })?;
+                    *slot = far;
+                    waiting += 1;
+                    Some(near)
+                }
+                Step::Done => match waiting.checked_sub(1) {
+                    Some(top) => {
+                        waiting = top;
+                        self.stack.get(top).copied()
+                    }
+                    None => None,
+                },
+                Step::OutOfBudget => {
+                    let mut lower = subtree.lower;
+                    for left in self.stack.iter().take(waiting) {
+                        if left.lower < lower {
+                            lower = left.lower;
+                        }
+                    }
+                    return search.finish(lower);
+                }
+            };
+        }
+        search.finish(f32::INFINITY)
+    }
+}
+
+/// What to do after a subtree was looked at.
+enum Step {
+    /// Nothing of it is left.
+    Done,
+    One(Waiting),
+    /// The nearer first.
+    Two(Waiting, Waiting),
+    OutOfBudget,
+}
+
+/// The state of one search besides the stack.
+struct Search<'s, 't, I, V: ?Sized, T> {
+    tree: &'s Tree<'t, I>,
+    vertices: &'s V,
+    tool: &'s T,
+    budget: Budget,
+    /// Turns a radius code into the sphere's radius under the stretch in use.
+    radius_scale: f32,
+    scale: f32,
+    slack: f32,
+    root_lower: f32,
+    /// Distance of the nearest surface point known, plus the slack: what is farther cannot win.
+    reach: f32,
+    reach_squared: f32,
+    pin: (u32, f32),
+    best: Option<AxisPair>,
+    best_squared: f32,
+    best_triangle: u32,
+    node_tests: u32,
+    triangle_tests: u32,
+}
+
+impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T> {
+    fn start(
+        tree: &'s Tree<'t, I>,
+        vertices: &'s V,
+        tool: &'s T,
+        options: &Options,
+    ) -> Result<Self, QueryError> {
+        let header = tree.header();
+        if vertices.len() != header.vertices as usize {
+            return Err(QueryError::VertexCount {
+                expected: header.vertices,
+                found: vertices.len() as u32,
+            });
+        }
+        let stretch = match options.stretch {
+            None => header.stretch,
+            Some(measured) if measured.mesh_id() == header.mesh_id => measured.sigma(),
+            Some(measured) => {
+                return Err(QueryError::Mesh {
+                    expected: header.mesh_id,
+                    found: measured.mesh_id(),
+                });
+            }
+        };
+        let radius_scale = header.radius_unit * stretch;
+        let radius = header.root_radius_code as f32 * radius_scale;
+        let pin = vertices
+            .position(header.root_pin)
+            .ok_or(QueryError::Corrupt { row: header.root_pin })?;
+        let distance = sqrt(tool.axis_distance_squared(pin));
+        let scale = distance + radius + 2.0 * tool.axis_length() + tool.radius();
+        if !(scale < 1e18) {
+            return Err(QueryError::Position { vertex: header.root_pin });
+        }
+        let slack = SLACK * scale;
+        // A sound tree visits each record once. If its bytes rot into a loop, this ends the search
+        // with an interval that is still right.
+        let most = header.nodes.saturating_mul(2).saturating_add(header.triangles);
+        let mut search = Self {
+            tree,
+            vertices,
+            tool,
+            budget: Budget {
+                node_tests: if options.budget.node_tests < most {
+                    options.budget.node_tests
+                } else {
+                    most
+                },
+                triangle_tests: options.budget.triangle_tests,
+            },
+            radius_scale,
+            scale,
+            slack,
+            root_lower: distance - radius,
+            reach: f32::INFINITY,
+            reach_squared: f32::INFINITY,
+            pin: (header.root_pin, f32::INFINITY),
+            best: None,
+            best_squared: f32::INFINITY,
+            best_triangle: u32::MAX,
+            node_tests: 1,
+            triangle_tests: 0,
+        };
+        search.pull_in(header.root_pin, distance);
+        if let Some(triangle) = options.warm_start
+            && triangle < header.triangles
+            && options.budget.triangle_tests > 0
+        {
+            let corners = search.corners(triangle)?;
+            search.test_triangle(triangle, &corners);
+        }
+        Ok(search)
+    }
+
+    /// A pin at this distance is a point of the surface: nothing farther can win.
+    #[inline(always)]
+    fn pull_in(&mut self, pin: u32, distance: f32) {
+        if distance < self.pin.1 {
+            self.pin = (pin, distance);
+            self.tighten(distance);
+        }
+    }
+
+    #[inline(always)]
+    fn tighten(&mut self, distance: f32) {
+        let reach = distance + self.slack;
+        if reach < self.reach {
+            self.reach = reach;
+            self.reach_squared = reach * reach;
+        }
+    }
+
+    /// Tests both children of an inner node.
+    #[inline(always)]
+    fn expand(&mut self, row: u32, parent_lower: f32) -> Result<Step, QueryError> {
+        if self.budget.node_tests.saturating_sub(self.node_tests - 1) < 2 {
+            return Ok(Step::OutOfBudget);
+        }
+        self.node_tests += 2;
+        let node = self.tree.node(row).ok_or(QueryError::Corrupt { row })?;
+        let [left_pin, right_pin] = node.pin;
+        let [left_code, right_code] = node.radius_code;
+        let [left_link, right_link] = node.link;
+        let left = self.child(left_pin, left_code, left_link, parent_lower)?;
+        let right = self.child(right_pin, right_code, right_link, parent_lower)?;
+        Ok(match (left, right) {
+            (Some(left), Some(right)) if right.lower < left.lower => Step::Two(right, left),
+            (Some(left), Some(right)) => Step::Two(left, right),
+            (Some(one), None) | (None, Some(one)) => Step::One(one),
+            (None, None) => Step::Done,
+        })
+    }
+
+    /// A child that may hold the closest point, or `None`.
+    #[inline(always)]
+    fn child(
+        &mut self,
+        pin: u32,
+        radius_code: u32,
+        link: u32,
+        parent_lower: f32,
+    ) -> Result<Option<Waiting>, QueryError> {
+        let position = self.vertices.position(pin).ok_or(QueryError::Corrupt { row: pin })?;
+        let radius = radius_code as f32 * self.radius_scale;
+        let squared = self.tool.axis_distance_squared(position);
+        let far = self.reach + radius;
+        if squared > far * far {
+            return Ok(None);
+        }
+        if squared.is_nan() {
+            return Err(QueryError::Position { vertex: pin });
+        }
+        let distance = sqrt(squared);
+        self.pull_in(pin, distance);
+        let own = distance - radius;
+        // A child lies inside its parent, whatever its own sphere says.
+        let lower = if own > parent_lower { own } else { parent_lower };
+        Ok(Some(Waiting { lower, link }))
+    }
+
+    /// Tests a leaf's triangles, each behind its elastic sphere.
+    #[inline(always)]
+    fn leaf(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
+        for triangle in first..first + count {
+            if triangle == self.best_triangle {
+                continue;
+            }
+            let spent = self.node_tests - 1 >= self.budget.node_tests
+                || self.triangle_tests >= self.budget.triangle_tests;
+            if spent {
+                return Ok(Step::OutOfBudget);
+            }
+            self.node_tests += 1;
+            let corners = self.corners(triangle)?;
+            let [a, b, c] = corners;
+            let (ab, ac) = ((b - a).length_squared(), (c - a).length_squared());
+            let elastic = if ab > ac { ab } else { ac };
+            let far = self.reach + sqrt(elastic);
+            let squared = self.tool.axis_distance_squared(a);
+            if squared > far * far {
+                continue;
+            }
+            if (squared + ab + ac).is_nan() {
+                return Err(QueryError::Position { vertex: self.not_a_number(triangle) });
+            }
+            self.test_triangle(triangle, &corners);
+        }
+        Ok(Step::Done)
+    }
+
+    #[inline(always)]
+    fn corners(&self, triangle: u32) -> Result<[Vec3; 3], QueryError> {
+        let rows = self.tree.triangle(triangle).ok_or(QueryError::Corrupt { row: triangle })?;
+        let [a, b, c] = rows;
+        let at = |row| self.vertices.position(row).ok_or(QueryError::Corrupt { row });
+        Ok([at(a)?, at(b)?, at(c)?])
+    }
+
+    #[inline(always)]
+    fn test_triangle(&mut self, triangle: u32, corners: &[Vec3; 3]) {
+        self.triangle_tests += 1;
+        if let Some(pair) = self.tool.closest_on_triangle(corners, self.reach_squared)
+            && pair.distance_squared < self.best_squared
+        {
+            self.best_squared = pair.distance_squared;
+            self.best_triangle = triangle;
+            self.best = Some(pair);
+            self.tighten(sqrt(pair.distance_squared));
+        }
+    }
+
+    /// Which corner of a triangle is not a number; the first where none is.
+    #[cold]
+    fn not_a_number(&self, triangle: u32) -> u32 {
+        let rows = self.tree.triangle(triangle).unwrap_or_default();
+        let is_nan = |&row: &u32| self.vertices.position(row).is_none_or(Vec3::is_nan);
+        rows.into_iter().find(is_nan).unwrap_or_default()
+    }
+
+    /// The answer, where `lower` bounds what was left unexplored.
+    fn finish(&self, lower: f32) -> Result<Proximity, QueryError> {
+        let (pin, pin_distance) = self.pin;
+        let radius = self.tool.radius();
+        let cut_short = lower < f32::INFINITY;
+        let (pair, triangle, corners) = match self.best {
+            Some(pair) if !cut_short || sqrt(pair.distance_squared) <= pin_distance => {
+                let row = self.best_triangle;
+                let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
+                (pair, Some(row), corners)
+            }
+            _ if cut_short => {
+                let position =
+                    self.vertices.position(pin).ok_or(QueryError::Corrupt { row: pin })?;
+                let point = self.tool.closest_on_triangle(&[position; 3], f32::INFINITY);
+                (point.ok_or(QueryError::Position { vertex: pin })?, None, [pin; 3])
+            }
+            _ => return Err(QueryError::Position { vertex: pin }),
+        };
+        let axis_distance = sqrt(pair.distance_squared);
+        let above_zero = |x: f32| if x > 0.0 { x } else { 0.0 };
+        let separation = above_zero(axis_distance - radius);
+        let left = above_zero(lower - radius);
+        let direction = if axis_distance > 0.0 {
+            (pair.on_axis - pair.on_surface) / axis_distance
+        } else {
+            Vec3::ZERO
+        };
+        Ok(Proximity {
+            separation,
+            lower: if left < separation { left } else { separation },
+            accuracy: ACCURACY * self.scale,
+            axis_distance,
+            point_on_surface: pair.on_surface,
+            point_on_tool: pair.on_axis - direction * radius,
+            direction,
+            axis_parameter: pair.axis_parameter,
+            triangle,
+            corners,
+            barycentric: pair.barycentric,
+            node_tests: self.node_tests,
+            triangle_tests: self.triangle_tests,
+        })
+    }
+}

@@ -1,0 +1,177 @@
+//! The tree: a validated view of bytes that stay where they are, in flash or in a file.
+
+use core::marker::PhantomData;
+
+use glam::Vec3;
+
+use crate::format::{self, Link, Node, PathKind, section};
+use crate::{FormatError, Index, check};
+
+/// A deformation invariant bounding sphere tree with its triangles.
+///
+/// `I` is the index width, `u16` for up to 65,536 vertices or `u32`. The tree borrows its bytes, holds
+/// no position (only which vertex each sphere is pinned to) and never changes: see `docs/format.md`.
+#[derive(Clone, Copy, Debug)]
+pub struct Tree<'a, I> {
+    pub(crate) nodes: &'a [u8],
+    pub(crate) triangles: &'a [u8],
+    order: &'a [u8],
+    rest: &'a [u8],
+    header: Header,
+    width: PhantomData<I>,
+}
+
+/// The header's fields that a query needs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Header {
+    pub paths: PathKind,
+    pub mesh_id: u32,
+    pub vertices: u32,
+    pub triangles: u32,
+    pub nodes: u32,
+    pub root: u32,
+    pub depth: u32,
+    pub stretch: f32,
+    pub radius_unit: f32,
+    pub root_pin: u32,
+    pub root_radius_code: u32,
+}
+
+impl<'a, I: Index> Tree<'a, I> {
+    /// Validates the bytes of a tree, and gives a view of them.
+    ///
+    /// `const`: a generated `static` is validated by the compiler, a blob once at start-up. Checks the
+    /// layout, the CRC-32, and that the tree is well formed: children after parents, every index
+    /// inside its table, every triangle in exactly one leaf, depth as stated. What it cannot check is
+    /// that the radii cover this mesh: that is the builder's promise, tied to the mesh id.
+    ///
+    /// Cost: linear in the bytes, no memory beyond a fixed stack of [`format::MAX_DEPTH`] words.
+    ///
+    /// # Errors
+    /// [`FormatError`] names the first thing that is wrong and its value.
+    pub const fn from_bytes(bytes: &'a [u8]) -> Result<Self, FormatError> {
+        let header = match check::header::<I>(bytes) {
+            Ok(header) => header,
+            Err(error) => return Err(error),
+        };
+        let tree = match check::sections::<I>(bytes) {
+            Ok([nodes, triangles, order, rest]) => {
+                Self { nodes, triangles, order, rest, header, width: PhantomData }
+            }
+            Err(error) => return Err(error),
+        };
+        match check::well_formed(&tree) {
+            Ok(()) => Ok(tree),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Identity of the mesh: CRC-32 of its triangles and rest positions. Vertex packets carry it, so
+    /// that a frame of another mesh is never taken for one of this.
+    #[must_use]
+    pub const fn mesh_id(&self) -> u32 {
+        self.header.mesh_id
+    }
+
+    /// Number of vertices: rows that a vertex table for this tree must have.
+    #[must_use]
+    pub const fn vertex_count(&self) -> u32 {
+        self.header.vertices
+    }
+
+    /// Number of triangles.
+    #[must_use]
+    pub const fn triangle_count(&self) -> u32 {
+        self.header.triangles
+    }
+
+    /// Number of inner nodes.
+    #[must_use]
+    pub const fn node_count(&self) -> u32 {
+        self.header.nodes
+    }
+
+    /// Inner nodes on the longest way from the root to a leaf: the traversal's stack must hold this
+    /// many entries.
+    #[must_use]
+    pub const fn depth(&self) -> u32 {
+        self.header.depth
+    }
+
+    /// The stretch limit `s` that the tree was built for (1 = no stretch).
+    #[must_use]
+    pub const fn stretch(&self) -> f32 {
+        self.header.stretch
+    }
+
+    /// Which deformations the stretch limit is about.
+    #[must_use]
+    pub const fn paths(&self) -> PathKind {
+        self.header.paths
+    }
+
+    /// Bytes of nodes and triangles: what a query reads besides the vertex table.
+    #[must_use]
+    pub const fn query_bytes(&self) -> usize {
+        self.nodes.len() + self.triangles.len()
+    }
+
+    /// Rows of the three corners of a triangle, or `None` outside the table.
+    #[inline(always)]
+    #[must_use]
+    pub const fn triangle(&self, row: u32) -> Option<[u32; 3]> {
+        format::triangle::<I>(self.triangles, row)
+    }
+
+    /// The mesh's own number of the vertex in `row`; `None` outside the table or where the tree was
+    /// emitted without its vertex order.
+    #[must_use]
+    pub const fn vertex_number(&self, row: u32) -> Option<u32> {
+        format::vertex_number::<I>(self.order, row)
+    }
+
+    /// Rest position of the vertex in `row` (mm); `None` outside the table or where the tree was
+    /// emitted without its rest shape.
+    #[must_use]
+    pub const fn rest_position(&self, row: u32) -> Option<Vec3> {
+        format::rest_position(self.rest, row)
+    }
+
+    /// Pin, geodesic radius (mm, rounded up) and link of the root, for tools that walk the tree.
+    #[must_use]
+    pub const fn root(&self) -> (u32, f32, Link) {
+        let header = &self.header;
+        let radius = header.root_radius_code as f32 * header.radius_unit;
+        (header.root_pin, radius, Link::decode(header.root))
+    }
+
+    /// Pin, geodesic radius (mm, rounded up) and link of both children of an inner node, for tools
+    /// that walk the tree; `None` outside the table.
+    #[must_use]
+    pub const fn children(&self, row: u32) -> Option<[(u32, f32, Link); 2]> {
+        let unit = self.header.radius_unit;
+        match self.node(row) {
+            Some(n) => Some([
+                (n.pin[0], n.radius_code[0] as f32 * unit, Link::decode(n.link[0])),
+                (n.pin[1], n.radius_code[1] as f32 * unit, Link::decode(n.link[1])),
+            ]),
+            None => None,
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) const fn node(&self, row: u32) -> Option<Node> {
+        format::node::<I>(self.nodes, row)
+    }
+
+    pub(crate) const fn header(&self) -> &Header {
+        &self.header
+    }
+
+    pub(crate) const fn order_bytes(&self) -> usize {
+        self.order.len()
+    }
+}
+
+pub(crate) const SECTIONS: [u32; 4] =
+    [section::NODES, section::TRIANGLES, section::VERTEX_ORDER, section::REST];
