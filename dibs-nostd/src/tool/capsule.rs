@@ -1,0 +1,104 @@
+//! The capsule: a segment with a radius.
+
+use super::{AxisPair, Tool, ToolError, check_point, check_radius, clamp, sealed, triangle};
+use crate::sqrt::sqrt;
+use glam::Vec3;
+
+/// Axes shorter than this are points: the squares of their components underflow.
+const SHORTEST: f32 = 1e-15;
+
+/// A capsule-shaped tool: all points within `radius` of a segment. A segment of length zero makes it
+/// a sphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Capsule {
+    axis: Axis,
+    radius: f32,
+}
+
+/// A segment, as its start, unit direction and length: the form in which a projection onto it takes
+/// one dot product and no division.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(super) struct Axis {
+    #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
+    pub(super) start: Vec3,
+    /// Zero for an axis of length zero.
+    #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
+    pub(super) direction: Vec3,
+    pub(super) length: f32,
+}
+
+impl Capsule {
+    /// All points within `radius` of the segment from `start` to `end`, in the mesh's unit and frame.
+    ///
+    /// # Errors
+    /// A coordinate or radius that is not finite or exceeds [`super::MAX_COORDINATE`], or a negative
+    /// radius.
+    ///
+    /// ```
+    /// use dibs_nostd::{Capsule, Tool};
+    /// use glam::Vec3;
+    /// let shaft = Capsule::new(Vec3::ZERO, Vec3::new(0.0, 0.0, 60.0), 2.5)?;
+    /// assert_eq!(shaft.axis_distance_squared(Vec3::new(3.0, 4.0, 30.0)), 25.0);
+    /// # Ok::<(), dibs_nostd::ToolError>(())
+    /// ```
+    pub fn new(start: Vec3, end: Vec3, radius: f32) -> Result<Self, ToolError> {
+        check_point(start)?;
+        check_point(end)?;
+        check_radius(radius)?;
+        let span = end - start;
+        let length = sqrt(span.dot(span));
+        let axis = if length > SHORTEST {
+            // Three divisions rather than one: `length * direction` is then within two roundings of
+            // `span`, however `length` was rounded.
+            let direction = Vec3::new(span.x / length, span.y / length, span.z / length);
+            Axis { start, direction, length }
+        } else {
+            Axis { start, direction: Vec3::ZERO, length: 0.0 }
+        };
+        Ok(Self { axis, radius })
+    }
+
+    /// The segment's first end, as given.
+    pub fn start(&self) -> Vec3 {
+        self.axis.start
+    }
+
+    /// The segment's second end, within rounding as given.
+    pub fn end(&self) -> Vec3 {
+        self.axis.start + self.axis.length * self.axis.direction
+    }
+}
+
+impl sealed::Sealed for Capsule {}
+
+impl Tool for Capsule {
+    #[inline]
+    fn radius(&self) -> f32 {
+        self.radius
+    }
+
+    #[inline]
+    fn axis_start(&self) -> Vec3 {
+        self.axis.start
+    }
+
+    #[inline]
+    fn axis_length(&self) -> f32 {
+        // The root of a rounded sum of squares is low by at most 2.5 * 2^-24 of itself.
+        self.axis.length * (1.0 + 2.0 * f32::EPSILON)
+    }
+
+    #[inline]
+    fn axis_distance_squared(&self, point: Vec3) -> f32 {
+        let Axis { start, direction, length } = self.axis;
+        let offset = point - start;
+        let across = offset - clamp(offset.dot(direction), length) * direction;
+        across.dot(across)
+    }
+
+    fn closest_on_triangle(&self, corners: &[Vec3; 3], limit_squared: f32) -> Option<AxisPair> {
+        triangle::closest_to_segment(&self.axis, corners, limit_squared)
+    }
+}

@@ -1,0 +1,68 @@
+//! The sphere: a point with a radius.
+
+use super::{AxisPair, Tool, ToolError, check_point, check_radius, sealed, triangle};
+use glam::Vec3;
+
+/// A spherical tool, or with radius zero a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Sphere {
+    #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
+    center: Vec3,
+    radius: f32,
+}
+
+impl Sphere {
+    /// A sphere of `radius` around `center`, in the mesh's unit and frame.
+    ///
+    /// # Errors
+    /// A coordinate or radius that is not finite or exceeds [`super::MAX_COORDINATE`], or a negative
+    /// radius.
+    ///
+    /// ```
+    /// use dibs_nostd::{Sphere, Tool};
+    /// use glam::Vec3;
+    /// let tip = Sphere::new(Vec3::new(10.0, 0.0, 0.0), 1.5)?;
+    /// assert_eq!(tip.axis_distance_squared(Vec3::ZERO), 100.0);
+    /// # Ok::<(), dibs_nostd::ToolError>(())
+    /// ```
+    pub fn new(center: Vec3, radius: f32) -> Result<Self, ToolError> {
+        check_point(center)?;
+        check_radius(radius)?;
+        Ok(Self { center, radius })
+    }
+
+    /// The centre as given.
+    pub fn center(&self) -> Vec3 {
+        self.center
+    }
+}
+
+impl sealed::Sealed for Sphere {}
+
+impl Tool for Sphere {
+    #[inline]
+    fn radius(&self) -> f32 {
+        self.radius
+    }
+
+    #[inline]
+    fn axis_start(&self) -> Vec3 {
+        self.center
+    }
+
+    #[inline]
+    fn axis_length(&self) -> f32 {
+        0.0
+    }
+
+    #[inline]
+    fn axis_distance_squared(&self, point: Vec3) -> f32 {
+        let offset = point - self.center;
+        offset.dot(offset)
+    }
+
+    fn closest_on_triangle(&self, corners: &[Vec3; 3], limit_squared: f32) -> Option<AxisPair> {
+        triangle::closest_to_point(self.center, corners, limit_squared)
+    }
+}

@@ -1,0 +1,401 @@
+//! The closest pair between a triangle and a point or segment, in f32, for any shape of triangle.
+//!
+//! # Method
+//! Call the *foot* the axis' point nearest to the triangle's plane: an end, or where the axis crosses
+//! the plane. If the foot projects into the triangle, that projection is the answer. If it does not,
+//! the answer lies on an edge that the foot's projection is beyond. (Proof: at the optimum the
+//! separation `d` has an in-plane part in the normal cone of the triangle's boundary there, and going
+//! back along the axis to the foot, towards the plane, can only go further out along that part,
+//! because `d` is perpendicular to the axis or the optimum is an end.) So most triangles cost one
+//! projection and one or two edges.
+//!
+//! Before that comes a bound that rejects most triangles: for any direction `d`, the axis' and the
+//! triangle's extents along `d` are apart by no more than their distance. The direction taken is that
+//! from the axis to the first corner.
+//!
+//! # Why the error is bounded, whatever the shape
+//! Everything is computed relative to the axis' start, so that all numbers are rounded relative to
+//! the size `S` of the problem (see [`super`]), by `u = 2^-24`. Each candidate is a pair of points,
+//! one on the axis and one on the triangle, whose distance is then evaluated from their difference:
+//! a candidate is never below the true distance by more than that evaluation's rounding, a few `u S`.
+//! It remains that one candidate is near the optimum.
+//! - *Projections* are successive: along an edge (or the axis) first, then along the part of the other
+//!   vector that is perpendicular to it. Their in-plane error is a few `u S` plus `D t`, where `D` is the
+//!   distance from the plane and `t` the error of the perpendicular part's direction, at most `c u / a`
+//!   for an angle with sine `a` and `c` about 6. An in-plane error costs second order: `D t^2 / 2`.
+//! - *Clear* cases, with sines above 2^-8 and axes inclined by more than 2^-12 to the plane, make that
+//!   less than `u S / 16`, and the foot is the right one or lies within a few `u S` of it where it matters:
+//!   an error of the plane's tilt is levered by the distance from the triangle, which is zero on it.
+//! - *Slivers* (and axes nearly parallel to the plane or to an edge) get all candidates: the face's and
+//!   all the edges'. A point of a sliver is within `S a` of an edge, so the edges' error is at most
+//!   `(S a)^2 / 2 D`, the face's at most `D (c u / a)^2 / 2`, and the smaller of the two at most the
+//!   geometric mean, `c u S / 2`, for every `a`.
+
+use super::capsule::Axis;
+use super::{AxisPair, clamp};
+use glam::Vec3;
+
+/// Square of the sine below which two directions count as nearly parallel: 2^-16.
+const SLIVER: f32 = 1.0 / 65_536.0;
+/// Square of the sine below which the axis counts as parallel to the plane: 2^-24.
+const PARALLEL: f32 = 1.0 / 16_777_216.0;
+/// Squared lengths below this divide nothing: 2^-100, the square of 1e-15.
+const TINY: f32 = 7.888_609e-31;
+/// Squared lengths below this make no clear plane, because products of four of them underflow: 2^-40,
+/// the square of 1e-6.
+const SMALL: f32 = 9.094_947e-13;
+
+/// The closest pair between a point and a triangle, if closer than the limit.
+pub(super) fn closest_to_point(
+    point: Vec3,
+    corners: &[Vec3; 3],
+    limit_squared: f32,
+) -> Option<AxisPair> {
+    let [a, b, c] = *corners;
+    let (to_a, ab, ac) = (a - point, b - a, c - a);
+    let (apart, along_ab, along_ac) = (to_a.dot(to_a), to_a.dot(ab), to_a.dot(ac));
+    if beyond_limit(apart + lowest(along_ab, along_ac), apart, limit_squared) {
+        return None;
+    }
+
+    let mut best = Candidate::none(limit_squared);
+    let mut edges = Edges::ALL;
+    let plane = Plane::new(ab, ac);
+    if plane.is_clear() {
+        let foot = plane.project(to_a, ab);
+        // Written so that NaN returns too.
+        let within_limit = foot.distance_squared < limit_squared;
+        if !within_limit {
+            return None;
+        }
+        edges = foot.edges;
+        if edges.is_empty() {
+            best.improve(foot.candidate(0.0));
+        }
+    } else if !plane.is_finite(apart) {
+        return None;
+    } else if plane.exists() {
+        let foot = plane.project(to_a, ab);
+        if foot.edges.is_empty() {
+            best.improve(foot.candidate(0.0));
+        }
+    }
+
+    if edges.contains(Edges::AB) {
+        best.improve(edge_to_point(to_a, ab, 0.0).on_ab());
+    }
+    if edges.contains(Edges::AC) {
+        best.improve(edge_to_point(to_a, ac, 0.0).on_ac());
+    }
+    if edges.contains(Edges::BC) {
+        best.improve(edge_to_point(b - point, c - b, 0.0).on_bc());
+    }
+    let found = best.distance_squared < limit_squared;
+    found.then(|| best.pair(a, ab, ac, point, 0.0))
+}
+
+/// The closest pair between a segment and a triangle, if closer than the limit.
+pub(super) fn closest_to_segment(
+    axis: &Axis,
+    corners: &[Vec3; 3],
+    limit_squared: f32,
+) -> Option<AxisPair> {
+    let [a, b, c] = *corners;
+    let (to_a, ab, ac) = (a - axis.start, b - a, c - a);
+    // From the axis' point nearest to the first corner, towards that corner.
+    let foot = clamp(to_a.dot(axis.direction), axis.length);
+    let across = to_a - foot * axis.direction;
+    let apart = across.dot(across);
+    // Exactly, no part of the axis is further along `across` than the foot; but a rounding at the
+    // foot is levered by the axis' length.
+    let incline = across.dot(axis.direction);
+    let lever = if incline > 0.0 { axis.length - foot } else { -foot };
+    let lean = lowest(across.dot(ab), across.dot(ac));
+    if beyond_limit(apart + lean - incline * lever, apart, limit_squared) {
+        return None;
+    }
+
+    let mut best = Candidate::none(limit_squared);
+    let mut edges = Edges::ALL;
+    let plane = Plane::new(ab, ac);
+    // Not `ab.cross(ac)`: in a sliver, rounding would tilt that along `ab` too, levered by its length.
+    let normal = ab.cross(plane.rise);
+    let area = normal.dot(normal);
+    let (height, slope) = (-normal.dot(to_a), normal.dot(axis.direction));
+    if plane.is_clear() && slope * slope > PARALLEL * area {
+        let crossing = -height / slope;
+        let foot = clamp(crossing, axis.length);
+        let height = height + foot * slope;
+        let crosses = crossing > 0.0 && crossing < axis.length;
+        if !crosses && height * (plane.ab_inverse * plane.rise_inverse) * height > limit_squared {
+            return None;
+        }
+        let projection = plane.project(to_a - foot * axis.direction, ab);
+        edges = projection.edges;
+        if edges.is_empty() {
+            let mut candidate = projection.candidate(foot);
+            if crosses {
+                candidate.distance_squared = 0.0;
+            }
+            best.improve(candidate);
+        }
+    } else if !plane.is_finite(apart) {
+        return None;
+    } else if plane.exists() {
+        for foot in [0.0, clamp(-height / slope, axis.length), axis.length] {
+            let projection = plane.project(to_a - foot * axis.direction, ab);
+            if projection.edges.is_empty() {
+                best.improve(projection.candidate(foot));
+            }
+        }
+    }
+
+    if edges.contains(Edges::AB) {
+        best.improve(edge_to_segment(axis, to_a, ab).on_ab());
+    }
+    if edges.contains(Edges::AC) {
+        best.improve(edge_to_segment(axis, to_a, ac).on_ac());
+    }
+    if edges.contains(Edges::BC) {
+        best.improve(edge_to_segment(axis, b - axis.start, c - b).on_bc());
+    }
+    let found = best.distance_squared < limit_squared;
+    found.then(|| {
+        let on_axis = axis.start + best.along * axis.direction;
+        let parameter = if axis.length > 0.0 { best.along / axis.length } else { 0.0 };
+        best.pair(a, ab, ac, on_axis, parameter)
+    })
+}
+
+/// Whether `bound / sqrt(apart)` is a distance above the limit.
+#[inline(always)]
+fn beyond_limit(bound: f32, apart: f32, limit_squared: f32) -> bool {
+    bound > 0.0 && bound * bound > limit_squared * apart
+}
+
+/// The least of `x`, `y` and zero.
+#[inline(always)]
+fn lowest(x: f32, y: f32) -> f32 {
+    let least = if x < y { x } else { y };
+    if least < 0.0 { least } else { 0.0 }
+}
+
+/// A pair found so far: where on the axis, and the weights of the second and third corner.
+#[derive(Clone, Copy)]
+struct Candidate {
+    distance_squared: f32,
+    along: f32,
+    v: f32,
+    w: f32,
+}
+
+impl Candidate {
+    /// What any pair below the limit improves on.
+    #[inline(always)]
+    fn none(limit_squared: f32) -> Self {
+        Self { distance_squared: limit_squared, along: 0.0, v: 0.0, w: 0.0 }
+    }
+
+    /// Takes `other` if it is strictly closer, which no NaN is.
+    #[inline(always)]
+    fn improve(&mut self, other: Self) {
+        if other.distance_squared < self.distance_squared {
+            *self = other;
+        }
+    }
+
+    #[inline(always)]
+    fn pair(&self, a: Vec3, ab: Vec3, ac: Vec3, on_axis: Vec3, axis_parameter: f32) -> AxisPair {
+        let rest = 1.0 - self.v - self.w;
+        AxisPair {
+            distance_squared: self.distance_squared,
+            on_axis,
+            axis_parameter,
+            on_surface: a + self.v * ab + self.w * ac,
+            barycentric: [if rest < 0.0 { 0.0 } else { rest }, self.v, self.w],
+        }
+    }
+}
+
+/// A set of the triangle's edges.
+#[derive(Clone, Copy)]
+struct Edges(u32);
+
+impl Edges {
+    const AB: u32 = 1;
+    const AC: u32 = 2;
+    const BC: u32 = 4;
+    const ALL: Self = Self(7);
+
+    #[inline(always)]
+    fn contains(self, edge: u32) -> bool {
+        self.0 & edge != 0
+    }
+
+    #[inline(always)]
+    fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+}
+
+/// A triangle's plane, spanned by `ab` and the height `rise` on it that ends in the third corner.
+struct Plane {
+    ab_squared: f32,
+    ac_squared: f32,
+    rise_squared: f32,
+    ab_inverse: f32,
+    rise_inverse: f32,
+    rise: Vec3,
+    /// Where the height stands, in units of `ab`.
+    skew: f32,
+}
+
+/// A point projected into the plane.
+struct Projection {
+    distance_squared: f32,
+    v: f32,
+    w: f32,
+    /// The edges whose outer side it is on.
+    edges: Edges,
+}
+
+impl Plane {
+    #[inline(always)]
+    fn new(ab: Vec3, ac: Vec3) -> Self {
+        let ab_squared = ab.dot(ab);
+        let ab_inverse = 1.0 / ab_squared;
+        let skew = ab.dot(ac) * ab_inverse;
+        let rise = ac - skew * ab;
+        let rise_squared = rise.dot(rise);
+        Self {
+            ab_squared,
+            ac_squared: ac.dot(ac),
+            rise_squared,
+            ab_inverse,
+            rise_inverse: 1.0 / rise_squared,
+            rise,
+            skew,
+        }
+    }
+
+    /// Whether the plane's tilt is known well enough to tell which edges matter. False for NaN.
+    #[inline(always)]
+    fn is_clear(&self) -> bool {
+        self.rise_squared > SLIVER * self.ac_squared
+            && self.rise_squared > SMALL
+            && self.ab_squared > SMALL
+    }
+
+    /// Whether there is a plane to project into, however badly its tilt is known.
+    #[inline(always)]
+    fn exists(&self) -> bool {
+        self.ab_squared > TINY && self.rise_squared > TINY
+    }
+
+    /// Whether all three corners are finite, `apart` being a squared distance to the first.
+    #[inline(always)]
+    fn is_finite(&self, apart: f32) -> bool {
+        apart + self.ab_squared + self.ac_squared <= f32::MAX
+    }
+
+    /// Projects the point from which the first corner is `to_a` away.
+    #[inline(always)]
+    fn project(&self, to_a: Vec3, ab: Vec3) -> Projection {
+        let x = -to_a.dot(ab) * self.ab_inverse;
+        let across = to_a + x * ab;
+        let w = -across.dot(self.rise) * self.rise_inverse;
+        let v = x - w * self.skew;
+        let apart = across + w * self.rise;
+        let mut edges = 0;
+        if w < 0.0 {
+            edges |= Edges::AB;
+        }
+        if v < 0.0 {
+            edges |= Edges::AC;
+        }
+        if 1.0 - v - w < 0.0 {
+            edges |= Edges::BC;
+        }
+        Projection { distance_squared: apart.dot(apart), v, w, edges: Edges(edges) }
+    }
+}
+
+impl Projection {
+    #[inline(always)]
+    fn candidate(&self, along: f32) -> Candidate {
+        Candidate { distance_squared: self.distance_squared, along, v: self.v, w: self.w }
+    }
+}
+
+/// A pair on an edge: where on the axis, and where on the edge (0 to 1).
+#[derive(Clone, Copy)]
+struct OnEdge {
+    distance_squared: f32,
+    along: f32,
+    x: f32,
+}
+
+impl OnEdge {
+    #[inline(always)]
+    fn on_ab(self) -> Candidate {
+        self.candidate(self.x, 0.0)
+    }
+
+    #[inline(always)]
+    fn on_ac(self) -> Candidate {
+        self.candidate(0.0, self.x)
+    }
+
+    #[inline(always)]
+    fn on_bc(self) -> Candidate {
+        self.candidate(1.0 - self.x, self.x)
+    }
+
+    #[inline(always)]
+    fn candidate(self, v: f32, w: f32) -> Candidate {
+        Candidate { distance_squared: self.distance_squared, along: self.along, v, w }
+    }
+}
+
+/// The closest pair between the edge from `corner` along `edge` and the origin, which is the point
+/// `along` the axis.
+#[inline(always)]
+fn edge_to_point(corner: Vec3, edge: Vec3, along: f32) -> OnEdge {
+    let squared = edge.dot(edge);
+    let x = if squared > TINY { clamp(-corner.dot(edge) / squared, 1.0) } else { 0.0 };
+    let apart = corner + x * edge;
+    OnEdge { distance_squared: apart.dot(apart), along, x }
+}
+
+/// The closest pair between the edge from `corner` (relative to the axis' start) along `edge`, and the
+/// axis.
+fn edge_to_segment(axis: &Axis, corner: Vec3, edge: Vec3) -> OnEdge {
+    let (corner_along, edge_along) = (corner.dot(axis.direction), edge.dot(axis.direction));
+    // Seen along the axis: the edge without its part along the axis.
+    let corner_across = corner - corner_along * axis.direction;
+    let edge_across = edge - edge_along * axis.direction;
+    let across_squared = edge_across.dot(edge_across);
+    let x = if across_squared > TINY {
+        clamp(-corner_across.dot(edge_across) / across_squared, 1.0)
+    } else {
+        0.0
+    };
+    let along = corner_along + x * edge_along;
+    let from = |along: f32| edge_to_point(corner - along * axis.direction, edge, along);
+    if across_squared > SLIVER * edge.dot(edge) {
+        if along >= 0.0 && along <= axis.length {
+            let apart = corner_across + x * edge_across;
+            return OnEdge { distance_squared: apart.dot(apart), along, x };
+        }
+        return from(clamp(along, axis.length));
+    }
+    // Nearly parallel: `x` is as good as unknown, but then the ends are nearly as good.
+    let mut best = from(clamp(along, axis.length));
+    for along in [corner_along, corner_along + edge_along, 0.0, axis.length] {
+        let other = from(clamp(along, axis.length));
+        if other.distance_squared < best.distance_squared {
+            best = other;
+        }
+    }
+    best
+}
