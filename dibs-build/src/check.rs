@@ -1,0 +1,315 @@
+//! From what a file says to a mesh that a tree can be built on: every check, in order.
+
+use crate::Mesh;
+use crate::read::polygon::Triangulator;
+use crate::read::raw::Raw;
+use crate::read::{Format, Import, ReadErrorKind, ReadOptions, Report};
+use crate::weld::first_coincident;
+use glam::{DVec3, Vec3};
+use petgraph::unionfind::UnionFind;
+use std::collections::HashSet;
+
+/// The exact tests multiply two squared lengths. Across a mesh of this size, with edges down to a
+/// thousandth of it, the product of two squared edges is still a normal f32.
+const LEAST_EXTENT: f64 = 1e-6;
+
+/// No distance between two points with such coordinates exceeds 3.5e9, whose fourth power is
+/// still finite in f32.
+const MOST_COORDINATE: f64 = 1e9;
+
+/// Ear clipping takes quadratic time at worst: below this, a second for one face.
+const MOST_CORNERS: usize = 10_000;
+
+type Result<T> = std::result::Result<T, ReadErrorKind>;
+
+pub(crate) fn import(raw: &Raw, format: Format, options: &ReadOptions) -> Result<Import> {
+    let positions = positions(raw, format)?;
+    let is_stl = matches!(format, Format::StlAscii | Format::StlBinary);
+    let mut report = Report {
+        format,
+        extension_disagrees: false,
+        vertices: 0,
+        unreferenced_vertices: 0,
+        triangles: 0,
+        polygons_triangulated: 0,
+        polygons_not_simple: 0,
+        welded: 0,
+        coincident: 0,
+        dropped_degenerate: 0,
+        dropped_duplicates: 0,
+        components: Vec::new(),
+        border_edges: 0,
+        non_manifold_edges: 0,
+        inconsistent_edges: 0,
+    };
+    let faces = triangles(raw, &mut report)?;
+    let mut surface = Surface { positions, faces };
+    check_scale(raw, format)?;
+    surface.weld(is_stl, options.weld_tolerance, &mut report);
+    surface.drop_degenerate(options.strict, &mut report)?;
+    surface.drop_duplicates(options.strict, &mut report)?;
+    if surface.faces.is_empty() {
+        return Err(ReadErrorKind::NoTriangles { degenerate: report.dropped_degenerate });
+    }
+    surface.keep_one_component(options.largest_component, &mut report)?;
+    surface.count_edges(&mut report);
+    surface.count_vertices(&mut report);
+    report.triangles = surface.faces.len();
+    let triangles = surface.faces.into_iter().map(|face| face.corners).collect();
+    Ok(Import { mesh: Mesh { positions: surface.positions, triangles }, report })
+}
+
+/// What an error calls a vertex.
+fn vertex_name(vertex: usize, format: Format) -> String {
+    match format {
+        Format::Obj => format!("vertex {}", vertex + 1),
+        Format::StlAscii | Format::StlBinary => {
+            format!("corner {} of triangle {}", vertex % 3 + 1, vertex / 3 + 1)
+        }
+        Format::Ply | Format::Off => format!("vertex {vertex} (counted from 0)"),
+    }
+}
+
+fn positions(raw: &Raw, format: Format) -> Result<Vec<Vec3>> {
+    let narrow = |(row, position): (usize, &[f64; 3])| {
+        for &value in position {
+            let vertex = || vertex_name(row, format);
+            if !value.is_finite() {
+                return Err(ReadErrorKind::NonFinite { vertex: vertex(), value });
+            }
+            if !(value as f32).is_finite() {
+                return Err(ReadErrorKind::Overflow { vertex: vertex(), value });
+            }
+        }
+        Ok(Vec3::from_array(position.map(|value| value as f32)))
+    };
+    raw.positions.iter().enumerate().map(narrow).collect()
+}
+
+fn check_scale(raw: &Raw, format: Format) -> Result<()> {
+    let mut low = [f64::INFINITY; 3];
+    let mut high = [f64::NEG_INFINITY; 3];
+    for (row, position) in raw.positions.iter().enumerate() {
+        for ((low, high), &value) in low.iter_mut().zip(&mut high).zip(position) {
+            if value.abs() > MOST_COORDINATE {
+                let vertex = vertex_name(row, format);
+                return Err(ReadErrorKind::TooLarge { vertex, value, most: MOST_COORDINATE });
+            }
+            *low = low.min(value);
+            *high = high.max(value);
+        }
+    }
+    let extent = low.iter().zip(&high).map(|(l, h)| (h - l) * (h - l)).sum::<f64>().sqrt();
+    // Where all vertices are one point, the triangles are found degenerate, which says more.
+    if extent > 0.0 && extent < LEAST_EXTENT {
+        return Err(ReadErrorKind::TooSmall { extent, least: LEAST_EXTENT });
+    }
+    Ok(())
+}
+
+/// A triangle, and the face (counted from 1) that it comes from.
+struct Triangle {
+    corners: [u32; 3],
+    face: usize,
+}
+
+/// Cuts faces into triangles. Faces of fewer than three corners count as degenerate ones: they
+/// become triangles that repeat a corner.
+fn triangles(raw: &Raw, report: &mut Report) -> Result<Vec<Triangle>> {
+    let mut triangulator = Triangulator::new();
+    let mut cut = Vec::new();
+    let mut triangles = Vec::with_capacity(raw.ends.len());
+    for (face, corners) in (1..).zip(raw.faces()) {
+        if let Some(&corner) = corners.iter().find(|&&c| c as usize >= raw.positions.len()) {
+            return Err(ReadErrorKind::IndexOutOfRange {
+                face,
+                index: i64::from(corner) + i64::from(raw.first_vertex),
+                vertices: raw.positions.len(),
+                first: raw.first_vertex,
+            });
+        }
+        if corners.len() > MOST_CORNERS {
+            let corners = corners.len();
+            return Err(ReadErrorKind::LargePolygon { face, corners, most: MOST_CORNERS });
+        }
+        match *corners {
+            [] => cut.push([0; 3]),
+            [a] => cut.push([a; 3]),
+            [a, b] => cut.push([a, b, b]),
+            _ => {
+                let simple = triangulator.cut(corners, &raw.positions, &mut cut);
+                report.polygons_triangulated += usize::from(corners.len() > 3);
+                report.polygons_not_simple += usize::from(!simple);
+            }
+        }
+        triangles.extend(cut.drain(..).map(|corners| Triangle { corners, face }));
+    }
+    Ok(triangles)
+}
+
+struct Surface {
+    positions: Vec<Vec3>,
+    faces: Vec<Triangle>,
+}
+
+impl Surface {
+    fn weld(&mut self, is_stl: bool, tolerance: Option<f32>, report: &mut Report) {
+        let first = first_coincident(&self.positions, tolerance.unwrap_or(0.0));
+        let mut referenced = self.referenced();
+        if is_stl {
+            // Every record repeats its corners: only here, where the file has no vertex numbers,
+            // do the distinct positions get new ones.
+            referenced.fill(true);
+        }
+        let coincident = (0..)
+            .zip(&first)
+            .filter(|&(vertex, &first)| vertex != first && referenced[vertex as usize])
+            .count();
+        if tolerance.is_none() && !is_stl && !self.is_soup() {
+            report.coincident = coincident;
+            return;
+        }
+        report.welded = coincident;
+        for corner in self.faces.iter_mut().flat_map(|face| &mut face.corners) {
+            *corner = first[*corner as usize];
+        }
+        if is_stl {
+            self.renumber(&first);
+        }
+    }
+
+    /// Removes the rows of welded vertices.
+    fn renumber(&mut self, first: &[u32]) {
+        let mut row = vec![0; first.len()];
+        let mut kept = Vec::new();
+        for (vertex, (&first, &position)) in first.iter().zip(&self.positions).enumerate() {
+            if first as usize == vertex {
+                row[vertex] = kept.len() as u32;
+                kept.push(position);
+            }
+        }
+        for corner in self.faces.iter_mut().flat_map(|face| &mut face.corners) {
+            *corner = row[*corner as usize];
+        }
+        self.positions = kept;
+    }
+
+    /// Whether no two faces share a vertex, so that the file says nothing about connectivity.
+    fn is_soup(&self) -> bool {
+        let mut user = vec![0; self.positions.len()];
+        self.faces.iter().all(|triangle| {
+            triangle.corners.iter().all(|&corner| {
+                let before = std::mem::replace(&mut user[corner as usize], triangle.face);
+                before == 0 || before == triangle.face
+            })
+        })
+    }
+
+    fn drop_degenerate(&mut self, strict: bool, report: &mut Report) -> Result<()> {
+        let positions = &self.positions;
+        let bad = |triangle: &Triangle| is_degenerate(triangle.corners, positions);
+        let first = self.faces.iter().find(|triangle| bad(triangle)).map(|t| t.face);
+        let before = self.faces.len();
+        self.faces.retain(|triangle| !bad(triangle));
+        let count = before - self.faces.len();
+        if let (true, Some(face)) = (strict, first) {
+            return Err(ReadErrorKind::Degenerate { count, face });
+        }
+        report.dropped_degenerate = count;
+        Ok(())
+    }
+
+    fn drop_duplicates(&mut self, strict: bool, report: &mut Report) -> Result<()> {
+        let mut seen = HashSet::with_capacity(self.faces.len());
+        let mut first = None;
+        let before = self.faces.len();
+        self.faces.retain(|triangle| {
+            let mut corners = triangle.corners;
+            corners.sort_unstable();
+            let new = seen.insert(corners);
+            if !new {
+                first.get_or_insert(triangle.face);
+            }
+            new
+        });
+        let count = before - self.faces.len();
+        if let (true, Some(face)) = (strict, first) {
+            return Err(ReadErrorKind::Duplicate { count, face });
+        }
+        report.dropped_duplicates = count;
+        Ok(())
+    }
+
+    /// Triangles that share a vertex are connected.
+    fn keep_one_component(&mut self, largest: bool, report: &mut Report) -> Result<()> {
+        let mut sets = UnionFind::<u32>::new(self.positions.len());
+        for [a, b, c] in self.faces.iter().map(|triangle| triangle.corners) {
+            sets.union(a, b);
+            sets.union(b, c);
+        }
+        let set = sets.into_labeling();
+        let set_of = |triangle: &Triangle| set[triangle.corners[0] as usize];
+        let mut size = vec![0_usize; set.len()];
+        for triangle in &self.faces {
+            size[set_of(triangle) as usize] += 1;
+        }
+        let mut sizes: Vec<usize> = size.iter().copied().filter(|&s| s > 0).collect();
+        sizes.sort_unstable_by(|a, b| b.cmp(a));
+        if sizes.len() > 1 {
+            if !largest {
+                return Err(ReadErrorKind::Components { sizes, coincident: report.coincident });
+            }
+            // Of equally large ones the first in the file.
+            let kept = self.faces.iter().map(set_of).find(|&set| size[set as usize] == sizes[0]);
+            self.faces.retain(|triangle| Some(set_of(triangle)) == kept);
+        }
+        report.components = sizes;
+        Ok(())
+    }
+
+    fn count_edges(&self, report: &mut Report) {
+        let mut edges: Vec<(u32, u32, bool)> = self
+            .faces
+            .iter()
+            .flat_map(|triangle| {
+                let [a, b, c] = triangle.corners;
+                [(a, b), (b, c), (c, a)].map(|(from, to)| (from.min(to), from.max(to), from < to))
+            })
+            .collect();
+        edges.sort_unstable();
+        for uses in edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            match uses {
+                [_] => report.border_edges += 1,
+                [one, other] => report.inconsistent_edges += usize::from(one.2 == other.2),
+                _ => report.non_manifold_edges += 1,
+            }
+        }
+    }
+
+    fn count_vertices(&self, report: &mut Report) {
+        report.vertices = self.positions.len();
+        report.unreferenced_vertices = self.referenced().into_iter().filter(|used| !used).count();
+    }
+
+    fn referenced(&self) -> Vec<bool> {
+        let mut referenced = vec![false; self.positions.len()];
+        for corner in self.faces.iter().flat_map(|triangle| triangle.corners) {
+            referenced[corner as usize] = true;
+        }
+        referenced
+    }
+}
+
+/// Whether a triangle repeats a vertex, or is so thin that rounding its corners to f32 could have
+/// made it out of a line segment: its height over its longest side is less than the distance
+/// between neighbouring f32 numbers of its coordinates' size.
+fn is_degenerate([a, b, c]: [u32; 3], positions: &[Vec3]) -> bool {
+    if a == b || b == c || c == a {
+        return true;
+    }
+    let [a, b, c] = [a, b, c].map(|corner| positions[corner as usize].as_dvec3());
+    let doubled_area = (b - a).cross(c - a).length();
+    let longest = [b - a, c - b, a - c].map(DVec3::length).into_iter().fold(0.0, f64::max);
+    let coordinate = [a, b, c].map(|p| p.abs().max_element()).into_iter().fold(0.0, f64::max);
+    doubled_area <= longest * coordinate * f64::from(f32::EPSILON)
+}

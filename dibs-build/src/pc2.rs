@@ -1,0 +1,132 @@
+//! Recorded motions: PC2 point cache files, as animation tools write them.
+//!
+//! Layout, little-endian: `POINTCACHE2\0`, i32 version 1, i32 points, f32 start frame, f32 sample
+//! rate (frames per sample; used here as samples a second, as the field's files do), i32 samples,
+//! then samples x points x 3 f32.
+
+use crate::read::{ReadError, ReadErrorKind};
+use crate::write::{WriteErrorKind, write_atomically};
+use crate::{Mesh, Motion, WriteError};
+use glam::Vec3;
+use std::path::Path;
+use thiserror::Error;
+
+const MAGIC: &[u8; 12] = b"POINTCACHE2\0";
+const HEADER: usize = 32;
+const POINT: usize = 12;
+
+/// A motion that does not fit a mesh.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error(
+    "frame {frame} of the motion has {found} vertices and the mesh has {expected}; use the mesh that the motion was recorded for"
+)]
+pub struct MotionMismatch {
+    /// The first frame that does not fit, counted from 0.
+    pub frame: usize,
+    /// Vertices of the mesh.
+    pub expected: usize,
+    /// Vertices of the frame.
+    pub found: usize,
+}
+
+impl Motion {
+    /// Reads a PC2 file.
+    ///
+    /// # Errors
+    /// [`ReadError`] for a file that is no PC2 file, is shorter than it claims, or has a coordinate
+    /// that is not finite.
+    pub fn read_pc2(path: impl AsRef<Path>) -> Result<Self, ReadError> {
+        let path = path.as_ref();
+        std::fs::read(path)
+            .map_err(ReadErrorKind::from)
+            .and_then(|bytes| parse(&bytes))
+            .map_err(|kind| ReadError { path: path.to_path_buf(), kind })
+    }
+
+    /// Writes a PC2 file.
+    ///
+    /// # Errors
+    /// [`WriteError`], also when frames differ in length; the file is complete or untouched.
+    pub fn write_pc2(&self, path: impl AsRef<Path>) -> Result<(), WriteError> {
+        let path = path.as_ref();
+        let fail = |kind| WriteError { path: path.to_path_buf(), kind };
+        let count = |element, count: usize| {
+            i32::try_from(count).map_err(|_| fail(WriteErrorKind::TooMany { element, count }))
+        };
+        let expected = self.frames.first().map_or(0, Vec::len);
+        if let Some(frame) = self.frames.iter().position(|frame| frame.len() != expected) {
+            let found = self.frames[frame].len();
+            return Err(fail(WriteErrorKind::UnevenFrames { frame, expected, found }));
+        }
+        let points = count("vertices", expected)?;
+        let samples = count("frames", self.frames.len())?;
+        write_atomically(path, |out| {
+            out.write_all(MAGIC)?;
+            out.write_all(&1_i32.to_le_bytes())?;
+            out.write_all(&points.to_le_bytes())?;
+            out.write_all(&0_f32.to_le_bytes())?;
+            out.write_all(&self.rate.to_le_bytes())?;
+            out.write_all(&samples.to_le_bytes())?;
+            for coordinate in self.frames.iter().flatten().flat_map(Vec3::to_array) {
+                out.write_all(&coordinate.to_le_bytes())?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Checks that every frame has one position for each of the mesh's vertices.
+    ///
+    /// # Errors
+    /// [`MotionMismatch`] for the first frame that does not.
+    pub fn check_fits(&self, mesh: &Mesh) -> Result<(), MotionMismatch> {
+        let expected = mesh.positions.len();
+        match self.frames.iter().position(|frame| frame.len() != expected) {
+            None => Ok(()),
+            Some(frame) => Err(MotionMismatch { frame, expected, found: self.frames[frame].len() }),
+        }
+    }
+}
+
+fn parse(bytes: &[u8]) -> Result<Motion, ReadErrorKind> {
+    if bytes.is_empty() {
+        return Err(ReadErrorKind::Empty);
+    }
+    let (Some(header), true) = (bytes.get(..HEADER), bytes.starts_with(MAGIC)) else {
+        return Err(ReadErrorKind::NotPc2);
+    };
+    let (words, _) = header[MAGIC.len()..].as_chunks::<4>();
+    let word = |i: usize| words[i];
+    let count = |i: usize| u64::from(u32::from_le_bytes(word(i)));
+    let (version, points, samples) = (count(0), count(1), count(4));
+    let data = &bytes[HEADER..];
+    let frame_bytes = points.saturating_mul(POINT as u64);
+    if version != 1 || points == 0 || samples == 0 {
+        return Err(ReadErrorKind::NotPc2);
+    }
+    // A product of counts that the file claims: compared with its size before it is used.
+    if frame_bytes.saturating_mul(samples) != data.len() as u64 {
+        return Err(ReadErrorKind::Count {
+            element: format!("frames of {points} vertices"),
+            claimed: samples,
+            found: data.len() as u64 / frame_bytes,
+            at_most: false,
+        });
+    }
+    let mut frames = Vec::with_capacity(samples as usize);
+    for (number, frame) in data.chunks_exact(frame_bytes as usize).enumerate() {
+        let (coordinates, _) = frame.as_chunks::<4>();
+        let (points, _) = coordinates.as_chunks::<3>();
+        let points: Vec<Vec3> =
+            points.iter().map(|p| Vec3::from_array(p.map(f32::from_le_bytes))).collect();
+        if let Some(vertex) = points.iter().position(|p| !p.is_finite()) {
+            let value = points[vertex].to_array().into_iter().find(|c| !c.is_finite());
+            return Err(ReadErrorKind::NonFinite {
+                vertex: format!("vertex {vertex} (counted from 0) in frame {number}"),
+                value: f64::from(value.unwrap_or(f32::NAN)),
+            });
+        }
+        frames.push(points);
+    }
+    let rate = f32::from_le_bytes(word(3));
+    Ok(Motion { frames, rate: if rate.is_finite() && rate > 0.0 { rate } else { 0.0 } })
+}

@@ -1,0 +1,205 @@
+//! Why a file gives no mesh: one sentence that names the file, the element and the remedy.
+
+use super::Format;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// A file that gives no mesh (or no motion), and why.
+#[derive(Debug, Error)]
+#[error("{}: {kind}", path.display())]
+pub struct ReadError {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong with it.
+    #[source]
+    pub kind: ReadErrorKind,
+}
+
+/// What is wrong with a file. Faces are counted from 1; vertices are named as the file numbers
+/// them: from 1 in OBJ, from 0 elsewhere.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ReadErrorKind {
+    /// The operating system could not read it.
+    #[error("cannot be read ({0}); check the path and its permissions")]
+    Io(#[from] std::io::Error),
+    /// It has no content at all.
+    #[error("the file is empty; export the mesh again")]
+    Empty,
+    /// Its content is none of the formats.
+    #[error("neither content nor extension is OBJ, STL, PLY or OFF; convert it to one of them")]
+    UnknownFormat,
+    /// A motion file that is not PC2.
+    #[error("not a PC2 file of version 1 with at least one frame; export the motion as PC2")]
+    NotPc2,
+    /// It does not follow its format.
+    #[error("not valid {format}{}: {what}; repair it or export the mesh again", at(*.line))]
+    Malformed {
+        /// The format as which it was read.
+        format: Format,
+        /// The line, counted from 1, where the format has lines.
+        line: Option<usize>,
+        /// What was found there.
+        what: String,
+    },
+    /// It ends too early.
+    #[error(
+        "the {format} data ends early: {missing}; the file was cut off, copy or export it again"
+    )]
+    Truncated {
+        /// The format as which it was read.
+        format: Format,
+        /// What should have followed.
+        missing: String,
+    },
+    /// A count that the file claims contradicts its size.
+    #[error(
+        "the file claims {claimed} {element}, but has {}{found}; it was cut off or written wrongly, export it again",
+        if *.at_most { "room for at most " } else { "" }
+    )]
+    Count {
+        /// What is counted.
+        element: String,
+        /// How many the file claims.
+        claimed: u64,
+        /// How many there are.
+        found: u64,
+        /// Whether `found` is an upper bound taken from the file's size.
+        at_most: bool,
+    },
+    /// There is no surface in it.
+    #[error("no triangles{}; export the mesh with its faces", dropped(*.degenerate))]
+    NoTriangles {
+        /// Triangles that were there, but degenerate.
+        degenerate: usize,
+    },
+    /// A face refers to a vertex that does not exist.
+    #[error(
+        "face {face} refers to vertex {index}, but the file has {vertices} vertices numbered from {first}; export the mesh again"
+    )]
+    IndexOutOfRange {
+        /// The face, counted from 1.
+        face: usize,
+        /// The vertex number as the file writes it.
+        index: i64,
+        /// How many vertices the file has.
+        vertices: usize,
+        /// The number of the file's first vertex.
+        first: u32,
+    },
+    /// A face has too many corners to be cut into triangles in reasonable time.
+    #[error(
+        "face {face} has {corners} corners and at most {most} are accepted; export the mesh as triangles"
+    )]
+    LargePolygon {
+        /// The face, counted from 1.
+        face: usize,
+        /// Its corners.
+        corners: usize,
+        /// The most that are accepted.
+        most: usize,
+    },
+    /// A coordinate is NaN or infinite.
+    #[error("{vertex} has the coordinate {value}, which is not a finite number; repair the mesh")]
+    NonFinite {
+        /// The vertex, in the file's own terms.
+        vertex: String,
+        /// The coordinate.
+        value: f64,
+    },
+    /// A coordinate is a number, but too large for f32.
+    #[error(
+        "{vertex} has the coordinate {value:e}, which overflows f32; scale the mesh to millimetres"
+    )]
+    Overflow {
+        /// The vertex, in the file's own terms.
+        vertex: String,
+        /// The coordinate.
+        value: f64,
+    },
+    /// The mesh is so small that products of squared lengths underflow f32.
+    #[error(
+        "the mesh is only {extent:e} across, where squared lengths underflow f32 (the least is {least:e}); scale it to millimetres"
+    )]
+    TooSmall {
+        /// Diagonal of the bounding box.
+        extent: f64,
+        /// The smallest extent that is accepted.
+        least: f64,
+    },
+    /// The mesh is so large that products of squared lengths overflow f32.
+    #[error(
+        "{vertex} has the coordinate {value:e}, where squared lengths overflow f32 (the most is {most:e}); scale the mesh to millimetres"
+    )]
+    TooLarge {
+        /// The vertex, in the file's own terms.
+        vertex: String,
+        /// The coordinate.
+        value: f64,
+        /// The largest magnitude that is accepted.
+        most: f64,
+    },
+    /// Triangles without area, under `strict`.
+    #[error(
+        "{count} degenerate triangles, the first in face {face}; repair the mesh, or read it without --strict to drop them"
+    )]
+    Degenerate {
+        /// How many.
+        count: usize,
+        /// The face of the first, counted from 1.
+        face: usize,
+    },
+    /// Triangles with the same three vertices as an earlier one, under `strict`.
+    #[error(
+        "{count} duplicate triangles, the first in face {face}; repair the mesh, or read it without --strict to drop them"
+    )]
+    Duplicate {
+        /// How many.
+        count: usize,
+        /// The face of the first, counted from 1.
+        face: usize,
+    },
+    /// Several surfaces: they are several trees.
+    #[error(
+        "{} surfaces that share no vertex ({} triangles); build one tree for each, or keep the largest with --largest-component{}",
+        .sizes.len(), list(.sizes), weld_hint(*.coincident)
+    )]
+    Components {
+        /// Triangles of each component, largest first.
+        sizes: Vec<usize>,
+        /// Vertices that coincide with another one and were not welded.
+        coincident: usize,
+    },
+    /// The weld tolerance is not a length.
+    #[error("the weld tolerance is {tolerance}; give a finite length of at least 0")]
+    Tolerance {
+        /// The tolerance that was asked for.
+        tolerance: f32,
+    },
+}
+
+fn at(line: Option<usize>) -> String {
+    line.map(|line| format!(", line {line}")).unwrap_or_default()
+}
+
+fn dropped(degenerate: usize) -> String {
+    if degenerate == 0 { String::new() } else { format!(" but {degenerate} degenerate ones") }
+}
+
+/// The largest few sizes, and how many more there are.
+fn list(sizes: &[usize]) -> String {
+    const SHOWN: usize = 8;
+    let mut text = sizes.iter().take(SHOWN).map(usize::to_string).collect::<Vec<_>>().join(", ");
+    if sizes.len() > SHOWN {
+        text += &format!(" and {} smaller ones", sizes.len() - SHOWN);
+    }
+    text
+}
+
+fn weld_hint(coincident: usize) -> String {
+    if coincident == 0 {
+        String::new()
+    } else {
+        format!("; or join them with --weld 0, as {coincident} vertices coincide with another")
+    }
+}

@@ -1,0 +1,78 @@
+//! Wavefront OBJ: its vertices and faces.
+//!
+//! Our own reader, although `tobj` exists: that renumbers vertices by first use and splits them by
+//! group and normal, so a recorded motion would no longer fit; and it knows no continued lines,
+//! stops at names that are not UTF-8, and reports no line. Tests compare the two.
+
+use super::raw::{Raw, excerpt, lines, position};
+use super::{Format, ReadErrorKind};
+
+pub(super) fn read(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
+    let mut raw = Raw::new(1);
+    let mut continued = String::new();
+    for (number, line) in lines(bytes) {
+        let line = line.trim();
+        // A comment is never continued: it may end in a path's backslash.
+        if continued.is_empty() && line.starts_with('#') {
+            continue;
+        }
+        if let Some(start) = line.strip_suffix('\\') {
+            continued += start;
+            continued.push(' ');
+            continue;
+        }
+        if continued.is_empty() {
+            statement(line, number, &mut raw)?;
+        } else {
+            statement(&(std::mem::take(&mut continued) + line), number, &mut raw)?;
+        }
+    }
+    if !continued.is_empty() {
+        return Err(ReadErrorKind::Truncated {
+            format: Format::Obj,
+            missing: "its last line is to be continued".to_owned(),
+        });
+    }
+    Ok(raw)
+}
+
+fn statement(line: &str, number: usize, raw: &mut Raw) -> Result<(), ReadErrorKind> {
+    let malformed =
+        |what| ReadErrorKind::Malformed { format: Format::Obj, line: Some(number), what };
+    let line = line.split_once('#').map_or(line, |(before, _)| before);
+    let mut words = line.split_whitespace();
+    match words.next() {
+        Some("v") => {
+            raw.positions.push(position(&mut words, Format::Obj, number)?);
+            // One more value is a weight, three or four are a colour.
+            if let (Some(weight), None) = (words.next(), words.next())
+                && weight.parse() != Ok(1.0)
+            {
+                return Err(malformed(format!(
+                    "a vertex has the weight '{}', and weights other than 1 are not supported",
+                    excerpt(weight)
+                )));
+            }
+        }
+        // "fo" is how the first version of the format wrote a face.
+        Some("f" | "fo") => {
+            let start = raw.corners.len();
+            for word in words {
+                // vertex/texture/normal
+                let vertex = word.split('/').next().unwrap_or_default();
+                let Ok(index) = vertex.parse::<i64>() else {
+                    return Err(malformed(format!("'{}' is not a vertex number", excerpt(word))));
+                };
+                // Negative numbers count back from the vertices so far.
+                let row = if index < 0 { index + raw.positions.len() as i64 } else { index - 1 };
+                raw.corners.push(u32::try_from(row).map_err(|_| raw.bad_index(index))?);
+            }
+            if raw.corners.len() == start {
+                return Err(malformed("a face without vertices".to_owned()));
+            }
+            raw.end_face();
+        }
+        _ => {}
+    }
+    Ok(())
+}

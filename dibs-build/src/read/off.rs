@@ -1,0 +1,70 @@
+//! OFF: a stream of numbers after the word OFF.
+//!
+//! Our own reader, although `off-rs` exists: that accepts one spelling of the header and one
+//! colour format announced in advance, where files in the wild mix them.
+
+use super::raw::{Raw, excerpt, lines, position};
+use super::{Format, ReadErrorKind};
+
+pub(super) fn read(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
+    let mut lines = lines(bytes)
+        .map(|(number, line)| {
+            let content = line.split('#').next().unwrap_or_default().trim().to_owned();
+            (number, content)
+        })
+        .filter(|(_, line)| !line.is_empty());
+    let malformed =
+        |line, what| ReadErrorKind::Malformed { format: Format::Off, line: Some(line), what };
+
+    let (number, header) = lines.next().ok_or(ReadErrorKind::Empty)?;
+    let (keyword, rest) = header.split_once(char::is_whitespace).unwrap_or((header.as_str(), ""));
+    if rest.to_ascii_lowercase().contains("binary") {
+        return Err(malformed(number, "binary OFF is not supported".to_owned()));
+    }
+    if !keyword.to_ascii_uppercase().ends_with("OFF") {
+        return Err(malformed(number, "no OFF header".to_owned()));
+    }
+    // The counts may stand on the header's line. What the prefixes of OFF announce (normals,
+    // colours, texture) follows the position on a vertex's line.
+    let (number, counts) = match rest.trim() {
+        "" => lines.next().ok_or_else(|| truncated("counts"))?,
+        rest => (number, rest.to_owned()),
+    };
+    let mut words = counts.split_whitespace();
+    let mut count = || words.next().and_then(|word| word.parse::<u64>().ok());
+    let (Some(vertices), Some(faces)) = (count(), count()) else {
+        return Err(malformed(number, format!("'{}' are not counts", excerpt(&counts))));
+    };
+
+    let mut raw = Raw::new(0);
+    for found in 0..vertices {
+        let lied = || lied("vertices", vertices, found);
+        let (number, line) = lines.next().ok_or_else(lied)?;
+        raw.positions.push(position(&mut line.split_whitespace(), Format::Off, number)?);
+    }
+    for found in 0..faces {
+        let (number, line) = lines.next().ok_or_else(|| lied("faces", faces, found))?;
+        let mut words = line.split_whitespace();
+        let size = words.next().and_then(|word| word.parse::<u64>().ok());
+        let Some(size) = size else {
+            return Err(malformed(number, format!("'{}' is not a face", excerpt(&line))));
+        };
+        for _ in 0..size {
+            let word = words.next().unwrap_or_default();
+            let Ok(index) = word.parse::<i64>() else {
+                return Err(malformed(number, format!("a face needs {size} vertex numbers")));
+            };
+            raw.corners.push(u32::try_from(index).map_err(|_| raw.bad_index(index))?);
+        }
+        raw.end_face();
+    }
+    Ok(raw)
+}
+
+fn truncated(missing: &str) -> ReadErrorKind {
+    ReadErrorKind::Truncated { format: Format::Off, missing: format!("no {missing}") }
+}
+
+fn lied(element: &str, claimed: u64, found: u64) -> ReadErrorKind {
+    ReadErrorKind::Count { element: element.to_owned(), claimed, found, at_most: true }
+}

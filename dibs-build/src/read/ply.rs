@@ -1,0 +1,224 @@
+//! PLY through `ply-rs-bw`: ASCII, little- and big-endian, any scalar types.
+
+use super::raw::Raw;
+use super::{Format, ReadErrorKind};
+use ply_rs_bw::parser::{ParseError, Parser, Reader};
+use ply_rs_bw::ply::{
+    BeginList, ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType,
+    ScalarType,
+};
+use std::io::{BufRead, ErrorKind};
+
+pub(super) fn read(mut bytes: Vec<u8>) -> Result<Raw, ReadErrorKind> {
+    make_header_ascii(&mut bytes);
+    let mut reader = Reader::new(bytes.as_slice());
+    let header =
+        Parser::<Other>::new().read_header(&mut reader).map_err(|error| malformed(&error))?;
+    let mut raw = Raw::new(0);
+    for element in header.elements.values() {
+        let remaining = reader.get_ref().len();
+        check_count(element, header.encoding, remaining)?;
+        match element.name.as_str() {
+            "vertex" => {
+                if let Some(missing) =
+                    ["x", "y", "z"].iter().find(|c| !element.properties.contains_key(**c))
+                {
+                    return Err(unusable(format!("its vertices have no property '{missing}'")));
+                }
+                let vertices = Parser::<Vertex>::new()
+                    .read_payload_for_element(&mut reader, element, &header)
+                    .map_err(|error| malformed(&error))?;
+                raw.positions = vertices.into_iter().map(|vertex| vertex.position).collect();
+            }
+            "face" => read_faces(&mut reader, element, &header, &mut raw)?,
+            _ => {
+                Parser::<Other>::new()
+                    .read_payload_for_element(&mut reader, element, &header)
+                    .map_err(|error| malformed(&error))?;
+            }
+        }
+    }
+    Ok(raw)
+}
+
+fn read_faces<T: BufRead>(
+    reader: &mut Reader<T>,
+    element: &ElementDef,
+    header: &ply_rs_bw::ply::Header,
+    raw: &mut Raw,
+) -> Result<(), ReadErrorKind> {
+    let faces = Parser::<Face>::new()
+        .read_payload_for_element(reader, element, header)
+        .map_err(|error| malformed(&error))?;
+    for face in faces {
+        for &index in &face.signed {
+            raw.corners.push(u32::try_from(index).map_err(|_| raw.bad_index(i64::from(index)))?);
+        }
+        raw.corners.extend(face.unsigned);
+        raw.end_face();
+    }
+    Ok(())
+}
+
+/// Comments come in any encoding, and the parser wants UTF-8.
+fn make_header_ascii(bytes: &mut [u8]) {
+    const END: &[u8] = b"end_header";
+    let end = bytes.windows(END.len()).position(|window| window == END).unwrap_or(0);
+    for byte in &mut bytes[..end] {
+        if !byte.is_ascii() {
+            *byte = b'?';
+        }
+    }
+}
+
+/// Refuses an element count that the rest of the file cannot hold, before anything is allocated
+/// for it. Elements without properties take no bytes in binary, so their count would be unbounded.
+fn check_count(
+    element: &ElementDef,
+    encoding: Encoding,
+    remaining: usize,
+) -> Result<(), ReadErrorKind> {
+    let least_bytes: usize = match encoding {
+        // A digit and a separator each, the last line perhaps without its end.
+        Encoding::Ascii => 2 * element.properties.len(),
+        _ => element
+            .properties
+            .values()
+            .map(|p| match &p.data_type {
+                PropertyType::Scalar(scalar) | PropertyType::List(scalar, _) => size(scalar),
+            })
+            .sum(),
+    };
+    let room = (remaining + 1) / least_bytes.max(1);
+    if element.count > room {
+        return Err(ReadErrorKind::Count {
+            element: format!("'{}' elements", element.name),
+            claimed: element.count as u64,
+            found: room as u64,
+            at_most: true,
+        });
+    }
+    Ok(())
+}
+
+fn size(scalar: &ScalarType) -> usize {
+    match scalar {
+        ScalarType::Char | ScalarType::UChar => 1,
+        ScalarType::Short | ScalarType::UShort => 2,
+        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
+        ScalarType::Double => 8,
+    }
+}
+
+fn malformed(error: &ParseError) -> ReadErrorKind {
+    if error.kind() == ErrorKind::UnexpectedEof {
+        return ReadErrorKind::Truncated {
+            format: Format::Ply,
+            missing: "there are fewer elements than its header says".to_owned(),
+        };
+    }
+    // The first line says what, the others repeat the input.
+    let text = error.to_string();
+    let first = text.lines().next().unwrap_or_default();
+    let what = first.split_once(": ").map_or(first, |(_, what)| what).trim_end_matches('.');
+    ReadErrorKind::Malformed { format: Format::Ply, line: error.line(), what: what.to_owned() }
+}
+
+fn unusable(what: String) -> ReadErrorKind {
+    ReadErrorKind::Malformed { format: Format::Ply, line: None, what }
+}
+
+struct Vertex {
+    position: [f64; 3],
+}
+
+impl Vertex {
+    fn set(&mut self, name: &str, value: f64) -> PropertyAccessResult {
+        let coordinate = match name {
+            "x" => 0,
+            "y" => 1,
+            "z" => 2,
+            _ => return PropertyAccessResult::Ignored,
+        };
+        self.position[coordinate] = value;
+        PropertyAccessResult::Set
+    }
+}
+
+impl PropertyAccess for Vertex {
+    fn new() -> Self {
+        // A coordinate that is not a scalar is never set, and NaN is refused later.
+        Self { position: [f64::NAN; 3] }
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        let value = match property {
+            Property::Char(v) => f64::from(v),
+            Property::UChar(v) => f64::from(v),
+            Property::Short(v) => f64::from(v),
+            Property::UShort(v) => f64::from(v),
+            Property::Int(v) => f64::from(v),
+            Property::UInt(v) => f64::from(v),
+            Property::Float(v) => f64::from(v),
+            Property::Double(v) => v,
+            _ => return PropertyAccessResult::Ignored,
+        };
+        self.set(name, value)
+    }
+
+    fn set_float(&mut self, name: &str, value: f32) -> PropertyAccessResult {
+        self.set(name, f64::from(value))
+    }
+
+    fn set_double(&mut self, name: &str, value: f64) -> PropertyAccessResult {
+        self.set(name, value)
+    }
+}
+
+/// A face fills one of the two lists, by the type that the file gives to its vertex numbers.
+#[derive(Default)]
+struct Face {
+    signed: Vec<i32>,
+    unsigned: Vec<u32>,
+}
+
+fn is_corners(name: &str) -> bool {
+    matches!(name, "vertex_indices" | "vertex_index")
+}
+
+impl PropertyAccess for Face {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn begin_list_int(&mut self, name: &str, _len: usize) -> BeginList<'_, i32> {
+        if is_corners(name) { BeginList::Fill(&mut self.signed) } else { BeginList::UseSetter }
+    }
+
+    fn begin_list_uint(&mut self, name: &str, _len: usize) -> BeginList<'_, u32> {
+        if is_corners(name) { BeginList::Fill(&mut self.unsigned) } else { BeginList::UseSetter }
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        if !is_corners(name) {
+            return PropertyAccessResult::Ignored;
+        }
+        match property {
+            Property::ListChar(v) => self.signed = v.into_iter().map(i32::from).collect(),
+            Property::ListShort(v) => self.signed = v.into_iter().map(i32::from).collect(),
+            Property::ListUChar(v) => self.unsigned = v.into_iter().map(u32::from).collect(),
+            Property::ListUShort(v) => self.unsigned = v.into_iter().map(u32::from).collect(),
+            _ => return PropertyAccessResult::UnsupportedType,
+        }
+        PropertyAccessResult::Set
+    }
+}
+
+/// Elements that are of no use here.
+struct Other;
+
+impl PropertyAccess for Other {
+    fn new() -> Self {
+        Self
+    }
+}

@@ -1,0 +1,98 @@
+//! A file's vertices and polygons, as written; and the lines and numbers of the text formats.
+
+use super::{Format, ReadErrorKind};
+use std::borrow::Cow;
+
+/// What a file contains, before any check that needs the whole of it.
+pub(crate) struct Raw {
+    /// f64, so that a coordinate too large for f32 can be told from an infinite one. Text is
+    /// rounded to f32 first: rounding twice could give another f32.
+    pub positions: Vec<[f64; 3]>,
+    /// The corners of all polygons, one after the other.
+    pub corners: Vec<u32>,
+    /// Where each polygon ends in `corners`.
+    pub ends: Vec<usize>,
+    /// The number that the file gives to its first vertex.
+    pub first_vertex: u32,
+}
+
+impl Raw {
+    pub fn new(first_vertex: u32) -> Self {
+        Self { positions: Vec::new(), corners: Vec::new(), ends: Vec::new(), first_vertex }
+    }
+
+    /// Ends a polygon whose corners were pushed.
+    pub fn end_face(&mut self) {
+        self.ends.push(self.corners.len());
+    }
+
+    /// A face's vertex number that cannot even be represented.
+    pub fn bad_index(&self, index: i64) -> ReadErrorKind {
+        ReadErrorKind::IndexOutOfRange {
+            face: self.ends.len() + 1,
+            index,
+            vertices: self.positions.len(),
+            first: self.first_vertex,
+        }
+    }
+
+    pub fn faces(&self) -> impl Iterator<Item = &[u32]> {
+        self.ends.iter().scan(0, |start, &end| {
+            let face = &self.corners[*start..end];
+            *start = end;
+            Some(face)
+        })
+    }
+}
+
+/// The lines of a text, counted from 1. Old exporters write names in any encoding, so bytes that
+/// are not UTF-8 are replaced instead of rejected.
+pub(crate) fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let separator = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
+    bytes
+        .split(move |&byte| byte == separator)
+        .map(String::from_utf8_lossy)
+        .enumerate()
+        .map(|(i, line)| (i + 1, line))
+}
+
+/// A coordinate in a text: rounded to f32 where f32 can hold it.
+pub(crate) fn coordinate(token: &str) -> Option<f64> {
+    let narrow = token.parse::<f32>().ok()?;
+    if narrow.is_finite() {
+        return Some(f64::from(narrow));
+    }
+    let wide = token.parse::<f64>().ok()?;
+    // "1e400" is a number too large even for f64: keep it apart from "inf".
+    let overflow = wide.is_infinite() && token.contains(|c: char| c.is_ascii_digit());
+    Some(if overflow { f64::MAX.copysign(wide) } else { wide })
+}
+
+/// The next three coordinates of a line.
+pub(crate) fn position<'a>(
+    words: &mut impl Iterator<Item = &'a str>,
+    format: Format,
+    line: usize,
+) -> Result<[f64; 3], ReadErrorKind> {
+    let mut position = [0.0; 3];
+    for value in &mut position {
+        let what = match words.next() {
+            None => "a vertex needs three coordinates".to_owned(),
+            Some(word) => match coordinate(word) {
+                Some(number) => {
+                    *value = number;
+                    continue;
+                }
+                None => format!("'{}' is not a number", excerpt(word)),
+            },
+        };
+        return Err(ReadErrorKind::Malformed { format, line: Some(line), what });
+    }
+    Ok(position)
+}
+
+/// The start of a text, short enough for a message.
+pub(crate) fn excerpt(text: &str) -> String {
+    text.chars().filter(|c| !c.is_control()).take(40).collect()
+}

@@ -1,0 +1,49 @@
+//! Which format a file has, by its content; the extension decides only where content does not.
+
+use super::raw::{coordinate, lines};
+use super::{Format, ReadErrorKind, stl};
+
+pub(super) fn format(bytes: &[u8], extension: Option<&str>) -> Result<Format, ReadErrorKind> {
+    if bytes.is_empty() {
+        return Err(ReadErrorKind::Empty);
+    }
+    let first_line = lines(bytes)
+        .map(|(_, line)| line.trim().to_ascii_lowercase())
+        .find(|line| !line.is_empty() && !line.starts_with('#'))
+        .unwrap_or_default();
+    let first_word = first_line.split_whitespace().next().unwrap_or_default();
+    if first_line == "ply" {
+        return Ok(Format::Ply);
+    }
+    if matches!(first_word, "off" | "coff" | "noff" | "cnoff" | "stoff") {
+        return Ok(Format::Off);
+    }
+    // Before "solid": many binary files begin with that word.
+    if stl::size_fits_count(bytes) {
+        return Ok(Format::StlBinary);
+    }
+    let is_text = !bytes.contains(&0);
+    if first_word == "solid" && is_text {
+        return Ok(Format::StlAscii);
+    }
+    if is_text && lines(bytes).any(|(_, line)| is_obj_line(&line)) {
+        return Ok(Format::Obj);
+    }
+    match extension.map(str::to_ascii_lowercase).as_deref() {
+        Some("obj") if is_text => Ok(Format::Obj),
+        Some("stl") => Ok(Format::StlBinary),
+        _ => Err(ReadErrorKind::UnknownFormat),
+    }
+}
+
+/// Whether a line is an OBJ vertex or face: prose may begin with "v" or "f", but not so.
+fn is_obj_line(line: &str) -> bool {
+    let mut words = line.split_whitespace();
+    match words.next() {
+        Some("v") => words.next().is_some_and(|word| coordinate(word).is_some()),
+        Some("f") => words
+            .next()
+            .is_some_and(|word| word.starts_with(|c: char| c == '-' || c.is_ascii_digit())),
+        _ => false,
+    }
+}

@@ -1,0 +1,149 @@
+//! Output files appear complete or not at all.
+
+use crate::Mesh;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// A file that could not be written. What was there before is untouched.
+#[derive(Debug, Error)]
+#[error("{}: {kind}", path.display())]
+pub struct WriteError {
+    /// The file.
+    pub path: PathBuf,
+    /// What went wrong.
+    #[source]
+    pub kind: WriteErrorKind,
+}
+
+/// What keeps a file from being written.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum WriteErrorKind {
+    /// The operating system refused.
+    #[error("cannot be written ({0}); check that the folder exists and has room")]
+    Io(#[from] io::Error),
+    /// The frames of a motion differ in length.
+    #[error("frame {frame} of the motion has {found} vertices, the first has {expected}")]
+    UnevenFrames {
+        /// The first frame that differs, counted from 0.
+        frame: usize,
+        /// Vertices of the first frame.
+        expected: usize,
+        /// Vertices of this one.
+        found: usize,
+    },
+    /// More elements than the format can count.
+    #[error("{count} {element} are more than the format can count")]
+    TooMany {
+        /// What is counted.
+        element: &'static str,
+        /// How many there are.
+        count: usize,
+    },
+}
+
+/// Writes a file through `contents` into a temporary file beside it, which is renamed once it is
+/// complete: no half-written output is left behind, whatever fails. A path that is no regular
+/// file (`/dev/stdout`) is written directly.
+///
+/// # Errors
+/// [`WriteErrorKind::Io`], also for whatever `contents` returns.
+pub fn write_atomically(
+    path: impl AsRef<Path>,
+    contents: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), WriteError> {
+    let path = path.as_ref();
+    write(path, contents).map_err(|e| WriteError { path: path.to_path_buf(), kind: e.into() })
+}
+
+fn write(path: &Path, contents: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    // A link stays a link: what it points to is replaced.
+    let target = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+    if target.metadata().is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir()) {
+        return fill(&File::create(&target)?, contents);
+    }
+    let folder = match target.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    {
+        // As any new file: the process's umask takes away from it.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let temporary = builder.prefix(".dibs-").tempfile_in(folder)?;
+    fill(temporary.as_file(), contents)?;
+    temporary.persist(&target)?;
+    Ok(())
+}
+
+fn fill(file: &File, contents: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let mut buffered = BufWriter::new(file);
+    contents(&mut buffered)?;
+    buffered.flush()
+}
+
+impl Mesh {
+    /// Writes a binary little-endian PLY file: f32 positions, 32-bit vertex numbers.
+    ///
+    /// # Errors
+    /// [`WriteError`]; the file is complete or untouched.
+    pub fn write_ply(&self, path: impl AsRef<Path>) -> Result<(), WriteError> {
+        write_atomically(path, |out| {
+            write!(
+                out,
+                "ply\nformat binary_little_endian 1.0\n\
+                 element vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+                 element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
+                self.positions.len(),
+                self.triangles.len()
+            )?;
+            for position in &self.positions {
+                for coordinate in position.to_array() {
+                    out.write_all(&coordinate.to_le_bytes())?;
+                }
+            }
+            for triangle in &self.triangles {
+                out.write_all(&[3])?;
+                for corner in triangle {
+                    out.write_all(&corner.to_le_bytes())?;
+                }
+            }
+            Ok(())
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn failure_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out.ply");
+        write_atomically(&path, |out| out.write_all(b"old")).unwrap();
+        let error = write_atomically(&path, |out| {
+            out.write_all(b"half of the new one")?;
+            Err(io::Error::other("no room"))
+        })
+        .unwrap_err();
+        assert!(error.to_string().contains("no room"), "{error}");
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        write_atomically(&path, |out| out.write_all(b"new")).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"new");
+    }
+
+    #[test]
+    fn missing_folder_is_an_error_that_names_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("absent").join("out.ply");
+        let error = Mesh::default().write_ply(&path).unwrap_err();
+        assert!(error.to_string().contains("out.ply"), "{error}");
+    }
+}

@@ -1,0 +1,292 @@
+//! Malformed and degenerate mesh files: the outcome of each is written down here.
+//!
+//! The files are not part of the project; without them these tests say so and pass.
+
+use dibs_build::{Import, ReadErrorKind, ReadOptions};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What reading a file must give.
+enum Want {
+    /// Rows of the vertex table, triangles, and every other count of the report that is not 0.
+    Mesh(usize, usize, &'static [(&'static str, usize)]),
+    /// A kind of error, and a part of its sentence.
+    Error(fn(&ReadErrorKind) -> bool, &'static str),
+    /// Several components: how many, and what the largest gives when only it is kept.
+    Components(usize, usize, usize, &'static [(&'static str, usize)]),
+}
+use ReadErrorKind as K;
+use Want::{Components, Error, Mesh};
+
+const fn polygons(count: usize) -> (&'static str, usize) {
+    ("polygons_triangulated", count)
+}
+const fn border(count: usize) -> (&'static str, usize) {
+    ("border_edges", count)
+}
+const fn unreferenced(count: usize) -> (&'static str, usize) {
+    ("unreferenced_vertices", count)
+}
+const fn degenerate(count: usize) -> (&'static str, usize) {
+    ("dropped_degenerate", count)
+}
+const fn duplicates(count: usize) -> (&'static str, usize) {
+    ("dropped_duplicates", count)
+}
+const fn welded(count: usize) -> (&'static str, usize) {
+    ("welded", count)
+}
+const fn coincident(count: usize) -> (&'static str, usize) {
+    ("coincident", count)
+}
+const fn inconsistent(count: usize) -> (&'static str, usize) {
+    ("inconsistent_edges", count)
+}
+
+const OUTCOMES: &[(&str, Want)] = &[
+    // Exported by 3ds Max: a binary file with the extension in capitals, of 24 parts.
+    ("assimp_3DSMaxExport.STL", Components(24, 1042, 170, &[welded(4958), unreferenced(955)])),
+    (
+        "assimp_OutOfMemory.off",
+        Error(|k| matches!(k, K::Count { claimed: 353_535_235_358, .. }), "vertices"),
+    ),
+    (
+        "assimp_Spider_binary.stl",
+        Components(18, 722, 98, &[welded(3382), unreferenced(671), degenerate(56)]),
+    ),
+    ("assimp_box.obj", Mesh(8, 12, &[polygons(6)])),
+    // One face goes round and round its four corners on a very long line.
+    (
+        "assimp_box_longline.obj",
+        Mesh(
+            8,
+            12,
+            &[
+                polygons(6),
+                ("polygons_not_simple", 1),
+                degenerate(466),
+                duplicates(466),
+                inconsistent(4),
+            ],
+        ),
+    ),
+    // A ring, cut open to be one polygon: its area is checked below.
+    ("assimp_concave_polygon.obj", Mesh(64, 64, &[polygons(1), border(64)])),
+    ("assimp_cube.ply", Mesh(8, 12, &[polygons(6)])),
+    ("assimp_cube_with_vertexcolors.obj", Mesh(8, 12, &[])),
+    ("assimp_invalid_empty.obj", Error(|k| matches!(k, K::Empty), "empty")),
+    ("assimp_invalid_empty.ply", Error(|k| matches!(k, K::Empty), "empty")),
+    // A face without any vertex: something is lost, and a surface with a hole would hide it.
+    (
+        "assimp_invalid_malformed2.obj",
+        Error(|k| matches!(k, K::Malformed { line: Some(23), .. }), "a face without vertices"),
+    ),
+    ("assimp_multiple_spaces.obj", Mesh(4, 1, &[unreferenced(1), border(3)])),
+    ("assimp_point_cloud.obj", Error(|k| matches!(k, K::NoTriangles { degenerate: 0 }), "faces")),
+    // A quad, and both of its halves again.
+    ("assimp_regr_3429812.obj", Mesh(4, 2, &[polygons(1), duplicates(2), border(4)])),
+    (
+        "assimp_spider.obj",
+        Components(19, 762, 98, &[coincident(40), unreferenced(711), degenerate(56)]),
+    ),
+    ("assimp_testpoints.obj", Error(|k| matches!(k, K::NoTriangles { degenerate: 0 }), "faces")),
+    ("assimp_triangle_with_empty_solid.stl", Mesh(3, 1, &[border(3)])),
+    ("synthetic_ascii.stl", Mesh(162, 320, &[welded(798)])),
+    (
+        "synthetic_ascii_nan.stl",
+        Error(|k| matches!(k, K::NonFinite { .. }), "corner 1 of triangle 1"),
+    ),
+    ("synthetic_ascii_truncated.stl", Error(|k| matches!(k, K::Truncated { .. }), "endsolid")),
+    ("synthetic_ascii_upper_crlf.stl", Mesh(162, 320, &[welded(798)])),
+    ("synthetic_collinear.obj", Error(|k| matches!(k, K::NoTriangles { degenerate: 320 }), "320")),
+    (
+        "synthetic_count_too_large.stl",
+        Error(|k| matches!(k, K::Count { claimed: 1_000_000_000, found: 320, .. }), "triangles"),
+    ),
+    // Whether the count or the data is wrong, the file does not say.
+    (
+        "synthetic_count_zero_with_data.stl",
+        Error(|k| matches!(k, K::Count { claimed: 0, found: 320, .. }), "triangles"),
+    ),
+    ("synthetic_dup_faces_and_flipped.obj", Mesh(162, 320, &[duplicates(20)])),
+    ("synthetic_empty_file.stl", Error(|k| matches!(k, K::Empty), "empty")),
+    // A ball pressed flat: its two sides coincide, and are still two sheets.
+    ("synthetic_flat_plane_z0.obj", Mesh(162, 304, &[coincident(73), degenerate(16), border(32)])),
+    ("synthetic_header_only_83_bytes.stl", Error(|k| matches!(k, K::Truncated { .. }), "83 bytes")),
+    (
+        "synthetic_index_out_of_range.obj",
+        Error(|k| matches!(k, K::IndexOutOfRange { face: 2, index: 9, .. }), "vertex 9"),
+    ),
+    ("synthetic_inf.stl", Error(|k| matches!(k, K::NonFinite { .. }), "corner 1 of triangle 6")),
+    ("synthetic_line_continuation.obj", Mesh(3, 1, &[border(3)])),
+    ("synthetic_mixed_orientation.obj", Mesh(162, 320, &[inconsistent(240)])),
+    ("synthetic_nan.stl", Error(|k| matches!(k, K::NonFinite { .. }), "corner 2 of triangle 6")),
+    ("synthetic_nan_vertex.obj", Error(|k| matches!(k, K::NonFinite { .. }), "vertex 8")),
+    ("synthetic_negative_index.obj", Mesh(3, 1, &[border(3)])),
+    ("synthetic_negative_zero.stl", Mesh(162, 320, &[welded(798)])),
+    ("synthetic_overflow_f32_vertex.obj", Error(|k| matches!(k, K::Overflow { .. }), "vertex 8")),
+    ("synthetic_scale_1e-30.obj", Error(|k| matches!(k, K::TooSmall { .. }), "millimetres")),
+    (
+        "synthetic_short_vertex.obj",
+        Error(|k| matches!(k, K::Malformed { line: Some(1), .. }), "three coordinates"),
+    ),
+    ("synthetic_touching_at_vertex.obj", Mesh(5, 2, &[border(6)])),
+    ("synthetic_two_components.obj", Components(2, 324, 320, &[unreferenced(162)])),
+    ("synthetic_unwelded_soup.obj", Mesh(960, 320, &[welded(798), unreferenced(798)])),
+    ("trimesh_LICENSE.md", Error(|k| matches!(k, K::UnknownFormat), "convert")),
+    ("trimesh_empty.obj", Error(|k| matches!(k, K::NoTriangles { degenerate: 0 }), "faces")),
+    ("trimesh_empty.stl", Error(|k| matches!(k, K::NoTriangles { degenerate: 0 }), "faces")),
+    // Its normals are numbered, but absent; a group's name contains an f.
+    ("trimesh_face_in_group_name_mid_file.obj", Mesh(5, 2, &[border(6)])),
+    // Two tetrahedra, each with the triangle between them.
+    ("trimesh_joined_tetrahedra.obj", Mesh(5, 7, &[duplicates(1), ("non_manifold_edges", 3)])),
+    ("trimesh_mirror.ply", Mesh(143, 286, &[])),
+    (
+        "trimesh_multibody.stl",
+        Components(2, 20, 20, &[welded(76), unreferenced(8), inconsistent(8)]),
+    ),
+    ("trimesh_negative_indices.obj", Mesh(8, 12, &[polygons(6)])),
+    // A face of two corners has no area.
+    ("trimesh_notenoughindices.obj", Mesh(3, 1, &[degenerate(1), border(3)])),
+    ("trimesh_obj_points.obj", Error(|k| matches!(k, K::NoTriangles { degenerate: 0 }), "faces")),
+    ("trimesh_obj_with_no_face_in_chunk.obj", Mesh(3, 1, &[border(3)])),
+    (
+        "trimesh_ply_empty_header.ply",
+        Error(|k| matches!(k, K::NoTriangles { degenerate: 0 }), "faces"),
+    ),
+    // Five corners in no plane: seen along their normal, one side runs back over another.
+    ("trimesh_polygonfaces.obj", Mesh(5, 3, &[polygons(1), ("polygons_not_simple", 1), border(5)])),
+    ("trimesh_soup.stl", Components(100, 300, 1, &[unreferenced(297), border(3)])),
+    (
+        "trimesh_stl_empty_bin.stl",
+        Error(|k| matches!(k, K::NoTriangles { degenerate: 0 }), "faces"),
+    ),
+    ("trimesh_two_objects.obj", Components(2, 12, 12, &[coincident(4), unreferenced(4)])),
+    ("trimesh_wallhole.obj", Mesh(92, 66, &[polygons(13), welded(57), unreferenced(57)])),
+];
+
+fn folder() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/nasty");
+    if !folder.is_dir() {
+        println!("skipped: {} is absent", folder.display());
+        return None;
+    }
+    Some(folder)
+}
+
+/// Every count of the report that is not 0, besides the sizes of the mesh.
+fn counts(import: &Import) -> BTreeMap<String, usize> {
+    let report = serde_json::to_value(&import.report).unwrap();
+    let report = report.as_object().unwrap();
+    report
+        .iter()
+        .filter(|(name, _)| !matches!(name.as_str(), "vertices" | "triangles"))
+        .filter_map(|(name, value)| Some((name.clone(), value.as_u64()? as usize)))
+        .filter(|&(_, count)| count != 0)
+        .collect()
+}
+
+fn check_mesh(
+    name: &str,
+    import: &Import,
+    vertices: usize,
+    triangles: usize,
+    want: &[(&str, usize)],
+) {
+    let mesh = &import.mesh;
+    assert_eq!((mesh.positions.len(), mesh.triangles.len()), (vertices, triangles), "{name}");
+    assert_eq!(
+        (import.report.vertices, import.report.triangles),
+        (vertices, triangles),
+        "{name}: the report disagrees with the mesh"
+    );
+    let want: BTreeMap<String, usize> = want.iter().map(|&(n, c)| (n.to_owned(), c)).collect();
+    assert_eq!(counts(import), want, "{name}");
+    assert!(mesh.positions.iter().all(|p| p.is_finite()), "{name}");
+    assert!(mesh.triangles.iter().flatten().all(|&v| (v as usize) < vertices), "{name}");
+}
+
+#[test]
+fn every_file_has_its_outcome() {
+    let Some(folder) = folder() else { return };
+    for (name, want) in OUTCOMES {
+        let path = folder.join(name);
+        let outcome = dibs_build::read(&path);
+        match want {
+            Mesh(vertices, triangles, counts) => match outcome {
+                Ok(import) => check_mesh(name, &import, *vertices, *triangles, counts),
+                Err(error) => panic!("{error}"),
+            },
+            Error(is_kind, part) => {
+                let error = outcome.err().unwrap_or_else(|| panic!("{name} gave a mesh"));
+                assert!(is_kind(&error.kind), "{error}");
+                let sentence = error.to_string();
+                assert!(sentence.contains(part) && sentence.contains(name), "{sentence}");
+                assert!(!sentence.contains('\n'), "{sentence}");
+            }
+            Components(components, vertices, triangles, counts) => {
+                let error = outcome.err().unwrap_or_else(|| panic!("{name} gave a mesh"));
+                let ReadErrorKind::Components { sizes, .. } = &error.kind else {
+                    panic!("{error}")
+                };
+                assert_eq!(sizes.len(), *components, "{error}");
+                assert!(error.to_string().contains("--largest-component"), "{error}");
+                let options = ReadOptions { largest_component: true, ..Import::options() };
+                let import = options.read(&path).unwrap();
+                assert_eq!(&import.report.components, sizes, "{name}");
+                check_mesh(name, &import, *vertices, *triangles, counts);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_file_is_in_the_table() {
+    let Some(folder) = folder() else { return };
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let name = entry.unwrap().file_name();
+        let name = name.to_str().unwrap();
+        assert!(OUTCOMES.iter().any(|(known, _)| *known == name), "{name} has no outcome");
+    }
+}
+
+#[test]
+fn strict_refuses_what_is_otherwise_dropped() {
+    let Some(folder) = folder() else { return };
+    for (name, want) in OUTCOMES {
+        let Mesh(_, _, counts) = want else { continue };
+        let options = ReadOptions { strict: true, ..Import::options() };
+        let outcome = options.read(folder.join(name));
+        let has = |name| counts.iter().find(|(n, _)| *n == name).map(|(_, count)| *count);
+        match (has("dropped_degenerate"), has("dropped_duplicates"), outcome) {
+            (None, None, Ok(_)) => {}
+            (Some(n), _, Err(e)) => {
+                assert!(matches!(e.kind, K::Degenerate { count, .. } if count == n), "{e}");
+            }
+            (None, Some(n), Err(e)) => {
+                assert!(matches!(e.kind, K::Duplicate { count, .. } if count == n), "{e}");
+            }
+            (_, _, outcome) => panic!("{name}: {outcome:?}"),
+        }
+    }
+}
+
+#[test]
+fn the_concave_polygon_keeps_its_area() {
+    let Some(folder) = folder() else { return };
+    let mesh = dibs_build::read(folder.join("assimp_concave_polygon.obj")).unwrap().mesh;
+    let area: f64 = mesh
+        .triangles
+        .iter()
+        .map(|t| {
+            let [a, b, c] = t.map(|v| mesh.positions[v as usize].as_dvec3());
+            (b - a).cross(c - a).length() / 2.0
+        })
+        .sum();
+    // Both rings are regular polygons of 32 corners, to the digits of the file.
+    let polygon = |radius: f64| {
+        let corners = 32.0;
+        corners / 2.0 * radius * radius * (std::f64::consts::TAU / corners).sin()
+    };
+    assert!((area - (polygon(0.7425) - polygon(0.6875))).abs() < 1e-3, "{area}");
+}
