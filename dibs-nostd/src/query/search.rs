@@ -1,153 +1,18 @@
-//! The traversal: the closest pair between a tool and the surface as it is now.
-
-use core::fmt;
+//! One search: the tests of nodes, leaves and triangles, and what is known so far.
 
 use glam::Vec3;
 
-use crate::format::Link;
+use super::{Budget, Options, QueryError};
 use crate::sqrt::sqrt;
-use crate::stretch::MeasuredStretch;
 use crate::tool::{AxisPair, Tool};
 use crate::{Index, Proximity, Tree, VertexTable};
 
-/// Why a query gave no answer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum QueryError {
-    /// The tree is deeper than the query's stack.
-    Depth {
-        /// The tree's depth.
-        needed: u32,
-        /// The stack's entries.
-        available: u32,
-    },
-    /// The vertex table does not have one row for each of the tree's vertices.
-    VertexCount {
-        /// Rows that the tree needs.
-        expected: u32,
-        /// Rows of the table.
-        found: u32,
-    },
-    /// A vertex's position is not a finite number, or so far away that f32 lengths overflow.
-    Position {
-        /// Row of the vertex.
-        vertex: u32,
-    },
-    /// The measured stretch is that of another mesh.
-    Mesh {
-        /// The tree's mesh id.
-        expected: u32,
-        /// The measurement's mesh id.
-        found: u32,
-    },
-    /// A row outside its table: the tree's bytes changed after they were validated.
-    Corrupt {
-        /// The row that is missing.
-        row: u32,
-    },
-}
-
-impl fmt::Display for QueryError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::Depth { needed, available } => {
-                write!(f, "the tree needs a stack of {needed} entries, the query has {available}")
-            }
-            Self::VertexCount { expected, found } => {
-                write!(f, "the tree has {expected} vertices, the table {found}")
-            }
-            Self::Position { vertex } => {
-                write!(f, "the position of vertex {vertex} is not finite or too large")
-            }
-            Self::Mesh { expected, found } => {
-                write!(f, "stretch measured on mesh {found:08x}, the tree is of {expected:08x}")
-            }
-            Self::Corrupt { row } => write!(f, "row {row} is missing: the tree's bytes changed"),
-        }
-    }
-}
-
-impl core::error::Error for QueryError {}
-
-/// The most work that one query may do. It bounds its time; an answer that was cut short is still
-/// valid, with a wider interval.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Budget {
-    /// Most sphere bounds evaluated, stored and elastic; the root's, always evaluated, is not counted.
-    pub node_tests: u32,
-    /// Most exact tool-triangle tests.
-    pub triangle_tests: u32,
-}
-
-impl Budget {
-    /// As much as it takes.
-    pub const UNLIMITED: Self = Self { node_tests: u32::MAX, triangle_tests: u32::MAX };
-}
-
-/// What a query may know beforehand. None of it changes what the answer is, only what it costs, except
-/// that a budget may widen the interval.
-#[derive(Clone, Copy, Debug)]
-pub struct Options {
-    budget: Budget,
-    warm_start: Option<u32>,
-    stretch: Option<MeasuredStretch>,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Options {
-    /// No budget, no warm start, and the stretch limit that the tree was built for.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { budget: Budget::UNLIMITED, warm_start: None, stretch: None }
-    }
-
-    /// Bounds the work.
-    #[must_use]
-    pub const fn budget(mut self, budget: Budget) -> Self {
-        self.budget = budget;
-        self
-    }
-
-    /// Starts from a triangle, usually the last tick's [`Proximity::triangle`]. A wrong or stale one
-    /// costs one triangle test; `None` starts cold.
-    #[must_use]
-    pub const fn warm_start(mut self, triangle: Option<u32>) -> Self {
-        self.warm_start = triangle;
-        self
-    }
-
-    /// Uses the stretch measured on the frame that is searched instead of the limit of the tree:
-    /// smaller spheres, fewer tests.
-    #[must_use]
-    pub const fn stretch(mut self, measured: MeasuredStretch) -> Self {
-        self.stretch = Some(measured);
-        self
-    }
-}
-
 /// A subtree that waits for its turn.
 #[derive(Clone, Copy, Debug)]
-struct Waiting {
+pub(super) struct Waiting {
     /// No point of the subtree is closer to the tool's axis than this.
-    lower: f32,
-    link: u32,
-}
-
-/// A query on one tree, with the fixed stack that its traversal needs: 8 bytes an entry.
-///
-/// `DEPTH` must be at least the tree's depth, checked once, here; [`Tree::depth`] tells it, and the
-/// builder prints it. Make it once, in a `static` or at start-up, and use it at every tick.
-#[derive(Clone, Debug)]
-pub struct Query<'t, I, const DEPTH: usize> {
-    tree: Tree<'t, I>,
-    stack: [Waiting; DEPTH],
+    pub lower: f32,
+    pub link: u32,
 }
 
 /// Slack of the pruning comparison, in units of the query's scale: the f32 rounding of both sides.
@@ -156,94 +21,17 @@ pub struct Query<'t, I, const DEPTH: usize> {
 /// of the root sphere, plus twice the axis). A pin's distance is off by at most `8 u S`, a bound
 /// `d - R` by `10 u S`, a triangle's distance by the kernel's [`crate::ACCURACY`]` S`.
 /// Twice the sum of the largest two covers any comparison between them.
-const SLACK: f32 = 64.0 / 16_777_216.0;
+const SLACK: f32 = 48.0 / 16_777_216.0;
 
 /// What [`Proximity::accuracy`] promises, in units of the scale: the kernel's error plus that of the
 /// pair's last operations.
-const ACCURACY: f32 = 64.0 / 16_777_216.0;
+const ACCURACY: f32 = 24.0 / 16_777_216.0;
 
-impl<'t, I: Index, const DEPTH: usize> Query<'t, I, DEPTH> {
-    /// A query on `tree`.
-    ///
-    /// # Errors
-    /// [`QueryError::Depth`] if the stack cannot hold the tree's depth.
-    pub const fn new(tree: &Tree<'t, I>) -> Result<Self, QueryError> {
-        if tree.depth() as usize > DEPTH {
-            return Err(QueryError::Depth { needed: tree.depth(), available: DEPTH as u32 });
-        }
-        Ok(Self { tree: *tree, stack: [Waiting { lower: 0.0, link: 0 }; DEPTH] })
-    }
-
-    /// The tree that is searched.
-    #[must_use]
-    pub const fn tree(&self) -> &Tree<'t, I> {
-        &self.tree
-    }
-
-    /// The closest pair between `tool` and the surface whose vertices are `vertices`.
-    ///
-    /// Exact within [`Proximity::accuracy`] as long as the surface keeps to the stretch limit (or to
-    /// the measured stretch in `options`). Pins are vertices of the surface, so their distances are
-    /// upper bounds from the first node on. Near child first; squares are compared, and a root is
-    /// taken only where an order is needed.
-    ///
-    /// Cost: the budget at most; typical counts are in `docs/performance.md`.
-    ///
-    /// # Errors
-    /// [`QueryError`]: a table of the wrong size, a root pin that is not finite, a measurement of
-    /// another mesh, or bytes that changed under the query. Never because the budget ran out.
-    pub fn closest<V: VertexTable + ?Sized, T: Tool>(
-        &mut self,
-        vertices: &V,
-        tool: &T,
-        options: &Options,
-    ) -> Result<Proximity, QueryError> {
-        let mut search = Search::start(&self.tree, vertices, tool, options)?;
-        let header = self.tree.header();
-        let mut waiting = 0usize;
-        let mut next = Some(Waiting { lower: search.root_lower, link: header.root });
-        while let Some(subtree) = next {
-            let deeper = if subtree.lower > search.reach {
-                Step::Done
-            } else {
-                match Link::decode(subtree.link) {
-                    Link::Node(row) => search.expand(row, subtree.lower)?,
-                    Link::Leaf { first, count } => search.leaf(first, count)?,
-                }
-            };
-            next = match deeper {
-                Step::One(near) => Some(near),
-                Step::Two(near, far) => {
-                    let slot =
-                        self.stack.get_mut(waiting).ok_or(QueryError::Corrupt { row: far.link })?;
-                    *slot = far;
-                    waiting += 1;
-                    Some(near)
-                }
-                Step::Done => match waiting.checked_sub(1) {
-                    Some(top) => {
-                        waiting = top;
-                        self.stack.get(top).copied()
-                    }
-                    None => None,
-                },
-                Step::OutOfBudget => {
-                    let mut lower = subtree.lower;
-                    for left in self.stack.iter().take(waiting) {
-                        if left.lower < lower {
-                            lower = left.lower;
-                        }
-                    }
-                    return search.finish(lower);
-                }
-            };
-        }
-        search.finish(f32::INFINITY)
-    }
-}
+/// Centres of elastic spheres are centroids: a third of the corners' sum.
+const THIRD: f32 = 1.0 / 3.0;
 
 /// What to do after a subtree was looked at.
-enum Step {
+pub(super) enum Step {
     /// Nothing of it is left.
     Done,
     One(Waiting),
@@ -253,7 +41,7 @@ enum Step {
 }
 
 /// The state of one search besides the stack.
-struct Search<'s, 't, I, V: ?Sized, T> {
+pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     tree: &'s Tree<'t, I>,
     vertices: &'s V,
     tool: &'s T,
@@ -262,9 +50,9 @@ struct Search<'s, 't, I, V: ?Sized, T> {
     radius_scale: f32,
     scale: f32,
     slack: f32,
-    root_lower: f32,
+    pub root_lower: f32,
     /// Distance of the nearest surface point known, plus the slack: what is farther cannot win.
-    reach: f32,
+    pub reach: f32,
     reach_squared: f32,
     pin: (u32, f32),
     best: Option<AxisPair>,
@@ -275,7 +63,7 @@ struct Search<'s, 't, I, V: ?Sized, T> {
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T> {
-    fn start(
+    pub fn start(
         tree: &'s Tree<'t, I>,
         vertices: &'s V,
         tool: &'s T,
@@ -368,7 +156,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
 
     /// Tests both children of an inner node.
     #[inline(always)]
-    fn expand(&mut self, row: u32, parent_lower: f32) -> Result<Step, QueryError> {
+    pub fn expand(&mut self, row: u32, parent_lower: f32) -> Result<Step, QueryError> {
         if self.budget.node_tests.saturating_sub(self.node_tests - 1) < 2 {
             return Ok(Step::OutOfBudget);
         }
@@ -416,7 +204,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
 
     /// Tests a leaf's triangles, each behind its elastic sphere.
     #[inline(always)]
-    fn leaf(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
+    pub fn leaf(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
         for triangle in first..first + count {
             if triangle == self.best_triangle {
                 continue;
@@ -429,14 +217,18 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             self.node_tests += 1;
             let corners = self.corners(triangle)?;
             let [a, b, c] = corners;
-            let (ab, ac) = ((b - a).length_squared(), (c - a).length_squared());
-            let elastic = if ab > ac { ab } else { ac };
+            let centre = (a + b + c) * THIRD;
+            let (to_a, to_b, to_c) = (a - centre, b - centre, c - centre);
+            let larger = |x: f32, y: f32| if x > y { x } else { y };
+            let elastic =
+                larger(larger(to_a.length_squared(), to_b.length_squared()), to_c.length_squared());
             let far = self.reach + sqrt(elastic);
-            let squared = self.tool.axis_distance_squared(a);
+            let squared = self.tool.axis_distance_squared(centre);
             if squared > far * far {
                 continue;
             }
-            if (squared + ab + ac).is_nan() {
+            // One corner that is not a number makes the centre none.
+            if squared.is_nan() {
                 return Err(QueryError::Position { vertex: self.not_a_number(triangle) });
             }
             self.test_triangle(triangle, &corners);
@@ -474,7 +266,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     }
 
     /// The answer, where `lower` bounds what was left unexplored.
-    fn finish(&self, lower: f32) -> Result<Proximity, QueryError> {
+    pub fn finish(&self, lower: f32) -> Result<Proximity, QueryError> {
         let (pin, pin_distance) = self.pin;
         let radius = self.tool.radius();
         let cut_short = lower < f32::INFINITY;

@@ -1,0 +1,63 @@
+//! Why a query gives no answer.
+
+use core::fmt;
+
+/// Why a query gave no answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum QueryError {
+    /// The tree is deeper than the query's stack.
+    Depth {
+        /// The tree's depth.
+        needed: u32,
+        /// The stack's entries.
+        available: u32,
+    },
+    /// The vertex table does not have one row for each of the tree's vertices.
+    VertexCount {
+        /// Rows that the tree needs.
+        expected: u32,
+        /// Rows of the table.
+        found: u32,
+    },
+    /// A vertex's position is not a finite number, or so far away that f32 lengths overflow.
+    Position {
+        /// Row of the vertex.
+        vertex: u32,
+    },
+    /// The measured stretch is that of another mesh.
+    Mesh {
+        /// The tree's mesh id.
+        expected: u32,
+        /// The measurement's mesh id.
+        found: u32,
+    },
+    /// A row outside its table: the tree's bytes changed after they were validated.
+    Corrupt {
+        /// The row that is missing.
+        row: u32,
+    },
+}
+
+impl fmt::Display for QueryError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Depth { needed, available } => {
+                write!(f, "the tree needs a stack of {needed} entries, the query has {available}")
+            }
+            Self::VertexCount { expected, found } => {
+                write!(f, "the tree has {expected} vertices, the table {found}")
+            }
+            Self::Position { vertex } => {
+                write!(f, "the position of vertex {vertex} is not finite or too large")
+            }
+            Self::Mesh { expected, found } => {
+                write!(f, "stretch measured on mesh {found:08x}, the tree is of {expected:08x}")
+            }
+            Self::Corrupt { row } => write!(f, "row {row} is missing: the tree's bytes changed"),
+        }
+    }
+}
+
+impl core::error::Error for QueryError {}

@@ -1,0 +1,65 @@
+//! What a query may know beforehand, and how much it may do.
+
+use crate::MeasuredStretch;
+
+/// The most work that one query may do. It bounds its time; an answer that was cut short is still
+/// valid, with a wider interval.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Budget {
+    /// Most sphere bounds evaluated, stored and elastic; the root's, always evaluated, is not counted.
+    pub node_tests: u32,
+    /// Most exact tool-triangle tests.
+    pub triangle_tests: u32,
+}
+
+impl Budget {
+    /// As much as it takes.
+    pub const UNLIMITED: Self = Self { node_tests: u32::MAX, triangle_tests: u32::MAX };
+}
+
+/// What a query may know beforehand. None of it changes what the answer is, only what it costs, except
+/// that a budget may widen the interval.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    pub(super) budget: Budget,
+    pub(super) warm_start: Option<u32>,
+    pub(super) stretch: Option<MeasuredStretch>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Options {
+    /// No budget, no warm start, and the stretch limit that the tree was built for.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { budget: Budget::UNLIMITED, warm_start: None, stretch: None }
+    }
+
+    /// Bounds the work.
+    #[must_use]
+    pub const fn budget(mut self, budget: Budget) -> Self {
+        self.budget = budget;
+        self
+    }
+
+    /// Starts from a triangle, usually the last tick's [`Proximity::triangle`]. A wrong or stale one
+    /// costs one triangle test; `None` starts cold.
+    #[must_use]
+    pub const fn warm_start(mut self, triangle: Option<u32>) -> Self {
+        self.warm_start = triangle;
+        self
+    }
+
+    /// Uses the stretch measured on the frame that is searched instead of the limit of the tree:
+    /// smaller spheres, fewer tests.
+    #[must_use]
+    pub const fn stretch(mut self, measured: MeasuredStretch) -> Self {
+        self.stretch = Some(measured);
+        self
+    }
+}

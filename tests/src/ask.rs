@@ -1,0 +1,27 @@
+//! One way to ask a tree, whatever the tool and the index width.
+
+use dibs_nostd::{Capsule, Index, Options, Proximity, Query, QueryError, Sphere, VertexTable};
+
+use crate::oracle::Instrument;
+
+/// Queries with the tool that the instrument describes: a sphere where its ends coincide.
+///
+/// # Errors
+/// The query's.
+///
+/// # Panics
+/// If the instrument is not a valid tool.
+pub fn closest<I: Index, const D: usize>(
+    query: &mut Query<'_, I, D>,
+    vertices: &(impl VertexTable + ?Sized),
+    tool: &Instrument,
+    options: &Options,
+) -> Result<Proximity, QueryError> {
+    if tool.start == tool.end {
+        let sphere = Sphere::new(tool.start, tool.radius).expect("a valid sphere");
+        query.closest(vertices, &sphere, options)
+    } else {
+        let capsule = Capsule::new(tool.start, tool.end, tool.radius).expect("a valid capsule");
+        query.closest(vertices, &capsule, options)
+    }
+}

@@ -1,0 +1,39 @@
+//! Stretch in f64, written apart from the measurement under test: per triangle by singular values of
+//! the deformation gradient in an orthonormal frame, per edge by lengths.
+
+use dibs_build::Mesh;
+use dibs_nostd::format::PathKind;
+use glam::{DMat2, DVec2, DVec3, Vec3};
+
+/// The largest stretch of `now` against the rest shape, over all triangles or edges.
+#[must_use]
+pub fn largest(mesh: &Mesh, now: &[Vec3], paths: PathKind) -> f64 {
+    let of = |triangle: &[u32; 3]| {
+        let rest = triangle.map(|v| mesh.positions[v as usize].as_dvec3());
+        let now = triangle.map(|v| now[v as usize].as_dvec3());
+        match paths {
+            PathKind::EdgePath => (0..3)
+                .map(|i| now[i].distance(now[(i + 1) % 3]) / rest[i].distance(rest[(i + 1) % 3]))
+                .fold(0.0, f64::max),
+            _ => largest_singular_value(rest, now),
+        }
+    };
+    mesh.triangles.iter().map(of).fold(0.0, f64::max)
+}
+
+/// In the triangle's plane, `F = [now] [rest]^-1` for the 2x2 edge matrices of both shapes.
+fn largest_singular_value(rest: [DVec3; 3], now: [DVec3; 3]) -> f64 {
+    let gradient = flat(now) * flat(rest).inverse();
+    let metric = gradient.transpose() * gradient;
+    let (trace, determinant) = (metric.x_axis.x + metric.y_axis.y, metric.determinant());
+    let root = (trace * trace / 4.0 - determinant).max(0.0).sqrt();
+    (trace / 2.0 + root).sqrt()
+}
+
+/// The triangle's two edges in an orthonormal basis of its plane.
+fn flat([a, b, c]: [DVec3; 3]) -> DMat2 {
+    let (along, across) = (b - a, c - a);
+    let x = along.normalize_or(DVec3::X);
+    let rest = across - x * across.dot(x);
+    DMat2::from_cols(DVec2::new(along.length(), 0.0), DVec2::new(across.dot(x), rest.length()))
+}

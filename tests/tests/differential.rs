@@ -1,0 +1,215 @@
+//! Whole queries against exhaustive search in f64: every construction, both index widths, spheres and
+//! capsules, deformations up to the limit. Nothing may be off by more than the stated accuracy.
+
+use dibs_build::{Builder, BuiltTree, Construction, IndexWidth, Mesh, Paths, generate};
+use dibs_nostd::{Budget, Index, Options, Proximity, Query, Tree, measure_stretch};
+use dibs_tests::ask;
+use dibs_tests::deform::Deformation;
+use dibs_tests::oracle::{Instrument, OraclePair, exhaustive};
+use dibs_tests::poses::pose;
+use fastrand::Rng;
+use glam::Vec3;
+
+/// Queries of a case, before it is shared out over the kinds of deformation.
+const QUERIES: usize = if cfg!(debug_assertions) { 90 } else { 4_500 };
+
+/// Poses tried on each deformation.
+const POSES: usize = 25;
+
+struct Case<'m> {
+    name: String,
+    mesh: &'m Mesh,
+    tree: BuiltTree,
+    queries: usize,
+}
+
+/// What a case found.
+#[derive(Default)]
+struct Tally {
+    queries: usize,
+    /// Largest error of a separation, in units of the accuracy stated for it.
+    worst: f64,
+}
+
+fn run(case: &Case<'_>, seed: u64) -> Tally {
+    if case.tree.index_bits() == 16 {
+        run_with(case, &case.tree.tree::<u16>().expect("valid"), seed)
+    } else {
+        run_with(case, &case.tree.tree::<u32>().expect("valid"), seed)
+    }
+}
+
+fn run_with<I: Index>(case: &Case<'_>, tree: &Tree<'_, I>, seed: u64) -> Tally {
+    let mut rng = Rng::with_seed(seed);
+    let mut query = Query::<I, 64>::new(tree).expect("64 entries are enough");
+    let mut tally = Tally::default();
+    let triangles = triangle_rows(tree);
+    while tally.queries < case.queries {
+        for deformation in Deformation::ALL {
+            let moved = deformation.apply(case.mesh, tree.paths(), tree.stretch(), &mut rng);
+            let rows = case.tree.to_rows(&moved);
+            let measured = measure_stretch(tree, rows.as_slice())
+                .unwrap_or_else(|e| panic!("{}: {deformation:?}: {e}", case.name));
+            let mut last = None;
+            for _ in 0..POSES {
+                let tool = pose(&rows, &triangles, &mut rng);
+                let truth = exhaustive(&rows, &triangles, &tool).expect("has triangles");
+                let all = [
+                    Options::new(),
+                    Options::new().stretch(measured),
+                    Options::new().stretch(measured).warm_start(last),
+                    Options::new().warm_start(Some(rng.u32(..))),
+                ];
+                for options in &all[rng.usize(..2)..] {
+                    let found = ask::closest(&mut query, rows.as_slice(), &tool, options)
+                        .unwrap_or_else(|e| panic!("{}: {deformation:?}: {e}", case.name));
+                    let error = check(&rows, &tool, &truth, &found);
+                    assert!(
+                        error <= 1.0 && found.lower == found.separation,
+                        "{}: {deformation:?}: {tool:?}\n  found {found:?}\n  truth {truth:?}",
+                        case.name
+                    );
+                    tally.worst = tally.worst.max(error);
+                    tally.queries += 1;
+                    last = found.triangle;
+                }
+                let budget = Budget { node_tests: rng.u32(..200), triangle_tests: rng.u32(..20) };
+                let cut = ask::closest(
+                    &mut query,
+                    rows.as_slice(),
+                    &tool,
+                    &Options::new().budget(budget),
+                )
+                .expect("a short budget is no error");
+                check_interval(&truth, &cut, budget);
+                tally.queries += 1;
+            }
+        }
+    }
+    tally
+}
+
+fn triangle_rows<I: Index>(tree: &Tree<'_, I>) -> Vec<[u32; 3]> {
+    (0..tree.triangle_count()).map(|t| tree.triangle(t).expect("in the table")).collect()
+}
+
+/// The error of an answer's separation in units of its accuracy; asserts that its parts agree.
+fn check(rows: &[Vec3], tool: &Instrument, truth: &OraclePair, found: &Proximity) -> f64 {
+    let accuracy = f64::from(found.accuracy);
+    let corners = found.corners.map(|v| rows[v as usize]);
+    let [a, b, c] = found.barycentric;
+    assert!(a >= 0.0 && b >= 0.0 && c >= 0.0 && (a + b + c - 1.0).abs() < 1e-5, "{found:?}");
+    let size = corners.iter().map(|p| p.abs().max_element()).fold(0.0, f32::max);
+    let from_weights = corners[0] * a + corners[1] * b + corners[2] * c;
+    let rounding = 1e-5 * size + found.accuracy;
+    assert!(from_weights.distance(found.point_on_surface) <= rounding, "{found:?}");
+    let axis_point = tool.start + (tool.end - tool.start) * found.axis_parameter;
+    let reach = axis_point.distance(found.point_on_surface);
+    let rounding = rounding + 1e-5 * axis_point.abs().max_element();
+    assert!((reach - found.axis_distance).abs() <= rounding, "{found:?}");
+    (truth.separation - f64::from(found.separation)).abs() / accuracy
+}
+
+fn check_interval(truth: &OraclePair, cut: &Proximity, budget: Budget) {
+    let accuracy = f64::from(cut.accuracy);
+    assert!(cut.node_tests <= budget.node_tests + 1, "{budget:?} {cut:?}");
+    assert!(cut.triangle_tests <= budget.triangle_tests, "{budget:?} {cut:?}");
+    assert!(cut.lower <= cut.separation, "{budget:?} {cut:?}");
+    let inside = f64::from(cut.lower) - accuracy <= truth.separation
+        && truth.separation <= f64::from(cut.separation) + accuracy;
+    assert!(inside, "{budget:?} {cut:?} {truth:?}");
+}
+
+/// Runs cases on all cores and prints what each found.
+fn run_all(cases: &[Case<'_>]) -> usize {
+    let next = std::sync::atomic::AtomicUsize::new(0);
+    let total = std::sync::atomic::AtomicUsize::new(0);
+    let work = || {
+        loop {
+            let number = next.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            let Some(case) = cases.get(number) else { break };
+            let tally = run(case, number as u64);
+            total.fetch_add(tally.queries, std::sync::atomic::Ordering::Relaxed);
+            let Tally { queries, worst } = tally;
+            println!("{:40} {queries:6} queries, worst error {worst:.3} of accuracy", case.name);
+        }
+    };
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| (0..cores).for_each(|_| drop(scope.spawn(work))));
+    total.into_inner()
+}
+
+/// Every construction, path kind, leaf size and index width of one mesh.
+fn cases_of<'m>(name: &str, mesh: &'m Mesh, queries: usize) -> Vec<Case<'m>> {
+    let geodesic = Builder::new().stretch(1.5);
+    let builders = [
+        ("default", geodesic.clone()),
+        ("default, 32 bit", geodesic.clone().index(IndexWidth::Bits32).stretch(2.0)),
+        ("edge paths", geodesic.clone().paths(Paths::Edges)),
+        ("one triangle a leaf", geodesic.clone().leaf_triangles(1).stretch(1.1)),
+        ("eight triangles a leaf", geodesic.leaf_triangles(8)),
+        ("paper", Builder::new().construction(Construction::Paper).stretch(2.0)),
+    ];
+    let case = |(kind, builder): (&str, Builder<'_>)| Case {
+        name: format!("{name}, {kind}"),
+        mesh,
+        tree: builder.build(mesh).unwrap_or_else(|e| panic!("{name}, {kind}: {e}")),
+        queries,
+    };
+    builders.into_iter().map(case).collect()
+}
+
+#[test]
+fn procedural_meshes_agree_with_exhaustive_search() {
+    let (heart, _) = generate::heart(600).expect("a valid size");
+    let brain = generate::brain(1_200).expect("a valid size");
+    let sheet = sheet(12);
+    let one = Mesh { positions: sheet.positions[..3].to_vec(), triangles: vec![[0, 1, 2]] };
+    let mut cases = cases_of("heart 600", &heart, QUERIES);
+    cases.extend(cases_of("brain 1,200", &brain, QUERIES));
+    cases.extend(cases_of("irregular sheet", &sheet, QUERIES));
+    cases.extend(cases_of("one triangle", &one, QUERIES / 4));
+    let total = run_all(&cases);
+    println!("{total} queries on procedural meshes, none beyond its accuracy");
+    assert!(cfg!(debug_assertions) || total >= 80_000, "{total}");
+}
+
+#[test]
+fn real_meshes_agree_with_exhaustive_search() {
+    let data = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    let names = ["brain_500", "brain_5k", "heart_10272", "brain_50k"];
+    let read = |name: &str| dibs_build::read(data.join(name).with_extension("ply"));
+    if !data.is_dir() {
+        println!("skipped: the real meshes are not here ({} is absent)", data.display());
+        return;
+    }
+    let meshes = names.map(|name| read(name).unwrap_or_else(|e| panic!("{e}")).mesh);
+    let mut cases = Vec::new();
+    for (name, mesh) in names.iter().zip(&meshes) {
+        cases.extend(cases_of(name, mesh, QUERIES * 1_000 / mesh.triangles.len().max(1_000)));
+    }
+    let total = run_all(&cases);
+    println!("{total} queries on real meshes, none beyond its accuracy");
+    assert!(cfg!(debug_assertions) || total >= 20_000, "{total}");
+}
+
+/// An open sheet with triangles of very different sizes and shapes, slivers among them.
+fn sheet(cells: u32) -> Mesh {
+    let mut rng = Rng::with_seed(7);
+    let side = cells + 1;
+    let place = |i: u32| (i as f32 / cells as f32).powi(3) * 100.0;
+    let mut positions = Vec::new();
+    for row in 0..side {
+        for column in 0..side {
+            positions.push(Vec3::new(place(row), place(column), rng.f32() * 5.0));
+        }
+    }
+    let mut triangles = Vec::new();
+    for row in 0..cells {
+        for column in 0..cells {
+            let a = row * side + column;
+            triangles.extend([[a, a + 1, a + side], [a + 1, a + side + 1, a + side]]);
+        }
+    }
+    Mesh { positions, triangles }
+}
