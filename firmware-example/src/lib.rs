@@ -1,2 +1,29 @@
-//! The control logic.
-#![no_std]
+//! The control logic of a robot that keeps its instrument off a beating heart.
+//!
+//! It compiles for the board and for the host alike: `no_std`, no allocation, no panic, and nothing
+//! that belongs to a board. Two contexts share it:
+//!
+//! - the control tick, 1 kHz, highest priority: [`Control::tick`] poses the instrument, asks for the
+//!   closest pair on the frame published last, and turns it into a force;
+//! - bus reception, any lower priority: [`Receiver::byte`] takes vertices as they come and publishes
+//!   complete frames.
+//!
+//! Between them stand [`Frames`](dibs_nostd::Frames), where a frame is published by one atomic
+//! operation, and [`BusStatus`], plain counters. [`telemetry`] is what the tick tells the world.
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+
+mod control;
+mod instrument;
+mod receiver;
+mod status;
+pub mod surface;
+pub mod telemetry;
+
+pub use control::{Control, SURFACE_AGE_LIMIT, SetupError};
+pub use instrument::instrument;
+pub use receiver::{MTU, Receiver};
+pub use status::BusStatus;
+
+/// Control ticks a second.
+pub const TICK_RATE: u32 = 1_000;

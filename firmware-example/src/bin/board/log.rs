@@ -3,17 +3,17 @@
 //! The crate `defmt-semihosting` panics when it is entered twice. This logger drops the nested
 //! frame instead, because the firmware links only without panic paths.
 
-use cortex_m_semihosting::{debug, hio};
+use cortex_m_semihosting::hio;
 
-use crate::shared::Exclusive;
+use crate::exclusive::Exclusive;
 
 static ENCODER: Exclusive<defmt::Encoder> = Exclusive::new(defmt::Encoder::new());
 
 #[defmt::global_logger]
 struct Logger;
 
-// SAFETY: `Exclusive` turns a second entry into a dropped write, so no two frames are open on the
-// encoder at once; only the idle priority logs.
+// SAFETY: only the idle priority logs, so frames do not interleave; an interrupt that logged all
+// the same would find `ENCODER` busy and lose its bytes.
 unsafe impl defmt::Logger for Logger {
     fn acquire() {
         ENCODER.with(|encoder| encoder.start_frame(emit));
@@ -34,13 +34,5 @@ fn emit(bytes: &[u8]) {
     // No debugger attached is no reason to stop a robot.
     if let Ok(mut out) = hio::hstdout() {
         let _ = out.write_all(bytes);
-    }
-}
-
-/// Ends the emulation with exit code 0 or 1. On real silicon without a debugger: halts.
-pub fn exit(success: bool) -> ! {
-    debug::exit(if success { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
-    loop {
-        cortex_m::asm::wfi();
     }
 }

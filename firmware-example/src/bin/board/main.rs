@@ -7,62 +7,82 @@
 #![no_main]
 
 mod clock;
+mod exclusive;
 mod log;
 mod panic;
 mod registers;
-mod shared;
+mod schedule;
+mod semihosting;
 mod stack;
 mod uart;
 mod vectors;
 
-use core::sync::atomic::{AtomicU32, Ordering};
-use cortex_m::peripheral::scb::SystemHandler;
-use cortex_m::peripheral::syst::SystClkSource;
-use cortex_m_rt::{entry, exception};
-use heapless::mpmc::Queue;
-use shared::Exclusive;
-use vectors::BusInterrupt;
+use controller::surface::{SURFACE, SurfaceFrames};
+use controller::telemetry::{MAX_FRAMED, Tick, frame};
+use controller::{BusStatus, Control, Receiver};
+use cortex_m_rt::entry;
+use heapless::spsc::{Consumer, Queue};
 
-static TICKS: AtomicU32 = AtomicU32::new(0);
-static ECHO: Queue<u8, 64> = Queue::new();
+/// Records that wait for the line.
+const QUEUE: usize = 64;
+
+static FRAMES: SurfaceFrames = SurfaceFrames::new();
+static BUS: BusStatus = BusStatus::new();
 
 #[entry]
 fn main() -> ! {
-    clock::start();
+    static mut RECORDS: Queue<Tick, QUEUE> = Queue::new();
+    let (producer, consumer) = RECORDS.split();
+
+    defmt::info!(
+        "{} triangles, {} vertices, mesh {=u32:08x}, stretch limit {}",
+        SURFACE.triangle_count(),
+        SURFACE.vertex_count(),
+        SURFACE.mesh_id(),
+        SURFACE.stretch()
+    );
+    let Some((writer, reader)) = FRAMES.split() else { semihosting::exit(false) };
+    let Ok(control) = Control::new(reader, &BUS) else {
+        defmt::error!("the controller's constants are out of range");
+        semihosting::exit(false)
+    };
+    schedule::start(control, producer, Receiver::new(writer, &BUS));
     uart::TELEMETRY.start_sending();
-    uart::BUS.start_receiving();
-    if let Some(mut core) = cortex_m::Peripherals::take() {
-        // SAFETY: priorities are set before the interrupts are enabled.
-        unsafe {
-            core.SCB.set_priority(SystemHandler::SysTick, 0x00);
-            core.NVIC.set_priority(BusInterrupt, 0x80);
-            cortex_m::peripheral::NVIC::unmask(BusInterrupt);
-        }
-        core.SYST.set_clock_source(SystClkSource::Core);
-        core.SYST.set_reload(clock::TICK - 1);
-        core.SYST.clear_current();
-        core.SYST.enable_interrupt();
-        core.SYST.enable_counter();
-    }
-    defmt::info!("hello {}", clock::now());
-    while TICKS.load(Ordering::Relaxed) < 2000 {
-        while let Some(b) = ECHO.dequeue() {
-            uart::TELEMETRY.write(b);
-        }
-    }
-    defmt::info!("bye {} {}", clock::now(), stack::high_water());
-    log::exit(true)
+    idle(consumer, semihosting::run_length())
 }
 
-#[exception]
-fn SysTick() {
-    TICKS.fetch_add(1, Ordering::Relaxed);
+/// Sends records until the run is over; a run length of 0 never is.
+fn idle(mut records: Consumer<'static, Tick>, ticks: u32) -> ! {
+    let mut line = [0; MAX_FRAMED];
+    loop {
+        // `heapless` divides by the queue's length, which it does not know to be positive: without
+        // this check the panic of that division would survive.
+        let record = if records.capacity() < QUEUE { records.dequeue() } else { None };
+        match record {
+            Some(record) => send(frame(&record, &mut line)),
+            None if ticks != 0 && schedule::ticks() >= ticks => break,
+            // An interrupt between the dequeue and here is seen at the next tick, 1 ms later.
+            None => cortex_m::asm::wfi(),
+        }
+    }
+    schedule::stop();
+    while let Some(record) = records.dequeue() {
+        send(frame(&record, &mut line));
+    }
+    let summary = schedule::summary(stack::high_water());
+    send(frame(&summary, &mut line));
+    defmt::info!(
+        "{} ticks, {} deadlines missed, {} frames published, {} bytes of stack",
+        summary.ticks,
+        summary.deadline_misses,
+        BUS.published(),
+        summary.stack_bytes
+    );
+    semihosting::exit(summary.deadline_misses == 0)
 }
 
-/// UART 0 has a byte.
-pub extern "C" fn bus_interrupt() {
-    uart::BUS.acknowledge();
-    while let Some(b) = uart::BUS.read() {
-        let _ = ECHO.enqueue(b);
+fn send(bytes: Option<&[u8]>) {
+    for &byte in bytes.unwrap_or_default() {
+        uart::TELEMETRY.write(byte);
     }
 }

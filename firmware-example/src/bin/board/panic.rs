@@ -15,11 +15,11 @@ fn panic(_info: &core::panic::PanicInfo) -> ! {
         unsafe { a_panic_path_survived_in_the_firmware() }
     }
     #[cfg(debug_assertions)]
-    crate::log::exit(false)
+    crate::semihosting::exit(false)
 }
 
 /// A fault means broken hardware or an unsound `unsafe`: stop, so that a test sees it.
 #[exception]
 unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
-    crate::log::exit(false)
+    crate::semihosting::exit(false)
 }

@@ -57,21 +57,16 @@ impl Uart {
 
     /// The byte that has arrived, if any.
     pub fn read(&self) -> Option<u8> {
-        let [byte, ..] = if self.state.read() & RECEIVE_FULL == 0 {
+        if self.state.read() & RECEIVE_FULL == 0 {
             return None;
-        } else {
-            self.data.read().to_le_bytes()
-        };
+        }
+        let [byte, ..] = self.data.read().to_le_bytes();
         Some(byte)
     }
 
-    /// Whether a byte was lost because nobody read the one before; clears the mark.
-    pub fn overrun(&self) -> bool {
-        let overrun = self.state.read() & RECEIVE_OVERRUN != 0;
-        if overrun {
-            self.state.write(RECEIVE_OVERRUN);
-        }
-        overrun
+    /// Whether a byte was ever lost because nobody read the one before.
+    pub fn has_overrun(&self) -> bool {
+        self.state.read() & RECEIVE_OVERRUN != 0
     }
 
     /// Sends one byte, after the one before has left.

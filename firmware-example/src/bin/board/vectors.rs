@@ -1,6 +1,6 @@
 //! The interrupt vectors of the board that are in use.
 
-use crate::bus_interrupt;
+use crate::schedule::bus_interrupt;
 
 /// Number of UART 0's receive interrupt.
 #[derive(Clone, Copy)]

@@ -1,0 +1,157 @@
+//! The two interrupts, and the watch over the first one's deadline.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use controller::telemetry::{Summary, Tick};
+use controller::{Control, Receiver};
+use cortex_m::peripheral::scb::SystemHandler;
+use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m::peripheral::{NVIC, Peripherals, SYST};
+use cortex_m_rt::exception;
+use heapless::spsc::Producer;
+
+use crate::exclusive::Exclusive;
+use crate::vectors::BusInterrupt;
+use crate::{QUEUE, clock, semihosting, uart};
+
+/// Priorities of the interrupts: the upper bits count, and less is more urgent.
+const CONTROL_PRIORITY: u8 = 0x00;
+const BUS_PRIORITY: u8 = 0x80;
+
+static TIMELINE: Exclusive<Option<Timeline>> = Exclusive::new(None);
+static RECEIVER: Exclusive<Option<Receiver>> = Exclusive::new(None);
+/// Control ticks run so far.
+static TICKS: AtomicU32 = AtomicU32::new(0);
+
+/// What the control interrupt owns.
+struct Timeline {
+    control: Control,
+    records: Producer<'static, Tick>,
+    /// When the running tick was due, on the clock; `None` before the first.
+    due: Option<u32>,
+    deadline_misses: u32,
+    latency: u32,
+    longest: u32,
+    dropped: u32,
+}
+
+/// Starts the clock and both interrupts.
+pub fn start(control: Control, records: Producer<'static, Tick>, receiver: Receiver) {
+    let Some(mut core) = Peripherals::take() else { semihosting::exit(false) };
+    TIMELINE.with(|timeline| {
+        *timeline = Some(Timeline {
+            control,
+            records,
+            due: None,
+            deadline_misses: 0,
+            latency: 0,
+            longest: 0,
+            dropped: 0,
+        });
+    });
+    RECEIVER.with(|place| *place = Some(receiver));
+    clock::start();
+    uart::BUS.start_receiving();
+    // SAFETY: no critical section relies on priorities, and the handlers' state is in place.
+    unsafe {
+        core.SCB.set_priority(SystemHandler::SysTick, CONTROL_PRIORITY);
+        core.NVIC.set_priority(BusInterrupt, BUS_PRIORITY);
+        NVIC::unmask(BusInterrupt);
+    }
+    core.SYST.set_clock_source(SystClkSource::Core);
+    core.SYST.set_reload(clock::TICK - 1);
+    core.SYST.clear_current();
+    core.SYST.enable_counter();
+    core.SYST.enable_interrupt();
+}
+
+/// Stops both interrupts.
+pub fn stop() {
+    NVIC::mask(BusInterrupt);
+    // SAFETY: SysTick belongs to this module; one write of its control register.
+    unsafe { (*SYST::PTR).csr.write(0) };
+}
+
+/// Control ticks run so far.
+pub fn ticks() -> u32 {
+    TICKS.load(Ordering::Relaxed)
+}
+
+/// The run so far; after `stop`, all of it.
+pub fn summary(stack_bytes: u32) -> Summary {
+    let mut summary = Summary {
+        kind: Summary::KIND,
+        ticks: ticks(),
+        deadline_misses: 0,
+        latency_counts: 0,
+        tick_counts: 0,
+        records_dropped: 0,
+        bus_overrun: u32::from(uart::BUS.has_overrun()),
+        stack_bytes,
+    };
+    TIMELINE.with(|timeline| {
+        if let Some(timeline) = timeline {
+            summary.deadline_misses = timeline.deadline_misses;
+            summary.latency_counts = timeline.latency;
+            summary.tick_counts = timeline.longest;
+            summary.records_dropped = timeline.dropped;
+        }
+    });
+    summary
+}
+
+/// The control tick.
+#[exception]
+fn SysTick() {
+    let now = clock::now();
+    // Counts since SysTick wrapped: how late this is.
+    let late = (clock::TICK - 1).wrapping_sub(SYST::get_current());
+    TIMELINE.with(|timeline| {
+        if let Some(timeline) = timeline {
+            timeline.run(now, late);
+        }
+    });
+    TICKS.fetch_add(1, Ordering::Relaxed);
+}
+
+impl Timeline {
+    fn run(&mut self, now: u32, late: u32) {
+        // Later ticks follow from the first one: a tick that never ran would leave no other trace.
+        let due = match self.due {
+            None => now.wrapping_sub(late),
+            Some(before) => {
+                let next = before.wrapping_add(clock::TICK);
+                let skipped = now.wrapping_sub(next) / clock::TICK;
+                self.deadline_misses = self.deadline_misses.saturating_add(skipped);
+                next.wrapping_add(skipped.wrapping_mul(clock::TICK))
+            }
+        };
+        self.due = Some(due);
+        self.latency = self.latency.max(now.wrapping_sub(due));
+
+        let record = self.control.tick(clock::now);
+        // The check tells the optimiser that the queue's length, by which `heapless` divides, is
+        // positive: else that division's panic would survive.
+        if self.records.capacity() >= QUEUE || self.records.enqueue(record).is_err() {
+            self.dropped = self.dropped.saturating_add(1);
+        }
+
+        let taken = clock::now().wrapping_sub(due);
+        self.longest = self.longest.max(taken);
+        if taken > clock::TICK {
+            self.deadline_misses = self.deadline_misses.saturating_add(1);
+        }
+    }
+}
+
+/// UART 0 has a byte.
+pub extern "C" fn bus_interrupt() {
+    uart::BUS.acknowledge();
+    RECEIVER.with(|receiver| {
+        while let Some(byte) = uart::BUS.read() {
+            if let Some(receiver) = receiver {
+                receiver.byte(byte, ticks());
+            }
+        }
+    });
+}

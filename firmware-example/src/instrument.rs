@@ -1,0 +1,37 @@
+//! Where the instrument is: on a robot, the kinematics answer this; here, a script.
+
+use core::f32::consts::TAU;
+
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::{Capsule, ToolError};
+
+use crate::surface::{SURFACE_CENTER, SURFACE_REACH};
+
+/// Length of the instrument's last link, in mm.
+const LENGTH: f32 = 60.0;
+/// Its radius, in mm.
+const RADIUS: f32 = 2.5;
+
+/// The instrument at a tick: a capsule that enters through a fixed port, as in keyhole surgery,
+/// while its tip sweeps around the surface and, every seven seconds, through the middle of it.
+///
+/// The sum of a few slow sines, as a surgeon's hand moves, and of a physiological tremor (9 Hz,
+/// 0.1 mm). A function of the tick alone, so that two runs are the same run.
+///
+/// # Errors
+/// None for a surface of ordinary size: [`ToolError`] names a coordinate that is not finite.
+pub fn instrument(tick: u32) -> Result<Capsule, ToolError> {
+    let wave = |period: u32, phase: f32| {
+        libm::sinf(TAU * ((tick % period) as f32 / period as f32 + phase))
+    };
+    // From 1.5 times the surface's size down to its middle.
+    let distance = SURFACE_REACH * (0.75 + 0.75 * wave(7_000, 0.25));
+    let around = Vec3::new(wave(11_000, 0.25), wave(11_000, 0.0), 0.6 * wave(5_300, 0.1));
+    let tremor = Vec3::new(wave(111, 0.0), wave(113, 0.3), wave(109, 0.7)) * 0.1;
+    let tip = SURFACE_CENTER + around * distance + tremor;
+
+    let port = SURFACE_CENTER + Vec3::new(0.3, -0.4, 2.0) * SURFACE_REACH;
+    let shaft = port - tip;
+    let length = libm::sqrtf(shaft.length_squared());
+    Capsule::new(tip, tip + shaft * (LENGTH / length), RADIUS)
+}

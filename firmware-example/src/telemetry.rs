@@ -1,0 +1,189 @@
+//! What the controller tells the world: one record a tick, and a summary at the end.
+//!
+//! A record is its fields in order, little-endian, 32 bits each, then a CRC-32 (ISO-HDLC) of them,
+//! framed with COBS and a zero byte. The first field tells which record it is.
+
+use bytemuck::{NoUninit, Pod, Zeroable};
+use dibs_nostd::wire::{enframe, framed_bytes};
+
+const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
+/// Bytes of a checksum.
+const CHECKSUM: usize = 4;
+
+/// Largest record on the line, in bytes.
+pub const MAX_FRAMED: usize = framed_bytes(size_of::<Tick>() + CHECKSUM);
+
+/// What happened in one control tick.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Tick {
+    /// [`Tick::KIND`].
+    pub kind: u32,
+    /// Number of the tick, from 0.
+    pub tick: u32,
+    /// What the controller is doing: a [`State`].
+    pub state: u32,
+    /// The frame that was asked, where there was an answer.
+    pub epoch: u32,
+    /// Its age in ticks.
+    pub age: u32,
+    /// How far its vertices may be from where the sender had them, in mm: the bus's quantisation.
+    pub position_error: f32,
+    /// The instrument's tip, exactly as the query had it, in mm.
+    pub tool_start: [f32; 3],
+    /// Its other end, in mm.
+    pub tool_end: [f32; 3],
+    /// Its radius, in mm.
+    pub tool_radius: f32,
+    /// The answer: see `dibs_nostd::Proximity`, in mm.
+    pub separation: f32,
+    /// Lower end of the certified interval, in mm.
+    pub lower: f32,
+    /// Stated accuracy of both, in mm.
+    pub accuracy: f32,
+    /// The surface's point of the closest pair, in mm.
+    pub point_on_surface: [f32; 3],
+    /// Its triangle's row in the tree; `u32::MAX` where there is none.
+    pub triangle: u32,
+    /// Sphere bounds evaluated.
+    pub node_tests: u32,
+    /// Triangles tested.
+    pub triangle_tests: u32,
+    /// The force on the instrument, in N.
+    pub force: [f32; 3],
+    /// Clock counts that the query took; 0 where there is no clock.
+    pub query_counts: u32,
+    /// Packets that the bus had brought.
+    pub packets: u32,
+    /// Frames published so far.
+    pub frames_published: u32,
+    /// Packets and frames rejected so far.
+    pub rejected: u32,
+}
+
+/// What the controller is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum State {
+    /// No surface was ever published: the output is safe, there is no answer.
+    Waiting = 0,
+    /// The surface is fresh; the force follows from the answer.
+    Tracking = 1,
+    /// The surface is older than its limit: the output is safe, the answer is for the record.
+    Stale = 2,
+    /// The query returned an error: the output is safe, there is no answer.
+    Fault = 3,
+}
+
+impl Tick {
+    /// First field of a tick's record.
+    pub const KIND: u32 = 1;
+
+    /// Whether the record holds an answer.
+    #[must_use]
+    pub fn is_answered(&self) -> bool {
+        self.state == State::Tracking as u32 || self.state == State::Stale as u32
+    }
+}
+
+/// What happened in the whole run.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Summary {
+    /// [`Summary::KIND`].
+    pub kind: u32,
+    /// Control ticks run.
+    pub ticks: u32,
+    /// Ticks that ended later than the next one was due, and ticks that never ran.
+    pub deadline_misses: u32,
+    /// Longest time from the moment a tick was due to its first instruction, in clock counts.
+    pub latency_counts: u32,
+    /// Longest time from the moment a tick was due to its end, in clock counts.
+    pub tick_counts: u32,
+    /// Records that found the queue full.
+    pub records_dropped: u32,
+    /// 1 if the bus ever lost a byte because nobody read it in time, else 0.
+    pub bus_overrun: u32,
+    /// Largest stack use, in bytes.
+    pub stack_bytes: u32,
+}
+
+impl Summary {
+    /// First field of a summary.
+    pub const KIND: u32 = 2;
+}
+
+/// A record as it comes over the line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Record {
+    /// One control tick.
+    Tick(Tick),
+    /// The whole run.
+    Summary(Summary),
+}
+
+/// Writes a [`Tick`] or a [`Summary`] to `out` as it goes over the line; `None` only where `out` is
+/// too small.
+pub fn frame<'b, T: NoUninit>(record: &T, out: &'b mut [u8; MAX_FRAMED]) -> Option<&'b [u8]> {
+    const { assert!(cfg!(target_endian = "little"), "records are little-endian") };
+    let mut bytes = [0; size_of::<Tick>() + CHECKSUM];
+    let fields = bytemuck::bytes_of(record);
+    let (place, rest) = bytes.split_at_mut_checked(fields.len())?;
+    for (to, from) in place.iter_mut().zip(fields) {
+        *to = *from;
+    }
+    *rest.first_chunk_mut()? = CRC.checksum(fields).to_le_bytes();
+    enframe(bytes.get(..fields.len() + CHECKSUM)?, out)
+}
+
+impl Record {
+    /// Reads what [`frame`] wrote, after COBS was taken off; `None` for anything damaged.
+    #[must_use]
+    pub fn decode(bytes: &[u8]) -> Option<Self> {
+        let (fields, stated) = bytes.split_last_chunk::<CHECKSUM>()?;
+        if CRC.checksum(fields) != u32::from_le_bytes(*stated) {
+            return None;
+        }
+        let kind = u32::from_le_bytes(*fields.first_chunk()?);
+        match kind {
+            Tick::KIND => bytemuck::try_pod_read_unaligned(fields).ok().map(Self::Tick),
+            Summary::KIND => bytemuck::try_pod_read_unaligned(fields).ok().map(Self::Summary),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MAX_FRAMED, Record, Summary, Tick, frame};
+    use bytemuck::Zeroable;
+    use dibs_nostd::wire::Deframer;
+
+    fn over_the_line(bytes: &[u8]) -> Option<Record> {
+        let mut deframer = Deframer::<256>::new();
+        let mut records = Vec::new();
+        for &byte in bytes {
+            if let Some(Ok(packet)) = deframer.push(byte) {
+                records.extend(Record::decode(packet));
+            }
+        }
+        records.first().copied()
+    }
+
+    #[test]
+    fn records_survive_the_line_and_damage_is_seen() {
+        let tick = Tick { kind: Tick::KIND, tick: 7, separation: 1.25, ..Tick::zeroed() };
+        let summary = Summary { kind: Summary::KIND, ticks: 9, ..Summary::zeroed() };
+        let mut out = [0; MAX_FRAMED];
+        let sent = frame(&summary, &mut out).unwrap();
+        assert_eq!(over_the_line(sent), Some(Record::Summary(summary)));
+        let sent = frame(&tick, &mut out).unwrap().to_vec();
+        assert_eq!(over_the_line(&sent), Some(Record::Tick(tick)));
+        for at in 0..sent.len() {
+            let mut damaged = sent.clone();
+            damaged[at] ^= 0x10;
+            assert_eq!(over_the_line(&damaged), None, "byte {at}");
+        }
+    }
+}

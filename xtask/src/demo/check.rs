@@ -1,0 +1,65 @@
+//! Whether an answer is right: exhaustive search in f64 on the vertices of the same frame.
+
+use anyhow::{Context, Result};
+use controller::telemetry::Tick;
+use dibs_nostd::Index;
+use dibs_tests::oracle::{Instrument, closest_pair, exhaustive};
+use glam::Vec3;
+
+use super::scene::Scene;
+use super::sender::Link;
+
+/// What the check of one answer found.
+#[derive(Clone, Copy, Debug)]
+pub struct Checked {
+    /// The tick.
+    pub tick: u32,
+    /// Distance of the answer from the truth, in units of its stated accuracy: at most 1 is right.
+    pub error: f64,
+}
+
+impl Checked {
+    /// Whether the answer is off by more than it states; also where the error is not a number.
+    pub fn is_wrong(&self) -> bool {
+        !(self.error <= 1.0)
+    }
+}
+
+/// Checks one answer: its separation, its interval, and its point. The error is the largest of the
+/// three.
+pub fn check(scene: &Scene, link: &Link, tick: &Tick) -> Result<Checked> {
+    let positions = link
+        .frame(tick.epoch)
+        .with_context(|| format!("tick {} used frame {}, never sent", tick.tick, tick.epoch))?;
+    let tool = Instrument::capsule(
+        Vec3::from(tick.tool_start),
+        Vec3::from(tick.tool_end),
+        tick.tool_radius,
+    );
+    let truth = exhaustive(&positions, &scene.triangles, &tool).context("no triangles")?;
+
+    // The bus's quantisation is not an error here: both sides use the vertices as they were decoded.
+    let accuracy = f64::from(tick.accuracy);
+    let separation = (f64::from(tick.separation) - truth.separation).abs();
+    let interval = (f64::from(tick.lower) - truth.separation).max(0.0);
+    let point = Vec3::from(tick.point_on_surface).as_dvec3();
+    let off_surface = match corners(scene, tick.triangle) {
+        Some(rows) => {
+            let corners = rows.map(|row| positions[row as usize].as_dvec3());
+            closest_pair(point, point, corners).distance
+        }
+        None => f64::INFINITY,
+    };
+    let largest = separation.max(interval).max(off_surface);
+    Ok(Checked { tick: tick.tick, error: largest / accuracy })
+}
+
+fn corners(scene: &Scene, triangle: u32) -> Option<[u32; 3]> {
+    fn of<I: Index>(scene: &Scene, triangle: u32) -> Option<[u32; 3]> {
+        scene.tree.tree::<I>().ok()?.triangle(triangle)
+    }
+    match scene.tree.index_bits() {
+        16 => of::<u16>(scene, triangle),
+        _ => of::<u32>(scene, triangle),
+    }
+}

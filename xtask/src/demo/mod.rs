@@ -1,0 +1,59 @@
+//! `cargo xtask demo`: a beating heart streamed to the controller, every answer checked.
+
+mod check;
+mod machine;
+mod plot;
+mod report;
+mod scene;
+mod sender;
+mod session;
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+
+use crate::workspace;
+use machine::Machine;
+use report::Report;
+use scene::Scene;
+
+/// Streams a beating heart to the firmware while its instrument moves around and through it, and
+/// checks every answer against exhaustive search.
+#[derive(clap::Args)]
+pub struct Options {
+    /// Mesh of the surface at rest (OBJ, STL, PLY or OFF); the generated heart of 10,272 triangles
+    /// if absent.
+    #[arg(long, requires = "motion")]
+    pub mesh: Option<PathBuf>,
+    /// Its motion: a PC2 file with a position for each of the mesh's vertices in every frame.
+    #[arg(long, requires = "mesh")]
+    pub motion: Option<PathBuf>,
+    /// Limit on stretch that the tree is built for; by default 1.5 for the generated heart, and
+    /// what the motion needs (with 2 % to spare) for a mesh of your own.
+    #[arg(long)]
+    pub stretch: Option<f32>,
+    /// Seconds of the controller's time to run.
+    #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..=3600))]
+    pub seconds: u32,
+    /// Runs the controller as a program on this computer, without cross toolchain and QEMU.
+    #[arg(long)]
+    pub host: bool,
+}
+
+/// Runs the demo and writes its report and pictures; an error names each promise that was broken.
+pub fn run(options: &Options) -> Result<()> {
+    let scene = Scene::load(options)?;
+    println!("surface: {}", scene.describe());
+    let machine = Machine::prepare(options.host, &scene)?;
+    println!("controller: {}", machine.describe());
+
+    let folder = workspace::demo();
+    std::fs::create_dir_all(&folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let outcome = session::run(&scene, &machine, options.seconds, &folder)?;
+    plot::draw(&outcome, &folder)?;
+    let report = Report::new(&scene, &machine, &outcome)?;
+    report.write(&folder)?;
+    report.print(&folder);
+    report.verdict()
+}

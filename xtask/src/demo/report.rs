@@ -1,0 +1,293 @@
+//! The report: `report.json`, the readable summary, and the verdict.
+
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+
+use anyhow::{Context, Result, bail};
+use controller::TICK_RATE;
+use controller::telemetry::{State, Tick};
+use serde::Serialize;
+
+use super::machine::Machine;
+use super::scene::Scene;
+use super::session::Outcome;
+use crate::process::quiet;
+use crate::{qemu, workspace};
+
+/// Instructions a second of the emulated processor's time.
+const INSTRUCTION_RATE: f64 = 25e6 * qemu::INSTRUCTIONS_A_COUNT as f64;
+
+/// What a run showed, for machines and people. What a run on the host cannot show is `null`.
+#[derive(Serialize)]
+pub struct Report {
+    frames_sent: u32,
+    frames_published: u32,
+    frames_rejected: u32,
+    ticks: u32,
+    queries: usize,
+    /// Answers off by more than their stated accuracy.
+    mismatches: usize,
+    /// Largest error of an answer, in units of its stated accuracy.
+    largest_error: f64,
+    /// Largest stated accuracy, in mm.
+    accuracy_mm: f32,
+    /// Largest distance between a vertex and what the bus's quantisation made of it, in mm.
+    position_error_mm: f32,
+    separation_min_mm: f32,
+    separation_max_mm: f32,
+    force_max_n: f32,
+    ticks_waiting: usize,
+    ticks_stale: usize,
+    instructions_mean: Option<f64>,
+    instructions_max: Option<u64>,
+    node_tests_mean: f64,
+    triangle_tests_mean: f64,
+    deadline_misses: Option<u32>,
+    /// Longest time from a tick's due moment to its first instruction, in microseconds.
+    latency_max_us: Option<f64>,
+    /// Longest time from a tick's due moment to its end, in microseconds.
+    tick_max_us: Option<f64>,
+    flash_bytes: Option<u64>,
+    /// Variables and the deepest stack.
+    ram_bytes: Option<u64>,
+    stack_bytes: Option<u32>,
+    records_lost: u32,
+    real_seconds: f64,
+    surface: String,
+    stretch_limit: f32,
+    machine: Facts,
+    /// Nothing in a run is random: motion and instrument are functions of time.
+    seed: Option<u64>,
+    command: String,
+    controller_command: String,
+    broken_promises: Vec<String>,
+}
+
+/// What the run ran on.
+#[derive(Serialize)]
+struct Facts {
+    controller: String,
+    os: &'static str,
+    processor: String,
+    cores: usize,
+    rustc: String,
+    commit: String,
+}
+
+impl Report {
+    /// Sums up a run.
+    pub fn new(scene: &Scene, machine: &Machine, outcome: &Outcome) -> Result<Self> {
+        let last = outcome.ticks.last().context("the controller ran no tick")?;
+        let answered: Vec<&Tick> = outcome.ticks.iter().filter(|t| t.is_answered()).collect();
+        let count = |state: State| outcome.ticks.iter().filter(|t| t.state == state as u32).count();
+        let mean = |value: fn(&Tick) -> u32| {
+            let sum: f64 = answered.iter().map(|tick| f64::from(value(tick))).sum();
+            if answered.is_empty() { 0.0 } else { sum / answered.len() as f64 }
+        };
+        let least = |value: fn(&Tick) -> f32| {
+            answered.iter().map(|tick| value(tick)).fold(f32::INFINITY, f32::min)
+        };
+        let largest = |value: fn(&Tick) -> f32| {
+            answered.iter().map(|tick| value(tick)).fold(0.0, f32::max)
+        };
+        let summary = outcome.summary;
+        let footprint = match machine {
+            Machine::Board { footprint, .. } => Some(footprint),
+            Machine::Host { .. } => None,
+        };
+        let on_board = footprint.is_some();
+        let scale = u64::from(qemu::INSTRUCTIONS_A_COUNT);
+        let microseconds = |counts: u32| f64::from(counts) / 25.0;
+        let counts_max = answered.iter().map(|tick| tick.query_counts).max().unwrap_or(0);
+        let expected = outcome.ticks_asked.saturating_sub(outcome.ticks.len() as u32);
+        let mut report = Self {
+            frames_sent: outcome.frames_sent,
+            frames_published: last.frames_published,
+            frames_rejected: last.rejected,
+            ticks: summary.ticks,
+            queries: answered.len(),
+            mismatches: outcome.checked.iter().filter(|c| c.is_wrong()).count(),
+            largest_error: outcome.checked.iter().map(|c| c.error).fold(0.0, f64::max),
+            accuracy_mm: largest(|tick| tick.accuracy),
+            position_error_mm: largest(|tick| tick.position_error),
+            separation_min_mm: least(|tick| tick.separation),
+            separation_max_mm: largest(|tick| tick.separation),
+            force_max_n: largest(force),
+            ticks_waiting: count(State::Waiting),
+            ticks_stale: count(State::Stale),
+            instructions_mean: on_board.then(|| mean(|tick| tick.query_counts) * scale as f64),
+            instructions_max: on_board.then_some(u64::from(counts_max) * scale),
+            node_tests_mean: mean(|tick| tick.node_tests),
+            triangle_tests_mean: mean(|tick| tick.triangle_tests),
+            deadline_misses: on_board.then_some(summary.deadline_misses),
+            latency_max_us: on_board.then(|| microseconds(summary.latency_counts)),
+            tick_max_us: on_board.then(|| microseconds(summary.tick_counts)),
+            flash_bytes: footprint.map(|f| f.flash),
+            ram_bytes: footprint.map(|f| f.ram + u64::from(summary.stack_bytes)),
+            stack_bytes: on_board.then_some(summary.stack_bytes),
+            records_lost: summary.records_dropped.max(expected),
+            real_seconds: outcome.took.as_secs_f64(),
+            surface: scene.describe(),
+            stretch_limit: scene.surface.stretch,
+            machine: Facts::gather(machine),
+            seed: None,
+            command: command_line(),
+            controller_command: outcome.command.clone(),
+            broken_promises: Vec::new(),
+        };
+        report.broken_promises = report.broken(machine, outcome, count(State::Fault));
+        Ok(report)
+    }
+
+    /// The promises that this run broke.
+    fn broken(&self, machine: &Machine, outcome: &Outcome, faults: usize) -> Vec<String> {
+        let mut broken = Vec::new();
+        let mut promise = |kept: bool, sentence: String| {
+            if !kept {
+                broken.push(sentence);
+            }
+        };
+        let (asked, ran) = (outcome.ticks_asked, self.ticks);
+        promise(ran >= asked, format!("{ran} of {asked} ticks ran"));
+        promise(self.queries > 0, "no query was answered".to_owned());
+        promise(self.queries == outcome.checked.len(), "not every answer was checked".to_owned());
+        let wrong = self.mismatches;
+        let first = outcome.checked.iter().find(|checked| checked.is_wrong());
+        let tick = first.map_or(0, |checked| checked.tick);
+        promise(
+            wrong == 0,
+            format!("{wrong} answers differ from exhaustive search, the first at tick {tick}"),
+        );
+        promise(faults == 0, format!("{faults} queries returned an error"));
+        let rejected = self.frames_rejected;
+        promise(rejected == 0, format!("{rejected} packets or frames were rejected"));
+        let (sent, published) = (self.frames_sent, self.frames_published);
+        // The last frame may have been on its way when the run ended.
+        promise(
+            published > 0 && published + 1 >= sent,
+            format!("{published} of {sent} frames were published"),
+        );
+        let stale = self.ticks_stale;
+        promise(stale == 0, format!("the surface was too old in {stale} ticks"));
+        let lost = self.records_lost;
+        promise(lost == 0, format!("{lost} telemetry records were lost"));
+        let missed = self.deadline_misses.unwrap_or(0);
+        promise(missed == 0, format!("{missed} deadlines were missed"));
+        promise(outcome.summary.bus_overrun == 0, "the bus lost bytes".to_owned());
+        promise(outcome.exited_well, "the controller ended with an error".to_owned());
+        if let Machine::Board { footprint, .. } = machine {
+            let found = footprint.allocators.join(", ");
+            promise(found.is_empty(), format!("the firmware has an allocator: {found}"));
+        }
+        broken
+    }
+
+    /// Writes `report.json`.
+    pub fn write(&self, folder: &Path) -> Result<()> {
+        let path = folder.join("report.json");
+        let json = serde_json::to_string_pretty(self)? + "\n";
+        std::fs::write(&path, json).with_context(|| format!("cannot write {}", path.display()))
+    }
+
+    /// Shows the run to a person.
+    pub fn print(&self, folder: &Path) {
+        let row = |name: &str, value: String| println!("  {name:<22}{value}");
+        println!();
+        row(
+            "frames",
+            format!(
+                "{} sent, {} published, {} packets or frames rejected",
+                self.frames_sent, self.frames_published, self.frames_rejected
+            ),
+        );
+        row("control ticks", format!("{} at {TICK_RATE} Hz", self.ticks));
+        row(
+            "answers",
+            format!(
+                "{}, {} differ from exhaustive f64 search (largest error {:.2} of the stated {:.1e} mm)",
+                self.queries, self.mismatches, self.largest_error, self.accuracy_mm
+            ),
+        );
+        row(
+            "separation",
+            format!("{:.2} to {:.2} mm", self.separation_min_mm, self.separation_max_mm),
+        );
+        row("largest force", format!("{:.2} N", self.force_max_n));
+        row(
+            "tests a query",
+            format!("{:.0} nodes, {:.0} triangles", self.node_tests_mean, self.triangle_tests_mean),
+        );
+        if let (Some(mean), Some(max)) = (self.instructions_mean, self.instructions_max) {
+            row("instructions a query", format!("{mean:.0} mean, {max} max"));
+            row(
+                "",
+                format!(
+                    "{:.1} kHz mean, {:.1} kHz worst at {:.0} MHz and one instruction a cycle",
+                    INSTRUCTION_RATE / mean / 1e3,
+                    INSTRUCTION_RATE / max as f64 / 1e3,
+                    INSTRUCTION_RATE / 1e6
+                ),
+            );
+        }
+        if let (Some(missed), Some(latency), Some(longest)) =
+            (self.deadline_misses, self.latency_max_us, self.tick_max_us)
+        {
+            row(
+                "deadlines missed",
+                format!("{missed}; latest start {latency:.1} us, latest end {longest:.0} us"),
+            );
+        }
+        if let (Some(flash), Some(ram), Some(stack)) =
+            (self.flash_bytes, self.ram_bytes, self.stack_bytes)
+        {
+            row("memory", format!("{flash} bytes flash, {ram} RAM, {stack} of them stack"));
+        }
+        row("took", format!("{:.1} s", self.real_seconds));
+        row("report and pictures", folder.display().to_string());
+        println!();
+    }
+
+    /// An error that names the broken promises, if any.
+    pub fn verdict(&self) -> Result<()> {
+        if !self.broken_promises.is_empty() {
+            bail!("broken promises:\n  {}", self.broken_promises.join("\n  "));
+        }
+        println!("every promise kept");
+        Ok(())
+    }
+}
+
+/// Size of a tick's force, in N.
+pub fn force(tick: &Tick) -> f32 {
+    glam::Vec3::from(tick.force).length()
+}
+
+impl Facts {
+    fn gather(machine: &Machine) -> Self {
+        let limit = Duration::from_secs(10);
+        let ask = |program: &str, arguments: &[&str]| {
+            let mut command = Command::new(program);
+            command.args(arguments).current_dir(workspace::root());
+            quiet(&mut command, limit).map_or("unknown".to_owned(), |text| text.trim().to_owned())
+        };
+        let processors = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+        let model = processors.lines().find_map(|line| line.strip_prefix("model name"));
+        Self {
+            controller: machine.describe(),
+            os: std::env::consts::OS,
+            processor: model
+                .map_or(std::env::consts::ARCH, |name| name.trim_start_matches([' ', '\t', ':']))
+                .to_owned(),
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            rustc: ask("rustc", &["--version"]),
+            commit: ask("git", &["describe", "--always", "--dirty"]),
+        }
+    }
+}
+
+/// The command that started this, as one would type it.
+fn command_line() -> String {
+    let arguments: Vec<_> = std::env::args().skip(1).collect();
+    format!("cargo xtask {}", arguments.join(" "))
+}

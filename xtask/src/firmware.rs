@@ -1,0 +1,89 @@
+//! The board's program: building it, and what its file says about it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, elf};
+
+use crate::process::run;
+use crate::toolchain::Cross;
+
+/// The surface that the firmware is built for.
+pub struct Surface {
+    /// A mesh file, or the generated heart.
+    pub mesh: Option<PathBuf>,
+    /// The limit on stretch.
+    pub stretch: f32,
+}
+
+/// Builds the firmware; it links only if no panic path survived.
+pub fn build(cross: &Cross, surface: &Surface) -> Result<PathBuf> {
+    let mut cargo = cross.cargo("build");
+    cargo.args(["--quiet", "--package", "firmware-example", "--bin", "board"]);
+    cargo.args(["--features", "board", "--profile", "firmware"]);
+    surface.describe_to(&mut cargo);
+    run(&mut cargo).context("the firmware does not build")?;
+    Ok(cross.program("firmware", "board"))
+}
+
+impl Surface {
+    /// Tells the firmware's build script which surface to build in.
+    pub fn describe_to(&self, cargo: &mut std::process::Command) {
+        match &self.mesh {
+            Some(mesh) => cargo.env("DIBS_MESH", mesh),
+            None => cargo.env_remove("DIBS_MESH"),
+        };
+        cargo.env("DIBS_STRETCH", self.stretch.to_string());
+    }
+}
+
+/// What a linked program needs of the board.
+pub struct Footprint {
+    /// Code, constants and the initial values of variables.
+    pub flash: u64,
+    /// Variables, without the stack.
+    pub ram: u64,
+    /// Names of allocator functions, of which there must be none.
+    pub allocators: Vec<String>,
+}
+
+impl Footprint {
+    /// Reads the program's sections and symbols.
+    pub fn read(program: &Path) -> Result<Self> {
+        let bytes = fs::read(program)
+            .with_context(|| format!("cannot read the firmware {}", program.display()))?;
+        let file = object::File::parse(&*bytes)?;
+        let (mut flash, mut ram) = (0, 0);
+        for section in file.sections() {
+            let SectionFlags::Elf { sh_flags, .. } = section.flags() else {
+                bail!("{} is not an ELF file", program.display());
+            };
+            if sh_flags & elf::SHF_ALLOC == elf::SectionFlags(0) {
+                continue;
+            }
+            let zeroed = section.kind() == SectionKind::UninitializedData;
+            if !zeroed {
+                flash += section.size();
+            }
+            if sh_flags & elf::SHF_WRITE != elf::SectionFlags(0) {
+                ram += section.size();
+            }
+        }
+        let allocators = file
+            .symbols()
+            .filter_map(|symbol| symbol.name().ok().map(str::to_owned))
+            .filter(|name| ["alloc", "malloc", "sbrk"].iter().any(|word| is_allocator(name, word)))
+            .collect();
+        Ok(Self { flash, ram, allocators })
+    }
+}
+
+/// `__rust_alloc`, `__rg_dealloc`, `malloc`, `_sbrk`, but not a name that merely contains the word.
+fn is_allocator(name: &str, word: &str) -> bool {
+    let bare = name.trim_start_matches('_');
+    bare == word
+        || ["rust_", "rg_", "rdl_", "rustc_"]
+            .iter()
+            .any(|prefix| bare.strip_prefix(prefix).is_some_and(|rest| rest.contains(word)))
+}

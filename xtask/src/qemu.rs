@@ -1,0 +1,50 @@
+//! The emulated board.
+
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+
+use anyhow::{Result, anyhow};
+
+use crate::apt;
+use crate::process::quiet;
+
+const PROGRAM: &str = "qemu-system-arm";
+
+/// `-icount shift=1`: one instruction takes 2 ns of the board's time, so 500 million of them make a
+/// second: a Cortex-M7 at about 480 MHz that always executes one instruction a cycle.
+const SHIFT: u32 = 1;
+
+/// Instructions that the processor executes while the board's 25 MHz clock counts one.
+pub const INSTRUCTIONS_A_COUNT: u32 = 40 >> SHIFT;
+
+/// Finds QEMU, or installs it. Returns its version line.
+pub fn find() -> Result<String> {
+    version().or_else(|_| apt::install(&[PROGRAM]).and_then(|()| version())).map_err(|error| {
+        anyhow!("no QEMU: {error:#}\nInstall it, then try again:\n  sudo apt-get install {PROGRAM}")
+    })
+}
+
+fn version() -> Result<String> {
+    let text = quiet(Command::new(PROGRAM).arg("--version"), Duration::from_secs(20))?;
+    Ok(text.lines().next().unwrap_or_default().to_owned())
+}
+
+/// The command that boots `program` for `ticks` control ticks. Its bus is UART 0, connected to the
+/// socket `bus`; its telemetry UART 1, connected to the socket `telemetry`.
+pub fn command(program: &Path, bus: &Path, telemetry: &Path, ticks: u32) -> Command {
+    let mut command = Command::new(PROGRAM);
+    command.args(["-machine", "mps2-an500", "-cpu", "cortex-m7"]);
+    command.args(["-display", "none", "-monitor", "none"]);
+    for socket in [bus, telemetry] {
+        command.arg("-serial").arg(format!("unix:{}", socket.display()));
+    }
+    // While the processor sleeps, time jumps to the next interrupt: left to run with this computer's
+    // clock, it would overshoot by however late this computer wakes up.
+    command.args(["-icount", &format!("shift={SHIFT},sleep=off")]);
+    // The firmware reads its run length where a program reads its arguments.
+    command
+        .args(["-semihosting-config", &format!("enable=on,target=native,arg=board,arg={ticks}")]);
+    command.arg("-kernel").arg(program);
+    command
+}

@@ -1,0 +1,166 @@
+//! How to build for the board. This is the only place that decides it.
+//!
+//! In this order: the target is installed for the toolchain in use; `rustup target add` can add it;
+//! Debian's own toolchain builds it together with `core`; or a message says what to do by hand.
+//! `DIBS_CROSS=rustup|debian|none` forces one of them.
+
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use anyhow::{Context, Result, anyhow, bail};
+
+use crate::process::quiet;
+use crate::{apt, workspace};
+
+/// The Cortex-M7 with its single-precision FPU.
+pub const TARGET: &str = "thumbv7em-none-eabihf";
+
+const MOMENT: Duration = Duration::from_secs(20);
+const DOWNLOAD: Duration = Duration::from_secs(180);
+const DEBIAN_CARGO: &str = "/usr/bin/cargo";
+const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+const DEBIAN_PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
+
+/// A toolchain that builds for the board.
+pub enum Cross {
+    /// The toolchain in use has the target.
+    Rustup,
+    /// Debian's compiler with `core` built from source, and the linker of the toolchain in use.
+    Debian {
+        /// `rust-lld`.
+        linker: PathBuf,
+    },
+}
+
+impl Cross {
+    /// Finds a toolchain, or makes one.
+    pub fn find() -> Result<Self> {
+        match env::var("DIBS_CROSS").as_deref() {
+            Ok("rustup") => rustup(),
+            Ok("debian") => debian(),
+            Ok("none") => bail!("DIBS_CROSS=none: told not to build for the board"),
+            Ok(other) => bail!("DIBS_CROSS is `{other}`: it must be rustup, debian or none"),
+            Err(_) => rustup()
+                .or_else(|no_rustup| debian().map_err(|no_debian| by_hand(&no_rustup, &no_debian))),
+        }
+    }
+
+    /// `cargo SUBCOMMAND` for the board. Each route has its own folder, so that two compilers do not
+    /// throw away each other's work.
+    pub fn cargo(&self, subcommand: &str) -> Command {
+        let mut command = match self {
+            Self::Rustup => {
+                let mut command = Command::new("cargo");
+                command.arg(subcommand);
+                command
+            }
+            Self::Debian { linker } => {
+                let mut command = Command::new(DEBIAN_CARGO);
+                command
+                    .args([subcommand, "-Zbuild-std=core"])
+                    .env("RUSTC", DEBIAN_RUSTC)
+                    .env("RUSTC_BOOTSTRAP", "1")
+                    .env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker)
+                    .env_remove("RUSTUP_TOOLCHAIN");
+                command
+            }
+        };
+        command.args(["--target", TARGET, "--target-dir"]).arg(self.target_dir());
+        command.current_dir(workspace::root());
+        command
+    }
+
+    /// The program that `cargo build --profile PROFILE` leaves.
+    pub fn program(&self, profile: &str, name: &str) -> PathBuf {
+        self.target_dir().join(TARGET).join(profile).join(name)
+    }
+
+    /// One line for the user.
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Rustup => format!("rustup toolchain with {TARGET}"),
+            Self::Debian { .. } => {
+                let version = quiet(Command::new(DEBIAN_RUSTC).arg("--version"), MOMENT);
+                format!("Debian's {} with core from source", version.unwrap_or_default().trim())
+            }
+        }
+    }
+
+    fn target_dir(&self) -> PathBuf {
+        match self {
+            Self::Rustup => workspace::target(),
+            Self::Debian { .. } => workspace::target().join("debian"),
+        }
+    }
+}
+
+fn rustup() -> Result<Cross> {
+    if target_installed() {
+        return Ok(Cross::Rustup);
+    }
+    eprintln!("adding the target {TARGET} ...");
+    quiet(Command::new("rustup").args(["target", "add", TARGET]), DOWNLOAD)?;
+    if !target_installed() {
+        bail!("rustup added {TARGET}, but not to the toolchain in use");
+    }
+    Ok(Cross::Rustup)
+}
+
+fn target_installed() -> bool {
+    let mut command = Command::new("rustc");
+    command.args(["--print", "target-libdir", "--target", TARGET]);
+    quiet(&mut command, MOMENT).is_ok_and(|folder| Path::new(folder.trim()).is_dir())
+}
+
+fn debian() -> Result<Cross> {
+    if !debian_installed() {
+        apt::install(&DEBIAN_PACKAGES)?;
+        if !debian_installed() {
+            bail!("{} left no compiler with core's sources", DEBIAN_PACKAGES.join(" "));
+        }
+    }
+    let version = quiet(Command::new(DEBIAN_RUSTC).arg("--version"), MOMENT)?;
+    let minor = version.split('.').nth(1).and_then(|minor| minor.parse::<u32>().ok());
+    let needed = env!("CARGO_PKG_RUST_VERSION").split('.').nth(1).and_then(|m| m.parse().ok());
+    if minor < needed {
+        bail!(
+            "{DEBIAN_RUSTC} is {}, older than {}",
+            version.trim(),
+            env!("CARGO_PKG_RUST_VERSION")
+        );
+    }
+    Ok(Cross::Debian { linker: linker()? })
+}
+
+fn debian_installed() -> bool {
+    let sysroot = quiet(Command::new(DEBIAN_RUSTC).args(["--print", "sysroot"]), MOMENT);
+    let sources = "lib/rustlib/src/rust/library/core/src/lib.rs";
+    sysroot.is_ok_and(|folder| Path::new(folder.trim()).join(sources).exists())
+        && Path::new(DEBIAN_CARGO).exists()
+}
+
+/// Debian's compiler has no `rust-lld`; the toolchain that builds xtask has one.
+fn linker() -> Result<PathBuf> {
+    let verbose = quiet(Command::new("rustc").arg("-vV"), MOMENT)?;
+    let host = verbose
+        .lines()
+        .find_map(|line| line.strip_prefix("host: "))
+        .context("`rustc -vV` names no host")?;
+    let sysroot = quiet(Command::new("rustc").args(["--print", "sysroot"]), MOMENT)?;
+    let linker = Path::new(sysroot.trim()).join("lib/rustlib").join(host).join("bin/rust-lld");
+    if !linker.exists() {
+        bail!("no linker at {}", linker.display());
+    }
+    Ok(linker)
+}
+
+fn by_hand(no_rustup: &anyhow::Error, no_debian: &anyhow::Error) -> anyhow::Error {
+    anyhow!(
+        "nothing here builds for {TARGET}:\n  rustup: {no_rustup:#}\n  Debian: {no_debian:#}\n\
+         Do one of these, then try again:\n  rustup target add {TARGET}\n  \
+         sudo apt-get install {}",
+        DEBIAN_PACKAGES.join(" ")
+    )
+}
