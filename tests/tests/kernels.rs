@@ -2,7 +2,7 @@
 //! scale, within the accuracy that the core states.
 
 use dibs_nostd::{ACCURACY, AxisPair, Capsule, Sphere, Tool, ToolError};
-use dibs_tests::oracle::closest_pair;
+use dibs_tests::oracle::{Instrument, closest_pair, exhaustive};
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 
@@ -311,6 +311,27 @@ fn a_capsule_of_length_zero_answers_as_a_sphere() {
             assert_eq!(pair.axis_parameter, 0.0);
         }
     }
+}
+
+/// The oracle's search of a whole surface passes over triangles, but never the closest.
+#[test]
+fn exhaustive_search_finds_the_closest_triangle() {
+    let mut rng = fastrand::Rng::with_seed(17);
+    for _ in 0..CASES / 10 {
+        let positions: Vec<Vec3> = (0..60).map(|_| vector(&mut rng)).collect();
+        let triangles: Vec<[u32; 3]> = (0..100).map(|_| [(); 3].map(|()| rng.u32(0..60))).collect();
+        let (start, end) = (3.0 * vector(&mut rng), 3.0 * vector(&mut rng));
+        let found = exhaustive(&positions, &triangles, &Instrument::capsule(start, end, 0.5))
+            .expect("there are triangles");
+        let distances = triangles.iter().map(|t| {
+            let corners = t.map(|v| positions[v as usize].as_dvec3());
+            closest_pair(start.as_dvec3(), end.as_dvec3(), corners).distance
+        });
+        let closest = distances.fold(f64::INFINITY, f64::min);
+        assert_eq!(found.axis_distance, closest);
+        assert_eq!(found.separation, (closest - 0.5).max(0.0));
+    }
+    assert!(exhaustive(&[], &[], &Instrument::sphere(Vec3::ZERO, 1.0)).is_none());
 }
 
 /// parry3d's projection onto a triangle is exact up to rounding for well-shaped triangles.

@@ -27,6 +27,16 @@ pub(super) struct Axis {
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub(super) direction: Vec3,
     pub(super) length: f32,
+    /// 2^-19 of the length's square. A projection onto the axis is off by a few 2^-24 of the distances
+    /// involved, and the axis' extent across it by that times the axis' length: at most this.
+    pub(super) slack: f32,
+}
+
+impl Axis {
+    /// A segment of length zero.
+    pub(super) fn point(start: Vec3) -> Self {
+        Self { start, direction: Vec3::ZERO, length: 0.0, slack: 0.0 }
+    }
 }
 
 impl Capsule {
@@ -53,9 +63,9 @@ impl Capsule {
             // Three divisions rather than one: `length * direction` is then within two roundings of
             // `span`, however `length` was rounded.
             let direction = Vec3::new(span.x / length, span.y / length, span.z / length);
-            Axis { start, direction, length }
+            Axis { start, direction, length, slack: length * length * (16.0 * f32::EPSILON) }
         } else {
-            Axis { start, direction: Vec3::ZERO, length: 0.0 }
+            Axis::point(start)
         };
         Ok(Self { axis, radius })
     }
@@ -92,13 +102,17 @@ impl Tool for Capsule {
 
     #[inline]
     fn axis_distance_squared(&self, point: Vec3) -> f32 {
-        let Axis { start, direction, length } = self.axis;
+        let Axis { start, direction, length, .. } = self.axis;
         let offset = point - start;
         let across = offset - clamp(offset.dot(direction), length) * direction;
         across.dot(across)
     }
 
+    #[inline]
     fn closest_on_triangle(&self, corners: &[Vec3; 3], limit_squared: f32) -> Option<AxisPair> {
+        if triangle::far_from_segment(&self.axis, corners, limit_squared) {
+            return None;
+        }
         triangle::closest_to_segment(&self.axis, corners, limit_squared)
     }
 }
