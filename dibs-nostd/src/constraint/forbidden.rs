@@ -1,0 +1,64 @@
+//! Keep out: a margin around the surface that pushes the tool back.
+
+use glam::Vec3;
+
+use super::{Approach, ConstraintForce, GainError, SpringDamper, Unknown, positive};
+use crate::Proximity;
+
+/// Pushes the tool away from the surface within a margin, and only ever away.
+///
+/// Force along the closest pair's direction, with `d = lower - accuracy`:
+///
+/// `F = min(max_force, max(0, K (margin - d) - B v))` for `d < margin`, else 0,
+///
+/// where `v` is the tool's speed away from the surface, negative on approach. In a shallow
+/// penetration `d` goes on below zero as the depth, and the spring goes on with it up to
+/// saturation. When a budget cut the query short, the size of the force is that of the nearest the
+/// surface could be, and its direction that of the best pair found.
+///
+/// ```
+/// use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper, Unknown};
+/// use dibs_nostd::glam::Vec3;
+///
+/// let spring = SpringDamper::new(2.0, 0.01, 5.0)?; // N/mm, N s/mm, N
+/// let wall = ForbiddenRegion::new(spring, 3.0)?; // mm
+///
+/// // No surface yet: the tool is damped, the state says why.
+/// let safe = wall.force(Err(Unknown::NoSurface), Vec3::new(100.0, 0.0, 0.0));
+/// assert_eq!(safe.state, ConstraintState::Safe(Unknown::NoSurface));
+/// assert_eq!(safe.force, Vec3::new(-1.0, 0.0, 0.0));
+/// # Ok::<(), dibs_nostd::constraint::GainError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ForbiddenRegion {
+    spring: SpringDamper,
+    margin: f32,
+}
+
+impl ForbiddenRegion {
+    /// A region that reaches `margin` mm from the surface, above 0.
+    ///
+    /// # Errors
+    /// [`GainError`] when the margin is not positive or not finite.
+    pub const fn new(spring: SpringDamper, margin: f32) -> Result<Self, GainError> {
+        let margin = tri!(positive("margin", margin));
+        Ok(Self { spring, margin })
+    }
+
+    /// The force on the tool at this tick.
+    ///
+    /// `velocity` (mm/s) is that of the tool's closest point against the surface; the tool's own
+    /// velocity takes the surface as standing still.
+    #[must_use]
+    pub fn force(&self, proximity: Result<&Proximity, Unknown>, velocity: Vec3) -> ConstraintForce {
+        match Approach::new(proximity, velocity) {
+            Err(reason) => self.spring.hold(velocity, reason),
+            Ok(approach) if approach.separation < self.margin => {
+                let depth = self.margin - approach.separation;
+                self.spring.along(&approach, depth, 0.0)
+            }
+            Ok(_) => ConstraintForce::NONE,
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! Stay near: a spring to a stand-off from the surface.
+
+use glam::Vec3;
+
+use super::{Approach, ConstraintForce, GainError, SpringDamper, Unknown, not_negative};
+use crate::Proximity;
+
+/// Draws the tool to a stand-off from the surface, from either side, with a dead band in which it is
+/// free.
+///
+/// Force along the closest pair's direction, with `d = lower - accuracy` and `e = d - stand_off`:
+///
+/// `F = -K (e -/+ dead_band) - B v` for `e` above / below the dead band, else 0, saturated at
+/// `max_force` both ways.
+///
+/// The lower end of the interval is the conservative one here too: it pulls towards the surface
+/// least, and pushes away from it most.
+///
+/// ```
+/// use dibs_nostd::constraint::{ConstraintState, Guidance, SpringDamper, Unknown};
+/// use dibs_nostd::glam::Vec3;
+///
+/// let spring = SpringDamper::new(0.5, 0.002, 2.0)?;
+/// let guide = Guidance::new(spring, 10.0, 1.0)?; // 9 to 11 mm from the surface is free
+/// let safe = guide.force(Err(Unknown::Stale { age: 250 }), Vec3::ZERO);
+/// assert_eq!(safe.state, ConstraintState::Safe(Unknown::Stale { age: 250 }));
+/// # Ok::<(), dibs_nostd::constraint::GainError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Guidance {
+    spring: SpringDamper,
+    stand_off: f32,
+    dead_band: f32,
+}
+
+impl Guidance {
+    /// A guide to `stand_off` mm from the surface, free within `dead_band` mm of it; both at least 0.
+    ///
+    /// # Errors
+    /// [`GainError`] names the parameter that is negative or not finite.
+    pub const fn new(
+        spring: SpringDamper,
+        stand_off: f32,
+        dead_band: f32,
+    ) -> Result<Self, GainError> {
+        let stand_off = tri!(not_negative("stand_off", stand_off));
+        let dead_band = tri!(not_negative("dead_band", dead_band));
+        Ok(Self { spring, stand_off, dead_band })
+    }
+
+    /// The force on the tool at this tick; `velocity` as in
+    /// [`ForbiddenRegion::force`](super::ForbiddenRegion::force).
+    #[must_use]
+    pub fn force(&self, proximity: Result<&Proximity, Unknown>, velocity: Vec3) -> ConstraintForce {
+        let approach = match Approach::new(proximity, velocity) {
+            Ok(approach) => approach,
+            Err(reason) => return self.spring.hold(velocity, reason),
+        };
+        let error = approach.separation - self.stand_off;
+        let length = if error > self.dead_band {
+            self.dead_band - error
+        } else if error < -self.dead_band {
+            -self.dead_band - error
+        } else {
+            return ConstraintForce::NONE;
+        };
+        let least = -self.spring.max_force;
+        self.spring.along(&approach, length, least)
+    }
+}

@@ -1,0 +1,279 @@
+//! From the closest pair to a force: what a dynamic active constraint puts on the robot.
+//!
+//! Two constraints, both a spring and a damper along the closest pair's direction:
+//! [`ForbiddenRegion`] keeps the tool out of a margin around the surface, [`Guidance`] keeps it at a
+//! stand-off. Units: mm, mm/s, N, N/mm, N s/mm, s. Each force costs some tens of f32 operations and
+//! one root, without a loop.
+//!
+//! # What is promised
+//!
+//! - A force is finite and never larger than `max_force` (up to the direction's rounding), whatever
+//!   comes in.
+//! - It is computed from the conservative end of the certified interval, `lower - accuracy`: a query
+//!   that its budget cut short never lets the tool closer.
+//! - When the proximity is unknown, the surface stale, or a number not finite, the output is the
+//!   *hold*: pure damping against the tool's velocity, saturated the same way, and the state says
+//!   why. With a velocity that is not finite it is zero.
+//!
+//! # What is not: passivity
+//!
+//! A sampled virtual wall puts out energy. Colgate and Schenkel ("Passivity of a class of sampled-data
+//! systems", J. Robotic Systems 14, 1997; ACC 1994) show that with sampling period `T`, stiffness `K`
+//! and damping `B` it is passive exactly if the device's own physical damping `b` satisfies
+//! `b > K T / 2 + |B|`, for velocities by backward difference; a velocity filter and delays ask for
+//! more. [`SpringDamper::device_damping`] computes that figure. Beyond it:
+//!
+//! - On entering a margin the damper acts at once: the force jumps by `B` times the approach speed.
+//! - Where two parts of the surface are equally near (the medial axis), the closest point and with it
+//!   the direction jump from one tick to the next. The size of the force does not, its direction
+//!   does. A narrow gap whose margins overlap is such a place: choose the margin below half the gap.
+//! - A moving surface moves the wall: it does work on the tool, as a beating heart would.
+//! - Saturation: a hand that pushes harder than `max_force` gets through.
+
+/// `?` in a `const fn`.
+macro_rules! tri {
+    ($result:expr) => {
+        match $result {
+            Ok(value) => value,
+            Err(error) => return Err(error),
+        }
+    };
+}
+
+mod forbidden;
+mod guidance;
+#[cfg(test)]
+mod tests;
+
+use core::fmt;
+
+use glam::Vec3;
+
+use crate::Proximity;
+use crate::sqrt::sqrt;
+
+pub use forbidden::ForbiddenRegion;
+pub use guidance::Guidance;
+
+/// A force on the tool, and how it came about.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConstraintForce {
+    /// The force on the tool, at its point of the closest pair, in N. Always finite.
+    pub force: Vec3,
+    /// How it came about.
+    pub state: ConstraintState,
+}
+
+impl ConstraintForce {
+    /// No force.
+    pub const NONE: Self = Self { force: Vec3::ZERO, state: ConstraintState::Inactive };
+}
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for ConstraintForce {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "{} N, {}", self.force.to_array(), self.state);
+    }
+}
+
+/// How a force came about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum ConstraintState {
+    /// The constraint does not act: there is no force.
+    Inactive,
+    /// The constraint acts.
+    Active,
+    /// The constraint acts with its largest force.
+    Saturated,
+    /// The proximity cannot be used: the force is the hold.
+    Safe(Unknown),
+}
+
+/// Why a proximity is unknown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Unknown {
+    /// No surface was ever published.
+    NoSurface,
+    /// The surface is older than allowed.
+    Stale {
+        /// Its age, on the receiver's clock.
+        age: u32,
+    },
+    /// The query returned an error.
+    Query,
+    /// The tool's axis touches the surface: no direction leads out.
+    NoDirection,
+    /// A number is not finite, or the direction is not a unit vector.
+    NotFinite,
+}
+
+impl fmt::Display for Unknown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoSurface => write!(f, "no surface was published yet"),
+            Self::Stale { age } => write!(f, "the surface is {age} old"),
+            Self::Query => write!(f, "the query failed"),
+            Self::NoDirection => write!(f, "the tool's axis touches the surface"),
+            Self::NotFinite => write!(f, "a number is not finite"),
+        }
+    }
+}
+
+impl core::error::Error for Unknown {}
+
+/// A spring and a damper with a largest force: what the constraints are made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SpringDamper {
+    stiffness: f32,
+    damping: f32,
+    hold_damping: f32,
+    max_force: f32,
+}
+
+impl SpringDamper {
+    /// `stiffness` in N/mm, above 0; `damping` in N s/mm, at least 0; `max_force` in N, above 0. The
+    /// hold damps as much as the constraint does.
+    ///
+    /// # Errors
+    /// [`GainError`] names the parameter that is out of range or not finite.
+    pub const fn new(stiffness: f32, damping: f32, max_force: f32) -> Result<Self, GainError> {
+        let stiffness = tri!(positive("stiffness", stiffness));
+        let damping = tri!(not_negative("damping", damping));
+        let max_force = tri!(positive("max_force", max_force));
+        Ok(Self { stiffness, damping, hold_damping: damping, max_force })
+    }
+
+    /// The same with another damping (N s/mm) for the hold; 0 lets go of the tool.
+    ///
+    /// # Errors
+    /// [`GainError`] when it is negative or not finite.
+    pub const fn with_hold_damping(self, hold_damping: f32) -> Result<Self, GainError> {
+        let hold_damping = tri!(not_negative("hold_damping", hold_damping));
+        Ok(Self { hold_damping, ..self })
+    }
+
+    /// The device's own damping (N s/mm) must be above this for a passive wall at a sampling period
+    /// of `tick` seconds: `K T / 2 + B` (Colgate and Schenkel 1997), or the hold's damping if that is
+    /// larger.
+    ///
+    /// ```
+    /// use dibs_nostd::constraint::SpringDamper;
+    /// let wall = SpringDamper::new(2.0, 0.001, 5.0).unwrap();
+    /// assert_eq!(wall.device_damping(0.001), 0.002); // 2 N s/m at 1 kHz
+    /// ```
+    #[must_use]
+    pub fn device_damping(&self, tick: f32) -> f32 {
+        let wall = self.stiffness * tick / 2.0 + self.damping;
+        if wall > self.hold_damping { wall } else { self.hold_damping }
+    }
+
+    /// Force along the approach's direction of a spring that is `length` mm out of its rest; at least
+    /// `least` N: 0 for a force that only ever pushes.
+    fn along(&self, approach: &Approach, length: f32, least: f32) -> ConstraintForce {
+        let force = self.stiffness * length - self.damping * approach.speed;
+        let (force, state) = if force >= self.max_force {
+            (self.max_force, ConstraintState::Saturated)
+        } else if force > least {
+            (force, ConstraintState::Active)
+        } else if force.is_nan() {
+            // Two infinities that cancel.
+            return self.hold(approach.velocity, Unknown::NotFinite);
+        } else if least < 0.0 {
+            (least, ConstraintState::Saturated)
+        } else {
+            (0.0, ConstraintState::Active)
+        };
+        ConstraintForce { force: approach.direction * force, state }
+    }
+
+    /// The safe output: damping against the velocity, saturated.
+    fn hold(&self, velocity: Vec3, reason: Unknown) -> ConstraintForce {
+        // Scaled by the largest axis, so that no square overflows or vanishes.
+        let mut largest = 0.0;
+        for axis in velocity.to_array() {
+            let axis = axis.abs();
+            if axis > largest {
+                largest = axis;
+            }
+        }
+        let scaled = velocity / largest;
+        let length = sqrt(scaled.length_squared());
+        let wanted = self.hold_damping * (largest * length);
+        let size = if wanted > self.max_force { self.max_force } else { wanted };
+        let force = scaled / length * -size;
+        // At rest, or a velocity that is not finite.
+        let force = if force.is_finite() { force } else { Vec3::ZERO };
+        ConstraintForce { force, state: ConstraintState::Safe(reason) }
+    }
+}
+
+/// What a constraint needs to know of a closest pair.
+#[derive(Clone, Copy)]
+struct Approach {
+    /// Unit vector from the surface to the tool.
+    direction: Vec3,
+    /// Conservative separation, in mm; negative for the depth of a penetration.
+    separation: f32,
+    /// Speed along the direction, in mm/s: positive when the tool leaves.
+    speed: f32,
+    velocity: Vec3,
+}
+
+impl Approach {
+    fn new(proximity: Result<&Proximity, Unknown>, velocity: Vec3) -> Result<Self, Unknown> {
+        let proximity = proximity?;
+        let direction = proximity.direction;
+        if direction == Vec3::ZERO {
+            return Err(Unknown::NoDirection);
+        }
+        // Along the direction the two points are `axis_distance - radius` apart, which goes on
+        // below zero where the separation stops.
+        let gap = (proximity.point_on_tool - proximity.point_on_surface).dot(direction);
+        let nearest =
+            if proximity.separation > 0.0 || gap > proximity.lower { proximity.lower } else { gap };
+        let approach = Self {
+            direction,
+            separation: nearest - proximity.accuracy,
+            speed: velocity.dot(direction),
+            velocity,
+        };
+        let is_unit = (direction.length_squared() - 1.0).abs() < 1.0e-3;
+        let is_finite = proximity.separation.is_finite()
+            && gap.is_finite()
+            && approach.separation.is_finite()
+            && approach.speed.is_finite();
+        if is_unit && is_finite { Ok(approach) } else { Err(Unknown::NotFinite) }
+    }
+}
+
+/// A gain that no constraint can have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub struct GainError {
+    /// The parameter's name.
+    pub parameter: &'static str,
+    /// Its value.
+    pub value: f32,
+}
+
+impl fmt::Display for GainError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} cannot be {}", self.parameter, self.value)
+    }
+}
+
+impl core::error::Error for GainError {}
+
+const fn positive(parameter: &'static str, value: f32) -> Result<f32, GainError> {
+    if value > 0.0 && value.is_finite() { Ok(value) } else { Err(GainError { parameter, value }) }
+}
+
+const fn not_negative(parameter: &'static str, value: f32) -> Result<f32, GainError> {
+    if value >= 0.0 && value.is_finite() { Ok(value) } else { Err(GainError { parameter, value }) }
+}

@@ -1,0 +1,251 @@
+//! The forces: their laws, their bounds, and what they do with nonsense.
+
+extern crate std;
+
+use proptest::prelude::*;
+
+use super::*;
+
+const SPRING: Result<SpringDamper, GainError> = SpringDamper::new(2.0, 0.01, 5.0);
+const RADIUS: f32 = 2.5;
+
+/// A tool of this radius whose axis is `gap + RADIUS` from a point of the surface.
+fn pair(gap: f32, direction: Vec3) -> Proximity {
+    let point_on_surface = Vec3::new(1.0, -2.0, 3.0);
+    let separation = if gap > 0.0 { gap } else { 0.0 };
+    Proximity {
+        separation,
+        lower: separation,
+        accuracy: 0.0,
+        axis_distance: gap + RADIUS,
+        point_on_surface,
+        point_on_tool: point_on_surface + direction * gap,
+        direction,
+        axis_parameter: 0.0,
+        triangle: Some(0),
+        corners: [0, 1, 2],
+        barycentric: [1.0, 0.0, 0.0],
+        node_tests: 0,
+        triangle_tests: 0,
+    }
+}
+
+fn wall() -> ForbiddenRegion {
+    ForbiddenRegion::new(SPRING.unwrap(), 3.0).unwrap()
+}
+
+fn guide() -> Guidance {
+    Guidance::new(SPRING.unwrap(), 10.0, 1.0).unwrap()
+}
+
+fn close(a: Vec3, b: Vec3) -> bool {
+    (a - b).length() < 1.0e-5
+}
+
+#[test]
+fn the_wall_is_a_spring_and_a_damper() {
+    let at = |gap, speed| wall().force(Ok(&pair(gap, Vec3::Y)), Vec3::new(9.0, speed, 7.0));
+    assert_eq!(at(3.0, -100.0), ConstraintForce::NONE);
+    assert_eq!(at(50.0, -100.0), ConstraintForce::NONE);
+    // 2 N/mm over 1 mm, and 0.01 N s/mm at 100 mm/s of approach; nothing sideways.
+    assert!(close(at(2.0, 0.0).force, Vec3::Y * 2.0));
+    assert!(close(at(2.0, -100.0).force, Vec3::Y * 3.0));
+    assert_eq!(at(2.0, -100.0).state, ConstraintState::Active);
+    // Leaving fast, the damper outweighs the spring: no force, not a pull.
+    assert_eq!(at(2.0, 1000.0).force, Vec3::ZERO);
+    assert_eq!(at(2.0, 1000.0).state, ConstraintState::Active);
+    assert!(close(at(0.0, 300.0).force, Vec3::Y * 3.0));
+    assert_eq!(at(0.0, 0.0).force, Vec3::Y * 5.0);
+    assert_eq!(at(0.0, 0.0).state, ConstraintState::Saturated);
+}
+
+#[test]
+fn the_spring_goes_on_below_the_surface() {
+    let soft = SpringDamper::new(0.5, 0.0, 5.0).unwrap();
+    let wall = ForbiddenRegion::new(soft, 3.0).unwrap();
+    for (gap, force) in [(1.0, 1.0), (0.0, 1.5), (-1.0, 2.0), (-2.0, 2.5)] {
+        let answer = wall.force(Ok(&pair(gap, Vec3::X)), Vec3::ZERO);
+        assert!(close(answer.force, Vec3::X * force), "{gap}: {answer:?}");
+    }
+}
+
+#[test]
+fn the_interval_counts_from_its_lower_end() {
+    let mut cut = pair(8.0, Vec3::X);
+    cut.lower = 2.0;
+    cut.accuracy = 0.5;
+    assert!(close(wall().force(Ok(&cut), Vec3::ZERO).force, Vec3::X * 3.0));
+    // The guide sees the tool 8.5 mm too near, not 2 mm.
+    assert!(close(guide().force(Ok(&cut), Vec3::ZERO).force, Vec3::X * 5.0));
+}
+
+#[test]
+fn the_guide_pulls_and_pushes() {
+    let at = |gap, speed| guide().force(Ok(&pair(gap, Vec3::Z)), Vec3::new(1.0, 2.0, speed));
+    for gap in [9.0, 9.5, 10.0, 11.0] {
+        assert_eq!(at(gap, 500.0), ConstraintForce::NONE, "{gap}");
+    }
+    assert!(close(at(12.0, 0.0).force, Vec3::Z * -2.0));
+    assert!(close(at(8.0, 0.0).force, Vec3::Z * 2.0));
+    assert!(close(at(12.0, 50.0).force, Vec3::Z * -2.5), "the damper slows leaving down");
+    assert!(close(at(12.0, -50.0).force, Vec3::Z * -1.5), "and coming near");
+    assert_eq!(at(90.0, 0.0).force, Vec3::Z * -5.0);
+    assert_eq!(at(90.0, 0.0).state, ConstraintState::Saturated);
+    assert_eq!(at(0.0, 0.0).force, Vec3::Z * 5.0);
+}
+
+#[test]
+fn the_hold_damps_and_says_why() {
+    let reasons = [
+        Unknown::NoSurface,
+        Unknown::Stale { age: 80 },
+        Unknown::Query,
+        Unknown::NoDirection,
+        Unknown::NotFinite,
+    ];
+    for reason in reasons {
+        let held = wall().force(Err(reason), Vec3::new(0.0, 100.0, 0.0));
+        assert_eq!(held.state, ConstraintState::Safe(reason));
+        assert!(close(held.force, Vec3::new(0.0, -1.0, 0.0)));
+        let fast = guide().force(Err(reason), Vec3::new(3.0e5, 0.0, 4.0e5));
+        assert!(close(fast.force, Vec3::new(-3.0, 0.0, -4.0)), "{fast:?}");
+        assert_eq!(wall().force(Err(reason), Vec3::splat(f32::NAN)).force, Vec3::ZERO);
+        assert_eq!(wall().force(Err(reason), Vec3::ZERO).force, Vec3::ZERO);
+        let absurd = wall().force(Err(reason), Vec3::Y * f32::MAX);
+        assert_eq!(absurd.force, Vec3::Y * -5.0);
+        let free = SPRING.unwrap().with_hold_damping(0.0).unwrap();
+        let free = ForbiddenRegion::new(free, 3.0).unwrap();
+        assert_eq!(free.force(Err(reason), Vec3::ONE).force, Vec3::ZERO);
+    }
+    // A query's answer that gives no direction.
+    let touching = wall().force(Ok(&pair(-RADIUS, Vec3::ZERO)), Vec3::X);
+    assert_eq!(touching.state, ConstraintState::Safe(Unknown::NoDirection));
+}
+
+#[test]
+fn what_is_not_finite_is_not_used() {
+    let spoil: [fn(&mut Proximity, f32); 6] = [
+        |pair, bad| pair.separation = bad,
+        |pair, bad| pair.lower = bad,
+        |pair, bad| pair.accuracy = bad,
+        |pair, bad| pair.direction.y = bad,
+        |pair, bad| pair.point_on_surface.x = bad,
+        |pair, bad| pair.point_on_tool.z = bad,
+    ];
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        for (which, spoil) in spoil.iter().enumerate() {
+            let mut pair = pair(1.0, Vec3::X);
+            spoil(&mut pair, bad);
+            let safe = ConstraintState::Safe(Unknown::NotFinite);
+            assert_eq!(wall().force(Ok(&pair), Vec3::ONE).state, safe, "field {which}, {bad}");
+            assert_eq!(guide().force(Ok(&pair), Vec3::ONE).state, safe, "field {which}, {bad}");
+        }
+        let moving = wall().force(Ok(&pair(1.0, Vec3::X)), Vec3::new(bad, 0.0, 0.0));
+        assert_eq!(moving.state, ConstraintState::Safe(Unknown::NotFinite));
+        assert_eq!(moving.force, Vec3::ZERO);
+    }
+    let mut long = pair(1.0, Vec3::X);
+    long.direction = Vec3::X * 1.5;
+    assert!(matches!(wall().force(Ok(&long), Vec3::ZERO).state, ConstraintState::Safe(_)));
+}
+
+#[test]
+fn gains_out_of_range_are_named() {
+    let named = |result: Result<SpringDamper, GainError>| result.unwrap_err().parameter;
+    for bad in [-1.0, f32::NAN, f32::INFINITY] {
+        assert_eq!(named(SpringDamper::new(bad, 0.0, 1.0)), "stiffness");
+        assert_eq!(named(SpringDamper::new(1.0, bad, 1.0)), "damping");
+        assert_eq!(named(SpringDamper::new(1.0, 0.0, bad)), "max_force");
+        assert_eq!(named(SPRING.unwrap().with_hold_damping(bad)), "hold_damping");
+        let spring = SPRING.unwrap();
+        assert_eq!(ForbiddenRegion::new(spring, bad).unwrap_err().parameter, "margin");
+        assert_eq!(Guidance::new(spring, bad, 0.0).unwrap_err().parameter, "stand_off");
+        assert_eq!(Guidance::new(spring, 0.0, bad).unwrap_err().parameter, "dead_band");
+    }
+    assert_eq!(named(SpringDamper::new(0.0, 0.0, 1.0)), "stiffness");
+    assert_eq!(named(SpringDamper::new(1.0, 0.0, 0.0)), "max_force");
+    assert_eq!(ForbiddenRegion::new(SPRING.unwrap(), 0.0).unwrap_err().parameter, "margin");
+}
+
+#[test]
+fn a_passive_wall_asks_for_damping_in_the_device() {
+    // K T / 2 + B, and the hold's where that is more.
+    let wall = SpringDamper::new(2.0, 0.01, 5.0).unwrap();
+    assert!((wall.device_damping(0.001) - 0.011).abs() < 1.0e-7);
+    let held = wall.with_hold_damping(0.5).unwrap();
+    assert!((held.device_damping(0.001) - 0.5).abs() < 1.0e-7);
+}
+
+/// Any `f32`, most of them not sensible.
+fn any_bits() -> impl Strategy<Value = f32> {
+    prop_oneof![any::<u32>().prop_map(f32::from_bits), -100.0_f32..100.0, Just(0.0)]
+}
+
+fn any_vec3() -> impl Strategy<Value = Vec3> {
+    prop::array::uniform3(any_bits()).prop_map(Vec3::from)
+}
+
+fn unit() -> impl Strategy<Value = Vec3> {
+    prop::array::uniform3(-1.0_f32..1.0)
+        .prop_map(Vec3::from)
+        .prop_filter("too short to be normalised", |v| v.length() > 0.1)
+        .prop_map(|v| v / v.length())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Whatever comes in, what goes out is finite and no more than the largest force.
+    #[test]
+    fn every_force_is_finite_and_bounded(
+        gains in prop::array::uniform6(any_bits()),
+        fields in prop::array::uniform4(any_bits()),
+        points in prop::array::uniform3(any_vec3()),
+        velocity in any_vec3(),
+        proper in unit(),
+        is_proper: bool,
+    ) {
+        let [stiffness, damping, max_force, hold, a, b] = gains.map(f32::abs);
+        let Ok(spring) = SpringDamper::new(stiffness, damping, max_force)
+            .and_then(|spring| spring.with_hold_damping(hold)) else { return Ok(()) };
+        let mut any = pair(1.0, if is_proper { proper } else { points[2] });
+        [any.separation, any.lower, any.accuracy, any.axis_distance] = fields;
+        [any.point_on_surface, any.point_on_tool, _] = points;
+        // Denormal forces round by more than a ratio.
+        let largest = f64::from(max_force) * (1.0 + 1.0e-3) + 1.0e-44;
+        let forces = [
+            ForbiddenRegion::new(spring, a).map(|wall| wall.force(Ok(&any), velocity)),
+            Guidance::new(spring, a, b).map(|guide| guide.force(Ok(&any), velocity)),
+            ForbiddenRegion::new(spring, a).map(|wall| wall.force(Err(Unknown::Query), velocity)),
+        ];
+        for answer in forces.into_iter().flatten() {
+            prop_assert!(answer.force.is_finite(), "{answer:?}");
+            let squares = answer.force.to_array().map(|axis| f64::from(axis) * f64::from(axis));
+            let length = squares.iter().sum::<f64>().sqrt();
+            prop_assert!(length <= largest, "{answer:?} of {max_force}");
+        }
+    }
+
+    /// The wall never pulls, is silent outside its margin, and its push never shrinks when the
+    /// surface may be nearer.
+    #[test]
+    fn the_wall_only_pushes(
+        direction in unit(), gap in -3.0_f32..10.0, slack in 0.0_f32..5.0, accuracy in 0.0_f32..0.1,
+        velocity in prop::array::uniform3(-300.0_f32..300.0),
+    ) {
+        let velocity = Vec3::from(velocity);
+        let exact = pair(gap, direction);
+        let push = |pair: &Proximity| wall().force(Ok(pair), velocity).force.dot(direction);
+        prop_assert!(push(&exact) >= 0.0);
+        if gap >= 3.0 {
+            prop_assert_eq!(wall().force(Ok(&exact), velocity), ConstraintForce::NONE);
+        }
+        let mut cut = exact;
+        cut.lower = if exact.lower > slack { exact.lower - slack } else { 0.0 };
+        cut.accuracy = accuracy;
+        prop_assert!(push(&cut) >= push(&exact));
+        // As much as an exact answer at the lower end would, or more.
+        let nearest = pair(cut.lower - accuracy, direction);
+        prop_assert!(push(&cut) >= push(&nearest) - 1.0e-4);
+    }
+}

@@ -1,0 +1,79 @@
+//! Why bytes are not a packet.
+
+use core::fmt;
+
+/// Why bytes are not a packet of this protocol. Named by the first check that failed; the checksum
+/// comes before everything that it covers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum PacketError {
+    /// Shorter than a header and a checksum.
+    TooShort {
+        /// Bytes received.
+        bytes: usize,
+    },
+    /// The checksum does not match: damaged on the way, or not a packet at all.
+    Checksum {
+        /// In the packet.
+        stated: u32,
+        /// Of the bytes received.
+        computed: u32,
+    },
+    /// A version that this receiver does not speak.
+    Version {
+        /// In the packet.
+        version: u8,
+    },
+    /// A kind that this version does not have.
+    Kind {
+        /// In the packet.
+        kind: u8,
+    },
+    /// A field that must be zero is not.
+    Reserved {
+        /// Offset of the field's first byte.
+        offset: usize,
+    },
+    /// The length does not follow from kind and count.
+    Length {
+        /// Bytes received.
+        bytes: usize,
+        /// Bytes that a packet of this kind and count has.
+        expected: usize,
+    },
+    /// A vertex packet without a vertex.
+    Empty,
+    /// An encoding that this version does not have.
+    Encoding {
+        /// In the packet.
+        encoding: u8,
+    },
+    /// A quantisation box that is not finite, or whose step is not positive.
+    Box,
+}
+
+impl fmt::Display for PacketError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooShort { bytes } => write!(f, "{bytes} bytes are too few for a packet"),
+            Self::Checksum { stated, computed } => {
+                write!(
+                    f,
+                    "the packet states checksum {stated:#010x}, its bytes have {computed:#010x}"
+                )
+            }
+            Self::Version { version } => write!(f, "protocol version {version} is not spoken here"),
+            Self::Kind { kind } => write!(f, "packet kind {kind} does not exist"),
+            Self::Reserved { offset } => write!(f, "the field at byte {offset} must be zero"),
+            Self::Length { bytes, expected } => {
+                write!(f, "the packet has {bytes} bytes where its kind and count make {expected}")
+            }
+            Self::Empty => write!(f, "a vertex packet without a vertex"),
+            Self::Encoding { encoding } => write!(f, "position encoding {encoding} does not exist"),
+            Self::Box => write!(f, "the quantisation box is not finite or its step not positive"),
+        }
+    }
+}
+
+impl core::error::Error for PacketError {}

@@ -1,0 +1,677 @@
+//! The bus: packets, COBS, and the assembler that publishes complete, right frames only.
+
+use std::cell::Cell;
+use std::collections::BTreeSet;
+use std::rc::Rc;
+
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::wire::{
+    Body, CHECKSUM_BYTES, Deframer, EncodeError, Encoding, FrameEncoder, Packet, PacketError,
+    QuantisedBox, Rows, StreamError, enframe, framed_bytes,
+};
+use dibs_nostd::{
+    Assembler, FrameReader, Frames, Gate, MeasuredStretch, Progress, Rejection, StretchError,
+    Unchecked, VertexTable,
+};
+use proptest::prelude::*;
+
+const MESH: u32 = 0xD1B5_0001;
+const N: usize = 40;
+type Bus = (Assembler<'static, Unchecked, N>, FrameReader<'static, N>);
+
+fn bus() -> Bus {
+    bus_with(Unchecked)
+}
+
+fn bus_with<G: Gate>(gate: G) -> (Assembler<'static, G, N>, FrameReader<'static, N>) {
+    let frames: &'static Frames<N> = Box::leak(Box::new(Frames::new()));
+    let (writer, reader) = frames.split().unwrap();
+    (Assembler::new(writer, gate, MESH, 100.0), reader)
+}
+
+/// A surface that differs from epoch to epoch.
+fn surface(epoch: u32) -> Vec<Vec3> {
+    (0..N)
+        .map(|i| {
+            let t = i as f32 + (epoch % 1000) as f32 * 0.01;
+            Vec3::new((t * 0.7).sin() * 40.0, (t * 1.3).cos() * 30.0, t * 0.9 - 20.0)
+        })
+        .collect()
+}
+
+fn encoding(quantised: bool, positions: &[Vec3]) -> Encoding {
+    if quantised {
+        Encoding::Quantised(QuantisedBox::covering(positions).unwrap())
+    } else {
+        Encoding::Float
+    }
+}
+
+fn packets<const MTU: usize>(epoch: u32, encoding: Encoding, positions: &[Vec3]) -> Vec<Vec<u8>> {
+    let mut encoder = FrameEncoder::<_, MTU>::new(MESH, epoch, encoding, positions).unwrap();
+    let mut buffer = [0; MTU];
+    let mut packets = Vec::new();
+    while let Some(packet) = encoder.next_packet(&mut buffer) {
+        packets.push(packet.to_vec());
+    }
+    packets
+}
+
+fn frame(epoch: u32, quantised: bool) -> Vec<Vec<u8>> {
+    let positions = surface(epoch);
+    packets::<64>(epoch, encoding(quantised, &positions), &positions)
+}
+
+fn published(reader: &mut FrameReader<'_, N>) -> Option<(u32, Vec<[u32; 3]>)> {
+    let frame = reader.read()?;
+    let positions = (0..N as u32).map(|v| frame.position(v).unwrap().to_array().map(f32::to_bits));
+    Some((frame.label().epoch, positions.collect()))
+}
+
+/// CRC-32 by the definition, one bit at a time: the packets' checksum is computed another way.
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(u32::MAX, |crc, &byte| {
+        (0..8).fold(crc ^ u32::from(byte), |crc, _| (crc >> 1) ^ (0xEDB8_8320 * (crc & 1)))
+    })
+}
+
+/// Makes the checksum right again, after whatever was done to the packet.
+fn reseal(mut packet: Vec<u8>) -> Vec<u8> {
+    packet.truncate(packet.len() - CHECKSUM_BYTES);
+    let checksum = crc32(&packet);
+    packet.extend(checksum.to_le_bytes());
+    packet
+}
+
+#[test]
+fn every_frame_arrives_as_it_was_sent() {
+    for quantised in [false, true] {
+        let (mut assembler, mut reader) = bus();
+        for epoch in 1..=5 {
+            let positions = surface(epoch);
+            let encoding = encoding(quantised, &positions);
+            let packets = packets::<64>(epoch, encoding, &positions);
+            // 18 + 4 bytes of a packet are not vertices.
+            assert_eq!(packets.len(), 2 + N.div_ceil(42 / if quantised { 6 } else { 12 }));
+            for (i, packet) in packets.iter().enumerate() {
+                let progress = assembler.accept(packet, 1000 * epoch + i as u32).unwrap();
+                let is_last = i + 1 == packets.len();
+                assert_eq!(progress == Progress::Published { epoch }, is_last);
+            }
+            let frame = reader.read().unwrap();
+            assert_eq!(frame.label().epoch, epoch);
+            assert_eq!(frame.label().received, 1000 * epoch, "the clock at the begin packet");
+            let error = frame.label().position_error;
+            assert_eq!(error > 0.0, quantised);
+            for (vertex, sent) in positions.iter().enumerate() {
+                let arrived = frame.position(vertex as u32).unwrap();
+                assert!(arrived.as_dvec3().distance(sent.as_dvec3()) <= f64::from(error));
+            }
+        }
+        assert_eq!(assembler.counters().published, 5);
+        assert_eq!(assembler.counters().rejected(), 0);
+    }
+}
+
+#[test]
+fn a_packet_has_one_meaning_at_every_transport_unit() {
+    let positions = surface(3);
+    for packets in [
+        packets::<64>(3, Encoding::Float, &positions),
+        packets::<256>(3, Encoding::Float, &positions),
+        packets::<1472>(3, Encoding::Float, &positions),
+        packets::<65_507>(3, Encoding::Float, &positions),
+    ] {
+        let (mut assembler, mut reader) = bus();
+        for packet in &packets {
+            assembler.accept(packet, 0).unwrap();
+        }
+        let expected: Vec<_> = positions.iter().map(|p| p.to_array().map(f32::to_bits)).collect();
+        assert_eq!(published(&mut reader), Some((3, expected)));
+    }
+}
+
+/// Exhaustive: each bit, and each pair of bits, of each kind of packet.
+#[test]
+fn one_or_two_flipped_bits_are_always_detected() {
+    for quantised in [false, true] {
+        let frame = frame(7, quantised);
+        for packet in [&frame[0], &frame[1], &frame[frame.len() - 2], &frame[frame.len() - 1]] {
+            assert!(Packet::decode(packet).is_ok());
+            let bits = packet.len() * 8;
+            let mut damaged = packet.clone();
+            for first in 0..bits {
+                damaged[first / 8] ^= 1 << (first % 8);
+                assert!(matches!(Packet::decode(&damaged), Err(PacketError::Checksum { .. })));
+                for second in first + 1..bits {
+                    damaged[second / 8] ^= 1 << (second % 8);
+                    assert!(matches!(Packet::decode(&damaged), Err(PacketError::Checksum { .. })));
+                    damaged[second / 8] ^= 1 << (second % 8);
+                }
+                damaged[first / 8] ^= 1 << (first % 8);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_frame_without_any_one_of_its_packets_is_not_published() {
+    for quantised in [false, true] {
+        let frame = frame(7, quantised);
+        for lost in 0..frame.len() {
+            let (mut assembler, mut reader) = bus();
+            for (_, packet) in frame.iter().enumerate().filter(|(i, _)| *i != lost) {
+                let _ = assembler.accept(packet, 0);
+            }
+            assert!(published(&mut reader).is_none(), "published without packet {lost}");
+            assert_eq!(assembler.counters().published, 0);
+        }
+    }
+}
+
+#[test]
+fn epochs_wrap() {
+    let (mut assembler, mut reader) = bus();
+    for epoch in [u32::MAX - 1, u32::MAX, 0, 1, 0x7FFF_FFFF, 0xFFFF_FFFE_u32, 5] {
+        for packet in frame(epoch, false) {
+            assembler.accept(&packet, 0).unwrap();
+        }
+        assert_eq!(published(&mut reader).unwrap().0, epoch);
+        // The same again, an older one, and the one just too far ahead.
+        for stale in
+            [epoch, epoch.wrapping_sub(1), epoch.wrapping_sub(0x7FFF_FFFF), epoch ^ 1 << 31]
+        {
+            for packet in frame(stale, false) {
+                let rejection = assembler.accept(&packet, 0).unwrap_err();
+                assert_eq!(rejection, Rejection::Stale { epoch: stale });
+            }
+        }
+        assert_eq!(published(&mut reader).unwrap().0, epoch);
+    }
+}
+
+#[test]
+fn a_newer_frame_supersedes_an_unfinished_one() {
+    let (mut assembler, mut reader) = bus();
+    let (first, second) = (frame(1, false), frame(2, false));
+    for packet in &first[..5] {
+        assembler.accept(packet, 0).unwrap();
+    }
+    assert_eq!(assembler.accept(&second[0], 0), Ok(Progress::Begun { epoch: 2 }));
+    assert_eq!(assembler.counters().abandoned, 1);
+    // What is left of the first is of no use any more, not even its begin.
+    let late = assembler.accept(&first[5], 0);
+    assert_eq!(late, Err(Rejection::Unexpected { epoch: 1 }));
+    assert_eq!(assembler.accept(&first[0], 0), Err(Rejection::Stale { epoch: 1 }));
+    for packet in &second[1..] {
+        assembler.accept(packet, 0).unwrap();
+    }
+    assert_eq!(published(&mut reader).unwrap().0, 2);
+}
+
+/// A sender that starts again within a frame, and numbers its frames from the same epoch: whatever
+/// is lost of its packets, the mixture is not published.
+#[test]
+fn two_frames_of_one_epoch_are_never_mixed() {
+    let (old, new) = (surface(1), surface(500));
+    // With the same encoding, even the begin packets are equal.
+    let old = packets::<64>(9, Encoding::Float, &old);
+    let new = packets::<64>(9, Encoding::Float, &new);
+    assert_eq!(old[0], new[0]);
+    let last = old.len() - 1;
+    for cut in 2..last {
+        for commit in [&old[last], &new[last]] {
+            let (mut assembler, mut reader) = bus();
+            for packet in old[..cut].iter().chain(&new[cut..last]) {
+                assembler.accept(packet, 0).unwrap();
+            }
+            let rejection = assembler.accept(commit, 0).unwrap_err();
+            assert!(matches!(rejection, Rejection::Digest { .. }), "{rejection}");
+            assert!(published(&mut reader).is_none());
+            // The next whole frame is taken, under the same number.
+            for packet in &new {
+                assembler.accept(packet, 0).unwrap();
+            }
+            assert_eq!(published(&mut reader).unwrap().0, 9);
+        }
+    }
+    // A begin packet that differs restarts the frame.
+    let (mut assembler, mut reader) = bus();
+    for packet in frame(9, true)[..4].iter().chain(&new) {
+        assembler.accept(packet, 0).unwrap();
+    }
+    assert_eq!(published(&mut reader).unwrap().0, 9);
+    assert_eq!(assembler.counters().abandoned, 1);
+}
+
+/// Each fault that a checksum cannot tell is rejected by its own cause and counted once.
+#[test]
+fn every_cause_has_its_counter() {
+    let positions = surface(1);
+    let with = |vertex: usize, position: Vec3| {
+        let mut moved = positions.clone();
+        moved[vertex] = Vec3::ZERO;
+        let mut packet = packets::<64>(1, Encoding::Float, &moved)[1 + vertex / 3].clone();
+        let at = 18 + vertex % 3 * 12;
+        for (i, coordinate) in position.to_array().into_iter().enumerate() {
+            packet[at + 4 * i..at + 4 * i + 4].copy_from_slice(&coordinate.to_le_bytes());
+        }
+        reseal(packet)
+    };
+    let edit = |packet: &[u8], at: usize, value: &[u8]| {
+        let mut packet = packet.to_vec();
+        packet[at..at + value.len()].copy_from_slice(value);
+        reseal(packet)
+    };
+    let good = frame(1, false);
+    let vertices = &good[1];
+    let cause = |fault: &[u8]| {
+        let (mut assembler, mut reader) = bus();
+        assembler.accept(&good[0], 0).unwrap();
+        assembler.accept(&good[3], 0).unwrap();
+        let rejection = assembler.accept(fault, 0).unwrap_err();
+        assert_eq!(assembler.counters().rejected(), 1);
+        // The fault leaves no trace: the frame goes on and is published.
+        for packet in &good[1..] {
+            assembler.accept(packet, 0).unwrap();
+        }
+        let sent: Vec<_> = positions.iter().map(|p| p.to_array().map(f32::to_bits)).collect();
+        assert_eq!(published(&mut reader), Some((1, sent)));
+        (rejection, *assembler.counters())
+    };
+
+    let (rejection, counters) = cause(&[0; 21]);
+    assert_eq!(rejection, Rejection::Packet(PacketError::TooShort { bytes: 21 }));
+    assert_eq!(counters.damaged, 1);
+    let (rejection, counters) = cause(&edit(vertices, 0, &[2]));
+    assert_eq!(rejection, Rejection::Packet(PacketError::Version { version: 2 }));
+    assert_eq!(counters.version, 1);
+    for (fault, expected) in [
+        (edit(vertices, 1, &[9]), PacketError::Kind { kind: 9 }),
+        (edit(vertices, 2, &[1]), PacketError::Reserved { offset: 2 }),
+        (edit(vertices, 17, &[1]), PacketError::Reserved { offset: 16 }),
+        (edit(vertices, 3, &[2]), PacketError::Length { bytes: 58, expected: 46 }),
+        (edit(&vertices[..22], 3, &[0]), PacketError::Empty),
+        (edit(&good[0], 3, &[1]), PacketError::Reserved { offset: 3 }),
+        (edit(&good[0], 12, &[1]), PacketError::Reserved { offset: 12 }),
+        (edit(&good[0], 22, &[7]), PacketError::Encoding { encoding: 7 }),
+        (edit(&good[0], 23, &[7]), PacketError::Reserved { offset: 23 }),
+        (edit(&good[0], 30, &[7]), PacketError::Reserved { offset: 26 }),
+        (edit(&good[0], 22, &[1]), PacketError::Box),
+    ] {
+        let (rejection, counters) = cause(&fault);
+        assert_eq!(rejection, Rejection::Packet(expected));
+        assert_eq!(counters.malformed, 1);
+    }
+    let (rejection, counters) = cause(&edit(vertices, 4, &[0xFF]));
+    assert_eq!(rejection, Rejection::WrongMesh { mesh_id: MESH | 0xFF });
+    assert_eq!(counters.wrong_mesh, 1);
+    let (rejection, counters) = cause(&edit(vertices, 8, &[2]));
+    assert_eq!(rejection, Rejection::Unexpected { epoch: 2 });
+    assert_eq!(counters.unexpected, 1);
+    let (rejection, counters) = cause(&edit(&good[0], 18, &41_u32.to_le_bytes()));
+    assert_eq!(rejection, Rejection::VertexCount { vertices: 41 });
+    assert_eq!(counters.vertex_count, 1);
+    let (rejection, counters) = cause(&frame(1, true)[1]);
+    assert_eq!(rejection, Rejection::OtherEncoding);
+    assert_eq!(counters.other_encoding, 1);
+    for first in [38, 40, u32::MAX - 1] {
+        let (rejection, counters) = cause(&edit(vertices, 12, &first.to_le_bytes()));
+        assert_eq!(rejection, Rejection::OutOfRange { first, count: 3 });
+        assert_eq!(counters.out_of_range, 1);
+    }
+    let (rejection, counters) = cause(&edit(vertices, 12, &5_u32.to_le_bytes()));
+    assert_eq!(rejection, Rejection::Overlap { first: 5 });
+    assert_eq!(counters.overlap, 1);
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let (rejection, counters) = cause(&with(2, Vec3::new(0.0, bad, 0.0)));
+        assert_eq!(rejection, Rejection::NotFinite { vertex: 2 });
+        assert_eq!(counters.not_finite, 1);
+    }
+    let (rejection, counters) = cause(&with(1, Vec3::new(0.0, 0.0, -100.01)));
+    assert_eq!(rejection, Rejection::TooFar { vertex: 1 });
+    assert_eq!(counters.too_far, 1);
+    let far = QuantisedBox::new(Vec3::splat(-50.0), Vec3::splat(0.01)).unwrap();
+    let far = packets::<64>(2, Encoding::Quantised(far), &surface(2));
+    let (rejection, counters) = cause(&far[0]);
+    assert_eq!(rejection, Rejection::TooFar { vertex: 0 });
+    assert_eq!(counters.too_far, 1);
+}
+
+/// Refuses while it is told to.
+struct Refuse(Rc<Cell<bool>>);
+
+impl Gate for Refuse {
+    fn admit<V: VertexTable + ?Sized>(
+        &mut self,
+        surface: &V,
+    ) -> Result<Option<MeasuredStretch>, StretchError> {
+        assert_eq!(surface.len(), N);
+        if self.0.get() { Err(StretchError::NoRestShape) } else { Ok(None) }
+    }
+}
+
+#[test]
+fn a_refused_surface_is_not_published_and_the_last_one_stays() {
+    let refusing = Rc::new(Cell::new(false));
+    let (mut assembler, mut reader) = bus_with(Refuse(refusing.clone()));
+    for (epoch, refuse) in [(1, false), (2, true), (2, false)] {
+        refusing.set(refuse);
+        let frame = frame(epoch, false);
+        let (commit, others) = frame.split_last().unwrap();
+        for packet in others {
+            assembler.accept(packet, 0).unwrap();
+        }
+        if refuse {
+            let rejection = assembler.accept(commit, 0).unwrap_err();
+            assert_eq!(rejection, Rejection::Stretch(StretchError::NoRestShape));
+            assert_eq!(published(&mut reader).unwrap().0, 1);
+            assert_eq!(assembler.published_epoch(), Some(1));
+        } else {
+            assert_eq!(assembler.accept(commit, 0), Ok(Progress::Published { epoch }));
+        }
+    }
+    assert_eq!(published(&mut reader).unwrap().0, 2);
+    assert_eq!(assembler.counters().stretch, 1);
+}
+
+#[test]
+fn a_frame_that_meets_a_read_is_held_and_published_later() {
+    let (mut assembler, mut reader) = bus();
+    for packet in frame(1, false) {
+        assembler.accept(&packet, 0).unwrap();
+    }
+    let guard = reader.read().unwrap();
+    let second = frame(2, true);
+    let (commit, others) = second.split_last().unwrap();
+    for packet in others {
+        assembler.accept(packet, 0).unwrap();
+    }
+    assert_eq!(assembler.accept(commit, 0), Ok(Progress::Held { epoch: 2 }));
+    assert_eq!(assembler.accept(commit, 0), Ok(Progress::Duplicate));
+    assert_eq!(assembler.poll(), None);
+    assert_eq!(guard.label().epoch, 1);
+    drop(guard);
+    assert_eq!(assembler.poll(), Some(2));
+    assert_eq!(published(&mut reader).unwrap().0, 2);
+    // Or by the next packet.
+    let guard = reader.read().unwrap();
+    for packet in frame(3, false) {
+        assembler.accept(&packet, 0).unwrap();
+    }
+    drop(guard);
+    assert_eq!(assembler.accept(&frame(4, false)[0], 0), Ok(Progress::Begun { epoch: 4 }));
+    assert_eq!(published(&mut reader).unwrap().0, 3);
+    assert_eq!(assembler.counters().abandoned, 0);
+}
+
+#[test]
+fn what_cannot_be_sent_is_named() {
+    let mut positions = surface(1);
+    let grid = encoding(true, &positions);
+    positions[17].y = f32::NAN;
+    for encoding in [Encoding::Float, grid] {
+        let error = FrameEncoder::<_, 64>::new(MESH, 1, encoding, &positions[..]).err();
+        assert_eq!(error, Some(EncodeError::NotFinite { vertex: 17 }));
+    }
+    positions[17].y = 99.0;
+    let error = FrameEncoder::<_, 64>::new(MESH, 1, grid, &positions[..]).err();
+    assert_eq!(error, Some(EncodeError::OutOfBox { vertex: 17 }));
+    let error = FrameEncoder::<_, 64>::new(MESH, 1, grid, &positions[..0]).err();
+    assert_eq!(error, Some(EncodeError::Vertices { vertices: 0 }));
+    positions[17].y = f32::INFINITY;
+    assert_eq!(QuantisedBox::covering(&positions), None);
+    assert_eq!(QuantisedBox::covering(&[]), None);
+    assert!(QuantisedBox::covering(&[Vec3::splat(1e30), Vec3::splat(1e30)]).is_some());
+    assert_eq!(QuantisedBox::covering(&[Vec3::splat(-3e38), Vec3::splat(3e38)]), None);
+    for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+        assert!(QuantisedBox::new(Vec3::ZERO, Vec3::new(1.0, bad, 1.0)).is_err());
+    }
+}
+
+#[test]
+fn a_packet_that_is_too_long_is_not_passed_on_cut() {
+    let mut stream = [0; framed_bytes(65)];
+    let framed = enframe(&[7; 65], &mut stream).unwrap().to_vec();
+    let mut deframer = Deframer::<64>::new();
+    let mut outcomes = Vec::new();
+    for &byte in framed.iter().chain(&[2, 9, 0]).chain(&[5, 1, 0]).chain(&[2, 8, 0]) {
+        if let Some(outcome) = deframer.push(byte) {
+            outcomes.push(outcome.map(<[u8]>::to_vec));
+        }
+    }
+    let expected = [
+        Err(StreamError::TooLong { bytes: 65, limit: 64 }),
+        Ok(vec![9]),
+        Err(StreamError::Cut { bytes: 1 }),
+        Ok(vec![8]),
+    ];
+    assert_eq!(outcomes, expected);
+    assert_eq!(enframe(&[7; 65], &mut stream[..66]), None);
+}
+
+/// The test vector of `docs/wire.md`, both ways.
+#[test]
+fn the_specification_shows_what_is_sent() {
+    let document = include_str!("../../docs/wire.md");
+    let vector = document.split("```text\n").nth(1).unwrap().split("```").next().unwrap();
+    let mut shown: Vec<Vec<u8>> = Vec::new();
+    for line in vector.lines() {
+        let (name, bytes) = line.split_at(10);
+        let bytes = bytes.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).unwrap());
+        if name.trim().is_empty() {
+            shown.last_mut().unwrap().extend(bytes);
+        } else {
+            shown.push(bytes.collect());
+        }
+    }
+    let positions = [Vec3::new(-1.0, 0.0, 1.0), Vec3::new(0.25, 0.5, 31.0)];
+    let grid = QuantisedBox::new(Vec3::new(-1.0, -1.0, -1.0), Vec3::splat(0.25)).unwrap();
+    let mut sent = packets::<64>(258, Encoding::Quantised(grid), &positions);
+    sent.extend(packets::<64>(259, Encoding::Float, &positions));
+    let mut stream = [0; framed_bytes(64)];
+    sent.push(enframe(&sent[2], &mut stream).unwrap().to_vec());
+    let hex = |packets: &[Vec<u8>]| -> String {
+        packets.iter().map(|packet| format!("{packet:02x?}\n")).collect()
+    };
+    assert_eq!(hex(&shown), hex(&sent));
+}
+
+proptest! {
+    #[test]
+    fn order_and_repetition_do_not_matter(
+        quantised: bool,
+        order in Just((1..100_usize).collect::<Vec<_>>()).prop_shuffle(),
+        repeated in prop::collection::vec(0..100_usize, 0..20),
+    ) {
+        let frame = frame(7, quantised);
+        let (mut in_order, mut expected) = bus();
+        for packet in &frame {
+            in_order.accept(packet, 0).unwrap();
+        }
+        let (mut assembler, mut reader) = bus();
+        assembler.accept(&frame[0], 0).unwrap();
+        let mut is_published = false;
+        for &i in repeated.iter().chain(&order).filter(|&&i| i < frame.len()) {
+            match assembler.accept(&frame[i], 0) {
+                Ok(Progress::Published { epoch: 7 }) => is_published = true,
+                // Repetitions after the end are of a frame that is published already.
+                Err(Rejection::Stale { epoch: 7 }) => prop_assert!(is_published),
+                outcome => prop_assert!(outcome.is_ok(), "{outcome:?}"),
+            }
+        }
+        prop_assert!(is_published);
+        prop_assert_eq!(published(&mut reader), published(&mut expected));
+    }
+
+    /// Frames through a line that loses, repeats, reorders and damages packets: only whole frames as
+    /// they were sent are ever published.
+    #[test]
+    fn only_what_was_sent_is_published(
+        faults in prop::collection::vec((0..6_u8, any::<prop::sample::Index>(), 0..512_usize), 0..30),
+        quantised: bool,
+    ) {
+        let mut line: Vec<Vec<u8>> = (1..=6).flat_map(|epoch| frame(epoch, quantised)).collect();
+        for (fault, index, bit) in faults {
+            let at = index.index(line.len());
+            if line[at].is_empty() { continue; }
+            match fault {
+                0 => drop(line.remove(at)),
+                1 => line.insert(at, line[at].clone()),
+                2 => { let other = (at + bit % 9) % line.len(); line.swap(at, other); }
+                3 => { let bits = line[at].len() * 8; line[at][bit % bits / 8] ^= 1 << (bit % 8); }
+                4 => { let len = line[at].len(); line[at].truncate(bit % len); }
+                _ => { let len = line[at].len(); for byte in &mut line[at][bit % len..] { *byte = 0xFF; } }
+            }
+        }
+        let (mut assembler, mut reader) = bus();
+        let mut taken = BTreeSet::new();
+        for packet in &line {
+            if let Ok(Progress::Published { epoch }) = assembler.accept(packet, 0) {
+                prop_assert!(taken.insert(epoch), "frame {} was published twice", epoch);
+                let sent = surface(epoch);
+                let expected: Vec<_> = match encoding(quantised, &sent) {
+                    Encoding::Quantised(grid) => sent
+                        .iter()
+                        .map(|&p| grid.position(grid.quantise(p).unwrap()))
+                        .collect(),
+                    _ => sent,
+                };
+                let expected: Vec<_> =
+                    expected.iter().map(|p| p.to_array().map(f32::to_bits)).collect();
+                prop_assert_eq!(published(&mut reader), Some((epoch, expected)));
+            }
+        }
+        prop_assert_eq!(taken.len() as u32, assembler.counters().published);
+    }
+
+    #[test]
+    fn bursts_are_always_detected(
+        start in 0..480_usize, burst: u32, quantised: bool, which in any::<prop::sample::Index>(),
+    ) {
+        prop_assume!(burst != 0);
+        let frame = frame(7, quantised);
+        let mut packet = frame[which.index(frame.len())].clone();
+        let mut changed = false;
+        for bit in (0..32).filter(|bit| burst >> bit & 1 == 1) {
+            if let Some(byte) = packet.get_mut((start + bit) / 8) {
+                *byte ^= 1 << ((start + bit) % 8);
+                changed = true;
+            }
+        }
+        prop_assert_eq!(Packet::decode(&packet).is_err(), changed);
+    }
+
+    #[test]
+    fn arbitrary_bytes_are_survived(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+        let _ = Packet::decode(&bytes);
+        let (mut assembler, _reader) = bus();
+        let _ = assembler.accept(&bytes, 0);
+        let mut deframer = Deframer::<64>::new();
+        for &byte in &bytes {
+            if let Some(Ok(packet)) = deframer.push(byte) {
+                prop_assert!(packet.len() <= 64 && packet.len() <= bytes.len());
+            }
+        }
+    }
+
+    /// The same with a right checksum and a likely header, so that everything behind it is reached.
+    #[test]
+    fn arbitrary_fields_are_survived(
+        kind in 0..6_u8, count in 0..9_u8, mesh in prop::bool::weighted(0.9), epoch in 0..3_u32,
+        first in prop_oneof![0..45_u32, any::<u32>()],
+        mut body in prop::collection::vec(any::<u8>(), 0..60), fit: bool,
+    ) {
+        if fit {
+            let size = match kind { 1 => 32, 2 => 12 * count, 3 => 6 * count, _ => 4 };
+            body.resize(size.into(), 0);
+        }
+        let (mut assembler, mut reader) = bus();
+        for packet in &frame(1, kind == 3)[..3] {
+            assembler.accept(packet, 0).unwrap();
+        }
+        let mut packet = vec![1, kind, 0, if kind == 2 || kind == 3 { count } else { 0 }];
+        packet.extend(if mesh { MESH } else { 1 }.to_le_bytes());
+        packet.extend(epoch.to_le_bytes());
+        packet.extend(if kind == 2 || kind == 3 { first } else { 0 }.to_le_bytes());
+        packet.extend([0; 2]);
+        packet.extend(body);
+        packet.extend([0; 4]);
+        let _ = assembler.accept(&reseal(packet), 0);
+        prop_assert!(published(&mut reader).is_none());
+    }
+
+    #[test]
+    fn quantisation_keeps_its_bound(
+        corner in prop::array::uniform3(-1000.0_f32..1000.0),
+        points in prop::collection::vec(prop::array::uniform3(0.0_f32..1.0), 1..30),
+        size in prop_oneof![Just(0.0_f32), 0.001_f32..300.0],
+    ) {
+        let points: Vec<Vec3> =
+            points.iter().map(|&p| Vec3::from(corner) + Vec3::from(p) * size).collect();
+        let grid = QuantisedBox::covering(&points).unwrap();
+        let (step, low, high) = (grid.step(), grid.origin(), grid.upper_corner());
+        let rounding = low.abs().max(high.abs()).as_dvec3() / f64::from(1 << 22);
+        for point in points {
+            let row = grid.quantise(point).expect("the box covers its points");
+            let decoded = grid.position(row);
+            let off = (decoded.as_dvec3() - point.as_dvec3()).abs();
+            prop_assert!(off.cmple(step.as_dvec3() * 0.5 + rounding).all(), "{off} of {step}");
+            prop_assert!(off.length() <= f64::from(grid.error()));
+            prop_assert!(decoded.cmpge(low).all() && decoded.cmple(high).all());
+        }
+    }
+
+    #[test]
+    fn streams_carry_packets_and_recover_at_the_next(
+        packets in prop::collection::vec(
+            prop::collection::vec(prop_oneof![Just(0_u8), Just(1), Just(255), any::<u8>()], 1..600),
+            1..6,
+        ),
+        damage: Option<(prop::sample::Index, u8)>,
+    ) {
+        let mut stream = Vec::new();
+        let mut starts = Vec::new();
+        for packet in &packets {
+            let mut out = vec![0; framed_bytes(packet.len())];
+            starts.push(stream.len());
+            let framed = enframe(packet, &mut out).expect("framed_bytes is enough");
+            prop_assert!(!framed[..framed.len() - 1].contains(&0));
+            stream.extend_from_slice(framed);
+        }
+        // One byte damaged: only the packet it is in, or that and its neighbour, may suffer.
+        let mut spoiled = None;
+        if let Some((at, flip)) = damage && flip != 0 {
+            let at = at.index(stream.len());
+            stream[at] ^= flip;
+            spoiled = Some(starts.partition_point(|&start| start <= at) - 1);
+        }
+        let mut deframer = Deframer::<600>::new();
+        let mut arrived = Vec::new();
+        for &byte in &stream {
+            if let Some(Ok(packet)) = deframer.push(byte) {
+                arrived.push(packet.to_vec());
+            }
+        }
+        match spoiled {
+            None => prop_assert_eq!(arrived, packets),
+            Some(spoiled) => {
+                let before = spoiled.min(packets.len());
+                let after = packets.len().saturating_sub(spoiled + 2);
+                prop_assert_eq!(&arrived[..before], &packets[..before]);
+                prop_assert_eq!(
+                    &arrived[arrived.len() - after..], &packets[packets.len() - after..]
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn rows_know_their_number() {
+    let frame = frame(1, true);
+    let Body::Vertices(vertices) = Packet::decode(&frame[1]).unwrap().body else { panic!() };
+    assert!(matches!(vertices.rows, Rows::Quantised(_)));
+    assert_eq!((vertices.first, vertices.rows.len()), (0, 7));
+    assert!(!vertices.rows.is_empty());
+}

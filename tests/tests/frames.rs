@@ -1,0 +1,198 @@
+//! The double buffer: one writer, one reader, complete frames, no torn read.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use dibs_nostd::constraint::Unknown;
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::{FrameLabel, Frames, PublishError, VertexTable};
+
+fn label(epoch: u32) -> FrameLabel {
+    FrameLabel { epoch, received: epoch.wrapping_mul(3), position_error: 0.5, stretch: None }
+}
+
+/// Every vertex carries the epoch and its own number.
+fn vertex_of(epoch: u32, vertex: u32) -> Vec3 {
+    Vec3::new(f32::from_bits(epoch), vertex as f32, f32::from_bits(!epoch))
+}
+
+#[test]
+fn there_is_one_writer_and_one_reader() {
+    let frames = Frames::<1>::new();
+    assert!(frames.split().is_some());
+    assert!(frames.split().is_none());
+}
+
+#[test]
+fn nothing_is_read_before_the_first_frame() {
+    let frames = Frames::<2>::new();
+    let (mut writer, mut reader) = frames.split().unwrap();
+    assert!(reader.read().is_none());
+    assert!(writer.front().is_none());
+    // A write before `begin` belongs to no frame.
+    writer.write(0, Vec3::ONE).unwrap();
+    assert!(!writer.is_written(0));
+    assert_eq!(writer.publish(label(1)), Err(PublishError::Incomplete { missing: 2 }));
+    // An attempt to read nothing holds nothing up.
+    writer.begin();
+    writer.write(0, Vec3::ONE).unwrap();
+    assert_eq!(writer.publish(label(1)), Err(PublishError::Incomplete { missing: 1 }));
+    writer.write(1, Vec3::ONE).unwrap();
+    assert_eq!(writer.publish(label(1)), Ok(()));
+    assert_eq!(reader.read().unwrap().label(), label(1));
+}
+
+#[test]
+fn a_frame_is_published_once_and_begun_anew() {
+    let frames = Frames::<1>::new();
+    let (mut writer, mut reader) = frames.split().unwrap();
+    writer.begin();
+    writer.write(0, Vec3::X).unwrap();
+    writer.publish(label(1)).unwrap();
+    assert_eq!(writer.publish(label(2)), Err(PublishError::Incomplete { missing: 1 }));
+    writer.write(0, Vec3::Y).unwrap();
+    assert_eq!(reader.read().unwrap().position(0), Some(Vec3::X), "writes go to the back");
+    writer.begin();
+    writer.write(0, Vec3::Y).unwrap();
+    assert_eq!(writer.back().position(0), Some(Vec3::Y));
+    writer.publish(label(2)).unwrap();
+    assert_eq!(reader.read().unwrap().position(0), Some(Vec3::Y));
+    assert_eq!(writer.front().unwrap().position(0), Some(Vec3::Y));
+}
+
+#[test]
+fn a_read_in_progress_holds_the_publication_back() {
+    let frames = Frames::<1>::new();
+    let (mut writer, mut reader) = frames.split().unwrap();
+    for epoch in 1..=2 {
+        writer.begin();
+        writer.write(0, vertex_of(epoch, 0)).unwrap();
+        if epoch == 1 {
+            writer.publish(label(1)).unwrap();
+        }
+    }
+    let guard = reader.read().unwrap();
+    assert_eq!(writer.publish(label(2)), Err(PublishError::Busy));
+    assert_eq!(guard.label(), label(1));
+    assert_eq!(guard.position(0).map(|p| p.x.to_bits()), Some(1));
+    drop(guard);
+    assert_eq!(writer.publish(label(2)), Ok(()));
+    assert_eq!(reader.read().unwrap().label(), label(2));
+}
+
+#[test]
+fn the_table_ends_where_it_ends() {
+    let frames = Frames::<3>::new();
+    let (mut writer, mut reader) = frames.split().unwrap();
+    writer.begin();
+    for vertex in 0..3 {
+        writer.write(vertex, vertex_of(9, vertex)).unwrap();
+    }
+    let error = writer.write(3, Vec3::ZERO).unwrap_err();
+    assert_eq!((error.vertex, error.vertices), (3, 3));
+    assert!(writer.write(u32::MAX, Vec3::ZERO).is_err());
+    assert!(!writer.is_written(3));
+    writer.publish(label(9)).unwrap();
+    let frame = reader.read().unwrap();
+    assert_eq!(frame.len(), 3);
+    assert!(frame.position(2).is_some());
+    assert_eq!(frame.position(3), None);
+}
+
+#[test]
+fn age_is_right_over_a_wrap_of_the_clock() {
+    let frames = Frames::<1>::new();
+    let (mut writer, mut reader) = frames.split().unwrap();
+    writer.begin();
+    writer.write(0, Vec3::ZERO).unwrap();
+    writer.publish(FrameLabel { received: u32::MAX - 4, ..label(1) }).unwrap();
+    let frame = reader.read().unwrap();
+    assert_eq!(frame.age(5), 10);
+    assert_eq!(frame.check_age(5, 10), Ok(()));
+    assert_eq!(frame.check_age(5, 9), Err(Unknown::Stale { age: 10 }));
+}
+
+/// The marks are one byte: a frame of 255 frames ago must not count for this one.
+#[test]
+fn old_marks_never_complete_a_frame() {
+    const N: u32 = 300;
+    let frames = Frames::<300>::new();
+    let (mut writer, _reader) = frames.split().unwrap();
+    for frame in 0..3 * 255_u32 {
+        writer.begin();
+        assert_eq!(writer.missing(), N);
+        assert!((0..N).all(|vertex| !writer.is_written(vertex)), "frame {frame}");
+        // Some vertices of each frame: other ones in other frames, all of them in some.
+        let step = frame % 7 + 1;
+        for vertex in (0..N).step_by(step as usize) {
+            writer.write(vertex, Vec3::ZERO).unwrap();
+            writer.write(vertex, Vec3::ZERO).unwrap();
+        }
+        assert_eq!(writer.missing(), N - N.div_ceil(step), "frame {frame}");
+    }
+}
+
+/// Two threads at full speed: every read sees one whole frame, and frames never go back. Runs until
+/// the reader has seen many frames, however the machine schedules the two.
+#[test]
+fn no_read_is_torn() {
+    const N: usize = 97;
+    const FRAMES_TO_SEE: u32 = 20_000;
+    static FRAMES: Frames<N> = Frames::new();
+    static SEEN: AtomicU32 = AtomicU32::new(0);
+    let (mut writer, mut reader) = FRAMES.split().unwrap();
+
+    std::thread::scope(|scope| {
+        let writing = scope.spawn(move || {
+            let (mut epoch, mut busy) = (0, 0_u64);
+            while SEEN.load(Ordering::Relaxed) < FRAMES_TO_SEE {
+                epoch += 1;
+                writer.begin();
+                for vertex in 0..N as u32 {
+                    writer.write(vertex, vertex_of(epoch, vertex)).unwrap();
+                }
+                while writer.publish(label(epoch)) == Err(PublishError::Busy) {
+                    busy += 1;
+                    std::thread::yield_now();
+                }
+            }
+            (epoch, busy)
+        });
+        let (mut reads, mut last) = (0_u64, 0_u32);
+        // Before an assertion fails, the writer must be let go, or the scope waits for it forever.
+        let verdict = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            while SEEN.load(Ordering::Relaxed) < FRAMES_TO_SEE {
+                if let Some(frame) = reader.read() {
+                    let epoch = frame.label().epoch;
+                    assert!(epoch >= last, "frame {epoch} after {last}");
+                    for vertex in 0..N as u32 {
+                        let position = frame.position(vertex).unwrap().to_array();
+                        assert_eq!(
+                            position.map(f32::to_bits),
+                            vertex_of(epoch, vertex).to_array().map(f32::to_bits),
+                            "vertex {vertex} of frame {epoch} is torn"
+                        );
+                    }
+                    assert_eq!(frame.label(), label(epoch));
+                    reads += 1;
+                    if epoch != last {
+                        SEEN.fetch_add(1, Ordering::Relaxed);
+                    }
+                    last = epoch;
+                }
+                // Pauses of all lengths, so that publications fall everywhere.
+                for _ in 0..reads % 61 {
+                    std::hint::spin_loop();
+                }
+                if reads % 16 == 0 {
+                    std::thread::yield_now();
+                }
+            }
+        }));
+        SEEN.store(FRAMES_TO_SEE, Ordering::Relaxed);
+        let (written, busy) = writing.join().unwrap();
+        println!("{reads} reads of {written} frames; {busy} attempts to publish had to wait");
+        if let Err(torn) = verdict {
+            std::panic::resume_unwind(torn);
+        }
+    });
+}
