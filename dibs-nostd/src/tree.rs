@@ -66,6 +66,24 @@ impl<'a, I: Index> Tree<'a, I> {
         }
     }
 
+    /// The same tree on a copy of its bytes, say in tightly coupled memory, without validating them
+    /// again. The header's values stay those that were validated.
+    ///
+    /// # Errors
+    /// [`FormatError`] if the copy's sections are not where this tree's layout has them.
+    pub const fn moved_to<'b>(&self, copy: &'b [u8]) -> Result<Tree<'b, I>, FormatError> {
+        match check::sections::<I>(copy) {
+            Ok([nodes, triangles, order, rest])
+                if nodes.len() == self.nodes.len() && triangles.len() == self.triangles.len() =>
+            {
+                let header = self.header;
+                Ok(Tree { nodes, triangles, order, rest, header, width: PhantomData })
+            }
+            Ok(_) => Err(FormatError::Section { kind: section::NODES }),
+            Err(error) => Err(error),
+        }
+    }
+
     /// Identity of the mesh: CRC-32 of its triangles and rest positions. Vertex packets carry it, so
     /// that a frame of another mesh is never taken for one of this.
     #[must_use]

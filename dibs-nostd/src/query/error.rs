@@ -33,6 +33,12 @@ pub enum QueryError {
         /// The measurement's mesh id.
         found: u32,
     },
+    /// No triangle was found within reach of the nearest pin: the surface is stretched beyond what the
+    /// query was told, or the tree's bytes changed after they were validated.
+    Uncovered {
+        /// Row of the nearest pin.
+        pin: u32,
+    },
     /// A row outside its table: the tree's bytes changed after they were validated.
     Corrupt {
         /// The row that is missing.
@@ -54,6 +60,9 @@ impl fmt::Display for QueryError {
             }
             Self::Mesh { expected, found } => {
                 write!(f, "stretch measured on mesh {found:08x}, the tree is of {expected:08x}")
+            }
+            Self::Uncovered { pin } => {
+                write!(f, "no triangle found within reach of vertex {pin}: over-stretched or corrupt")
             }
             Self::Corrupt { row } => write!(f, "row {row} is missing: the tree's bytes changed"),
         }

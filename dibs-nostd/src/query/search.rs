@@ -282,7 +282,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
                 let point = self.tool.closest_on_triangle(&[position; 3], f32::INFINITY);
                 (point.ok_or(QueryError::Position { vertex: pin })?, None, [pin; 3])
             }
-            _ => return Err(QueryError::Position { vertex: pin }),
+            _ => return Err(QueryError::Uncovered { pin }),
         };
         let axis_distance = sqrt(pair.distance_squared);
         let above_zero = |x: f32| if x > 0.0 { x } else { 0.0 };

@@ -1,0 +1,162 @@
+//! The tree's bytes against their specification, `docs/format.md`, and against corruption.
+
+use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
+use dibs_nostd::format::CRC;
+use dibs_nostd::{FormatError, Options, Query, QueryError, Sphere, Tree};
+use fastrand::Rng;
+use glam::Vec3;
+
+fn heart(index: IndexWidth) -> (Mesh, BuiltTree) {
+    let (mesh, _) = generate::heart(320).expect("a valid size");
+    let tree = Builder::new().index(index).build(&mesh).expect("a valid mesh");
+    (mesh, tree)
+}
+
+fn word(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"))
+}
+
+/// Puts a word and makes the checksum right again, so that only the meaning is wrong.
+fn with_word(bytes: &[u8], at: usize, value: u32) -> Vec<u8> {
+    let mut changed = bytes.to_vec();
+    changed[at..at + 4].copy_from_slice(&value.to_le_bytes());
+    let mut digest = CRC.digest();
+    digest.update(&changed[..60]);
+    digest.update(&changed[64..]);
+    changed[60..64].copy_from_slice(&digest.finalize().to_le_bytes());
+    changed
+}
+
+/// Offset and length of a section, read by the specification alone.
+fn section(bytes: &[u8], kind: u32) -> (usize, usize) {
+    let rows = word(bytes, 48) as usize;
+    let row = (0..rows).map(|r| 64 + 12 * r).find(|&at| word(bytes, at) == kind);
+    let at = row.expect("the section is there");
+    (word(bytes, at + 4) as usize, word(bytes, at + 8) as usize)
+}
+
+#[test]
+fn the_example_of_the_specification_is_what_the_builder_writes() {
+    let mesh = Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]] };
+    let builder = Builder::new().stretch(1.5).with_vertex_order(false).with_rest_shape(false);
+    let tree = builder.build(&mesh).expect("a valid mesh");
+    let text = include_str!("../../docs/format.md");
+    let example = text.split("```text").nth(1).and_then(|t| t.split("```").next());
+    let digits: String = example.expect("an example").split_whitespace().collect();
+    let written: String = tree.blob().iter().map(|b| format!("{b:02x}")).collect();
+    assert_eq!(digits, written);
+}
+
+#[test]
+fn every_field_and_section_stands_where_the_specification_says() {
+    for (index, width) in [(IndexWidth::Bits16, 2), (IndexWidth::Bits32, 4)] {
+        let (mesh, built) = heart(index);
+        let bytes = built.blob();
+        assert_eq!(&bytes[..4], b"DIBS");
+        assert_eq!(bytes[4..8], [1, 0, width as u8, 1]);
+        let (vertices, triangles, nodes) = (word(bytes, 12), word(bytes, 16), word(bytes, 20));
+        assert_eq!(triangles as usize, mesh.triangles.len());
+        assert_eq!(vertices as usize, mesh.positions.len());
+        assert_eq!(word(bytes, 52) as usize, bytes.len());
+        assert_eq!(section(bytes, 1).1, nodes as usize * (4 * width + 8));
+        assert_eq!(section(bytes, 2).1, triangles as usize * 3 * width);
+        let (order, length) = section(bytes, 3);
+        assert_eq!(length, vertices as usize * width);
+        let (rest, length) = section(bytes, 4);
+        assert_eq!(length, vertices as usize * 12);
+        let short = |at: usize| usize::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
+        for row in 0..vertices as usize {
+            let vertex = short(order + row * width);
+            let x = f32::from_bits(word(bytes, rest + 12 * row));
+            assert_eq!(x, mesh.positions[vertex].x);
+            assert_eq!(built.vertex_order()[row] as usize, vertex);
+        }
+        let mut identity = CRC.digest();
+        let ((at, length), (rest, rest_length)) = (section(bytes, 2), section(bytes, 4));
+        identity.update(&bytes[at..at + length]);
+        identity.update(&bytes[rest..rest + rest_length]);
+        assert_eq!(identity.finalize(), word(bytes, 8));
+    }
+}
+
+#[test]
+fn every_flipped_bit_and_every_truncation_is_refused() {
+    let (_, built) = heart(IndexWidth::Bits16);
+    let mut bytes = built.blob().to_vec();
+    for at in 0..bytes.len() {
+        for bit in 0..8 {
+            bytes[at] ^= 1 << bit;
+            assert!(Tree::<u16>::from_bytes(&bytes).is_err(), "byte {at} bit {bit}");
+            bytes[at] ^= 1 << bit;
+        }
+    }
+    for length in 0..bytes.len() {
+        assert!(Tree::<u16>::from_bytes(&bytes[..length]).is_err(), "{length} bytes");
+    }
+    assert!(Tree::<u16>::from_bytes(&bytes).is_ok());
+}
+
+#[test]
+fn a_wrong_value_with_a_right_checksum_is_named() {
+    let (_, built) = heart(IndexWidth::Bits16);
+    let bytes = built.blob();
+    let (nodes, triangles) = (section(bytes, 1).0, section(bytes, 2).0);
+    let vertices = word(bytes, 12);
+    let refuse = |at: usize, value: u32| {
+        Tree::<u16>::from_bytes(&with_word(bytes, at, value)).expect_err("is wrong")
+    };
+    assert!(matches!(Tree::<u32>::from_bytes(bytes), Err(FormatError::Width { found: 2, .. })));
+    assert!(matches!(refuse(0, 0), FormatError::Magic { .. }));
+    assert!(matches!(refuse(4, 0x0102_0002), FormatError::Version { found: 2 }));
+    assert!(matches!(refuse(4, 0x0702_0001), FormatError::Field { offset: 7, value: 7 }));
+    for (at, value) in [(12, 0), (12, 65_537), (16, 0), (28, 65), (40, vertices), (56, 1)] {
+        let expected = FormatError::Field { offset: at as u8, value };
+        assert_eq!(refuse(at, value), expected, "field at {at}");
+    }
+    for wrong in [0.5f32, f32::NAN, f32::INFINITY] {
+        assert!(matches!(refuse(32, wrong.to_bits()), FormatError::Field { offset: 32, .. }));
+        assert!(wrong == 0.5 || matches!(refuse(36, wrong.to_bits()), FormatError::Field { .. }));
+    }
+    assert!(matches!(refuse(20, word(bytes, 20) - 1), FormatError::Section { kind: 1 }));
+    assert!(matches!(refuse(64, 99), FormatError::Section { kind: 1 }));
+    assert!(matches!(refuse(68, 7), FormatError::Section { kind: 1 }));
+    assert!(matches!(refuse(28, word(bytes, 28) - 1), FormatError::Depth { .. }));
+    assert!(matches!(refuse(28, word(bytes, 28) + 1), FormatError::Depth { .. }));
+    assert!(matches!(refuse(24, 1), FormatError::NodeOrder { node: 1 }));
+    assert!(matches!(refuse(nodes, 0xFFFF_FFFF), FormatError::Pin { node: 0, pin: 0xFFFF }));
+    assert!(matches!(refuse(nodes + 8, 0), FormatError::NodeOrder { node: 0 }));
+    assert!(matches!(refuse(nodes + 8, 1 << 31), FormatError::NodeOrder { .. }));
+    let corner = refuse(triangles, 0xFFFF_FFFF);
+    assert!(matches!(corner, FormatError::Corner { triangle: 0, vertex: 0xFFFF }));
+}
+
+/// What a validated tree does when its bytes rot afterwards: an error or an answer, but it ends.
+#[test]
+fn a_query_on_rotten_bytes_ends() {
+    let (mesh, built) = heart(IndexWidth::Bits16);
+    let bytes = built.blob();
+    let tree = Tree::<u16>::from_bytes(bytes).expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let (nodes, length) = section(bytes, 1);
+    let mut rng = Rng::with_seed(5);
+    let (mut errors, mut answers) = (0, 0);
+    for _ in 0..2_000 {
+        let mut rotten = bytes.to_vec();
+        for _ in 0..1 + rng.usize(..8) {
+            rotten[nodes + rng.usize(..length)] ^= 1 << rng.u32(..8);
+        }
+        let view = tree.moved_to(&rotten).expect("same layout");
+        let mut query = Query::<u16, 64>::new(&view).expect("deep enough");
+        let tool = Sphere::new(rows[rng.usize(..rows.len())] * 1.3, 1.0).expect("valid");
+        match query.closest(rows.as_slice(), &tool, &Options::new()) {
+            Ok(found) => {
+                answers += 1;
+                assert!(found.node_tests <= 2 * tree.node_count() + tree.triangle_count() + 1);
+            }
+            Err(QueryError::Corrupt { .. } | QueryError::Uncovered { .. }) => errors += 1,
+            Err(other) => panic!("{other}"),
+        }
+    }
+    println!("{answers} answers, {errors} errors");
+    assert!(answers > 0 && errors > 0);
+}
