@@ -23,11 +23,14 @@ pub struct Proximity {
     /// difference is the depth of a shallow penetration.
     pub axis_distance: f32,
     /// The surface's point of the closest pair.
+    #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub point_on_surface: Vec3,
     /// The tool's point of the closest pair, on the tool's own surface.
+    #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub point_on_tool: Vec3,
     /// Unit vector from `point_on_surface` towards the tool's axis; zero when the axis itself
     /// touches the surface, where no direction is defined.
+    #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub direction: Vec3,
     /// Where along the tool's axis the pair sits: 0 at its start, 1 at its end; 0 for a sphere.
     pub axis_parameter: f32,
