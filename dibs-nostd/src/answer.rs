@@ -46,3 +46,15 @@ pub struct Proximity {
     /// Exact tool-triangle tests evaluated.
     pub triangle_tests: u32,
 }
+
+impl Proximity {
+    /// The same pair, its accuracy widened by `error` (mm, not negative): how far a vertex may be from
+    /// where the table has it, say [`FrameLabel::position_error`](crate::FrameLabel::position_error)
+    /// of a quantised frame, or the age of the surface times the tissue's greatest speed. A distance
+    /// changes by at most as much as its points move.
+    #[must_use]
+    pub fn widened(mut self, error: f32) -> Self {
+        self.accuracy += error;
+        self
+    }
+}

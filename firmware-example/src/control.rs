@@ -119,7 +119,8 @@ impl Control {
         if age > SURFACE_AGE_LIMIT {
             (State::Stale, self.wall.force(Err(Unknown::Stale { age }), velocity))
         } else {
-            (State::Tracking, self.wall.force(Ok(&closest), velocity))
+            let cautious = closest.widened(label.position_error);
+            (State::Tracking, self.wall.force(Ok(&cautious), velocity))
         }
     }
 }

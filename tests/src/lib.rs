@@ -1,7 +1,16 @@
 //! Shared by the tests.
 
 pub mod ask;
+pub mod baselines;
 pub mod deform;
+pub mod dibs;
+pub mod method;
 pub mod oracle;
 pub mod poses;
+pub mod streams;
 pub mod stretch;
+
+/// The README's code: it compiles, and its control loop runs.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+pub struct Readme;

@@ -62,7 +62,10 @@ impl fmt::Display for QueryError {
                 write!(f, "stretch measured on mesh {found:08x}, the tree is of {expected:08x}")
             }
             Self::Uncovered { pin } => {
-                write!(f, "no triangle found within reach of vertex {pin}: over-stretched or corrupt")
+                write!(
+                    f,
+                    "no triangle found within reach of vertex {pin}: over-stretched or corrupt"
+                )
             }
             Self::Corrupt { row } => write!(f, "row {row} is missing: the tree's bytes changed"),
         }

@@ -47,7 +47,7 @@ impl Options {
         self
     }
 
-    /// Starts from a triangle, usually the last tick's [`Proximity::triangle`]. A wrong or stale one
+    /// Starts from a triangle, usually the last tick's [`Proximity::triangle`](crate::Proximity::triangle). A wrong or stale one
     /// costs one triangle test; `None` starts cold.
     #[must_use]
     pub const fn warm_start(mut self, triangle: Option<u32>) -> Self {

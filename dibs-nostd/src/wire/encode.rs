@@ -3,9 +3,10 @@
 use core::fmt;
 
 use super::{
-    CHECKSUM_BYTES, CRC, Encoding, HEADER_BYTES, MAX_PACKET, MIN_MTU, QuantisedBox, VERSION, kind,
+    CHECKSUM_BYTES, Encoding, HEADER_BYTES, MAX_PACKET, MIN_MTU, QuantisedBox, VERSION, kind,
 };
 use crate::VertexTable;
+use crate::format::CRC;
 
 /// Cuts one frame into packets of at most `MTU` bytes: begin, vertices, commit.
 ///

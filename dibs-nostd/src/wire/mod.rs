@@ -36,15 +36,6 @@ pub const MIN_MTU: usize = 64;
 /// Largest packet: 255 `f32` positions.
 pub const MAX_PACKET: usize = HEADER_BYTES + 255 * 12 + CHECKSUM_BYTES;
 
-/// CRC-32 (ISO-HDLC, that of zlib and Ethernet), by a table of 1 KiB: about seven instructions a
-/// byte. Sixteen tables would halve that for 16 KiB, which is all of a Cortex-M7's data cache.
-///
-/// Detected for certain: every burst of up to 32 bits, every pattern of up to 4 flipped bits in a
-/// packet of up to 375 bytes, of up to 3 in the largest one (Koopman, "32-bit cyclic redundancy
-/// codes for internet applications", DSN 2002: Hamming distance 5 to 2,974 data bits, 4 to 91,607).
-/// Of other damage one pattern in 2^32 passes.
-static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
-
 /// The packet kinds: the second byte. Others are reserved.
 mod kind {
     pub const BEGIN: u8 = 1;

@@ -2,9 +2,8 @@
 
 use glam::Vec3;
 
-use super::{
-    BoxError, CHECKSUM_BYTES, CRC, HEADER_BYTES, PacketError, QuantisedBox, VERSION, kind,
-};
+use super::{BoxError, CHECKSUM_BYTES, HEADER_BYTES, PacketError, QuantisedBox, VERSION, kind};
+use crate::format::CRC;
 
 /// A packet whose checksum and form are right. It borrows the bytes that it was decoded from.
 #[derive(Clone, Copy, Debug, PartialEq)]
