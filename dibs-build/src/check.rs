@@ -13,9 +13,8 @@ use std::collections::HashSet;
 /// thousandth of it, the product of two squared edges is still a normal f32.
 const LEAST_EXTENT: f64 = 1e-6;
 
-/// No distance between two points with such coordinates exceeds 3.5e9, whose fourth power is
-/// still finite in f32.
-const MOST_COORDINATE: f64 = 1e9;
+/// Above, fourth powers of distances overflow f32.
+const MOST_COORDINATE: f64 = dibs_nostd::MAX_COORDINATE as f64;
 
 /// Ear clipping takes quadratic time at worst: below this, a second for one face.
 const MOST_CORNERS: usize = 10_000;

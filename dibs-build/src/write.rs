@@ -13,7 +13,6 @@ pub struct WriteError {
     /// The file.
     pub path: PathBuf,
     /// What went wrong.
-    #[source]
     pub kind: WriteErrorKind,
 }
 

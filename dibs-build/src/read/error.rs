@@ -11,7 +11,6 @@ pub struct ReadError {
     /// The file.
     pub path: PathBuf,
     /// What is wrong with it.
-    #[source]
     pub kind: ReadErrorKind,
 }
 

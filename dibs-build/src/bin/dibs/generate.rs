@@ -1,0 +1,59 @@
+//! `dibs generate`: procedural surfaces.
+
+use anyhow::Result;
+use clap::Subcommand;
+use dibs_build::generate;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  dibs generate heart --triangles 10272 -o heart.ply --motion heart.pc2
+  dibs generate brain --triangles 50000 -o brain.ply")]
+pub struct Args {
+    #[command(subcommand)]
+    surface: Surface,
+}
+
+#[derive(Subcommand)]
+enum Surface {
+    /// A beating heart, in mm: closed, manifold, one component
+    Heart {
+        /// Triangles: an even number
+        #[arg(long, default_value_t = 10_272)]
+        triangles: u32,
+        /// The mesh to write, PLY
+        #[arg(short, long)]
+        output: PathBuf,
+        /// The motion to write, PC2: one cycle
+        #[arg(long)]
+        motion: Option<PathBuf>,
+    },
+    /// A cortex with gyri and sulci, in mm: closed, manifold, one component
+    Brain {
+        /// Triangles: an even number
+        #[arg(long, default_value_t = 50_000)]
+        triangles: u32,
+        /// The mesh to write, PLY
+        #[arg(short, long)]
+        output: PathBuf,
+    },
+}
+
+pub fn run(args: &Args) -> Result<()> {
+    let (mesh, output) = match &args.surface {
+        Surface::Heart { triangles, output, motion } => {
+            let (mesh, beat) = generate::heart(*triangles)?;
+            if let Some(path) = motion {
+                beat.write_pc2(path)?;
+                println!("written  {}: {} frames", path.display(), beat.frames.len());
+            }
+            (mesh, output)
+        }
+        Surface::Brain { triangles, output } => (generate::brain(*triangles)?, output),
+    };
+    mesh.write_ply(output)?;
+    let (vertices, triangles) = (mesh.positions.len(), mesh.triangles.len());
+    println!("written  {}: {vertices} vertices, {triangles} triangles", output.display());
+    Ok(())
+}

@@ -1,0 +1,56 @@
+//! `dibs`: from a mesh file to a tree, and queries on it, on the command line.
+
+mod build;
+mod generate;
+mod inspect;
+mod query;
+mod tree_file;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Closest points on a deforming surface, by trees that never need refitting.
+#[derive(Parser)]
+#[command(version, after_help = EXAMPLES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Build a tree from a mesh file (OBJ, STL, PLY or OFF)
+    Build(build::Args),
+    /// Validate a tree file and show what it is and costs
+    Inspect(inspect::Args),
+    /// Find the surface point closest to a tool
+    Query(query::Args),
+    /// Generate a procedural heart or brain
+    Generate(generate::Args),
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  dibs generate heart --triangles 10272 -o heart.ply --motion heart.pc2
+  dibs build heart.ply -o heart.dibs --stretch 1.5
+  dibs inspect heart.dibs
+  dibs query heart.dibs --tool capsule:0,0,60,0,0,200,4 --vertices heart.pc2 --frame 9
+
+Lengths are in the mesh's own unit. Warnings and progress go to standard error, results to
+standard output; --json makes them one JSON object. Bad input ends with exit code 1.";
+
+fn main() -> ExitCode {
+    let outcome = match Cli::parse().command {
+        Command::Build(args) => build::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
+        Command::Query(args) => query::run(&args),
+        Command::Generate(args) => generate::run(&args),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

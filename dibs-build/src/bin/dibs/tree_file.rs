@@ -1,0 +1,43 @@
+//! Tree files of either index width.
+
+use anyhow::{Result, anyhow};
+use dibs_build::Summary;
+use dibs_nostd::{FormatError, Tree};
+use std::path::Path;
+
+/// A validated tree of either width.
+pub enum AnyTree<'a> {
+    Narrow(Tree<'a, u16>),
+    Wide(Tree<'a, u32>),
+}
+
+pub fn load(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).map_err(|e| anyhow!("{}: cannot be read ({e})", path.display()))
+}
+
+pub fn validate<'a>(bytes: &'a [u8], path: &Path) -> Result<AnyTree<'a>> {
+    match Tree::<u16>::from_bytes(bytes) {
+        Err(FormatError::Width { .. }) => Tree::<u32>::from_bytes(bytes).map(AnyTree::Wide),
+        narrow => narrow.map(AnyTree::Narrow),
+    }
+    .map_err(|e| anyhow!("{}: not a valid tree: {e}; build it again", path.display()))
+}
+
+pub fn print(summary: &Summary) {
+    let s = summary;
+    println!(
+        "tree     {} triangles, {} vertices, {} nodes, depth {}, {}-bit indices",
+        s.triangles, s.vertices, s.nodes, s.depth, s.index_bits
+    );
+    let paths = if s.surface_paths { "of triangles" } else { "of edges" };
+    println!("stretch  limit {} {paths}, root radius at rest {}", s.stretch, s.root_radius);
+    println!("mesh id  {:08x}", s.mesh_id);
+    println!(
+        "flash    {} bytes; of these a query reads {} ({:.1} a triangle)",
+        s.flash_bytes, s.query_bytes, s.query_bytes_per_triangle
+    );
+    println!(
+        "RAM      {} bytes for two buffers of positions, {} for a query's stack",
+        s.ram_bytes, s.stack_bytes
+    );
+}

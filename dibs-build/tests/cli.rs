@@ -1,0 +1,172 @@
+//! The `dibs` program, as a script would run it.
+
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn dibs(folder: &Path, line: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_dibs"))
+        .current_dir(folder)
+        .args(line.split_whitespace())
+        .output()
+        .unwrap()
+}
+
+fn succeeds(folder: &Path, line: &str) -> String {
+    let output = dibs(folder, line);
+    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn json(folder: &Path, line: &str) -> Value {
+    serde_json::from_str(&succeeds(folder, line)).unwrap()
+}
+
+/// Exit code 1, nothing on standard output, and one line on standard error.
+fn fails(folder: &Path, line: &str) -> String {
+    let output = dibs(folder, line);
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{line}: {error}");
+    assert!(output.stdout.is_empty(), "{line}");
+    assert_eq!(error.lines().filter(|line| line.starts_with("error: ")).count(), 1, "{error}");
+    error.lines().last().unwrap().trim_start_matches("error: ").to_owned()
+}
+
+fn vector(value: &Value) -> [f64; 3] {
+    serde_json::from_value(value.clone()).unwrap()
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
+}
+
+#[test]
+fn from_generated_mesh_to_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeeds(folder, "generate heart --triangles 1000 -o heart.ply --motion heart.pc2");
+    let built = json(folder, "build heart.ply -o heart.dibs --stretch 1.5 --json");
+    assert_eq!(built["mesh"]["triangles"], 1000);
+    assert_eq!(built["tree"]["index_bits"], 16);
+    assert_eq!(json(folder, "inspect heart.dibs --json"), built["tree"]);
+    let wide = json(folder, "build heart.ply -o wide.dibs --stretch 1.5 --index 32 --json");
+    assert_eq!(wide["tree"]["index_bits"], 32);
+    let paper =
+        json(folder, "build heart.ply -o paper.dibs --construction paper --stretch 1.5 --json");
+    assert_eq!(paper["tree"]["surface_paths"], false);
+
+    let tool = "--tool capsule:-70,5,20,-90,0,80,4 --vertices heart.pc2 --frame 9 --json";
+    let answers =
+        ["heart", "wide", "paper"].map(|tree| json(folder, &format!("query {tree}.dibs {tool}")));
+    let motion = dibs_build::Motion::read_pc2(folder.join("heart.pc2")).unwrap();
+    for answer in &answers {
+        let separation = answer["separation"].as_f64().unwrap();
+        let on_surface = vector(&answer["point_on_surface"]);
+        assert!((separation - answers[0]["separation"].as_f64().unwrap()).abs() < 1e-3);
+        let apart = distance(on_surface, vector(&answer["point_on_tool"]));
+        assert!((separation - apart).abs() < 1e-3, "{answer}");
+        // The triangle is named by the input file's vertices.
+        let corners: [usize; 3] = serde_json::from_value(answer["triangle"].clone()).unwrap();
+        let weights = vector(&answer["barycentric"]);
+        let mut point = [0.0; 3];
+        for (corner, weight) in corners.into_iter().zip(weights) {
+            let position = motion.frames[9][corner].to_array();
+            for i in 0..3 {
+                point[i] += weight * f64::from(position[i]);
+            }
+        }
+        assert!(distance(point, on_surface) < 1e-3, "{answer}");
+    }
+    let measured = json(folder, &format!("query heart.dibs {tool} --stretch 1.5"));
+    assert_eq!(measured["separation"], answers[0]["separation"]);
+    assert!(measured["node_tests"].as_u64() <= answers[0]["node_tests"].as_u64());
+}
+
+#[test]
+fn rust_source_is_named_after_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeeds(folder, "generate brain --triangles 500 -o brain.ply");
+    succeeds(folder, "build brain.ply -o left-brain.rs --stretch 2");
+    let source = std::fs::read_to_string(folder.join("left-brain.rs")).unwrap();
+    assert!(source.contains("pub static LEFT_BRAIN: "), "{}", &source[..300]);
+    succeeds(folder, "build brain.ply -o tree.rs --name CORTEX");
+    let source = std::fs::read_to_string(folder.join("tree.rs")).unwrap();
+    assert!(source.contains("pub static CORTEX: "), "{}", &source[..300]);
+}
+
+#[test]
+fn bad_input_is_one_sentence_and_no_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+    write("ok.obj", "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 1 2 3\n");
+    write("twice.obj", "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 1 2 3\nf 1 2 3\n");
+    write("torn.obj", "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 1 2 9\n");
+    write("old.dibs", "what was there before");
+    for (line, part) in [
+        ("build absent.obj -o old.dibs", "absent.obj"),
+        ("build torn.obj -o old.dibs", "vertex 9"),
+        ("build twice.obj -o old.dibs --strict", "duplicate"),
+        ("build ok.obj -o old.dibs --weld=-1", "tolerance"),
+        ("build ok.obj -o old.dibs --stretch 0.5", "stretch limit of 0.5"),
+        ("build ok.obj -o old.txt", ".dibs or .rs"),
+        ("build ok.obj -o absent/new.dibs", "absent/new.dibs"),
+        ("inspect ok.obj", "not a valid tree"),
+        ("inspect absent.dibs", "absent.dibs"),
+        ("generate heart --triangles 11 -o heart.ply", "11 triangles"),
+    ] {
+        let error = fails(folder, line);
+        assert!(error.contains(part), "{line}: {error}");
+    }
+    assert_eq!(std::fs::read_to_string(folder.join("old.dibs")).unwrap(), "what was there before");
+    assert_eq!(std::fs::read_dir(folder).unwrap().count(), 4);
+
+    succeeds(folder, "build ok.obj -o ok.dibs --stretch 1.2");
+    write("far.obj", "v 0 0 0\nv 20 0 0\nv 0 10 0\nf 1 2 3\n");
+    write("few.off", "OFF 2 0 0\n0 0 0\n1 0 0\n");
+    for (line, part) in [
+        ("--vertices far.obj", "stretched by 2"),
+        ("--vertices few.off", "no triangles"),
+        ("--vertices ok.obj --frame 0", ".pc2"),
+        ("--vertices ok.obj --stretch 0.9", "more than the 0.9"),
+        ("--vertices absent.pc2 --frame 0", "absent.pc2"),
+    ] {
+        let error = fails(folder, &format!("query ok.dibs --tool sphere:0,0,5,1 {line}"));
+        assert!(error.contains(part), "{line}: {error}");
+    }
+    let rest = json(folder, "query ok.dibs --tool sphere:1,1,-5,1 --json");
+    assert!((rest["separation"].as_f64().unwrap() - 4.0).abs() < 1e-5, "{rest}");
+    assert!(distance(vector(&rest["point_on_surface"]), [1.0, 1.0, 0.0]) < 1e-5, "{rest}");
+}
+
+/// The program and the library agree on every malformed file; what the library must say about
+/// each is asserted in the tests package. The files are not part of the project.
+#[test]
+fn malformed_files_end_as_the_library_says() {
+    let nasty = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/nasty");
+    if !nasty.is_dir() {
+        println!("skipped: {} is absent", nasty.display());
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("tree.dibs");
+    for entry in std::fs::read_dir(nasty).unwrap() {
+        let path = entry.unwrap().path();
+        let line = format!("build {} -o tree.dibs --stretch 1.3 --json", path.display());
+        match dibs_build::read(&path) {
+            Ok(import) => {
+                let built = json(folder.path(), &line);
+                let report = serde_json::to_value(&import.report).unwrap();
+                assert_eq!(built["mesh"], report, "{line}");
+                assert_eq!(built["tree"]["triangles"], report["triangles"], "{line}");
+                json(folder.path(), "inspect tree.dibs --json");
+                std::fs::remove_file(&output).unwrap();
+            }
+            Err(error) => {
+                assert_eq!(fails(folder.path(), &line), error.to_string());
+                assert!(!output.exists(), "{line}");
+            }
+        }
+    }
+}
