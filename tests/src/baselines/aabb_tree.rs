@@ -1,0 +1,291 @@
+//! A tree of axis-aligned boxes: built once by the surface area heuristic, refitted ever after.
+
+use std::ops::Range;
+
+use dibs_build::Mesh;
+use glam::{Vec3, Vec3A};
+
+use super::bounds::Axis;
+use crate::method::Found;
+
+/// Most triangles of a leaf.
+const LEAF: usize = 6;
+/// Bins of the surface area heuristic, and the cost of a box test against a triangle test.
+const BINS: usize = 16;
+const BOX_COST: f32 = 1.0;
+/// Enough for trees that halve at least every other level, as checked when they are built.
+const STACK: usize = 96;
+
+/// A box: its lowest and highest corner.
+pub type Bounds = [Vec3A; 2];
+
+const NOTHING: Bounds = [Vec3A::INFINITY, Vec3A::NEG_INFINITY];
+
+/// What a node holds. Children are adjacent, after their parent, and all descendants of a node are one
+/// range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Link {
+    /// The first child, or the first triangle.
+    pub first: u32,
+    /// 0 for an inner node, the triangles of a leaf, or [`DEFERRED`] and more: see the hybrid.
+    pub count: u32,
+}
+
+/// Counts from here on mark an inner node whose descendants may be out of date.
+pub const DEFERRED: u32 = 1 << 31;
+
+/// The tree, its triangles in the order of the leaves, its vertices in the order of the triangles.
+#[derive(Clone)]
+pub struct AabbTree {
+    pub(super) boxes: Vec<Bounds>,
+    pub(super) links: Vec<Link>,
+    pub(super) positions: Vec<Vec3A>,
+    triangles: Vec<[u32; 3]>,
+    order: Vec<u32>,
+    /// The vertices of each leaf, each once, and where each node's begin.
+    leaf_vertices: Vec<u32>,
+    leaf_start: Vec<u32>,
+}
+
+impl AabbTree {
+    /// Builds the tree for the mesh as it is.
+    ///
+    /// # Panics
+    /// If the tree is deeper than the traversal's stack.
+    #[must_use]
+    pub fn new(mesh: &Mesh) -> Self {
+        let corners = |t: &[u32; 3]| t.map(|v| Vec3A::from(mesh.positions[v as usize]));
+        let boxes: Vec<Bounds> =
+            mesh.triangles.iter().map(|t| corners(t).into_iter().fold(NOTHING, grown)).collect();
+        let mut builder = Builder {
+            centres: boxes.iter().map(|[low, high]| (low + high) * 0.5).collect(),
+            boxes,
+            items: (0..mesh.triangles.len() as u32).collect(),
+            links: vec![Link { first: 0, count: 0 }],
+        };
+        let depth = builder.node(0, 0..mesh.triangles.len(), 1);
+        assert!(depth < STACK, "the tree is {depth} deep");
+        let Builder { items, links, .. } = builder;
+
+        let mut row = vec![u32::MAX; mesh.positions.len()];
+        let mut order = Vec::with_capacity(mesh.positions.len());
+        let mut triangles = Vec::with_capacity(items.len());
+        for &item in &items {
+            triangles.push(mesh.triangles[item as usize].map(|vertex| {
+                let row = &mut row[vertex as usize];
+                if *row == u32::MAX {
+                    *row = order.len() as u32;
+                    order.push(vertex);
+                }
+                *row
+            }));
+        }
+        let (mut leaf_vertices, mut leaf_start) = (Vec::new(), vec![0]);
+        for link in &links {
+            if link.count > 0 {
+                let range = link.first as usize..(link.first + link.count) as usize;
+                let mut of_leaf: Vec<u32> = triangles[range].iter().flatten().copied().collect();
+                of_leaf.sort_unstable();
+                of_leaf.dedup();
+                leaf_vertices.extend(of_leaf);
+            }
+            leaf_start.push(leaf_vertices.len() as u32);
+        }
+        let mut tree = Self {
+            boxes: vec![NOTHING; links.len()],
+            links,
+            positions: Vec::new(),
+            triangles,
+            order,
+            leaf_vertices,
+            leaf_start,
+        };
+        tree.load(&mesh.positions);
+        tree
+    }
+
+    pub(super) fn load(&mut self, positions: &[Vec3]) {
+        self.positions.clear();
+        self.positions.extend(self.order.iter().map(|&v| Vec3A::from(positions[v as usize])));
+    }
+
+    /// Refits nodes from the last to the first: children before parents.
+    pub(super) fn refit(&mut self, nodes: Range<usize>) {
+        let (links, boxes) = (&self.links[..nodes.end], &mut self.boxes[..nodes.end]);
+        let starts = &self.leaf_start[..=nodes.end];
+        for node in nodes.rev() {
+            let Link { first, count } = links[node];
+            boxes[node] = if count == 0 {
+                let first = first as usize;
+                joined(boxes[first], boxes[first + 1])
+            } else {
+                let vertices = starts[node] as usize..starts[node + 1] as usize;
+                let of_leaf = &self.leaf_vertices[vertices];
+                of_leaf.iter().fold(NOTHING, |b, &v| grown(b, self.positions[v as usize]))
+            };
+        }
+    }
+
+    /// The vertices below a range of nodes, each once, in ascending order.
+    pub(super) fn vertices_of(&self, nodes: Range<usize>) -> Vec<u32> {
+        let refs = self.leaf_start[nodes.start] as usize..self.leaf_start[nodes.end] as usize;
+        let mut vertices = self.leaf_vertices[refs].to_vec();
+        vertices.sort_unstable();
+        vertices.dedup();
+        vertices
+    }
+
+    /// The range of a node's descendants.
+    pub(super) fn descendants(&self, node: usize) -> Range<usize> {
+        match self.links[node] {
+            Link { first, count: 0 } => {
+                let first = first as usize;
+                let ends = [first, first + 1].map(|child| self.descendants(child).end);
+                first..ends[0].max(ends[1]).max(first + 2)
+            }
+            _ => node..node,
+        }
+    }
+
+    /// The closest pair. Near child first; `refresh` brings a deferred node's descendants up to date and
+    /// returns its first child.
+    #[inline(always)]
+    pub(super) fn closest<A: Axis>(
+        &mut self,
+        tool: &A,
+        mut refresh: impl FnMut(&mut Self, usize) -> u32,
+    ) -> Found {
+        let axis = tool.prepare();
+        let mut best = f32::INFINITY;
+        let (mut node_tests, mut triangle_tests) = (1, 0);
+        let mut stack = [(0.0_f32, 0_u32); STACK];
+        let mut waiting = 0;
+        let mut node = 0_u32;
+        loop {
+            let Link { first, count } = self.links[node as usize];
+            if count == 0 || count >= DEFERRED {
+                let first = if count == 0 { first } else { refresh(self, node as usize) };
+                node_tests += 2;
+                let [low, high] = self.boxes[first as usize];
+                let left = A::bound(&axis, low, high, best);
+                let [low, high] = self.boxes[first as usize + 1];
+                let right = A::bound(&axis, low, high, best);
+                let right_first = right < left;
+                let (near, far) = if right_first { (right, left) } else { (left, right) };
+                let side = u32::from(right_first);
+                if far < best {
+                    stack[waiting] = (far, first + (side ^ 1));
+                    waiting += 1;
+                }
+                if near < best {
+                    node = first + side;
+                    continue;
+                }
+            } else {
+                for triangle in &self.triangles[first as usize..(first + count) as usize] {
+                    let corners = triangle.map(|v| Vec3::from(self.positions[v as usize]));
+                    triangle_tests += 1;
+                    if let Some(pair) = tool.closest_on_triangle(&corners, best) {
+                        best = pair.distance_squared;
+                    }
+                }
+            }
+            loop {
+                if waiting == 0 {
+                    let separation = (best.sqrt() - tool.radius()).max(0.0);
+                    return Found { separation, tests: Some([node_tests, triangle_tests]) };
+                }
+                waiting -= 1;
+                let (lower, next) = stack[waiting];
+                if lower < best {
+                    node = next;
+                    break;
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+pub fn grown([low, high]: Bounds, point: Vec3A) -> Bounds {
+    [low.min(point), high.max(point)]
+}
+
+#[inline(always)]
+pub fn joined(a: Bounds, b: Bounds) -> Bounds {
+    [a[0].min(b[0]), a[1].max(b[1])]
+}
+
+/// Half the surface of a box.
+fn area([low, high]: Bounds) -> f32 {
+    let size = high - low;
+    size.x * size.y + size.y * size.z + size.z * size.x
+}
+
+struct Builder {
+    boxes: Vec<Bounds>,
+    centres: Vec<Vec3A>,
+    items: Vec<u32>,
+    links: Vec<Link>,
+}
+
+impl Builder {
+    /// Builds the subtree of some items, and returns how deep it is.
+    fn node(&mut self, node: usize, range: Range<usize>, depth: usize) -> usize {
+        let middle = if range.len() > 1 { self.split(range.clone()) } else { None };
+        let Some(middle) = middle else {
+            self.links[node] = Link { first: range.start as u32, count: range.len() as u32 };
+            return depth;
+        };
+        let first = self.links.len();
+        self.links[node] = Link { first: first as u32, count: 0 };
+        self.links.extend([Link { first: 0, count: 0 }; 2]);
+        let left = self.node(first, range.start..middle, depth + 1);
+        left.max(self.node(first + 1, middle..range.end, depth + 1))
+    }
+
+    /// Sorts the items into two parts and returns where the second starts, or `None` for a leaf.
+    fn split(&mut self, range: Range<usize>) -> Option<usize> {
+        let items = &mut self.items[range.clone()];
+        let (boxes, centres) = (&self.boxes, &self.centres);
+        let whole = items.iter().fold(NOTHING, |b, &i| joined(b, boxes[i as usize]));
+        let [low, high] = items.iter().fold(NOTHING, |b, &i| grown(b, centres[i as usize]));
+        let scale = Vec3A::splat(BINS as f32 * 0.9999) / (high - low);
+        let mut best: Option<(f32, usize, usize)> = None;
+        for axis in (0..3).filter(|&axis| high[axis] > low[axis]) {
+            let mut bins = [(NOTHING, 0_usize); BINS];
+            for &i in &*items {
+                let i = i as usize;
+                let bin = &mut bins[((centres[i][axis] - low[axis]) * scale[axis]) as usize];
+                *bin = (joined(bin.0, boxes[i]), bin.1 + 1);
+            }
+            let mut right_cost = [0.0; BINS];
+            let mut right = (NOTHING, 0);
+            for (cut, bin) in bins.iter().enumerate().rev() {
+                right = (joined(right.0, bin.0), right.1 + bin.1);
+                right_cost[cut] = area(right.0) * right.1 as f32;
+            }
+            let mut left = (NOTHING, 0);
+            for cut in 1..BINS {
+                left = (joined(left.0, bins[cut - 1].0), left.1 + bins[cut - 1].1);
+                let cost = area(left.0) * left.1 as f32 + right_cost[cut];
+                let both = left.1 > 0 && left.1 < items.len();
+                if both && best.is_none_or(|(least, ..)| cost < least) {
+                    best = Some((cost, axis, cut));
+                }
+            }
+        }
+        let Some((cost, axis, cut)) = best else {
+            // All centres in one point.
+            return (items.len() > LEAF).then_some(range.start + items.len() / 2);
+        };
+        let leaf_cost = area(whole) * (items.len() as f32 - 2.0 * BOX_COST);
+        if items.len() <= LEAF && leaf_cost <= cost {
+            return None;
+        }
+        let is_right =
+            |&i: &u32| ((centres[i as usize][axis] - low[axis]) * scale[axis]) as usize >= cut;
+        items.sort_by_key(is_right);
+        Some(range.start + items.partition_point(|i| !is_right(i)))
+    }
+}

@@ -1,0 +1,118 @@
+//! The AABB tree refitted partly before and partly during queries (Larsson and Akenine-Moller 2001).
+//!
+//! The boxes of the top levels are refitted bottom-up, starting at a *cut* of the tree where each box
+//! is taken straight from the vertices below it. What is below the cut is refitted, one subtree at a
+//! time, when a query first comes there.
+
+use glam::Vec3;
+
+use super::aabb_tree::{AabbTree, Bounds, DEFERRED, Link, grown, joined};
+use crate::method::{Found, Method, Probe};
+
+/// A tree of boxes with a cut.
+pub struct Hybrid {
+    tree: AabbTree,
+    /// Inner nodes above the cut, parents first.
+    top: Vec<u32>,
+    cut: Vec<Cut>,
+    frame: u64,
+}
+
+/// A subtree below the cut.
+struct Cut {
+    node: u32,
+    first_child: u32,
+    end: u32,
+    /// The vertices below: the rows from `rows.0` to `rows.1`, and others.
+    rows: (u32, u32),
+    others: Vec<u32>,
+    /// The frame that the descendants were refitted for.
+    refitted: u64,
+}
+
+impl Hybrid {
+    /// Refits this tree, with the cut `level` levels below the root.
+    #[must_use]
+    pub fn new(mut tree: AabbTree, level: u32) -> Self {
+        let (mut top, mut cut) = (Vec::new(), Vec::new());
+        let mut waiting = vec![(0_usize, 0)];
+        while let Some((node, depth)) = waiting.pop() {
+            let Link { first, count } = tree.links[node];
+            if count == 0 && depth < level {
+                top.push(node as u32);
+                waiting.extend([(first as usize, depth + 1), (first as usize + 1, depth + 1)]);
+            } else {
+                cut.push(Cut::new(&tree, node));
+            }
+        }
+        top.sort_unstable();
+        cut.sort_unstable_by_key(|cut| cut.node);
+        for (number, cut) in cut.iter().enumerate() {
+            let link = &mut tree.links[cut.node as usize];
+            if link.count == 0 {
+                link.count = DEFERRED | number as u32;
+            }
+        }
+        Self { tree, top, cut, frame: 0 }
+    }
+}
+
+impl Cut {
+    fn new(tree: &AabbTree, node: usize) -> Self {
+        let below = tree.descendants(node);
+        let vertices =
+            tree.vertices_of(if below.is_empty() { node..node + 1 } else { below.clone() });
+        // Rows are numbered as leaves need them, so most of them are the subtree's last and in one run.
+        let run = vertices.windows(2).rev().take_while(|pair| pair[0] + 1 == pair[1]).count() + 1;
+        let (others, rows) = vertices.split_at(vertices.len() - run);
+        Self {
+            node: node as u32,
+            first_child: below.start as u32,
+            end: below.end as u32,
+            rows: (rows[0], rows[0] + run as u32),
+            others: others.to_vec(),
+            refitted: 0,
+        }
+    }
+
+    fn bounds(&self, tree: &AabbTree) -> Bounds {
+        let run = &tree.positions[self.rows.0 as usize..self.rows.1 as usize];
+        let start = [run[0]; 2];
+        let of_run = run.iter().fold(start, |b, &p| grown(b, p));
+        self.others.iter().fold(of_run, |b, &v| grown(b, tree.positions[v as usize]))
+    }
+}
+
+impl Method for Hybrid {
+    fn load(&mut self, positions: &[Vec3]) {
+        self.tree.load(positions);
+    }
+
+    fn update(&mut self) {
+        self.frame += 1;
+        for cut in &self.cut {
+            self.tree.boxes[cut.node as usize] = cut.bounds(&self.tree);
+        }
+        for &node in self.top.iter().rev() {
+            let first = self.tree.links[node as usize].first as usize;
+            self.tree.boxes[node as usize] =
+                joined(self.tree.boxes[first], self.tree.boxes[first + 1]);
+        }
+    }
+
+    fn find(&mut self, tool: &Probe) -> Found {
+        let (cuts, frame) = (&mut self.cut, self.frame);
+        let refresh = |tree: &mut AabbTree, node: usize| {
+            let cut = &mut cuts[(tree.links[node].count & !DEFERRED) as usize];
+            if cut.refitted != frame {
+                cut.refitted = frame;
+                tree.refit(cut.first_child as usize..cut.end as usize);
+            }
+            cut.first_child
+        };
+        match tool {
+            Probe::Sphere(sphere) => self.tree.closest(sphere, refresh),
+            Probe::Capsule(capsule) => self.tree.closest(capsule, refresh),
+        }
+    }
+}

@@ -1,0 +1,13 @@
+//! What the paper compares with, written to win: flat arrays in f32, SAH splits, one tight loop to
+//! refit, SIMD boxes, near child first, and the triangle kernels of the library under test.
+
+mod aabb_tree;
+pub mod bounds;
+mod exhaustive;
+mod hybrid;
+mod refit;
+
+pub use aabb_tree::AabbTree;
+pub use exhaustive::Exhaustive;
+pub use hybrid::Hybrid;
+pub use refit::Refit;

@@ -1,0 +1,172 @@
+//! The benchmark's seeded streams: deformed surfaces with tools about them, and the beating heart's.
+
+use std::f32::consts::TAU;
+
+use dibs_build::Motion;
+use dibs_nostd::{Capsule, Sphere};
+use fastrand::Rng;
+use glam::{Quat, Vec3};
+
+use crate::deform::unit;
+use crate::method::Probe;
+
+/// Radius of the spheres, radius and length of the capsules, in mm.
+pub const SPHERE_RADIUS: f32 = 3.0;
+/// Radius of the capsules, in mm.
+pub const CAPSULE_RADIUS: f32 = 2.5;
+/// Length of the capsules' axes, in mm.
+pub const CAPSULE_LENGTH: f32 = 60.0;
+
+/// Independent random deformations of one surface, each with a sphere and a capsule near it.
+///
+/// A deformation is the paper's: every axis scaled on its own, long waves over the whole surface, one
+/// local bump, and a rotation. On the brains its largest stretch is 1.2 to 1.4 of the 2 that the trees
+/// are built for; a frame that goes beyond the limit is not used.
+///
+/// A tool's distance from a random vertex is drawn so that its separation, which the folds around that
+/// vertex only lessen, is about 40 +- 30 mm on a brain: the paper's.
+pub struct Stream<'m> {
+    rest: &'m [Vec3],
+    middle: Vec3,
+    size: f32,
+    rng: Rng,
+}
+
+impl<'m> Stream<'m> {
+    /// A stream of frames of the surface with these positions at rest.
+    #[must_use]
+    pub fn new(rest: &'m [Vec3], seed: u64) -> Self {
+        let low = rest.iter().copied().fold(Vec3::INFINITY, Vec3::min);
+        let high = rest.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
+        let (middle, size) = ((low + high) / 2.0, (high - low).length());
+        Self { rest, middle, size, rng: Rng::with_seed(seed) }
+    }
+
+    /// The next frame, as positions in the mesh's order.
+    pub fn deform(&mut self, positions: &mut Vec<Vec3>) {
+        let (rng, middle, size) = (&mut self.rng, self.middle, self.size);
+        let scale = Vec3::ONE + signed(rng) * 0.06;
+        let waves: [Wave; 3] = std::array::from_fn(|_| Wave {
+            // Turns a mm, so that a wave is at least a third of the surface long.
+            along: unit(rng) * unit(rng) * (20.0 / TAU / size),
+            push: unit(rng) * size * 0.006,
+            phase: rng.f32(),
+        });
+        let bump = self.rest[rng.usize(..self.rest.len())] - middle;
+        let height = unit(rng) * size * 0.01 * rng.f32();
+        let narrow = 1.0 / (size * 0.24);
+        let turn = glam::Mat3::from_quat(Quat::from_axis_angle(unit(rng), rng.f32() * TAU));
+        positions.clear();
+        positions.extend(self.rest.iter().map(|&p| {
+            let p = p - middle;
+            let mut moved = p * scale;
+            for wave in &waves {
+                moved += wave.push * smooth_wave(p.dot(wave.along) + wave.phase);
+            }
+            let near = 1.0 - ((p - bump) * narrow).length_squared();
+            let near = near.max(0.0);
+            moved += height * (near * near);
+            turn * moved
+        }));
+    }
+
+    /// A sphere and a capsule near the surface as it is.
+    pub fn tools(&mut self, positions: &[Vec3]) -> [Probe; 2] {
+        let rng = &mut self.rng;
+        let scale = self.size / 240.0;
+        let mut near = |nearest: f32, farthest: f32| {
+            let from = positions[rng.usize(..positions.len())];
+            // Away from the surface's middle rather than into it.
+            let outwards = unit(rng) + from.normalize_or_zero() * 0.8;
+            from + outwards.normalize_or(Vec3::X)
+                * (nearest + (farthest - nearest) * rng.f32())
+                * scale
+        };
+        let (centre, middle) = (near(0.0, 100.0), near(10.0, 120.0));
+        let half = unit(rng) * CAPSULE_LENGTH / 2.0;
+        let sphere = Sphere::new(centre, SPHERE_RADIUS);
+        let capsule = Capsule::new(middle - half, middle + half, CAPSULE_RADIUS);
+        [
+            Probe::Sphere(sphere.expect("a valid sphere")),
+            Probe::Capsule(capsule.expect("a valid capsule")),
+        ]
+    }
+}
+
+struct Wave {
+    along: Vec3,
+    push: Vec3,
+    phase: f32,
+}
+
+fn signed(rng: &mut Rng) -> Vec3 {
+    Vec3::new(rng.f32(), rng.f32(), rng.f32()) * 2.0 - 1.0
+}
+
+/// A smooth wave of period and height 1, made of parabolas: a sine would take most of a run's time.
+fn smooth_wave(turns: f32) -> f32 {
+    // Rounds to the nearest whole turn, for any of fewer than 4 million turns.
+    const ROUND: f32 = 12_582_912.0;
+    let t = turns - ((turns + ROUND) - ROUND);
+    t * (8.0 - 16.0 * t.abs())
+}
+
+/// Ticks a second of a control loop.
+pub const TICK_RATE: f32 = 1_000.0;
+
+/// A recorded motion, played at its own speed and looked at in every tick of a control loop.
+pub struct Beat<'m> {
+    motion: &'m Motion,
+    middle: Vec3,
+    /// Half the longest side of the surface at rest.
+    reach: f32,
+}
+
+impl<'m> Beat<'m> {
+    /// Plays a motion, over and over.
+    ///
+    /// # Panics
+    /// If it has no frame.
+    #[must_use]
+    pub fn new(motion: &'m Motion) -> Self {
+        let rest = &motion.frames[0];
+        let low = rest.iter().copied().fold(Vec3::INFINITY, Vec3::min);
+        let high = rest.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
+        let middle = (low + high) / 2.0;
+        let reach = (high - low).max_element() / 2.0;
+        Self { motion, middle, reach }
+    }
+
+    /// The positions at a tick, between the two frames around it.
+    pub fn deform(&self, tick: u32, positions: &mut Vec<Vec3>) {
+        let rate = if self.motion.rate > 0.0 { self.motion.rate } else { 25.0 };
+        let frames = &self.motion.frames;
+        let time = (tick as f32 / TICK_RATE * rate).rem_euclid(frames.len() as f32);
+        let first = time as usize % frames.len();
+        let second = (first + 1) % frames.len();
+        let share = time - time.floor();
+        positions.clear();
+        positions
+            .extend(frames[first].iter().zip(&frames[second]).map(|(&a, &b)| a + (b - a) * share));
+    }
+
+    /// The instrument at a tick: a capsule that enters through a fixed port, as in keyhole surgery,
+    /// while its tip sweeps around the surface and, every seven seconds, through the middle of it. The
+    /// sum of a few slow sines and a physiological tremor; the same script as `firmware-example`'s.
+    ///
+    /// # Panics
+    /// Never for finite frames.
+    #[must_use]
+    pub fn tool(&self, tick: u32) -> Probe {
+        let wave = |period: u32, phase: f32| {
+            (TAU * ((tick % period) as f32 / period as f32 + phase)).sin()
+        };
+        let distance = self.reach * (0.75 + 0.75 * wave(7_000, 0.25));
+        let around = Vec3::new(wave(11_000, 0.25), wave(11_000, 0.0), 0.6 * wave(5_300, 0.1));
+        let tremor = Vec3::new(wave(111, 0.0), wave(113, 0.3), wave(109, 0.7)) * 0.1;
+        let tip = self.middle + around * distance + tremor;
+        let port = self.middle + Vec3::new(0.3, -0.4, 2.0) * self.reach;
+        let end = tip + (port - tip).normalize() * CAPSULE_LENGTH;
+        Probe::Capsule(Capsule::new(tip, end, CAPSULE_RADIUS).expect("a valid capsule"))
+    }
+}
