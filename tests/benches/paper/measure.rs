@@ -1,0 +1,181 @@
+//! Methods side by side on one stream, interleaved in one process, so that whatever slows the machine
+//! slows all of them.
+
+use std::time::Instant;
+
+use anyhow::{Result, ensure};
+use dibs_tests::method::{Method, Probe};
+use glam::Vec3;
+
+use super::record::{Cell, Record, Records};
+use super::statistics::Summary;
+
+/// What a method's `update` is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Update {
+    /// Nothing is done.
+    Nothing,
+    /// Boxes are refitted: part of the total.
+    Refit,
+    /// The stretch is measured: a column of its own, and a total of its own, because in a controller
+    /// the vertex path does it when a frame arrives.
+    Measure,
+}
+
+/// A method that takes part.
+pub struct Contender<'a> {
+    pub name: &'static str,
+    pub method: Box<dyn Method + 'a>,
+    pub update: Update,
+    /// Takes part in each of this many steps: more than 1 for what is too slow.
+    pub every: usize,
+    /// How far its answers may be from the others', in mm.
+    pub tolerance: f32,
+}
+
+/// Agreement expected of exact methods: f32 rounding at coordinates of some 100 mm, many times over.
+pub const EXACT: f32 = 1e-3;
+/// Agreement expected of parry3d's stock capsule distance, which is iterative.
+pub const ITERATIVE: f32 = 0.5;
+
+impl<'a> Contender<'a> {
+    pub fn new(name: &'static str, update: Update, method: Box<dyn Method + 'a>) -> Self {
+        Self { name, method, update, every: 1, tolerance: EXACT }
+    }
+}
+
+/// What was measured of one method with one tool: one value a step, times in microseconds.
+#[derive(Clone, Debug, Default)]
+pub struct Samples {
+    pub update: Vec<f64>,
+    pub traversal: Vec<f64>,
+    pub node_tests: Vec<f64>,
+    pub triangle_tests: Vec<f64>,
+    pub disagreement: f32,
+}
+
+/// Contenders, and what was measured so far.
+pub struct Race<'a> {
+    pub contenders: Vec<Contender<'a>>,
+    /// By contender, then by tool.
+    samples: Vec<Vec<Samples>>,
+    /// One value a step, in mm.
+    pub separations: Vec<Vec<f64>>,
+    steps: usize,
+}
+
+impl<'a> Race<'a> {
+    /// A race with this many tools a step.
+    pub fn new(contenders: Vec<Contender<'a>>, tools: usize) -> Self {
+        let samples = vec![vec![Samples::default(); tools]; contenders.len()];
+        Self { contenders, samples, separations: vec![Vec::new(); tools], steps: 0 }
+    }
+
+    /// Forgets what was measured: the end of the warm-up.
+    pub fn reset(&mut self) {
+        let contenders = std::mem::take(&mut self.contenders);
+        *self = Self::new(contenders, self.separations.len());
+    }
+
+    /// One step: every method takes the frame in, and for every tool updates itself and answers. Who
+    /// comes first, and which tool, changes from step to step. The separations must agree.
+    pub fn step(&mut self, positions: &[Vec3], tools: &[Probe]) -> Result<()> {
+        let count = self.contenders.len();
+        let mut reference: Vec<Option<(&str, f32)>> = vec![None; tools.len()];
+        for turn in 0..count {
+            let number = (turn + self.steps) % count;
+            let contender = &mut self.contenders[number];
+            if self.steps % contender.every != 0 {
+                continue;
+            }
+            contender.method.load(positions);
+            for turn in 0..tools.len() {
+                let tool = (turn + self.steps) % tools.len();
+                let samples = &mut self.samples[number][tool];
+                let start = Instant::now();
+                contender.method.update();
+                samples.update.push(microseconds(start));
+                let start = Instant::now();
+                let found = contender.method.find(&tools[tool]);
+                samples.traversal.push(microseconds(start));
+                if let Some([nodes, triangles]) = found.tests {
+                    samples.node_tests.push(f64::from(nodes));
+                    samples.triangle_tests.push(f64::from(triangles));
+                }
+                let separation = found.separation;
+                if let Some((other, expected)) = reference[tool] {
+                    let off = (separation - expected).abs();
+                    samples.disagreement = samples.disagreement.max(off);
+                    let name = contender.name;
+                    ensure!(
+                        off <= contender.tolerance,
+                        "{name} says {separation} mm where {other} says {expected} mm"
+                    );
+                } else if contender.tolerance == EXACT {
+                    reference[tool] = Some((contender.name, separation));
+                    self.separations[tool].push(f64::from(separation));
+                }
+            }
+        }
+        self.steps += 1;
+        Ok(())
+    }
+
+    /// The samples of a method with one tool.
+    pub fn of(&self, name: &str, tool: usize) -> Option<&Samples> {
+        let number = self.contenders.iter().position(|c| c.name == name)?;
+        self.samples.get(number)?.get(tool)
+    }
+
+    /// Every contender with its samples with one tool.
+    pub fn results(&self, tool: usize) -> impl Iterator<Item = (&Contender<'a>, &Samples)> {
+        self.contenders.iter().zip(self.samples.iter().map(move |of_tool| &of_tool[tool]))
+    }
+
+    /// Records of everything measured with one tool.
+    pub fn record(&self, cell: &Cell, tool: usize, records: &mut Records) {
+        let separation = Summary::of(&self.separations[tool]);
+        records.push(Record::summary(cell, "", "separation", &separation, "mm"));
+        for (contender, samples) in self.results(tool) {
+            let mut push = |metric: &str, values: &[f64], unit: &str| {
+                if !values.is_empty() {
+                    let summary = Summary::of(values);
+                    records.push(Record::summary(cell, contender.name, metric, &summary, unit));
+                }
+            };
+            match contender.update {
+                Update::Nothing => {}
+                Update::Refit => push("refit", &samples.update, "us"),
+                Update::Measure => push("measure", &samples.update, "us"),
+            }
+            push("traversal", &samples.traversal, "us");
+            push("node_tests", &samples.node_tests, "tests");
+            push("triangle_tests", &samples.triangle_tests, "tests");
+            push("total", &samples.total(contender.update), "us");
+            if contender.update == Update::Measure {
+                push("total_with_measuring", &samples.total(Update::Refit), "us");
+            }
+            push("disagreement", &[f64::from(samples.disagreement)], "mm");
+        }
+    }
+}
+
+impl Samples {
+    /// Time of each step: the traversal, and the update unless that is a measurement.
+    pub fn total(&self, update: Update) -> Vec<f64> {
+        match update {
+            Update::Refit => self.update.iter().zip(&self.traversal).map(|(u, t)| u + t).collect(),
+            Update::Nothing | Update::Measure => self.traversal.clone(),
+        }
+    }
+}
+
+fn microseconds(start: Instant) -> f64 {
+    start.elapsed().as_nanos() as f64 / 1e3
+}
+
+/// What reading the clock twice takes, in microseconds: part of every time measured.
+pub fn clock() -> f64 {
+    let readings: Vec<f64> = (0..10_000).map(|_| microseconds(Instant::now())).collect();
+    Summary::of(&readings).mean
+}

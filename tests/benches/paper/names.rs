@@ -1,0 +1,34 @@
+//! What the methods are called.
+
+pub const PAPER: &str = "dibs-paper";
+pub const DIBS: &str = "dibs";
+pub const MEASURED: &str = "dibs-measured";
+pub const WARM: &str = "dibs-warm";
+pub const MEASURED_WARM: &str = "dibs-measured-warm";
+pub const REFIT: &str = "aabb-refit";
+pub const HYBRID: &str = "aabb-hybrid";
+pub const EXHAUSTIVE: &str = "exhaustive";
+pub const OBVHS: &str = "obvhs";
+pub const PARRY_TRIMESH: &str = "parry-trimesh";
+pub const PARRY_BVH: &str = "parry-bvh";
+
+/// What refits: what DIBS is compared with.
+pub const OTHERS: [&str; 6] = [REFIT, HYBRID, OBVHS, PARRY_BVH, PARRY_TRIMESH, EXHAUSTIVE];
+
+/// A name for people.
+pub fn title(method: &str) -> &str {
+    match method {
+        PAPER => "DIBS, the paper's construction",
+        DIBS => "DIBS",
+        MEASURED => "DIBS, measured stretch",
+        WARM => "DIBS, warm start",
+        MEASURED_WARM => "DIBS, measured stretch, warm start",
+        REFIT => "AABB, bottom-up refit",
+        HYBRID => "AABB, hybrid refit",
+        EXHAUSTIVE => "exhaustive",
+        OBVHS => "obvhs 0.4",
+        PARRY_TRIMESH => "parry3d 0.31 `TriMesh`",
+        PARRY_BVH => "parry3d 0.31 `Bvh`, by hand",
+        other => other,
+    }
+}
