@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, elf};
@@ -17,19 +18,33 @@ pub struct Surface {
     pub stretch: f32,
 }
 
+/// Limit on stretch of the generated heart, whose motion keeps to it: the paper's.
+pub const HEART_STRETCH: f32 = 1.5;
+
+impl Default for Surface {
+    fn default() -> Self {
+        Self { mesh: None, stretch: HEART_STRETCH }
+    }
+}
+
 /// Builds the firmware; it links only if no panic path survived.
 pub fn build(cross: &Cross, surface: &Surface) -> Result<PathBuf> {
+    run(&mut command(cross, surface)).context("the firmware does not build")?;
+    Ok(cross.program("firmware", "board"))
+}
+
+/// The command that builds the firmware.
+pub fn command(cross: &Cross, surface: &Surface) -> Command {
     let mut cargo = cross.cargo("build");
     cargo.args(["--quiet", "--package", "firmware-example", "--bin", "board"]);
     cargo.args(["--features", "board", "--profile", "firmware"]);
     surface.describe_to(&mut cargo);
-    run(&mut cargo).context("the firmware does not build")?;
-    Ok(cross.program("firmware", "board"))
+    cargo
 }
 
 impl Surface {
     /// Tells the firmware's build script which surface to build in.
-    pub fn describe_to(&self, cargo: &mut std::process::Command) {
+    pub fn describe_to(&self, cargo: &mut Command) {
         match &self.mesh {
             Some(mesh) => cargo.env("DIBS_MESH", mesh),
             None => cargo.env_remove("DIBS_MESH"),

@@ -1,10 +1,12 @@
 //! `cargo xtask`: what needs more than cargo.
 
 mod apt;
+mod bench;
 mod demo;
 mod firmware;
 mod process;
 mod qemu;
+mod test;
 mod toolchain;
 mod workspace;
 
@@ -24,11 +26,15 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Task {
     Demo(demo::Options),
+    Test(test::Options),
+    Bench(bench::Options),
 }
 
 fn main() -> ExitCode {
     let result = match Arguments::parse().task {
         Task::Demo(options) => demo::run(&options),
+        Task::Test(options) => test::test(&options),
+        Task::Bench(options) => bench::run(&options),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -41,7 +41,7 @@ pub fn command(program: &Path, bus: &Path, telemetry: &Path, ticks: u32) -> Comm
     }
     // While the processor sleeps, time jumps to the next interrupt: left to run with this computer's
     // clock, it would overshoot by however late this computer wakes up.
-    command.args(["-icount", &format!("shift={SHIFT},sleep=off")]);
+    command.args(["-icount", &format!("shift={SHIFT}")]);
     // The firmware reads its run length where a program reads its arguments.
     command
         .args(["-semihosting-config", &format!("enable=on,target=native,arg=board,arg={ticks}")]);

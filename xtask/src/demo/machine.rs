@@ -5,6 +5,7 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result};
 
+use super::Options;
 use super::scene::Scene;
 use crate::firmware::{self, Footprint};
 use crate::process::run;
@@ -35,8 +36,8 @@ pub enum Machine {
 
 impl Machine {
     /// Builds the controller: for the board where that is possible and wanted.
-    pub fn prepare(host: bool, scene: &Scene) -> Result<Self> {
-        if host {
+    pub fn prepare(options: &Options, scene: &Scene) -> Result<Self> {
+        if options.host {
             return Self::host(scene, "as asked by --host".to_owned());
         }
         match Cross::find().and_then(|cross| Ok((cross, qemu::find()?))) {
@@ -45,6 +46,7 @@ impl Machine {
                 let footprint = Footprint::read(&program)?;
                 Ok(Self::Board { program, footprint, toolchain: cross.describe(), emulator })
             }
+            Err(error) if options.board_only => Err(error),
             Err(error) => {
                 let line = "!".repeat(78);
                 eprintln!("{line}\n{error:#}\n");

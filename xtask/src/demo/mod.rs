@@ -19,7 +19,7 @@ use scene::Scene;
 
 /// Streams a beating heart to the firmware while its instrument moves around and through it, and
 /// checks every answer against exhaustive search.
-#[derive(clap::Args)]
+#[derive(clap::Args, Default)]
 pub struct Options {
     /// Mesh of the surface at rest (OBJ, STL, PLY or OFF); the generated heart of 10,272 triangles
     /// if absent.
@@ -38,13 +38,16 @@ pub struct Options {
     /// Runs the controller as a program on this computer, without cross toolchain and QEMU.
     #[arg(long)]
     pub host: bool,
+    /// Whether the board may be replaced by this computer where it cannot be had.
+    #[arg(skip)]
+    pub board_only: bool,
 }
 
 /// Runs the demo and writes its report and pictures; an error names each promise that was broken.
 pub fn run(options: &Options) -> Result<()> {
     let scene = Scene::load(options)?;
     println!("surface: {}", scene.describe());
-    let machine = Machine::prepare(options.host, &scene)?;
+    let machine = Machine::prepare(options, &scene)?;
     println!("controller: {}", machine.describe());
 
     let folder = workspace::demo();

@@ -29,7 +29,12 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
     let root = SVGBackend::new(&picture, (900, 560)).into_drawing_area();
     root.fill(&WHITE).map_err(failed)?;
     let (upper, lower) = root.split_vertically(280);
-    curve(&upper, "separation (mm)", BLUE_INK, &extremes(&answered, |tick| tick.separation.into()))?;
+    curve(
+        &upper,
+        "separation (mm)",
+        BLUE_INK,
+        &extremes(&answered, |tick| tick.separation.into()),
+    )?;
     curve(&lower, "force (N)", RED_INK, &extremes(&answered, |tick| force(tick).into()))?;
     root.present().map_err(failed)?;
 
@@ -84,8 +89,8 @@ fn curve(
 }
 
 fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
-    let (low, high) = values
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+    let (low, high) =
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
     low..high
 }
 

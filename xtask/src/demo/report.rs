@@ -88,9 +88,8 @@ impl Report {
         let least = |value: fn(&Tick) -> f32| {
             answered.iter().map(|tick| value(tick)).fold(f32::INFINITY, f32::min)
         };
-        let largest = |value: fn(&Tick) -> f32| {
-            answered.iter().map(|tick| value(tick)).fold(0.0, f32::max)
-        };
+        let largest =
+            |value: fn(&Tick) -> f32| answered.iter().map(|tick| value(tick)).fold(0.0, f32::max);
         let summary = outcome.summary;
         let footprint = match machine {
             Machine::Board { footprint, .. } => Some(footprint),

@@ -6,12 +6,10 @@ use dibs_nostd::{Index, measure_stretch};
 use glam::Vec3;
 
 use super::Options;
-use crate::firmware::Surface;
+use crate::firmware::{HEART_STRETCH, Surface};
 
 /// Triangles of the generated heart: those of the paper's.
 const HEART_TRIANGLES: u32 = 10_272;
-/// Limit on stretch of the generated heart, whose motion keeps to it: the paper's.
-const HEART_STRETCH: f32 = 1.5;
 /// Spared above the largest stretch of a recorded motion.
 const MARGIN: f32 = 1.02;
 /// Beyond any motion: the limit of the tree that measures what a motion needs.
@@ -35,9 +33,7 @@ impl Scene {
     /// Reads or generates everything.
     pub fn load(options: &Options) -> Result<Self> {
         let (mesh, motion) = match (&options.mesh, &options.motion) {
-            (Some(mesh), Some(motion)) => {
-                (dibs_build::read(mesh)?.mesh, Motion::read_pc2(motion)?)
-            }
+            (Some(mesh), Some(motion)) => (dibs_build::read(mesh)?.mesh, Motion::read_pc2(motion)?),
             _ => generate::heart(HEART_TRIANGLES)?,
         };
         motion.check_fits(&mesh)?;

@@ -104,8 +104,8 @@ pub fn summary(stack_bytes: u32) -> Summary {
 #[exception]
 fn SysTick() {
     let now = clock::now();
-    // Counts since SysTick wrapped: how late this is.
-    let late = (clock::TICK - 1).wrapping_sub(SYST::get_current());
+    // Counts since SysTick reached 0, where it asks for this interrupt: how late this is.
+    let late = clock::TICK.wrapping_sub(SYST::get_current()) % clock::TICK;
     TIMELINE.with(|timeline| {
         if let Some(timeline) = timeline {
             timeline.run(now, late);

@@ -1,0 +1,145 @@
+//! The control logic on the host, against an in-process bus: what the board does, byte for byte.
+
+use std::collections::HashMap;
+
+use controller::surface::{SURFACE, SurfaceFrames};
+use controller::telemetry::{State, Tick};
+use controller::{BusStatus, Control, MTU, Receiver, SURFACE_AGE_LIMIT};
+use dibs_build::{Builder, generate};
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::wire::{Encoding, FrameEncoder, QuantisedBox, enframe, framed_bytes};
+use dibs_tests::oracle::{Instrument, exhaustive};
+
+/// The sending side: the generated heart, in the tree's order.
+struct Sender {
+    frames: Vec<Vec<Vec3>>,
+    triangles: Vec<[u32; 3]>,
+    /// What the controller has of each frame sent.
+    decoded: HashMap<u32, Vec<Vec3>>,
+}
+
+impl Sender {
+    fn new() -> Self {
+        let (mesh, motion) = generate::heart(10_272).expect("a heart");
+        let tree = Builder::new().stretch(1.5).build(&mesh).expect("a tree");
+        assert_eq!(tree.summary().mesh_id, SURFACE.mesh_id(), "the firmware has another surface");
+        let mut row = vec![0; mesh.positions.len()];
+        for (place, &vertex) in (0..).zip(tree.vertex_order()) {
+            row[vertex as usize] = place;
+        }
+        Self {
+            frames: motion.frames.iter().map(|frame| tree.to_rows(frame)).collect(),
+            triangles: mesh.triangles.iter().map(|t| t.map(|v| row[v as usize])).collect(),
+            decoded: HashMap::new(),
+        }
+    }
+
+    /// A frame as the bytes of the bus.
+    fn bytes(&mut self, epoch: u32) -> Vec<u8> {
+        let exact = &self.frames[epoch as usize * 5 % self.frames.len()];
+        let grid = QuantisedBox::covering(exact).expect("finite positions");
+        let decode = |&p: &Vec3| grid.position(grid.quantise(p).expect("inside its own box"));
+        self.decoded.insert(epoch, exact.iter().map(decode).collect());
+        let encoding = Encoding::Quantised(grid);
+        let mut encoder =
+            FrameEncoder::<_, MTU>::new(SURFACE.mesh_id(), epoch, encoding, &exact[..]).unwrap();
+        let (mut packet, mut line, mut all) = ([0; MTU], [0; framed_bytes(MTU)], Vec::new());
+        while let Some(packet) = encoder.next_packet(&mut packet) {
+            all.extend_from_slice(enframe(packet, &mut line).expect("room"));
+        }
+        all
+    }
+
+    /// Holds an answer against exhaustive search on the frame that it names.
+    fn check(&self, tick: &Tick) {
+        let (start, end) = (Vec3::from(tick.tool_start), Vec3::from(tick.tool_end));
+        let tool = Instrument::capsule(start, end, tick.tool_radius);
+        let truth = exhaustive(&self.decoded[&tick.epoch], &self.triangles, &tool).unwrap();
+        let error = (f64::from(tick.separation) - truth.separation).abs();
+        assert!(error <= f64::from(tick.accuracy), "tick {}: off by {error}", tick.tick);
+        assert!(f64::from(tick.lower) <= truth.separation + f64::from(tick.accuracy));
+    }
+}
+
+fn force(tick: &Tick) -> f32 {
+    Vec3::from(tick.force).length()
+}
+
+#[test]
+fn every_answer_is_that_of_one_whole_frame() {
+    static FRAMES: SurfaceFrames = SurfaceFrames::new();
+    static BUS: BusStatus = BusStatus::new();
+    let (writer, reader) = FRAMES.split().unwrap();
+    let mut receiver = Receiver::new(writer, &BUS);
+    let mut control = Control::new(reader, &BUS).unwrap();
+    let mut sender = Sender::new();
+
+    let first = control.tick(|| 0);
+    assert_eq!(first.state, State::Waiting as u32);
+    assert!(!first.is_answered());
+
+    let (mut answers, mut acting, mut free) = (0, 0, 0);
+    for epoch in 1..=30 {
+        // A tick every 61 bytes, so that most ticks fall inside a packet.
+        for chunk in sender.bytes(epoch).chunks(61) {
+            for &byte in chunk {
+                receiver.byte(byte, control.now());
+            }
+            let tick = control.tick(|| 0);
+            if tick.is_answered() {
+                assert!(tick.epoch == epoch || tick.epoch + 1 == epoch);
+                sender.check(&tick);
+                answers += 1;
+                if force(&tick) > 0.0 { acting += 1 } else { free += 1 }
+            }
+        }
+        assert_eq!(BUS.published(), epoch);
+    }
+    assert_eq!(BUS.rejected(), 0);
+    assert!(answers > 10_000, "{answers} answers");
+    assert!(acting > 100 && free > 100, "the wall acted {acting} times and was still {free} times");
+}
+
+#[test]
+fn a_damaged_frame_is_not_published_and_an_old_surface_is_a_fault() {
+    static FRAMES: SurfaceFrames = SurfaceFrames::new();
+    static BUS: BusStatus = BusStatus::new();
+    let (writer, reader) = FRAMES.split().unwrap();
+    let mut receiver = Receiver::new(writer, &BUS);
+    let mut control = Control::new(reader, &BUS).unwrap();
+    let mut sender = Sender::new();
+    let mut feed = |bytes: &[u8], now: u32| {
+        for &byte in bytes {
+            receiver.byte(byte, now);
+        }
+    };
+
+    feed(&sender.bytes(1), control.now());
+    let mut damaged = sender.bytes(2);
+    damaged[9_000] ^= 4;
+    feed(&damaged, control.now());
+    let tick = control.tick(|| 0);
+    assert_eq!((tick.epoch, BUS.published()), (1, 1), "the damaged frame is not acted on");
+    assert!(BUS.rejected() > 0);
+
+    // No more frames: the surface grows old.
+    let mut last = tick;
+    for _ in 0..SURFACE_AGE_LIMIT {
+        last = control.tick(|| 0);
+    }
+    assert_eq!((last.age, last.state), (SURFACE_AGE_LIMIT, State::Tracking as u32));
+    let mut before = last;
+    for _ in 0..500 {
+        let tick = control.tick(|| 0);
+        assert_eq!(tick.state, State::Stale as u32);
+        sender.check(&tick);
+        // The hold: damping alone, against the motion of the instrument.
+        let moved = Vec3::from(tick.tool_start) - Vec3::from(before.tool_start);
+        assert!(Vec3::from(tick.force).dot(moved) <= 0.0);
+        before = tick;
+    }
+
+    feed(&sender.bytes(3), control.now());
+    let tick = control.tick(|| 0);
+    assert_eq!((tick.epoch, tick.state), (3, State::Tracking as u32));
+}
