@@ -1,0 +1,80 @@
+//! The heart's motion: three control frames, and the way between them.
+
+use glam::{DVec2, DVec3, Vec3};
+
+use super::heart::{BASE, LEFT};
+use crate::Motion;
+
+/// Frames of one cycle, and cycles a second (72 a minute).
+const FRAMES: usize = 25;
+const RATE: f64 = 1.2;
+
+/// One control frame, as what it does to the shape at end diastole.
+struct Control {
+    /// Share of the radius that the left ventricle's inside loses.
+    contraction: f64,
+    /// Share of the distance from the left ventricle's axis that the right free wall loses.
+    right_contraction: f64,
+    /// Share of the length that is lost.
+    shortening: f64,
+    /// Rotation of the apex against the base, radians.
+    twist: f64,
+}
+
+const MID_SYSTOLE: Control =
+    Control { contraction: 0.19, right_contraction: 0.06, shortening: 0.05, twist: 0.19 };
+const END_SYSTOLE: Control =
+    Control { contraction: 0.29, right_contraction: 0.11, shortening: 0.12, twist: 0.24 };
+
+/// One cycle from the shape at end diastole, which is frame 0.
+///
+/// The three control positions of a vertex are joined by a parabola, along which it moves with the
+/// phase `(1 - cos(2 pi t)) / 2`: sinusoidally, from end diastole to end systole and back.
+pub(super) fn beat(rest: &[Vec3]) -> Motion {
+    let controls: Vec<[DVec3; 3]> = rest
+        .iter()
+        .map(|&point| {
+            let point = point.as_dvec3();
+            [point, MID_SYSTOLE.place(point), END_SYSTOLE.place(point)]
+        })
+        .collect();
+    let frames = (0..FRAMES)
+        .map(|frame| {
+            let turn = std::f64::consts::TAU * frame as f64 / FRAMES as f64;
+            let phase = (1.0 - libm::cos(turn)) / 2.0;
+            // Lagrange's weights of the nodes 1/2 and 1; that of 0 is what they leave.
+            let middle = 4.0 * phase * (1.0 - phase);
+            let end = phase * (2.0 * phase - 1.0);
+            controls
+                .iter()
+                .map(|[start, mid, last]| {
+                    (start + (mid - start) * middle + (last - start) * end).as_vec3()
+                })
+                .collect()
+        })
+        .collect();
+    Motion { frames, rate: (FRAMES as f64 * RATE) as f32 }
+}
+
+impl Control {
+    fn place(&self, point: DVec3) -> DVec3 {
+        // The muscle thickens because its inside moves inwards more than its outside.
+        let level = LEFT.level(point) / 0.92;
+        let square = level * level;
+        let inward = 1.0 / (1.0 + (square * square) * (square * square));
+        let right = smooth_step(point.x / 60.0);
+        let radius = 1.0 - self.contraction * inward - self.right_contraction * right;
+        let height = point.z / BASE;
+        // Seen from the apex the apex turns one way, the base a little the other way.
+        let angle = self.twist * (0.75 - height);
+        let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+        let flat = DVec2::new(cos, sin).rotate(point.truncate()) * radius;
+        flat.extend(point.z * (1.0 - self.shortening))
+    }
+}
+
+/// 0 below 0, 1 above 1, smooth between.
+fn smooth_step(t: f64) -> f64 {
+    let t = t.clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}

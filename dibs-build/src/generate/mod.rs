@@ -1,0 +1,73 @@
+//! Procedural test surfaces with the shape that makes proximity queries hard on anatomy: walls that
+//! are close in space and far apart along the surface.
+//!
+//! [`heart`] and [`brain`] have exactly the asked number of triangles, are closed, manifold, of
+//! genus 0 and face outwards, and are the same to the last bit on every machine: they use nothing
+//! but IEEE arithmetic, square roots and the `libm` crate.
+
+mod beat;
+mod brain;
+mod contour;
+mod half_edge;
+mod heart;
+mod noise;
+mod remesh;
+#[cfg(test)]
+mod tests;
+
+use std::ops::RangeInclusive;
+
+pub use brain::brain;
+pub use heart::heart;
+
+/// Why a surface could not be generated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GenerateError {
+    /// A closed triangle mesh has an even number of triangles, and a shape needs a least number to
+    /// be recognisable.
+    #[error(
+        "a generated {surface} cannot have {asked} triangles: \
+         ask for an even number from {least} to {most}, the nearest is {nearest}"
+    )]
+    TriangleCount {
+        /// "heart" or "brain".
+        surface: &'static str,
+        /// What was asked for.
+        asked: u32,
+        /// The valid number next to it (the smaller of two).
+        nearest: u32,
+        /// The smallest valid number.
+        least: u32,
+        /// The largest valid number.
+        most: u32,
+    },
+    /// The mesh could not be brought to the asked number without folding it over.
+    #[error(
+        "the generated {surface} got stuck at {reached} triangles instead of {asked}: \
+         ask for a slightly different number"
+    )]
+    Stuck {
+        /// "heart" or "brain".
+        surface: &'static str,
+        /// What was asked for.
+        asked: u32,
+        /// What was reached.
+        reached: usize,
+    },
+}
+
+/// Counts in `range`, whose ends are even, are valid if they are even.
+fn check(
+    surface: &'static str,
+    asked: u32,
+    range: RangeInclusive<u32>,
+) -> Result<(), GenerateError> {
+    let (least, most) = range.into_inner();
+    let nearest = asked.clamp(least, most) & !1;
+    if nearest == asked {
+        Ok(())
+    } else {
+        Err(GenerateError::TriangleCount { surface, asked, nearest, least, most })
+    }
+}
