@@ -21,7 +21,7 @@ fn next(h: u32) -> u32 {
 }
 
 fn previous(h: u32) -> u32 {
-    if h % 3 == 0 { h + 2 } else { h - 1 }
+    if h.is_multiple_of(3) { h + 2 } else { h - 1 }
 }
 
 impl HalfEdges {
@@ -50,8 +50,7 @@ impl HalfEdges {
         self.alive
     }
 
-    /// Every undirected edge once, as one of its half-edges, as things stand at each step: half-edges
-    /// that are added on the way are not visited, those that die are passed over.
+    /// One more than the largest half-edge, dead ones included.
     pub fn edge_count_bound(&self) -> u32 {
         self.origin.len() as u32
     }

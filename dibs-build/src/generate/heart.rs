@@ -12,7 +12,7 @@ use crate::{Mesh, Motion};
 
 const TRIANGLES: RangeInclusive<u32> = 320..=1_000_000;
 
-/// Where the base is cut, mm above the origin of the left ventricle's apex region.
+/// Height at which the base is cut, mm; the apex is at -10.
 pub(super) const BASE: f64 = 86.0;
 /// Outside of the left ventricle: centre and semi-axes of an ellipsoid about the z axis.
 pub(super) const LEFT: Ellipsoid =
@@ -33,10 +33,11 @@ const RIGHT_CAVITY: Ellipsoid =
 /// both are convex in the positions, so the same holds for positions interpolated linearly between
 /// any frames.
 ///
-/// Cost: about 0.2 s for 10,272 triangles in a release build.
+/// Cost: less than a second for 10,272 triangles in a release build.
 ///
 /// # Errors
 /// [`GenerateError::TriangleCount`] for an odd number or one outside the range.
+/// [`GenerateError::Stuck`] if the mesh cannot be brought to that number; no such number is known.
 ///
 /// ```
 /// let (heart, motion) = dibs_build::generate::heart(1000)?;

@@ -44,7 +44,7 @@ fn assert_sound(mesh: &Mesh, triangles: u32) {
     // Each vertex has a single fan: walking around it meets all of its triangles.
     let mut degree = vec![0; mesh.positions.len()];
     let mut first = vec![0; mesh.positions.len()];
-    for (&(from, to), _) in &facing {
+    for &(from, to) in facing.keys() {
         degree[from as usize] += 1;
         first[from as usize] = to;
     }
