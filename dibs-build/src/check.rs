@@ -41,8 +41,8 @@ pub(crate) fn import(raw: &Raw, format: Format, options: &ReadOptions) -> Result
         non_manifold_edges: 0,
         inconsistent_edges: 0,
     };
-    let faces = triangles(raw, &mut report)?;
-    let mut surface = Surface { positions, faces };
+    let (faces, short) = triangles(raw, &mut report)?;
+    let mut surface = Surface { positions, faces, short };
     check_scale(raw, format)?;
     surface.weld(is_stl, options.weld_tolerance, &mut report);
     surface.drop_degenerate(options.strict, &mut report)?;
@@ -112,12 +112,12 @@ struct Triangle {
     face: usize,
 }
 
-/// Cuts faces into triangles. Faces of fewer than three corners count as degenerate ones: they
-/// become triangles that repeat a corner.
-fn triangles(raw: &Raw, report: &mut Report) -> Result<Vec<Triangle>> {
+/// Cuts faces into triangles, and lists those of fewer than three corners.
+fn triangles(raw: &Raw, report: &mut Report) -> Result<(Vec<Triangle>, Vec<usize>)> {
     let mut triangulator = Triangulator::new();
     let mut cut = Vec::new();
     let mut triangles = Vec::with_capacity(raw.ends.len());
+    let mut short = Vec::new();
     for (face, corners) in (1..).zip(raw.faces()) {
         if let Some(&corner) = corners.iter().find(|&&c| c as usize >= raw.positions.len()) {
             return Err(ReadErrorKind::IndexOutOfRange {
@@ -131,24 +131,23 @@ fn triangles(raw: &Raw, report: &mut Report) -> Result<Vec<Triangle>> {
             let corners = corners.len();
             return Err(ReadErrorKind::LargePolygon { face, corners, most: MOST_CORNERS });
         }
-        match *corners {
-            [] => cut.push([0; 3]),
-            [a] => cut.push([a; 3]),
-            [a, b] => cut.push([a, b, b]),
-            _ => {
-                let simple = triangulator.cut(corners, &raw.positions, &mut cut);
-                report.polygons_triangulated += usize::from(corners.len() > 3);
-                report.polygons_not_simple += usize::from(!simple);
-            }
+        if corners.len() < 3 {
+            short.push(face);
+            continue;
         }
+        let simple = triangulator.cut(corners, &raw.positions, &mut cut);
+        report.polygons_triangulated += usize::from(corners.len() > 3);
+        report.polygons_not_simple += usize::from(!simple);
         triangles.extend(cut.drain(..).map(|corners| Triangle { corners, face }));
     }
-    Ok(triangles)
+    Ok((triangles, short))
 }
 
 struct Surface {
     positions: Vec<Vec3>,
     faces: Vec<Triangle>,
+    /// Faces (counted from 1) of fewer than three corners.
+    short: Vec<usize>,
 }
 
 impl Surface {
@@ -207,10 +206,11 @@ impl Surface {
     fn drop_degenerate(&mut self, strict: bool, report: &mut Report) -> Result<()> {
         let positions = &self.positions;
         let bad = |triangle: &Triangle| is_degenerate(triangle.corners, positions);
-        let first = self.faces.iter().find(|triangle| bad(triangle)).map(|t| t.face);
+        let first_thin = self.faces.iter().find(|triangle| bad(triangle)).map(|t| t.face);
+        let first = self.short.iter().copied().chain(first_thin).min();
         let before = self.faces.len();
         self.faces.retain(|triangle| !bad(triangle));
-        let count = before - self.faces.len();
+        let count = self.short.len() + before - self.faces.len();
         if let (true, Some(face)) = (strict, first) {
             return Err(ReadErrorKind::Degenerate { count, face });
         }

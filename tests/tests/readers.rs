@@ -348,6 +348,18 @@ fn dropping_joins_and_parts_nothing_unnoticed() {
 }
 
 #[test]
+fn faces_of_fewer_than_three_corners_are_degenerate() {
+    let folder = Folder::new();
+    let kind = folder.read("a.off", "OFF 0 2 0\n0\n0\n").unwrap_err();
+    assert!(matches!(kind, ReadErrorKind::NoTriangles { degenerate: 2 }), "{kind}");
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1\nf 1 2\n";
+    assert_eq!(folder.read("a.obj", text).unwrap().report.dropped_degenerate, 2);
+    let strict = ReadOptions { strict: true, ..Import::options() };
+    let kind = folder.read_with(strict, text).unwrap_err();
+    assert!(matches!(kind, ReadErrorKind::Degenerate { count: 2, face: 2 }), "{kind}");
+}
+
+#[test]
 fn triangles_that_rounding_made_from_a_line_are_degenerate() {
     let folder = Folder::new();
     // Three points of one line in space that f32 cannot hold exactly.
