@@ -49,11 +49,11 @@ impl<'m> Stream<'m> {
         let waves: [Wave; 3] = std::array::from_fn(|_| Wave {
             // Turns a mm, so that a wave is at least a third of the surface long.
             along: unit(rng) * unit(rng) * (20.0 / TAU / size),
-            push: unit(rng) * size * 0.006,
+            push: unit(rng) * size * 0.009,
             phase: rng.f32(),
         });
         let bump = self.rest[rng.usize(..self.rest.len())] - middle;
-        let height = unit(rng) * size * 0.01 * rng.f32();
+        let height = unit(rng) * size * 0.016 * rng.f32();
         let narrow = 1.0 / (size * 0.24);
         let turn = glam::Mat3::from_quat(Quat::from_axis_angle(unit(rng), rng.f32() * TAU));
         positions.clear();
@@ -82,7 +82,7 @@ impl<'m> Stream<'m> {
                 * (nearest + (farthest - nearest) * rng.f32())
                 * scale
         };
-        let (centre, middle) = (near(0.0, 100.0), near(10.0, 120.0));
+        let (centre, middle) = (near(5.0, 130.0), near(5.0, 145.0));
         let half = unit(rng) * CAPSULE_LENGTH / 2.0;
         let sphere = Sphere::new(centre, SPHERE_RADIUS);
         let capsule = Capsule::new(middle - half, middle + half, CAPSULE_RADIUS);

@@ -62,7 +62,9 @@ fn run_with<I: Index>(case: &Case<'_>, tree: &Tree<'_, I>, seed: u64) -> Tally {
                 ];
                 for options in &all[rng.usize(..2)..] {
                     let found = ask::closest(&mut query, rows.as_slice(), &tool, options)
-                        .unwrap_or_else(|e| panic!("{}: {deformation:?}: {e}", case.name));
+                        .unwrap_or_else(|e| {
+                            panic!("{}: {deformation:?}: {tool:?} {options:?}: {e}", case.name)
+                        });
                     let error = check(&rows, &tool, &truth, &found);
                     assert!(
                         error <= 1.0 && found.lower == found.separation,

@@ -43,13 +43,23 @@ pub fn command(cross: &Cross, surface: &Surface) -> Command {
 }
 
 impl Surface {
-    /// Tells the firmware's build script which surface to build in.
+    /// Tells the build script which surface to build in. Says nothing where that is the one it takes
+    /// anyway: cargo would rebuild for any change of these variables.
     pub fn describe_to(&self, cargo: &mut Command) {
         match &self.mesh {
             Some(mesh) => cargo.env("DIBS_MESH", mesh),
             None => cargo.env_remove("DIBS_MESH"),
         };
-        cargo.env("DIBS_STRETCH", self.stretch.to_string());
+        if self.stretch == HEART_STRETCH {
+            cargo.env_remove("DIBS_STRETCH");
+        } else {
+            cargo.env("DIBS_STRETCH", self.stretch.to_string());
+        }
+    }
+
+    /// Whether this is what the build script takes unless it is told otherwise.
+    pub fn is_default(&self) -> bool {
+        self.mesh.is_none() && self.stretch == HEART_STRETCH
     }
 }
 

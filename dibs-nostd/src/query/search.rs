@@ -27,6 +27,15 @@ const SLACK: f32 = 48.0 / 16_777_216.0;
 /// pair's last operations.
 const ACCURACY: f32 = 24.0 / 16_777_216.0;
 
+/// Share of the coordinates that counts into the scale: a computed centroid is off by up to three `u`
+/// of them, and the distances to it by a few `u` of that. It shows only where a whole surface lies
+/// within rounding of the tool.
+const CENTROID: f32 = 1.0 / 1_048_576.0;
+
+/// Lengths that the kernels count as zero, times a few: what is left of slack and accuracy where tool
+/// and surface are one point.
+const FLOOR: f32 = 1e-14;
+
 /// Centres of elastic spheres are centroids: a third of the corners' sum.
 const THIRD: f32 = 1.0 / 3.0;
 
@@ -92,11 +101,12 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             .position(header.root_pin)
             .ok_or(QueryError::Corrupt { row: header.root_pin })?;
         let distance = sqrt(tool.axis_distance_squared(pin));
-        let scale = distance + radius + 2.0 * tool.axis_length() + tool.radius();
+        let far_out = pin.abs().max_element() * CENTROID;
+        let scale = distance + radius + 2.0 * tool.axis_length() + tool.radius() + far_out;
         if !(scale < 1e18) {
             return Err(QueryError::Position { vertex: header.root_pin });
         }
-        let slack = SLACK * scale;
+        let slack = SLACK * scale + FLOOR;
         // A sound tree visits each record once. If its bytes rot into a loop, this ends the search
         // with an interval that is still right.
         let most = header.nodes.saturating_mul(2).saturating_add(header.triangles);
@@ -296,7 +306,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         Ok(Proximity {
             separation,
             lower: if left < separation { left } else { separation },
-            accuracy: ACCURACY * self.scale,
+            accuracy: ACCURACY * self.scale + FLOOR,
             axis_distance,
             point_on_surface: pair.on_surface,
             point_on_tool: pair.on_axis - direction * radius,

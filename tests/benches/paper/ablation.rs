@@ -98,6 +98,7 @@ fn one(plan: &Plan, name: &str, mesh: &Mesh, records: &mut Records) -> Result<()
             race.step(positions, &tools[tool..=tool])?;
             progress.one();
         }
+        race.finish()?;
         let cell = Cell::new("ablation", name, size, tool_name);
         race.record(&cell, 0, records);
         for variant in &variants {

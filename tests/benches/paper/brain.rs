@@ -72,7 +72,7 @@ fn one(plan: &Plan, subject: &Subject, count: usize, records: &mut Records) -> R
         let (positions, tools) = frames.next(&mut warm_up);
         race.step(positions, &tools)?;
     }
-    race.reset();
+    race.reset()?;
     frames.stretches.clear();
     let progress = Progress::start(&format!("{} of {size} triangles", subject.name), count as u64);
     for seed in 1..=SEEDS {
@@ -83,6 +83,7 @@ fn one(plan: &Plan, subject: &Subject, count: usize, records: &mut Records) -> R
             progress.one();
         }
     }
+    race.finish()?;
     progress.finish();
 
     for (tool, name) in TOOLS.into_iter().enumerate() {
@@ -140,10 +141,11 @@ fn split_level(ours: &BuiltTree, mesh: &dibs_build::Mesh, boxes: &AabbTree) -> R
     for step in 0..30 {
         let (positions, tools) = frames.next(&mut stream);
         race.step(positions, &tools)?;
-        if step == 4 {
-            race.reset();
+        if step == 9 {
+            race.reset()?;
         }
     }
+    race.finish()?;
     let mut costs = vec![0.0; levels.len()];
     for tool in 0..TOOLS.len() {
         for (cost, (_, samples)) in costs.iter_mut().zip(race.results(tool)) {
@@ -163,7 +165,7 @@ fn compare(race: &Race<'_>, cell: &Cell, tool: usize, records: &mut Records) {
             ("total_with_measuring", samples.total(Update::Refit))
         }];
         let totals = &totals[..if ours == MEASURED { 2 } else { 1 }];
-        for contender in race.contenders.iter().filter(|c| OTHERS.contains(&c.name)) {
+        for contender in race.contenders().iter().filter(|c| OTHERS.contains(&c.name)) {
             let Some(theirs) = race.of(contender.name, tool) else { continue };
             let their_total = theirs.total(contender.update);
             for (metric, total) in totals {

@@ -96,7 +96,7 @@ fn total_against_size(area: &Area<'_>, records: &Records, tool: &str) -> Result<
     let lines: Vec<_> =
         methods.iter().map(|m| (*m, line(records, "brain", tool, m, "total"))).collect();
     let caption = format!("Refit and one query, {tool}");
-    chart(area, &caption, "median total, µs", &lines, &[])
+    chart(area, &caption, "median total, µs", &lines, &[], SeriesLabelPosition::UpperLeft)
 }
 
 /// Figure 6: how often a surface may move before not refitting is faster.
@@ -107,7 +107,7 @@ fn crossovers(area: &Area<'_>, records: &Records, ours: &str, tool: &str) -> Res
         .collect();
     let caption = format!("Crossover of {}, {tool}", plain(ours));
     let marks = [(1.0, "a refit every query"), (0.03, "30 Hz imaging, 1 kHz control")];
-    chart(area, &caption, "refit ratio h_c", &lines, &marks)
+    chart(area, &caption, "refit ratio h_c", &lines, &marks, SeriesLabelPosition::LowerLeft)
 }
 
 /// Lines in logarithmic axes, each with its name.
@@ -117,6 +117,7 @@ fn chart(
     y_name: &str,
     lines: &[(&str, Vec<(f64, f64)>)],
     marks: &[(f64, &str)],
+    legend: SeriesLabelPosition,
 ) -> Result<()> {
     let points = || lines.iter().flat_map(|(_, points)| points.iter().copied());
     let range = |values: &mut dyn Iterator<Item = f64>, room: f64| {
@@ -151,7 +152,7 @@ fn chart(
         chart.draw_series(LineSeries::new(at, style)).map_err(|e| anyhow!("{e}"))?;
         let font = ("sans-serif", 13).into_font().color(&style);
         let text =
-            Text::new(name.to_owned(), (x.start * 1.05, value * 1.12), font.pos(left_above()));
+            Text::new(name.to_owned(), (x.end / 1.05, value * 1.12), font.pos(right_above()));
         chart.draw_series([text]).map_err(|e| anyhow!("{e}"))?;
     }
     for (method, points) in lines {
@@ -167,7 +168,7 @@ fn chart(
     }
     chart
         .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
+        .position(legend)
         .background_style(WHITE.mix(0.85))
         .border_style(RGBColor(200, 200, 200))
         .label_font(("sans-serif", 13))
@@ -176,10 +177,11 @@ fn chart(
     Ok(())
 }
 
-fn left_above() -> Pos {
-    Pos::new(HPos::Left, VPos::Bottom)
+fn right_above() -> Pos {
+    Pos::new(HPos::Right, VPos::Bottom)
 }
 
+/// A number without noughts behind the point.
 fn number(value: f64) -> String {
     let text = format!("{value:.5}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
@@ -225,6 +227,8 @@ fn distribution(area: &Area<'_>, records: &Records, method: &str, tool: &str) ->
         .x_desc("node tests a query")
         .y_desc("queries")
         .disable_x_mesh()
+        .x_label_formatter(&|v| number(*v))
+        .y_label_formatter(&|v| number(*v))
         .label_style(("sans-serif", 14))
         .light_line_style(WHITE)
         .bold_line_style(RGBColor(225, 225, 225))

@@ -65,7 +65,7 @@ fn one(plan: &Plan, heart: &Heart, records: &mut Records) -> Result<()> {
         beat.deform(tick, &mut positions);
         race.step(&positions, &[beat.tool(tick)])?;
     }
-    race.reset();
+    race.reset()?;
     let mut stretches = Vec::new();
     for repetition in 0..plan.repetitions {
         for tick in 0..plan.ticks {
@@ -77,6 +77,7 @@ fn one(plan: &Plan, heart: &Heart, records: &mut Records) -> Result<()> {
             progress.one();
         }
     }
+    race.finish()?;
     progress.finish();
 
     let cell = Cell::new("heart", &heart.name, mesh.triangles.len(), "capsule");
@@ -125,6 +126,7 @@ fn split_level(beat: &Beat<'_>, boxes: &AabbTree) -> Result<u32> {
         beat.deform(tick, &mut positions);
         race.step(&positions, &[beat.tool(tick)])?;
     }
+    race.finish()?;
     let cost = |(_, samples)| Summary::of(&Samples::total(samples, Update::Refit)).median;
     let costs: Vec<f64> = race.results(0).map(cost).collect();
     let best = (1..).zip(costs).min_by(|(_, a), (_, b)| a.total_cmp(b));

@@ -38,13 +38,14 @@ const READING: &str = "\n\
     before the first query of a frame, *total* is refit and traversal. *Measuring* is the stretch \
     measurement of the whole frame, which in a controller belongs to the path by which vertices arrive: \
     it has a column of its own, and a total that includes it. Queries are independent of each other \
-    (no warm start) except where a row says so. Methods take turns in one process; the order changes \
-    with every step. Their answers are compared at every step, and the run stops if two exact methods \
+    (no warm start) except where a row says so. Methods take turns of ten steps in one process, in changing order, the first step \
+    of a turn being done once before it is timed. Their answers are compared at every step, and the run stops if two exact methods \
     differ by more than 0.001 mm. Intervals are 95 % confidence intervals of the median (order \
     statistics). Node tests of DIBS are spheres, of the others boxes; exact counts.\n";
 
 const FIGURE_4: &str = "\n## Figure 4: total against size\n\n![figure 4](figures/figure4.svg)\n";
-const FIGURE_6: &str = "\n![figure 6](figures/figure6.svg)\n";
+const FIGURE_6: &str = "\n![figure 6](figures/figure6.svg)\n\n\
+    Not drawn: ratios of 0 and below, where DIBS is the faster one even if nothing moves.\n";
 const DISTRIBUTION: &str = "\n## Node tests of each query\n\n\
     On a microcontroller the time of a query is its tests. The worst case of the run is marked.\n\n\
     ![node tests](figures/node-tests.svg)\n";

@@ -1,5 +1,9 @@
 //! Methods side by side on one stream, interleaved in one process, so that whatever slows the machine
 //! slows all of them.
+//!
+//! They take turns of a few steps rather than of one: a method that waits for ten others at every step
+//! finds its data evicted from the caches, which no controller does to it. The first step of a turn is
+//! done once before it is timed.
 
 use std::time::Instant;
 
@@ -42,6 +46,46 @@ impl<'a> Contender<'a> {
     pub fn new(name: &'static str, update: Update, method: Box<dyn Method + 'a>) -> Self {
         Self { name, method, update, every: 1, tolerance: EXACT }
     }
+
+    /// A step that is not timed.
+    fn warm_up(&mut self, step: &Step) {
+        self.method.load(&step.positions);
+        for tool in &step.tools {
+            self.method.update();
+            self.method.find(tool);
+        }
+    }
+
+    fn take(&mut self, step: &mut Step, place: usize, samples: &mut [Samples]) -> Result<()> {
+        self.method.load(&step.positions);
+        let count = step.tools.len();
+        for tool in (0..count).map(|turn| (turn + place) % count) {
+            let samples = &mut samples[tool];
+            let start = Instant::now();
+            self.method.update();
+            samples.update.push(microseconds(start));
+            let start = Instant::now();
+            let found = self.method.find(&step.tools[tool]);
+            samples.traversal.push(microseconds(start));
+            if let Some([nodes, triangles]) = found.tests {
+                samples.node_tests.push(f64::from(nodes));
+                samples.triangle_tests.push(f64::from(triangles));
+            }
+            let separation = found.separation;
+            if let Some((other, expected)) = step.reference[tool] {
+                let off = (separation - expected).abs();
+                samples.disagreement = samples.disagreement.max(off);
+                let name = self.name;
+                ensure!(
+                    off <= self.tolerance,
+                    "{name} says {separation} mm where {other} says {expected} mm"
+                );
+            } else if self.tolerance == EXACT {
+                step.reference[tool] = Some((self.name, separation));
+            }
+        }
+        Ok(())
+    }
 }
 
 /// What was measured of one method with one tool: one value a step, times in microseconds.
@@ -54,70 +98,76 @@ pub struct Samples {
     pub disagreement: f32,
 }
 
+/// Steps of a turn.
+const TURN: usize = 10;
+
+/// A frame, its tools and the first exact answer for each.
+struct Step {
+    positions: Vec<Vec3>,
+    tools: Vec<Probe>,
+    reference: Vec<Option<(&'static str, f32)>>,
+}
+
 /// Contenders, and what was measured so far.
 pub struct Race<'a> {
-    pub contenders: Vec<Contender<'a>>,
+    contenders: Vec<Contender<'a>>,
     /// By contender, then by tool.
     samples: Vec<Vec<Samples>>,
     /// One value a step, in mm.
-    pub separations: Vec<Vec<f64>>,
-    steps: usize,
+    separations: Vec<Vec<f64>>,
+    waiting: Vec<Step>,
+    done: usize,
 }
 
 impl<'a> Race<'a> {
     /// A race with this many tools a step.
     pub fn new(contenders: Vec<Contender<'a>>, tools: usize) -> Self {
         let samples = vec![vec![Samples::default(); tools]; contenders.len()];
-        Self { contenders, samples, separations: vec![Vec::new(); tools], steps: 0 }
+        let separations = vec![Vec::new(); tools];
+        Self { contenders, samples, separations, waiting: Vec::new(), done: 0 }
     }
 
     /// Forgets what was measured: the end of the warm-up.
-    pub fn reset(&mut self) {
+    pub fn reset(&mut self) -> Result<()> {
+        self.finish()?;
         let contenders = std::mem::take(&mut self.contenders);
         *self = Self::new(contenders, self.separations.len());
+        Ok(())
     }
 
-    /// One step: every method takes the frame in, and for every tool updates itself and answers. Who
-    /// comes first, and which tool, changes from step to step. The separations must agree.
+    /// Adds a step: every method takes the frame in, and for every tool updates itself and answers. The
+    /// separations must agree.
     pub fn step(&mut self, positions: &[Vec3], tools: &[Probe]) -> Result<()> {
+        let reference = vec![None; tools.len()];
+        self.waiting.push(Step { positions: positions.to_vec(), tools: tools.to_vec(), reference });
+        if self.waiting.len() == TURN { self.finish() } else { Ok(()) }
+    }
+
+    /// Does the steps that wait. Who comes first changes from turn to turn, and which tool from step to
+    /// step.
+    pub fn finish(&mut self) -> Result<()> {
+        let mut steps = std::mem::take(&mut self.waiting);
         let count = self.contenders.len();
-        let mut reference: Vec<Option<(&str, f32)>> = vec![None; tools.len()];
         for turn in 0..count {
-            let number = (turn + self.steps) % count;
+            let number = (turn + self.done / TURN) % count;
             let contender = &mut self.contenders[number];
-            if self.steps % contender.every != 0 {
-                continue;
-            }
-            contender.method.load(positions);
-            for turn in 0..tools.len() {
-                let tool = (turn + self.steps) % tools.len();
-                let samples = &mut self.samples[number][tool];
-                let start = Instant::now();
-                contender.method.update();
-                samples.update.push(microseconds(start));
-                let start = Instant::now();
-                let found = contender.method.find(&tools[tool]);
-                samples.traversal.push(microseconds(start));
-                if let Some([nodes, triangles]) = found.tests {
-                    samples.node_tests.push(f64::from(nodes));
-                    samples.triangle_tests.push(f64::from(triangles));
+            let mut warm = false;
+            for (place, step) in (self.done..).zip(&mut steps) {
+                if place % contender.every != 0 {
+                    continue;
                 }
-                let separation = found.separation;
-                if let Some((other, expected)) = reference[tool] {
-                    let off = (separation - expected).abs();
-                    samples.disagreement = samples.disagreement.max(off);
-                    let name = contender.name;
-                    ensure!(
-                        off <= contender.tolerance,
-                        "{name} says {separation} mm where {other} says {expected} mm"
-                    );
-                } else if contender.tolerance == EXACT {
-                    reference[tool] = Some((contender.name, separation));
-                    self.separations[tool].push(f64::from(separation));
+                if !warm {
+                    contender.warm_up(step);
+                    warm = true;
                 }
+                contender.take(step, place, &mut self.samples[number])?;
             }
         }
-        self.steps += 1;
+        for (tool, separations) in self.separations.iter_mut().enumerate() {
+            let answers = steps.iter().filter_map(|step| step.reference[tool]);
+            separations.extend(answers.map(|(_, separation)| f64::from(separation)));
+        }
+        self.done += steps.len();
         Ok(())
     }
 
@@ -130,6 +180,11 @@ impl<'a> Race<'a> {
     /// Every contender with its samples with one tool.
     pub fn results(&self, tool: usize) -> impl Iterator<Item = (&Contender<'a>, &Samples)> {
         self.contenders.iter().zip(self.samples.iter().map(move |of_tool| &of_tool[tool]))
+    }
+
+    /// Every contender.
+    pub fn contenders(&self) -> &[Contender<'a>] {
+        &self.contenders
     }
 
     /// Records of everything measured with one tool.

@@ -64,8 +64,8 @@ impl Plan {
             name: "quick",
             brains: vec![(500, 2_000), (5_000, 2_000), (50_000, 500), (500_000, 100)],
             exhaustive_most: 20,
-            ticks: 7_000,
-            repetitions: 2,
+            ticks: 3_500,
+            repetitions: 3,
             ablation_brains: vec![5_000],
             ablation_queries: 200,
             ..Self::full()

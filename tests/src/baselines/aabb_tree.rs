@@ -42,7 +42,10 @@ pub struct AabbTree {
     pub(super) positions: Vec<Vec3A>,
     triangles: Vec<[u32; 3]>,
     order: Vec<u32>,
-    /// The vertices of each leaf, each once, and where each node's begin.
+    /// The leaves' and the inner nodes' numbers, ascending: a loop over either has no branch to guess.
+    leaves: Vec<u32>,
+    inner: Vec<u32>,
+    /// The vertices of each leaf, each once, and where each leaf's begin.
     leaf_vertices: Vec<u32>,
     leaf_start: Vec<u32>,
 }
@@ -80,15 +83,13 @@ impl AabbTree {
                 *row
             }));
         }
+        let is_leaf = |&node: &u32| links[node as usize].count > 0;
+        let (leaves, inner): (Vec<u32>, Vec<u32>) = (0..links.len() as u32).partition(is_leaf);
         let (mut leaf_vertices, mut leaf_start) = (Vec::new(), vec![0]);
-        for link in &links {
-            if link.count > 0 {
-                let range = link.first as usize..(link.first + link.count) as usize;
-                let mut of_leaf: Vec<u32> = triangles[range].iter().flatten().copied().collect();
-                of_leaf.sort_unstable();
-                of_leaf.dedup();
-                leaf_vertices.extend(of_leaf);
-            }
+        for &leaf in &leaves {
+            let Link { first, count } = links[leaf as usize];
+            let of_leaf = &triangles[first as usize..(first + count) as usize];
+            leaf_vertices.extend(each_once(of_leaf.iter().flatten().copied().collect()));
             leaf_start.push(leaf_vertices.len() as u32);
         }
         let mut tree = Self {
@@ -97,6 +98,8 @@ impl AabbTree {
             positions: Vec::new(),
             triangles,
             order,
+            leaves,
+            inner,
             leaf_vertices,
             leaf_start,
         };
@@ -109,30 +112,29 @@ impl AabbTree {
         self.positions.extend(self.order.iter().map(|&v| Vec3A::from(positions[v as usize])));
     }
 
-    /// Refits nodes from the last to the first: children before parents.
+    /// Refits a range of nodes that holds the descendants of its own: first leaves, then inner nodes
+    /// from the last to the first, so that children come before parents.
     pub(super) fn refit(&mut self, nodes: Range<usize>) {
-        let (links, boxes) = (&self.links[..nodes.end], &mut self.boxes[..nodes.end]);
-        let starts = &self.leaf_start[..=nodes.end];
-        for node in nodes.rev() {
-            let Link { first, count } = links[node];
-            boxes[node] = if count == 0 {
-                let first = first as usize;
-                joined(boxes[first], boxes[first + 1])
-            } else {
-                let vertices = starts[node] as usize..starts[node + 1] as usize;
-                let of_leaf = &self.leaf_vertices[vertices];
-                of_leaf.iter().fold(NOTHING, |b, &v| grown(b, self.positions[v as usize]))
-            };
+        let leaves = within(&self.leaves, &nodes);
+        let mut start = self.leaf_start[leaves.start] as usize;
+        let ends = &self.leaf_start[leaves.start + 1..=leaves.end];
+        for (&leaf, &end) in self.leaves[leaves].iter().zip(ends) {
+            let of_leaf = &self.leaf_vertices[start..end as usize];
+            let bounds = of_leaf.iter().fold(NOTHING, |b, &v| grown(b, self.positions[v as usize]));
+            self.boxes[leaf as usize] = bounds;
+            start = end as usize;
+        }
+        for &node in self.inner[within(&self.inner, &nodes)].iter().rev() {
+            let first = self.links[node as usize].first as usize;
+            self.boxes[node as usize] = joined(self.boxes[first], self.boxes[first + 1]);
         }
     }
 
     /// The vertices below a range of nodes, each once, in ascending order.
-    pub(super) fn vertices_of(&self, nodes: Range<usize>) -> Vec<u32> {
-        let refs = self.leaf_start[nodes.start] as usize..self.leaf_start[nodes.end] as usize;
-        let mut vertices = self.leaf_vertices[refs].to_vec();
-        vertices.sort_unstable();
-        vertices.dedup();
-        vertices
+    pub(super) fn vertices_of(&self, nodes: &Range<usize>) -> Vec<u32> {
+        let Range { start, end } = within(&self.leaves, nodes);
+        let vertices = self.leaf_start[start] as usize..self.leaf_start[end] as usize;
+        each_once(self.leaf_vertices[vertices].to_vec())
     }
 
     /// The range of a node's descendants.
@@ -204,6 +206,18 @@ impl AabbTree {
             }
         }
     }
+}
+
+/// Where the ascending numbers of a range are.
+fn within(numbers: &[u32], range: &Range<usize>) -> Range<usize> {
+    let below = |limit: usize| numbers.partition_point(|&number| (number as usize) < limit);
+    below(range.start)..below(range.end)
+}
+
+fn each_once(mut numbers: Vec<u32>) -> Vec<u32> {
+    numbers.sort_unstable();
+    numbers.dedup();
+    numbers
 }
 
 #[inline(always)]

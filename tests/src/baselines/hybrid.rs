@@ -60,8 +60,8 @@ impl Hybrid {
 impl Cut {
     fn new(tree: &AabbTree, node: usize) -> Self {
         let below = tree.descendants(node);
-        let vertices =
-            tree.vertices_of(if below.is_empty() { node..node + 1 } else { below.clone() });
+        let itself = node..node + 1;
+        let vertices = tree.vertices_of(if below.is_empty() { &itself } else { &below });
         // Rows are numbered as leaves need them, so most of them are the subtree's last and in one run.
         let run = vertices.windows(2).rev().take_while(|pair| pair[0] + 1 == pair[1]).count() + 1;
         let (others, rows) = vertices.split_at(vertices.len() - run);

@@ -58,11 +58,16 @@ impl Machine {
     }
 
     fn host(scene: &Scene, reason: String) -> Result<Self> {
-        // A folder of its own: another surface would make cargo rebuild xtask itself next time.
-        let folder = workspace::target().join("host-controller");
+        // xtask contains the controller's library too. A folder of its own for another surface, and
+        // the same selection of packages for this one, keep cargo from building anything twice.
+        let folder = if scene.surface.is_default() {
+            workspace::target()
+        } else {
+            workspace::target().join("host-controller")
+        };
         let mut cargo = Command::new("cargo");
-        cargo.args(["build", "--quiet", "--release", "--package", "firmware-example"]);
-        cargo.args(["--bin", "host", "--target-dir"]).arg(&folder);
+        cargo.args(["build", "--quiet", "--release", "--package", "xtask"]);
+        cargo.args(["--package", "firmware-example", "--bin", "host", "--target-dir"]).arg(&folder);
         cargo.current_dir(workspace::root());
         scene.surface.describe_to(&mut cargo);
         run(&mut cargo).context("the host's controller does not build")?;

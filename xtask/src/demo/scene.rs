@@ -17,6 +17,8 @@ const ANY_STRETCH: f32 = 1_000.0;
 
 /// What moves, and the tree that the firmware has of it.
 pub struct Scene {
+    /// What to call the surface.
+    name: String,
     /// What the firmware's build script is told.
     pub surface: Surface,
     /// The tree; the firmware builds the same one, byte for byte.
@@ -49,7 +51,9 @@ impl Scene {
             row[vertex as usize] = place;
         }
         let path = options.mesh.as_deref().map(std::path::absolute).transpose()?;
+        let given = options.mesh.as_ref().map(|path| path.display().to_string());
         Ok(Self {
+            name: given.unwrap_or_else(|| "generated heart".to_owned()),
             surface: Surface { mesh: path, stretch },
             frames: motion.frames.iter().map(|frame| tree.to_rows(frame)).collect(),
             rate: if motion.rate > 0.0 { motion.rate } else { 25.0 },
@@ -61,12 +65,9 @@ impl Scene {
     /// One line for the user.
     pub fn describe(&self) -> String {
         let summary = self.tree.summary();
-        let name = match &self.surface.mesh {
-            Some(path) => path.display().to_string(),
-            None => "generated heart".to_owned(),
-        };
         format!(
-            "{name}: {} triangles, {} vertices, {} frames of motion, stretch limit {}",
+            "{}: {} triangles, {} vertices, {} frames of motion, stretch limit {}",
+            self.name,
             summary.triangles,
             summary.vertices,
             self.frames.len(),

@@ -21,7 +21,7 @@ use super::machine::Machine;
 use super::scene::Scene;
 use super::sender::{Link, send};
 use crate::process::shown;
-use crate::qemu;
+use crate::{qemu, workspace};
 
 /// Real time that a connected controller may stay silent.
 const SILENCE: Duration = Duration::from_secs(30);
@@ -55,7 +55,10 @@ pub fn run(scene: &Scene, machine: &Machine, seconds: u32, folder: &Path) -> Res
     let telemetry_socket = UnixListener::bind(&telemetry_path)?;
 
     let mut command = machine.command(&bus_path, &telemetry_path, ticks_asked);
-    let shown = shown(&command);
+    // As one would type it at the top of the repository.
+    let shown = shown(&command)
+        .replace(&format!("{}/", workspace::root().display()), "")
+        .replace(&format!("{}/", sockets.path().display()), "");
     // The firmware's log, in defmt's encoding: `defmt-print -e FIRMWARE < log.defmt`.
     command.stdout(File::create(folder.join("log.defmt"))?);
     let start = Instant::now();

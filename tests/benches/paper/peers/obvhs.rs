@@ -23,6 +23,9 @@ pub struct Obvhs {
     order: Vec<u32>,
     positions: Vec<Vec3A>,
     leaves: Vec<u32>,
+    /// The vertices of each leaf, each once, and where each leaf's end.
+    leaf_vertices: Vec<u32>,
+    leaf_end: Vec<u32>,
 }
 
 impl Obvhs {
@@ -51,10 +54,21 @@ impl Obvhs {
                 *row
             })
         });
-        let triangles = triangles.collect();
+        let triangles: Vec<[u32; 3]> = triangles.collect();
         let leaves = (0..tree.nodes.len() as u32).filter(|&n| tree.nodes[n as usize].is_leaf());
-        let leaves = leaves.collect();
-        Self { tree, triangles, order, positions: Vec::new(), leaves }
+        let leaves: Vec<u32> = leaves.collect();
+        let (mut leaf_vertices, mut leaf_end) = (Vec::new(), Vec::new());
+        for &leaf in &leaves {
+            let node = &tree.nodes[leaf as usize];
+            let range = node.first_index as usize..(node.first_index + node.prim_count) as usize;
+            let mut vertices: Vec<u32> = triangles[range].iter().flatten().copied().collect();
+            vertices.sort_unstable();
+            vertices.dedup();
+            leaf_vertices.extend(vertices);
+            leaf_end.push(leaf_vertices.len() as u32);
+        }
+        let positions = Vec::new();
+        Self { tree, triangles, order, positions, leaves, leaf_vertices, leaf_end }
     }
 
     fn closest<A: Axis>(&self, tool: &A) -> Found {
@@ -118,16 +132,16 @@ impl Method for Obvhs {
     }
 
     fn update(&mut self) {
-        for &leaf in &self.leaves {
-            let node = &mut self.tree.nodes[leaf as usize];
-            let range = node.first_index as usize..(node.first_index + node.prim_count) as usize;
+        let mut start = 0;
+        for (&leaf, &end) in self.leaves.iter().zip(&self.leaf_end) {
             let (mut min, mut max) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
-            for &vertex in self.triangles[range].iter().flatten() {
+            for &vertex in &self.leaf_vertices[start..end as usize] {
                 let position = self.positions[vertex as usize];
                 min = min.min(position);
                 max = max.max(position);
             }
-            node.set_aabb(Aabb::new(min, max));
+            self.tree.nodes[leaf as usize].set_aabb(Aabb::new(min, max));
+            start = end as usize;
         }
         self.tree.refit_all();
     }
