@@ -1,0 +1,245 @@
+//! The builder: coverage against distances computed another way, determinism, cost, refusals.
+
+use dibs_build::{BuildError, Builder, BuiltTree, Construction, IndexWidth, Mesh, Paths, generate};
+use dibs_nostd::format::Link;
+use dibs_nostd::{Index, Options, Query, Sphere, Tree, measure_stretch};
+use dibs_tests::deform::{Deformation, unit};
+use fastrand::Rng;
+use glam::Vec3;
+
+fn heart(triangles: u32) -> Mesh {
+    generate::heart(triangles).expect("a valid size").0
+}
+
+/// Shortest edge paths between all pairs of vertices (Floyd and Warshall).
+fn all_pairs(mesh: &Mesh) -> Vec<Vec<f64>> {
+    let count = mesh.positions.len();
+    let mut distance = vec![vec![f64::INFINITY; count]; count];
+    for [a, b, c] in &mesh.triangles {
+        for (u, v) in
+            [(*a as usize, *b as usize), (*b as usize, *c as usize), (*c as usize, *a as usize)]
+        {
+            let length = mesh.positions[u].as_dvec3().distance(mesh.positions[v].as_dvec3());
+            distance[u][v] = length;
+            distance[v][u] = length;
+        }
+    }
+    for (v, row) in distance.iter_mut().enumerate() {
+        row[v] = 0.0;
+    }
+    for through in 0..count {
+        let via = distance[through].clone();
+        for row in &mut distance {
+            let to_via = row[through];
+            for (d, onward) in row.iter_mut().zip(&via) {
+                *d = d.min(to_via + onward);
+            }
+        }
+    }
+    distance
+}
+
+/// Calls `visit` with every node's pin, radius and vertices, as vertex numbers of the mesh.
+fn each_node<I: Index>(tree: &Tree<'_, I>, visit: &mut impl FnMut(u32, f64, &[u32])) {
+    let number = |row: u32| tree.vertex_number(row).expect("in the tree");
+    let (pin, radius, link) = tree.root();
+    let mut stack = vec![(pin, radius, link)];
+    while let Some((pin, radius, link)) = stack.pop() {
+        let mut vertices = Vec::new();
+        let mut links = vec![link];
+        while let Some(link) = links.pop() {
+            match link {
+                Link::Leaf { first, count } => {
+                    let rows = (first..first + count).filter_map(|t| tree.triangle(t));
+                    vertices.extend(rows.flatten().map(number));
+                }
+                Link::Node(row) => {
+                    links.extend(tree.children(row).expect("in the tree").map(|c| c.2));
+                }
+            }
+        }
+        visit(number(pin), f64::from(radius), &vertices);
+        if let Link::Node(row) = link {
+            stack.extend(tree.children(row).expect("in the tree"));
+        }
+    }
+}
+
+#[test]
+fn edge_path_radii_are_the_geodesic_ones_rounded_up() {
+    let mesh = heart(600);
+    let truth = all_pairs(&mesh);
+    let built = Builder::new().paths(Paths::Edges).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let unit = f64::from(f32::from_bits(u32::from_le_bytes(
+        built.blob()[36..40].try_into().expect("four bytes"),
+    )));
+    let mut nodes = 0;
+    each_node(&tree, &mut |pin, radius, vertices| {
+        let needed = vertices.iter().map(|&v| truth[pin as usize][v as usize]).fold(0.0, f64::max);
+        assert!(radius >= needed, "node pinned to {pin}: {radius} covers {needed}");
+        // Arcs are rounded up to f32, and the radius to a multiple of the unit.
+        assert!(radius <= needed * (1.0 + 1e-6) + 1.01 * unit, "{radius} for {needed}");
+        nodes += 1;
+    });
+    assert_eq!(nodes, 2 * tree.node_count() + 1);
+}
+
+#[test]
+fn surface_radii_lie_between_straight_lines_and_edge_paths() {
+    let mesh = heart(600);
+    let edges = all_pairs(&mesh);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let at = |v: u32| mesh.positions[v as usize].as_dvec3();
+    let mut shorter = 0;
+    each_node(&built.tree::<u16>().expect("valid"), &mut |pin, radius, vertices| {
+        let farthest = |d: &dyn Fn(u32) -> f64| vertices.iter().map(|&v| d(v)).fold(0.0, f64::max);
+        let straight = farthest(&|v| at(pin).distance(at(v)));
+        let along_edges = farthest(&|v| edges[pin as usize][v as usize]);
+        assert!(radius >= straight, "{radius} below the straight line {straight}");
+        assert!(radius <= along_edges * 1.001 + 0.01, "{radius} above the edge path {along_edges}");
+        shorter += u32::from(radius < 0.97 * along_edges);
+    });
+    assert!(shorter > 50, "chords shorten paths: {shorter}");
+}
+
+/// Stretches to the very limit, with every vertex of every node held against its sphere.
+#[test]
+fn spheres_cover_their_sections_up_to_the_limit() {
+    let mesh = heart(320);
+    let mut rng = Rng::with_seed(11);
+    for construction in [Construction::Geodesic, Construction::Paper] {
+        let built = Builder::new().stretch(1.5).construction(construction).build(&mesh);
+        let built = built.expect("a valid mesh");
+        let tree = built.tree::<u16>().expect("valid");
+        for deformation in Deformation::ALL {
+            let moved = deformation.apply(&mesh, tree.paths(), tree.stretch(), &mut rng);
+            let sigma = measure_stretch(&tree, built.to_rows(&moved).as_slice());
+            let sigma = f64::from(sigma.expect("within the limit").sigma());
+            each_node(&tree, &mut |pin, radius, vertices| {
+                for &v in vertices {
+                    let reach =
+                        moved[pin as usize].as_dvec3().distance(moved[v as usize].as_dvec3());
+                    // Positions are rounded to f32 after the deformation.
+                    assert!(reach <= sigma * radius + 1e-4, "{deformation:?}: {reach}");
+                }
+            });
+        }
+    }
+}
+
+/// A stretch beyond the limit is refused and named; a tree that is told too little misses.
+#[test]
+fn a_violated_limit_is_reported_not_tolerated() {
+    let mesh = heart(320);
+    let built = Builder::new().stretch(1.1).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let doubled: Vec<Vec3> = built.to_rows(&mesh.positions).iter().map(|p| *p * 2.0).collect();
+    let refused = measure_stretch(&tree, doubled.as_slice()).expect_err("twice is too much");
+    assert!(refused.to_string().contains("stretched by 2"), "{refused}");
+    let mut query = Query::<u16, 64>::new(&tree).expect("deep enough");
+    let mut rng = Rng::with_seed(3);
+    let wrong = (0..300).filter(|_| {
+        let at = doubled[rng.usize(..doubled.len())] + unit(&mut rng) * 20.0;
+        let tool = Sphere::new(at, 0.0).expect("valid");
+        let nearest = doubled.iter().map(|p| p.distance(at)).fold(f32::INFINITY, f32::min);
+        match query.closest(doubled.as_slice(), &tool, &Options::new()) {
+            Ok(found) => found.separation > nearest + found.accuracy,
+            Err(_) => true,
+        }
+    });
+    assert!(wrong.count() > 0, "the limit matters: without it some answers are wrong");
+}
+
+#[test]
+fn the_bytes_do_not_depend_on_the_threads() {
+    let mesh = generate::brain(4_000).expect("a valid size");
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| Builder::new().build(&mesh).expect("a valid mesh"))
+    };
+    let one = with(1);
+    for threads in [2, 7] {
+        assert!(with(threads).blob() == one.blob(), "{threads} threads");
+    }
+}
+
+#[test]
+fn the_heart_takes_at_most_22_bytes_a_triangle() {
+    let (mesh, _) = generate::heart(10_272).expect("the default");
+    let summary = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh").summary();
+    println!("{:.2} bytes a triangle", summary.query_bytes_per_triangle);
+    assert!(summary.query_bytes_per_triangle <= 22.0);
+    assert_eq!(summary.query_bytes, 16 * summary.nodes as usize + 6 * 10_272);
+}
+
+#[test]
+fn what_cannot_be_built_is_named() {
+    let mesh = heart(320);
+    let built = |m: &Mesh, b: Builder<'_>| b.build(m).map(|_: BuiltTree| ()).expect_err("refused");
+    let new = Builder::new;
+    let none = Mesh { triangles: vec![], ..mesh.clone() };
+    assert!(matches!(built(&none, new()), BuildError::NoTriangles));
+    for stretch in [0.99, f32::NAN, f32::INFINITY, -1.0] {
+        assert!(matches!(built(&mesh, new().stretch(stretch)), BuildError::Stretch { .. }));
+    }
+    for leaf in [0, 9] {
+        let error = built(&mesh, new().leaf_triangles(leaf));
+        assert!(matches!(error, BuildError::LeafSize { triangles } if triangles == leaf));
+    }
+    let mut broken = mesh.clone();
+    broken.positions[7].y = f32::NAN;
+    assert!(matches!(built(&broken, new()), BuildError::Coordinate { vertex: 7 }));
+    let mut broken = mesh.clone();
+    broken.triangles[5][1] = 9_999;
+    let error = built(&broken, new());
+    assert!(matches!(error, BuildError::Corner { triangle: 5, vertex: 9_999, .. }), "{error}");
+    let mut two = mesh.clone();
+    let first = two.positions.len() as u32;
+    two.positions.extend([Vec3::X, Vec3::Y, Vec3::Z].map(|p| p * 500.0));
+    two.triangles.push([first, first + 1, first + 2]);
+    assert!(matches!(built(&two, new()), BuildError::NotConnected { .. }));
+    let mut many = mesh.clone();
+    many.positions.resize(65_537, Vec3::ZERO);
+    let error = built(&many, new().index(IndexWidth::Bits16));
+    assert!(matches!(error, BuildError::TooManyVertices { vertices: 65_537, bits: 16, .. }));
+    assert_eq!(new().build(&many).expect("32 bits").index_bits(), 32);
+    let tree = new().build(&mesh).expect("a valid mesh");
+    for name in ["", "heart", "9HEART", "HEART MURMUR"] {
+        assert!(matches!(tree.rust(name), Err(BuildError::Name { .. })), "{name:?}");
+    }
+    let shallow = Query::<u16, 3>::new(&tree.tree().expect("valid"));
+    assert!(shallow.is_err(), "a stack of 3 is too small");
+}
+
+/// Counts are exact: a change of the tree or of the traversal shows here, and must be meant.
+#[test]
+fn counts_of_a_fixed_stream_are_what_they_were() {
+    let mesh = heart(2_000);
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let measured = measure_stretch(&tree, rows.as_slice()).expect("at rest");
+    let mut query = Query::<u16, 64>::new(&tree).expect("deep enough");
+    let mut rng = Rng::with_seed(1);
+    let mut counts = [(0, 0); 3];
+    let mut last = None;
+    for _ in 0..400 {
+        let on_surface = mesh.positions[rng.usize(..mesh.positions.len())];
+        let tool = Sphere::new(on_surface + unit(&mut rng) * 40.0 * rng.f32(), 2.0).expect("valid");
+        let options = [
+            Options::new(),
+            Options::new().stretch(measured),
+            Options::new().stretch(measured).warm_start(last),
+        ];
+        for (count, options) in counts.iter_mut().zip(options) {
+            let found = query.closest(rows.as_slice(), &tool, &options).expect("an answer");
+            *count = (count.0 + found.node_tests, count.1 + found.triangle_tests);
+            last = found.triangle;
+        }
+    }
+    assert_eq!(counts, GOLDEN, "node and triangle tests: limit, measured, measured and warm");
+}
+
+/// Node and triangle tests of the stream above.
+const GOLDEN: [(u32, u32); 3] = [(150_044, 10_587), (79_719, 10_285), (78_653, 10_278)];
