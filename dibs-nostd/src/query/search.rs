@@ -298,11 +298,11 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         let above_zero = |x: f32| if x > 0.0 { x } else { 0.0 };
         let separation = above_zero(axis_distance - radius);
         let left = above_zero(lower - radius);
-        let direction = if axis_distance > 0.0 {
-            (pair.on_axis - pair.on_surface) / axis_distance
-        } else {
-            Vec3::ZERO
-        };
+        // By its own length: next to contact the points' rounding is not that of the distance.
+        let towards = pair.on_axis - pair.on_surface;
+        let length = sqrt(towards.length_squared());
+        let touches = axis_distance <= 0.0 || length <= 0.0;
+        let direction = if touches { Vec3::ZERO } else { towards / length };
         Ok(Proximity {
             separation,
             lower: if left < separation { left } else { separation },

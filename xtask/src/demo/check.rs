@@ -21,7 +21,7 @@ pub struct Checked {
 impl Checked {
     /// Whether the answer is off by more than it states; also where the error is not a number.
     pub fn is_wrong(&self) -> bool {
-        !(self.error <= 1.0)
+        self.error > 1.0 || self.error.is_nan()
     }
 }
 
