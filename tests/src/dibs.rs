@@ -84,7 +84,6 @@ impl<I: Index> Method for Dibs<'_, I> {
     fn load(&mut self, positions: &[Vec3]) {
         self.rows.clear();
         self.rows.extend(self.order.iter().map(|&vertex| positions[vertex as usize]));
-        self.stretch = None;
     }
 
     fn update(&mut self) {

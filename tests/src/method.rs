@@ -23,7 +23,8 @@ pub struct Found {
 
 /// A way to answer closest-point queries on a surface that deforms.
 ///
-/// A step is `load`, `update`, then any number of `find`. All methods are single-threaded.
+/// A step is `load`, `update`, then any number of `find`; the same frame may be loaded again before a
+/// `find`. All methods are single-threaded.
 pub trait Method {
     /// Takes the frame's positions (in the mesh's order) into the method's own order and layout. Not
     /// timed: every method's vertices are written by somebody.

@@ -1,5 +1,7 @@
 //! The benchmark itself: it runs, its methods agree, and its documents are what its records say.
 
+// The longer plans are the benchmark's own.
+#[allow(dead_code)]
 #[path = "../benches/paper/mod.rs"]
 mod paper;
 

@@ -50,6 +50,8 @@ fn variants(mesh: &Mesh) -> Result<Vec<Variant>> {
         ("paths: chords across 1 edge", surface(1)),
         ("paths: chords across up to 2 edges", surface(2)),
         ("paths: chords across up to 3 edges", surface(3)),
+        ("pin: middle of the coordinates", default().construction(Construction::MidRangePin)),
+        ("split: a plane", default().construction(Construction::PlaneSplit)),
         ("leaves of 1 triangle", default().leaf_triangles(1)),
         ("leaves of up to 2 triangles", default().leaf_triangles(2)),
         ("leaves of up to 4 triangles", default().leaf_triangles(4)),

@@ -37,7 +37,8 @@ const READING: &str = "\n\
     Vertices reach each method in its own order and layout at no cost. *Refit* is what a method does \
     before the first query of a frame, *total* is refit and traversal. *Measuring* is the stretch \
     measurement of the whole frame, which in a controller belongs to the path by which vertices arrive: \
-    it has a column of its own, and a total that includes it. Queries are independent of each other \
+    it has a column of its own, and a total that includes it; after it, the frame is taken in once \
+    more, untimed, so that it does not leave the query with cold caches. Queries are independent of each other \
     (no warm start) except where a row says so. Methods take turns of ten steps in one process, in changing order, the first step \
     of a turn being done once before it is timed. Their answers are compared at every step, and the run stops if two exact methods \
     differ by more than 0.001 mm. Intervals are 95 % confidence intervals of the median (order \
