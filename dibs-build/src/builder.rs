@@ -22,6 +22,10 @@ pub enum Construction {
     /// The paper's: mid-range pin, edge paths inside the section, split by a plane, orphans swapped,
     /// one triangle a leaf.
     Paper,
+    /// The default, but with the paper's pin: for comparison.
+    MidRangePin,
+    /// The default, but split by the paper's plane: for comparison.
+    PlaneSplit,
 }
 
 /// Width of the vertex indices in the tree.
@@ -175,8 +179,8 @@ impl<'p> Builder<'p> {
             return Err(BuildError::TooManyVertices { vertices, most, bits });
         }
         let paths = self.paths.unwrap_or(match self.construction {
-            Construction::Geodesic => Paths::Surface { crossings: DEFAULT_CROSSINGS },
             Construction::Paper => Paths::Edges,
+            _ => Paths::Surface { crossings: DEFAULT_CROSSINGS },
         });
         let root = self.construct(mesh, paths)?;
         let kind = match paths {
@@ -195,8 +199,8 @@ impl<'p> Builder<'p> {
 
     fn construct(&self, mesh: &Mesh, paths: Paths) -> Result<Cluster, BuildError> {
         let leaf_triangles = self.leaf_triangles.unwrap_or(match self.construction {
-            Construction::Geodesic => DEFAULT_LEAF,
             Construction::Paper => 1,
+            _ => DEFAULT_LEAF,
         });
         let topology = Topology::new(mesh);
         let graph = Graph::new(mesh, &topology, paths);

@@ -94,8 +94,17 @@ impl<'a> Constructor<'a> {
 
     fn pin(&self, section: &Section, searches: &mut Searches, start: u32) -> Pin {
         match self.construction {
-            Construction::Geodesic => pin::geodesic_centre(&self.surface, section, searches, start),
             Construction::Paper => paper::mid_range_pin(&self.surface, section, searches),
+            construction => {
+                // Also leaves the seeds of the split.
+                let centre = pin::geodesic_centre(&self.surface, section, searches, start);
+                match construction {
+                    Construction::MidRangePin => {
+                        paper::mid_range_pin(&self.surface, section, searches)
+                    }
+                    _ => centre,
+                }
+            }
         }
     }
 
@@ -103,8 +112,12 @@ impl<'a> Constructor<'a> {
         let halvings = section.triangles.len().ilog2() + 1;
         let even = depth + halvings >= MAX_DEPTH - 1;
         match self.construction {
-            Construction::Geodesic => split::by_geodesic(&self.surface, section, searches, even),
-            Construction::Paper => paper::split(&self.surface, section, even),
+            Construction::Geodesic | Construction::MidRangePin => {
+                split::by_geodesic(&self.surface, section, searches, even)
+            }
+            Construction::Paper | Construction::PlaneSplit => {
+                paper::split(&self.surface, section, even)
+            }
         }
     }
 
