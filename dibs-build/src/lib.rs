@@ -1,4 +1,20 @@
-//! From a mesh file to a static deformation invariant bounding sphere tree.
+//! From a mesh file to a static deformation invariant bounding sphere tree, for `dibs-nostd`.
+//!
+//! A `build.rs`:
+//!
+//! ```no_run
+//! fn main() -> Result<(), Box<dyn std::error::Error>> {
+//!     let mesh = dibs_build::read("heart.ply")?.mesh;
+//!     let tree = dibs_build::Builder::new().stretch(1.5).build(&mesh)?;
+//!     tree.write_rust(format!("{}/heart.rs", std::env::var("OUT_DIR")?), "HEART")?;
+//!     Ok(())
+//! }
+//! ```
+//!
+//! [`read`] imports and checks a mesh (OBJ, STL, PLY, OFF), [`Builder`] makes the tree, [`BuiltTree`]
+//! is written as Rust source or as a blob. [`Motion`] is a recorded deformation (PC2), and [`generate`]
+//! makes procedural hearts and brains. The library prints nothing; the program `dibs` (feature `cli`,
+//! on by default) does.
 
 mod builder;
 mod check;

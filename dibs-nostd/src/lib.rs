@@ -1,4 +1,51 @@
-//! Proximity queries on a deforming mesh, for hard real-time controllers.
+//! The closest pair of points between an instrument and a deforming mesh, for hard real-time
+//! controllers.
+//!
+//! Deformation invariant bounding spheres (Bowyer & Rodriguez y Baena, Proc IMechE Part H 228(4),
+//! 2014): each sphere of a [`Tree`] is pinned to a mesh vertex, and its radius is the largest distance
+//! along the surface to the vertices below it, times a limit on stretch. When the vertices move, the
+//! tree is right again without being touched, so it can lie in flash.
+//!
+//! `no_std`, no allocation, no panic, no recursion, no unbounded loop. `unsafe` only for the hardware
+//! square root. The same bits on host and target.
+//!
+//! # From vertices to a force
+//!
+//! | step | type | context |
+//! |---|---|---|
+//! | bytes become packets | [`wire::Deframer`], [`wire::Packet`] | bus interrupt |
+//! | packets become complete, checked frames | [`Assembler`], [`measure_stretch`] | bus interrupt |
+//! | frames change hands, never torn | [`Frames`] | both |
+//! | a frame is searched | [`Query`], [`Sphere`], [`Capsule`] | control interrupt |
+//! | the answer and its certainty | [`Proximity`] | control interrupt |
+//! | the force | [`constraint`] | control interrupt |
+//!
+//! Lengths are in the mesh's own unit, mm in the examples. Trees come from the crate `dibs-build`.
+//!
+//! ```
+//! use dibs_build::{Builder, generate};
+//! use dibs_nostd::{Capsule, Options, Query, Tree, measure_stretch, glam::Vec3};
+//!
+//! // On a host: a tree, as a build script would write it into a static.
+//! let (heart, motion) = generate::heart(1_000)?;
+//! let built = Builder::new().stretch(1.5).build(&heart)?;
+//!
+//! // On the target: the tree's bytes, validated once, and a query with a fixed stack.
+//! let tree = Tree::<u16>::from_bytes(built.blob())?;
+//! let mut query = Query::<_, 32>::new(&tree)?;
+//!
+//! // At each tick: the vertices as they are now, in the tree's order.
+//! let vertices = built.to_rows(&motion.frames[9]);
+//! let tool = Capsule::new(Vec3::new(70.0, 0.0, 20.0), Vec3::new(120.0, 0.0, 60.0), 2.5)?;
+//! let measured = measure_stretch(&tree, vertices.as_slice())?;
+//! let closest = query.closest(vertices.as_slice(), &tool, &Options::new().stretch(measured))?;
+//! assert!(closest.lower == closest.separation && closest.accuracy < 0.001);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Features
+//!
+//! `defmt`: `defmt::Format` for every public value and error.
 #![no_std]
 #![deny(unsafe_code)]
 
