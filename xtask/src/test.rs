@@ -42,7 +42,7 @@ pub fn test(options: &Options) -> Result<()> {
     steps.cargo("format", &["fmt", "--all", "--check"], &[]);
     steps.cargo("lints", &[&["clippy"], &workspace[..], &["--", "-D", "warnings"]].concat(), &[]);
     steps.cargo("plain build", &["build"], &[]);
-    steps.cargo("tests", &[&["test", "--release"], &workspace[..]].concat(), &[]);
+    steps.cargo("tests", &[&["test", "--release", "--no-fail-fast"], &workspace[..]].concat(), &[]);
     steps.cargo("documentation examples", &["test", "--release", "--workspace", "--doc"], &[]);
     steps.cargo(
         "documentation",
