@@ -86,7 +86,7 @@ fn main_axis(points: impl Iterator<Item = DVec3> + Clone) -> DVec3 {
         if size == 0.0 {
             return DVec3::X;
         }
-        covariance = covariance * (1.0 / size);
+        covariance *= 1.0 / size;
         covariance = covariance * covariance;
     }
     let columns = [covariance.x_axis, covariance.y_axis, covariance.z_axis];

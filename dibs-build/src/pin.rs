@@ -26,9 +26,9 @@ pub(crate) fn geodesic_centre(
     searches: &mut Searches,
     start: u32,
 ) -> Pin {
-    let first = searches.from_other(surface, section, start).vertex;
-    let second = searches.from_seed(0, surface, section, first).vertex;
-    searches.from_seed(1, surface, section, second);
+    let first = searches.search_other(surface, section, start).vertex;
+    let second = searches.search_seed(0, surface, section, first).vertex;
+    searches.search_seed(1, surface, section, second);
     if section.vertices.len() <= TRY_ALL {
         return best_of(surface, section, searches, &section.vertices);
     }
@@ -38,8 +38,8 @@ pub(crate) fn geodesic_centre(
     };
     let mut best = evaluate(surface, section, searches, centre);
     for _ in 0..ROUNDS {
-        let far = searches.from_other(surface, section, centre).vertex;
-        searches.from_other(surface, section, far);
+        let far = searches.search_other(surface, section, centre).vertex;
+        searches.search_other(surface, section, far);
         for (vertex, worst) in &mut candidates {
             *worst = worst.max(searches.other.get(*vertex));
         }
@@ -93,7 +93,7 @@ pub(crate) fn evaluate(
     searches: &mut Searches,
     vertex: u32,
 ) -> Pin {
-    let farthest = searches.from_other(surface, section, vertex);
+    let farthest = searches.search_other(surface, section, vertex);
     let complete = farthest.reached == section.vertices.len();
     Pin { vertex, radius: if complete { farthest.distance } else { f64::INFINITY } }
 }

@@ -60,7 +60,7 @@ impl Searches {
     }
 
     /// Distances from `source` to every vertex of the section that was entered, into one of `seeds`.
-    pub fn from_seed(
+    pub fn search_seed(
         &mut self,
         seed: usize,
         surface: &Surface<'_>,
@@ -72,7 +72,7 @@ impl Searches {
     }
 
     /// Distances from `source` to every vertex of the section that was entered, into `other`.
-    pub fn from_other(
+    pub fn search_other(
         &mut self,
         surface: &Surface<'_>,
         section: &Section,

@@ -260,7 +260,7 @@ pub(crate) const fn sections<I: Index>(bytes: &[u8]) -> Result<[&[u8]; 4], Forma
         while slot < SECTIONS.len() {
             if SECTIONS[slot] == kind {
                 let part = format::range(bytes, offset, length);
-                let placed = offset as usize % SECTION_ALIGN == 0
+                let placed = (offset as usize).is_multiple_of(SECTION_ALIGN)
                     && offset as usize >= HEADER_BYTES
                     && length as u64 == expected[slot];
                 if part.is_none() || !placed || found[slot].is_some() {

@@ -15,7 +15,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 /// Finds or installs the cross toolchain and the emulator where a task needs them.
-/// DIBS_CROSS=rustup|debian|none forces one way to build for the board.
+/// `DIBS_CROSS=rustup|debian|none` forces one way to build for the board.
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask")]
 struct Arguments {

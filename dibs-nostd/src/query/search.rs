@@ -67,6 +67,7 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     best: Option<AxisPair>,
     best_squared: f32,
     best_triangle: u32,
+    /// Besides the root's.
     node_tests: u32,
     triangle_tests: u32,
 }
@@ -132,7 +133,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             best: None,
             best_squared: f32::INFINITY,
             best_triangle: u32::MAX,
-            node_tests: 1,
+            node_tests: 0,
             triangle_tests: 0,
         };
         search.pull_in(header.root_pin, distance);
@@ -167,7 +168,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     /// Tests both children of an inner node.
     #[inline(always)]
     pub fn expand(&mut self, row: u32, parent_lower: f32) -> Result<Step, QueryError> {
-        if self.budget.node_tests.saturating_sub(self.node_tests - 1) < 2 {
+        if self.budget.node_tests.saturating_sub(self.node_tests) < 2 {
             return Ok(Step::OutOfBudget);
         }
         self.node_tests += 2;
@@ -219,7 +220,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             if triangle == self.best_triangle {
                 continue;
             }
-            let spent = self.node_tests - 1 >= self.budget.node_tests
+            let spent = self.node_tests >= self.budget.node_tests
                 || self.triangle_tests >= self.budget.triangle_tests;
             if spent {
                 return Ok(Step::OutOfBudget);
@@ -315,7 +316,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             triangle,
             corners,
             barycentric: pair.barycentric,
-            node_tests: self.node_tests,
+            node_tests: self.node_tests.saturating_add(1),
             triangle_tests: self.triangle_tests,
         })
     }
