@@ -42,7 +42,8 @@ const READING: &str = "\n\
     (no warm start) except where a row says so. Methods take turns of ten steps in one process, in changing order, the first step \
     of a turn being done once before it is timed. Their answers are compared at every step, and the run stops if two exact methods \
     differ by more than 0.001 mm. Intervals are 95 % confidence intervals of the median (order \
-    statistics). Node tests of DIBS are spheres, of the others boxes; exact counts.\n";
+    statistics). Node tests of DIBS are spheres, of the others boxes; exact counts. \
+    (parry3d counts nothing in `TriMesh`.)\n";
 
 const FIGURE_4: &str = "\n## Figure 4: total against size\n\n![figure 4](figures/figure4.svg)\n";
 const FIGURE_6: &str = "\n![figure 6](figures/figure6.svg)\n\n\
