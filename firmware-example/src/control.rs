@@ -13,9 +13,10 @@ use crate::{BusStatus, TICK_RATE, instrument};
 
 /// A surface older than this many ticks is a fault: the output is safe until a fresh one comes.
 ///
-/// Three seconds, because the emulated serial line brings a frame a second. A real bus brings tens
-/// of them a second, and a real limit is a few tens of milliseconds.
-pub const SURFACE_AGE_LIMIT: u32 = 3 * TICK_RATE;
+/// Six seconds, because the emulated serial line takes one to three for a frame, and a frame is as old
+/// as its first packet. A real bus brings tens of frames a second, and a real limit is a few tens of
+/// milliseconds.
+pub const SURFACE_AGE_LIMIT: u32 = 6 * TICK_RATE;
 
 /// Stiffness (N/mm), damping (N s/mm), largest force (N) and margin (mm) of the constraint.
 const STIFFNESS: f32 = 1.0;

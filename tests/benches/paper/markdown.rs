@@ -189,7 +189,9 @@ fn cortex_m7(page: &mut String, records: &Records) {
     let found =
         records.0.iter().find(|r| r.experiment == "cortex-m7" && r.metric == "instructions");
     let Some(instructions) = found else {
-        page.push_str("Not part of this run: no emulator, or no way to build for the board.\n");
+        page.push_str(
+            "Not part of this run: no emulator, no way to build for the board, or a failed demo.\n",
+        );
         return;
     };
     let of = Of(records, "cortex-m7", &instructions.mesh, 0, "capsule");

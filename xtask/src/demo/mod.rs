@@ -38,6 +38,9 @@ pub struct Options {
     /// Runs the controller as a program on this computer, without cross toolchain and QEMU.
     #[arg(long)]
     pub host: bool,
+    /// Folder for the report and the pictures; `target/demo` if absent.
+    #[arg(long)]
+    pub output: Option<PathBuf>,
     /// Whether the board may be replaced by this computer where it cannot be had.
     #[arg(skip)]
     pub board_only: bool,
@@ -50,7 +53,7 @@ pub fn run(options: &Options) -> Result<()> {
     let machine = Machine::prepare(options, &scene)?;
     println!("controller: {}", machine.describe());
 
-    let folder = workspace::demo();
+    let folder = options.output.clone().unwrap_or_else(workspace::demo);
     std::fs::create_dir_all(&folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let outcome = session::run(&scene, &machine, options.seconds, &folder)?;
