@@ -45,7 +45,7 @@ pub struct Summary {
     pub query_bytes_per_triangle: f64,
     /// Flash of the whole tree with all its optional sections.
     pub flash_bytes: usize,
-    /// RAM of the surface: two buffers of f32 positions.
+    /// RAM of the surface: `dibs_nostd::Frames`, two buffers of f32 positions and a mark a vertex.
     pub ram_bytes: usize,
     /// RAM of one query's stack.
     pub stack_bytes: usize,
@@ -189,7 +189,7 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
         query_bytes: tree.query_bytes(),
         query_bytes_per_triangle: tree.query_bytes() as f64 / f64::from(tree.triangle_count()),
         flash_bytes: length,
-        ram_bytes: 2 * 12 * vertices as usize,
+        ram_bytes: (25 * vertices as usize + 53).next_multiple_of(4),
         stack_bytes: 8 * tree.depth() as usize,
     }
 }

@@ -173,6 +173,17 @@ fn the_heart_takes_at_most_22_bytes_a_triangle() {
     assert_eq!(summary.query_bytes, 16 * summary.nodes as usize + 6 * 10_272);
 }
 
+/// The RAM that the builder prints is what the firmware's buffers take.
+#[test]
+fn the_stated_ram_is_that_of_the_frames() {
+    let stated = |triangles: u32| {
+        let summary = Builder::new().build(&heart(triangles)).expect("a valid mesh").summary();
+        (summary.vertices, summary.ram_bytes)
+    };
+    assert_eq!(stated(1_000), (502, size_of::<dibs_nostd::Frames<502>>()));
+    assert_eq!(stated(1_002), (503, size_of::<dibs_nostd::Frames<503>>()));
+}
+
 #[test]
 fn what_cannot_be_built_is_named() {
     let mesh = heart(320);

@@ -151,6 +151,8 @@ fn cases_of<'m>(name: &str, mesh: &'m Mesh, queries: usize) -> Vec<Case<'m>> {
         ("one triangle a leaf", geodesic.clone().leaf_triangles(1).stretch(1.1)),
         ("eight triangles a leaf", geodesic.leaf_triangles(8)),
         ("paper", Builder::new().construction(Construction::Paper).stretch(2.0)),
+        ("the paper's pin", Builder::new().construction(Construction::MidRangePin)),
+        ("the paper's split", Builder::new().construction(Construction::PlaneSplit)),
     ];
     let case = |(kind, builder): (&str, Builder<'_>)| Case {
         name: format!("{name}, {kind}"),
