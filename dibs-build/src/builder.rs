@@ -4,13 +4,10 @@ use dibs_nostd::Index;
 use dibs_nostd::format::{MAX_LEAF_TRIANGLES, PathKind};
 
 use crate::Mesh;
-use crate::construct::{Cluster, Constructor};
-use crate::emit::BuiltTree;
+use crate::array::{BuiltTree, Facts, flatten};
+use crate::construct::{Cluster, Constructor, Surface};
 use crate::error::BuildError;
-use crate::flatten::{Facts, flatten};
-use crate::graph::{Graph, Paths};
-use crate::section::Surface;
-use crate::topology::Topology;
+use crate::geodesic::{Graph, Paths, Topology};
 
 /// How sections are pinned, measured and split.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]

@@ -1,19 +1,21 @@
 //! Mesh files: OBJ, STL, PLY and OFF, recognised by what they contain.
 
+mod check;
 mod error;
 mod obj;
 mod off;
 mod ply;
-pub(crate) mod polygon;
-pub(crate) mod raw;
+mod polygon;
+mod raw;
 mod report;
 mod sniff;
 mod stl;
+mod weld;
 
 pub use error::{ReadError, ReadErrorKind};
 pub use report::{Format, Report};
 
-use crate::{Mesh, check};
+use crate::Mesh;
 use std::path::Path;
 
 /// A mesh that passed every check, and what was found and done on the way.

@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use crate::graph::Graph;
+use super::Graph;
 
 /// Distances of one search, kept until the next one with the same memory.
 #[derive(Debug)]

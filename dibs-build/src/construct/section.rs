@@ -1,8 +1,7 @@
 //! A section: the triangles below one node, and the searches that measure it.
 
 use crate::Mesh;
-use crate::geodesic::{Distances, Farthest};
-use crate::graph::Graph;
+use crate::geodesic::{Distances, Farthest, Graph};
 
 /// The triangles below one node, and their vertices in ascending order.
 #[derive(Debug)]

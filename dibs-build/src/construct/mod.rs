@@ -1,13 +1,19 @@
 //! Top-down construction: from one section of all triangles to the tree of sections.
 
+mod paper;
+mod pin;
+mod section;
+mod split;
+
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::Construction;
 use crate::error::BuildError;
-use crate::pin::{self, Pin};
-use crate::section::{Searches, Section, Surface};
-use crate::{Construction, paper, split};
 use dibs_nostd::format::MAX_DEPTH;
+use pin::Pin;
+pub(crate) use section::Surface;
+use section::{Searches, Section};
 
 /// A node before it is flattened.
 #[derive(Debug)]

@@ -10,9 +10,9 @@ use std::collections::HashMap;
 use glam::{DMat3, DVec3};
 use petgraph::unionfind::UnionFind;
 
-use crate::pin::{self, Pin};
-use crate::section::{Searches, Section, Surface};
-use crate::split;
+use super::pin::{self, Pin};
+use super::section::{Searches, Section, Surface};
+use super::split;
 
 /// The vertex nearest to the mid-range of the section, and its geodesic radius.
 pub(crate) fn mid_range_pin(

@@ -7,8 +7,8 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::Topology;
 use crate::Mesh;
-use crate::topology::Topology;
 
 /// How far along-surface distances look beyond the mesh's edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! Where a section's sphere is pinned: the vertex whose farthest vertex of the section is nearest.
 
-use crate::section::{Searches, Section, Surface};
+use super::section::{Searches, Section, Surface};
 
 /// A pin and the geodesic radius of the section around it.
 #[derive(Clone, Copy, Debug)]

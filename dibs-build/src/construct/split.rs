@@ -1,6 +1,6 @@
 //! Dividing a section in two by distance along the surface.
 
-use crate::section::{Searches, Section, Surface};
+use super::section::{Searches, Section, Surface};
 
 /// No side of a split gets less than this share of the triangles: it bounds the depth.
 const LEAST_SHARE: f64 = 0.1;

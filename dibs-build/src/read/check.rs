@@ -1,10 +1,10 @@
 //! From what a file says to a mesh that a tree can be built on: every check, in order.
 
+use super::polygon::Triangulator;
+use super::raw::Raw;
+use super::weld::first_coincident;
+use super::{Format, Import, ReadErrorKind, ReadOptions, Report};
 use crate::Mesh;
-use crate::read::polygon::Triangulator;
-use crate::read::raw::Raw;
-use crate::read::{Format, Import, ReadErrorKind, ReadOptions, Report};
-use crate::weld::first_coincident;
 use glam::{DVec3, Vec3};
 use petgraph::unionfind::UnionFind;
 use std::collections::HashSet;

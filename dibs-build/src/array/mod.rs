@@ -1,0 +1,7 @@
+//! The tree as a flat array: its bytes, and the files that hold them.
+
+mod emit;
+mod flatten;
+
+pub use emit::{BuiltTree, Summary, summarise};
+pub(crate) use flatten::{Facts, flatten};

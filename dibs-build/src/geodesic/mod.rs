@@ -1,0 +1,10 @@
+//! Distances along the surface: the graph of its paths, and shortest paths in it.
+
+mod graph;
+mod search;
+mod topology;
+
+pub(crate) use graph::Graph;
+pub use graph::Paths;
+pub(crate) use search::{Distances, Farthest};
+pub(crate) use topology::Topology;
