@@ -2,6 +2,7 @@
 
 pub mod ask;
 pub mod baselines;
+pub mod bus;
 pub mod deform;
 pub mod dibs;
 pub mod method;

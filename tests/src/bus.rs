@@ -1,0 +1,98 @@
+//! A small surface on a bus: what the bus tests share.
+
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::wire::{CHECKSUM_BYTES, Encoding, FrameEncoder, QuantisedBox};
+use dibs_nostd::{Assembler, FrameReader, Frames, Gate, Unchecked, VertexTable};
+
+/// Mesh id of the packets.
+pub const MESH: u32 = 0xD1B5_0001;
+/// Vertices of the surface.
+pub const N: usize = 40;
+/// An assembler without a gate, and what reads its frames.
+pub type Bus = (Assembler<'static, Unchecked, N>, FrameReader<'static, N>);
+
+/// A fresh bus without a gate.
+pub fn bus() -> Bus {
+    bus_with(Unchecked)
+}
+
+/// A fresh bus with a gate.
+///
+/// # Panics
+/// Never: the frames are new.
+pub fn bus_with<G: Gate>(gate: G) -> (Assembler<'static, G, N>, FrameReader<'static, N>) {
+    let frames: &'static Frames<N> = Box::leak(Box::new(Frames::new()));
+    let (writer, reader) = frames.split().unwrap();
+    (Assembler::new(writer, gate, MESH, 100.0), reader)
+}
+
+/// A surface that differs from epoch to epoch.
+pub fn surface(epoch: u32) -> Vec<Vec3> {
+    (0..N)
+        .map(|i| {
+            let t = i as f32 + (epoch % 1000) as f32 * 0.01;
+            Vec3::new((t * 0.7).sin() * 40.0, (t * 1.3).cos() * 30.0, t * 0.9 - 20.0)
+        })
+        .collect()
+}
+
+/// The encoding of a surface: a box around it, or floats.
+///
+/// # Panics
+/// If no box covers the positions.
+pub fn encoding(quantised: bool, positions: &[Vec3]) -> Encoding {
+    if quantised {
+        Encoding::Quantised(QuantisedBox::covering(positions).unwrap())
+    } else {
+        Encoding::Float
+    }
+}
+
+/// A frame cut into packets.
+///
+/// # Panics
+/// If the frame cannot be sent.
+pub fn packets<const MTU: usize>(
+    epoch: u32,
+    encoding: Encoding,
+    positions: &[Vec3],
+) -> Vec<Vec<u8>> {
+    let mut encoder = FrameEncoder::<_, MTU>::new(MESH, epoch, encoding, positions).unwrap();
+    let mut buffer = [0; MTU];
+    let mut packets = Vec::new();
+    while let Some(packet) = encoder.next_packet(&mut buffer) {
+        packets.push(packet.to_vec());
+    }
+    packets
+}
+
+/// The packets of an epoch of [`surface`], for CAN-FD.
+pub fn frame(epoch: u32, quantised: bool) -> Vec<Vec<u8>> {
+    let positions = surface(epoch);
+    packets::<64>(epoch, encoding(quantised, &positions), &positions)
+}
+
+/// Epoch and positions (as bits) of the published frame.
+///
+/// # Panics
+/// If a vertex is missing.
+pub fn published(reader: &mut FrameReader<'_, N>) -> Option<(u32, Vec<[u32; 3]>)> {
+    let frame = reader.read()?;
+    let positions = (0..N as u32).map(|v| frame.position(v).unwrap().to_array().map(f32::to_bits));
+    Some((frame.label().epoch, positions.collect()))
+}
+
+/// CRC-32 by the definition, one bit at a time: the packets' checksum is computed another way.
+pub fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(u32::MAX, |crc, &byte| {
+        (0..8).fold(crc ^ u32::from(byte), |crc, _| (crc >> 1) ^ (0xEDB8_8320 * (crc & 1)))
+    })
+}
+
+/// Makes the checksum right again, after whatever was done to the packet.
+pub fn reseal(mut packet: Vec<u8>) -> Vec<u8> {
+    packet.truncate(packet.len() - CHECKSUM_BYTES);
+    let checksum = crc32(&packet);
+    packet.extend(checksum.to_le_bytes());
+    packet
+}
