@@ -46,7 +46,7 @@ impl<'t, I: Index, const DEPTH: usize> Query<'t, I, DEPTH> {
     /// upper bounds from the first node on. Near child first; squares are compared, and a root is
     /// taken only where an order is needed.
     ///
-    /// Cost: the budget at most; typical counts are in `docs/performance.md`.
+    /// Cost: the budget at most; typical counts are in `docs/benchmarks.md`.
     ///
     /// # Errors
     /// [`QueryError`]: a table of the wrong size, a root pin that is not finite, a measurement of

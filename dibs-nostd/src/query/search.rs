@@ -19,8 +19,8 @@ pub(super) struct Waiting {
 ///
 /// With `u = 2^-24`, all lengths in a query are at most the scale `S` (distance to the farthest point
 /// of the root sphere, plus twice the axis). A pin's distance is off by at most `8 u S`, a bound
-/// `d - R` by `10 u S`, a triangle's distance by the kernel's [`crate::ACCURACY`]` S`.
-/// Twice the sum of the largest two covers any comparison between them.
+/// `d - R` by `12 u S`, a triangle's distance by the kernel's [`crate::ACCURACY`]` S`, `16 u S`: a
+/// comparison of any two by at most `28 u S`.
 const SLACK: f32 = 48.0 / 16_777_216.0;
 
 /// What [`Proximity::accuracy`] promises, in units of the scale: the kernel's error plus that of the

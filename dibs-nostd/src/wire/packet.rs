@@ -113,7 +113,7 @@ pub struct Commit {
 }
 
 impl<'a> Packet<'a> {
-    /// Checks the checksum and the form of a packet. Cost: about 7 instructions a byte.
+    /// Checks the checksum and the form of a packet. Cost: linear in the bytes.
     ///
     /// Whether mesh, epoch, range and coordinates make sense is for the receiver to judge.
     ///
