@@ -18,6 +18,7 @@
 //! | frames change hands, never torn | [`Frames`] | both |
 //! | a frame is searched | [`Query`], [`Sphere`], [`Capsule`] | control interrupt |
 //! | the answer and its certainty | [`Proximity`] | control interrupt |
+//! | whether the surface may be trusted | [`failsafe`] | control interrupt |
 //! | the force | [`constraint`] | control interrupt |
 //!
 //! Lengths are in the mesh's own unit, mm in the examples. Trees come from the crate `dibs-build`.
@@ -55,6 +56,7 @@ mod answer;
 mod assembler;
 mod check;
 pub mod constraint;
+pub mod failsafe;
 pub mod format;
 mod frames;
 mod index;

@@ -105,6 +105,21 @@ pub enum Unknown {
     },
     /// The query returned an error.
     Query,
+    /// No good packet came for longer than allowed.
+    LinkLost {
+        /// Time since the last one, on the receiver's clock.
+        silence: u32,
+    },
+    /// No heartbeat came for longer than allowed.
+    HeartbeatLost {
+        /// Time since the last one, on the receiver's clock.
+        silence: u32,
+    },
+    /// More was rejected than allowed since the last frame was published.
+    Rejections {
+        /// Packets and frames rejected.
+        streak: u32,
+    },
     /// The tool's axis touches the surface: no direction leads out.
     NoDirection,
     /// A number is not finite, or the direction is not a unit vector.
@@ -117,6 +132,11 @@ impl fmt::Display for Unknown {
             Self::NoSurface => write!(f, "no surface was published yet"),
             Self::Stale { age } => write!(f, "the surface is {age} old"),
             Self::Query => write!(f, "the query failed"),
+            Self::LinkLost { silence } => write!(f, "no good packet came for {silence}"),
+            Self::HeartbeatLost { silence } => write!(f, "no heartbeat came for {silence}"),
+            Self::Rejections { streak } => {
+                write!(f, "{streak} packets or frames were rejected in a row")
+            }
             Self::NoDirection => write!(f, "the tool's axis touches the surface"),
             Self::NotFinite => write!(f, "a number is not finite"),
         }

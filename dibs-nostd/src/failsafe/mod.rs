@@ -1,0 +1,284 @@
+//! When to stop trusting the surface: from age, silence, lost heartbeats and rejections to a defined
+//! output.
+//!
+//! [`FailSafe`] is a state machine that the control tick steps once. It owns no clock and no memory
+//! but its own few words; each step is a handful of integer comparisons, whatever happened.
+//!
+//! # States
+//!
+//! | state | what the constraint gets | meaning |
+//! |---|---|---|
+//! | [`State::Nominal`] | the answer, widened by age x tissue speed | every input is within its limits |
+//! | [`State::Degraded`] | the same, and the margin grows with the age | an input is beyond its first limit, or was: tell the operator |
+//! | [`State::Safe`] | [`Unknown`]: the constraint's hold | an input is beyond its second limit, or was: the surface is not acted on |
+//!
+//! The answer is widened in the nominal state too, so that the force does not jump where the state
+//! changes: the margin is one continuous function of the age.
+//!
+//! # Transitions
+//!
+//! Each input has two limits, a [`Watch`]. *Clear* is a step at which every input is within its first
+//! limit, a surface is there and the query gave an answer. The *run* counts the frames that were
+//! published since the last step that was not clear; two frames between two steps count as one.
+//!
+//! | from | to | when |
+//! |---|---|---|
+//! | (start) | safe | always: no surface was published yet |
+//! | nominal | degraded | an input is beyond its first limit |
+//! | nominal, degraded | safe | an input is beyond its second limit, the query failed, or there is no surface |
+//! | degraded | nominal | the run reaches [`Limits::recovery`]'s frames |
+//! | safe | nominal | the same, and [`FailSafe::acknowledge`] was accepted since; or alone, with [`Limits::automatic`] |
+//!
+//! From safe there is no way to degraded, and from a fault no way back without new frames: a surface
+//! that only looks fresh, because a clock wrapped, recovers nothing. An acknowledgement is accepted
+//! only once the run is complete, and void as soon as a step is not clear: nobody can acknowledge in
+//! advance. That there is no automatic recovery unless asked for is the da Vinci Research Kit's rule.
+//!
+//! # Time
+//!
+//! Any unit, any epoch, wrapping: the control tick's number does. With a surface received at tick `r`
+//! and nothing after it, the first safe step is that of tick `r + safe + 1`, where `safe` is the
+//! second limit on age: never later, and exactly then unless another input comes first. Times are
+//! compared over half the clock's range: 24 days at 1 kHz, after which the machine is long safe and
+//! stays so.
+
+mod limits;
+mod link;
+#[cfg(test)]
+mod tests;
+
+use core::fmt;
+
+use crate::Proximity;
+use crate::constraint::Unknown;
+
+pub use limits::{LimitError, Limits, Watch};
+pub use link::{Link, LinkStatus};
+
+/// What a step of the machine sees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Observation {
+    /// The clock.
+    pub now: u32,
+    /// Epoch of the published frame, and when it was received; `None` before the first.
+    pub frame: Option<(u32, u32)>,
+    /// What is known of the bus.
+    pub link: Link,
+    /// Whether the query on that frame returned an error.
+    pub query_failed: bool,
+}
+
+/// How far the surface may be trusted, from the best on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum State {
+    /// Every input is within its limits.
+    Nominal,
+    /// The surface is acted on, with a growing margin.
+    Degraded,
+    /// The surface is not acted on.
+    Safe,
+}
+
+/// What a step came to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Verdict {
+    /// The state after the step.
+    pub state: State,
+    /// Why it is not nominal: the first input, in the order of [`Observation`], that asks for the
+    /// state; where none does any more, the last one that did.
+    pub cause: Option<Unknown>,
+    /// How far the tissue may have moved since the surface was received, in mm: age times speed.
+    pub margin: f32,
+    /// Whether only an acknowledgement is missing to leave the safe state.
+    pub waits_for_acknowledgement: bool,
+}
+
+impl Verdict {
+    /// What the constraint may act on: the answer widened by the margin, or why there is none.
+    ///
+    /// # Errors
+    /// The cause in the safe state.
+    pub fn admit(&self, answer: Proximity) -> Result<Proximity, Unknown> {
+        match (self.state, self.cause) {
+            (State::Nominal | State::Degraded, _) => Ok(answer.widened(self.margin)),
+            (State::Safe, cause) => Err(cause.unwrap_or(Unknown::NoSurface)),
+        }
+    }
+}
+
+/// The state machine.
+///
+/// ```
+/// use dibs_nostd::failsafe::{FailSafe, Limits, Link, Observation, State, Watch};
+///
+/// // Ticks of 1 ms: degraded after 50, safe after 200; tissue at up to 0.1 mm a tick.
+/// let limits = Limits::new(Watch::new(50, 200)?, 0.1)?.recovery(2)?.automatic();
+/// let mut machine = FailSafe::new(limits);
+/// let link = Link { silence: 0, heartbeat: 0, rejections: 0 };
+/// let mut state = |now, epoch, received| {
+///     let frame = Some((epoch, received));
+///     machine.step(&Observation { now, frame, link, query_failed: false }).state
+/// };
+/// assert_eq!(state(1000, 1, 1000), State::Safe); // it starts safe
+/// assert_eq!(state(1001, 2, 1001), State::Nominal); // the second frame
+/// assert_eq!(state(1052, 2, 1001), State::Degraded);
+/// assert_eq!(state(1202, 2, 1001), State::Safe);
+/// # Ok::<(), dibs_nostd::failsafe::LimitError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct FailSafe {
+    limits: Limits,
+    state: State,
+    cause: Option<Unknown>,
+    /// The frame of the last step.
+    frame: Option<(u32, u32)>,
+    /// Frames since the last step that was not clear; stops at the number needed.
+    run: u16,
+    acknowledged: bool,
+}
+
+impl FailSafe {
+    /// A machine in the safe state.
+    #[must_use]
+    pub const fn new(limits: Limits) -> Self {
+        Self {
+            limits,
+            state: State::Safe,
+            cause: Some(Unknown::NoSurface),
+            frame: None,
+            run: 0,
+            acknowledged: false,
+        }
+    }
+
+    /// The limits.
+    #[must_use]
+    pub const fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// The state after the last step.
+    #[must_use]
+    pub const fn state(&self) -> State {
+        self.state
+    }
+
+    /// One control tick. O(1): six comparisons of two limits.
+    pub fn step(&mut self, seen: &Observation) -> Verdict {
+        let age = seen.frame.map_or(u32::MAX, |(_, received)| elapsed(seen.now, received));
+        let (level, cause) = self.worst(seen, age);
+
+        let is_new = seen.frame.is_some() && seen.frame != self.frame;
+        self.frame = seen.frame;
+        if level == State::Nominal {
+            if is_new && self.run < self.limits.recovery_frames() {
+                self.run += 1;
+            }
+        } else {
+            self.run = 0;
+            self.acknowledged = false;
+        }
+
+        let has_recovered = self.run >= self.limits.recovery_frames();
+        self.state = match (self.state, level) {
+            (State::Safe, _)
+                if has_recovered && (self.acknowledged || self.limits.is_automatic()) =>
+            {
+                State::Nominal
+            }
+            (State::Safe, _) | (_, State::Safe) => State::Safe,
+            (State::Degraded, State::Nominal) if has_recovered => State::Nominal,
+            (State::Degraded, _) | (_, State::Degraded) => State::Degraded,
+            (State::Nominal, State::Nominal) => State::Nominal,
+        };
+        let before = self.cause;
+        self.cause = match self.state {
+            State::Nominal => None,
+            state if level < state => before,
+            _ => cause,
+        };
+        if self.state == State::Nominal {
+            self.acknowledged = false;
+        }
+        Verdict {
+            state: self.state,
+            cause: self.cause,
+            margin: if seen.frame.is_some() { self.limits.margin(age) } else { 0.0 },
+            waits_for_acknowledgement: self.state == State::Safe && has_recovered,
+        }
+    }
+
+    /// An operator's acknowledgement: the next step leaves the safe state if it is clear.
+    ///
+    /// # Errors
+    /// [`NotReady`] unless the last step waited for it; nothing is remembered then.
+    pub fn acknowledge(&mut self) -> Result<(), NotReady> {
+        let frames = self.limits.recovery_frames().saturating_sub(self.run);
+        if self.state == State::Safe && frames == 0 {
+            self.acknowledged = true;
+            Ok(())
+        } else {
+            Err(NotReady { state: self.state, frames })
+        }
+    }
+
+    /// The level that the inputs of this step ask for, and the first cause of it.
+    fn worst(&self, seen: &Observation, age: u32) -> (State, Option<Unknown>) {
+        let (link, limits) = (seen.link, &self.limits);
+        let mut worst = (State::Nominal, None);
+        let stale = Unknown::Stale { age };
+        let silent = Unknown::LinkLost { silence: link.silence };
+        let heartbeat = Unknown::HeartbeatLost { silence: link.heartbeat };
+        let rejections = Unknown::Rejections { streak: link.rejections };
+        for (level, cause) in [
+            (safe_if(seen.frame.is_none()), Unknown::NoSurface),
+            (safe_if(seen.query_failed), Unknown::Query),
+            (limits.age.level(age), stale),
+            (limits.silence.level(link.silence), silent),
+            (limits.heartbeat.level(link.heartbeat), heartbeat),
+            (limits.rejections.level(link.rejections), rejections),
+        ] {
+            if level > worst.0 {
+                worst = (level, Some(cause));
+            }
+        }
+        worst
+    }
+}
+
+fn safe_if(is_safe: bool) -> State {
+    if is_safe { State::Safe } else { State::Nominal }
+}
+
+/// Time from `since` to `now`, 0 where `since` is later: another core's clock may be a little ahead.
+const fn elapsed(now: u32, since: u32) -> u32 {
+    let elapsed = now.wrapping_sub(since);
+    if elapsed > i32::MAX as u32 { 0 } else { elapsed }
+}
+
+/// An acknowledgement that came too early.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub struct NotReady {
+    /// The machine's state.
+    pub state: State,
+    /// Good frames that are still missing.
+    pub frames: u16,
+}
+
+impl fmt::Display for NotReady {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.state {
+            State::Safe => {
+                write!(f, "{} good frames are missing before an acknowledgement", self.frames)
+            }
+            _ => write!(f, "the state is not safe: there is nothing to acknowledge"),
+        }
+    }
+}
+
+impl core::error::Error for NotReady {}

@@ -1,0 +1,330 @@
+//! The machine against its table, and against a second one that remembers everything.
+
+extern crate std;
+
+use std::vec::Vec;
+
+use proptest::prelude::*;
+
+use super::{FailSafe, LimitError, Limits, Link, Observation, State, Verdict, Watch};
+use crate::constraint::Unknown;
+
+const AGE: Watch = watch(50, 200);
+const SILENCE: Watch = watch(20, 100);
+const HEARTBEAT: Watch = watch(30, 150);
+const REJECTIONS: Watch = watch(3, 9);
+const SPEED: f32 = 0.125;
+
+const fn watch(degraded: u32, safe: u32) -> Watch {
+    match Watch::new(degraded, safe) {
+        Ok(watch) => watch,
+        Err(_) => panic!("limits in the wrong order"),
+    }
+}
+
+fn limits(frames: u16, automatic: bool) -> Limits {
+    let limits = Limits::new(AGE, SPEED)
+        .unwrap()
+        .silence(SILENCE)
+        .heartbeat(HEARTBEAT)
+        .rejections(REJECTIONS)
+        .recovery(frames)
+        .unwrap();
+    if automatic { limits.automatic() } else { limits }
+}
+
+const GOOD: Link = Link { silence: 0, heartbeat: 0, rejections: 0 };
+
+/// A step at `now` with a surface of this epoch and age.
+fn seen(now: u32, epoch: u32, age: u32) -> Observation {
+    Observation {
+        now,
+        frame: Some((epoch, now.wrapping_sub(age))),
+        link: GOOD,
+        query_failed: false,
+    }
+}
+
+/// A machine in a state, after frame 100.
+fn machine(state: State, limits: Limits) -> FailSafe {
+    let mut machine = FailSafe::new(limits);
+    for epoch in 0..=100 {
+        machine.step(&seen(epoch, epoch, 0));
+        let _ = machine.acknowledge();
+    }
+    let age = match state {
+        State::Nominal => 0,
+        State::Degraded => 51,
+        State::Safe => 201,
+    };
+    assert_eq!(machine.step(&seen(1000, 100, age)).state, state);
+    machine
+}
+
+/// Every way in which an input can ask for a level, with the cause that is named.
+fn requests() -> Vec<(State, Observation, Option<Unknown>)> {
+    use State::{Degraded, Nominal, Safe};
+    let with = |link: Link| Observation { link, ..seen(2000, 100, 0) };
+    let mut all = Vec::new();
+    all.push((Safe, Observation { frame: None, ..seen(2000, 0, 0) }, Some(Unknown::NoSurface)));
+    all.push((
+        Safe,
+        Observation { query_failed: true, ..seen(2000, 100, 0) },
+        Some(Unknown::Query),
+    ));
+    for (level, age) in [(Nominal, 50), (Degraded, 51), (Degraded, 200), (Safe, 201)] {
+        let cause = (level != Nominal).then_some(Unknown::Stale { age });
+        all.push((level, seen(2000, 100, age), cause));
+    }
+    for (level, silence) in [(Nominal, 20), (Degraded, 21), (Degraded, 100), (Safe, 101)] {
+        let cause = (level != Nominal).then_some(Unknown::LinkLost { silence });
+        all.push((level, with(Link { silence, ..GOOD }), cause));
+    }
+    for (level, silence) in [(Nominal, 30), (Degraded, 31), (Degraded, 150), (Safe, 151)] {
+        let cause = (level != Nominal).then_some(Unknown::HeartbeatLost { silence });
+        all.push((level, with(Link { heartbeat: silence, ..GOOD }), cause));
+    }
+    for (level, streak) in [(Nominal, 3), (Degraded, 4), (Degraded, 9), (Safe, 10)] {
+        let cause = (level != Nominal).then_some(Unknown::Rejections { streak });
+        all.push((level, with(Link { rejections: streak, ..GOOD }), cause));
+    }
+    all.push((
+        Safe,
+        with(Link { silence: u32::MAX, ..GOOD }),
+        Some(Unknown::LinkLost { silence: u32::MAX }),
+    ));
+    all
+}
+
+#[test]
+fn every_input_at_each_limit_leads_from_each_state_to_the_state_of_the_table() {
+    for before in [State::Nominal, State::Degraded, State::Safe] {
+        for (level, observation, cause) in requests() {
+            for automatic in [false, true] {
+                let mut machine = machine(before, limits(3, automatic));
+                let verdict = machine.step(&observation);
+                // Without new frames nothing gets better.
+                assert_eq!(verdict.state, before.max(level), "{before:?}, {observation:?}");
+                if level == verdict.state {
+                    assert_eq!(verdict.cause, cause, "{before:?}, {observation:?}");
+                } else {
+                    assert!(verdict.cause.is_some(), "the last cause stays");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn recovery_takes_its_frames_in_a_row_and_from_safe_an_acknowledgement() {
+    for before in [State::Degraded, State::Safe] {
+        for frames in [1_u16, 2, 5] {
+            for automatic in [false, true] {
+                let mut machine = machine(before, limits(frames, automatic));
+                let mut now = 3000;
+                // One frame short of it, then a step that is not clear: all over again.
+                for epoch in 1..frames {
+                    now += 1;
+                    assert_eq!(machine.step(&seen(now, 100 + u32::from(epoch), 0)).state, before);
+                    assert!(machine.acknowledge().is_err(), "too early");
+                }
+                let broken =
+                    Observation { link: Link { rejections: 4, ..GOOD }, ..seen(now + 1, 200, 0) };
+                assert_eq!(machine.step(&broken).state, before);
+                for epoch in 1..frames {
+                    now += 2;
+                    assert_eq!(machine.step(&seen(now, 200 + u32::from(epoch), 0)).state, before);
+                    // The same frame again does not count.
+                    assert_eq!(
+                        machine.step(&seen(now + 1, 200 + u32::from(epoch), 1)).state,
+                        before
+                    );
+                }
+                let verdict = machine.step(&seen(now + 2, 300, 0));
+                if before == State::Degraded || automatic {
+                    assert_eq!((verdict.state, verdict.cause), (State::Nominal, None));
+                    continue;
+                }
+                assert_eq!(verdict.state, State::Safe);
+                assert!(verdict.waits_for_acknowledgement);
+                machine.acknowledge().unwrap();
+                // A fault before the next step voids the acknowledgement.
+                assert_eq!(machine.step(&broken).state, State::Safe);
+                for epoch in 0..u32::from(frames) {
+                    now += 1;
+                    assert_eq!(machine.step(&seen(now, 400 + epoch, 0)).state, State::Safe);
+                }
+                machine.acknowledge().unwrap();
+                let verdict = machine.step(&seen(now + 1, 500, 0));
+                assert_eq!((verdict.state, verdict.cause), (State::Nominal, None));
+                assert!(machine.acknowledge().is_err(), "there is nothing to acknowledge");
+            }
+        }
+    }
+}
+
+#[test]
+fn safe_comes_exactly_one_tick_after_the_limit_whatever_the_clock_shows() {
+    for start in [0, 1, u32::MAX - 300, u32::MAX - 200, u32::MAX, i32::MAX as u32 - 100] {
+        let mut machine = FailSafe::new(Limits::new(AGE, SPEED).unwrap().automatic());
+        let mut states = Vec::new();
+        for tick in 0..400_u32 {
+            let now = start.wrapping_add(tick);
+            states.push(machine.step(&seen(now, 1, tick)).state);
+        }
+        let first = |state| states.iter().position(|&s| s == state);
+        assert_eq!(first(State::Nominal), Some(0));
+        assert_eq!(first(State::Degraded), Some(AGE.degraded() as usize + 1));
+        assert_eq!(first(State::Safe), Some(AGE.safe() as usize + 1));
+        assert!(states[AGE.safe() as usize + 1..].iter().all(|&s| s == State::Safe));
+        // A whole turn of the clock later the old surface looks fresh; nothing comes back.
+        assert_eq!(machine.step(&seen(start, 1, 0)).state, State::Safe);
+    }
+}
+
+#[test]
+fn the_margin_is_age_times_speed_in_every_state_that_acts() {
+    let mut machine = FailSafe::new(Limits::new(AGE, SPEED).unwrap().automatic());
+    let mut before = -1.0;
+    for age in 0..=AGE.safe() {
+        let verdict = machine.step(&seen(1000 + age, 1, age));
+        let exact = f64::from(age) * f64::from(SPEED);
+        assert!(f64::from(verdict.margin) >= exact, "rounded up");
+        assert!(f64::from(verdict.margin) <= exact * 1.000_001);
+        assert!(verdict.margin > before, "grows");
+        before = verdict.margin;
+    }
+    let limits = Limits::new(watch(1, i32::MAX as u32 - 1), 0.3).unwrap();
+    for age in [16_777_217, 33_554_435, i32::MAX as u32 - 1] {
+        assert!(f64::from(limits.margin(age)) >= f64::from(age) * f64::from(0.3_f32));
+    }
+}
+
+#[test]
+fn a_slow_second_core_is_not_an_old_surface() {
+    let mut machine = FailSafe::new(Limits::new(AGE, SPEED).unwrap().automatic());
+    // The receiver's clock is ahead by one.
+    let verdict = machine.step(&seen(1000, 1, u32::MAX));
+    assert_eq!((verdict.state, verdict.margin), (State::Nominal, 0.0));
+}
+
+#[test]
+fn limits_that_no_machine_can_have_are_named() {
+    assert_eq!(Watch::new(5, 4), Err(LimitError::Order { degraded: 5, safe: 4 }));
+    let long = 1 << 31;
+    assert_eq!(Watch::new(5, long), Err(LimitError::TooLong { safe: long }));
+    assert_eq!(Limits::new(Watch::OFF, 0.0), Err(LimitError::TooLong { safe: u32::MAX }));
+    for tissue_speed in [-1.0, f32::INFINITY] {
+        assert_eq!(Limits::new(AGE, tissue_speed), Err(LimitError::Speed { tissue_speed }));
+    }
+    assert!(matches!(Limits::new(AGE, f32::NAN), Err(LimitError::Speed { .. })));
+    assert_eq!(limits(1, false).recovery(0), Err(LimitError::Recovery { frames: 0 }));
+}
+
+/// One step of a random run.
+#[derive(Clone, Copy, Debug)]
+struct Step {
+    wait: u32,
+    new_frame: bool,
+    delay: u32,
+    link: Link,
+    query_failed: bool,
+    acknowledge: bool,
+}
+
+fn steps() -> impl Strategy<Value = Vec<Step>> {
+    let link = prop_oneof![
+        8 => Just(GOOD),
+        1 => (0_u32..120, 0_u32..170, 0_u32..12)
+            .prop_map(|(silence, heartbeat, rejections)| Link { silence, heartbeat, rejections }),
+    ];
+    let step = (1_u32..80, any::<bool>(), 0_u32..70, link, 0_u32..40, any::<bool>()).prop_map(
+        |(wait, new_frame, delay, link, fault, acknowledge)| Step {
+            wait,
+            new_frame,
+            delay,
+            link,
+            query_failed: fault == 0,
+            acknowledge,
+        },
+    );
+    prop::collection::vec(step, 1..200)
+}
+
+fn run(steps: &[Step], limits: Limits, start: u32) -> (Vec<Observation>, Vec<Verdict>, Vec<bool>) {
+    let mut machine = FailSafe::new(limits);
+    let (mut now, mut epoch, mut frame) = (start, 0_u32, None);
+    let (mut observations, mut verdicts, mut acknowledged) = (Vec::new(), Vec::new(), Vec::new());
+    for step in steps {
+        now = now.wrapping_add(step.wait);
+        if step.new_frame {
+            epoch = epoch.wrapping_add(1);
+            frame = Some((epoch, now.wrapping_sub(step.delay)));
+        }
+        let seen = Observation { now, frame, link: step.link, query_failed: step.query_failed };
+        verdicts.push(machine.step(&seen));
+        acknowledged.push(step.acknowledge && machine.acknowledge().is_ok());
+        observations.push(seen);
+    }
+    (observations, verdicts, acknowledged)
+}
+
+/// Whether an observation is beyond its first (`strict`) or second limits, computed anew.
+fn is_beyond(seen: &Observation, second: bool) -> bool {
+    let limit = |watch: Watch| if second { watch.safe() } else { watch.degraded() };
+    let Some((_, received)) = seen.frame else { return true };
+    seen.query_failed
+        || seen.now.wrapping_sub(received) > limit(AGE)
+        || seen.link.silence > limit(SILENCE)
+        || seen.link.heartbeat > limit(HEARTBEAT)
+        || seen.link.rejections > limit(REJECTIONS)
+}
+
+proptest! {
+    #[test]
+    fn a_random_run_keeps_the_rules(
+        steps in steps(),
+        frames in 1_u16..4,
+        automatic in any::<bool>(),
+        start in any::<u32>(),
+    ) {
+        let (seen, verdicts, acknowledged) = run(&steps, limits(frames, automatic), start);
+        for (at, verdict) in verdicts.iter().enumerate() {
+            // What is beyond a limit is never acted on as if it were not.
+            prop_assert!(!is_beyond(&seen[at], true) || verdict.state == State::Safe);
+            prop_assert!(!is_beyond(&seen[at], false) || verdict.state != State::Nominal);
+            prop_assert_eq!(verdict.cause.is_none(), verdict.state == State::Nominal);
+
+            let before = if at == 0 { State::Safe } else { verdicts[at - 1].state };
+            if verdict.state >= before {
+                continue;
+            }
+            // Better only by the whole way back: frames in a row, all clear, acknowledged.
+            prop_assert_eq!(verdict.state, State::Nominal);
+            let clear: Vec<usize> =
+                (0..=at).rev().take_while(|&i| !is_beyond(&seen[i], false)).collect();
+            let is_new = |i: usize| i == 0 || seen[i].frame != seen[i - 1].frame;
+            let new = clear.iter().filter(|&&i| is_new(i)).count();
+            prop_assert!(new >= usize::from(frames));
+            if before == State::Safe && !automatic {
+                prop_assert!(clear.iter().any(|&i| i < at && acknowledged[i]));
+            }
+        }
+        // No later than the rule allows, either.
+        for at in 1..verdicts.len() {
+            if verdicts[at].state == State::Degraded {
+                let clear: Vec<usize> =
+                    (0..=at).rev().take_while(|&i| !is_beyond(&seen[i], false)).collect();
+                let new = clear.iter().filter(|&&i| seen[i].frame != seen[i - 1].frame).count();
+                prop_assert!(new < usize::from(frames));
+            }
+        }
+    }
+
+    #[test]
+    fn where_the_clock_starts_does_not_matter(steps in steps(), start in any::<u32>()) {
+        let (_, expected, _) = run(&steps, limits(2, false), 0);
+        let (_, shifted, _) = run(&steps, limits(2, false), start);
+        prop_assert_eq!(expected, shifted);
+    }
+}
