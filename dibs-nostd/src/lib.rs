@@ -69,7 +69,7 @@ mod vertices;
 pub mod wire;
 
 pub use answer::Proximity;
-pub use assembler::{Assembler, Counters, Gate, Progress, Rejection, Unchecked};
+pub use assembler::{Assembler, Changed, Counters, Gate, Progress, Rejection, Unchecked, Verdict};
 pub use check::FormatError;
 pub use frames::{
     FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames, OutOfTable, PublishError,

@@ -8,7 +8,7 @@ use dibs_nostd::wire::{
     Body, Deframer, EncodeError, Encoding, FrameEncoder, Packet, PacketError, QuantisedBox, Rows,
     StreamError, enframe, framed_bytes,
 };
-use dibs_nostd::{Gate, MeasuredStretch, Progress, Rejection, StretchError, VertexTable};
+use dibs_nostd::{Changed, Gate, Progress, Rejection, StretchError, Verdict, VertexTable};
 use dibs_tests::bus::*;
 
 #[test]
@@ -270,12 +270,16 @@ fn every_cause_has_its_counter() {
 struct Refuse(Rc<Cell<bool>>);
 
 impl Gate for Refuse {
-    fn admit<V: VertexTable + ?Sized>(
+    fn begin(&mut self, _: Changed) {}
+
+    fn advance<V: VertexTable + ?Sized>(
         &mut self,
         surface: &V,
-    ) -> Result<Option<MeasuredStretch>, StretchError> {
-        assert_eq!(surface.len(), N);
-        if self.0.get() { Err(StretchError::NoRestShape) } else { Ok(None) }
+        ready: u32,
+        _: u32,
+    ) -> Result<Verdict, StretchError> {
+        assert_eq!((surface.len(), ready), (N, N as u32));
+        if self.0.get() { Err(StretchError::NoRestShape) } else { Ok(Verdict::Admitted(None)) }
     }
 }
 

@@ -1,17 +1,17 @@
 //! From packets to published frames: the gate between the bus and what the controller acts on.
 
+mod gate;
 mod rejection;
 
 use core::ops::Range;
 
+use crate::MAX_COORDINATE;
 use crate::frames::{FrameLabel, FrameView, FrameWriter, PublishError};
 use crate::wire::{
     Begin, Body, Commit, Encoding, Packet, Rows, Vertices, float_position, quantised_row,
 };
-use crate::{
-    Index, MAX_COORDINATE, MeasuredStretch, StretchError, Tree, VertexTable, measure_stretch,
-};
 
+pub use gate::{Changed, Gate, Unchecked, Verdict};
 use rejection::increment;
 pub use rejection::{Counters, Rejection};
 
@@ -108,43 +108,6 @@ pub enum Progress {
         /// Its number.
         epoch: u32,
     },
-}
-
-/// The last check of a complete frame before it is published.
-pub trait Gate {
-    /// Admits the surface, with its stretch where it was measured, or refuses it.
-    ///
-    /// # Errors
-    /// [`StretchError`] when the surface must not be published.
-    fn admit<V: VertexTable + ?Sized>(
-        &mut self,
-        surface: &V,
-    ) -> Result<Option<MeasuredStretch>, StretchError>;
-}
-
-/// Admits every surface, unmeasured: coverage then rests on the assumption that the tissue keeps
-/// within the tree's stretch limit, as in the paper.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Unchecked;
-
-impl Gate for Unchecked {
-    fn admit<V: VertexTable + ?Sized>(
-        &mut self,
-        _: &V,
-    ) -> Result<Option<MeasuredStretch>, StretchError> {
-        Ok(None)
-    }
-}
-
-/// A tree admits what lies within its stretch limit. Cost: one [`measure_stretch`], linear in the
-/// triangles, inside the call that completes the frame.
-impl<I: Index> Gate for &Tree<'_, I> {
-    fn admit<V: VertexTable + ?Sized>(
-        &mut self,
-        surface: &V,
-    ) -> Result<Option<MeasuredStretch>, StretchError> {
-        measure_stretch(self, surface).map(Some)
-    }
 }
 
 impl<'f, G: Gate, const N: usize> Assembler<'f, G, N> {
@@ -341,7 +304,11 @@ impl<'f, G: Gate, const N: usize> Assembler<'f, G, N> {
         if stated != computed {
             return Err(Rejection::Digest { stated, computed });
         }
-        let stretch = self.gate.admit(&self.writer.back()).map_err(Rejection::Stretch)?;
+        self.gate.begin(Changed::Whole);
+        let verdict = self.gate.advance(&self.writer.back(), N as u32, u32::MAX);
+        let Verdict::Admitted(stretch) = verdict.map_err(Rejection::Stretch)? else {
+            return Ok(Progress::Stored { missing });
+        };
         let position_error = match frame.encoding {
             Encoding::Float => 0.0,
             Encoding::Quantised(grid) => grid.error(),

@@ -1,0 +1,95 @@
+//! The last check of a frame before it is published: a trait, so that what is checked can be chosen.
+
+use core::ops::Range;
+
+use crate::{Index, MeasuredStretch, StretchError, Tree, VertexTable, measure_stretch};
+
+/// What a frame changes of the published surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Changed {
+    /// Every row.
+    Whole,
+    /// Some rows; the others are as they were published.
+    Partial,
+}
+
+/// How far a check has come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Verdict {
+    /// Not finished, for want of work or of rows.
+    Pending,
+    /// The whole surface may be published; with its stretch, where that was measured.
+    Admitted(Option<MeasuredStretch>),
+}
+
+/// Checks the surface that is being received, in slices of bounded work.
+///
+/// For each frame: [`begin`](Self::begin) once, then [`moved`](Self::moved) for each packet and
+/// [`advance`](Self::advance) as often as there is time, until it admits or refuses the frame. A frame
+/// may be abandoned at any moment; the next `begin` says so. [`published`](Self::published) follows
+/// once an admitted frame has become the one that is read.
+pub trait Gate {
+    /// A frame begins, and the one before is forgotten unless it was published. O(1).
+    fn begin(&mut self, changed: Changed);
+
+    /// These rows of the frame have come: each row at most once, in any order of packets. O(1).
+    fn moved(&mut self, rows: Range<u32>) {
+        let _ = rows;
+    }
+
+    /// Checks at most `work` triangles of those whose corners are all below row `ready`.
+    ///
+    /// Rows below `ready` have their final values; the others may hold anything. `ready` only grows
+    /// within a frame, and is the number of rows once the frame is complete. Admission before that
+    /// has no effect.
+    ///
+    /// # Errors
+    /// [`StretchError`] when the surface must not be published; it names the triangle.
+    fn advance<V: VertexTable + ?Sized>(
+        &mut self,
+        surface: &V,
+        ready: u32,
+        work: u32,
+    ) -> Result<Verdict, StretchError>;
+
+    /// The frame that was admitted is the published one now.
+    fn published(&mut self) {}
+}
+
+/// Admits every surface, unmeasured: coverage then rests on the assumption that the tissue keeps
+/// within the tree's stretch limit, as in the paper.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Unchecked;
+
+impl Gate for Unchecked {
+    fn begin(&mut self, _: Changed) {}
+
+    fn advance<V: VertexTable + ?Sized>(
+        &mut self,
+        _: &V,
+        _: u32,
+        _: u32,
+    ) -> Result<Verdict, StretchError> {
+        Ok(Verdict::Admitted(None))
+    }
+}
+
+/// A tree admits what lies within its stretch limit, by one [`measure_stretch`] once the frame is
+/// complete. Not sliced: the cost of that call is linear in the triangles, whatever `work` says.
+impl<I: Index> Gate for &Tree<'_, I> {
+    fn begin(&mut self, _: Changed) {}
+
+    fn advance<V: VertexTable + ?Sized>(
+        &mut self,
+        surface: &V,
+        ready: u32,
+        _: u32,
+    ) -> Result<Verdict, StretchError> {
+        if (ready as usize) < surface.len() {
+            return Ok(Verdict::Pending);
+        }
+        measure_stretch(self, surface).map(|stretch| Verdict::Admitted(Some(stretch)))
+    }
+}
