@@ -311,8 +311,8 @@ proptest! {
             }
         }
         // No later than the rule allows, either.
-        for at in 1..verdicts.len() {
-            if verdicts[at].state == State::Degraded {
+        for (at, verdict) in verdicts.iter().enumerate() {
+            if verdict.state == State::Degraded {
                 let clear: Vec<usize> =
                     (0..=at).rev().take_while(|&i| !is_beyond(&seen[i], false)).collect();
                 let new = clear.iter().filter(|&&i| seen[i].frame != seen[i - 1].frame).count();
