@@ -3,20 +3,40 @@
 use core::fmt;
 
 use bytemuck::Zeroable;
-use dibs_nostd::constraint::{ConstraintForce, ForbiddenRegion, GainError, SpringDamper, Unknown};
+use dibs_nostd::constraint::{ForbiddenRegion, GainError, SpringDamper, Unknown};
+use dibs_nostd::failsafe::{FailSafe, LimitError, Limits, Observation, Watch};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{Capsule, Options, Proximity, QueryError, Tool};
 
 use crate::surface::{SURFACE, SurfaceQuery, SurfaceReader};
-use crate::telemetry::{State, Tick};
+use crate::telemetry::{Tick, cause_code};
 use crate::{BusStatus, TICK_RATE, instrument};
 
-/// A surface older than this many ticks is a fault: the output is safe until a fresh one comes.
+/// A surface older than this many ticks is acted on with a warning: the state is degraded.
+pub const SURFACE_AGE_WARNING: u32 = 4 * TICK_RATE;
+
+/// A surface older than this many ticks is not acted on: the output is safe until fresh ones come.
 ///
-/// Six seconds, because the emulated serial line takes one to three for a frame, and a frame is as old
-/// as its first packet. A real bus brings tens of frames a second, and a real limit is a few tens of
-/// milliseconds.
+/// Six seconds, because the emulated serial line takes one to three for a whole frame, and a frame is
+/// as old as its first packet. A real bus brings tens of frames a second, and a real limit is a few
+/// tens of milliseconds.
 pub const SURFACE_AGE_LIMIT: u32 = 6 * TICK_RATE;
+
+/// Ticks without any good packet after which the state is degraded.
+pub const SILENCE_WARNING: u32 = TICK_RATE;
+
+/// Ticks without any good packet after which the output is safe.
+pub const SILENCE_LIMIT: u32 = 2 * TICK_RATE;
+
+/// Packets and frames rejected in a row after which the state is degraded, and after which it is safe.
+const REJECTIONS: (u32, u32) = (50, 500);
+
+/// No point of the tissue moves faster, in mm a tick. The line above shows a heart slowed down some
+/// fifty times; a real one reaches 0.2 mm a millisecond.
+const TISSUE_SPEED: f32 = 0.001;
+
+/// Frames in a row that recover. Nobody is here to acknowledge: a real robot leaves `automatic` out.
+const RECOVERY_FRAMES: u16 = 1;
 
 /// Stiffness (N/mm), damping (N s/mm), largest force (N) and margin (mm) of the constraint.
 const STIFFNESS: f32 = 1.0;
@@ -29,6 +49,7 @@ pub struct Control {
     query: SurfaceQuery,
     surface: SurfaceReader,
     wall: ForbiddenRegion,
+    failsafe: FailSafe,
     bus: &'static BusStatus,
     tick: u32,
     /// The last tick's closest triangle: where the next query starts.
@@ -48,6 +69,7 @@ impl Control {
             query: SurfaceQuery::new(&SURFACE).map_err(SetupError::Query)?,
             surface,
             wall: ForbiddenRegion::new(spring, MARGIN).map_err(SetupError::Gain)?,
+            failsafe: FailSafe::new(limits().map_err(SetupError::Limit)?),
             bus,
             tick: 0,
             warm_start: None,
@@ -69,36 +91,53 @@ impl Control {
         record.frames_published = self.bus.published();
         record.rejected = self.bus.rejected();
 
-        let (state, force) = match instrument(self.tick) {
-            Ok(tool) => self.act(&tool, clock, &mut record),
-            // A pose that is not finite: there is no velocity to damp either.
-            Err(_) => (State::Fault, self.wall.force(Err(Unknown::NotFinite), Vec3::NAN)),
+        let tool = instrument(self.tick).ok();
+        let before = self.before;
+        self.before = tool;
+        let (frame, answer) = match &tool {
+            Some(tool) => self.ask(tool, clock, &mut record),
+            // A pose that is not finite: nothing to ask with.
+            None => (None, Err(Unknown::NotFinite)),
         };
-        record.state = state as u32;
+        let verdict = self.failsafe.step(&Observation {
+            now: self.tick,
+            frame,
+            link: self.bus.link.read(self.tick),
+            query_failed: answer == Err(Unknown::Query),
+        });
+        let admitted = answer.and_then(|closest| verdict.admit(closest));
+        let along = answer.map_or(0.5, |closest| closest.axis_parameter);
+        let velocity = match (before, tool) {
+            (Some(before), Some(now)) => velocity(&before, &now, along),
+            (None, Some(_)) => Vec3::ZERO,
+            // There is no velocity to damp either.
+            (_, None) => Vec3::NAN,
+        };
+        let force = self.wall.force(admitted.as_ref().map_err(|unknown| *unknown), velocity);
+
+        record.state = verdict.state as u32;
+        record.cause = verdict.cause.map_or(0, |cause| cause_code(&cause));
+        record.margin = verdict.margin;
         record.force = force.force.to_array();
         self.tick = self.tick.wrapping_add(1);
         record
     }
 
-    fn act(
+    /// The closest pair on the frame published last: which frame, and the answer, widened by the
+    /// quantisation.
+    fn ask(
         &mut self,
         tool: &Capsule,
         clock: impl Fn() -> u32,
         record: &mut Tick,
-    ) -> (State, ConstraintForce) {
+    ) -> (Option<(u32, u32)>, Result<Proximity, Unknown>) {
         record.tool_start = tool.start().to_array();
         record.tool_end = tool.end().to_array();
         record.tool_radius = tool.radius();
-        let before = self.before.replace(*tool).unwrap_or(*tool);
-
-        let Some(frame) = self.surface.read() else {
-            let velocity = velocity(&before, tool, 0.5);
-            return (State::Waiting, self.wall.force(Err(Unknown::NoSurface), velocity));
-        };
+        let Some(frame) = self.surface.read() else { return (None, Err(Unknown::NoSurface)) };
         let label = frame.label();
-        let age = frame.age(self.tick);
         record.epoch = label.epoch;
-        record.age = age;
+        record.age = frame.age(self.tick);
         record.position_error = label.position_error;
 
         let mut options = Options::new().warm_start(self.warm_start);
@@ -110,20 +149,29 @@ impl Control {
         record.query_counts = clock().wrapping_sub(start);
         drop(frame);
 
-        let Ok(closest) = answer else {
-            let velocity = velocity(&before, tool, 0.5);
-            return (State::Fault, self.wall.force(Err(Unknown::Query), velocity));
-        };
+        let frame = Some((label.epoch, label.received));
+        let Ok(closest) = answer else { return (frame, Err(Unknown::Query)) };
         self.warm_start = closest.triangle;
         write(&closest, record);
-        let velocity = velocity(&before, tool, closest.axis_parameter);
-        if age > SURFACE_AGE_LIMIT {
-            (State::Stale, self.wall.force(Err(Unknown::Stale { age }), velocity))
-        } else {
-            let cautious = closest.widened(label.position_error);
-            (State::Tracking, self.wall.force(Ok(&cautious), velocity))
-        }
+        (frame, Ok(closest.widened(label.position_error)))
     }
+}
+
+/// When the surface is no longer trusted.
+const fn limits() -> Result<Limits, LimitError> {
+    macro_rules! tri {
+        ($result:expr) => {
+            match $result {
+                Ok(value) => value,
+                Err(error) => return Err(error),
+            }
+        };
+    }
+    let age = tri!(Watch::new(SURFACE_AGE_WARNING, SURFACE_AGE_LIMIT));
+    let silence = tri!(Watch::new(SILENCE_WARNING, SILENCE_LIMIT));
+    let rejections = tri!(Watch::new(REJECTIONS.0, REJECTIONS.1));
+    let limits = tri!(tri!(Limits::new(age, TISSUE_SPEED)).recovery(RECOVERY_FRAMES));
+    Ok(limits.silence(silence).rejections(rejections).automatic())
 }
 
 /// Velocity of the point at `along` (0 to 1) of the instrument's axis, in mm/s.
@@ -134,6 +182,7 @@ fn velocity(before: &Capsule, now: &Capsule, along: f32) -> Vec3 {
 }
 
 fn write(answer: &Proximity, record: &mut Tick) {
+    record.answered = 1;
     record.separation = answer.separation;
     record.lower = answer.lower;
     record.accuracy = answer.accuracy;
@@ -149,6 +198,8 @@ fn write(answer: &Proximity, record: &mut Tick) {
 pub enum SetupError {
     /// A gain of the constraint is out of range.
     Gain(GainError),
+    /// A limit of the fail-safe machine is out of range.
+    Limit(LimitError),
     /// The query cannot search the tree.
     Query(QueryError),
 }
@@ -157,6 +208,7 @@ impl fmt::Display for SetupError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Gain(error) => error.fmt(f),
+            Self::Limit(error) => error.fmt(f),
             Self::Query(error) => error.fmt(f),
         }
     }

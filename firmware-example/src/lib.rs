@@ -4,7 +4,8 @@
 //! that belongs to a board. Two contexts share it:
 //!
 //! - the control tick, 1 kHz, highest priority: [`Control::tick`] poses the instrument, asks for the
-//!   closest pair on the frame published last, and turns it into a force;
+//!   closest pair on the frame published last, judges how far that frame may be trusted, and turns
+//!   the answer into a force;
 //! - bus reception, any lower priority: [`Receiver::byte`] takes vertices as they come and publishes
 //!   complete frames.
 //!
@@ -20,7 +21,9 @@ mod status;
 pub mod surface;
 pub mod telemetry;
 
-pub use control::{Control, SURFACE_AGE_LIMIT, SetupError};
+pub use control::{
+    Control, SILENCE_LIMIT, SILENCE_WARNING, SURFACE_AGE_LIMIT, SURFACE_AGE_WARNING, SetupError,
+};
 pub use instrument::instrument;
 pub use receiver::{MTU, Receiver};
 pub use status::BusStatus;

@@ -39,8 +39,13 @@ impl Receiver {
         match self.deframer.push(byte) {
             None => return,
             // Rejections are counted by cause in the assembler.
-            Some(Ok(packet)) => drop(self.assembler.accept(packet, tick)),
-            Some(Err(_)) => self.damaged = self.damaged.saturating_add(1),
+            Some(Ok(packet)) => {
+                self.status.link.note(&self.assembler.accept(packet, tick), tick);
+            }
+            Some(Err(_)) => {
+                self.damaged = self.damaged.saturating_add(1);
+                self.status.link.damaged();
+            }
         }
         self.packets = self.packets.wrapping_add(1);
         let counters = self.assembler.counters();

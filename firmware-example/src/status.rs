@@ -2,10 +2,14 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use dibs_nostd::failsafe::LinkStatus;
+
 /// Counters since start, written by the bus interrupt and read by anybody. Each is exact; together
 /// they may be of two moments.
 #[derive(Debug, Default)]
 pub struct BusStatus {
+    /// What the fail-safe machine watches.
+    pub link: LinkStatus,
     packets: AtomicU32,
     published: AtomicU32,
     rejected: AtomicU32,
@@ -16,6 +20,7 @@ impl BusStatus {
     #[must_use]
     pub const fn new() -> Self {
         Self {
+            link: LinkStatus::new(),
             packets: AtomicU32::new(0),
             published: AtomicU32::new(0),
             rejected: AtomicU32::new(0),

@@ -4,6 +4,7 @@
 //! framed with COBS and a zero byte. The first field tells which record it is.
 
 use bytemuck::{NoUninit, Pod, Zeroable};
+use dibs_nostd::constraint::Unknown;
 use dibs_nostd::wire::{enframe, framed_bytes};
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
@@ -22,8 +23,15 @@ pub struct Tick {
     pub kind: u32,
     /// Number of the tick, from 0.
     pub tick: u32,
-    /// What the controller is doing: a [`State`].
+    /// How far the surface is trusted: `dibs_nostd::failsafe::State` as a number.
     pub state: u32,
+    /// Why it is not nominal: [`cause_code`]; 0 where it is.
+    pub cause: u32,
+    /// 1 if there was an answer, else 0.
+    pub answered: u32,
+    /// How far the tissue may have moved since the frame was received, in mm: added to the accuracy
+    /// before the constraint sees the answer.
+    pub margin: f32,
     /// The frame that was asked, where there was an answer.
     pub epoch: u32,
     /// Its age in ticks.
@@ -62,18 +70,33 @@ pub struct Tick {
     pub rejected: u32,
 }
 
-/// What the controller is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub enum State {
-    /// No surface was ever published: the output is safe, there is no answer.
-    Waiting = 0,
-    /// The surface is fresh; the force follows from the answer.
-    Tracking = 1,
-    /// The surface is older than its limit: the output is safe, the answer is for the record.
-    Stale = 2,
-    /// The query returned an error: the output is safe, there is no answer.
-    Fault = 3,
+/// A cause as a number.
+#[must_use]
+pub const fn cause_code(cause: &Unknown) -> u32 {
+    match cause {
+        Unknown::NoSurface => 1,
+        Unknown::Stale { .. } => 2,
+        Unknown::Query => 3,
+        Unknown::LinkLost { .. } => 4,
+        Unknown::HeartbeatLost { .. } => 5,
+        Unknown::Rejections { .. } => 6,
+        _ => 7,
+    }
+}
+
+/// What to call a cause's number.
+#[must_use]
+pub const fn cause_name(code: u32) -> &'static str {
+    match code {
+        0 => "none",
+        1 => "no surface",
+        2 => "surface too old",
+        3 => "query failed",
+        4 => "link lost",
+        5 => "heartbeat lost",
+        6 => "rejections in a row",
+        _ => "number not finite",
+    }
 }
 
 impl Tick {
@@ -83,7 +106,7 @@ impl Tick {
     /// Whether the record holds an answer.
     #[must_use]
     pub fn is_answered(&self) -> bool {
-        self.state == State::Tracking as u32 || self.state == State::Stale as u32
+        self.answered == 1
     }
 }
 

@@ -3,9 +3,14 @@
 use std::collections::HashMap;
 
 use controller::surface::{SURFACE, SurfaceFrames};
-use controller::telemetry::{State, Tick};
-use controller::{BusStatus, Control, MTU, Receiver, SURFACE_AGE_LIMIT};
+use controller::telemetry::{Tick, cause_code};
+use controller::{
+    BusStatus, Control, MTU, Receiver, SILENCE_LIMIT, SILENCE_WARNING, SURFACE_AGE_LIMIT,
+    SURFACE_AGE_WARNING,
+};
 use dibs_build::{Builder, generate};
+use dibs_nostd::constraint::Unknown;
+use dibs_nostd::failsafe::State;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, QuantisedBox, enframe, framed_bytes};
 use dibs_tests::oracle::{Instrument, exhaustive};
@@ -75,7 +80,7 @@ fn every_answer_is_that_of_one_whole_frame() {
     let mut sender = Sender::new();
 
     let first = control.tick(|| 0);
-    assert_eq!(first.state, State::Waiting as u32);
+    assert_eq!(first.state, State::Safe as u32);
     assert!(!first.is_answered());
 
     let (mut answers, mut acting, mut free) = (0, 0, 0);
@@ -101,7 +106,7 @@ fn every_answer_is_that_of_one_whole_frame() {
 }
 
 #[test]
-fn a_damaged_frame_is_not_published_and_an_old_surface_is_a_fault() {
+fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
     static FRAMES: SurfaceFrames = SurfaceFrames::new();
     static BUS: BusStatus = BusStatus::new();
     let (writer, reader) = FRAMES.split().unwrap();
@@ -122,24 +127,48 @@ fn a_damaged_frame_is_not_published_and_an_old_surface_is_a_fault() {
     assert_eq!((tick.epoch, BUS.published()), (1, 1), "the damaged frame is not acted on");
     assert!(BUS.rejected() > 0);
 
-    // No more frames: the surface grows old.
-    let mut last = tick;
-    for _ in 0..SURFACE_AGE_LIMIT {
-        last = control.tick(|| 0);
-    }
-    assert_eq!((last.age, last.state), (SURFACE_AGE_LIMIT, State::Tracking as u32));
-    let mut before = last;
-    for _ in 0..500 {
+    // The line is cut: two seconds later, to the tick, the output is safe.
+    assert_eq!(tick.state, State::Nominal as u32);
+    let cut = tick.tick;
+    let mut before = tick;
+    for silence in 1..SILENCE_LIMIT + 500 {
         let tick = control.tick(|| 0);
-        assert_eq!(tick.state, State::Stale as u32);
+        assert_eq!((tick.tick, tick.age), (cut + silence, silence));
+        let expected = match silence {
+            0..=SILENCE_WARNING => (State::Nominal, 0),
+            0..=SILENCE_LIMIT => (State::Degraded, cause_code(&Unknown::LinkLost { silence })),
+            _ => (State::Safe, cause_code(&Unknown::LinkLost { silence })),
+        };
+        assert_eq!((tick.state, tick.cause), (expected.0 as u32, expected.1), "after {silence}");
         sender.check(&tick);
-        // The hold: damping alone, against the motion of the instrument.
-        let moved = Vec3::from(tick.tool_start) - Vec3::from(before.tool_start);
-        assert!(Vec3::from(tick.force).dot(moved) <= 0.0);
+        if expected.0 == State::Safe {
+            // The hold: damping alone, against the motion of the instrument.
+            let moved = Vec3::from(tick.tool_start) - Vec3::from(before.tool_start);
+            assert!(Vec3::from(tick.force).dot(moved) <= 0.0);
+        }
         before = tick;
     }
 
+    // A fresh frame recovers.
     feed(&sender.bytes(3), control.now());
     let tick = control.tick(|| 0);
-    assert_eq!((tick.epoch, tick.state), (3, State::Tracking as u32));
+    assert_eq!((tick.epoch, tick.state), (3, State::Nominal as u32));
+
+    // Packets come, but never a whole frame: the surface grows old.
+    let (received, mut epoch) = (tick.tick, 4);
+    for age in 1..SURFACE_AGE_LIMIT + 100 {
+        if age % 500 == 0 {
+            feed(&sender.bytes(epoch)[..2_000], control.now());
+            feed(&[0], control.now()); // ends the packet that was cut
+            epoch += 1;
+        }
+        let tick = control.tick(|| 0);
+        assert_eq!((tick.tick, tick.age), (received + age, age));
+        let expected = match age {
+            0..=SURFACE_AGE_WARNING => State::Nominal,
+            0..=SURFACE_AGE_LIMIT => State::Degraded,
+            _ => State::Safe,
+        };
+        assert_eq!(tick.state, expected as u32, "at the age of {age}");
+    }
 }

@@ -5,8 +5,10 @@ use std::process::Command;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
-use controller::telemetry::{State, Tick};
+use controller::telemetry::{Tick, cause_code, cause_name};
 use controller::{SURFACE_AGE_LIMIT, TICK_RATE};
+use dibs_nostd::constraint::Unknown;
+use dibs_nostd::failsafe::State;
 use serde::Serialize;
 
 use super::machine::Machine;
@@ -37,8 +39,14 @@ pub struct Report {
     separation_min_mm: f32,
     separation_max_mm: f32,
     force_max_n: f32,
+    /// Ticks before the first frame, when the output is safe.
     ticks_waiting: usize,
-    ticks_stale: usize,
+    ticks_nominal: usize,
+    ticks_degraded: usize,
+    /// Ticks with the safe output after the first frame.
+    ticks_safe: usize,
+    /// Every change of the fail-safe machine's state.
+    transitions: Vec<Transition>,
     instructions_mean: Option<f64>,
     instructions_max: Option<u64>,
     node_tests_mean: f64,
@@ -81,6 +89,11 @@ impl Report {
         let last = outcome.ticks.last().context("the controller ran no tick")?;
         let answered: Vec<&Tick> = outcome.ticks.iter().filter(|t| t.is_answered()).collect();
         let count = |state: State| outcome.ticks.iter().filter(|t| t.state == state as u32).count();
+        let because = |cause: Unknown| {
+            let is_so = |t: &&Tick| t.state == State::Safe as u32 && t.cause == cause_code(&cause);
+            outcome.ticks.iter().filter(is_so).count()
+        };
+        let waiting = because(Unknown::NoSurface);
         let mean = |value: fn(&Tick) -> u32| {
             let sum: f64 = answered.iter().map(|tick| f64::from(value(tick))).sum();
             if answered.is_empty() { 0.0 } else { sum / answered.len() as f64 }
@@ -113,8 +126,11 @@ impl Report {
             separation_min_mm: least(|tick| tick.separation),
             separation_max_mm: largest(|tick| tick.separation),
             force_max_n: largest(force),
-            ticks_waiting: count(State::Waiting),
-            ticks_stale: count(State::Stale),
+            ticks_waiting: waiting,
+            ticks_nominal: count(State::Nominal),
+            ticks_degraded: count(State::Degraded),
+            ticks_safe: count(State::Safe) - waiting,
+            transitions: Transition::all(&outcome.ticks),
             instructions_mean: on_board.then(|| mean(|tick| tick.query_counts) * scale as f64),
             instructions_max: on_board.then_some(u64::from(counts_max) * scale),
             node_tests_mean: mean(|tick| tick.node_tests),
@@ -135,7 +151,7 @@ impl Report {
             controller_command: outcome.command.clone(),
             broken_promises: Vec::new(),
         };
-        report.broken_promises = report.broken(machine, outcome, count(State::Fault));
+        report.broken_promises = report.broken(machine, outcome, because(Unknown::Query));
         Ok(report)
     }
 
@@ -169,7 +185,7 @@ impl Report {
         );
         // How often a frame comes is up to this computer; what is done without one is the promise.
         let too_old =
-            |tick: &&Tick| tick.state == State::Tracking as u32 && tick.age > SURFACE_AGE_LIMIT;
+            |tick: &&Tick| tick.state != State::Safe as u32 && tick.age > SURFACE_AGE_LIMIT;
         let trusted = outcome.ticks.iter().filter(too_old).count();
         promise(trusted == 0, format!("{trusted} ticks acted on a surface that was too old"));
         let lost = self.records_lost;
@@ -204,10 +220,16 @@ impl Report {
             ),
         );
         row("control ticks", format!("{} at {TICK_RATE} Hz", self.ticks));
-        if self.ticks_stale > 0 {
-            let limit = SURFACE_AGE_LIMIT / TICK_RATE;
-            let stale = self.ticks_stale;
-            row("safe output", format!("{stale} ticks, the surface being older than {limit} s"));
+        row(
+            "surface trusted",
+            format!(
+                "{} ticks nominal, {} degraded, {} safe, {} before the first frame",
+                self.ticks_nominal, self.ticks_degraded, self.ticks_safe, self.ticks_waiting
+            ),
+        );
+        for change in &self.transitions {
+            let Transition { tick, from, to, cause, age } = change;
+            row("", format!("tick {tick}: {from} to {to}, {cause}, surface {age} ms old"));
         }
         row(
             "answers",
@@ -262,6 +284,41 @@ impl Report {
         }
         println!("every promise kept");
         Ok(())
+    }
+}
+
+/// A change of the fail-safe machine's state.
+#[derive(Serialize)]
+pub struct Transition {
+    tick: u32,
+    from: &'static str,
+    to: &'static str,
+    cause: &'static str,
+    /// Age of the surface, in ms.
+    age: u32,
+}
+
+impl Transition {
+    /// The changes of a run.
+    pub fn all(ticks: &[Tick]) -> Vec<Self> {
+        let changes = ticks.array_windows().filter(|[a, b]| a.state != b.state);
+        changes
+            .map(|[before, after]| Self {
+                tick: after.tick,
+                from: state_name(before.state),
+                to: state_name(after.state),
+                cause: cause_name(after.cause),
+                age: after.age * 1_000 / TICK_RATE,
+            })
+            .collect()
+    }
+}
+
+fn state_name(state: u32) -> &'static str {
+    match state {
+        0 => "nominal",
+        1 => "degraded",
+        _ => "safe",
     }
 }
 
