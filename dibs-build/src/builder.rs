@@ -55,6 +55,7 @@ pub struct Builder<'p> {
     index: IndexWidth,
     with_order: bool,
     with_rest: bool,
+    with_metric: bool,
     progress: &'p (dyn Fn(usize) + Sync),
 }
 
@@ -88,6 +89,7 @@ impl<'p> Builder<'p> {
             index: IndexWidth::Fitting,
             with_order: true,
             with_rest: true,
+            with_metric: true,
             progress: &|_| (),
         }
     }
@@ -134,11 +136,18 @@ impl<'p> Builder<'p> {
         self
     }
 
-    /// Whether the tree carries the rest shape (12 bytes a vertex), which the stretch measurement
-    /// needs.
+    /// Whether the tree carries the rest shape (12 bytes a vertex).
     #[must_use]
     pub fn with_rest_shape(mut self, with: bool) -> Self {
         self.with_rest = with;
+        self
+    }
+
+    /// Whether the tree carries the triangles' rest metric (12 bytes a triangle), which the stretch
+    /// measurement needs.
+    #[must_use]
+    pub fn with_metric(mut self, with: bool) -> Self {
+        self.with_metric = with;
         self
     }
 
@@ -189,6 +198,7 @@ impl<'p> Builder<'p> {
             stretch: self.stretch,
             with_order: self.with_order,
             with_rest: self.with_rest,
+            with_metric: self.with_metric,
         };
         let (bytes, order) = flatten::<I>(mesh, &root, facts)?;
         Ok(BuiltTree::new::<I>(bytes, order))

@@ -4,10 +4,9 @@ use core::fmt;
 
 use crate::Index;
 use crate::format::{
-    self, CHECKSUM_AT, CRC, HEADER_BYTES, Link, MAGIC, MAX_DEPTH, PathKind, SECTION_ALIGN,
-    SECTION_BYTES, VERSION, node_bytes, triangle_bytes, u32_at,
+    CHECKSUM_AT, CRC, HEADER_BYTES, Link, MAGIC, MAX_DEPTH, PathKind, VERSION, limit_code, u32_at,
 };
-use crate::tree::{Header, SECTIONS, Tree};
+use crate::tree::{Header, Tree};
 
 /// Why bytes are not a tree that this crate can search.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,7 +53,7 @@ pub enum FormatError {
     },
     /// A section is missing, misplaced, or not as long as the counts require.
     Section {
-        /// The section's kind, see [`format::section`].
+        /// The section's kind, see [`crate::format::section`].
         kind: u32,
     },
     /// A node's children do not follow it in depth-first order.
@@ -93,6 +92,16 @@ pub enum FormatError {
         /// Row of the vertex order.
         row: u32,
     },
+    /// A triangle's rest metric is not finite, is negative, or continues a fan that is not there.
+    Metric {
+        /// Row of the triangle.
+        triangle: u32,
+    },
+    /// A triangle's stretch limit is zero.
+    Limit {
+        /// Row of the triangle.
+        triangle: u32,
+    },
     /// The tree is deeper or shallower than the header states.
     Depth {
         /// The depth in the header.
@@ -130,6 +139,8 @@ impl fmt::Display for FormatError {
                 write!(f, "triangle {triangle} uses missing vertex {vertex}")
             }
             Self::Order { row } => write!(f, "vertex order row {row} is not a vertex"),
+            Self::Metric { triangle } => write!(f, "triangle {triangle} has an impossible metric"),
+            Self::Limit { triangle } => write!(f, "triangle {triangle} has no stretch limit"),
             Self::Depth { stated, found } => {
                 write!(f, "depth {found} found, the header states {stated}")
             }
@@ -197,6 +208,8 @@ pub(crate) const fn header<I: Index>(bytes: &[u8]) -> Result<Header, FormatError
         radius_unit: f32::from_bits(tri!(field(bytes, 36))),
         root_pin: tri!(field(bytes, 40)),
         root_radius_code: tri!(field(bytes, 44)),
+        sections: tri!(field(bytes, 48)),
+        checksum: tri!(field(bytes, CHECKSUM_AT)),
     };
     let reserved = tri!(field(bytes, 56));
     let wrong = if header.vertices == 0 || header.vertices > I::MAX_VERTICES {
@@ -235,57 +248,6 @@ const fn checksum(bytes: &[u8]) -> Result<(), FormatError> {
     digest.update(after);
     let computed = digest.finalize();
     if computed == stated { Ok(()) } else { Err(FormatError::Checksum { stated, computed }) }
-}
-
-/// The parts of `bytes` that hold [`SECTIONS`]; an optional section that is absent is empty.
-pub(crate) const fn sections<I: Index>(bytes: &[u8]) -> Result<[&[u8]; 4], FormatError> {
-    let vertices = tri!(field(bytes, 12)) as u64;
-    let triangles = tri!(field(bytes, 16)) as u64;
-    let nodes = tri!(field(bytes, 20)) as u64;
-    let rows = tri!(field(bytes, 48));
-    let expected = [
-        nodes * node_bytes::<I>() as u64,
-        triangles * triangle_bytes::<I>() as u64,
-        vertices * I::BYTES as u64,
-        vertices * 12,
-    ];
-    let mut found: [Option<&[u8]>; 4] = [None; 4];
-    let mut row = 0;
-    while row < rows {
-        let at = HEADER_BYTES + row as usize * SECTION_BYTES;
-        let kind = tri!(field(bytes, at));
-        let offset = tri!(field(bytes, at + 4));
-        let length = tri!(field(bytes, at + 8));
-        let mut slot = 0;
-        while slot < SECTIONS.len() {
-            if SECTIONS[slot] == kind {
-                let part = format::range(bytes, offset, length);
-                let placed = (offset as usize).is_multiple_of(SECTION_ALIGN)
-                    && offset as usize >= HEADER_BYTES
-                    && length as u64 == expected[slot];
-                if part.is_none() || !placed || found[slot].is_some() {
-                    return Err(FormatError::Section { kind });
-                }
-                found[slot] = part;
-            }
-            slot += 1;
-        }
-        row += 1;
-    }
-    match found {
-        [Some(nodes), Some(triangles), order, rest] => {
-            Ok([nodes, triangles, or_empty(order), or_empty(rest)])
-        }
-        [None, ..] => Err(FormatError::Section { kind: SECTIONS[0] }),
-        _ => Err(FormatError::Section { kind: SECTIONS[1] }),
-    }
-}
-
-const fn or_empty(part: Option<&[u8]>) -> &[u8] {
-    match part {
-        Some(part) => part,
-        None => &[],
-    }
 }
 
 /// Walks the whole tree once, depth first, near child before far one. Since the array must come out
@@ -376,12 +338,49 @@ const fn tables<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatError> {
         }
         row += 1;
     }
+    let sections = tree.sections();
     let mut row = 0;
-    while row < header.vertices && tree.order_bytes() > 0 {
+    while row < header.vertices && !sections.order.is_empty() {
         match tree.vertex_number(row) {
             Some(_) => row += 1,
             None => return Err(FormatError::Order { row }),
         }
     }
+    let mut row = 0;
+    while row < header.triangles && !sections.metric.is_empty() {
+        if !is_metric(tree, row) {
+            return Err(FormatError::Metric { triangle: row });
+        }
+        row += 1;
+    }
+    let mut row = 0;
+    while row < header.triangles && !sections.limits.is_empty() {
+        if let None | Some(0) = limit_code(sections.limits, row) {
+            return Err(FormatError::Limit { triangle: row });
+        }
+        row += 1;
+    }
     Ok(())
+}
+
+/// Whether a triangle's metric is one, and the fan that it continues is there.
+const fn is_metric<I: Index>(tree: &Tree<'_, I>, row: u32) -> bool {
+    let Some(([first, second, third], continues)) = tree.metric(row) else { return false };
+    let is_fan = if continues {
+        match (row.checked_sub(1), tree.triangle(row)) {
+            (Some(before), Some([a, b, _])) => match tree.triangle(before) {
+                Some([first, _, third]) => first == a && third == b,
+                None => false,
+            },
+            _ => false,
+        }
+    } else {
+        true
+    };
+    // A value that is not a number is in no range.
+    first < f32::INFINITY
+        && second.abs() < f32::INFINITY
+        && third >= 0.0
+        && third < f32::INFINITY
+        && is_fan
 }

@@ -23,6 +23,13 @@ pub const MAX_DEPTH: u32 = 64;
 /// Most triangles in one leaf.
 pub const MAX_LEAF_TRIANGLES: u32 = 8;
 
+/// Bytes of one row of the metric section.
+pub const METRIC_BYTES: usize = 12;
+/// Bytes of one row of the limits section.
+pub const LIMIT_BYTES: usize = 2;
+/// The limit code that stands for the tree's own stretch limit.
+pub const MAX_LIMIT_CODE: u32 = 0xFFFF;
+
 /// CRC-32 (ISO-HDLC, that of zlib and Ethernet) of trees and bus packets, by a table of 1 KiB.
 ///
 /// Detected for certain: every burst of up to 32 bits; any 4 flipped bits in up to 2,974 data bits, any
@@ -40,8 +47,15 @@ pub mod section {
     pub const TRIANGLES: u32 = 2;
     /// The mesh's own vertex number of every row (optional: hosts need it, a controller does not).
     pub const VERTEX_ORDER: u32 = 3;
-    /// Rest position of every row, three `f32` (optional: the stretch measurement needs it).
+    /// Rest position of every row, three `f32` (optional).
     pub const REST: u32 = 4;
+    /// Rest metric of every triangle, three `f32` (optional: the stretch measurement needs it).
+    pub const METRIC: u32 = 5;
+    /// Stretch limit of every triangle, a 16-bit part of the tree's (optional: where it is absent, the
+    /// tree's limit is each triangle's).
+    pub const LIMITS: u32 = 6;
+    /// Displacement modes (optional).
+    pub const MODES: u32 = 7;
 }
 
 /// How geodesic radii were measured, which decides what limits their growth (`design` invariant
@@ -217,6 +231,24 @@ pub(crate) const fn rest_position(rest: &[u8], row: u32) -> Option<glam::Vec3> {
         f32::from_le_bytes([r[4], r[5], r[6], r[7]]),
         f32::from_le_bytes([r[8], r[9], r[10], r[11]]),
     ))
+}
+
+/// The rest metric of a triangle: three floats, and whether it continues the fan of the row before.
+#[inline(always)]
+pub(crate) const fn metric(metric: &[u8], row: u32) -> Option<([f32; 3], bool)> {
+    let Some(tail) = rows_from(metric, row, METRIC_BYTES) else { return None };
+    let Some(r) = tail.first_chunk::<METRIC_BYTES>() else { return None };
+    let first = f32::from_le_bytes([r[0], r[1], r[2], r[3]]);
+    let second = f32::from_le_bytes([r[4], r[5], r[6], r[7]]);
+    let third = f32::from_le_bytes([r[8], r[9], r[10], r[11]]);
+    Some(([first.abs(), second, third], first.is_sign_negative()))
+}
+
+#[inline(always)]
+pub(crate) const fn limit_code(limits: &[u8], row: u32) -> Option<u32> {
+    let Some(tail) = rows_from(limits, row, LIMIT_BYTES) else { return None };
+    let Some(r) = tail.first_chunk::<LIMIT_BYTES>() else { return None };
+    Some(short(r[0], r[1]))
 }
 
 #[inline(always)]

@@ -61,6 +61,7 @@ pub mod format;
 mod frames;
 mod index;
 mod query;
+mod sections;
 mod sqrt;
 mod stretch;
 mod tool;

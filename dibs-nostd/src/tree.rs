@@ -5,6 +5,7 @@ use core::marker::PhantomData;
 use glam::Vec3;
 
 use crate::format::{self, Link, Node, PathKind, section};
+use crate::sections::{self, Sections};
 use crate::{FormatError, Index, check};
 
 /// A deformation invariant bounding sphere tree with its triangles.
@@ -13,10 +14,7 @@ use crate::{FormatError, Index, check};
 /// no position (only which vertex each sphere is pinned to) and never changes: see `docs/format.md`.
 #[derive(Clone, Copy, Debug)]
 pub struct Tree<'a, I> {
-    pub(crate) nodes: &'a [u8],
-    pub(crate) triangles: &'a [u8],
-    order: &'a [u8],
-    rest: &'a [u8],
+    sections: Sections<'a>,
     header: Header,
     width: PhantomData<I>,
 }
@@ -35,6 +33,9 @@ pub(crate) struct Header {
     pub radius_unit: f32,
     pub root_pin: u32,
     pub root_radius_code: u32,
+    /// Rows of the section table.
+    pub sections: u32,
+    pub checksum: u32,
 }
 
 impl<'a, I: Index> Tree<'a, I> {
@@ -54,10 +55,8 @@ impl<'a, I: Index> Tree<'a, I> {
             Ok(header) => header,
             Err(error) => return Err(error),
         };
-        let tree = match check::sections::<I>(bytes) {
-            Ok([nodes, triangles, order, rest]) => {
-                Self { nodes, triangles, order, rest, header, width: PhantomData }
-            }
+        let tree = match sections::find::<I>(bytes, &header) {
+            Ok(sections) => Self { sections, header, width: PhantomData },
             Err(error) => return Err(error),
         };
         match check::well_formed(&tree) {
@@ -72,16 +71,19 @@ impl<'a, I: Index> Tree<'a, I> {
     /// # Errors
     /// [`FormatError`] if the copy's sections are not where this tree's layout has them.
     pub const fn moved_to<'b>(&self, copy: &'b [u8]) -> Result<Tree<'b, I>, FormatError> {
-        match check::sections::<I>(copy) {
-            Ok([nodes, triangles, order, rest])
-                if nodes.len() == self.nodes.len() && triangles.len() == self.triangles.len() =>
-            {
-                let header = self.header;
-                Ok(Tree { nodes, triangles, order, rest, header, width: PhantomData })
+        match sections::find::<I>(copy, &self.header) {
+            Ok(sections) if self.sections.matches(&sections) => {
+                Ok(Tree { sections, header: self.header, width: PhantomData })
             }
             Ok(_) => Err(FormatError::Section { kind: section::NODES }),
             Err(error) => Err(error),
         }
+    }
+
+    /// Checksum of all of the tree's bytes: tells this tree from another one of the same mesh.
+    #[must_use]
+    pub const fn checksum(&self) -> u32 {
+        self.header.checksum
     }
 
     /// Identity of the mesh: CRC-32 of its triangles and rest positions. Vertex packets carry it, so
@@ -131,28 +133,49 @@ impl<'a, I: Index> Tree<'a, I> {
     /// Bytes of nodes and triangles: what a query reads besides the vertex table.
     #[must_use]
     pub const fn query_bytes(&self) -> usize {
-        self.nodes.len() + self.triangles.len()
+        self.sections.nodes.len() + self.sections.triangles.len()
     }
 
     /// Rows of the three corners of a triangle, or `None` outside the table.
     #[inline(always)]
     #[must_use]
     pub const fn triangle(&self, row: u32) -> Option<[u32; 3]> {
-        format::triangle::<I>(self.triangles, row)
+        format::triangle::<I>(self.sections.triangles, row)
     }
 
     /// The mesh's own number of the vertex in `row`; `None` outside the table or where the tree was
     /// emitted without its vertex order.
     #[must_use]
     pub const fn vertex_number(&self, row: u32) -> Option<u32> {
-        format::vertex_number::<I>(self.order, row)
+        format::vertex_number::<I>(self.sections.order, row)
     }
 
     /// Rest position of the vertex in `row` (mm); `None` outside the table or where the tree was
     /// emitted without its rest shape.
     #[must_use]
     pub const fn rest_position(&self, row: u32) -> Option<Vec3> {
-        format::rest_position(self.rest, row)
+        format::rest_position(self.sections.rest, row)
+    }
+
+    /// Rest metric of a triangle, and whether it continues the fan of the row before (`docs/format.md`);
+    /// `None` outside the table or where the tree was emitted without its metric.
+    #[inline(always)]
+    #[must_use]
+    pub const fn metric(&self, row: u32) -> Option<([f32; 3], bool)> {
+        format::metric(self.sections.metric, row)
+    }
+
+    /// Stretch limit of a triangle: the tree's, or less where the tree was built with limits for each
+    /// triangle. `None` outside the table.
+    #[must_use]
+    pub const fn stretch_limit(&self, row: u32) -> Option<f32> {
+        if self.sections.limits.is_empty() {
+            return if row < self.header.triangles { Some(self.header.stretch) } else { None };
+        }
+        match format::limit_code(self.sections.limits, row) {
+            Some(code) => Some(self.header.stretch * (code as f32 / format::MAX_LIMIT_CODE as f32)),
+            None => None,
+        }
     }
 
     /// Pin, geodesic radius (mm, rounded up) and link of the root, for tools that walk the tree.
@@ -179,17 +202,14 @@ impl<'a, I: Index> Tree<'a, I> {
 
     #[inline(always)]
     pub(crate) const fn node(&self, row: u32) -> Option<Node> {
-        format::node::<I>(self.nodes, row)
+        format::node::<I>(self.sections.nodes, row)
     }
 
     pub(crate) const fn header(&self) -> &Header {
         &self.header
     }
 
-    pub(crate) const fn order_bytes(&self) -> usize {
-        self.order.len()
+    pub(crate) const fn sections(&self) -> &Sections<'a> {
+        &self.sections
     }
 }
-
-pub(crate) const SECTIONS: [u32; 4] =
-    [section::NODES, section::TRIANGLES, section::VERTEX_ORDER, section::REST];

@@ -6,6 +6,7 @@ use dibs_nostd::format::{
 };
 use dibs_nostd::{Index, Tree};
 
+use super::metric::metric;
 use crate::Mesh;
 use crate::construct::{Cluster, Content};
 use crate::error::BuildError;
@@ -51,6 +52,7 @@ pub(crate) struct Facts {
     pub stretch: f32,
     pub with_order: bool,
     pub with_rest: bool,
+    pub with_metric: bool,
 }
 
 /// The bytes of a tree, and the mesh vertex of each row.
@@ -98,6 +100,9 @@ pub(crate) fn flatten<I: Index>(
     if facts.with_rest {
         sections.push((section::REST, rest));
     }
+    if facts.with_metric {
+        sections.push((section::METRIC, metrics(mesh, &flat.triangles, facts.paths)));
+    }
     let header = [
         identity.finalize(),
         order.len() as u32,
@@ -121,6 +126,24 @@ fn vertex_order(mesh: &Mesh, triangles: &[u32]) -> Vec<u32> {
     let mut seen = vec![false; mesh.positions.len()];
     let corners = triangles.iter().flat_map(|&t| mesh.triangles[t as usize]);
     corners.filter(|&v| !std::mem::replace(&mut seen[v as usize], true)).collect()
+}
+
+/// The metric of each triangle, marked where it continues the fan of the triangle before.
+fn metrics(mesh: &Mesh, triangles: &[u32], paths: PathKind) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(12 * triangles.len());
+    let mut last = None;
+    for &triangle in triangles {
+        let corners = mesh.triangles[triangle as usize];
+        let [mut first, second, third] =
+            metric(corners.map(|v| mesh.positions[v as usize]), 1.0, paths);
+        let [a, b, c] = corners;
+        if last == Some((a, b)) {
+            first = -first;
+        }
+        last = Some((a, c));
+        [first, second, third].iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+    }
+    bytes
 }
 
 /// The length of one radius code: the largest radius takes nearly the largest code.

@@ -2,6 +2,7 @@
 
 mod emit;
 mod flatten;
+mod metric;
 
 pub use emit::{BuiltTree, Summary, summarise};
 pub(crate) use flatten::{Facts, flatten};

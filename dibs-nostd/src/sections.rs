@@ -1,0 +1,123 @@
+//! The sections of a tree: which there are, how long each must be, and where they stand.
+//!
+//! To add one: its kind in [`section`], a row in [`rules`], a field of [`Sections`].
+
+use crate::format::{
+    self, HEADER_BYTES, LIMIT_BYTES, METRIC_BYTES, SECTION_ALIGN, SECTION_BYTES, node_bytes,
+    section, triangle_bytes,
+};
+use crate::tree::Header;
+use crate::{FormatError, Index};
+
+/// The parts of a tree's bytes; an optional one that is absent is empty.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sections<'a> {
+    pub nodes: &'a [u8],
+    pub triangles: &'a [u8],
+    pub order: &'a [u8],
+    pub rest: &'a [u8],
+    pub metric: &'a [u8],
+    pub limits: &'a [u8],
+}
+
+/// What a section must be.
+#[derive(Clone, Copy)]
+struct Rule {
+    kind: u32,
+    /// Bytes that it must have; `None` where a later check decides.
+    length: Option<u64>,
+    required: bool,
+}
+
+impl Rule {
+    const fn required(kind: u32, rows: u32, stride: usize) -> Self {
+        Self { required: true, ..Self::optional(kind, rows, stride) }
+    }
+
+    const fn optional(kind: u32, rows: u32, stride: usize) -> Self {
+        Self { kind, length: Some(rows as u64 * stride as u64), required: false }
+    }
+}
+
+const COUNT: usize = 6;
+
+/// In the order of [`Sections`]' fields.
+const fn rules<I: Index>(header: &Header) -> [Rule; COUNT] {
+    let Header { vertices, triangles, nodes, .. } = *header;
+    [
+        Rule::required(section::NODES, nodes, node_bytes::<I>()),
+        Rule::required(section::TRIANGLES, triangles, triangle_bytes::<I>()),
+        Rule::optional(section::VERTEX_ORDER, vertices, I::BYTES),
+        Rule::optional(section::REST, vertices, 12),
+        Rule::optional(section::METRIC, triangles, METRIC_BYTES),
+        Rule::optional(section::LIMITS, triangles, LIMIT_BYTES),
+    ]
+}
+
+/// Finds the sections of a tree with this header.
+pub(crate) const fn find<'a, I: Index>(
+    bytes: &'a [u8],
+    header: &Header,
+) -> Result<Sections<'a>, FormatError> {
+    let rules = rules::<I>(header);
+    let mut found: [Option<&[u8]>; COUNT] = [None; COUNT];
+    let mut row = 0;
+    while row < header.sections {
+        let at = HEADER_BYTES.saturating_add((row as usize).saturating_mul(SECTION_BYTES));
+        let (Some(kind), Some(offset), Some(length)) = (
+            format::u32_at(bytes, at),
+            format::u32_at(bytes, at.saturating_add(4)),
+            format::u32_at(bytes, at.saturating_add(8)),
+        ) else {
+            return Err(FormatError::Length {
+                expected: at.saturating_add(SECTION_BYTES) as u32,
+                found: bytes.len() as u32,
+            });
+        };
+        let mut slot = 0;
+        while slot < COUNT {
+            let rule = rules[slot];
+            if rule.kind == kind {
+                let part = format::range(bytes, offset, length);
+                let placed = (offset as usize).is_multiple_of(SECTION_ALIGN)
+                    && offset as usize >= HEADER_BYTES
+                    && match rule.length {
+                        Some(expected) => length as u64 == expected,
+                        None => true,
+                    };
+                if part.is_none() || !placed || found[slot].is_some() {
+                    return Err(FormatError::Section { kind });
+                }
+                found[slot] = part;
+            }
+            slot += 1;
+        }
+        row += 1;
+    }
+    let mut parts: [&[u8]; COUNT] = [&[]; COUNT];
+    let mut slot = 0;
+    while slot < COUNT {
+        match found[slot] {
+            Some(part) => parts[slot] = part,
+            None if rules[slot].required => {
+                return Err(FormatError::Section { kind: rules[slot].kind });
+            }
+            None => (),
+        }
+        slot += 1;
+    }
+    let [nodes, triangles, order, rest, metric, limits] = parts;
+    Ok(Sections { nodes, triangles, order, rest, metric, limits })
+}
+
+impl Sections<'_> {
+    /// Whether each section is as long as its counterpart.
+    pub const fn matches(&self, other: &Sections<'_>) -> bool {
+        self.nodes.len() == other.nodes.len()
+            && self.triangles.len() == other.triangles.len()
+            && self.order.len() == other.order.len()
+            && self.rest.len() == other.rest.len()
+            && self.metric.len() == other.metric.len()
+            && self.limits.len() == other.limits.len()
+    }
+}
