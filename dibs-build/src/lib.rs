@@ -25,6 +25,8 @@ mod geodesic;
 mod mesh;
 mod pc2;
 mod read;
+#[cfg(feature = "stream")]
+pub mod stream;
 mod write;
 
 pub use array::{BuiltTree, Summary, summarise};

@@ -135,8 +135,10 @@ fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
         let tick = control.tick(|| 0);
         assert_eq!((tick.tick, tick.age), (cut + silence, silence));
         let expected = match silence {
-            0..=SILENCE_WARNING => (State::Nominal, 0),
-            0..=SILENCE_LIMIT => (State::Degraded, cause_code(&Unknown::LinkLost { silence })),
+            _ if silence <= SILENCE_WARNING => (State::Nominal, 0),
+            _ if silence <= SILENCE_LIMIT => {
+                (State::Degraded, cause_code(&Unknown::LinkLost { silence }))
+            }
             _ => (State::Safe, cause_code(&Unknown::LinkLost { silence })),
         };
         assert_eq!((tick.state, tick.cause), (expected.0 as u32, expected.1), "after {silence}");
@@ -165,8 +167,8 @@ fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
         let tick = control.tick(|| 0);
         assert_eq!((tick.tick, tick.age), (received + age, age));
         let expected = match age {
-            0..=SURFACE_AGE_WARNING => State::Nominal,
-            0..=SURFACE_AGE_LIMIT => State::Degraded,
+            _ if age <= SURFACE_AGE_WARNING => State::Nominal,
+            _ if age <= SURFACE_AGE_LIMIT => State::Degraded,
             _ => State::Safe,
         };
         assert_eq!(tick.state, expected as u32, "at the age of {age}");
