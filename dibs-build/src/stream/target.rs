@@ -1,0 +1,159 @@
+//! Where to: `serial:…`, `tcp:…`, `udp:…`, `unix:…`.
+
+use std::fmt;
+use std::net::{SocketAddr, TcpStream, ToSocketAddrs, UdpSocket};
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Duration;
+
+use serial2::SerialPort;
+use thiserror::Error;
+
+use super::Line;
+
+/// Bits a second of a serial line that states none.
+const BAUD: u32 = 115_200;
+
+/// How long a connection may take to come about.
+const CONNECT: Duration = Duration::from_secs(5);
+
+/// A receiver's address.
+///
+/// ```
+/// use dibs_build::stream::Target;
+/// let target: Target = "serial:/dev/ttyUSB0@921600".parse()?;
+/// assert_eq!(target.to_string(), "serial:/dev/ttyUSB0@921600");
+/// assert!("ttyUSB0".parse::<Target>().is_err());
+/// # Ok::<(), dibs_build::stream::TargetError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Target {
+    /// A serial port, `serial:PORT` or `serial:PORT@BAUD`; 115,200 baud where none are given.
+    Serial {
+        /// The port: a device file, or `COM3`.
+        port: String,
+        /// Bits a second.
+        baud: u32,
+    },
+    /// A TCP server, `tcp:HOST:PORT`.
+    Tcp(String),
+    /// A UDP receiver, `udp:HOST:PORT`.
+    Udp(String),
+    /// A listening Unix socket, `unix:PATH`.
+    Unix(PathBuf),
+}
+
+/// A target that cannot be understood or reached.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum TargetError {
+    /// None of the four kinds.
+    #[error("`{text}` is no target: serial:PORT[@BAUD], tcp:HOST:PORT, udp:HOST:PORT or unix:PATH")]
+    Kind {
+        /// What was given.
+        text: String,
+    },
+    /// A baud rate that is no positive number.
+    #[error("`{text}`: the baud rate `{baud}` is not a positive whole number")]
+    Baud {
+        /// What was given.
+        text: String,
+        /// The part after the `@`.
+        baud: String,
+    },
+    /// Nothing answers there.
+    #[error(
+        "{target}: cannot be opened ({source}); is the receiver running, and the address right?"
+    )]
+    Open {
+        /// The target.
+        target: Target,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+}
+
+impl FromStr for Target {
+    type Err = TargetError;
+
+    fn from_str(text: &str) -> Result<Self, TargetError> {
+        let kind = || TargetError::Kind { text: text.to_owned() };
+        let (scheme, rest) = text.split_once(':').ok_or_else(kind)?;
+        let address = || {
+            let (host, port) = rest.rsplit_once(':').ok_or_else(kind)?;
+            let is_address = !host.is_empty() && port.parse::<u16>().is_ok();
+            if is_address { Ok(rest.to_owned()) } else { Err(kind()) }
+        };
+        match scheme {
+            _ if rest.is_empty() => Err(kind()),
+            "serial" => {
+                let (port, baud) = match rest.rsplit_once('@') {
+                    None => (rest, BAUD),
+                    Some((port, text_of_baud)) => {
+                        let baud = text_of_baud.parse().ok().filter(|&baud| baud > 0);
+                        let baud = baud.ok_or_else(|| TargetError::Baud {
+                            text: text.to_owned(),
+                            baud: text_of_baud.to_owned(),
+                        })?;
+                        (port, baud)
+                    }
+                };
+                Ok(Self::Serial { port: port.to_owned(), baud })
+            }
+            "tcp" => Ok(Self::Tcp(address()?)),
+            "udp" => Ok(Self::Udp(address()?)),
+            "unix" => Ok(Self::Unix(PathBuf::from(rest))),
+            _ => Err(kind()),
+        }
+    }
+}
+
+impl fmt::Display for Target {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Serial { port, baud } => write!(f, "serial:{port}@{baud}"),
+            Self::Tcp(address) => write!(f, "tcp:{address}"),
+            Self::Udp(address) => write!(f, "udp:{address}"),
+            Self::Unix(path) => write!(f, "unix:{}", path.display()),
+        }
+    }
+}
+
+impl Target {
+    /// Connects.
+    ///
+    /// # Errors
+    /// [`TargetError::Open`] with what the operating system says.
+    pub fn open(&self) -> Result<Line, TargetError> {
+        self.connect().map_err(|source| TargetError::Open { target: self.clone(), source })
+    }
+
+    fn connect(&self) -> std::io::Result<Line> {
+        match self {
+            Self::Serial { port, baud } => Line::serial(SerialPort::open(port, *baud)?),
+            Self::Tcp(address) => {
+                Line::tcp(TcpStream::connect_timeout(&resolve(address)?, CONNECT)?)
+            }
+            Self::Udp(address) => {
+                let peer = resolve(address)?;
+                let any: SocketAddr =
+                    if peer.is_ipv4() { ([0, 0, 0, 0], 0).into() } else { ([0_u16; 8], 0).into() };
+                let socket = UdpSocket::bind(any)?;
+                socket.connect(peer)?;
+                Line::udp(socket)
+            }
+            #[cfg(unix)]
+            Self::Unix(path) => Line::unix(std::os::unix::net::UnixStream::connect(path)?),
+            #[cfg(not(unix))]
+            Self::Unix(_) => Err(std::io::Error::other("this system has no Unix sockets")),
+        }
+    }
+}
+
+fn resolve(address: &str) -> std::io::Result<SocketAddr> {
+    address
+        .to_socket_addrs()?
+        .next()
+        .ok_or_else(|| std::io::Error::other("the host name has no address"))
+}

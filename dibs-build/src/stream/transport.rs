@@ -1,0 +1,256 @@
+//! How packets travel: as datagrams, or as COBS frames on a byte stream.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::{Shutdown, TcpStream, UdpSocket};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::thread;
+use std::time::Duration;
+
+#[cfg(unix)]
+use std::os::unix::net::UnixStream;
+
+use dibs_nostd::wire::{Deframer, MAX_PACKET, enframe, framed_bytes};
+use serial2::SerialPort;
+
+/// What a [`Sender`](super::Sender) sends through.
+///
+/// [`Line`] is the one for serial lines and sockets; a CAN adapter, or a fault injector between sender
+/// and receiver, is another implementation.
+pub trait Transport {
+    /// Sends one packet, whole. May block for as long as the line is busy.
+    ///
+    /// # Errors
+    /// What the operating system says; the connection is then of no use any more.
+    fn send(&mut self, packet: &[u8]) -> io::Result<()>;
+
+    /// The next packet that came back, `None` if none is there. Does not block.
+    ///
+    /// # Errors
+    /// [`ErrorKind::UnexpectedEof`] when the other side has closed the connection.
+    fn receive(&mut self) -> io::Result<Option<Vec<u8>>>;
+}
+
+/// Collects packets: for tests, and for programs that carry them by themselves.
+impl Transport for Vec<Vec<u8>> {
+    fn send(&mut self, packet: &[u8]) -> io::Result<()> {
+        self.push(packet.to_vec());
+        Ok(())
+    }
+
+    fn receive(&mut self) -> io::Result<Option<Vec<u8>>> {
+        Ok(None)
+    }
+}
+
+impl<T: Transport + ?Sized> Transport for Box<T> {
+    fn send(&mut self, packet: &[u8]) -> io::Result<()> {
+        (**self).send(packet)
+    }
+
+    fn receive(&mut self) -> io::Result<Option<Vec<u8>>> {
+        (**self).receive()
+    }
+}
+
+/// How long the reading thread waits before it looks whether it is still wanted.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// A serial line or a socket. What comes back is read by a thread of its own, so that neither
+/// direction waits for the other.
+pub struct Line {
+    writer: Box<dyn Write + Send>,
+    is_stream: bool,
+    framed: Vec<u8>,
+    received: Receiver<io::Result<Vec<u8>>>,
+    over: Arc<AtomicBool>,
+    hang_up: Box<dyn Fn() + Send>,
+}
+
+impl Line {
+    /// A serial port: 8 data bits, no parity, 1 stop bit, no flow control.
+    ///
+    /// # Errors
+    /// When the port cannot be shared with the reading thread.
+    pub fn serial(mut port: SerialPort) -> io::Result<Self> {
+        port.set_read_timeout(PATIENCE)?;
+        // A packet is a fraction of a second even on a slow line; a line that takes nothing for this
+        // long is stuck.
+        port.set_write_timeout(Duration::from_secs(10))?;
+        let reader = port.try_clone()?;
+        Ok(Self::stream(port, reader, || ()))
+    }
+
+    /// A TCP connection.
+    ///
+    /// # Errors
+    /// When the socket cannot be shared with the reading thread.
+    pub fn tcp(socket: TcpStream) -> io::Result<Self> {
+        socket.set_nodelay(true)?;
+        socket.set_read_timeout(Some(PATIENCE))?;
+        let (reader, handle) = (socket.try_clone()?, socket.try_clone()?);
+        Ok(Self::stream(socket, reader, move || drop(handle.shutdown(Shutdown::Both))))
+    }
+
+    /// A Unix socket, say that of an emulator's serial line.
+    ///
+    /// # Errors
+    /// When the socket cannot be shared with the reading thread.
+    #[cfg(unix)]
+    pub fn unix(socket: UnixStream) -> io::Result<Self> {
+        socket.set_read_timeout(Some(PATIENCE))?;
+        let (reader, handle) = (socket.try_clone()?, socket.try_clone()?);
+        Ok(Self::stream(socket, reader, move || drop(handle.shutdown(Shutdown::Both))))
+    }
+
+    /// A UDP socket that is connected to its peer: one packet a datagram.
+    ///
+    /// # Errors
+    /// When the socket cannot be shared with the reading thread.
+    pub fn udp(socket: UdpSocket) -> io::Result<Self> {
+        socket.set_read_timeout(Some(PATIENCE))?;
+        let reader = socket.try_clone()?;
+        let mut buffer = vec![0; MAX_PACKET];
+        Ok(Self::new(
+            Datagrams(socket),
+            false,
+            || (),
+            move |packets| {
+                match reader.recv(&mut buffer) {
+                    Ok(bytes) => packets.push(buffer[..bytes].to_vec()),
+                    // Nobody listens there, or not yet: the sender goes on, as with any lost datagram.
+                    Err(error) if error.kind() == ErrorKind::ConnectionRefused => (),
+                    Err(error) => return Err(error),
+                }
+                Ok(())
+            },
+        ))
+    }
+
+    /// A byte stream with a reading and a writing end.
+    fn stream(
+        writer: impl Write + Send + 'static,
+        mut reader: impl Read + Send + 'static,
+        hang_up: impl Fn() + Send + 'static,
+    ) -> Self {
+        let mut deframer = Deframer::<MAX_PACKET>::new();
+        let mut buffer = [0; 4096];
+        Self::new(writer, true, hang_up, move |packets| {
+            let bytes = reader.read(&mut buffer)?;
+            if bytes == 0 {
+                return Err(ErrorKind::UnexpectedEof.into());
+            }
+            // What was damaged on the way back is as good as not sent: the next status follows.
+            let whole = buffer[..bytes]
+                .iter()
+                .filter_map(|&byte| deframer.push(byte).and_then(Result::ok).map(<[u8]>::to_vec));
+            packets.extend(whole);
+            Ok(())
+        })
+    }
+
+    fn new(
+        writer: impl Write + Send + 'static,
+        is_stream: bool,
+        hang_up: impl Fn() + Send + 'static,
+        mut read: impl FnMut(&mut Vec<Vec<u8>>) -> io::Result<()> + Send + 'static,
+    ) -> Self {
+        let (to_owner, received) = channel();
+        let over = Arc::new(AtomicBool::new(false));
+        let is_over = Arc::clone(&over);
+        thread::spawn(move || {
+            let mut packets = Vec::new();
+            while !is_over.load(Ordering::Relaxed) {
+                match read(&mut packets) {
+                    Ok(()) => (),
+                    Err(error) if is_patience(&error) => (),
+                    Err(error) => {
+                        // Nobody to tell where the owner is gone.
+                        let _ = to_owner.send(Err(error));
+                        return;
+                    }
+                }
+                for packet in packets.drain(..) {
+                    if to_owner.send(Ok(packet)).is_err() {
+                        return;
+                    }
+                }
+            }
+        });
+        Self {
+            writer: Box::new(writer),
+            is_stream,
+            framed: vec![0; framed_bytes(MAX_PACKET)],
+            received,
+            over,
+            hang_up: Box::new(hang_up),
+        }
+    }
+
+    /// Whether packets are framed on a byte stream, and not datagrams.
+    #[must_use]
+    pub const fn is_stream(&self) -> bool {
+        self.is_stream
+    }
+
+    /// Sends bytes as they are: what a damaged line would make of a packet. For fault injection.
+    ///
+    /// # Errors
+    /// What the operating system says.
+    pub fn send_raw(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.writer.write_all(bytes)?;
+        self.writer.flush()
+    }
+}
+
+impl Transport for Line {
+    fn send(&mut self, packet: &[u8]) -> io::Result<()> {
+        let bytes = if self.is_stream {
+            enframe(packet, &mut self.framed)
+                .ok_or_else(|| io::Error::other("a packet larger than any"))?
+        } else {
+            packet
+        };
+        self.writer.write_all(bytes)?;
+        self.writer.flush()
+    }
+
+    fn receive(&mut self) -> io::Result<Option<Vec<u8>>> {
+        match self.received.try_recv() {
+            Ok(packet) => packet.map(Some),
+            Err(TryRecvError::Empty) => Ok(None),
+            // The thread ends after an error only, which was handed out before.
+            Err(TryRecvError::Disconnected) => Err(ErrorKind::UnexpectedEof.into()),
+        }
+    }
+}
+
+impl Drop for Line {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        (self.hang_up)();
+    }
+}
+
+/// Nothing came in time.
+fn is_patience(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
+}
+
+/// A write is a datagram.
+struct Datagrams(UdpSocket);
+
+impl Write for Datagrams {
+    fn write(&mut self, packet: &[u8]) -> io::Result<usize> {
+        match self.0.send(packet) {
+            // The answer to an earlier datagram: nobody listens yet.
+            Err(error) if error.kind() == ErrorKind::ConnectionRefused => Ok(packet.len()),
+            sent => sent,
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
