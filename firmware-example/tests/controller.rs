@@ -12,7 +12,7 @@ use dibs_build::{Builder, generate};
 use dibs_nostd::constraint::Unknown;
 use dibs_nostd::failsafe::State;
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::wire::{Encoding, FrameEncoder, QuantisedBox, enframe, framed_bytes};
+use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, QuantisedBox, enframe, framed_bytes};
 use dibs_tests::oracle::{Instrument, exhaustive};
 
 /// The sending side: the generated heart, in the tree's order.
@@ -46,8 +46,8 @@ impl Sender {
         let decode = |&p: &Vec3| grid.position(grid.quantise(p).expect("inside its own box"));
         self.decoded.insert(epoch, exact.iter().map(decode).collect());
         let encoding = Encoding::Quantised(grid);
-        let mut encoder =
-            FrameEncoder::<_, MTU>::new(SURFACE.mesh_id(), epoch, encoding, &exact[..]).unwrap();
+        let id = FrameId { mesh_id: SURFACE.mesh_id(), session: 1, epoch };
+        let mut encoder = FrameEncoder::<_, MTU>::new(id, encoding, &exact[..]).unwrap();
         let (mut packet, mut line, mut all) = ([0; MTU], [0; framed_bytes(MTU)], Vec::new());
         while let Some(packet) = encoder.next_packet(&mut packet) {
             all.extend_from_slice(enframe(packet, &mut line).expect("room"));

@@ -1,7 +1,7 @@
 //! A small surface on a bus: what the bus tests share.
 
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::wire::{CHECKSUM_BYTES, Encoding, FrameEncoder, QuantisedBox};
+use dibs_nostd::wire::{CHECKSUM_BYTES, Encoding, FrameEncoder, FrameId, QuantisedBox};
 use dibs_nostd::{Assembler, FrameReader, Frames, Gate, Unchecked, VertexTable};
 
 /// Mesh id of the packets.
@@ -57,7 +57,8 @@ pub fn packets<const MTU: usize>(
     encoding: Encoding,
     positions: &[Vec3],
 ) -> Vec<Vec<u8>> {
-    let mut encoder = FrameEncoder::<_, MTU>::new(MESH, epoch, encoding, positions).unwrap();
+    let id = FrameId { mesh_id: MESH, session: 1, epoch };
+    let mut encoder = FrameEncoder::<_, MTU>::new(id, encoding, positions).unwrap();
     let mut buffer = [0; MTU];
     let mut packets = Vec::new();
     while let Some(packet) = encoder.next_packet(&mut buffer) {

@@ -2,7 +2,7 @@
 
 use dibs_build::{Builder, Paths, generate};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::wire::{Encoding, FrameEncoder};
+use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 use dibs_nostd::{Assembler, Frames, Rejection, StretchError, Tree, measure_stretch};
 use dibs_tests::deform::Deformation;
 use dibs_tests::stretch;
@@ -67,9 +67,9 @@ fn a_surface_beyond_the_stretch_limit_is_refused() {
     let mut assembler = Assembler::new(writer, tree, tree.mesh_id(), 1e4);
     let mut send = |epoch: u32, scale: f32| {
         let moved: Vec<Vec3> = rest.iter().map(|p| *p * scale).collect();
+        let id = FrameId { mesh_id: tree.mesh_id(), session: 1, epoch };
         let mut encoder =
-            FrameEncoder::<_, 512>::new(tree.mesh_id(), epoch, Encoding::Float, &moved[..])
-                .expect("can be sent");
+            FrameEncoder::<_, 512>::new(id, Encoding::Float, &moved[..]).expect("can be sent");
         let mut buffer = [0; 512];
         let mut last = None;
         while let Some(packet) = encoder.next_packet(&mut buffer) {

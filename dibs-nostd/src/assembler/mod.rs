@@ -8,7 +8,7 @@ use core::ops::Range;
 use crate::MAX_COORDINATE;
 use crate::frames::{FrameLabel, FrameView, FrameWriter, PublishError};
 use crate::wire::{
-    Begin, Body, Commit, Encoding, Packet, Rows, Vertices, float_position, quantised_row,
+    Begin, Body, Commit, Content, Encoding, Packet, Rows, Vertices, float_position, quantised_row,
 };
 
 pub use gate::{Changed, Gate, Unchecked, Verdict};
@@ -37,7 +37,7 @@ pub use rejection::{Counters, Rejection};
 /// gate's own cost at the end of a frame. No memory beyond the [`Frames`](crate::Frames).
 ///
 /// ```
-/// use dibs_nostd::wire::{Encoding, FrameEncoder};
+/// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 /// use dibs_nostd::{Assembler, Frames, Progress, Unchecked, VertexTable, glam::Vec3};
 ///
 /// static FRAMES: Frames<3> = Frames::new();
@@ -45,7 +45,12 @@ pub use rejection::{Counters, Rejection};
 /// let mut assembler = Assembler::new(writer, Unchecked, 0xB0D1, 1000.0);
 ///
 /// let positions = [Vec3::X, Vec3::Y, Vec3::Z];
-/// let mut sender = FrameEncoder::<_, 64>::new(0xB0D1, 1, Encoding::Float, &positions[..]).unwrap();
+/// let mut sender = FrameEncoder::<_, 64>::new(
+///     FrameId { mesh_id: 0xB0D1, session: 1, epoch: 1 },
+///     Encoding::Float,
+///     &positions[..],
+/// )
+/// .unwrap();
 /// let mut buffer = [0; 64];
 /// let mut last = None;
 /// while let Some(packet) = sender.next_packet(&mut buffer) {
@@ -203,8 +208,8 @@ impl<'f, G: Gate, const N: usize> Assembler<'f, G, N> {
         now: u32,
     ) -> Result<Progress, Rejection> {
         let epoch = packet.epoch;
-        if begin.vertices as usize != N {
-            return Err(Rejection::VertexCount { vertices: begin.vertices });
+        if begin.rows as usize != N || begin.content != Content::Whole {
+            return Err(Rejection::VertexCount { vertices: begin.rows });
         }
         // A box within the limit holds no row beyond it: quantised vertices need no further check.
         if let Encoding::Quantised(grid) = begin.encoding {

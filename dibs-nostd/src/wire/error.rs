@@ -35,6 +35,11 @@ pub enum PacketError {
         /// Offset of the field's first byte.
         offset: usize,
     },
+    /// A begin, heartbeat or status with a place in a frame, or anything else without one.
+    Sequence {
+        /// In the packet.
+        sequence: u16,
+    },
     /// The length does not follow from kind and count.
     Length {
         /// Bytes received.
@@ -42,8 +47,18 @@ pub enum PacketError {
         /// Bytes that a packet of this kind and count has.
         expected: usize,
     },
-    /// A vertex packet without a vertex.
+    /// A packet of vertices or weights without any.
     Empty,
+    /// A content of frames that this version does not have.
+    Content {
+        /// In the packet.
+        content: u8,
+    },
+    /// A frame without rows, or with more than a frame can have.
+    Rows {
+        /// In the packet.
+        rows: u32,
+    },
     /// An encoding that this version does not have.
     Encoding {
         /// In the packet.
@@ -66,10 +81,15 @@ impl fmt::Display for PacketError {
             Self::Version { version } => write!(f, "protocol version {version} is not spoken here"),
             Self::Kind { kind } => write!(f, "packet kind {kind} does not exist"),
             Self::Reserved { offset } => write!(f, "the field at byte {offset} must be zero"),
+            Self::Sequence { sequence } => {
+                write!(f, "sequence number {sequence} does not go with the packet's kind")
+            }
             Self::Length { bytes, expected } => {
                 write!(f, "the packet has {bytes} bytes where its kind and count make {expected}")
             }
-            Self::Empty => write!(f, "a vertex packet without a vertex"),
+            Self::Empty => write!(f, "a packet of vertices or weights without any"),
+            Self::Content { content } => write!(f, "frame content {content} does not exist"),
+            Self::Rows { rows } => write!(f, "a frame cannot have {rows} rows"),
             Self::Encoding { encoding } => write!(f, "position encoding {encoding} does not exist"),
             Self::Box => write!(f, "the quantisation box is not finite or its step not positive"),
         }

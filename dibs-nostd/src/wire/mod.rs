@@ -1,28 +1,43 @@
-//! The wire protocol: vertex frames as packets of at most one transport unit.
+//! The wire protocol: surfaces as packets of at most one transport unit, and the way back.
 //!
-//! The byte layout is specified in `docs/wire.md`. A frame is one [`Begin`] packet, [`Vertices`]
-//! packets in any order, and one [`Commit`]. [`FrameEncoder`] makes the packets on the sender's side,
-//! [`Packet::decode`] reads one in place on the receiver's, and the
-//! [`Assembler`](crate::Assembler) makes frames of them. On a byte stream each packet is framed with
-//! COBS: [`enframe`] and [`Deframer`]. On CAN-FD or UDP a packet is one message.
+//! The byte layout is specified in `docs/wire.md`. A frame is one [`Begin`] packet, packets of
+//! [`Vertices`] or [`Weights`], and one [`Commit`]. [`FrameEncoder`] and [`WeightsEncoder`] make the
+//! packets on the sender's side, [`Packet::decode`] reads one in place on the receiver's, and the
+//! [`Assembler`](crate::Assembler) makes frames of them. A [`Heartbeat`] tells the receiver that the
+//! sender lives, a [`Status`] tells the sender what came of its frames.
+//!
+//! On a byte stream each packet is framed with COBS: [`enframe`] and [`Deframer`]. On UDP a packet is
+//! one datagram, on CAN-FD one message: [`canfd`].
 //!
 //! Everything is bounded by the packet's length, and nothing is copied but positions.
 
+mod body;
+pub mod canfd;
+mod counters;
 mod encode;
 mod error;
+mod fields;
+mod id;
+mod mac;
 mod packet;
 mod quantised;
+mod status;
 mod stream;
 
-pub use encode::{EncodeError, FrameEncoder};
+pub use body::{Begin, Body, Commit, Content, Encoding, Heartbeat, Rows, Vertices, Weights};
+pub(crate) use body::{float_position, quantised_row};
+pub use counters::{Counters, Event};
+pub use encode::{EncodeError, FrameEncoder, WeightsEncoder, encode_heartbeat, encode_status};
 pub use error::PacketError;
-pub use packet::{Begin, Body, Commit, Encoding, Packet, Rows, Vertices};
-pub(crate) use packet::{float_position, quantised_row};
+pub use id::{FrameId, is_newer};
+pub use mac::{Mac, NoMac, TAG_BYTES};
+pub use packet::Packet;
 pub use quantised::{BoxError, QuantisedBox};
+pub use status::{PublishedStatus, Status, StatusReport};
 pub use stream::{Deframer, StreamError, enframe, framed_bytes};
 
 /// The protocol's version: the first byte of every packet.
-pub const VERSION: u8 = 1;
+pub const VERSION: u8 = 2;
 
 /// Bytes of the header that every packet starts with.
 pub const HEADER_BYTES: usize = 18;
@@ -30,11 +45,20 @@ pub const HEADER_BYTES: usize = 18;
 /// Bytes of the CRC-32 that every packet ends with.
 pub const CHECKSUM_BYTES: usize = 4;
 
-/// Smallest transport unit: a CAN-FD message. A [`Begin`] packet needs 54 bytes of it.
+/// Smallest transport unit: a CAN-FD message.
 pub const MIN_MTU: usize = 64;
 
-/// Largest packet: 255 `f32` positions.
-pub const MAX_PACKET: usize = HEADER_BYTES + 255 * 12 + CHECKSUM_BYTES;
+/// Largest packet: 255 `f32` positions and a tag.
+pub const MAX_PACKET: usize = HEADER_BYTES + 255 * 12 + TAG_BYTES + CHECKSUM_BYTES;
+
+/// Most rows that a frame can have.
+pub const MAX_ROWS: u32 = 1 << 24;
+
+/// Most packets between a frame's begin and its commit.
+pub const MAX_CONTENT_PACKETS: u32 = 65_534;
+
+/// Most weights that a modal frame can have.
+pub const MAX_WEIGHTS: u32 = 64;
 
 /// The packet kinds: the second byte. Others are reserved.
 mod kind {
@@ -42,4 +66,17 @@ mod kind {
     pub const FLOAT_VERTICES: u8 = 2;
     pub const QUANTISED_VERTICES: u8 = 3;
     pub const COMMIT: u8 = 4;
+    pub const WEIGHTS: u8 = 5;
+    pub const HEARTBEAT: u8 = 6;
+    pub const STATUS: u8 = 7;
+    /// Set in the kind of a packet that carries a tag.
+    pub const TAGGED: u8 = 0x80;
+}
+
+/// Length of a packet whose content takes this many bytes: up to 64, the next length that CAN-FD has.
+const fn padded(bytes: usize) -> usize {
+    match canfd::dlc_of(bytes) {
+        Some(dlc) => canfd::length_of(dlc),
+        None => bytes,
+    }
 }

@@ -1,253 +1,203 @@
 //! One packet, decoded in place.
 
-use glam::Vec3;
-
-use super::{BoxError, CHECKSUM_BYTES, HEADER_BYTES, PacketError, QuantisedBox, VERSION, kind};
+use super::fields::Fields;
+use super::{
+    Begin, Body, BoxError, CHECKSUM_BYTES, Commit, Content, Encoding, HEADER_BYTES, Heartbeat,
+    MAX_ROWS, MAX_WEIGHTS, Mac, PacketError, PublishedStatus, QuantisedBox, Rows, Status,
+    StatusReport, TAG_BYTES, VERSION, Vertices, Weights, float_position, kind, padded,
+};
 use crate::format::CRC;
 
 /// A packet whose checksum and form are right. It borrows the bytes that it was decoded from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Packet<'a> {
-    /// Identity of the mesh whose vertices these are: `Tree::mesh_id`.
+    /// Identity of the mesh whose surface this is about: `Tree::mesh_id`.
     pub mesh_id: u32,
+    /// The lower half of the session; [`Begin`], [`Heartbeat`] and [`Status`] have all of it.
+    pub session_low: u16,
     /// Number of the frame; wraps.
     pub epoch: u32,
+    /// Place of the packet in its frame: 0 for a begin, from 1 for what follows.
+    pub sequence: u16,
     /// The packet's CRC-32: [`Commit::digest`] sums them.
     pub checksum: u32,
     /// What the packet says.
     pub body: Body<'a>,
-}
-
-/// What a packet says.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Body<'a> {
-    /// A frame begins.
-    Begin(Begin),
-    /// Some of its vertices.
-    Vertices(Vertices<'a>),
-    /// The sender has sent all of it.
-    Commit(Commit),
-}
-
-/// The first packet of a frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Begin {
-    /// Vertices of the whole frame.
-    pub vertices: u32,
-    /// How the frame's positions are written.
-    pub encoding: Encoding,
-}
-
-/// How a frame's positions are written.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Encoding {
-    /// Three `f32` in mm: 12 bytes a vertex, exact.
-    Float,
-    /// Three `u16` in a box: 6 bytes a vertex.
-    Quantised(QuantisedBox),
-}
-
-/// A run of consecutive vertices.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Vertices<'a> {
-    /// Row of the first vertex, in the tree's vertex order.
-    pub first: u32,
-    /// The positions.
-    pub rows: Rows<'a>,
-}
-
-/// Positions as they stand in the packet: 1 to 255 of them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Rows<'a> {
-    /// Little-endian `f32`, not checked: any bits may come.
-    Float(&'a [[u8; 12]]),
-    /// Little-endian `u16`.
-    Quantised(&'a [[u8; 6]]),
-}
-
-impl Rows<'_> {
-    /// Number of positions.
-    #[must_use]
-    pub const fn len(&self) -> usize {
-        match self {
-            Self::Float(rows) => rows.len(),
-            Self::Quantised(rows) => rows.len(),
-        }
-    }
-
-    /// Never true for a decoded packet.
-    #[must_use]
-    pub const fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-}
-
-/// Decodes one row of [`Rows::Float`].
-#[inline(always)]
-pub(crate) fn float_position(row: &[u8; 12]) -> Vec3 {
-    let &[x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3] = row;
-    Vec3::new(
-        f32::from_le_bytes([x0, x1, x2, x3]),
-        f32::from_le_bytes([y0, y1, y2, y3]),
-        f32::from_le_bytes([z0, z1, z2, z3]),
-    )
-}
-
-/// Decodes one row of [`Rows::Quantised`].
-#[inline(always)]
-pub(crate) const fn quantised_row(row: &[u8; 6]) -> [u16; 3] {
-    let &[x0, x1, y0, y1, z0, z1] = row;
-    [u16::from_le_bytes([x0, x1]), u16::from_le_bytes([y0, y1]), u16::from_le_bytes([z0, z1])]
-}
-
-/// The last packet of a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Commit {
-    /// Wrapping sum of the checksums of the frame's begin packet and all its vertex packets. Packets
-    /// of two frames that happen to share an epoch, as after a restart of the sender, do not add up
-    /// to it.
-    pub digest: u32,
+    /// What the tag covers, and the tag.
+    tag: Option<(&'a [u8], &'a [u8; TAG_BYTES])>,
 }
 
 impl<'a> Packet<'a> {
-    /// Checks the checksum and the form of a packet. Cost: linear in the bytes.
-    ///
-    /// Whether mesh, epoch, range and coordinates make sense is for the receiver to judge.
+    /// Decodes one packet, whole and nothing else. Cost: O(bytes), for the checksum; the positions
+    /// stay where they are.
     ///
     /// ```
     /// use dibs_nostd::wire::{Packet, PacketError};
-    /// assert_eq!(Packet::decode(&[1, 2, 3]), Err(PacketError::TooShort { bytes: 3 }));
+    /// assert_eq!(Packet::decode(&[2, 1, 0]), Err(PacketError::TooShort { bytes: 3 }));
     /// ```
     ///
     /// # Errors
     /// [`PacketError`] names the first check that failed.
+    #[inline]
     pub fn decode(bytes: &'a [u8]) -> Result<Self, PacketError> {
         let too_short = PacketError::TooShort { bytes: bytes.len() };
-        let (content, stated) = bytes.split_last_chunk::<CHECKSUM_BYTES>().ok_or(too_short)?;
-        let (header, rest) = content.split_first_chunk::<HEADER_BYTES>().ok_or(too_short)?;
+        let (covered, stated) = bytes.split_last_chunk::<CHECKSUM_BYTES>().ok_or(too_short)?;
+        let (header, rest) = covered.split_first_chunk::<HEADER_BYTES>().ok_or(too_short)?;
         let stated = u32::from_le_bytes(*stated);
-        let computed = CRC.checksum(content);
+        let computed = CRC.checksum(covered);
         if stated != computed {
             return Err(PacketError::Checksum { stated, computed });
         }
-        let &[version, kind, flags, count, m0, m1, m2, m3, e0, e1, e2, e3, f0, f1, f2, f3, r0, r1] =
-            header;
+        let mut fields = Fields(header);
+        let version = fields.u8();
         if version != VERSION {
             return Err(PacketError::Version { version });
         }
-        zero(flags == 0, 2)?;
-        zero(r0 == 0 && r1 == 0, 16)?;
-        let first = u32::from_le_bytes([f0, f1, f2, f3]);
-        let frame = FieldsOfBody { bytes: bytes.len(), first, count, rest };
+        let tagged_kind = fields.u8();
+        let session_low = fields.u16();
+        let mesh_id = fields.u32();
+        let epoch = fields.u32();
+        let sequence = fields.u16();
+        let count = fields.u8();
+        let first = fields.u24();
+        let (kind, is_tagged) = (tagged_kind & !kind::TAGGED, tagged_kind & kind::TAGGED != 0);
+        let size = match kind {
+            kind::BEGIN => 36,
+            kind::FLOAT_VERTICES => usize::from(count) * 12,
+            kind::QUANTISED_VERTICES => usize::from(count) * 6,
+            kind::COMMIT => 4,
+            kind::WEIGHTS => usize::from(count) * 4,
+            kind::HEARTBEAT => 8,
+            kind::STATUS => 20 + usize::from(count) * 4,
+            _ => return Err(PacketError::Kind { kind: tagged_kind }),
+        };
+        let tag_bytes = if is_tagged { TAG_BYTES } else { 0 };
+        let expected = padded(HEADER_BYTES + size + tag_bytes + CHECKSUM_BYTES);
+        let wrong_length = PacketError::Length { bytes: bytes.len(), expected };
+        let (body, padding) = rest.split_at_checked(size).ok_or(wrong_length)?;
+        if bytes.len() != expected {
+            return Err(wrong_length);
+        }
+        let (padding, tag) = if is_tagged {
+            let (padding, tag) = padding.split_last_chunk::<TAG_BYTES>().ok_or(wrong_length)?;
+            let signed = covered.get(..covered.len().saturating_sub(TAG_BYTES));
+            (padding, Some((signed.unwrap_or_default(), tag)))
+        } else {
+            (padding, None)
+        };
+        zero(padding, HEADER_BYTES + size)?;
+        if !matches!(kind, kind::FLOAT_VERTICES | kind::QUANTISED_VERTICES | kind::WEIGHTS) {
+            zero(&[if kind == kind::STATUS { 0 } else { count }], 14)?;
+            zero(&[if kind == kind::STATUS { 0 } else { u8::from(first != 0) }], 15)?;
+        } else if count == 0 {
+            return Err(PacketError::Empty);
+        }
+        // Only what comes after a frame's begin has a place in it.
+        let is_placed = !matches!(kind, kind::BEGIN | kind::HEARTBEAT | kind::STATUS);
+        if is_placed != (sequence != 0) {
+            return Err(PacketError::Sequence { sequence });
+        }
         let body = match kind {
-            kind::BEGIN => Body::Begin(frame.begin()?),
+            kind::BEGIN => Body::Begin(begin(Fields(body), session_low)?),
             kind::FLOAT_VERTICES => {
-                Body::Vertices(Vertices { first, rows: Rows::Float(frame.rows()?) })
+                Body::Vertices(Vertices { first, rows: Rows::Float(body.as_chunks().0) })
             }
             kind::QUANTISED_VERTICES => {
-                Body::Vertices(Vertices { first, rows: Rows::Quantised(frame.rows()?) })
+                Body::Vertices(Vertices { first, rows: Rows::Quantised(body.as_chunks().0) })
             }
-            kind::COMMIT => Body::Commit(frame.commit()?),
-            kind => return Err(PacketError::Kind { kind }),
+            kind::COMMIT => Body::Commit(Commit { digest: Fields(body).u32() }),
+            kind::WEIGHTS => Body::Weights(Weights { first, values: body.as_chunks().0 }),
+            kind::HEARTBEAT => Body::Heartbeat(heartbeat(Fields(body), session_low)?),
+            _ => Body::Status(status(Fields(body), session_low, epoch, first)?),
         };
-        Ok(Self {
-            mesh_id: u32::from_le_bytes([m0, m1, m2, m3]),
-            epoch: u32::from_le_bytes([e0, e1, e2, e3]),
-            checksum: stated,
-            body,
-        })
-    }
-}
-
-/// What the bodies are decoded from.
-struct FieldsOfBody<'a> {
-    bytes: usize,
-    first: u32,
-    count: u8,
-    rest: &'a [u8],
-}
-
-impl<'a> FieldsOfBody<'a> {
-    fn length(&self, body: usize) -> PacketError {
-        PacketError::Length { bytes: self.bytes, expected: HEADER_BYTES + body + CHECKSUM_BYTES }
+        Ok(Self { mesh_id, session_low, epoch, sequence, checksum: stated, body, tag })
     }
 
-    /// A body of fixed size, in a packet that carries no vertices.
-    fn fixed<const SIZE: usize>(&self) -> Result<&'a [u8; SIZE], PacketError> {
-        zero(self.count == 0, 3)?;
-        zero(self.first == 0, 12)?;
-        self.rest.try_into().map_err(|_| self.length(SIZE))
-    }
-
-    fn begin(&self) -> Result<Begin, PacketError> {
-        let &[
-            n0,
-            n1,
-            n2,
-            n3,
-            encoding,
-            p0,
-            p1,
-            p2,
-            x0,
-            x1,
-            x2,
-            x3,
-            y0,
-            y1,
-            y2,
-            y3,
-            z0,
-            z1,
-            z2,
-            z3,
-            u0,
-            u1,
-            u2,
-            u3,
-            v0,
-            v1,
-            v2,
-            v3,
-            w0,
-            w1,
-            w2,
-            w3,
-        ] = self.fixed::<32>()?;
-        zero([p0, p1, p2] == [0; 3], HEADER_BYTES + 5)?;
-        let origin = [x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3];
-        let step = [u0, u1, u2, u3, v0, v1, v2, v3, w0, w1, w2, w3];
-        let encoding = match encoding {
-            0 => {
-                zero(origin == [0; 12] && step == [0; 12], HEADER_BYTES + 8)?;
-                Encoding::Float
+    /// Whether the packet is genuine, as one of this session: its tag is the one that `mac` makes, or
+    /// it carries none and `mac` asks for none. Compares in constant time.
+    #[must_use]
+    pub fn is_genuine<M: Mac>(&self, mac: &M, session: u32) -> bool {
+        match self.tag {
+            Some((signed, tag)) if M::TAGGED => {
+                let made = mac.tag(session, signed);
+                made.iter().zip(tag).fold(0, |difference, (a, b)| difference | (a ^ b)) == 0
             }
-            1 => Encoding::Quantised(
-                QuantisedBox::new(float_position(&origin), float_position(&step))
-                    .map_err(|BoxError { .. }| PacketError::Box)?,
-            ),
-            encoding => return Err(PacketError::Encoding { encoding }),
-        };
-        Ok(Begin { vertices: u32::from_le_bytes([n0, n1, n2, n3]), encoding })
-    }
-
-    fn rows<const SIZE: usize>(&self) -> Result<&'a [[u8; SIZE]], PacketError> {
-        let (rows, remainder) = self.rest.as_chunks::<SIZE>();
-        if rows.len() != usize::from(self.count) || !remainder.is_empty() {
-            return Err(self.length(usize::from(self.count) * SIZE));
+            None => !M::TAGGED,
+            Some(_) => false,
         }
-        if rows.is_empty() { Err(PacketError::Empty) } else { Ok(rows) }
     }
+}
 
-    fn commit(&self) -> Result<Commit, PacketError> {
-        Ok(Commit { digest: u32::from_le_bytes(*self.fixed()?) })
+/// A session of which the header has the lower half.
+fn session_of(high: u16, low: u16) -> u32 {
+    u32::from(high) << 16 | u32::from(low)
+}
+
+fn begin(mut fields: Fields<'_>, session_low: u16) -> Result<Begin, PacketError> {
+    let session = session_of(fields.u16(), session_low);
+    let (content, encoding) = (fields.u8(), fields.u8());
+    let (rows, base_epoch) = (fields.u32(), fields.u32());
+    let grid = fields.0;
+    let (origin, step) = (fields.take(), fields.take());
+    let (content, limit) = match content {
+        0 => (Content::Whole, MAX_ROWS),
+        1 => (Content::Partial { base_epoch }, MAX_ROWS),
+        2 => (Content::Modal, MAX_WEIGHTS),
+        content => return Err(PacketError::Content { content }),
+    };
+    if rows == 0 || rows > limit {
+        return Err(PacketError::Rows { rows });
     }
+    if !matches!(content, Content::Partial { .. }) {
+        zero(&base_epoch.to_le_bytes(), HEADER_BYTES + 8)?;
+    }
+    let encoding = match encoding {
+        0 => {
+            zero(grid, HEADER_BYTES + 12)?;
+            Encoding::Float
+        }
+        1 if content != Content::Modal => Encoding::Quantised(
+            QuantisedBox::new(float_position(&origin), float_position(&step))
+                .map_err(|BoxError { .. }| PacketError::Box)?,
+        ),
+        encoding => return Err(PacketError::Encoding { encoding }),
+    };
+    Ok(Begin { session, content, encoding, rows })
+}
+
+fn heartbeat(mut fields: Fields<'_>, session_low: u16) -> Result<Heartbeat, PacketError> {
+    let session = session_of(fields.u16(), session_low);
+    zero(&fields.take::<2>(), HEADER_BYTES + 2)?;
+    Ok(Heartbeat { session, beat: fields.u32() })
+}
+
+fn status(
+    mut fields: Fields<'_>,
+    session_low: u16,
+    epoch: u32,
+    first: u32,
+) -> Result<StatusReport<'_>, PacketError> {
+    let session = session_of(fields.u16(), session_low);
+    let (flags, safety) = (fields.u8(), fields.u8());
+    let number = fields.u32();
+    let (age_ms, stretch) = (fields.u32(), f32::from_bits(fields.u32()));
+    let challenge = fields.u32();
+    zero(&[flags & !3], HEADER_BYTES + 2)?;
+    let published = if flags & 1 == 0 {
+        zero(&[u8::from(session != 0 || epoch != 0 || age_ms != 0)], HEADER_BYTES)?;
+        zero(&stretch.to_bits().to_le_bytes(), HEADER_BYTES + 12)?;
+        None
+    } else {
+        let stretch = if stretch > 0.0 { Some(stretch) } else { None };
+        Some(PublishedStatus { session, epoch, age_ms, stretch })
+    };
+    let status = Status { published, wants_whole: flags & 2 != 0, safety, number, challenge };
+    let first_counter = u8::try_from(first).map_err(|_| PacketError::Reserved { offset: 16 })?;
+    Ok(StatusReport { status, first_counter, counters: fields.0.as_chunks().0 })
 }
 
 /// An error unless a reserved field, at this offset, is zero.
-fn zero(is_zero: bool, offset: usize) -> Result<(), PacketError> {
-    if is_zero { Ok(()) } else { Err(PacketError::Reserved { offset }) }
+#[inline]
+fn zero(field: &[u8], offset: usize) -> Result<(), PacketError> {
+    if field.iter().all(|&byte| byte == 0) { Ok(()) } else { Err(PacketError::Reserved { offset }) }
 }

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use controller::{MTU, TICK_RATE};
-use dibs_nostd::wire::{Encoding, FrameEncoder, QuantisedBox, enframe, framed_bytes};
+use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, QuantisedBox, enframe, framed_bytes};
 use glam::Vec3;
 
 use super::scene::Scene;
@@ -62,8 +62,8 @@ pub fn send(scene: &Scene, link: &Link, mut bus: UnixStream) -> Result<()> {
 
         let start = link.tick.load(Ordering::Relaxed);
         let encoding = Encoding::Quantised(grid);
-        let mesh = scene.tree.summary().mesh_id;
-        let mut encoder = FrameEncoder::<_, MTU>::new(mesh, epoch, encoding, &exact[..])?;
+        let id = FrameId { mesh_id: scene.tree.summary().mesh_id, session: 1, epoch };
+        let mut encoder = FrameEncoder::<_, MTU>::new(id, encoding, &exact[..])?;
         let mut packet = [0; MTU];
         let mut line = [0; framed_bytes(MTU)];
         while let Some(packet) = encoder.next_packet(&mut packet) {

@@ -1,0 +1,155 @@
+//! What packets say.
+
+use glam::Vec3;
+
+use super::{QuantisedBox, StatusReport};
+
+/// What a packet says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Body<'a> {
+    /// A frame begins.
+    Begin(Begin),
+    /// Some of its vertices.
+    Vertices(Vertices<'a>),
+    /// Some of its mode weights.
+    Weights(Weights<'a>),
+    /// The sender has sent all of it.
+    Commit(Commit),
+    /// The sender lives.
+    Heartbeat(Heartbeat),
+    /// What the receiver has: the only packet on the way back.
+    Status(StatusReport<'a>),
+}
+
+/// The first packet of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Begin {
+    /// The sender's session, all of it.
+    pub session: u32,
+    /// What the frame holds.
+    pub content: Content,
+    /// How its positions are written.
+    pub encoding: Encoding,
+    /// Vertices of the surface; in a modal frame, weights.
+    pub rows: u32,
+}
+
+/// What a frame holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Content {
+    /// Every vertex.
+    Whole,
+    /// The vertices that are not, within the encoding's error, where they were in a published frame.
+    Partial {
+        /// That frame, of the same session.
+        base_epoch: u32,
+    },
+    /// The weights of displacement modes.
+    Modal,
+}
+
+/// How a frame's positions are written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Encoding {
+    /// Three `f32` in mm: 12 bytes a vertex, exact.
+    Float,
+    /// Three `u16` in a box: 6 bytes a vertex.
+    Quantised(QuantisedBox),
+}
+
+impl Encoding {
+    /// No decoded position is farther than this from the sender's, in mm.
+    #[must_use]
+    pub fn error(&self) -> f32 {
+        match self {
+            Self::Float => 0.0,
+            Self::Quantised(grid) => grid.error(),
+        }
+    }
+}
+
+/// A run of consecutive vertices.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vertices<'a> {
+    /// Row of the first vertex, in the tree's vertex order.
+    pub first: u32,
+    /// The positions.
+    pub rows: Rows<'a>,
+}
+
+/// Positions as they stand in the packet: 1 to 255 of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Rows<'a> {
+    /// Little-endian `f32`, not checked: any bits may come.
+    Float(&'a [[u8; 12]]),
+    /// Little-endian `u16`.
+    Quantised(&'a [[u8; 6]]),
+}
+
+impl Rows<'_> {
+    /// Number of positions.
+    #[must_use]
+    pub const fn len(&self) -> usize {
+        match self {
+            Self::Float(rows) => rows.len(),
+            Self::Quantised(rows) => rows.len(),
+        }
+    }
+
+    /// Never true for a decoded packet.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// Decodes one row of [`Rows::Float`].
+#[inline(always)]
+pub(crate) fn float_position(row: &[u8; 12]) -> Vec3 {
+    let &[x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3] = row;
+    Vec3::new(
+        f32::from_le_bytes([x0, x1, x2, x3]),
+        f32::from_le_bytes([y0, y1, y2, y3]),
+        f32::from_le_bytes([z0, z1, z2, z3]),
+    )
+}
+
+/// Decodes one row of [`Rows::Quantised`].
+#[inline(always)]
+pub(crate) const fn quantised_row(row: &[u8; 6]) -> [u16; 3] {
+    let &[x0, x1, y0, y1, z0, z1] = row;
+    [u16::from_le_bytes([x0, x1]), u16::from_le_bytes([y0, y1]), u16::from_le_bytes([z0, z1])]
+}
+
+/// A run of consecutive mode weights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weights<'a> {
+    /// Number of the first mode.
+    pub first: u32,
+    /// Little-endian `f32`, 1 to 64 of them, not checked: any bits may come.
+    pub values: &'a [[u8; 4]],
+}
+
+/// The last packet of a frame. Its sequence number is one more than that of the frame's last packet
+/// of content.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Commit {
+    /// Wrapping sum of the checksums of the frame's begin packet and all its packets of content.
+    /// Packets of two frames that happen to share session and epoch do not add up.
+    pub digest: u32,
+}
+
+/// A sign of life from the sender; the packet's epoch is the newest that it has begun.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Heartbeat {
+    /// The sender's session, all of it.
+    pub session: u32,
+    /// One more in each heartbeat of the session; wraps.
+    pub beat: u32,
+}

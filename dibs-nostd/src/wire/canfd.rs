@@ -1,0 +1,87 @@
+//! Packets as CAN-FD messages: data length codes and identifiers, for any driver.
+//!
+//! A packet of at most 64 bytes has one of CAN-FD's lengths already, so a message's data is the
+//! packet. `embedded-can`'s frames hold 8 bytes, hence this mapping onto plain numbers and slices.
+//!
+//! ```
+//! use dibs_nostd::wire::canfd::{Identifiers, dlc_of, length_of};
+//! # let packet = [2, 4, 0, 0, 0xD1, 0xB5, 1, 0, 9, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+//! let identifiers = Identifiers::new(0x120).unwrap();
+//! let identifier = identifiers.of(&packet); // a commit travels with its frame
+//! assert_eq!(identifier, 0x122);
+//! assert_eq!(dlc_of(packet.len()).map(length_of), Some(packet.len()));
+//! ```
+
+use super::kind;
+
+/// Lengths of a CAN-FD message, by its data length code.
+pub const LENGTHS: [u8; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
+
+/// The data length code of the shortest message that holds this many bytes; `None` above 64.
+#[must_use]
+pub const fn dlc_of(bytes: usize) -> Option<u8> {
+    Some(match bytes {
+        0..=8 => bytes as u8,
+        9..=12 => 9,
+        13..=16 => 10,
+        17..=20 => 11,
+        21..=24 => 12,
+        25..=32 => 13,
+        33..=48 => 14,
+        49..=64 => 15,
+        _ => return None,
+    })
+}
+
+/// Bytes of a message with this data length code; its upper four bits do not count.
+#[must_use]
+pub const fn length_of(dlc: u8) -> usize {
+    match dlc & 15 {
+        15 => 64,
+        14 => 48,
+        13 => 32,
+        short if short <= 8 => short as usize,
+        // 12, 16, 20, 24
+        middle => (middle as usize - 6) * 4,
+    }
+}
+
+/// The three identifiers of one surface: the lower wins the bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Identifiers {
+    base: u16,
+}
+
+impl Identifiers {
+    /// The identifiers `base` (heartbeats), `base + 1` (statuses) and `base + 2` (frames): 11 bits
+    /// each, `None` beyond.
+    ///
+    /// All packets of frames share one identifier, because CAN keeps the order only within one.
+    #[must_use]
+    pub const fn new(base: u16) -> Option<Self> {
+        if base <= 0x7FD { Some(Self { base }) } else { None }
+    }
+
+    /// The identifier to send a packet under.
+    #[must_use]
+    pub fn of(self, packet: &[u8]) -> u16 {
+        match packet.get(1).map(|kind| kind & !kind::TAGGED) {
+            Some(kind::HEARTBEAT) => self.base,
+            Some(kind::STATUS) => self.base.wrapping_add(1),
+            _ => self.base.wrapping_add(2),
+        }
+    }
+
+    /// Whether a message with this identifier is for the receiver of the surface.
+    #[must_use]
+    pub const fn is_to_receiver(self, identifier: u16) -> bool {
+        matches!(identifier.wrapping_sub(self.base), 0 | 2)
+    }
+
+    /// Whether a message with this identifier is for the sender of the surface.
+    #[must_use]
+    pub const fn is_to_sender(self, identifier: u16) -> bool {
+        identifier.wrapping_sub(self.base) == 1
+    }
+}

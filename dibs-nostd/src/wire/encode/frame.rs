@@ -1,0 +1,223 @@
+//! A frame of vertices as packets.
+
+use super::{PacketWriter, capacity};
+use crate::VertexTable;
+use crate::wire::{
+    Begin, Content, EncodeError, Encoding, FrameId, HEADER_BYTES, MAX_CONTENT_PACKETS, MAX_ROWS,
+    Mac, NoMac, kind,
+};
+
+/// Cuts one frame into packets of at most `MTU` bytes: begin, vertices, commit.
+///
+/// `MTU` is 64 for CAN-FD, up to [`MAX_PACKET`](crate::wire::MAX_PACKET) elsewhere; less than 64 does
+/// not compile. No memory but the caller's buffer.
+///
+/// ```
+/// use dibs_nostd::{wire::{Encoding, FrameEncoder, FrameId, Packet}, glam::Vec3};
+///
+/// let positions = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE];
+/// let id = FrameId { mesh_id: 0xB0D1, session: 1, epoch: 1 };
+/// let mut buffer = [0; 64];
+/// let mut frame = FrameEncoder::<_, 64>::new(id, Encoding::Float, &positions[..])?;
+/// let mut packets = 0;
+/// while let Some(packet) = frame.next_packet(&mut buffer) {
+///     assert!(Packet::decode(packet).is_ok());
+///     packets += 1;
+/// }
+/// assert_eq!(packets, 4); // begin, three vertices, the fourth vertex, commit
+///
+/// // One vertex moves: the next frame holds only that.
+/// let mut moved = positions;
+/// moved[2].z = 1.5;
+/// let id = FrameId { epoch: 2, ..id };
+/// let mut frame =
+///     FrameEncoder::<_, 64>::partial(id, Encoding::Float, &moved[..], 1, &positions[..])?;
+/// let mut packets = 0;
+/// while frame.next_packet(&mut buffer).is_some() {
+///     packets += 1;
+/// }
+/// assert_eq!(packets, 3);
+/// # Ok::<(), dibs_nostd::wire::EncodeError>(())
+/// ```
+pub struct FrameEncoder<'a, T: ?Sized, const MTU: usize, M = NoMac> {
+    id: FrameId,
+    begin: Begin,
+    positions: &'a T,
+    /// Of a partial frame: where the receiver has the vertices.
+    held: Option<&'a T>,
+    mac: M,
+    next: Next,
+    sequence: u16,
+    digest: u32,
+}
+
+enum Next {
+    Begin,
+    Vertices { first: u32 },
+    Commit,
+    Done,
+}
+
+impl<'a, T: VertexTable + ?Sized, const MTU: usize> FrameEncoder<'a, T, MTU> {
+    /// A whole frame. Checks that all of it can be sent: linear in the vertices.
+    ///
+    /// # Errors
+    /// [`EncodeError`] names the first vertex that is not finite or outside the quantisation box.
+    pub fn new(id: FrameId, encoding: Encoding, positions: &'a T) -> Result<Self, EncodeError> {
+        let rows = u32::try_from(positions.len()).ok().filter(|rows| (1..=MAX_ROWS).contains(rows));
+        let rows = rows.ok_or(EncodeError::Rows { rows: positions.len() })?;
+        for row in 0..rows {
+            let position = positions.position(row).filter(|position| position.is_finite());
+            let position = position.ok_or(EncodeError::NotFinite { row })?;
+            if let Encoding::Quantised(grid) = encoding
+                && grid.quantise(position).is_none()
+            {
+                return Err(EncodeError::OutOfBox { row });
+            }
+        }
+        let begin = Begin { session: id.session, content: Content::Whole, encoding, rows };
+        let next = Next::Begin;
+        let frame =
+            Self { id, begin, positions, held: None, mac: NoMac, next, sequence: 0, digest: 0 };
+        frame.fits()
+    }
+
+    /// A partial frame: the vertices that are not, within the encoding's error, where the receiver has
+    /// them, which is as `held` in the frame `base_epoch` of the same session. With a few others in
+    /// between, where that saves packets.
+    ///
+    /// `held` must be what the receiver decoded: for a quantised base, not what was quantised.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), and [`EncodeError::Base`].
+    pub fn partial(
+        id: FrameId,
+        encoding: Encoding,
+        positions: &'a T,
+        base_epoch: u32,
+        held: &'a T,
+    ) -> Result<Self, EncodeError> {
+        if held.len() != positions.len() {
+            return Err(EncodeError::Base { rows: held.len() });
+        }
+        let mut frame = Self::new(id, encoding, positions)?;
+        frame.begin.content = Content::Partial { base_epoch };
+        frame.held = Some(held);
+        Ok(frame)
+    }
+
+    /// The same frame, with a tag on every packet.
+    ///
+    /// # Errors
+    /// [`EncodeError::Packets`], because fewer vertices fit a packet.
+    pub fn with_mac<M: Mac>(self, mac: M) -> Result<FrameEncoder<'a, T, MTU, M>, EncodeError> {
+        let Self { id, begin, positions, held, next, sequence, digest, .. } = self;
+        FrameEncoder { id, begin, positions, held, mac, next, sequence, digest }.fits()
+    }
+}
+
+impl<T: VertexTable + ?Sized, M: Mac, const MTU: usize> FrameEncoder<'_, T, MTU, M> {
+    /// Vertices in a packet of `f32` positions.
+    const FLOATS: u32 = capacity::<M>(MTU, HEADER_BYTES, 12);
+    /// Vertices in a packet of quantised positions.
+    const QUANTISED: u32 = capacity::<M>(MTU, HEADER_BYTES, 6);
+
+    /// Vertices in a full packet.
+    const fn capacity(&self) -> u32 {
+        match self.begin.encoding {
+            Encoding::Float => Self::FLOATS,
+            Encoding::Quantised(_) => Self::QUANTISED,
+        }
+    }
+
+    /// A partial frame never takes more packets than a whole one: each packet starts at a vertex that
+    /// moved, and takes all that fit behind it.
+    fn fits(self) -> Result<Self, EncodeError> {
+        let packets = self.begin.rows.div_ceil(self.capacity());
+        if packets > MAX_CONTENT_PACKETS { Err(EncodeError::Packets { packets }) } else { Ok(self) }
+    }
+
+    /// Writes the next packet to the buffer; `None` after the commit.
+    pub fn next_packet<'b>(&mut self, buffer: &'b mut [u8; MTU]) -> Option<&'b [u8]> {
+        let first = match self.next {
+            Next::Begin => {
+                let mut packet = self.packet(buffer, kind::BEGIN, 0, 0);
+                packet.begin(&self.begin);
+                let (packet, checksum) = packet.finish(&self.mac, self.id.session);
+                self.digest = checksum;
+                self.next = self.vertices_from(0);
+                return Some(packet);
+            }
+            Next::Vertices { first } => first,
+            Next::Commit => {
+                self.sequence = self.sequence.wrapping_add(1);
+                let mut packet = self.packet(buffer, kind::COMMIT, 0, 0);
+                packet.put(&self.digest.to_le_bytes());
+                self.next = Next::Done;
+                return Some(packet.finish(&self.mac, self.id.session).0);
+            }
+            Next::Done => return None,
+        };
+        self.sequence = self.sequence.wrapping_add(1);
+        let end = self.end_of_run(first);
+        let count = (end - first) as u8;
+        let kind = match self.begin.encoding {
+            Encoding::Float => kind::FLOAT_VERTICES,
+            Encoding::Quantised(_) => kind::QUANTISED_VERTICES,
+        };
+        let mut packet = self.packet(buffer, kind, count, first);
+        for row in first..end {
+            let position = self.positions.position(row).unwrap_or_default();
+            match self.begin.encoding {
+                Encoding::Float => {
+                    for coordinate in position.to_array() {
+                        packet.put(&coordinate.to_le_bytes());
+                    }
+                }
+                Encoding::Quantised(grid) => {
+                    for coordinate in grid.quantise(position).unwrap_or_default() {
+                        packet.put(&coordinate.to_le_bytes());
+                    }
+                }
+            }
+        }
+        let (packet, checksum) = packet.finish(&self.mac, self.id.session);
+        self.digest = self.digest.wrapping_add(checksum);
+        self.next = self.vertices_from(end);
+        Some(packet)
+    }
+
+    fn packet<'b>(
+        &self,
+        buffer: &'b mut [u8; MTU],
+        kind: u8,
+        count: u8,
+        first: u32,
+    ) -> PacketWriter<'b, M> {
+        PacketWriter::new(buffer, kind, &self.id, self.sequence, count, first)
+    }
+
+    /// The next packet of vertices starts at the first row from here on that must be sent.
+    fn vertices_from(&self, row: u32) -> Next {
+        match (row..self.begin.rows).find(|&row| self.must_be_sent(row)) {
+            Some(first) => Next::Vertices { first },
+            None => Next::Commit,
+        }
+    }
+
+    /// One past the last row that must be sent and fits a packet that starts at `first`.
+    fn end_of_run(&self, first: u32) -> u32 {
+        let limit = self.begin.rows.min(first.saturating_add(self.capacity()));
+        let last = (first..limit).rev().find(|&row| self.must_be_sent(row));
+        last.map_or(limit, |last| last + 1)
+    }
+
+    fn must_be_sent(&self, row: u32) -> bool {
+        let Some(held) = self.held else { return true };
+        let (now, held) = (self.positions.position(row), held.position(row));
+        let (Some(now), Some(held)) = (now, held) else { return true };
+        // Written so that NaN is sent. The difference is rounded, the limit is lowered by as much.
+        let limit = self.begin.encoding.error() * (1.0 - 4.0 * f32::EPSILON);
+        !(now == held || (now - held).length() <= limit)
+    }
+}

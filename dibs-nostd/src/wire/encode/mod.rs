@@ -1,0 +1,199 @@
+//! Packets as bytes, for whoever sends them.
+
+mod frame;
+mod weights;
+
+pub use frame::FrameEncoder;
+pub use weights::WeightsEncoder;
+
+use core::fmt;
+
+use super::fields::Bytes;
+use super::{
+    Begin, CHECKSUM_BYTES, Content, Counters, Encoding, FrameId, HEADER_BYTES, Heartbeat,
+    MAX_CONTENT_PACKETS, MAX_ROWS, MAX_WEIGHTS, MIN_MTU, Mac, Status, TAG_BYTES, VERSION, kind,
+    padded,
+};
+use crate::format::CRC;
+
+/// Writes a heartbeat to the buffer. `id` has the newest epoch that the sender has begun; before the
+/// first frame, one less than the first will have. `beat` is one more in each.
+pub fn encode_heartbeat<'b, M: Mac>(
+    id: &FrameId,
+    beat: u32,
+    mac: &M,
+    buffer: &'b mut [u8; MIN_MTU],
+) -> &'b [u8] {
+    let mut packet = PacketWriter::<M>::new(buffer, kind::HEARTBEAT, id, 0, 0, 0);
+    let Heartbeat { session, beat } = Heartbeat { session: id.session, beat };
+    let [_, _, high @ ..] = session.to_le_bytes();
+    packet.put(&high);
+    packet.put(&[0; 2]);
+    packet.put(&beat.to_le_bytes());
+    packet.finish(mac, session).0
+}
+
+/// Writes a status to the buffer, with as many counters as fit: which ones follows from the status's
+/// number, so that all of them have come after a few.
+pub fn encode_status<'b, M: Mac, const MTU: usize>(
+    mesh_id: u32,
+    status: &Status,
+    counters: &Counters,
+    mac: &M,
+    buffer: &'b mut [u8; MTU],
+) -> &'b [u8] {
+    let room = const { capacity::<M>(MTU, 20 + HEADER_BYTES, 4) };
+    let all = counters.from(0).len();
+    let pages = all.div_ceil(room as usize);
+    let first = (status.number as usize).checked_rem(pages).unwrap_or(0) * room as usize;
+    let page = counters.from(first);
+    let page = page.get(..room as usize).unwrap_or(page);
+
+    let (session, epoch, age_ms, stretch) = match status.published {
+        Some(p) => (p.session, p.epoch, p.age_ms, p.stretch.unwrap_or(0.0)),
+        None => (0, 0, 0, 0.0),
+    };
+    let id = FrameId { mesh_id, session, epoch };
+    let count = page.len() as u8;
+    let mut packet = PacketWriter::<M>::new(buffer, kind::STATUS, &id, 0, count, first as u32);
+    let [_, _, high @ ..] = session.to_le_bytes();
+    packet.put(&high);
+    let flags = u8::from(status.published.is_some()) | u8::from(status.wants_whole) << 1;
+    packet.put(&[flags, status.safety]);
+    packet.put(&status.number.to_le_bytes());
+    packet.put(&age_ms.to_le_bytes());
+    packet.put(&stretch.to_le_bytes());
+    packet.put(&status.challenge.to_le_bytes());
+    for counter in page {
+        packet.put(&counter.to_le_bytes());
+    }
+    packet.finish(mac, session).0
+}
+
+/// Rows of this size that fit one packet behind `fixed` bytes.
+const fn capacity<M: Mac>(mtu: usize, fixed: usize, row: usize) -> u32 {
+    assert!(mtu >= MIN_MTU, "a packet needs a transport unit of at least 64 bytes");
+    let tag = if M::TAGGED { TAG_BYTES } else { 0 };
+    let rows = (mtu - fixed - tag - CHECKSUM_BYTES) / row;
+    if rows > 255 { 255 } else { rows as u32 }
+}
+
+/// One packet being written. The buffer is known to be large enough: `MTU` and the counts see to it.
+struct PacketWriter<'b, M> {
+    bytes: Bytes<'b>,
+    mac: core::marker::PhantomData<M>,
+}
+
+impl<'b, M: Mac> PacketWriter<'b, M> {
+    fn new(
+        buffer: &'b mut [u8],
+        kind: u8,
+        id: &FrameId,
+        sequence: u16,
+        count: u8,
+        first: u32,
+    ) -> Self {
+        let mut bytes = Bytes { buffer, used: 0 };
+        let [low, high, ..] = id.session.to_le_bytes();
+        bytes.put(&[VERSION, if M::TAGGED { kind | kind::TAGGED } else { kind }, low, high]);
+        bytes.put(&id.mesh_id.to_le_bytes());
+        bytes.put(&id.epoch.to_le_bytes());
+        bytes.put(&sequence.to_le_bytes());
+        let [f0, f1, f2, _] = first.to_le_bytes();
+        bytes.put(&[count, f0, f1, f2]);
+        Self { bytes, mac: core::marker::PhantomData }
+    }
+
+    fn put(&mut self, bytes: &[u8]) {
+        self.bytes.put(bytes);
+    }
+
+    /// The body of a begin packet.
+    fn begin(&mut self, begin: &Begin) {
+        let [_, _, high @ ..] = begin.session.to_le_bytes();
+        self.put(&high);
+        let (content, base_epoch) = match begin.content {
+            Content::Whole => (0, 0),
+            Content::Partial { base_epoch } => (1, base_epoch),
+            Content::Modal => (2, 0),
+        };
+        self.put(&[content, u8::from(begin.encoding != Encoding::Float)]);
+        self.put(&begin.rows.to_le_bytes());
+        self.put(&base_epoch.to_le_bytes());
+        match begin.encoding {
+            Encoding::Float => self.put(&[0; 24]),
+            Encoding::Quantised(grid) => {
+                for coordinate in grid.origin().to_array().iter().chain(&grid.step().to_array()) {
+                    self.put(&coordinate.to_le_bytes());
+                }
+            }
+        }
+    }
+
+    /// Adds padding, tag and checksum; the packet and its checksum.
+    fn finish(mut self, mac: &M, session: u32) -> (&'b [u8], u32) {
+        let tag_bytes = if M::TAGGED { TAG_BYTES } else { 0 };
+        let end = padded(self.bytes.used + tag_bytes + CHECKSUM_BYTES) - tag_bytes - CHECKSUM_BYTES;
+        for _ in self.bytes.used..end {
+            self.put(&[0]);
+        }
+        if M::TAGGED {
+            let tag = mac.tag(session, self.bytes.written());
+            self.put(&tag);
+        }
+        let checksum = CRC.checksum(self.bytes.written());
+        self.put(&checksum.to_le_bytes());
+        (self.bytes.into_written().unwrap_or_default(), checksum)
+    }
+}
+
+/// Why a frame cannot be sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum EncodeError {
+    /// No row, or more than a frame can have.
+    Rows {
+        /// How many.
+        rows: usize,
+    },
+    /// More packets than a frame can have: take a larger transport unit.
+    Packets {
+        /// How many it would take.
+        packets: u32,
+    },
+    /// The base of a partial frame has another number of vertices.
+    Base {
+        /// How many it has.
+        rows: usize,
+    },
+    /// A position or weight is not finite.
+    NotFinite {
+        /// The first such row.
+        row: u32,
+    },
+    /// A position is outside the quantisation box.
+    OutOfBox {
+        /// The first such row.
+        row: u32,
+    },
+}
+
+impl fmt::Display for EncodeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Rows { rows } => write!(f, "a frame of {rows} rows cannot be sent"),
+            Self::Packets { packets } => {
+                write!(f, "a frame of {packets} packets cannot be sent: the packets are too small")
+            }
+            Self::Base { rows } => write!(f, "the base of the partial frame has {rows} rows"),
+            Self::NotFinite { row } => write!(f, "row {row} is not finite"),
+            Self::OutOfBox { row } => write!(f, "row {row} is outside the quantisation box"),
+        }
+    }
+}
+
+impl core::error::Error for EncodeError {}
+
+const _: () = assert!(MAX_ROWS as usize <= usize::MAX && MAX_WEIGHTS < 255);
+const _: () = assert!(MAX_CONTENT_PACKETS < u16::MAX as u32);

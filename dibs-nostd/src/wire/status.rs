@@ -1,0 +1,43 @@
+//! What the receiver reports back to the sender.
+
+/// What the receiver has published, and what it needs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Status {
+    /// The frame published last; `None` before the first.
+    pub published: Option<PublishedStatus>,
+    /// Partial frames were refused for their base: only a whole frame helps.
+    pub wants_whole: bool,
+    /// The controller's safety state: 0 not reported, 1 nominal, 2 degraded, 3 safe.
+    pub safety: u8,
+    /// One more in each status of a receiver's run; wraps.
+    pub number: u32,
+    /// What the receiver's tags are bound to: [`Mac::challenge`](super::Mac::challenge).
+    pub challenge: u32,
+}
+
+/// The acknowledgement of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct PublishedStatus {
+    /// Its session.
+    pub session: u32,
+    /// Its number.
+    pub epoch: u32,
+    /// Time since its first packet arrived, in ms.
+    pub age_ms: u32,
+    /// Its measured stretch, `None` where the receiver does not measure.
+    pub stretch: Option<f32>,
+}
+
+/// A status with its share of the receiver's counters. [`Counters::update`](super::Counters::update)
+/// collects them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StatusReport<'a> {
+    /// The status.
+    pub status: Status,
+    /// Place of the first counter in the packet.
+    pub first_counter: u8,
+    /// The counters as they stand in the packet.
+    pub counters: &'a [[u8; 4]],
+}

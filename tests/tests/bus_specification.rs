@@ -1,0 +1,117 @@
+//! `docs/wire.md` against the code: the test vectors, and what the tables say about sizes.
+
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::wire::{
+    Body, Counters, Encoding, FrameEncoder, FrameId, NoMac, Packet, PublishedStatus, QuantisedBox,
+    Status, StatusReport, WeightsEncoder, encode_heartbeat, encode_status, enframe, framed_bytes,
+};
+
+const ID: FrameId = FrameId { mesh_id: 0xD1B5_0001, session: 0x0003_0002, epoch: 258 };
+
+/// Every line of the vectors: name and bytes.
+fn vectors() -> Vec<(&'static str, Vec<u8>)> {
+    let mut buffer = [0; 64];
+    let mut all = Vec::new();
+
+    let positions = [Vec3::new(-1.0, 0.0, 1.0), Vec3::new(0.25, 0.5, 31.0)];
+    let grid = QuantisedBox::new(Vec3::splat(-1.0), Vec3::splat(0.25)).unwrap();
+    let encoding = Encoding::Quantised(grid);
+    let mut whole = FrameEncoder::<_, 64>::new(ID, encoding, &positions[..]).unwrap();
+    for name in ["begin", "vertices", "commit"] {
+        all.push((name, whole.next_packet(&mut buffer).unwrap().to_vec()));
+    }
+    let mut line = [0; framed_bytes(64)];
+    let stream = enframe(&all[2].1, &mut line).unwrap().to_vec();
+
+    let moved = [positions[0], Vec3::new(0.25, 0.5, 30.0)];
+    let id = FrameId { epoch: 259, ..ID };
+    let mut partial =
+        FrameEncoder::<_, 64>::partial(id, Encoding::Float, &moved[..], 258, &positions[..])
+            .unwrap();
+    for name in ["begin", "vertices", "commit"] {
+        all.push((name, partial.next_packet(&mut buffer).unwrap().to_vec()));
+    }
+
+    let id = FrameId { epoch: 260, ..ID };
+    let mut modal = WeightsEncoder::<64>::new(id, &[1.0, -0.5, 0.25]).unwrap();
+    for name in ["begin", "weights", "commit"] {
+        all.push((name, modal.next_packet(&mut buffer).unwrap().to_vec()));
+    }
+    assert!(whole.next_packet(&mut buffer).is_none());
+    assert!(partial.next_packet(&mut buffer).is_none());
+    assert!(modal.next_packet(&mut buffer).is_none());
+
+    all.push(("heartbeat", encode_heartbeat(&id, 7, &NoMac, &mut buffer).into()));
+    all.push((
+        "status",
+        encode_status(ID.mesh_id, &status(), &counters(), &NoMac, &mut buffer).into(),
+    ));
+    all.push(("stream", stream));
+    all
+}
+
+fn status() -> Status {
+    Status {
+        published: Some(PublishedStatus {
+            session: ID.session,
+            epoch: 259,
+            age_ms: 12,
+            stretch: Some(1.25),
+        }),
+        wants_whole: false,
+        safety: 1,
+        number: 6,
+        challenge: 0x00C0_FFEE,
+    }
+}
+
+/// Counter number `i` is `i`.
+fn counters() -> Counters {
+    let numbers: Vec<[u8; 4]> = (0..24_u32).map(u32::to_le_bytes).collect();
+    let mut counters = Counters::new();
+    counters.update(&StatusReport { status: status(), first_counter: 0, counters: &numbers });
+    counters
+}
+
+#[test]
+fn the_specification_shows_what_is_sent() {
+    let document = include_str!("../../docs/wire.md");
+    let shown = document.split("```text\n").nth(1).unwrap().split("```").next().unwrap();
+    let mut expected = String::new();
+    for (name, bytes) in vectors() {
+        for (i, line) in bytes.chunks(26).enumerate() {
+            let hex: Vec<_> = line.iter().map(|byte| format!("{byte:02x}")).collect();
+            let name = if i == 0 { name } else { "" };
+            expected += &format!("{name:<10}{}\n", hex.join(" "));
+        }
+    }
+    assert!(shown == expected, "docs/wire.md must show\n{expected}");
+}
+
+#[test]
+fn every_vector_is_read_as_what_it_was_written_from() {
+    let vectors = vectors();
+    for (name, bytes) in &vectors[..vectors.len() - 1] {
+        let packet = Packet::decode(bytes).unwrap();
+        assert_eq!(packet.mesh_id, ID.mesh_id);
+        assert_eq!(packet.session_low, 2);
+        match (*name, packet.body) {
+            ("begin", Body::Begin(begin)) => assert_eq!(begin.session, ID.session),
+            ("vertices", Body::Vertices(_)) | ("commit", Body::Commit(_)) => {}
+            ("weights", Body::Weights(weights)) => {
+                let values: Vec<_> =
+                    weights.values.iter().map(|w| f32::from_le_bytes(*w)).collect();
+                assert_eq!((weights.first, values), (0, vec![1.0, -0.5, 0.25]));
+            }
+            ("heartbeat", Body::Heartbeat(heartbeat)) => {
+                assert_eq!((heartbeat.session, heartbeat.beat), (ID.session, 7));
+                assert_eq!(packet.epoch, 260);
+            }
+            ("status", Body::Status(report)) => {
+                assert_eq!(report.status, status());
+                assert_eq!(packet.epoch, 259);
+            }
+            (name, body) => panic!("{name} was read as {body:?}"),
+        }
+    }
+}
