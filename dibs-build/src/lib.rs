@@ -12,8 +12,8 @@
 //! ```
 //!
 //! [`read`] imports and checks a mesh (OBJ, STL, PLY, OFF), [`Builder`] makes the tree, [`BuiltTree`]
-//! is written as Rust source or as a blob. [`Motion`] is a recorded deformation (PC2), and [`generate`]
-//! makes procedural hearts and brains. The library prints nothing; the program `dibs` (feature `cli`,
+//! is written as Rust source or as a blob. [`Motion`] is a recorded deformation (PC2), [`modes`] make a
+//! few weights of it, and [`generate`] makes procedural hearts and brains. The library prints nothing; the program `dibs` (feature `cli`,
 //! on by default) does.
 
 mod array;
@@ -23,13 +23,14 @@ mod error;
 pub mod generate;
 mod geodesic;
 mod mesh;
+pub mod modes;
 mod pc2;
 mod read;
 #[cfg(feature = "stream")]
 pub mod stream;
 mod write;
 
-pub use array::{BuiltTree, Summary, summarise};
+pub use array::{BuiltTree, ModesSummary, Summary, summarise};
 pub use builder::{Builder, Construction, IndexWidth};
 pub use error::BuildError;
 pub use geodesic::Paths;

@@ -140,6 +140,49 @@ fn bad_input_is_one_sentence_and_no_output() {
     assert!(distance(vector(&rest["point_on_surface"]), [1.0, 1.0, 0.0]) < 1e-5, "{rest}");
 }
 
+#[test]
+fn modes_are_fitted_shown_and_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeeds(folder, "generate heart --triangles 1000 -o heart.ply --motion heart.pc2");
+    let line = "build heart.ply -o heart.dibs --motion heart.pc2 --modes";
+    let built = json(folder, &format!("{line} 2 --json"));
+    assert_eq!(built["tree"]["modes"]["count"], 2);
+    assert_eq!(json(folder, "inspect heart.dibs --json"), built["tree"]);
+    let errors = built["mode_errors"].as_array().unwrap();
+    let error = |modes: usize| errors[modes - 1]["max"].as_f64().unwrap();
+    assert!(errors.len() == 2 && error(1) > 1.0 && error(2) < 1e-4, "{errors:?}");
+    let stated = built["tree"]["modes"]["position_error"].as_f64().unwrap();
+    assert!(stated >= error(2) && stated < 1e-3, "{stated}");
+    assert!(succeeds(folder, &format!("{line} 1")).contains("<- written"));
+    assert!(succeeds(folder, "inspect heart.dibs").contains("modes    1, within"));
+    succeeds(folder, "build heart.ply -o heart.rs --motion heart.pc2 --modes 2");
+    let source = std::fs::read_to_string(folder.join("heart.rs")).unwrap();
+    assert!(
+        source.contains("pub static HEART_MODES: ") && source.contains("_MODE_COUNT: usize = 2")
+    );
+
+    let warned = dibs(folder, &format!("{line} 2 --stretch 1.2"));
+    assert!(warned.status.success());
+    let warning = String::from_utf8(warned.stderr).unwrap();
+    assert!(warning.contains("beyond the limit of 1.2"), "{warning}");
+
+    std::fs::write(folder.join("old.dibs"), "what was there before").unwrap();
+    succeeds(folder, "generate heart --triangles 998 -o other.ply --motion other.pc2");
+    for (line, part) in [
+        ("heart.pc2 --modes 0", "0 modes cannot be had: the motion has 2"),
+        ("heart.pc2 --modes 3", "3 modes cannot be had: the motion has 2"),
+        ("other.pc2 --modes 2", "has 501 vertices and the mesh has 502"),
+        ("absent.pc2 --modes 2", "absent.pc2"),
+        ("heart.ply --modes 2", "heart.ply"),
+    ] {
+        let error = fails(folder, &format!("build heart.ply -o old.dibs --motion {line}"));
+        assert!(error.contains(part), "{line}: {error}");
+    }
+    let before = std::fs::read_to_string(folder.join("old.dibs")).unwrap();
+    assert_eq!(before, "what was there before");
+}
+
 /// The program and the library agree on every malformed file; what the library must say about
 /// each is asserted in the tests package. The files are not part of the project.
 #[test]

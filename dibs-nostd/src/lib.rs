@@ -60,6 +60,7 @@ pub mod failsafe;
 pub mod format;
 mod frames;
 mod index;
+pub mod modes;
 mod query;
 mod sections;
 mod sqrt;

@@ -18,6 +18,7 @@ pub(crate) struct Sections<'a> {
     pub rest: &'a [u8],
     pub metric: &'a [u8],
     pub limits: &'a [u8],
+    pub modes: &'a [u8],
 }
 
 /// What a section must be.
@@ -39,7 +40,7 @@ impl Rule {
     }
 }
 
-const COUNT: usize = 6;
+const COUNT: usize = 7;
 
 /// In the order of [`Sections`]' fields.
 const fn rules<I: Index>(header: &Header) -> [Rule; COUNT] {
@@ -51,6 +52,8 @@ const fn rules<I: Index>(header: &Header) -> [Rule; COUNT] {
         Rule::optional(section::REST, vertices, 12),
         Rule::optional(section::METRIC, triangles, METRIC_BYTES),
         Rule::optional(section::LIMITS, triangles, LIMIT_BYTES),
+        // `Modes::of` checks it.
+        Rule { kind: section::MODES, length: None, required: false },
     ]
 }
 
@@ -106,8 +109,8 @@ pub(crate) const fn find<'a, I: Index>(
         }
         slot += 1;
     }
-    let [nodes, triangles, order, rest, metric, limits] = parts;
-    Ok(Sections { nodes, triangles, order, rest, metric, limits })
+    let [nodes, triangles, order, rest, metric, limits, modes] = parts;
+    Ok(Sections { nodes, triangles, order, rest, metric, limits, modes })
 }
 
 impl Sections<'_> {
@@ -119,5 +122,6 @@ impl Sections<'_> {
             && self.rest.len() == other.rest.len()
             && self.metric.len() == other.metric.len()
             && self.limits.len() == other.limits.len()
+            && self.modes.len() == other.modes.len()
     }
 }

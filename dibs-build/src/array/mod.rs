@@ -1,8 +1,9 @@
 //! The tree as a flat array: its bytes, and the files that hold them.
 
+mod append;
 mod emit;
 mod flatten;
 mod metric;
 
-pub use emit::{BuiltTree, Summary, summarise};
+pub use emit::{BuiltTree, ModesSummary, Summary, summarise};
 pub(crate) use flatten::{Facts, flatten};

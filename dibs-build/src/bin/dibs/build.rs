@@ -1,6 +1,6 @@
 //! `dibs build`: a mesh file becomes a blob or Rust source.
 
-use crate::tree_file;
+use crate::{modes, tree_file};
 use anyhow::{Result, bail};
 use clap::ValueEnum;
 use dibs_build::{Builder, BuiltTree, Construction, Import, IndexWidth, Mesh, ReadOptions};
@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 Examples:
   dibs build heart.ply -o heart.dibs --stretch 1.5
   dibs build heart.stl -o heart.rs --name HEART --weld 0.001
-  dibs build scan.obj -o scan.dibs --largest-component --json")]
+  dibs build scan.obj -o scan.dibs --largest-component --json
+  dibs build heart.ply -o heart.dibs --motion heart.pc2 --modes 16")]
 pub struct Args {
     /// The rest shape: OBJ, STL, PLY or OFF, told apart by content
     mesh: PathBuf,
@@ -40,6 +41,12 @@ pub struct Args {
     /// Keep the largest of several separate surfaces
     #[arg(long)]
     largest_component: bool,
+    /// Add displacement modes fitted to the motion, so that as many weights drive the surface
+    #[arg(long, value_name = "COUNT", requires = "motion")]
+    modes: Option<usize>,
+    /// The recorded motion of the mesh, a .pc2 file
+    #[arg(long, requires = "modes")]
+    motion: Option<PathBuf>,
     /// Print a JSON object
     #[arg(long)]
     json: bool,
@@ -78,8 +85,13 @@ pub fn run(args: &Args) -> Result<()> {
     for warning in report.warnings() {
         eprintln!("warning: {name}: {warning}");
     }
-    let tree = build(args, &mesh)
+    // A motion that does not fit is found before the work, too.
+    let fit = args.motion.as_deref().map(|path| modes::fit(&mesh, path)).transpose()?;
+    let mut tree = build(args, &mesh)
         .map_err(|error| anyhow::anyhow!("{name}: no tree can be built: {error}"))?;
+    if let (Some(fit), Some(count)) = (&fit, args.modes) {
+        tree = fit.add(&tree, count)?;
+    }
     if is_source {
         tree.write_rust(&args.output, &static_name(args))?;
     } else {
@@ -92,11 +104,15 @@ pub fn run(args: &Args) -> Result<()> {
         println!(
             "{:#}",
             serde_json::json!({
-                "output": output, "mesh": report, "warnings": warnings, "tree": summary
+                "output": output, "mesh": report, "warnings": warnings, "tree": summary,
+                "mode_errors": fit.as_ref().map(|fit| fit.errors()),
             })
         );
     } else {
         println!("read     {name}: {report}");
+        if let Some(fit) = &fit {
+            fit.print(summary.modes.map_or(0, |modes| modes.count));
+        }
         tree_file::print(&summary);
         println!("written  {}", args.output.display());
     }

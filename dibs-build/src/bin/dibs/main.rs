@@ -3,6 +3,7 @@
 mod build;
 mod generate;
 mod inspect;
+mod modes;
 mod query;
 mod tree_file;
 

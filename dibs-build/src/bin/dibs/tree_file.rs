@@ -40,4 +40,17 @@ pub fn print(summary: &Summary) {
         "RAM      {} bytes for two buffers of positions and a mark a vertex, {} for a query's stack",
         s.ram_bytes, s.stack_bytes
     );
+    if let Some(m) = s.modes {
+        println!(
+            "modes    {}, within {} of the motion (rms {}); {} bytes of the flash ({:.1} a vertex), \
+             {} a frame; {} anchors of the stretch bound",
+            m.count,
+            m.position_error,
+            m.rms_error,
+            m.flash_bytes,
+            m.flash_bytes_per_vertex,
+            4 * m.count,
+            m.anchors
+        );
+    }
 }

@@ -1,0 +1,58 @@
+//! Displacement modes for `dibs build`.
+
+use anyhow::{Result, anyhow};
+use dibs_build::modes::{ModalError, ModalFit};
+use dibs_build::{BuiltTree, Mesh, Motion};
+use std::path::{Path, PathBuf};
+
+/// The modes of a motion file.
+pub struct Fit {
+    path: PathBuf,
+    fit: ModalFit,
+}
+
+/// Fits modes to a motion file.
+pub fn fit(mesh: &Mesh, path: &Path) -> Result<Fit> {
+    let motion = Motion::read_pc2(path)?;
+    let fit =
+        ModalFit::new(mesh, &motion).map_err(|error| anyhow!("{}: {error}", path.display()))?;
+    Ok(Fit { path: path.to_path_buf(), fit })
+}
+
+impl Fit {
+    /// Adds modes to a tree, and warns of frames that a controller would reject.
+    pub fn add(&self, tree: &BuiltTree, count: usize) -> Result<BuiltTree> {
+        let name = self.path.display();
+        let tree = tree.with_modes(&self.fit, count).map_err(|error| anyhow!("{name}: {error}"))?;
+        if let Some(motion) = tree.modal_motion()
+            && let Some(first) = motion.beyond_limit.first()
+        {
+            eprintln!(
+                "warning: {name}: {} of {} frames (the first is frame {first}) stretch the surface \
+                 beyond the limit of {}: a controller rejects them, build with a larger --stretch",
+                motion.beyond_limit.len(),
+                motion.weights.len(),
+                tree.summary().stretch
+            );
+        }
+        Ok(tree)
+    }
+
+    /// The error of every number of modes.
+    pub fn errors(&self) -> &[ModalError] {
+        self.fit.errors()
+    }
+
+    /// What other numbers of modes would have given.
+    pub fn print(&self, chosen: usize) {
+        println!("motion   {}: modes against its largest and RMS error", self.path.display());
+        for error in self.errors() {
+            let modes = error.modes;
+            let is_last = modes == self.fit.available();
+            if modes <= 4 || modes % 4 == 0 || modes == chosen || is_last {
+                let mark = if modes == chosen { "  <- written" } else { "" };
+                println!("         {modes:4} {:11.6} {:11.6}{mark}", error.max, error.rms);
+            }
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! What the modes do to the triangles' stretch: the constants of the run-time bound, in f64, rounded up.
+
+use dibs_nostd::format::PathKind;
+use dibs_nostd::{Index, Tree};
+use glam::DVec3;
+
+/// The triangles of a tree, ready to tell what a displacement does to them.
+pub struct Triangles {
+    corners: Vec<[u32; 3]>,
+    shapes: Vec<Shape>,
+}
+
+/// One triangle at rest.
+struct Shape {
+    /// The tree's stretch limit over the triangle's: its stretch counts as so many times more.
+    strictness: f64,
+    measure: Measure,
+}
+
+enum Measure {
+    /// Length of the first edge, and the second edge along and across it.
+    Surface { x1: f64, x2: f64, y2: f64 },
+    /// Lengths of the edges.
+    Edges([f64; 3]),
+}
+
+impl Triangles {
+    /// The triangles of a tree with a rest shape; `None` if a row is missing.
+    pub fn new<I: Index>(tree: &Tree<'_, I>) -> Option<Self> {
+        let rows = 0..tree.triangle_count();
+        let corners: Vec<[u32; 3]> =
+            rows.clone().map(|row| tree.triangle(row)).collect::<Option<_>>()?;
+        let shape = |row: u32| {
+            let [a, b, c] = corners[row as usize];
+            let at = |vertex| Some(tree.rest_position(vertex)?.as_dvec3());
+            let [a, b, c] = [at(a)?, at(b)?, at(c)?];
+            let (e1, e2) = (b - a, c - a);
+            let measure = match tree.paths() {
+                PathKind::EdgePath => Measure::Edges([e1.length(), e2.length(), e1.distance(e2)]),
+                _ => {
+                    let x1 = e1.length();
+                    Measure::Surface { x1, x2: e1.dot(e2) / x1, y2: e1.cross(e2).length() / x1 }
+                }
+            };
+            let limit = f64::from(tree.stretch_limit(row)?);
+            Some(Shape { strictness: f64::from(tree.stretch()) / limit, measure })
+        };
+        let shapes = rows.map(shape).collect::<Option<_>>()?;
+        Some(Self { corners, shapes })
+    }
+
+    /// Most that a displacement adds to the stretch of any triangle: the largest norm of its gradient.
+    pub fn growth(&self, displacement: &[DVec3]) -> f64 {
+        let growths = self.corners.iter().zip(&self.shapes).map(|(corners, shape)| {
+            let [a, b, c] = corners.map(|row| displacement[row as usize]);
+            shape.strictness * shape.measure.norm(b - a, c - a)
+        });
+        growths.fold(0.0, f64::max)
+    }
+
+    /// Most that moving every vertex by at most `error` can add to the stretch of any triangle.
+    pub fn growth_of_error(&self, error: f64) -> f64 {
+        let growths =
+            self.shapes.iter().map(|shape| shape.strictness * shape.measure.of_error(error));
+        growths.fold(0.0, f64::max)
+    }
+}
+
+impl Measure {
+    /// Norm of the gradient (or, for edges, the largest relative change) that takes the rest edges to
+    /// these.
+    fn norm(&self, f1: DVec3, f2: DVec3) -> f64 {
+        match *self {
+            Self::Surface { x1, x2, y2 } => {
+                let p = f1 / x1;
+                let q = (f2 - p * x2) / y2;
+                let (pp, pq, qq) = (p.length_squared(), p.dot(q), q.length_squared());
+                let (mean, half) = (0.5 * (pp + qq), 0.5 * (pp - qq));
+                (mean + (half * half + pq * pq).sqrt()).sqrt()
+            }
+            Self::Edges(rest) => {
+                let now = [f1.length(), f2.length(), f1.distance(f2)];
+                rest.iter().zip(now).map(|(rest, now)| now / rest).fold(0.0, f64::max)
+            }
+        }
+    }
+
+    /// The same where both ends of every edge move by at most `error`: `|p| <= 2 e / x1`, and
+    /// `|q| <= (2 e + |p| |x2|) / y2`; the norm is at most that of both together.
+    fn of_error(&self, error: f64) -> f64 {
+        match *self {
+            Self::Surface { x1, x2, y2 } => {
+                let p = 2.0 * error / x1;
+                let q = (2.0 * error + p * x2.abs()) / y2;
+                p.hypot(q)
+            }
+            Self::Edges(rest) => rest.iter().map(|rest| 2.0 * error / rest).fold(0.0, f64::max),
+        }
+    }
+}

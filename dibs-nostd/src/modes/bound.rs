@@ -1,0 +1,106 @@
+//! How far a modal surface is stretched, at most, from its weights alone.
+//!
+//! Positions are linear in the weights, so each triangle's deformation gradient is too, and its largest
+//! singular value, a norm, is convex; so is the length of an edge, and the largest over all triangles.
+//! Two things follow for the stretch `sigma(w)`, with `g_k` the largest norm of any triangle's gradient
+//! of mode `k`:
+//!
+//! - `sigma(w) <= sigma(a) + sum of g_k |w_k - a_k|`, from any shape `a`;
+//! - `sigma(a + t (b - a)) <= (1 - t) sigma(a) + t sigma(b)`, between any two.
+//!
+//! The builder stores the weights of recorded shapes with their measured stretch, the *anchors*. The
+//! bound is the least of: from each anchor; from the nearest point of the two segments that join the
+//! nearest anchor to its neighbours in time. At a recorded frame it is that frame's stretch, between two
+//! of them hardly more, and away from them it grows with the distance.
+//!
+//! Rounding. The arithmetic here is some tens of roundings deep: a relative 2^-16 covers it. The slack
+//! that the builder stores covers the positions' (a rounded vertex moves the gradient by its error over
+//! the triangle's height) and that of the points on segments.
+
+use super::layout::{self, Anchor};
+use super::{Modes, WeightsError};
+use crate::MeasuredStretch;
+
+/// What covers the f32 rounding of a bound.
+const ROUNDING: f32 = 1.0 + 1.0 / 65_536.0;
+
+impl Modes<'_> {
+    /// An upper bound of the stretch of the surface at these weights: never below the true one, and at
+    /// the recorded frames what [`measure_stretch`](crate::measure_stretch) measures, but for rounding.
+    /// Its [`triangle`](MeasuredStretch::triangle) is the one
+    /// stretched most in the nearest of them.
+    ///
+    /// Cost: O(modes times anchors), whatever the number of triangles.
+    ///
+    /// # Errors
+    /// [`WeightsError`] for weights that [`check`](Self::check) refuses.
+    pub fn stretch_bound(&self, weights: &[f32]) -> Result<MeasuredStretch, WeightsError> {
+        self.check(weights)?;
+        let mut sigma = f32::INFINITY;
+        let (mut nearest, mut shortest) = (0, f32::INFINITY);
+        for row in 0..self.anchor_count() {
+            let Some(anchor) = self.anchor(row) else { break };
+            let away = self.growth_from(weights, anchor);
+            if away < shortest {
+                (nearest, shortest) = (row, away);
+            }
+            if anchor.sigma + away < sigma {
+                sigma = anchor.sigma + away;
+            }
+        }
+        let last = self.anchor_count().saturating_sub(1);
+        let before = nearest.checked_sub(1).unwrap_or(last);
+        let after = if nearest < last { nearest + 1 } else { 0 };
+        let mut triangle = 0;
+        if let Some(here) = self.anchor(nearest) {
+            triangle = here.triangle;
+            for there in [before, after].into_iter().filter_map(|row| self.anchor(row)) {
+                let between = self.between(weights, here, there);
+                if between < sigma {
+                    sigma = between;
+                }
+            }
+        }
+        Ok(MeasuredStretch {
+            sigma: sigma * ROUNDING + self.header.slack,
+            mesh_id: self.mesh_id,
+            triangle,
+        })
+    }
+
+    fn anchor(&self, row: usize) -> Option<Anchor<'_>> {
+        layout::anchor(self.anchors, row, self.count())
+    }
+
+    /// Most that the way from an anchor's shape to these weights adds to the stretch.
+    fn growth_from(&self, weights: &[f32], anchor: Anchor<'_>) -> f32 {
+        let mut sum = 0.0;
+        for ((weight, from), mode) in weights.iter().zip(anchor.weights).zip(self.modes()) {
+            sum += mode.growth * (weight - f32::from_le_bytes(*from)).abs();
+        }
+        sum
+    }
+
+    /// The bound from the point between two anchors that is nearest, in a sense: any would do.
+    fn between(&self, weights: &[f32], a: Anchor<'_>, b: Anchor<'_>) -> f32 {
+        let ends = || a.weights.iter().zip(b.weights).zip(self.modes());
+        let (mut along, mut length) = (0.0, 0.0);
+        for (weight, ((a, b), mode)) in weights.iter().zip(ends()) {
+            let (a, b) = (f32::from_le_bytes(*a), f32::from_le_bytes(*b));
+            let square = mode.growth * mode.growth;
+            along += square * (weight - a) * (b - a);
+            length += square * (b - a) * (b - a);
+        }
+        let t = along / length;
+        // Also where two anchors are one, and `t` is no number.
+        if !(t > 0.0 && t < 1.0) {
+            return f32::INFINITY;
+        }
+        let mut away = 0.0;
+        for (weight, ((a, b), mode)) in weights.iter().zip(ends()) {
+            let (a, b) = (f32::from_le_bytes(*a), f32::from_le_bytes(*b));
+            away += mode.growth * (weight - (a + t * (b - a))).abs();
+        }
+        a.sigma + t * (b.sigma - a.sigma) + away
+    }
+}

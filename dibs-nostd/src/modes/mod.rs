@@ -1,0 +1,257 @@
+//! Surfaces that a few weights move: a rest shape plus displacement modes, in flash.
+//!
+//! A vertex is at `rest + sum of weight_k * mode_k`, and is computed when a query asks for it, never
+//! before (Bowyer & Rodriguez y Baena 2014 name this "lazy evaluation" as future work). So a frame is
+//! as large as its weights, at most [`MAX_MODES`] numbers, and nothing has to be done to thousands of
+//! vertices at each tick.
+//!
+//! | | |
+//! |---|---|
+//! | [`Modes`] | what the builder fitted, read from the tree's bytes and validated once |
+//! | [`ModalSurface`] | the surface at some weights: a [`VertexTable`](crate::VertexTable) |
+//! | [`Modes::stretch_bound`] | how far it is stretched, in time that does not depend on the vertices |
+
+mod bound;
+mod error;
+mod layout;
+mod surface;
+
+use layout::Header;
+
+pub use error::{ModesError, WeightsError};
+pub use layout::{ANCHOR_TAIL_BYTES, HEADER_BYTES, MAX_ANCHORS, MODE_BYTES, VERTEX_MODE_BYTES};
+pub use surface::ModalSurface;
+
+use glam::Vec3;
+
+use crate::{Index, Tree, format};
+
+/// Most modes of a surface.
+pub const MAX_MODES: usize = 64;
+
+/// Bits of a displacement sum below its unit.
+pub const FRACTION_BITS: u32 = 16;
+
+/// Largest sum, over the modes, of largest weight times gain: a displacement sum then fits 46 bits.
+pub const MAX_GAIN: f32 = 536_870_912.0;
+
+/// The displacement modes that a tree carries, validated once: a view of bytes in flash.
+///
+/// ```
+/// use dibs_build::{Builder, generate, modes::ModalFit};
+/// use dibs_nostd::modes::Modes;
+/// use dibs_nostd::{Options, Query, Sphere, Tree, glam::Vec3};
+///
+/// // On a host: two modes are all that this motion has.
+/// let (heart, motion) = generate::heart(1_000)?;
+/// let fit = ModalFit::new(&heart, &motion)?;
+/// let built = Builder::new().stretch(1.5).build(&heart)?.with_modes(&fit, 2)?;
+///
+/// // On the target: the tree and its modes, each validated once.
+/// let tree = Tree::<u16>::from_bytes(built.blob())?;
+/// let modes = Modes::of(&tree)?;
+/// let mut query = Query::<_, 32>::new(&tree)?;
+///
+/// // At each tick: two weights come over the bus instead of 502 vertices.
+/// let weights = [0.5, -0.1];
+/// let stretch = modes.stretch_bound(&weights)?;
+/// assert!(stretch.sigma() <= tree.stretch());
+/// let surface = modes.surface::<2>(&weights)?;
+/// let tool = Sphere::new(Vec3::new(0.0, 0.0, 150.0), 5.0)?;
+/// let closest = query.closest(&surface, &tool, &Options::new().stretch(stretch))?;
+/// assert!(closest.widened(modes.position_error()).accuracy < 0.01);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Modes<'a> {
+    header: Header,
+    /// One record a mode.
+    records: &'a [u8],
+    anchors: &'a [u8],
+    /// One row a vertex, all of its modes side by side.
+    rows: &'a [u8],
+    rest: &'a [u8],
+    vertices: u32,
+    mesh_id: u32,
+    /// The tree's stretch limit.
+    limit: f32,
+}
+
+impl<'a> Modes<'a> {
+    /// Validates the modes that a tree carries (section 7 of `docs/format.md`). `const`: for a
+    /// generated `static` the compiler does it.
+    ///
+    /// Cost: O(modes times anchors). The rows need no check, any bits are displacements.
+    ///
+    /// # Errors
+    /// [`ModesError`] names the first thing that is wrong and its value.
+    pub const fn of<I: Index>(tree: &Tree<'a, I>) -> Result<Self, ModesError> {
+        let sections = tree.sections();
+        if sections.modes.is_empty() {
+            return Err(ModesError::Absent);
+        }
+        if sections.rest.is_empty() {
+            return Err(ModesError::NoRestShape);
+        }
+        let vertices = tree.vertex_count();
+        match layout::parts(sections.modes, vertices, tree.triangle_count()) {
+            Ok((header, [records, anchors, rows])) => Ok(Self {
+                header,
+                records,
+                anchors,
+                rows,
+                rest: sections.rest,
+                vertices,
+                mesh_id: tree.mesh_id(),
+                limit: tree.stretch(),
+            }),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Number of modes, 1 to [`MAX_MODES`].
+    #[must_use]
+    pub const fn count(&self) -> usize {
+        self.header.modes as usize
+    }
+
+    /// Number of vertices of the surface.
+    #[must_use]
+    pub const fn vertex_count(&self) -> u32 {
+        self.vertices
+    }
+
+    /// Recorded shapes that [`stretch_bound`](Self::stretch_bound) starts from, the rest shape among
+    /// them.
+    #[must_use]
+    pub const fn anchor_count(&self) -> usize {
+        self.header.anchors as usize
+    }
+
+    /// The mesh that the modes displace.
+    #[must_use]
+    pub const fn mesh_id(&self) -> u32 {
+        self.mesh_id
+    }
+
+    /// The stretch limit of the tree: what [`stretch_bound`](Self::stretch_bound) must not exceed.
+    #[must_use]
+    pub const fn stretch_limit(&self) -> f32 {
+        self.limit
+    }
+
+    /// Largest distance between a recorded vertex and the modal surface's, over the motion that the
+    /// modes were fitted to, everything included: modes left out, quantisation, arithmetic (mm). For
+    /// the answer's accuracy: [`Proximity::widened`](crate::Proximity::widened).
+    ///
+    /// It says nothing about motions other than the recorded one.
+    #[must_use]
+    pub const fn position_error(&self) -> f32 {
+        self.header.position_error
+    }
+
+    /// Root mean square of the same distance (mm).
+    #[must_use]
+    pub const fn rms_error(&self) -> f32 {
+        self.header.rms_error
+    }
+
+    /// How far [`range`](Self::range) goes beyond what was recorded, as a part of the recorded range.
+    #[must_use]
+    pub const fn margin(&self) -> f32 {
+        self.header.margin
+    }
+
+    /// Bytes of flash that the modes take, without the rest shape.
+    #[must_use]
+    pub const fn flash_bytes(&self) -> usize {
+        HEADER_BYTES + self.records.len() + self.anchors.len() + self.rows.len()
+    }
+
+    /// Smallest and largest weight of a mode that [`check`](Self::check) admits; `None` for a mode
+    /// that is not there.
+    #[must_use]
+    pub const fn range(&self, mode: usize) -> Option<[f32; 2]> {
+        match layout::mode(self.records, mode) {
+            Some(mode) => Some([mode.low, mode.high]),
+            None => None,
+        }
+    }
+
+    /// Position of a vertex at rest (mm): where all weights are 0. `None` outside the table.
+    #[must_use]
+    pub const fn rest_position(&self, vertex: u32) -> Option<Vec3> {
+        format::rest_position(self.rest, vertex)
+    }
+
+    /// Size of one step of a mode's displacements at weight 1 (mm); `None` for a mode that is not
+    /// there.
+    #[must_use]
+    pub const fn step(&self, mode: usize) -> Option<f32> {
+        match layout::mode(self.records, mode) {
+            // Exact: the builder's unit is a power of two.
+            Some(mode) => Some(mode.gain * self.header.unit / (1 << FRACTION_BITS) as f32),
+            None => None,
+        }
+    }
+
+    /// Displacement of a vertex by one mode, in the mode's [`step`](Self::step)s; `None` outside the
+    /// tables. For hosts: a query reads all modes at once.
+    #[must_use]
+    pub fn displacement(&self, mode: usize, vertex: u32) -> Option<[i16; 3]> {
+        let &[x0, x1, y0, y1, z0, z1] = self.row(vertex)?.get(mode)?;
+        Some([[x0, x1], [y0, y1], [z0, z1]].map(i16::from_le_bytes))
+    }
+
+    /// Whether there is one weight for each mode, finite and in the mode's range. O(modes).
+    ///
+    /// # Errors
+    /// [`WeightsError`] names the first weight that is not right.
+    pub fn check(&self, weights: &[f32]) -> Result<(), WeightsError> {
+        if weights.len() != self.count() {
+            return Err(WeightsError::Count {
+                expected: self.count() as u32,
+                found: weights.len() as u32,
+            });
+        }
+        for (mode, (&weight, record)) in weights.iter().zip(self.modes()).enumerate() {
+            let mode = mode as u32;
+            if !weight.is_finite() {
+                return Err(WeightsError::NotFinite { mode });
+            }
+            if weight < record.low || weight > record.high {
+                return Err(WeightsError::OutOfRange { mode, weight });
+            }
+        }
+        Ok(())
+    }
+
+    /// The surface at these weights. O(modes): no vertex is computed yet.
+    ///
+    /// # Errors
+    /// [`WeightsError`] for weights that [`check`](Self::check) refuses, or more modes than `K`.
+    pub fn surface<const K: usize>(
+        &self,
+        weights: &[f32],
+    ) -> Result<ModalSurface<'a, K>, WeightsError> {
+        if self.count() > K {
+            return Err(WeightsError::Capacity {
+                needed: self.count() as u32,
+                available: K as u32,
+            });
+        }
+        self.check(weights)?;
+        Ok(ModalSurface::new(self, weights.iter().copied()))
+    }
+
+    /// The records of all modes.
+    fn modes(&self) -> impl Iterator<Item = layout::Mode> {
+        self.records.as_chunks::<MODE_BYTES>().0.iter().map(layout::decode)
+    }
+
+    /// A vertex's displacements by all modes, as they are stored.
+    #[inline(always)]
+    fn row(&self, vertex: u32) -> Option<&'a [[u8; VERTEX_MODE_BYTES]]> {
+        layout::row(self.rows, vertex, self.count())
+    }
+}

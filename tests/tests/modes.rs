@@ -1,0 +1,486 @@
+//! Modal surfaces: what is computed lazily, how far it is from the recorded motion, and that the stretch
+//! bound is one.
+
+use std::cell::RefCell;
+use std::collections::HashSet;
+use std::path::Path;
+
+use dibs_build::modes::{MARGIN, ModalFit, ModesError, Projector};
+use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, Motion, Paths, generate};
+use dibs_nostd::format::CRC;
+use dibs_nostd::modes::{self, MAX_MODES, ModalSurface, Modes, WeightsError};
+use dibs_nostd::{Index, Options, Query, StretchError, Tree, VertexTable, measure_stretch};
+use dibs_tests::oracle::exhaustive;
+use dibs_tests::poses::pose;
+use dibs_tests::{ask, stretch};
+use fastrand::Rng;
+use glam::Vec3;
+
+/// A heart that beats, breathes and trembles: a motion with `2 waves` modes.
+fn trembling(triangles: u32, waves: usize, seed: u64) -> (Mesh, Motion) {
+    let (mesh, mut motion) = generate::heart(triangles).expect("a valid size");
+    let mut rng = Rng::with_seed(seed);
+    let mut vector = |size: f32| Vec3::from([(); 3].map(|()| (rng.f32() - 0.5) * size));
+    let waves: Vec<[Vec3; 2]> = (0..waves).map(|_| [vector(0.12), vector(1.0)]).collect();
+    let frames = motion.frames.len() as f32;
+    for (time, frame) in motion.frames.iter_mut().enumerate() {
+        for (position, rest) in frame.iter_mut().zip(&mesh.positions) {
+            for (number, [wave, size]) in (1..).zip(&waves) {
+                let turn = std::f32::consts::TAU * (number * time) as f32 / frames;
+                *position += *size * ((wave.dot(*rest) + turn).sin() - wave.dot(*rest).sin());
+            }
+        }
+    }
+    (mesh, motion)
+}
+
+fn positions(surface: &impl VertexTable) -> Vec<Vec3> {
+    let rows = 0..surface.len() as u32;
+    rows.map(|row| surface.position(row).expect("in the table")).collect()
+}
+
+/// Weights anywhere in the admitted ranges.
+fn anywhere(modes: &Modes<'_>, rng: &mut Rng) -> Vec<f32> {
+    let range = |mode| modes.range(mode).expect("there is one");
+    let within = |[low, high]: [f32; 2]| (low + (high - low) * rng.f32()).clamp(low, high);
+    (0..modes.count()).map(range).map(within).collect()
+}
+
+fn triangle_rows<I: Index>(tree: &Tree<'_, I>) -> Vec<[u32; 3]> {
+    (0..tree.triangle_count()).map(|row| tree.triangle(row).expect("in the table")).collect()
+}
+
+/// The stated errors hold at every vertex of every frame, and are reached; the same positions come out
+/// of a sum in f64, but for rounding.
+#[test]
+fn every_frame_is_within_the_stated_error() {
+    let (mesh, motion) = trembling(2_000, 5, 1);
+    let fit = ModalFit::new(&mesh, &motion).expect("a motion");
+    assert_eq!(fit.available(), 10);
+    let tree = Builder::new().stretch(2.0).build(&mesh).expect("a valid mesh");
+    for count in [1, 2, 5, 10] {
+        let built = tree.with_modes(&fit, count).expect("so many there are");
+        let tree = built.tree::<u16>().expect("valid");
+        let modes = Modes::of(&tree).expect("valid");
+        let stated = fit.errors()[count - 1];
+        let (mut largest, mut sum) = (0.0_f64, 0.0);
+        let recorded = built.modal_motion().expect("has modes");
+        assert_eq!(recorded.beyond_limit, [0; 0]);
+        for (weights, frame) in recorded.weights.iter().zip(&motion.frames) {
+            let surface = modes.surface::<10>(weights).expect("recorded");
+            for (row, exact) in (0..).zip(built.to_rows(frame)) {
+                let now = surface.position(row).expect("in the table").as_dvec3();
+                let rest = modes.rest_position(row).expect("in the table").as_dvec3();
+                let plain = weights.iter().enumerate().fold(rest, |sum, (mode, weight)| {
+                    let steps = modes.displacement(mode, row).expect("there").map(f64::from);
+                    let step = f64::from(modes.step(mode).expect("there"));
+                    sum + glam::DVec3::from(steps) * step * f64::from(*weight)
+                });
+                assert!(now.distance(plain) < 3e-5, "{now} {plain}");
+                let away = now.distance(exact.as_dvec3());
+                (largest, sum) = (largest.max(away), sum + away * away);
+            }
+        }
+        let rms = (sum / (motion.frames.len() * mesh.positions.len()) as f64).sqrt();
+        for (stated, found, before) in
+            [(modes.position_error(), largest, stated.max), (modes.rms_error(), rms, stated.rms)]
+        {
+            assert!(f64::from(stated) >= found && f64::from(stated) <= found * 1.001 + 1e-9);
+            // Rounding the modes to 16 bits costs next to nothing.
+            assert!((found - before).abs() < 0.01 * before + 1e-3, "{count}: {found} {before}");
+        }
+    }
+}
+
+/// A vertex table that notes what it is asked for.
+struct Watched<'a, T> {
+    table: &'a T,
+    asked: RefCell<Vec<u32>>,
+}
+
+impl<T: VertexTable> VertexTable for Watched<'_, T> {
+    fn len(&self) -> usize {
+        self.table.len()
+    }
+
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.asked.borrow_mut().push(vertex);
+        self.table.position(vertex)
+    }
+}
+
+/// A query that computes vertices when it comes to them finds, bit for bit, what it finds in a table
+/// where all were computed before; that is what exhaustive search finds; and most vertices are never
+/// computed.
+#[test]
+fn lazy_is_eager_bit_for_bit_and_right() {
+    let (mesh, motion) = trembling(2_000, 5, 2);
+    let fit = ModalFit::new(&mesh, &motion).expect("a motion");
+    for width in [IndexWidth::Bits16, IndexWidth::Bits32] {
+        let builder = Builder::new().stretch(2.5).index(width);
+        let built = builder.build(&mesh).expect("valid").with_modes(&fit, 10).expect("so many");
+        match width {
+            IndexWidth::Bits16 => lazy_is_eager(&built.tree::<u16>().expect("valid")),
+            _ => lazy_is_eager(&built.tree::<u32>().expect("valid")),
+        }
+    }
+}
+
+fn lazy_is_eager<I: Index>(tree: &Tree<'_, I>) {
+    let mut rng = Rng::with_seed(3);
+    let modes = Modes::of(tree).expect("valid");
+    let triangles = triangle_rows(tree);
+    let mut query = Query::<I, 64>::new(tree).expect("deep enough");
+    let (mut queries, mut computed) = (0, 0);
+    while queries < 400 {
+        let weights = anywhere(&modes, &mut rng);
+        let surface = modes.surface::<10>(&weights).expect("in range");
+        let eager = positions(&surface);
+        let Ok(measured) = measure_stretch(tree, eager.as_slice()) else { continue };
+        assert_eq!(measure_stretch(tree, &surface), Ok(measured));
+        let watched = Watched { table: &surface, asked: RefCell::default() };
+        for _ in 0..8 {
+            let tool = pose(&eager, &triangles, &mut rng);
+            for options in [Options::new(), Options::new().stretch(measured)] {
+                watched.asked.borrow_mut().clear();
+                let lazily = ask::closest(&mut query, &watched, &tool, &options).expect("sound");
+                let eagerly =
+                    ask::closest(&mut query, eager.as_slice(), &tool, &options).expect("sound");
+                assert_eq!(format!("{lazily:?}"), format!("{eagerly:?}"));
+                let truth = exhaustive(&eager, &triangles, &tool).expect("has triangles");
+                let error = (truth.separation - f64::from(lazily.separation)).abs();
+                assert!(error <= f64::from(lazily.accuracy), "{tool:?} {lazily:?} {truth:?}");
+                let distinct: HashSet<u32> = watched.asked.borrow().iter().copied().collect();
+                (queries, computed) = (queries + 1, computed + distinct.len());
+            }
+        }
+    }
+    let share = computed as f64 / f64::from(queries * tree.vertex_count());
+    assert!(share < 0.5, "{share} of the vertices were computed");
+}
+
+/// The bound is never below the true stretch, whatever the weights, and at a recorded frame hardly
+/// above it.
+#[test]
+fn the_stretch_bound_is_sound_and_tight() {
+    let (mesh, motion) = trembling(1_000, 5, 4);
+    let fit = ModalFit::new(&mesh, &motion).expect("a motion");
+    for paths in [Paths::Edges, Paths::Surface { crossings: 2 }] {
+        let builder = Builder::new().stretch(3.0).paths(paths);
+        let built =
+            builder.build(&mesh).expect("a valid mesh").with_modes(&fit, 10).expect("so many");
+        let tree = built.tree::<u16>().expect("valid");
+        let modes = Modes::of(&tree).expect("valid");
+        let rows =
+            Mesh { positions: built.to_rows(&mesh.positions), triangles: triangle_rows(&tree) };
+        let recorded = &built.modal_motion().expect("has modes").weights;
+        let mut rng = Rng::with_seed(5);
+        let check = |weights: &[f32], most: f64| {
+            let surface = modes.surface::<10>(weights).expect("in range");
+            let truth = stretch::largest(&rows, &positions(&surface), tree.paths());
+            let bound = modes.stretch_bound(weights).expect("in range");
+            let sigma = f64::from(bound.sigma());
+            assert!(sigma >= truth, "{sigma} is below {truth}");
+            assert!(sigma <= truth * most + 1e-6, "{sigma} for {truth}");
+        };
+        for (frame, weights) in recorded.iter().enumerate() {
+            check(weights, 1.0002);
+            let next = &recorded[(frame + 1) % recorded.len()];
+            for _ in 0..20 {
+                let t = rng.f32();
+                let blend = |noise: f32, rng: &mut Rng| -> Vec<f32> {
+                    let of_mode =
+                        |(a, b): (&f32, &f32)| a + t * (b - a) + noise * (rng.f32() - 0.5);
+                    weights.iter().zip(next).map(of_mode).collect()
+                };
+                check(&blend(0.0, &mut rng), 1.1);
+                check(&blend(0.05, &mut rng), 1.3);
+                check(&anywhere(&modes, &mut rng), 4.0);
+            }
+        }
+        check(&[0.0; 10], 1.0002);
+    }
+}
+
+#[test]
+fn weights_that_make_no_surface_are_refused() {
+    let (built, _) = small(4);
+    let tree = built.tree::<u16>().expect("valid");
+    let modes = Modes::of(&tree).expect("valid");
+    let good = &built.modal_motion().expect("has modes").weights[7];
+    assert!(modes.surface::<4>(good).is_ok() && modes.surface::<64>(good).is_ok());
+    let refused = modes.surface::<3>(good).expect_err("no room");
+    assert_eq!(refused, WeightsError::Capacity { needed: 4, available: 3 });
+    for length in [0, 3, 5] {
+        let weights = vec![0.0; length];
+        let refused = modes.surface::<8>(&weights).expect_err("another number");
+        assert_eq!(refused, WeightsError::Count { expected: 4, found: length as u32 });
+    }
+    for mode in 0..4 {
+        let [low, high] = modes.range(mode).expect("there");
+        let with = |weight: f32| {
+            let mut weights = good.clone();
+            weights[mode] = weight;
+            [modes.check(&weights), modes.stretch_bound(&weights).map(|_| ())]
+        };
+        for weight in [low, high, 0.0, -0.0, f32::MIN_POSITIVE] {
+            assert_eq!(with(weight), [Ok(()); 2]);
+        }
+        let mode = mode as u32;
+        for weight in [low.next_down(), high.next_up(), -1e30, f32::MAX] {
+            assert_eq!(with(weight), [Err(WeightsError::OutOfRange { mode, weight }); 2]);
+        }
+        for weight in [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            assert_eq!(with(weight), [Err(WeightsError::NotFinite { mode }); 2]);
+        }
+    }
+    assert_eq!(modes.range(4), None);
+}
+
+/// The range that is admitted is the recorded one with the stated margin.
+#[test]
+fn the_ranges_are_the_recorded_ones_with_the_margin() {
+    let (built, _) = small(4);
+    let tree = built.tree::<u16>().expect("valid");
+    let modes = Modes::of(&tree).expect("valid");
+    assert_eq!(modes.margin(), MARGIN);
+    for mode in 0..4 {
+        let weights = built.modal_motion().expect("has modes").weights.iter().map(|w| w[mode]);
+        let (low, high) = weights.fold((0.0_f32, 0.0_f32), |(l, h), w| (l.min(w), h.max(w)));
+        let margin = MARGIN * (high - low);
+        assert_eq!(modes.range(mode), Some([low - margin, high + margin]));
+    }
+}
+
+fn small(count: usize) -> (BuiltTree, ModalFit) {
+    let (mesh, motion) = trembling(320, 3, 6);
+    let fit = ModalFit::new(&mesh, &motion).expect("a motion");
+    let tree = Builder::new().stretch(3.0).build(&mesh).expect("a valid mesh");
+    (tree.with_modes(&fit, count).expect("so many"), fit)
+}
+
+/// The same input gives the same bytes; a sender that has nothing but the tree finds the same weights.
+#[test]
+fn fits_are_reproducible() {
+    let (first, second) = (small(5).0, small(5).0);
+    assert_eq!(first.blob(), second.blob());
+    let (_, motion) = trembling(320, 3, 6);
+    let tree = first.tree::<u16>().expect("valid");
+    let projector = Projector::new(&Modes::of(&tree).expect("valid")).expect("independent");
+    for (frame, weights) in motion.frames.iter().zip(&first.modal_motion().expect("has").weights) {
+        assert_eq!(&projector.weights(&first.to_rows(frame)), weights);
+    }
+}
+
+#[test]
+fn what_cannot_be_fitted_is_named() {
+    let (mesh, motion) = generate::heart(320).expect("a valid size");
+    let tree = Builder::new().build(&mesh).expect("a valid mesh");
+    let fit = |frames: Vec<Vec<Vec3>>| ModalFit::new(&mesh, &Motion { frames, rate: 0.0 });
+    assert!(matches!(fit(vec![]), Err(ModesError::Frames { frames: 0 })));
+    let still = fit(vec![mesh.positions.clone(); 3]);
+    assert!(matches!(still, Err(ModesError::Still)));
+    let short = fit(vec![mesh.positions[1..].to_vec()]);
+    assert!(matches!(short, Err(ModesError::Mismatch(_))));
+    let mut wrong = motion.frames.clone();
+    wrong[3][7].y = f32::NAN;
+    let wrong = fit(wrong);
+    assert!(matches!(wrong, Err(ModesError::Coordinate { frame: 3, vertex: 7 })));
+    let good = fit(motion.frames).expect("a motion");
+    for asked in [0, 3, 100] {
+        let refused = tree.with_modes(&good, asked);
+        assert!(matches!(refused, Err(ModesError::Count { available: 2, .. })), "{asked}");
+    }
+    let bare = Builder::new().with_rest_shape(false).build(&mesh).expect("a valid mesh");
+    assert!(matches!(bare.with_modes(&good, 2), Err(ModesError::NoRestShape)));
+    let (other, _) = generate::heart(322).expect("a valid size");
+    let other = Builder::new().build(&other).expect("a valid mesh");
+    assert!(matches!(other.with_modes(&good, 2), Err(ModesError::OtherMesh)));
+    let bare = tree.tree::<u16>().expect("valid");
+    assert!(matches!(Modes::of(&bare), Err(modes::ModesError::Absent)));
+}
+
+/// A motion beyond the limit is named, and is no anchor: what is bounded by it stays refused.
+#[test]
+fn frames_beyond_the_limit_are_named() {
+    let (mesh, motion) = generate::heart(320).expect("a valid size");
+    let fit = ModalFit::new(&mesh, &motion).expect("a motion");
+    let tree = Builder::new().stretch(1.2).build(&mesh).expect("a valid mesh");
+    let built = tree.with_modes(&fit, 2).expect("so many");
+    let tree = built.tree::<u16>().expect("valid");
+    let modes = Modes::of(&tree).expect("valid");
+    let recorded = built.modal_motion().expect("has modes");
+    assert!(!recorded.beyond_limit.is_empty());
+    assert_eq!(modes.anchor_count(), 1 + recorded.weights.len() - recorded.beyond_limit.len());
+    for (frame, weights) in recorded.weights.iter().enumerate() {
+        let surface = modes.surface::<2>(weights).expect("in range");
+        let is_beyond = recorded.beyond_limit.contains(&frame);
+        let measured = measure_stretch(&tree, &surface);
+        assert_eq!(is_beyond, matches!(measured, Err(StretchError::Exceeded { .. })));
+        let bound = modes.stretch_bound(weights).expect("in range").sigma();
+        assert!(!is_beyond || bound > tree.stretch(), "{frame}: {bound}");
+    }
+}
+
+/// Every damaged field of the section is an error that names it; any other damage makes other
+/// positions, and nothing worse.
+#[test]
+fn damaged_modes_do_not_validate() {
+    let (built, _) = small(3);
+    let blob = built.blob();
+    let (start, length) = section(blob, 7);
+    let damaged = |at: usize, bytes: &[u8]| {
+        let mut blob = blob.to_vec();
+        blob[start + at..][..bytes.len()].copy_from_slice(bytes);
+        let mut digest = CRC.digest();
+        digest.update(&blob[..60]);
+        digest.update(&blob[64..]);
+        blob[60..64].copy_from_slice(&digest.finalize().to_le_bytes());
+        let tree = Tree::<u16>::from_bytes(&blob).expect("the tree itself is sound");
+        Modes::of(&tree).map(|modes| {
+            let weights = vec![0.0; modes.count()];
+            let surface = modes.surface::<MAX_MODES>(&weights).expect("0 is in every range");
+            (positions(&surface), modes.stretch_bound(&weights))
+        })
+    };
+    let modes = Modes::of(&built.tree::<u16>().expect("valid")).map(|m| m.anchor_count());
+    let anchors = 32 + 16 * 3;
+    let anchor_bytes = 4 * 3 + 8;
+    assert_eq!(length, anchors + anchor_bytes * modes.expect("valid") + 6 * 3 * 162);
+
+    use modes::ModesError as E;
+    for count in [0_u16, 65, u16::MAX] {
+        let value = u32::from(count);
+        let refused = damaged(0, &count.to_le_bytes()).expect_err("no such number");
+        assert_eq!(refused, E::Field { offset: 0, value });
+    }
+    let refused = damaged(0, &4_u16.to_le_bytes()).expect_err("another length");
+    assert!(matches!(refused, E::Length { .. }), "{refused}");
+    for count in [0_u16, 66] {
+        let refused = damaged(2, &count.to_le_bytes()).expect_err("no such number");
+        assert!(matches!(refused, E::Field { offset: 2, .. }), "{refused}");
+    }
+    for offset in [4, 8, 12, 16, 20] {
+        for wrong in [f32::NAN, -1.0, f32::INFINITY, 1e19] {
+            let value = wrong.to_bits();
+            let refused = damaged(offset, &wrong.to_le_bytes()).expect_err("not a length");
+            assert_eq!(refused, E::Field { offset: offset as u8, value });
+        }
+    }
+    for offset in [24, 28] {
+        let refused = damaged(offset, &[0, 0, 1, 0]).expect_err("reserved");
+        assert_eq!(refused, E::Field { offset: offset as u8, value: 0x1_0000 });
+    }
+    for mode in 0..3 {
+        for (field, wrong) in [
+            (0, 0.5),
+            (1, -0.5),
+            (2, -1.0),
+            (3, -1.0),
+            (0, -1e9),
+            (1, f32::NAN),
+            (2, 1e17),
+            (3, 1e19),
+        ] {
+            let refused = damaged(32 + 16 * mode + 4 * field, &f32::to_le_bytes(wrong));
+            let expected = E::Mode { mode: mode as u32 };
+            assert_eq!(refused.expect_err("is wrong"), expected, "{field} {wrong}");
+        }
+    }
+    let anchor = anchors + 2 * anchor_bytes;
+    for (at, wrong) in [(4, f32::NAN.to_bits()), (12, (-1.0_f32).to_bits()), (16, 320)] {
+        let refused = damaged(anchor + at, &wrong.to_le_bytes()).expect_err("is wrong");
+        assert_eq!(refused, E::Anchor { anchor: 2 });
+    }
+
+    let mut rng = Rng::with_seed(8);
+    for _ in 0..2_000 {
+        let at = rng.usize(..length - 4);
+        let _ = damaged(at, &rng.u32(..).to_le_bytes());
+    }
+}
+
+/// Offset and length of a section, read by the specification alone.
+fn section(bytes: &[u8], kind: u32) -> (usize, usize) {
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
+    let row = (0..word(48) as usize).map(|r| 64 + 12 * r).find(|&at| word(at) == kind);
+    let at = row.expect("the section is there");
+    (word(at + 4) as usize, word(at + 8) as usize)
+}
+
+include!(concat!(env!("OUT_DIR"), "/modal_heart.rs"));
+
+/// The generated statics, which the compiler validated, are what the builder built.
+#[test]
+fn the_generated_static_holds_the_modes() {
+    let (mesh, motion) = generate::heart(1_000).expect("a valid size");
+    let fit = ModalFit::new(&mesh, &motion).expect("a motion");
+    let tree = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
+    let built = tree.with_modes(&fit, 2).expect("so many");
+    let weights = &built.modal_motion().expect("has modes").weights[9];
+    let modes = [HEART_MODES, Modes::of(&built.tree::<u16>().expect("valid")).expect("valid")];
+    let [generated, built] = modes.map(|modes| {
+        let surface = modes.surface::<HEART_MODE_COUNT>(weights).expect("in range");
+        (positions(&surface), modes.stretch_bound(weights))
+    });
+    assert_eq!(generated, built);
+    assert_eq!(generated.0.len(), HEART_VERTICES);
+    assert!(HEART_DEPTH >= 1);
+}
+
+/// All 24 modes of the real heart's 25 frames: driven whole by as many numbers a tick.
+#[test]
+fn the_real_heart_is_driven_by_its_modes() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    let path = folder.join("heart_10272.ply");
+    if !path.exists() {
+        println!("skipped: {} is not there", path.display());
+        return;
+    }
+    let mesh = dibs_build::read(path).expect("a mesh").mesh;
+    let motion = Motion::read_pc2(folder.join("heart_10272.pc2")).expect("a motion");
+    let fit = ModalFit::new(&mesh, &motion).expect("fits");
+    assert_eq!(fit.available(), 24);
+    let tree = Builder::new().stretch(2.5).build(&mesh).expect("a valid mesh");
+    let mut rng = Rng::with_seed(9);
+    for count in [8, 16, 24] {
+        let built = tree.with_modes(&fit, count).expect("so many");
+        let tree = built.tree::<u16>().expect("valid");
+        let modes = Modes::of(&tree).expect("valid");
+        let recorded = built.modal_motion().expect("has modes");
+        assert_eq!(recorded.beyond_limit, [0; 0]);
+        assert!(count < 24 || modes.position_error() < 0.002);
+        let triangles = triangle_rows(&tree);
+        let mut query = Query::<u16, 64>::new(&tree).expect("deep enough");
+        let (mut queries, mut asked, mut distinct) = (0, 0, 0);
+        for weights in &recorded.weights {
+            let surface: ModalSurface<'_, 24> = modes.surface(weights).expect("recorded");
+            let bound = modes.stretch_bound(weights).expect("recorded");
+            assert!(bound.sigma() <= tree.stretch());
+            let eager = positions(&surface);
+            let watched = Watched { table: &surface, asked: RefCell::default() };
+            for _ in 0..20 {
+                let tool = pose(&eager, &triangles, &mut rng);
+                watched.asked.borrow_mut().clear();
+                let options = Options::new().stretch(bound);
+                let found = ask::closest(&mut query, &watched, &tool, &options).expect("sound");
+                let truth = exhaustive(&eager, &triangles, &tool).expect("has triangles");
+                let error = (truth.separation - f64::from(found.separation)).abs();
+                assert!(error <= f64::from(found.accuracy));
+                let asked_for = watched.asked.borrow();
+                (queries, asked) = (queries + 1, asked + asked_for.len());
+                distinct += asked_for.iter().collect::<HashSet<_>>().len();
+            }
+        }
+        println!(
+            "{count} modes: position error {:.4}, rms {:.4}, {:.1} bytes of flash a vertex; a query \
+             asks for {} positions of {} vertices, of {}",
+            modes.position_error(),
+            modes.rms_error(),
+            modes.flash_bytes() as f64 / f64::from(tree.vertex_count()),
+            asked / queries,
+            distinct / queries,
+            tree.vertex_count(),
+        );
+    }
+}
