@@ -1,5 +1,29 @@
 //! The imaging side: sends a moving surface to a controller, over a serial line or a socket.
+//!
+//! ```no_run
+//! use dibs_build::stream::{Sender, Settings, SurfaceOrder, Target};
+//! # let (heart, motion) = dibs_build::generate::heart(500)?;
+//! # let built = dibs_build::Builder::new().build(&heart)?;
+//!
+//! let target: Target = "serial:/dev/ttyUSB0@921600".parse()?;
+//! let order = SurfaceOrder::of(&built.tree::<u16>()?);
+//! let settings = Settings { partial: Some(0.05), ..Settings::default() };
+//! let mut sender = Sender::<_, 1024>::new(target.open()?, order, settings);
+//! for positions in &motion.frames {
+//!     let sent = sender.send(positions)?;
+//!     sender.poll()?;
+//!     println!("frame {} in {} bytes, {:?}", sent.epoch, sent.bytes, sender.status());
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! The bytes are specified in `docs/wire.md`. [`faults`] damages what is sent, for tests.
+
+pub mod faults;
+mod sender;
 mod target;
 mod transport;
+
+pub use sender::{SendError, Sender, Sent, Settings, SurfaceOrder, Totals};
 pub use target::{Target, TargetError};
 pub use transport::{Line, Transport};

@@ -5,6 +5,7 @@ mod generate;
 mod inspect;
 mod modes;
 mod query;
+mod stream;
 mod tree_file;
 
 use clap::{Parser, Subcommand};
@@ -26,6 +27,8 @@ enum Command {
     Inspect(inspect::Args),
     /// Find the surface point closest to a tool
     Query(query::Args),
+    /// Send a recorded motion to a controller, over a serial line or a socket
+    Stream(stream::Args),
     /// Generate a procedural heart or brain
     Generate(generate::Args),
 }
@@ -36,6 +39,7 @@ Examples:
   dibs build heart.ply -o heart.dibs --stretch 1.5
   dibs inspect heart.dibs
   dibs query heart.dibs --tool capsule:0,0,60,0,0,200,4 --vertices heart.pc2 --frame 9
+  dibs stream heart.dibs heart.pc2 --to serial:/dev/ttyUSB0@921600 --quantise --loop
 
 Lengths are in the mesh's own unit. Warnings and progress go to standard error, results to
 standard output; --json makes them one JSON object. Bad input ends with exit code 1.";
@@ -45,6 +49,7 @@ fn main() -> ExitCode {
         Command::Build(args) => build::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Query(args) => query::run(&args),
+        Command::Stream(args) => stream::run(&args),
         Command::Generate(args) => generate::run(&args),
     };
     match outcome {

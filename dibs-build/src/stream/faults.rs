@@ -1,0 +1,485 @@
+//! Faults on the way from sender to receiver: seeded, reproducible.
+//!
+//! [`Injector`] turns packets into what a bad line, a bad sender or an attacker would make of them.
+//! Put it between any sender and any receiver; [`FaultyLine`] does so for a [`Line`].
+//!
+//! Faults that a checksum would catch at once, though another layer is meant to, are *sealed*: the
+//! checksum is made right again, as if the sender itself had made the mistake. Tags cannot be made
+//! right without the key.
+//!
+//! ```
+//! use dibs_build::stream::faults::{Fault, Injector};
+//! use dibs_nostd::wire::{FrameId, NoMac, Packet, PacketError, encode_heartbeat};
+//!
+//! let mut buffer = [0; 64];
+//! let id = FrameId { mesh_id: 0xB0D1, session: 1, epoch: 1 };
+//! let packet = encode_heartbeat(&id, 1, &NoMac, &mut buffer);
+//! let mut injector = Injector::new(7);
+//! assert_eq!(injector.pass(packet), [packet]);
+//! let damaged = injector.inject(Fault::FlipTwo, packet).expect("any packet can be damaged");
+//! assert!(matches!(Packet::decode(&damaged[0]), Err(PacketError::Checksum { .. })));
+//! ```
+
+use std::collections::VecDeque;
+use std::io;
+
+use dibs_nostd::format::CRC;
+use dibs_nostd::wire::{
+    Body, CHECKSUM_BYTES, Content, Encoding, HEADER_BYTES, Packet, Rows, TAG_BYTES, enframe,
+    framed_bytes,
+};
+use fastrand::Rng;
+
+use super::{Line, Transport};
+
+/// What can go wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Fault {
+    /// One bit is flipped.
+    FlipOne,
+    /// Two bits are flipped.
+    FlipTwo,
+    /// A run of up to 64 bits is overwritten.
+    Burst,
+    /// The packet is lost.
+    Drop,
+    /// The packet comes twice.
+    Duplicate,
+    /// The packet comes after up to four of its successors.
+    Reorder,
+    /// The end of the packet is missing.
+    Truncate,
+    /// Bytes in the middle are missing; on a stream, the mark between two packets too.
+    Overrun,
+    /// The packet has an earlier epoch. Sealed.
+    StaleEpoch,
+    /// A packet, or all packets, of an earlier frame come again, as they were.
+    Replay,
+    /// The packet has another mesh id. Sealed.
+    WrongMesh,
+    /// Vertices beyond the surface. Sealed.
+    OutOfRange,
+    /// A position, or the quantisation box, is infinite or not a number. Sealed.
+    NotFinite,
+    /// A position, or the quantisation box, is farther out than any surface. Sealed.
+    TooFar,
+    /// A vertex is far from its neighbours, and the frame's digest is made to confirm it. Sealed.
+    Stretch,
+    /// The tag or what it covers is changed. Sealed. Only where packets carry tags.
+    Forgery,
+    /// The sender starts anew in the middle of a frame.
+    SenderRestart,
+    /// The receiver starts anew in the middle of a frame.
+    ReceiverRestart,
+}
+
+impl Fault {
+    /// Every fault.
+    pub const ALL: [Self; 18] = [
+        Self::FlipOne,
+        Self::FlipTwo,
+        Self::Burst,
+        Self::Drop,
+        Self::Duplicate,
+        Self::Reorder,
+        Self::Truncate,
+        Self::Overrun,
+        Self::StaleEpoch,
+        Self::Replay,
+        Self::WrongMesh,
+        Self::OutOfRange,
+        Self::NotFinite,
+        Self::TooFar,
+        Self::Stretch,
+        Self::Forgery,
+        Self::SenderRestart,
+        Self::ReceiverRestart,
+    ];
+
+    /// A short name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::FlipOne => "bit flip (1)",
+            Self::FlipTwo => "bit flip (2)",
+            Self::Burst => "burst",
+            Self::Drop => "drop",
+            Self::Duplicate => "duplicate",
+            Self::Reorder => "reorder",
+            Self::Truncate => "truncate",
+            Self::Overrun => "overrun",
+            Self::StaleEpoch => "stale epoch",
+            Self::Replay => "replay",
+            Self::WrongMesh => "wrong mesh id",
+            Self::OutOfRange => "index out of range",
+            Self::NotFinite => "NaN or infinity",
+            Self::TooFar => "out of box",
+            Self::Stretch => "stretch violation",
+            Self::Forgery => "forged MAC",
+            Self::SenderRestart => "sender restart",
+            Self::ReceiverRestart => "receiver restart",
+        }
+    }
+
+    /// Whether the fault is damage to bytes, which a line can also do to what is around the packet:
+    /// [`Injector::damage`].
+    #[must_use]
+    pub const fn is_damage(self) -> bool {
+        matches!(self, Self::FlipOne | Self::FlipTwo | Self::Burst | Self::Truncate | Self::Overrun)
+    }
+
+    /// Whether a program starts anew: not for an injector to do.
+    #[must_use]
+    pub const fn is_restart(self) -> bool {
+        matches!(self, Self::SenderRestart | Self::ReceiverRestart)
+    }
+}
+
+/// Frames that a replay chooses from.
+const REMEMBERED: usize = 8;
+
+/// Turns packets into faulty ones. The same seed and the same packets give the same faults.
+pub struct Injector {
+    rng: Rng,
+    /// Packets of the last frames, the present one last.
+    frames: VecDeque<Vec<Vec<u8>>>,
+    /// Packets that come later, and after how many others.
+    late: Vec<(usize, Vec<u8>)>,
+    /// Rows of the surface, from the last begin.
+    rows: u32,
+    /// What is to be added to the frame's digest.
+    digest: u32,
+}
+
+impl Injector {
+    /// An injector that has seen nothing yet.
+    #[must_use]
+    pub fn new(seed: u64) -> Self {
+        Self {
+            rng: Rng::with_seed(seed),
+            frames: VecDeque::new(),
+            late: Vec::new(),
+            rows: 0,
+            digest: 0,
+        }
+    }
+
+    /// A packet passes as it is: what the receiver gets, which is that packet and those that were
+    /// held back until now.
+    pub fn pass(&mut self, packet: &[u8]) -> Vec<Vec<u8>> {
+        self.watch(packet);
+        let packet = self.corrected(packet);
+        self.with_late(vec![packet])
+    }
+
+    /// A fault happens to a packet: what the receiver gets. `None` if the fault cannot happen to this
+    /// packet (say, a position that is not a number to a packet without positions): nothing has
+    /// happened then, and it has not passed.
+    pub fn inject(&mut self, fault: Fault, packet: &[u8]) -> Option<Vec<Vec<u8>>> {
+        let faulty = match fault {
+            Fault::Drop => Vec::new(),
+            Fault::Duplicate => vec![packet.to_vec(), packet.to_vec()],
+            Fault::Reorder => {
+                self.watch(packet);
+                let others = self.with_late(Vec::new());
+                self.late.push((self.rng.usize(1..=4), packet.to_vec()));
+                return Some(others);
+            }
+            Fault::Replay => self.replay(packet)?,
+            _ if fault.is_damage() => {
+                let mut damaged = packet.to_vec();
+                self.damage(fault, &mut damaged);
+                vec![damaged]
+            }
+            _ => vec![self.altered(fault, packet)?],
+        };
+        self.watch(packet);
+        Some(self.with_late(faulty))
+    }
+
+    /// Damages bytes in place, at least one: a packet, or what it became on the line.
+    ///
+    /// Truncation and overrun shorten; an empty slice stays as it is.
+    pub fn damage(&mut self, fault: Fault, bytes: &mut Vec<u8>) {
+        let rng = &mut self.rng;
+        if bytes.is_empty() {
+            return;
+        }
+        let bits = bytes.len() * 8;
+        let flip = |bytes: &mut [u8], bit: usize| bytes[bit / 8] ^= 1 << (bit % 8);
+        match fault {
+            Fault::FlipOne => flip(bytes, rng.usize(..bits)),
+            Fault::FlipTwo => {
+                let first = rng.usize(..bits);
+                let second = (first + rng.usize(1..bits)) % bits;
+                flip(bytes, first);
+                flip(bytes, second);
+            }
+            Fault::Burst => {
+                let length = rng.usize(2..=64.min(bits));
+                let first = rng.usize(..=bits - length);
+                // Its ends are flipped for certain, what is between them at random.
+                for bit in 0..length {
+                    if bit == 0 || bit + 1 == length || rng.bool() {
+                        flip(bytes, first + bit);
+                    }
+                }
+            }
+            Fault::Truncate => bytes.truncate(rng.usize(..bytes.len())),
+            _ => {
+                let lost = rng.usize(1..=16.min(bytes.len()));
+                let first = rng.usize(..=bytes.len() - lost);
+                bytes.drain(first..first + lost);
+            }
+        }
+    }
+
+    /// Remembers a packet that was sent.
+    fn watch(&mut self, packet: &[u8]) {
+        let Ok(Packet { body, .. }) = Packet::decode(packet) else { return };
+        if let Body::Begin(begin) = body {
+            self.digest = 0;
+            if begin.content != Content::Modal {
+                self.rows = begin.rows;
+            }
+            self.frames.push_back(Vec::new());
+            if self.frames.len() > REMEMBERED {
+                self.frames.pop_front();
+            }
+        }
+        if let Some(frame) = self.frames.back_mut() {
+            frame.push(packet.to_vec());
+        }
+    }
+
+    /// Adds the packets that have been held back for long enough.
+    fn with_late(&mut self, mut packets: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
+        for (after, _) in &mut self.late {
+            *after -= 1;
+        }
+        packets
+            .extend(self.late.extract_if(.., |(after, _)| *after == 0).map(|(_, packet)| packet));
+        packets
+    }
+
+    /// A commit that confirms what was altered in its frame; any other packet as it is.
+    fn corrected(&mut self, packet: &[u8]) -> Vec<u8> {
+        let mut packet = packet.to_vec();
+        let commit = match Packet::decode(&packet) {
+            Ok(Packet { body: Body::Commit(commit), .. }) if self.digest != 0 => commit,
+            _ => return packet,
+        };
+        let digest = commit.digest.wrapping_add(self.digest);
+        packet[HEADER_BYTES..HEADER_BYTES + 4].copy_from_slice(&digest.to_le_bytes());
+        self.digest = 0;
+        seal(&mut packet);
+        packet
+    }
+
+    fn replay(&mut self, packet: &[u8]) -> Option<Vec<Vec<u8>>> {
+        // Packets of the present frame would be duplicates.
+        let is_begin = matches!(Packet::decode(packet).ok()?.body, Body::Begin(_));
+        let earlier = self.frames.len() - usize::from(!is_begin && !self.frames.is_empty());
+        if earlier == 0 {
+            return None;
+        }
+        let frame = &self.frames[self.rng.usize(..earlier)];
+        let mut packets = if self.rng.bool() {
+            frame.clone()
+        } else {
+            vec![frame[self.rng.usize(..frame.len())].clone()]
+        };
+        packets.push(packet.to_vec());
+        Some(packets)
+    }
+
+    /// A packet with one field changed, and its checksum made right.
+    fn altered(&mut self, fault: Fault, packet: &[u8]) -> Option<Vec<u8>> {
+        let decoded = Packet::decode(packet).ok()?;
+        let is_tagged = packet[1] & 0x80 != 0;
+        let mut altered = packet.to_vec();
+        let mut put =
+            |at: usize, bytes: &[u8]| altered[at..at + bytes.len()].copy_from_slice(bytes);
+        let rng = &mut self.rng;
+        match (fault, decoded.body) {
+            (Fault::StaleEpoch, _) => {
+                let epoch = decoded.epoch.wrapping_sub(rng.u32(1..1 << 31));
+                put(8, &epoch.to_le_bytes());
+            }
+            (Fault::WrongMesh, _) => {
+                put(4, &(decoded.mesh_id ^ rng.u32(1..)).to_le_bytes());
+            }
+            (Fault::OutOfRange, Body::Vertices(vertices)) => {
+                let least = (self.rows + 1).saturating_sub(vertices.rows.len() as u32);
+                let first = rng.u32(least..1 << 24).to_le_bytes();
+                put(15, &first[..3]);
+            }
+            (Fault::NotFinite | Fault::TooFar, Body::Vertices(vertices)) => {
+                let Rows::Float(rows) = vertices.rows else { return None };
+                let coordinate = HEADER_BYTES + 4 * rng.usize(..3 * rows.len());
+                put(coordinate, &bad_number(fault, rng).to_le_bytes());
+            }
+            (Fault::NotFinite | Fault::TooFar, Body::Weights(weights)) => {
+                let weight = HEADER_BYTES + 4 * rng.usize(..weights.values.len());
+                put(weight, &bad_number(fault, rng).to_le_bytes());
+            }
+            (Fault::NotFinite | Fault::TooFar, Body::Begin(begin)) => {
+                let Encoding::Quantised(_) = begin.encoding else { return None };
+                // One of the three numbers of the origin.
+                let number = HEADER_BYTES + 12 + 4 * rng.usize(..3);
+                put(number, &bad_number(fault, rng).to_le_bytes());
+            }
+            (Fault::Stretch, Body::Vertices(vertices)) => match vertices.rows {
+                Rows::Quantised(rows) => {
+                    // Half the box away.
+                    let at = HEADER_BYTES + 2 * rng.usize(..3 * rows.len()) + 1;
+                    put(at, &[packet[at] ^ 0x80]);
+                }
+                Rows::Float(rows) => {
+                    let at = HEADER_BYTES + 4 * rng.usize(..3 * rows.len());
+                    // Mirrored and doubled, or moved away from zero: still a place for a vertex.
+                    let value = f32::from_le_bytes([
+                        packet[at],
+                        packet[at + 1],
+                        packet[at + 2],
+                        packet[at + 3],
+                    ]);
+                    let moved = if value < 0.0 { value + FAR } else { value - FAR };
+                    put(at, &moved.to_le_bytes());
+                }
+                _ => return None,
+            },
+            (Fault::Forgery, _) if is_tagged => {
+                let tag = packet.len() - CHECKSUM_BYTES - TAG_BYTES;
+                let at = match decoded.body {
+                    // What it says, under the same tag; padding would be malformed.
+                    Body::Vertices(_) | Body::Commit(_) if rng.bool() => HEADER_BYTES,
+                    _ => tag + rng.usize(..TAG_BYTES),
+                };
+                put(at, &[packet[at] ^ rng.u8(1..)]);
+            }
+            _ => return None,
+        }
+        seal(&mut altered);
+        if fault == Fault::Stretch {
+            let change = checksum(&altered).wrapping_sub(checksum(packet));
+            self.digest = self.digest.wrapping_add(change);
+        }
+        Some(altered)
+    }
+}
+
+/// How far a vertex of float positions is moved to violate the stretch, in mm: farther than any
+/// triangle is long, not as far as any limit on coordinates.
+const FAR: f32 = 100.0;
+
+fn bad_number(fault: Fault, rng: &mut Rng) -> f32 {
+    let values: &[f32] = if fault == Fault::NotFinite {
+        &[f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY]
+    } else {
+        &[1e9, -1e9, 3e30, f32::MAX, f32::MIN]
+    };
+    values[rng.usize(..values.len())]
+}
+
+/// Makes a packet's checksum right.
+fn seal(packet: &mut [u8]) {
+    if let Some((content, checksum)) = packet.split_last_chunk_mut::<CHECKSUM_BYTES>() {
+        *checksum = CRC.checksum(content).to_le_bytes();
+    }
+}
+
+fn checksum(packet: &[u8]) -> u32 {
+    packet.last_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes))
+}
+
+/// A line on which faults happen.
+pub struct FaultyLine {
+    line: Line,
+    injector: Injector,
+    rng: Rng,
+    faults: Vec<Fault>,
+    rate: f64,
+    /// How often each fault has happened.
+    counts: Vec<(Fault, u64)>,
+    /// Set while nothing is sent at all.
+    is_cut: bool,
+}
+
+impl FaultyLine {
+    /// A line on which each packet meets one of these faults with this probability. Restarts, which no
+    /// line can do, never happen.
+    #[must_use]
+    pub fn new(line: Line, seed: u64, faults: &[Fault], rate: f64) -> Self {
+        let faults: Vec<Fault> = faults.iter().copied().filter(|f| !f.is_restart()).collect();
+        Self {
+            line,
+            injector: Injector::new(seed),
+            rng: Rng::with_seed(!seed),
+            counts: faults.iter().map(|&fault| (fault, 0)).collect(),
+            faults,
+            rate,
+            is_cut: false,
+        }
+    }
+
+    /// How often each fault has happened.
+    #[must_use]
+    pub fn counts(&self) -> &[(Fault, u64)] {
+        &self.counts
+    }
+
+    /// Probability of a fault a packet from now on.
+    pub fn set_rate(&mut self, rate: f64) {
+        self.rate = rate;
+    }
+
+    /// Cuts the line, or joins it again.
+    pub fn cut(&mut self, is_cut: bool) {
+        self.is_cut = is_cut;
+    }
+
+    fn fault(&mut self) -> Option<Fault> {
+        (self.rng.f64() < self.rate).then(|| self.rng.choice(self.faults.iter().copied()))?
+    }
+
+    fn count(&mut self, happened: Fault) {
+        for (fault, count) in &mut self.counts {
+            *count += u64::from(*fault == happened);
+        }
+    }
+}
+
+impl Transport for FaultyLine {
+    fn send(&mut self, packet: &[u8]) -> io::Result<()> {
+        if self.is_cut {
+            return Ok(());
+        }
+        let fault = self.fault();
+        if let Some(fault) = fault
+            && fault.is_damage()
+            && self.line.is_stream()
+        {
+            self.count(fault);
+            let mut framed = vec![0; framed_bytes(packet.len())];
+            let bytes = enframe(packet, &mut framed).map_or(0, <[u8]>::len);
+            framed.truncate(bytes);
+            self.injector.damage(fault, &mut framed);
+            return self.line.send_raw(&framed);
+        }
+        let packets =
+            match fault.and_then(|fault| Some((fault, self.injector.inject(fault, packet)?))) {
+                Some((fault, packets)) => {
+                    self.count(fault);
+                    packets
+                }
+                None => self.injector.pass(packet),
+            };
+        packets.iter().try_for_each(|packet| self.line.send(packet))
+    }
+
+    fn receive(&mut self) -> io::Result<Option<Vec<u8>>> {
+        self.line.receive()
+    }
+}

@@ -1,0 +1,459 @@
+//! From positions to packets, and what comes back.
+
+use std::time::{Duration, Instant, SystemTime};
+
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::wire::{
+    Body, Content, Counters, EncodeError, Encoding, FrameEncoder, FrameId, Mac, NoMac, Packet,
+    QuantisedBox, Rows, Status, WeightsEncoder, encode_heartbeat, is_newer,
+};
+use dibs_nostd::{Index, Tree};
+use thiserror::Error;
+
+use super::Transport;
+
+/// Which mesh, and in which order its vertices are sent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SurfaceOrder {
+    mesh_id: u32,
+    /// The mesh's vertex of each row.
+    order: Vec<u32>,
+}
+
+impl SurfaceOrder {
+    /// That of a tree: the tree that the receiver has, or one built from the same mesh in the same way.
+    #[must_use]
+    pub fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
+        let order = (0..tree.vertex_count()).map(|row| tree.vertex_number(row).unwrap_or(row));
+        Self { mesh_id: tree.mesh_id(), order: order.collect() }
+    }
+
+    /// An order of one's own: `order` has the mesh's vertex for each row of the vertex table.
+    #[must_use]
+    pub const fn new(mesh_id: u32, order: Vec<u32>) -> Self {
+        Self { mesh_id, order }
+    }
+
+    /// Identity of the mesh.
+    #[must_use]
+    pub const fn mesh_id(&self) -> u32 {
+        self.mesh_id
+    }
+
+    /// Rows of the vertex table.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.order.len()
+    }
+
+    fn to_rows(&self, positions: &[Vec3]) -> Result<Vec<Vec3>, SendError> {
+        let row = |&vertex: &u32| {
+            positions
+                .get(vertex as usize)
+                .copied()
+                .ok_or(SendError::Vertices { vertex, found: positions.len() })
+        };
+        self.order.iter().map(row).collect()
+    }
+}
+
+/// How a [`Sender`] sends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// 6 bytes a vertex instead of 12, in a box that is fitted to each frame.
+    pub quantised: bool,
+    /// Sends only the vertices that moved by more than this, in mm. With quantised positions the box
+    /// is as coarse as that, so that the error that it states covers what was not sent; it then
+    /// reaches 73 m a mm of tolerance, and the receiver must allow coordinates that large. With float
+    /// positions there is no error to state: whatever the tolerance, only vertices that did not move
+    /// at all are left out.
+    pub partial: Option<f32>,
+    /// With partial frames: at least every this many frames a whole one. What a receiver that cannot
+    /// answer needs after a loss.
+    pub whole_every: u32,
+    /// Between two heartbeats; `None` sends none.
+    pub heartbeat: Option<Duration>,
+    /// Number of this run: later than that of every run before, which the receiver remembers. By
+    /// default the time in tenths of a second, which wraps after 13 years.
+    pub session: u32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        Self {
+            quantised: true,
+            partial: None,
+            whole_every: 250,
+            heartbeat: Some(Duration::from_millis(100)),
+            session: (now.as_millis() / 100) as u32,
+        }
+    }
+}
+
+/// A frame that was sent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sent {
+    /// Its number.
+    pub epoch: u32,
+    /// Whether whole, partial or modal.
+    pub content: Content,
+    /// Vertices, or weights, in it.
+    pub rows: usize,
+    /// Packets that it took.
+    pub packets: usize,
+    /// Bytes of these, without what a byte stream adds.
+    pub bytes: usize,
+    /// No vertex is farther than this from where the receiver has it, in mm.
+    pub error: f32,
+}
+
+/// What was sent since the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Totals {
+    /// Frames.
+    pub frames: u64,
+    /// Of these, partial ones.
+    pub partial: u64,
+    /// Packets, heartbeats included.
+    pub packets: u64,
+    /// Bytes, without what a byte stream adds.
+    pub bytes: u64,
+    /// Statuses that came back.
+    pub statuses: u64,
+}
+
+/// Sends the frames of a moving surface, in packets of at most `MTU` bytes, and listens to what the
+/// receiver reports.
+///
+/// ```
+/// use dibs_build::stream::{Sender, Settings, SurfaceOrder};
+/// use dibs_build::{Builder, generate};
+///
+/// let (heart, motion) = generate::heart(500)?;
+/// let tree = Builder::new().build(&heart)?;
+/// let order = SurfaceOrder::of(&tree.tree::<u16>()?);
+/// // A `Vec` collects the packets; `Target::open` gives a line.
+/// let mut sender = Sender::<_, 64>::new(Vec::new(), order, Settings::default());
+/// for frame in &motion.frames {
+///     sender.send(frame)?; // positions in the mesh's order
+///     sender.poll()?; // heartbeats there, statuses back
+/// }
+/// assert_eq!(sender.totals().frames, motion.frames.len() as u64);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Sender<T, const MTU: usize> {
+    transport: T,
+    surface: SurfaceOrder,
+    settings: Settings,
+    epoch: u32,
+    beat: u32,
+    last_beat: Option<Instant>,
+    /// The last frame of positions, as the receiver has it if it came through.
+    held: Option<(u32, Vec<Vec3>)>,
+    since_whole: u32,
+    whole_wanted: bool,
+    /// The last whole frame: until it is acknowledged, requests for one are about the time before it.
+    whole: Option<(u32, Instant)>,
+    status: Option<Status>,
+    counters: Counters,
+    totals: Totals,
+}
+
+/// How long a whole frame may be on its way before the receiver's request for one is heeded again.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// Statuses that may be overtaken on their way.
+const OVERTAKEN: u32 = 8;
+
+impl<T: Transport, const MTU: usize> Sender<T, MTU> {
+    /// A sender that has sent nothing yet.
+    #[must_use]
+    pub fn new(transport: T, surface: SurfaceOrder, settings: Settings) -> Self {
+        Self {
+            transport,
+            surface,
+            settings,
+            epoch: 0,
+            beat: 0,
+            last_beat: None,
+            held: None,
+            since_whole: 0,
+            whole_wanted: true,
+            whole: None,
+            status: None,
+            counters: Counters::new(),
+            totals: Totals::default(),
+        }
+    }
+
+    /// Sends a frame: positions (mm) in the mesh's order. Whole, or only what moved, as the settings
+    /// and the receiver ask for.
+    ///
+    /// # Errors
+    /// [`SendError`] names the vertex that cannot be sent, or what the line said.
+    pub fn send(&mut self, positions: &[Vec3]) -> Result<Sent, SendError> {
+        let rows = self.surface.to_rows(positions)?;
+        let encoding = self.encoding(&rows)?;
+        let is_partial = self.is_partial_wanted();
+        let base = self.held.take().filter(|_| is_partial);
+        let id = self.next_id();
+        let frame = match &base {
+            Some((epoch, held)) => {
+                FrameEncoder::partial(id, encoding, &rows[..], *epoch, &held[..])
+            }
+            None => FrameEncoder::new(id, encoding, &rows[..]),
+        };
+        let packets = packets_of::<_, MTU>(frame.map_err(SendError::Frame)?);
+
+        let content = match base {
+            Some((base_epoch, _)) => Content::Partial { base_epoch },
+            None => Content::Whole,
+        };
+        let mut held = base.map_or_else(|| vec![Vec3::ZERO; rows.len()], |(_, held)| held);
+        let mut sent = Sent { epoch: id.epoch, content, error: encoding.error(), ..Sent::NOTHING };
+        for packet in &packets {
+            sent.rows += apply(packet, encoding, &mut held);
+            self.transmit(packet, &mut sent)?;
+        }
+        self.held = Some((id.epoch, held));
+        if content == Content::Whole {
+            self.whole = Some((id.epoch, Instant::now()));
+            self.since_whole = 0;
+            self.whole_wanted = false;
+        } else {
+            self.since_whole += 1;
+            self.totals.partial += 1;
+        }
+        self.totals.frames += 1;
+        Ok(sent)
+    }
+
+    /// Sends a modal frame: the weights of the receiver's displacement modes.
+    ///
+    /// # Errors
+    /// [`SendError`] names the weight that cannot be sent, or what the line said.
+    pub fn send_weights(&mut self, weights: &[f32]) -> Result<Sent, SendError> {
+        let id = self.next_id();
+        let mut frame = WeightsEncoder::<MTU>::new(id, weights).map_err(SendError::Frame)?;
+        let mut buffer = [0; MTU];
+        let rows = weights.len();
+        let mut sent = Sent { epoch: id.epoch, content: Content::Modal, rows, ..Sent::NOTHING };
+        while let Some(packet) = frame.next_packet(&mut buffer) {
+            self.transmit(packet, &mut sent)?;
+        }
+        self.totals.frames += 1;
+        Ok(sent)
+    }
+
+    /// Sends a heartbeat if one is due, and takes in the statuses that have come. Does not block;
+    /// to be called some times between two heartbeats.
+    ///
+    /// # Errors
+    /// [`SendError::Line`] when the connection is gone.
+    pub fn poll(&mut self) -> Result<(), SendError> {
+        if let Some(interval) = self.settings.heartbeat
+            && self.last_beat.is_none_or(|last| last.elapsed() >= interval)
+        {
+            self.last_beat = Some(Instant::now());
+            self.beat = self.beat.wrapping_add(1);
+            let mut buffer = [0; 64];
+            let beat = encode_heartbeat(&self.id(), self.beat, &NoMac, &mut buffer).to_vec();
+            self.transmit(&beat, &mut Sent::NOTHING.clone())?;
+        }
+        while let Some(packet) = self.transport.receive().map_err(SendError::Line)? {
+            self.take(&packet);
+        }
+        Ok(())
+    }
+
+    /// The frame that the receiver has published, if it has said so in this session.
+    #[must_use]
+    pub fn acknowledged(&self) -> Option<u32> {
+        let published = self.status?.published?;
+        (published.session == self.settings.session).then_some(published.epoch)
+    }
+
+    /// Frames that were sent and not acknowledged yet, nor a later one.
+    #[must_use]
+    pub fn in_flight(&self) -> u32 {
+        self.epoch.wrapping_sub(self.acknowledged().unwrap_or(0))
+    }
+
+    /// What the receiver reported last.
+    #[must_use]
+    pub const fn status(&self) -> Option<&Status> {
+        self.status.as_ref()
+    }
+
+    /// The receiver's counters, as far as it has reported them.
+    #[must_use]
+    pub const fn counters(&self) -> &Counters {
+        &self.counters
+    }
+
+    /// What was sent since the start.
+    #[must_use]
+    pub const fn totals(&self) -> &Totals {
+        &self.totals
+    }
+
+    /// The last frame of positions as the receiver has it if all of it came through: its number, and
+    /// the positions in the order of its rows.
+    #[must_use]
+    pub fn held(&self) -> Option<(u32, &[Vec3])> {
+        self.held.as_ref().map(|(epoch, held)| (*epoch, held.as_slice()))
+    }
+
+    /// What the packets go through.
+    pub const fn transport(&mut self) -> &mut T {
+        &mut self.transport
+    }
+
+    /// Makes the next frame a whole one.
+    pub const fn want_whole(&mut self) {
+        self.whole_wanted = true;
+    }
+
+    fn id(&self) -> FrameId {
+        let Settings { session, .. } = self.settings;
+        FrameId { mesh_id: self.surface.mesh_id, session, epoch: self.epoch }
+    }
+
+    fn next_id(&mut self) -> FrameId {
+        self.epoch = self.epoch.wrapping_add(1);
+        self.id()
+    }
+
+    fn is_partial_wanted(&self) -> bool {
+        self.settings.partial.is_some()
+            && !self.whole_wanted
+            && self.since_whole + 1 < self.settings.whole_every
+    }
+
+    fn encoding(&self, rows: &[Vec3]) -> Result<Encoding, SendError> {
+        if !self.settings.quantised {
+            return Ok(Encoding::Float);
+        }
+        // A position that is not finite is what is wrong, not the box: the encoder names it.
+        let Some(grid) = QuantisedBox::covering(rows) else { return Ok(Encoding::Float) };
+        let tolerance = self.settings.partial.unwrap_or(0.0);
+        Ok(Encoding::Quantised(coarsened(grid, tolerance)))
+    }
+
+    fn transmit(&mut self, packet: &[u8], sent: &mut Sent) -> Result<(), SendError> {
+        self.transport.send(packet).map_err(SendError::Line)?;
+        sent.packets += 1;
+        sent.bytes += packet.len();
+        self.totals.packets += 1;
+        self.totals.bytes += packet.len() as u64;
+        Ok(())
+    }
+
+    /// Takes in a packet that came back. What is no status of this mesh is not for this sender.
+    fn take(&mut self, packet: &[u8]) {
+        let Ok(packet) = Packet::decode(packet) else { return };
+        let Body::Status(report) = packet.body else { return };
+        if packet.mesh_id != self.surface.mesh_id {
+            return;
+        }
+        // Datagrams may overtake each other; farther back is a receiver that has started anew.
+        let is_late = self
+            .status
+            .is_some_and(|last| last.number.wrapping_sub(report.status.number) < OVERTAKEN);
+        if is_late {
+            return;
+        }
+        self.counters.update(&report);
+        self.status = Some(report.status);
+        self.totals.statuses += 1;
+        // Somebody has sent under a later session: this one would be refused for ever.
+        if let Some(published) = report.status.published
+            && is_newer(published.session, self.settings.session)
+        {
+            self.settings.session = published.session.wrapping_add(1);
+            self.held = None;
+            self.whole_wanted = true;
+        }
+        let is_answered = self.whole.is_some_and(|(epoch, at)| {
+            let has_come = self.acknowledged().is_some_and(|newest| !is_newer(epoch, newest));
+            has_come || at.elapsed() > PATIENCE
+        });
+        if is_answered && (report.status.wants_whole || self.acknowledged().is_none()) {
+            self.whole_wanted = true;
+        }
+    }
+}
+
+impl Sent {
+    const NOTHING: Self =
+        Self { epoch: 0, content: Content::Whole, rows: 0, packets: 0, bytes: 0, error: 0.0 };
+}
+
+fn packets_of<M: Mac, const MTU: usize>(
+    mut frame: FrameEncoder<'_, [Vec3], MTU, M>,
+) -> Vec<Vec<u8>> {
+    let mut buffer = [0; MTU];
+    let mut packets = Vec::new();
+    while let Some(packet) = frame.next_packet(&mut buffer) {
+        packets.push(packet.to_vec());
+    }
+    packets
+}
+
+/// Does to the positions what the receiver will do; how many there were.
+fn apply(packet: &[u8], encoding: Encoding, held: &mut [Vec3]) -> usize {
+    let Ok(Packet { body: Body::Vertices(vertices), .. }) = Packet::decode(packet) else {
+        return 0;
+    };
+    let rows = held.iter_mut().skip(vertices.first as usize);
+    match (vertices.rows, encoding) {
+        (Rows::Float(floats), _) => {
+            for (row, bytes) in rows.zip(floats) {
+                let (words, _) = bytes.as_chunks::<4>();
+                *row = Vec3::from_array([0, 1, 2].map(|axis| f32::from_le_bytes(words[axis])));
+            }
+        }
+        (Rows::Quantised(numbers), Encoding::Quantised(grid)) => {
+            for (row, bytes) in rows.zip(numbers) {
+                let (words, _) = bytes.as_chunks::<2>();
+                *row = grid.position([0, 1, 2].map(|axis| u16::from_le_bytes(words[axis])));
+            }
+        }
+        _ => (),
+    }
+    vertices.rows.len()
+}
+
+/// The same box in coarser steps, so that its error is nearly `error` (mm), where it is less.
+fn coarsened(grid: QuantisedBox, error: f32) -> QuantisedBox {
+    // Half a step along each of three axes, and the rounding of the 65,536 steps that the box reaches.
+    let step = error * 1.119 - grid.origin().abs().max_element() * 1e-6;
+    if step <= grid.step().max_element() {
+        return grid;
+    }
+    QuantisedBox::new(grid.origin() - step, Vec3::splat(step)).unwrap_or(grid)
+}
+
+/// Why a frame was not sent.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SendError {
+    /// The frame has too few vertices.
+    #[error(
+        "the frame has {found} vertices and the tree uses vertex {vertex}: send the positions of \
+         the mesh that the tree was built from"
+    )]
+    Vertices {
+        /// A vertex of the tree.
+        vertex: u32,
+        /// Vertices of the frame.
+        found: usize,
+    },
+    /// The positions cannot be put into packets.
+    #[error("the frame cannot be sent: {0}")]
+    Frame(EncodeError),
+    /// The connection is gone.
+    #[error("the connection broke: {0}")]
+    Line(std::io::Error),
+}
