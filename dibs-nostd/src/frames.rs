@@ -30,10 +30,10 @@
 //! priority.)
 
 use core::fmt;
-use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use glam::Vec3;
 
+use crate::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use crate::constraint::Unknown;
 use crate::{MeasuredStretch, VertexTable};
 
@@ -70,6 +70,7 @@ struct Buffer<const N: usize> {
 }
 
 impl<const N: usize> Buffer<N> {
+    #[cfg(not(loom))]
     const fn new() -> Self {
         Self {
             positions: [const { [const { AtomicU32::new(0) }; 3] }; N],
@@ -77,6 +78,18 @@ impl<const N: usize> Buffer<N> {
             received: AtomicU32::new(0),
             position_error: AtomicU32::new(0),
             stretch: [const { AtomicU32::new(0) }; 3],
+        }
+    }
+
+    #[cfg(loom)]
+    fn new() -> Self {
+        use core::array::from_fn;
+        Self {
+            positions: from_fn(|_| from_fn(|_| AtomicU32::new(0))),
+            epoch: AtomicU32::new(0),
+            received: AtomicU32::new(0),
+            position_error: AtomicU32::new(0),
+            stretch: from_fn(|_| AtomicU32::new(0)),
         }
     }
 
@@ -150,11 +163,25 @@ pub struct Frames<const N: usize> {
 
 impl<const N: usize> Frames<N> {
     /// An empty double buffer: nothing is published.
+    #[cfg(not(loom))]
     #[must_use]
     pub const fn new() -> Self {
         Self {
             buffers: [const { Buffer::new() }; 2],
             marks: [const { AtomicU8::new(0) }; N],
+            state: AtomicU32::new(0),
+            split: AtomicBool::new(false),
+        }
+    }
+
+    /// An empty double buffer, of atomics whose order a model checker decides.
+    #[cfg(loom)]
+    #[must_use]
+    pub fn new() -> Self {
+        use core::array::from_fn;
+        Self {
+            buffers: from_fn(|_| Buffer::new()),
+            marks: from_fn(|_| AtomicU8::new(0)),
             state: AtomicU32::new(0),
             split: AtomicBool::new(false),
         }

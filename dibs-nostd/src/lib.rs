@@ -54,6 +54,7 @@ pub use glam;
 
 mod answer;
 mod assembler;
+mod atomic;
 mod check;
 pub mod constraint;
 pub mod failsafe;
@@ -62,6 +63,7 @@ mod frames;
 mod index;
 pub mod modes;
 mod query;
+mod scrub;
 mod sections;
 mod sqrt;
 mod stretch;
@@ -77,7 +79,8 @@ pub use frames::{
     FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames, OutOfTable, PublishError,
 };
 pub use index::Index;
-pub use query::{Budget, Options, Query, QueryError};
+pub use query::{Budget, Cost, Options, Query, QueryError};
+pub use scrub::{Rot, Scrub};
 pub use stretch::{MeasuredStretch, StretchError, measure_stretch};
 pub use tool::{ACCURACY, AxisPair, Capsule, MAX_COORDINATE, Sphere, Tool, ToolError};
 pub use tree::Tree;

@@ -1,9 +1,12 @@
 //! The traversal: the closest pair between a tool and the surface as it is now.
 
+mod cost;
+mod cost_m7;
 mod error;
 mod options;
 mod search;
 
+pub use cost::Cost;
 pub use error::QueryError;
 pub use options::{Budget, Options};
 

@@ -1,0 +1,69 @@
+//! From a deadline to a budget: what a query costs at most.
+
+use super::Budget;
+
+/// A bound for what a query costs: `base + n * node_test + t * triangle_test`, in instructions, where `n`
+/// and `t` are the node and triangle tests that a [`Budget`] limits.
+///
+/// The constants of the Cortex-M7 are measured, on an emulated one, as the plane above all of some
+/// thousand adversarial queries, and checked on others: `docs/guarantees.md` says on how many, how tight the
+/// bound is, and what a number of instructions says about a number of cycles. They hold for vertex
+/// tables that are slices of `Vec3`, and the firmware's profile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Cost {
+    /// What every query costs: setting it up, the root, a warm start's bookkeeping, and the answer.
+    pub base: u32,
+    /// What a node test costs, be its sphere stored or elastic.
+    pub node_test: u32,
+    /// What an exact triangle test costs, on top of the elastic test before it.
+    pub triangle_test: u32,
+}
+
+impl Cost {
+    /// The most instructions that a query takes which does no more than `budget`.
+    ///
+    /// ```
+    /// use dibs_nostd::{Budget, Cost};
+    /// let cost = Cost { base: 500, node_test: 60, triangle_test: 400 };
+    /// let most = cost.instructions(Budget { node_tests: 100, triangle_tests: 10 });
+    /// assert_eq!(most, 10_500);
+    /// ```
+    #[must_use]
+    pub const fn instructions(&self, budget: Budget) -> u64 {
+        let nodes = budget.node_tests as u64 * self.node_test as u64;
+        let triangles = budget.triangle_tests as u64 * self.triangle_test as u64;
+        nodes.saturating_add(triangles).saturating_add(self.base as u64)
+    }
+}
+
+impl Budget {
+    /// The budget of a query that must end within this many instructions: half of them for each kind of
+    /// test, which is about how an ordinary query spends them. A deadline shorter than [`Cost::base`]
+    /// gives an empty budget, which still costs the base.
+    ///
+    /// ```
+    /// use dibs_nostd::{Budget, Cost, Options};
+    /// // A quarter of a millisecond at 480 MHz, if an instruction takes a cycle and a half.
+    /// let budget = Budget::for_instructions(80_000, &Cost::M7_CAPSULE);
+    /// assert!(Cost::M7_CAPSULE.instructions(budget) <= 80_000);
+    /// let options = Options::new().budget(budget);
+    /// # let _ = options;
+    /// ```
+    #[must_use]
+    pub const fn for_instructions(instructions: u32, cost: &Cost) -> Self {
+        let half = instructions.saturating_sub(cost.base) / 2;
+        Self {
+            node_tests: share(half, cost.node_test),
+            triangle_tests: share(half, cost.triangle_test),
+        }
+    }
+}
+
+/// How many at `each` there are in `all`; without limit where they cost nothing.
+const fn share(all: u32, each: u32) -> u32 {
+    match all.checked_div(each) {
+        Some(number) => number,
+        None => u32::MAX,
+    }
+}
