@@ -10,6 +10,7 @@ pub mod oracle;
 pub mod poses;
 pub mod streams;
 pub mod stretch;
+pub mod surfaces;
 
 /// The README's code: it compiles, and its control loop runs.
 #[cfg(doctest)]

@@ -4,6 +4,7 @@ mod apt;
 mod bench;
 mod demo;
 mod firmware;
+mod guarantees;
 mod process;
 mod qemu;
 mod test;
@@ -28,6 +29,7 @@ enum Task {
     Demo(demo::Options),
     Test(test::Options),
     Bench(bench::Options),
+    Guarantees(guarantees::Options),
 }
 
 fn main() -> ExitCode {
@@ -35,6 +37,7 @@ fn main() -> ExitCode {
         Task::Demo(options) => demo::run(&options),
         Task::Test(options) => test::test(&options),
         Task::Bench(options) => bench::run(&options),
+        Task::Guarantees(options) => guarantees::run(&options),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,0 +1,218 @@
+//! Answers a script of queries, wherever it runs: on the board under QEMU, and on the host in any build.
+//!
+//! A script is a stream of little-endian 32-bit words, made by `cargo xtask guarantees`; the answers are
+//! another. Both sides run this code, so that a difference is one of compiler and processor.
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::{
+    Budget, Capsule, MeasuredStretch, Options, Proximity, Query, Sphere, Tool, Tree,
+    measure_stretch,
+};
+
+/// What a word at the start of a record means.
+pub mod command {
+    /// End of the script.
+    pub const END: u32 = 0;
+    /// A tree of 16-bit indices: its length in bytes, then the bytes, padded to a word.
+    pub const TREE: u32 = 1;
+    /// A frame: three `f32` for each of the tree's vertices. Answered by the instructions that measuring
+    /// its stretch took, and the stretch's bits.
+    pub const FRAME: u32 = 2;
+    /// A query: [`QUERY_WORDS`](super::QUERY_WORDS). Answered by [`ANSWER_WORDS`](super::ANSWER_WORDS).
+    pub const QUERY: u32 = 3;
+}
+
+/// Words of a query: the axis' ends, the radius, 1 for a capsule and 0 for a sphere, 1 to use the
+/// measured stretch, the warm start or `u32::MAX`, and the budget's node and triangle tests.
+pub const QUERY_WORDS: usize = 12;
+/// Words of an answer: what it took on the clock, then everything in a [`Proximity`].
+pub const ANSWER_WORDS: usize = 24;
+/// Largest tree, in bytes.
+pub const TREE_BYTES: usize = 1 << 20;
+/// Most vertices.
+pub const VERTICES: usize = 1 << 15;
+
+/// What a program must offer to run a script.
+pub trait Machine {
+    /// Fills the buffer from the script.
+    ///
+    /// # Errors
+    /// [`Fault`] where the script ends too early.
+    fn read(&mut self, buffer: &mut [u8]) -> Result<(), Fault>;
+
+    /// Appends to the answers.
+    ///
+    /// # Errors
+    /// [`Fault`] where nothing can be written.
+    fn write(&mut self, bytes: &[u8]) -> Result<(), Fault>;
+
+    /// A free-running counter.
+    fn clock(&self) -> u32;
+}
+
+/// The script cannot be followed.
+#[derive(Clone, Copy, Debug)]
+pub struct Fault;
+
+/// Where a tree and a frame are kept.
+pub struct Memory {
+    tree: [u8; TREE_BYTES],
+    rows: [Vec3; VERTICES],
+}
+
+impl Memory {
+    /// Empty.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { tree: [0; TREE_BYTES], rows: [Vec3::ZERO; VERTICES] }
+    }
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Follows a script to its end.
+///
+/// # Errors
+/// [`Fault`] where the script makes no sense, or a query fails.
+pub fn run(memory: &mut Memory, machine: &mut impl Machine) -> Result<(), Fault> {
+    let mut next = word(machine)?;
+    while next == command::TREE {
+        let length = word(machine)? as usize;
+        let Memory { tree, rows } = memory;
+        machine.read(tree.get_mut(..length.next_multiple_of(4)).ok_or(Fault)?)?;
+        let bytes = tree.get(..length).ok_or(Fault)?;
+        let tree = Tree::from_bytes(bytes).map_err(|_| Fault)?;
+        next = queries(&tree, rows, machine)?;
+    }
+    if next == command::END { Ok(()) } else { Err(Fault) }
+}
+
+/// Frames and queries of one tree. Returns the command that is neither.
+fn queries(
+    tree: &Tree<'_, u16>,
+    rows: &mut [Vec3],
+    machine: &mut impl Machine,
+) -> Result<u32, Fault> {
+    let mut query = Query::<_, 64>::new(tree).map_err(|_| Fault)?;
+    let rows = rows.get_mut(..tree.vertex_count() as usize).ok_or(Fault)?;
+    let mut measured = None;
+    loop {
+        match word(machine)? {
+            command::FRAME => {
+                for row in rows.iter_mut() {
+                    *row = point(machine)?;
+                }
+                let start = machine.clock();
+                let stretch = measure_stretch(tree, &*rows).map_err(|_| Fault)?;
+                let took = machine.clock().wrapping_sub(start);
+                measured = Some(stretch);
+                put(machine, &[took, stretch.sigma().to_bits()])?;
+            }
+            command::QUERY => {
+                let answer = ask(&mut query, rows, measured, machine)?;
+                put(machine, &answer)?;
+            }
+            other => return Ok(other),
+        }
+    }
+}
+
+fn ask(
+    query: &mut Query<'_, u16, 64>,
+    rows: &[Vec3],
+    measured: Option<MeasuredStretch>,
+    machine: &mut impl Machine,
+) -> Result<[u32; ANSWER_WORDS], Fault> {
+    let (start, end) = (point(machine)?, point(machine)?);
+    let radius = f32::from_bits(word(machine)?);
+    let is_capsule = word(machine)? != 0;
+    let use_measured = word(machine)? != 0;
+    let warm = word(machine)?;
+    let budget = Budget { node_tests: word(machine)?, triangle_tests: word(machine)? };
+    let mut options = Options::new().budget(budget);
+    if warm != u32::MAX {
+        options = options.warm_start(Some(warm));
+    }
+    if use_measured && let Some(measured) = measured {
+        options = options.stretch(measured);
+    }
+    if is_capsule {
+        let tool = Capsule::new(start, end, radius).map_err(|_| Fault)?;
+        timed(query, rows, &tool, &options, machine)
+    } else {
+        let tool = Sphere::new(start, radius).map_err(|_| Fault)?;
+        timed(query, rows, &tool, &options, machine)
+    }
+}
+
+fn timed(
+    query: &mut Query<'_, u16, 64>,
+    rows: &[Vec3],
+    tool: &impl Tool,
+    options: &Options,
+    machine: &impl Machine,
+) -> Result<[u32; ANSWER_WORDS], Fault> {
+    let before = machine.clock();
+    let answer = query.closest(rows, tool, options);
+    let took = machine.clock().wrapping_sub(before);
+    Ok(words(took, &answer.map_err(|_| Fault)?))
+}
+
+fn words(took: u32, answer: &Proximity) -> [u32; ANSWER_WORDS] {
+    let bits = |v: Vec3| v.to_array().map(f32::to_bits);
+    let [sx, sy, sz] = bits(answer.point_on_surface);
+    let [tx, ty, tz] = bits(answer.point_on_tool);
+    let [dx, dy, dz] = bits(answer.direction);
+    let [a, b, c] = answer.corners;
+    let [u, v, w] = answer.barycentric.map(f32::to_bits);
+    [
+        took,
+        answer.node_tests,
+        answer.triangle_tests,
+        answer.separation.to_bits(),
+        answer.lower.to_bits(),
+        answer.accuracy.to_bits(),
+        answer.axis_distance.to_bits(),
+        answer.axis_parameter.to_bits(),
+        answer.triangle.unwrap_or(u32::MAX),
+        sx,
+        sy,
+        sz,
+        tx,
+        ty,
+        tz,
+        dx,
+        dy,
+        dz,
+        a,
+        b,
+        c,
+        u,
+        v,
+        w,
+    ]
+}
+
+fn word(machine: &mut impl Machine) -> Result<u32, Fault> {
+    let mut bytes = [0; 4];
+    machine.read(&mut bytes)?;
+    Ok(u32::from_le_bytes(bytes))
+}
+
+fn point(machine: &mut impl Machine) -> Result<Vec3, Fault> {
+    let mut number = || Ok(f32::from_bits(word(machine)?));
+    Ok(Vec3::new(number()?, number()?, number()?))
+}
+
+fn put(machine: &mut impl Machine, words: &[u32]) -> Result<(), Fault> {
+    for word in words {
+        machine.write(&word.to_le_bytes())?;
+    }
+    Ok(())
+}

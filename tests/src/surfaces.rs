@@ -1,0 +1,89 @@
+//! Small surfaces of every kind, so that exhaustive search is cheap enough for a million cases.
+
+use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
+use dibs_nostd::{Index, Tree};
+use glam::Vec3;
+
+/// A mesh and its tree.
+pub struct Surface {
+    /// At rest.
+    pub mesh: Mesh,
+    /// Its tree, of 16-bit indices.
+    pub tree: BuiltTree,
+}
+
+/// An organ with folds, a bumpy ball, a closed ball whose centre is equally far from everything, and a
+/// flat patch of slivers. Lean trees hold only what a query reads.
+///
+/// # Panics
+/// Never: the sizes are valid.
+#[must_use]
+pub fn all(lean: bool) -> Vec<Surface> {
+    let heart = generate::heart(320).expect("a valid size").0;
+    let brain = generate::brain(500).expect("a valid size");
+    let build = |(mesh, leaf): (Mesh, usize)| {
+        let builder = Builder::new().index(IndexWidth::Bits16).stretch(1.5).leaf_triangles(leaf);
+        let builder = builder.with_rest_shape(!lean).with_vertex_order(!lean);
+        Surface { tree: builder.build(&mesh).expect("a valid mesh"), mesh }
+    };
+    [(heart.clone(), 1), (heart, 4), (brain, 2), (ball(2), 1), (slivers(20), 1)].map(build).into()
+}
+
+/// The corners of every triangle, as rows.
+///
+/// # Panics
+/// Never: every row is inside the table.
+#[must_use]
+pub fn triangles<I: Index>(tree: &Tree<'_, I>) -> Vec<[u32; 3]> {
+    (0..tree.triangle_count()).map(|row| tree.triangle(row).expect("inside the table")).collect()
+}
+
+/// An octahedron whose triangles are split into four, this many times: every vertex is at the same distance
+/// from the centre, 40 mm.
+#[must_use]
+pub fn ball(splits: u32) -> Mesh {
+    let (x, y, z) = (Vec3::X, Vec3::Y, Vec3::Z);
+    let mut positions = vec![x, y, -x, -y, z, -z];
+    let mut triangles = Vec::new();
+    for side in 0..4_u32 {
+        let next = (side + 1) % 4;
+        triangles.extend([[side, next, 4], [next, side, 5]]);
+    }
+    for _ in 0..splits {
+        let mut middles = std::collections::BTreeMap::new();
+        let mut split = Vec::new();
+        for [a, b, c] in triangles {
+            let mut middle = |p: u32, q: u32| {
+                *middles.entry((p.min(q), p.max(q))).or_insert_with(|| {
+                    positions.push((positions[p as usize] + positions[q as usize]).normalize());
+                    positions.len() as u32 - 1
+                })
+            };
+            let (d, e, f) = (middle(a, b), middle(b, c), middle(c, a));
+            split.extend([[a, d, f], [d, b, e], [f, e, c], [d, e, f]]);
+        }
+        triangles = split;
+    }
+    Mesh { positions: positions.into_iter().map(|p| p * 40.0).collect(), triangles }
+}
+
+/// A band of triangles a hundred times longer than wide.
+#[must_use]
+pub fn slivers(rows: u32) -> Mesh {
+    let columns = 4_u32;
+    let at = |row: u32, column: u32| row * (columns + 1) + column;
+    let mut positions = Vec::new();
+    let mut triangles = Vec::new();
+    for row in 0..=rows {
+        for column in 0..=columns {
+            let wave = (column as f32 * 1.3 + row as f32 * 0.2).sin();
+            positions.push(Vec3::new(column as f32 * 25.0, row as f32 * 0.25, wave * 0.02));
+            if row < rows && column < columns {
+                let (a, b) = (at(row, column), at(row, column + 1));
+                let (c, d) = (at(row + 1, column), at(row + 1, column + 1));
+                triangles.extend([[a, b, c], [b, d, c]]);
+            }
+        }
+    }
+    Mesh { positions, triangles }
+}

@@ -1,0 +1,174 @@
+//! The cost model: constants that bound every query's instructions, fitted on one set of adversarial
+//! queries and checked on others.
+
+use std::fs;
+
+use anyhow::{Context, Result, bail, ensure};
+use dibs_nostd::Cost;
+use microlp::{ComparisonOp, OptimizationDirection, Problem, SolveOutcome};
+
+use super::figures::Figures;
+use super::probe::{Answers, build_for_board, on_board};
+use super::script::{Draw, Record, Script};
+use crate::toolchain::Cross;
+use crate::workspace;
+
+/// Added to the fitted constants, in per cent: the queries that bound the bound are a sample.
+const MARGIN: f64 = 5.0;
+
+/// What a query cost.
+#[derive(Clone, Copy)]
+struct Sample {
+    tests: [u32; 2],
+    instructions: u32,
+}
+
+/// Fits the constants, and writes them into the core crate.
+pub fn fit(cross: &Cross, queries: usize) -> Result<()> {
+    let program = build_for_board(cross, "probe")?;
+    let mut spheres = Vec::new();
+    let mut capsules = Vec::new();
+    let draws = [(Draw::Exhausting, 1), (Draw::Any, 1), (Draw::Short, 8)];
+    for (seed, (draw, times)) in draws.into_iter().enumerate() {
+        let script = Script::adversarial(times * queries, draw, 11 + seed as u64);
+        let answers = on_board(&program, &script, true)?;
+        spheres.extend(samples(&answers, false));
+        capsules.extend(samples(&answers, true));
+    }
+    let constants = [plane_above(&spheres)?, plane_above(&capsules)?];
+    let [sphere, capsule] = constants.map(|c| {
+        let Cost { base, node_test, triangle_test } = c;
+        format!("Self {{ base: {base}, node_test: {node_test}, triangle_test: {triangle_test} }}")
+    });
+    let file = workspace::root().join("dibs-nostd/src/query/cost_m7.rs");
+    fs::write(
+        &file,
+        format!(
+            "//! Measured on an emulated Cortex-M7. Written by `cargo xtask guarantees`: do not edit.
+
+use super::Cost;
+
+impl Cost {{
+    /// A sphere on a Cortex-M7.
+    pub const M7_SPHERE: Self =
+        {sphere};
+    /// A capsule on a Cortex-M7.
+    pub const M7_CAPSULE: Self =
+        {capsule};
+}}
+"
+        ),
+    )
+    .with_context(|| format!("cannot write {}", file.display()))?;
+    println!("sphere: {sphere}\ncapsule: {capsule}");
+    Ok(())
+}
+
+/// Checks the constants on queries that they were not fitted to.
+pub fn check(cross: &Cross, queries: usize, figures: &mut Figures) -> Result<()> {
+    let program = build_for_board(cross, "probe")?;
+    let (mut beyond, mut late, mut checked) = (0, 0, 0_usize);
+    let mut tightness: [Vec<f64>; 2] = [Vec::new(), Vec::new()];
+    // Half with the whole search, half with a budget made for a deadline.
+    for (draw, seed) in [(Draw::Exhausting, 21), (Draw::Deadline, 22)] {
+        let answers = on_board(&program, &Script::adversarial(queries / 2, draw, seed), true)?;
+        for answer in answers.iter() {
+            let Record::Query { is_capsule, deadline } = answer.record else { continue };
+            let cost = if is_capsule { Cost::M7_CAPSULE } else { Cost::M7_SPHERE };
+            let [node_tests, triangle_tests] = answer.tests();
+            let bound = cost.instructions(dibs_nostd::Budget { node_tests, triangle_tests });
+            let took = answer.instructions();
+            checked += 1;
+            beyond += u32::from(u64::from(took) > bound);
+            late += u32::from(deadline.is_some_and(|deadline| took > deadline));
+            tightness[usize::from(is_capsule)].push(f64::from(took) / bound as f64);
+        }
+    }
+    figures.note("cost.queries", checked as f64);
+    figures.note("cost.beyond", f64::from(beyond));
+    figures.note("cost.late", f64::from(late));
+    for (name, shares) in ["sphere", "capsule"].iter().zip(&tightness) {
+        let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+        let most = shares.iter().copied().fold(0.0, f64::max);
+        figures.note(&format!("cost.{name}.mean-share"), 100.0 * mean);
+        figures.note(&format!("cost.{name}.largest-share"), 100.0 * most);
+    }
+    for (name, cost) in [("sphere", Cost::M7_SPHERE), ("capsule", Cost::M7_CAPSULE)] {
+        figures.note(&format!("cost.{name}.base"), f64::from(cost.base));
+        figures.note(&format!("cost.{name}.node-test"), f64::from(cost.node_test));
+        figures.note(&format!("cost.{name}.triangle-test"), f64::from(cost.triangle_test));
+    }
+    usual(&on_board(&program, &Script::usual(800, 31), true)?, figures);
+    ensure!(beyond == 0, "{beyond} of {checked} queries cost more than their bound");
+    ensure!(late == 0, "{late} of {checked} queries were later than their budget's deadline");
+    Ok(())
+}
+
+/// The usual case, for comparison from commit to commit.
+fn usual(answers: &Answers, figures: &mut Figures) {
+    for (name, is_capsule) in [("sphere", false), ("capsule", true)] {
+        let samples = samples(answers, is_capsule);
+        let sum: f64 = samples.iter().map(|sample| f64::from(sample.instructions)).sum();
+        let most = samples.iter().map(|sample| sample.instructions).max().unwrap_or_default();
+        figures.note(&format!("m7.{name}.mean"), (sum / samples.len() as f64).round());
+        figures.note(&format!("m7.{name}.largest"), f64::from(most));
+    }
+    let a_triangle = answers.iter().filter_map(|answer| match answer.record {
+        Record::Stretch(triangles) => Some(f64::from(answer.instructions()) / f64::from(triangles)),
+        Record::Query { .. } => None,
+    });
+    figures.note("m7.stretch", a_triangle.fold(0.0, f64::max).round());
+}
+
+fn samples(answers: &Answers, capsules: bool) -> Vec<Sample> {
+    let wanted =
+        |record| matches!(record, Record::Query { is_capsule, .. } if is_capsule == capsules);
+    answers
+        .iter()
+        .filter(|answer| wanted(answer.record))
+        .map(|answer| Sample { tests: answer.tests(), instructions: answer.instructions() })
+        .collect()
+}
+
+/// The lowest plane, on average, that no sample is above: a linear programme, of which only the constraints
+/// that turn out to matter are handed to the solver.
+fn plane_above(samples: &[Sample]) -> Result<Cost> {
+    let count = samples.len() as f64;
+    let mean =
+        |of: fn(&Sample) -> u32| samples.iter().map(|s| f64::from(of(s))).sum::<f64>() / count;
+    let mut problem = Problem::new(OptimizationDirection::Minimize);
+    let free = (0.0, f64::INFINITY);
+    let constants = [
+        problem.add_var(1.0, free),
+        problem.add_var(mean(|s| s.tests[0]), free),
+        problem.add_var(mean(|s| s.tests[1]), free),
+    ];
+    let mut chosen: Vec<Sample> = samples.iter().take(3).copied().collect();
+    loop {
+        let mut with_chosen = problem.clone();
+        for sample in &chosen {
+            let factors = [1.0, f64::from(sample.tests[0]), f64::from(sample.tests[1])];
+            let terms: Vec<_> = constants.into_iter().zip(factors).collect();
+            with_chosen.add_constraint(terms, ComparisonOp::Ge, f64::from(sample.instructions));
+        }
+        let solved = with_chosen.solve().context("no plane above the samples")?;
+        let SolveOutcome::Solution(solution) = solved else { bail!("no plane in time") };
+        let [base, node, triangle] = constants.map(|constant| solution[constant]);
+        let above = |s: &Sample| {
+            let [nodes, triangles] = s.tests.map(f64::from);
+            f64::from(s.instructions) - (base + node * nodes + triangle * triangles)
+        };
+        let Some(worst) = samples.iter().max_by(|a, b| above(a).total_cmp(&above(b))) else {
+            bail!("no samples");
+        };
+        if above(worst) <= 0.5 {
+            let raised = |constant: f64| (constant * (1.0 + MARGIN / 100.0)).ceil() as u32;
+            return Ok(Cost {
+                base: raised(base),
+                node_test: raised(node),
+                triangle_test: raised(triangle),
+            });
+        }
+        chosen.push(*worst);
+    }
+}

@@ -1,0 +1,145 @@
+//! The probe: a program that answers a script, on the emulated board and on this computer.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, ensure};
+use probe::ANSWER_WORDS;
+
+use super::script::{Record, Script};
+use crate::process::run;
+use crate::toolchain::Cross;
+use crate::workspace;
+
+/// One answer: its words, of which the first is what it took on the clock.
+pub struct Answer<'a> {
+    /// What was asked.
+    pub record: Record,
+    /// What came back.
+    pub words: &'a [u32],
+}
+
+impl Answer<'_> {
+    /// Instructions on the emulated board, whose clock counted 1.6 to each.
+    pub fn instructions(&self) -> u32 {
+        (u64::from(self.words[0]) * 5 / 8) as u32
+    }
+
+    /// Node tests that the budget counts, and triangle tests.
+    pub fn tests(&self) -> [u32; 2] {
+        [self.words[1].saturating_sub(1), self.words[2]]
+    }
+
+    /// Everything that must be the same wherever it was answered.
+    pub fn bits(&self) -> &[u32] {
+        &self.words[1..]
+    }
+}
+
+/// The answers to a script.
+pub struct Answers {
+    words: Vec<u32>,
+    records: Vec<Record>,
+}
+
+impl Answers {
+    fn read(file: &Path, script: &Script) -> Result<Self> {
+        let bytes = fs::read(file).with_context(|| format!("no answers in {}", file.display()))?;
+        let words = bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        let words: Vec<u32> = words.collect();
+        let expected: usize = script.records.iter().map(|&record| length(record)).sum();
+        ensure!(words.len() == expected, "{} words answered, not {expected}", words.len());
+        Ok(Self { words, records: script.records.clone() })
+    }
+
+    /// All answers, in order.
+    pub fn iter(&self) -> impl Iterator<Item = Answer<'_>> {
+        let mut rest = self.words.as_slice();
+        self.records.iter().map(move |&record| {
+            let (words, after) = rest.split_at(length(record));
+            rest = after;
+            Answer { record, words }
+        })
+    }
+}
+
+fn length(record: Record) -> usize {
+    match record {
+        Record::Stretch(_) => 2,
+        Record::Query { .. } => ANSWER_WORDS,
+    }
+}
+
+/// The probe for the board.
+pub fn build_for_board(cross: &Cross, name: &str) -> Result<PathBuf> {
+    let mut cargo = cross.cargo("build");
+    cargo.args(["--quiet", "--package", "dibs-probe", "--features", "board"]);
+    run(cargo.args(["--profile", "firmware", "--bin", name]))?;
+    Ok(cross.program("firmware", name))
+}
+
+/// Answers on the emulated board; with `count`, its clock counts instructions.
+pub fn on_board(program: &Path, script: &Script, count: bool) -> Result<Answers> {
+    let folder = tempfile::tempdir()?;
+    fs::write(folder.path().join("script.bin"), script.bytes())?;
+    let mut qemu = Command::new("qemu-system-arm");
+    qemu.args(["-machine", "mps2-an500", "-cpu", "cortex-m7", "-display", "none"]);
+    qemu.args(["-monitor", "none", "-serial", "none"]);
+    if count {
+        qemu.args(["-icount", "shift=6"]);
+    }
+    qemu.args(["-semihosting-config", "enable=on,target=native", "-kernel"]).arg(program);
+    run(qemu.current_dir(folder.path()).stdin(Stdio::null()))?;
+    Answers::read(&folder.path().join("answers.bin"), script)
+}
+
+/// One way to build the probe for this computer.
+#[derive(Clone, Copy)]
+pub enum Build {
+    Debug,
+    Release,
+    /// For the very processor of this computer, with all of its instructions.
+    Native,
+}
+
+impl Build {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Debug, Self::Release, Self::Native];
+
+    /// For people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Debug => "debug",
+            Self::Release => "release",
+            Self::Native => "target-cpu=native",
+        }
+    }
+
+    /// Answers on this computer.
+    pub fn answers(self, script: &Script) -> Result<Answers> {
+        let target = match self {
+            Self::Native => workspace::target().join("native"),
+            Self::Debug | Self::Release => workspace::target(),
+        };
+        let mut cargo = Command::new("cargo");
+        cargo.args(["build", "--quiet", "--package", "dibs-probe", "--bin", "answer"]);
+        cargo.arg("--target-dir").arg(&target).current_dir(workspace::root());
+        let folder = match self {
+            Self::Debug => "debug",
+            Self::Release | Self::Native => {
+                cargo.arg("--release");
+                "release"
+            }
+        };
+        if matches!(self, Self::Native) {
+            cargo.env("RUSTFLAGS", "-C target-cpu=native");
+        }
+        run(&mut cargo)?;
+        let files = tempfile::tempdir()?;
+        let (script_file, answers) = (files.path().join("script"), files.path().join("answers"));
+        fs::write(&script_file, script.bytes())?;
+        run(Command::new(target.join(folder).join("answer")).arg(&script_file).arg(&answers))?;
+        Answers::read(&answers, script)
+    }
+}

@@ -1,0 +1,186 @@
+//! Scripts for the probe: surfaces, frames and queries, as words.
+
+use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
+use dibs_nostd::{Budget, Cost};
+use dibs_tests::deform::Deformation;
+use dibs_tests::oracle::Instrument;
+use dibs_tests::poses::pose;
+use dibs_tests::surfaces;
+use fastrand::Rng;
+use glam::Vec3;
+use probe::command;
+
+/// A script, and how many queries are in it.
+#[derive(Default)]
+pub struct Script {
+    words: Vec<u32>,
+    /// What an answer's place in the answers belongs to.
+    pub records: Vec<Record>,
+}
+
+/// What the probe is asked, in order.
+#[derive(Clone, Copy, Debug)]
+pub enum Record {
+    /// The stretch of a frame of this many triangles.
+    Stretch(u32),
+    /// A query.
+    Query {
+        /// Whether the tool is a capsule.
+        is_capsule: bool,
+        /// Instructions that the budget was made for, if it was.
+        deadline: Option<u32>,
+    },
+}
+
+/// How the queries of a script are drawn.
+#[derive(Clone, Copy)]
+pub enum Draw {
+    /// Every option at random.
+    Any,
+    /// Without a budget: the whole search.
+    Exhausting,
+    /// With a budget of a few tests, so that the dearest of them shows.
+    Short,
+    /// With a budget made for a random number of instructions.
+    Deadline,
+}
+
+impl Script {
+    /// Small surfaces of every kind in every deformation, with tools where it hurts: near, on and inside,
+    /// at centres and middle planes, where all distances are equal.
+    pub fn adversarial(queries: usize, draw: Draw, seed: u64) -> Self {
+        let mut rng = Rng::with_seed(seed);
+        let heart = generate::heart(1_280).expect("a valid size").0;
+        let brain = generate::brain(1_200).expect("a valid size");
+        let meshes = [(heart, 1), (brain, 4), (surfaces::ball(3), 1), (surfaces::slivers(60), 2)];
+        let mut script = Self::default();
+        let of_each = queries.div_ceil(meshes.len());
+        for (mesh, leaf) in meshes {
+            let built = build(&mesh, leaf);
+            script.tree(&built);
+            let end = script.queries() + of_each;
+            while script.queries() < end {
+                for deformation in Deformation::ALL {
+                    let left = end.saturating_sub(script.queries());
+                    script.frame(&built, &mesh, deformation, left.min(100), draw, &mut rng);
+                }
+            }
+        }
+        script.words.push(command::END);
+        script
+    }
+
+    /// The heart of the firmware in its motion, and a tool that wanders about it: the usual case.
+    pub fn usual(queries: usize, seed: u64) -> Self {
+        let mut rng = Rng::with_seed(seed);
+        let (mesh, motion) = generate::heart(10_272).expect("a valid size");
+        let built = build(&mesh, 4);
+        let tree = built.tree::<u16>().expect("16-bit indices");
+        let triangles = surfaces::triangles(&tree);
+        let mut script = Self::default();
+        script.tree(&built);
+        for positions in motion.frames.iter().step_by(motion.frames.len().div_ceil(8)) {
+            let rows = built.to_rows(positions);
+            script.rows(&rows, triangles.len() as u32);
+            for number in 0..queries.div_ceil(8) {
+                let [a, ..] = triangles[rng.usize(..triangles.len())].map(|v| rows[v as usize]);
+                let away = a.normalize_or(Vec3::Z) * 60.0 * rng.f32();
+                let tool = match number % 2 {
+                    0 => Instrument::sphere(a + away, 2.5),
+                    _ => Instrument::capsule(a + away, a + away * 1.5 + Vec3::Z * 60.0, 2.5),
+                };
+                script.query(&tool, number % 2 == 1, true, u32::MAX, Budget::UNLIMITED, None);
+            }
+        }
+        script.words.push(command::END);
+        script
+    }
+
+    /// The script's bytes.
+    pub fn bytes(&self) -> Vec<u8> {
+        self.words.iter().flat_map(|word| word.to_le_bytes()).collect()
+    }
+
+    /// Queries so far.
+    pub fn queries(&self) -> usize {
+        self.records.iter().filter(|record| matches!(record, Record::Query { .. })).count()
+    }
+
+    fn tree(&mut self, built: &BuiltTree) {
+        let blob = built.blob();
+        self.words.extend([command::TREE, blob.len() as u32]);
+        let word = |part: &[u8]| {
+            let mut bytes = [0; 4];
+            bytes[..part.len()].copy_from_slice(part);
+            u32::from_le_bytes(bytes)
+        };
+        self.words.extend(blob.chunks(4).map(word));
+    }
+
+    fn frame(
+        &mut self,
+        built: &BuiltTree,
+        mesh: &Mesh,
+        deformation: Deformation,
+        queries: usize,
+        draw: Draw,
+        rng: &mut Rng,
+    ) {
+        let tree = built.tree::<u16>().expect("16-bit indices");
+        let triangles = surfaces::triangles(&tree);
+        let moved = deformation.apply(mesh, tree.paths(), tree.stretch(), rng);
+        let rows = built.to_rows(&moved);
+        self.rows(&rows, tree.triangle_count());
+        for _ in 0..queries {
+            let tool = pose(&rows, &triangles, rng);
+            // A capsule of length zero is one too.
+            let is_capsule = tool.start != tool.end || rng.u32(..8) == 0;
+            let warm = if rng.bool() { u32::MAX } else { rng.u32(..tree.triangle_count() + 2) };
+            let measured = rng.bool();
+            let mut deadline = None;
+            let budget = match draw {
+                Draw::Any if rng.bool() => {
+                    Budget { node_tests: rng.u32(..300), triangle_tests: rng.u32(..60) }
+                }
+                Draw::Short => Budget { node_tests: rng.u32(..24), triangle_tests: rng.u32(..6) },
+                Draw::Deadline => {
+                    let cost = if is_capsule { Cost::M7_CAPSULE } else { Cost::M7_SPHERE };
+                    let instructions = cost.base + rng.u32(..100_000);
+                    deadline = Some(instructions);
+                    Budget::for_instructions(instructions, &cost)
+                }
+                _ => Budget::UNLIMITED,
+            };
+            self.query(&tool, is_capsule, measured, warm, budget, deadline);
+        }
+    }
+
+    fn rows(&mut self, rows: &[Vec3], triangles: u32) {
+        self.words.push(command::FRAME);
+        self.words.extend(rows.iter().flat_map(|row| row.to_array().map(f32::to_bits)));
+        self.records.push(Record::Stretch(triangles));
+    }
+
+    fn query(
+        &mut self,
+        tool: &Instrument,
+        is_capsule: bool,
+        measured: bool,
+        warm: u32,
+        budget: Budget,
+        deadline: Option<u32>,
+    ) {
+        self.words.push(command::QUERY);
+        let points = [tool.start, tool.end].map(|p| p.to_array().map(f32::to_bits));
+        self.words.extend(points.as_flattened());
+        self.words.push(tool.radius.to_bits());
+        self.words.extend([u32::from(is_capsule), u32::from(measured), warm]);
+        self.words.extend([budget.node_tests, budget.triangle_tests]);
+        self.records.push(Record::Query { is_capsule, deadline });
+    }
+}
+
+fn build(mesh: &Mesh, leaf: usize) -> BuiltTree {
+    let builder = Builder::new().index(IndexWidth::Bits16).stretch(1.5).leaf_triangles(leaf);
+    builder.build(mesh).expect("a valid mesh")
+}
