@@ -65,8 +65,8 @@ struct Buffer<const N: usize> {
     epoch: AtomicU32,
     received: AtomicU32,
     position_error: AtomicU32,
-    /// Measured stretch: bits of its size, not a number where there is none; triangle; mesh id.
-    stretch: [AtomicU32; 3],
+    /// Measured stretch; the first word is not a number where there is none.
+    stretch: [AtomicU32; MeasuredStretch::WORDS],
 }
 
 impl<const N: usize> Buffer<N> {
@@ -77,7 +77,7 @@ impl<const N: usize> Buffer<N> {
             epoch: AtomicU32::new(0),
             received: AtomicU32::new(0),
             position_error: AtomicU32::new(0),
-            stretch: [const { AtomicU32::new(0) }; 3],
+            stretch: [const { AtomicU32::new(0) }; MeasuredStretch::WORDS],
         }
     }
 
@@ -104,35 +104,31 @@ impl<const N: usize> Buffer<N> {
         self.epoch.store(label.epoch, Ordering::Relaxed);
         self.received.store(label.received, Ordering::Relaxed);
         self.position_error.store(label.position_error.to_bits(), Ordering::Relaxed);
-        let [sigma, triangle, mesh_id] = match label.stretch {
-            Some(measured) => [measured.sigma.to_bits(), measured.triangle, measured.mesh_id],
-            None => [f32::NAN.to_bits(), 0, 0],
+        let words = match label.stretch {
+            Some(measured) => measured.to_words(),
+            None => [f32::NAN.to_bits(); MeasuredStretch::WORDS],
         };
-        let [at_sigma, at_triangle, at_mesh_id] = &self.stretch;
-        at_sigma.store(sigma, Ordering::Relaxed);
-        at_triangle.store(triangle, Ordering::Relaxed);
-        at_mesh_id.store(mesh_id, Ordering::Relaxed);
+        for (at, word) in self.stretch.iter().zip(words) {
+            at.store(word, Ordering::Relaxed);
+        }
     }
 
     fn label(&self) -> FrameLabel {
-        let [sigma, triangle, mesh_id] = &self.stretch;
-        let measured = MeasuredStretch {
-            sigma: f32::from_bits(sigma.load(Ordering::Relaxed)),
-            triangle: triangle.load(Ordering::Relaxed),
-            mesh_id: mesh_id.load(Ordering::Relaxed),
-        };
+        let words = self.stretch.each_ref().map(|word| word.load(Ordering::Relaxed));
+        let epoch = self.epoch.load(Ordering::Relaxed);
+        let is_measured = words.first().is_some_and(|&sigma| !f32::from_bits(sigma).is_nan());
         FrameLabel {
-            epoch: self.epoch.load(Ordering::Relaxed),
+            epoch,
             received: self.received.load(Ordering::Relaxed),
             position_error: f32::from_bits(self.position_error.load(Ordering::Relaxed)),
-            stretch: if measured.sigma.is_nan() { None } else { Some(measured) },
+            stretch: is_measured.then(|| MeasuredStretch::from_words(&words, epoch)),
         }
     }
 }
 
 /// A double buffer of `N` vertex positions, meant for a `static`.
 ///
-/// RAM: 25 bytes a vertex and 56 more (all zero at start, so it lives in `.bss`): two positions, and
+/// RAM: 25 bytes a vertex and 120 more (all zero at start, so it lives in `.bss`): two positions, and
 /// one byte that remembers in which frame the vertex was last written.
 ///
 /// ```
@@ -388,6 +384,10 @@ impl<const N: usize> VertexTable for FrameGuard<'_, N> {
     #[inline(always)]
     fn position(&self, vertex: u32) -> Option<Vec3> {
         self.view.buffer.position(vertex)
+    }
+
+    fn epoch(&self) -> Option<u32> {
+        Some(self.view.buffer.epoch.load(Ordering::Relaxed))
     }
 }
 

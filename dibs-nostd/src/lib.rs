@@ -14,7 +14,7 @@
 //! | step | type | context |
 //! |---|---|---|
 //! | bytes become packets | [`wire::Deframer`], [`wire::Packet`] | bus interrupt |
-//! | packets become complete, checked frames | [`Assembler`], [`measure_stretch`] | bus interrupt |
+//! | packets become complete, checked frames | [`Assembler`], [`StretchMonitor`] | bus interrupt |
 //! | frames change hands, never torn | [`Frames`] | both |
 //! | a frame is searched | [`Query`], [`Sphere`], [`Capsule`] | control interrupt |
 //! | the answer and its certainty | [`Proximity`] | control interrupt |
@@ -81,7 +81,7 @@ pub use frames::{
 pub use index::Index;
 pub use query::{Budget, Cost, Options, Query, QueryError};
 pub use scrub::{Rot, Scrub};
-pub use stretch::{MeasuredStretch, StretchError, measure_stretch};
+pub use stretch::{MeasuredStretch, REGIONS, StretchError, StretchMonitor, measure_stretch};
 pub use tool::{ACCURACY, AxisPair, Capsule, MAX_COORDINATE, Sphere, Tool, ToolError};
 pub use tree::Tree;
 pub use vertices::{QuantisedVertices, VertexTable};

@@ -12,6 +12,12 @@ pub trait VertexTable {
     /// Position of one vertex in the mesh's unit (mm), or `None` outside the table.
     fn position(&self, vertex: u32) -> Option<Vec3>;
 
+    /// Number of the frame that these positions are of, where they have one: keeps what was measured on
+    /// one frame from being used on another.
+    fn epoch(&self) -> Option<u32> {
+        None
+    }
+
     /// Whether the table holds no vertex.
     fn is_empty(&self) -> bool {
         self.len() == 0
@@ -48,6 +54,10 @@ impl<T: VertexTable + ?Sized> VertexTable for &T {
     #[inline(always)]
     fn position(&self, vertex: u32) -> Option<Vec3> {
         (**self).position(vertex)
+    }
+
+    fn epoch(&self) -> Option<u32> {
+        (**self).epoch()
     }
 }
 

@@ -8,17 +8,21 @@ use glam::{DMat2, DVec2, DVec3, Vec3};
 /// The largest stretch of `now` against the rest shape, over all triangles or edges.
 #[must_use]
 pub fn largest(mesh: &Mesh, now: &[Vec3], paths: PathKind) -> f64 {
-    let of = |triangle: &[u32; 3]| {
-        let rest = triangle.map(|v| mesh.positions[v as usize].as_dvec3());
-        let now = triangle.map(|v| now[v as usize].as_dvec3());
-        match paths {
-            PathKind::EdgePath => (0..3)
-                .map(|i| now[i].distance(now[(i + 1) % 3]) / rest[i].distance(rest[(i + 1) % 3]))
-                .fold(0.0, f64::max),
-            _ => largest_singular_value(rest, now),
-        }
-    };
-    mesh.triangles.iter().map(of).fold(0.0, f64::max)
+    (0..mesh.triangles.len()).map(|t| of_triangle(mesh, now, t, paths)).fold(0.0, f64::max)
+}
+
+/// The stretch of one triangle.
+#[must_use]
+pub fn of_triangle(mesh: &Mesh, now: &[Vec3], triangle: usize, paths: PathKind) -> f64 {
+    let corners = mesh.triangles[triangle];
+    let rest = corners.map(|v| mesh.positions[v as usize].as_dvec3());
+    let now = corners.map(|v| now[v as usize].as_dvec3());
+    match paths {
+        PathKind::EdgePath => (0..3)
+            .map(|i| now[i].distance(now[(i + 1) % 3]) / rest[i].distance(rest[(i + 1) % 3]))
+            .fold(0.0, f64::max),
+        _ => largest_singular_value(rest, now),
+    }
 }
 
 /// In the triangle's plane, `F = [now] [rest]^-1` for the 2x2 edge matrices of both shapes.

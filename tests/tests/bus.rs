@@ -280,7 +280,7 @@ impl Gate for Refuse {
         _: u32,
     ) -> Result<Verdict, StretchError> {
         assert_eq!((surface.len(), ready), (N, N as u32));
-        if self.0.get() { Err(StretchError::NoRestShape) } else { Ok(Verdict::Admitted(None)) }
+        if self.0.get() { Err(StretchError::NoMetric) } else { Ok(Verdict::Admitted(None)) }
     }
 }
 
@@ -297,7 +297,7 @@ fn a_refused_surface_is_not_published_and_the_last_one_stays() {
         }
         if refuse {
             let rejection = assembler.accept(commit, 0).unwrap_err();
-            assert_eq!(rejection, Rejection::Stretch(StretchError::NoRestShape));
+            assert_eq!(rejection, Rejection::Stretch(StretchError::NoMetric));
             assert_eq!(published(&mut reader).unwrap().0, 1);
             assert_eq!(assembler.published_epoch(), Some(1));
         } else {

@@ -269,7 +269,7 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
         query_bytes: tree.query_bytes(),
         query_bytes_per_triangle: tree.query_bytes() as f64 / f64::from(tree.triangle_count()),
         flash_bytes: length,
-        ram_bytes: (25 * vertices as usize + 53).next_multiple_of(4),
+        ram_bytes: (25 * vertices as usize + 117).next_multiple_of(4),
         stack_bytes: 8 * tree.depth() as usize,
         modes: Modes::of(tree).ok().map(|modes| ModesSummary {
             count: modes.count(),

@@ -1,11 +1,12 @@
 //! From a tree of sections to the flat array: order, round up, write.
 
 use dibs_nostd::format::{
-    CHECKSUM_AT, CRC, HEADER_BYTES, Link, MAGIC, PathKind, SECTION_ALIGN, SECTION_BYTES, VERSION,
-    section,
+    CHECKSUM_AT, CRC, HEADER_BYTES, Link, MAGIC, METRIC_BYTES, PathKind, SECTION_ALIGN,
+    SECTION_BYTES, VERSION, section,
 };
 use dibs_nostd::{Index, Tree};
 
+use super::fans::{Placed, arrange};
 use super::metric::metric;
 use crate::Mesh;
 use crate::construct::{Cluster, Content};
@@ -16,18 +17,19 @@ use crate::error::BuildError;
 struct Flat {
     /// Pins, radii and links of both children, a node.
     nodes: Vec<[(u32, f64, Link); 2]>,
-    /// Mesh triangles, leaf by leaf.
-    triangles: Vec<u32>,
+    /// Triangles, leaf by leaf.
+    triangles: Vec<Placed>,
     depth: u32,
 }
 
 impl Flat {
     /// Depth first, so that children follow their parents and the triangles of a section are one run.
-    fn add(&mut self, cluster: &Cluster, above: u32) -> Link {
+    fn add(&mut self, mesh: &Mesh, cluster: &Cluster, above: u32) -> Link {
         match &cluster.content {
             Content::Leaf(triangles) => {
                 let first = self.triangles.len() as u32;
-                self.triangles.extend(triangles);
+                let before = self.triangles.last().copied();
+                self.triangles.extend(arrange(mesh, triangles, before));
                 Link::Leaf { first, count: triangles.len() as u32 }
             }
             Content::Inner(children) => {
@@ -36,7 +38,7 @@ impl Flat {
                 let mut record = children.each_ref().map(|c| (c.pin, c.radius, Link::Node(0)));
                 self.nodes.push(record);
                 for (entry, child) in record.iter_mut().zip(children.iter()) {
-                    entry.2 = self.add(child, above + 1);
+                    entry.2 = self.add(mesh, child, above + 1);
                 }
                 self.nodes[row] = record;
                 Link::Node(row as u32)
@@ -62,7 +64,7 @@ pub(crate) fn flatten<I: Index>(
     facts: Facts,
 ) -> Result<(Vec<u8>, Vec<u32>), BuildError> {
     let mut flat = Flat::default();
-    let root_link = flat.add(root, 0);
+    let root_link = flat.add(mesh, root, 0);
     let order = vertex_order(mesh, &flat.triangles);
     let mut row_of = vec![u32::MAX; mesh.positions.len()];
     for (row, &vertex) in order.iter().enumerate() {
@@ -77,8 +79,8 @@ pub(crate) fn flatten<I: Index>(
         children.iter().for_each(|(.., link)| nodes.extend(link.encode().to_le_bytes()));
     }
     let mut triangles = Vec::new();
-    for &triangle in &flat.triangles {
-        for corner in mesh.triangles[triangle as usize] {
+    for triangle in &flat.triangles {
+        for corner in triangle.corners {
             put::<I>(&mut triangles, row_of[corner as usize]);
         }
     }
@@ -101,7 +103,7 @@ pub(crate) fn flatten<I: Index>(
         sections.push((section::REST, rest));
     }
     if facts.with_metric {
-        sections.push((section::METRIC, metrics(mesh, &flat.triangles, facts.paths)));
+        sections.push((section::METRIC, metrics(mesh, &flat.triangles, facts)));
     }
     let header = [
         identity.finalize(),
@@ -122,26 +124,25 @@ pub(crate) fn flatten<I: Index>(
 
 /// Mesh vertices in the order in which the leaves come to them, so that what is near on the surface
 /// is near in memory.
-fn vertex_order(mesh: &Mesh, triangles: &[u32]) -> Vec<u32> {
+fn vertex_order(mesh: &Mesh, triangles: &[Placed]) -> Vec<u32> {
     let mut seen = vec![false; mesh.positions.len()];
-    let corners = triangles.iter().flat_map(|&t| mesh.triangles[t as usize]);
+    let corners = triangles.iter().flat_map(|t| t.corners);
     corners.filter(|&v| !std::mem::replace(&mut seen[v as usize], true)).collect()
 }
 
 /// The metric of each triangle, marked where it continues the fan of the triangle before.
-fn metrics(mesh: &Mesh, triangles: &[u32], paths: PathKind) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(12 * triangles.len());
+fn metrics(mesh: &Mesh, triangles: &[Placed], facts: Facts) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(METRIC_BYTES * triangles.len());
     let mut last = None;
-    for &triangle in triangles {
-        let corners = mesh.triangles[triangle as usize];
-        let [mut first, second, third] =
-            metric(corners.map(|v| mesh.positions[v as usize]), 1.0, paths);
-        let [a, b, c] = corners;
+    for placed in triangles {
+        let corners = placed.corners.map(|v| mesh.positions[v as usize]);
+        let mut row = metric(corners, 1.0, f64::from(facts.stretch), facts.paths);
+        let [a, b, c] = placed.corners;
         if last == Some((a, b)) {
-            first = -first;
+            row[0] = -row[0];
         }
         last = Some((a, c));
-        [first, second, third].iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+        row.iter().for_each(|x| bytes.extend(x.to_le_bytes()));
     }
     bytes
 }

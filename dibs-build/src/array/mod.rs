@@ -2,6 +2,7 @@
 
 mod append;
 mod emit;
+mod fans;
 mod flatten;
 mod metric;
 

@@ -61,11 +61,8 @@ impl Modes<'_> {
                 }
             }
         }
-        Ok(MeasuredStretch {
-            sigma: sigma * ROUNDING + self.header.slack,
-            mesh_id: self.mesh_id,
-            triangle,
-        })
+        let sigma = sigma * ROUNDING + self.header.slack;
+        Ok(MeasuredStretch::everywhere(sigma, self.tree, triangle))
     }
 
     fn anchor(&self, row: usize) -> Option<Anchor<'_>> {

@@ -73,6 +73,8 @@ pub struct Modes<'a> {
     rest: &'a [u8],
     vertices: u32,
     mesh_id: u32,
+    /// The tree's checksum.
+    tree: u32,
     /// The tree's stretch limit.
     limit: f32,
 }
@@ -103,6 +105,7 @@ impl<'a> Modes<'a> {
                 rest: sections.rest,
                 vertices,
                 mesh_id: tree.mesh_id(),
+                tree: tree.checksum(),
                 limit: tree.stretch(),
             }),
             Err(error) => Err(error),

@@ -26,11 +26,18 @@ pub enum QueryError {
         /// Row of the vertex.
         vertex: u32,
     },
-    /// The measured stretch is that of another mesh.
-    Mesh {
-        /// The tree's mesh id.
+    /// The stretch was measured with another tree.
+    OtherTree {
+        /// Checksum of the tree.
         expected: u32,
-        /// The measurement's mesh id.
+        /// Checksum of the measurement's tree.
+        found: u32,
+    },
+    /// The stretch was measured on another frame.
+    OtherFrame {
+        /// Number of the frame that is searched.
+        expected: u32,
+        /// Number of the frame that was measured.
         found: u32,
     },
     /// No triangle was found within reach of the nearest pin: the surface is stretched beyond what the
@@ -58,8 +65,11 @@ impl fmt::Display for QueryError {
             Self::Position { vertex } => {
                 write!(f, "the position of vertex {vertex} is not finite or too large")
             }
-            Self::Mesh { expected, found } => {
-                write!(f, "stretch measured on mesh {found:08x}, the tree is of {expected:08x}")
+            Self::OtherTree { expected, found } => {
+                write!(f, "stretch measured with tree {found:08x}, this is tree {expected:08x}")
+            }
+            Self::OtherFrame { expected, found } => {
+                write!(f, "stretch measured on frame {found}, this is frame {expected}")
             }
             Self::Uncovered { pin } => {
                 write!(

@@ -88,12 +88,17 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         }
         let stretch = match options.stretch {
             None => header.stretch,
-            Some(measured) if measured.mesh_id() == header.mesh_id => measured.sigma(),
             Some(measured) => {
-                return Err(QueryError::Mesh {
-                    expected: header.mesh_id,
-                    found: measured.mesh_id(),
-                });
+                let (expected, found) = (header.checksum, measured.tree());
+                if expected != found {
+                    return Err(QueryError::OtherTree { expected, found });
+                }
+                if let (Some(expected), Some(found)) = (vertices.epoch(), measured.epoch())
+                    && expected != found
+                {
+                    return Err(QueryError::OtherFrame { expected, found });
+                }
+                measured.sigma()
             }
         };
         let radius_scale = header.radius_unit * stretch;

@@ -78,7 +78,7 @@ struct Answer {
     proximity: Proximity,
     /// Corners of the triangle, numbered as in the mesh file.
     triangle: [u32; 3],
-    /// `None` where the tree has no rest shape to measure against.
+    /// `None` where the tree has no rest metric to measure with.
     stretch: Option<MeasuredStretch>,
 }
 
@@ -94,13 +94,13 @@ fn ask<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<Answer> {
     // A distance on a surface that is stretched beyond the limit could be wrong: none is given.
     let stretch = match measure_stretch(tree, positions.as_slice()) {
         Ok(measured) => Some(measured),
-        Err(StretchError::NoRestShape) => None,
+        Err(StretchError::NoMetric) => None,
         Err(error) => bail!("{name}: {error}; build the tree with a larger --stretch"),
     };
     let mut options = Options::new();
     if let Some(limit) = args.stretch {
         let measured =
-            stretch.ok_or_else(|| anyhow!("{name}: no rest shape to measure a stretch against"))?;
+            stretch.ok_or_else(|| anyhow!("{name}: no rest metric to measure a stretch with"))?;
         let sigma = measured.sigma();
         if sigma > limit || limit.is_nan() {
             bail!(

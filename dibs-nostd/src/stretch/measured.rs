@@ -1,0 +1,134 @@
+//! What a measurement found.
+
+use super::kernel::{Worst, root_up};
+use crate::{Index, Tree};
+
+/// Regions that a surface is divided into for its measured stretch: equal runs of triangle rows, which
+/// are patches of the surface because rows stand leaf by leaf.
+pub const REGIONS: usize = 32;
+
+/// Triangle rows of each region (the last may have fewer).
+pub(crate) const fn region_rows<I: Index>(tree: &Tree<'_, I>) -> u32 {
+    tree.triangle_count().div_ceil(REGIONS as u32)
+}
+
+/// The stretch `sigma` of one frame, measured on every triangle: the largest, and that of each region.
+///
+/// Only a measurement makes one, so a query cannot be given a stretch below the true one by mistake.
+/// It belongs to the tree and, where that is known, to the frame that it was measured on; a query
+/// refuses another's.
+///
+/// Where triangles have limits of their own, a stretch counts as the part of its limit that it takes,
+/// times the tree's limit: that is what the tree's radii grow with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct MeasuredStretch {
+    sigma: f32,
+    tree: u32,
+    triangle: u32,
+    epoch: Option<u32>,
+    /// Each region's share of `sigma`, less one, in parts of 256.
+    regions: [u8; REGIONS],
+}
+
+impl MeasuredStretch {
+    pub(super) fn of_regions<I: Index>(
+        tree: &Tree<'_, I>,
+        regions: &[Worst; REGIONS],
+        epoch: Option<u32>,
+    ) -> Self {
+        let mut worst = Worst::none(0);
+        for region in regions {
+            if region.squared > worst.squared {
+                worst = *region;
+            }
+        }
+        // What passed at the limit is within it, whatever the root's rounding says.
+        let within = |squared: f32| {
+            let sigma = root_up(squared);
+            if sigma > tree.stretch() { tree.stretch() } else { sigma }
+        };
+        let sigma = within(worst.squared);
+        let mut codes = [0; REGIONS];
+        for (code, region) in codes.iter_mut().zip(regions) {
+            let own = within(region.squared);
+            // The least code that stands for enough, whichever way the division rounds.
+            let mut part = ((own / sigma * 256.0) as u8).saturating_sub(1);
+            for _ in 0..2 {
+                if share(sigma, part) < own {
+                    part = part.saturating_add(1);
+                }
+            }
+            *code = part;
+        }
+        Self { sigma, tree: tree.checksum(), triangle: worst.triangle, epoch, regions: codes }
+    }
+
+    /// One bound for the whole surface, by other means than measuring every triangle.
+    pub(crate) const fn everywhere(sigma: f32, tree: u32, triangle: u32) -> Self {
+        Self { sigma, tree, triangle, epoch: None, regions: [u8::MAX; REGIONS] }
+    }
+
+    /// The largest stretch, rounded up: at least 1 where anything kept its length, and never below a
+    /// half.
+    #[must_use]
+    pub const fn sigma(&self) -> f32 {
+        self.sigma
+    }
+
+    /// The largest stretch of each region, rounded up to a 256th of [`sigma`](Self::sigma).
+    #[must_use]
+    pub fn regions(&self) -> [f32; REGIONS] {
+        self.regions.map(|code| share(self.sigma, code))
+    }
+
+    /// The triangle that is stretched most.
+    #[must_use]
+    pub const fn triangle(&self) -> u32 {
+        self.triangle
+    }
+
+    /// Checksum of the tree that it was measured with.
+    #[must_use]
+    pub const fn tree(&self) -> u32 {
+        self.tree
+    }
+
+    /// Number of the frame that it was measured on, where the frame has one.
+    #[must_use]
+    pub const fn epoch(&self) -> Option<u32> {
+        self.epoch
+    }
+
+    /// The measurement as words, without its epoch: for the frame that it is kept with.
+    pub(crate) fn to_words(self) -> [u32; MeasuredStretch::WORDS] {
+        let mut words = [0; Self::WORDS];
+        let [sigma, tree, triangle, regions @ ..] = &mut words;
+        (*sigma, *tree, *triangle) = (self.sigma.to_bits(), self.tree, self.triangle);
+        let (codes, _) = self.regions.as_chunks::<4>();
+        for (word, codes) in regions.iter_mut().zip(codes) {
+            *word = u32::from_le_bytes(*codes);
+        }
+        words
+    }
+
+    /// The inverse of [`to_words`](Self::to_words).
+    pub(crate) fn from_words(words: &[u32; Self::WORDS], epoch: u32) -> Self {
+        let [sigma, tree, triangle, packed @ ..] = words;
+        let mut regions = [0; REGIONS];
+        let (codes, _) = regions.as_chunks_mut::<4>();
+        for (codes, word) in codes.iter_mut().zip(packed) {
+            *codes = word.to_le_bytes();
+        }
+        let sigma = f32::from_bits(*sigma);
+        Self { sigma, tree: *tree, triangle: *triangle, epoch: Some(epoch), regions }
+    }
+
+    /// Words that a measurement takes.
+    pub(crate) const WORDS: usize = 3 + REGIONS / 4;
+}
+
+/// What a region's code stands for.
+fn share(sigma: f32, code: u8) -> f32 {
+    sigma * ((f32::from(code) + 1.0) * (1.0 / 256.0))
+}

@@ -1,0 +1,169 @@
+//! The stretch of each frame, measured in slices of bounded work while its packets arrive.
+
+use core::ops::Range;
+
+use super::kernel::{self, Worst};
+use super::measured::region_rows;
+use super::{MeasuredStretch, REGIONS, StretchError, check_tables};
+use crate::assembler::{Changed, Gate, Verdict};
+use crate::{Index, Tree, VertexTable};
+
+/// Blocks of vertex rows, at most: what a partial frame moved is remembered by them.
+const BLOCKS: usize = 64;
+
+/// All regions, one bit each.
+const ALL: u32 = u32::MAX;
+const _: () = assert!(REGIONS == u32::BITS as usize);
+
+/// Measures every frame before it is published, a few triangles at a time: the [`Gate`] that keeps what
+/// is stretched beyond its limit from the controller, and gives the query the measured stretch.
+///
+/// A whole frame is measured as it arrives: a triangle can be checked as soon as its corners are there,
+/// and rows are numbered so that corners come about when their triangles do. Of a partial frame only
+/// the [`REGIONS`] with a moved corner are measured, once it is complete; the others' stretch
+/// stays. Either way the result is that of [`measure_stretch`](super::measure_stretch) on the whole
+/// surface, to the bit.
+///
+/// Cost: [`advance`](Gate::advance) checks at most as many triangles as it is told, and takes
+/// O([`REGIONS`]) besides. RAM: 776 bytes and the tree's view, whatever the surface. Making one
+/// takes one pass over the triangles.
+#[derive(Clone, Debug)]
+pub struct StretchMonitor<'t, I> {
+    tree: Tree<'t, I>,
+    /// Which regions have corners in each block of `1 << block_shift` vertex rows.
+    touched: [u32; BLOCKS],
+    block_shift: u32,
+    changed: Changed,
+    /// Regions still to be measured.
+    left: u32,
+    /// The next triangle of the region that is being measured.
+    next: Option<u32>,
+    regions: [Worst; REGIONS],
+    /// The regions of the published frame; `None` before the first.
+    published: Option<[Worst; REGIONS]>,
+}
+
+impl<'t, I: Index> StretchMonitor<'t, I> {
+    /// A monitor for surfaces of this tree.
+    ///
+    /// # Errors
+    /// [`StretchError::NoMetric`] where the tree was emitted without what it takes.
+    pub fn new(tree: &Tree<'t, I>) -> Result<Self, StretchError> {
+        if tree.sections().metric.is_empty() {
+            return Err(StretchError::NoMetric);
+        }
+        let last = tree.vertex_count().saturating_sub(1);
+        let block_shift = (u32::BITS - last.leading_zeros()).saturating_sub(BLOCKS.ilog2());
+        let mut touched = [0; BLOCKS];
+        let rows = region_rows(tree);
+        let (mut region, mut end) = (1u32, rows);
+        for triangle in 0..tree.triangle_count() {
+            if triangle == end {
+                (region, end) = (region << 1, end.saturating_add(rows));
+            }
+            let corners = tree.triangle(triangle).ok_or(StretchError::Corrupt { row: triangle })?;
+            for corner in corners {
+                let block = touched.get_mut((corner >> block_shift) as usize);
+                *block.ok_or(StretchError::Corrupt { row: triangle })? |= region;
+            }
+        }
+        Ok(Self {
+            tree: *tree,
+            touched,
+            block_shift,
+            changed: Changed::Whole,
+            left: ALL,
+            next: None,
+            regions: [Worst::none(0); REGIONS],
+            published: None,
+        })
+    }
+
+    /// The tree whose surfaces are measured.
+    #[must_use]
+    pub const fn tree(&self) -> &Tree<'t, I> {
+        &self.tree
+    }
+
+    /// Triangles that a frame of which every row moved takes: the sum of its slices' work.
+    #[must_use]
+    pub const fn whole_work(&self) -> u32 {
+        self.tree.triangle_count()
+    }
+
+    /// The rows of a region's triangles.
+    fn rows(&self, region: u32) -> Range<u32> {
+        let rows = region_rows(&self.tree);
+        let triangles = self.tree.triangle_count();
+        let first = rows.saturating_mul(region);
+        let end = first.saturating_add(rows);
+        if end < triangles { first..end } else { first.min(triangles)..triangles }
+    }
+}
+
+impl<I: Index> Gate for StretchMonitor<'_, I> {
+    fn begin(&mut self, changed: Changed) {
+        self.changed = changed;
+        self.next = None;
+        match (changed, self.published) {
+            (Changed::Partial, Some(published)) => {
+                self.left = 0;
+                self.regions = published;
+            }
+            // Nothing to go on from: everything is measured.
+            _ => self.left = ALL,
+        }
+    }
+
+    fn moved(&mut self, rows: Range<u32>) {
+        if self.changed == Changed::Whole || rows.is_empty() {
+            return;
+        }
+        let first = (rows.start >> self.block_shift) as usize;
+        let last = (rows.end.saturating_sub(1) >> self.block_shift) as usize;
+        for block in self.touched.iter().take(last.saturating_add(1)).skip(first) {
+            self.left |= block;
+        }
+    }
+
+    fn advance<V: VertexTable + ?Sized>(
+        &mut self,
+        surface: &V,
+        ready: u32,
+        mut work: u32,
+    ) -> Result<Verdict, StretchError> {
+        check_tables(&self.tree, surface)?;
+        let is_complete = ready >= self.tree.vertex_count();
+        if self.changed == Changed::Partial && !is_complete {
+            return Ok(Verdict::Pending);
+        }
+        while self.left != 0 {
+            let region = self.left.trailing_zeros();
+            let rows = self.rows(region);
+            let next = self.next.unwrap_or(rows.start);
+            let slot = self.regions.get_mut(region as usize);
+            let slot = slot.ok_or(StretchError::Corrupt { row: rows.start })?;
+            if self.next.is_none() {
+                *slot = Worst::none(rows.start);
+            }
+            let stop = if rows.end - next < work { rows.end } else { next + work };
+            let at = kernel::scan(&self.tree, surface, next..stop, ready, slot)?;
+            work -= at - next;
+            if at < rows.end {
+                self.next = Some(at);
+                return Ok(Verdict::Pending);
+            }
+            self.next = None;
+            self.left &= self.left - 1;
+        }
+        if !is_complete {
+            return Ok(Verdict::Pending);
+        }
+        let measured = MeasuredStretch::of_regions(&self.tree, &self.regions, surface.epoch());
+        Ok(Verdict::Admitted(Some(measured)))
+    }
+
+    fn published(&mut self) {
+        self.published = Some(self.regions);
+    }
+}
