@@ -56,6 +56,19 @@ pub trait Gate {
 
     /// The frame that was admitted is the published one now.
     fn published(&mut self) {}
+
+    /// Smallest and largest weight of a mode that may be published. A gate that has none, as most, is
+    /// one of vertices: the receiver then takes no modal frames, and only them where there is one. The
+    /// rows of a modal frame are [`Vec3`](crate::glam::Vec3)s with a weight each, as `x`.
+    fn weight_range(&self, mode: u32) -> Option<[f32; 2]> {
+        let _ = mode;
+        None
+    }
+
+    /// What to add to a frame's position error for how its surface is made of its rows (mm).
+    fn position_error(&self) -> f32 {
+        0.0
+    }
 }
 
 /// Admits every surface, unmeasured: coverage then rests on the assumption that the tissue keeps

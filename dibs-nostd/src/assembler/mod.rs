@@ -5,10 +5,13 @@ mod rejection;
 
 use core::ops::Range;
 
+use glam::Vec3;
+
 use crate::MAX_COORDINATE;
 use crate::frames::{FrameLabel, FrameView, FrameWriter, PublishError};
 use crate::wire::{
-    Begin, Body, Commit, Content, Encoding, Packet, Rows, Vertices, float_position, quantised_row,
+    Begin, Body, Commit, Content, Encoding, Packet, Rows, Vertices, Weights, float_position,
+    quantised_row,
 };
 
 pub use gate::{Changed, Gate, Unchecked, Verdict};
@@ -193,6 +196,9 @@ impl<'f, G: Gate, const N: usize> Assembler<'f, G, N> {
             (Body::Vertices(vertices), Some(frame)) if frame.epoch == epoch => {
                 self.vertices(frame, packet.checksum, vertices)
             }
+            (Body::Weights(weights), Some(frame)) if frame.epoch == epoch => {
+                self.weights(frame, packet.checksum, weights)
+            }
             (Body::Commit(commit), Some(frame)) if frame.epoch == epoch => {
                 self.commit(frame, commit)
             }
@@ -208,8 +214,13 @@ impl<'f, G: Gate, const N: usize> Assembler<'f, G, N> {
         now: u32,
     ) -> Result<Progress, Rejection> {
         let epoch = packet.epoch;
-        if begin.rows as usize != N || begin.content != Content::Whole {
+        if begin.rows as usize != N {
             return Err(Rejection::VertexCount { vertices: begin.rows });
+        }
+        match begin.content {
+            Content::Whole if self.gate.weight_range(0).is_none() => (),
+            Content::Modal if self.gate.weight_range(0).is_some() => (),
+            _ => return Err(Rejection::OtherEncoding),
         }
         // A box within the limit holds no row beyond it: quantised vertices need no further check.
         if let Encoding::Quantised(grid) = begin.encoding {
@@ -260,7 +271,7 @@ impl<'f, G: Gate, const N: usize> Assembler<'f, G, N> {
                     let _ = self.writer.write(vertex, grid.position(quantised_row(row)));
                 }
             }
-            (Rows::Float(rows), Encoding::Float) => {
+            (Rows::Float(rows), Encoding::Float) if self.gate.weight_range(0).is_none() => {
                 if is_repeated? {
                     return Ok(Progress::Duplicate);
                 }
@@ -272,6 +283,36 @@ impl<'f, G: Gate, const N: usize> Assembler<'f, G, N> {
                 }
             }
             _ => return Err(Rejection::OtherEncoding),
+        }
+        frame.sum = frame.sum.wrapping_add(checksum);
+        self.frame = Some(frame);
+        self.finish(frame)
+    }
+
+    fn weights(
+        &mut self,
+        mut frame: Frame,
+        checksum: u32,
+        weights: Weights<'_>,
+    ) -> Result<Progress, Rejection> {
+        let Weights { first, values } = weights;
+        let count = values.len() as u32;
+        let end = first.checked_add(count).filter(|&end| end as usize <= N);
+        let range = first..end.ok_or(Rejection::OutOfRange { first, count })?;
+        if self.is_repeated(range.clone(), first)? {
+            return Ok(Progress::Duplicate);
+        }
+        for (mode, value) in range.clone().zip(values) {
+            let weight = f32::from_le_bytes(*value);
+            match self.gate.weight_range(mode) {
+                Some([low, high]) if weight >= low && weight <= high => (),
+                Some(_) if weight.is_finite() => return Err(Rejection::TooFar { vertex: mode }),
+                Some(_) => return Err(Rejection::NotFinite { vertex: mode }),
+                None => return Err(Rejection::OtherEncoding),
+            }
+        }
+        for (mode, value) in range.zip(values) {
+            let _ = self.writer.write(mode, Vec3::new(f32::from_le_bytes(*value), 0.0, 0.0));
         }
         frame.sum = frame.sum.wrapping_add(checksum);
         self.frame = Some(frame);
@@ -314,10 +355,7 @@ impl<'f, G: Gate, const N: usize> Assembler<'f, G, N> {
         let Verdict::Admitted(stretch) = verdict.map_err(Rejection::Stretch)? else {
             return Ok(Progress::Stored { missing });
         };
-        let position_error = match frame.encoding {
-            Encoding::Float => 0.0,
-            Encoding::Quantised(grid) => grid.error(),
-        };
+        let position_error = frame.encoding.error() + self.gate.position_error();
         let label =
             FrameLabel { epoch: frame.epoch, received: frame.received, position_error, stretch };
         frame.admitted = Some(label);

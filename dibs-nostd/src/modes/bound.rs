@@ -36,6 +36,11 @@ impl Modes<'_> {
     /// [`WeightsError`] for weights that [`check`](Self::check) refuses.
     pub fn stretch_bound(&self, weights: &[f32]) -> Result<MeasuredStretch, WeightsError> {
         self.check(weights)?;
+        Ok(self.bound(weights))
+    }
+
+    /// The same, of weights that were checked.
+    pub(super) fn bound(&self, weights: &[f32]) -> MeasuredStretch {
         let mut sigma = f32::INFINITY;
         let (mut nearest, mut shortest) = (0, f32::INFINITY);
         for row in 0..self.anchor_count() {
@@ -62,7 +67,7 @@ impl Modes<'_> {
             }
         }
         let sigma = sigma * ROUNDING + self.header.slack;
-        Ok(MeasuredStretch::everywhere(sigma, self.tree, triangle))
+        MeasuredStretch::everywhere(sigma, self.tree, triangle)
     }
 
     fn anchor(&self, row: usize) -> Option<Anchor<'_>> {

@@ -10,16 +10,24 @@
 //! | [`Modes`] | what the builder fitted, read from the tree's bytes and validated once |
 //! | [`ModalSurface`] | the surface at some weights: a [`VertexTable`](crate::VertexTable) |
 //! | [`Modes::stretch_bound`] | how far it is stretched, in time that does not depend on the vertices |
+//! | [`ModalGate`], [`ModalReader`] | both ends of a bus that carries weights |
+//! | [`Memo`] | remembers what was computed, for the length of a query |
 
 mod bound;
 mod error;
+mod gate;
 mod layout;
+mod memo;
+mod reader;
 mod surface;
 
 use layout::Header;
 
 pub use error::{ModesError, WeightsError};
+pub use gate::ModalGate;
 pub use layout::{ANCHOR_TAIL_BYTES, HEADER_BYTES, MAX_ANCHORS, MODE_BYTES, VERTEX_MODE_BYTES};
+pub use memo::Memo;
+pub use reader::{ModalFrame, ModalReader};
 pub use surface::ModalSurface;
 
 use glam::Vec3;

@@ -1,0 +1,70 @@
+//! Positions that were computed before.
+
+use core::cell::Cell;
+
+use glam::Vec3;
+
+use crate::VertexTable;
+
+/// A vertex table that remembers some positions of another one: for a
+/// [`ModalSurface`](super::ModalSurface), of which a query asks for the same vertices a few times, as
+/// pins and as corners of several triangles.
+///
+/// `N` slots of 16 bytes, a power of two for speed, each for every `N`th row: rows that are near each
+/// other, and so are vertices on the surface, do not displace each other. Make one for each query, on
+/// the stack; it does not change any bit of the answer.
+///
+/// ```
+/// use dibs_nostd::{VertexTable, glam::Vec3, modes::Memo};
+/// let table = [Vec3::X, Vec3::Y];
+/// let memo = Memo::<_, 16>::new(&table);
+/// assert_eq!(memo.position(1), Some(Vec3::Y));
+/// assert_eq!(memo.position(1), Some(Vec3::Y)); // without asking the table again
+/// assert_eq!(memo.position(2), None);
+/// ```
+#[derive(Debug)]
+pub struct Memo<'t, T: ?Sized, const N: usize> {
+    table: &'t T,
+    slots: [Cell<Slot>; N],
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Slot {
+    vertex: u32,
+    position: Vec3,
+}
+
+/// No row has this number: a table's length is at most that.
+const NOBODY: u32 = u32::MAX;
+
+impl<'t, T: VertexTable + ?Sized, const N: usize> Memo<'t, T, N> {
+    /// A memory of this table, empty. Cost: `N` slots are written.
+    #[must_use]
+    pub const fn new(table: &'t T) -> Self {
+        const EMPTY: Slot = Slot { vertex: NOBODY, position: Vec3::ZERO };
+        Self { table, slots: [const { Cell::new(EMPTY) }; N] }
+    }
+}
+
+impl<T: VertexTable + ?Sized, const N: usize> VertexTable for Memo<'_, T, N> {
+    fn len(&self) -> usize {
+        self.table.len()
+    }
+
+    #[inline(always)]
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        let place = (vertex as usize).checked_rem(N).and_then(|place| self.slots.get(place));
+        let Some(slot) = place else { return self.table.position(vertex) };
+        let known = slot.get();
+        if known.vertex == vertex && vertex != NOBODY {
+            return Some(known.position);
+        }
+        let position = self.table.position(vertex)?;
+        slot.set(Slot { vertex, position });
+        Some(position)
+    }
+
+    fn epoch(&self) -> Option<u32> {
+        self.table.epoch()
+    }
+}
