@@ -8,6 +8,7 @@ use crate::array::{BuiltTree, Facts, flatten};
 use crate::construct::{Cluster, Constructor, Surface};
 use crate::error::BuildError;
 use crate::geodesic::{Graph, Paths, Topology};
+use crate::stretch::Shares;
 
 /// How sections are pinned, measured and split.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -49,6 +50,7 @@ pub enum IndexWidth {
 #[derive(Clone)]
 pub struct Builder<'p> {
     stretch: f32,
+    limits: Option<Vec<f32>>,
     construction: Construction,
     paths: Option<Paths>,
     leaf_triangles: Option<usize>,
@@ -83,6 +85,7 @@ impl<'p> Builder<'p> {
     pub fn new() -> Self {
         Self {
             stretch: 1.5,
+            limits: None,
             construction: Construction::Geodesic,
             paths: None,
             leaf_triangles: None,
@@ -98,6 +101,17 @@ impl<'p> Builder<'p> {
     #[must_use]
     pub fn stretch(mut self, limit: f32) -> Self {
         self.stretch = limit;
+        self
+    }
+
+    /// A stretch limit for each of the mesh's triangles, each at least 1, instead of one for all.
+    ///
+    /// Tissue stretches much in few places: a tree that knows where has smaller spheres everywhere else.
+    /// [`MotionStretch::limits`](crate::MotionStretch::limits) learns them from a recorded motion.
+    /// Along-surface distances are weighted by the limits, and the tree's own limit is the largest.
+    #[must_use]
+    pub fn limits(mut self, limits: Vec<f32>) -> Self {
+        self.limits = Some(limits);
         self
     }
 
@@ -186,16 +200,21 @@ impl<'p> Builder<'p> {
         }
         let paths = self.paths.unwrap_or(match self.construction {
             Construction::Paper => Paths::Edges,
-            _ => Paths::Surface { crossings: DEFAULT_CROSSINGS },
+            _ => Paths::default(),
         });
-        let root = self.construct(mesh, paths)?;
+        let (stretch, shares) = match &self.limits {
+            Some(limits) => Shares::of(limits),
+            None => (self.stretch, Shares::default()),
+        };
+        let root = self.construct(mesh, paths, &shares)?;
         let kind = match paths {
             Paths::Edges => PathKind::EdgePath,
             Paths::Surface { .. } => PathKind::Surface,
         };
         let facts = Facts {
             paths: kind,
-            stretch: self.stretch,
+            stretch,
+            shares: &shares,
             with_order: self.with_order,
             with_rest: self.with_rest,
             with_metric: self.with_metric,
@@ -204,25 +223,41 @@ impl<'p> Builder<'p> {
         Ok(BuiltTree::new::<I>(bytes, order))
     }
 
-    fn construct(&self, mesh: &Mesh, paths: Paths) -> Result<Cluster, BuildError> {
+    fn construct(&self, mesh: &Mesh, paths: Paths, shares: &Shares) -> Result<Cluster, BuildError> {
         let leaf_triangles = self.leaf_triangles.unwrap_or(match self.construction {
             Construction::Paper => 1,
             _ => DEFAULT_LEAF,
         });
         let topology = Topology::new(mesh);
-        let graph = Graph::new(mesh, &topology, paths);
+        let graph = Graph::new(mesh, &topology, paths, shares);
         let restricted = self.construction == Construction::Paper;
         let surface = Surface { mesh, graph: &graph, restricted };
         Constructor::new(surface, self.construction, leaf_triangles, self.progress).run()
+    }
+
+    fn check_limits(&self, mesh: &Mesh) -> Result<(), BuildError> {
+        let possible = 1.0..=1e6;
+        let Some(limits) = &self.limits else {
+            if possible.contains(&self.stretch) {
+                return Ok(());
+            }
+            return Err(BuildError::Stretch { stretch: self.stretch });
+        };
+        if limits.len() != mesh.triangles.len() {
+            let (limits, triangles) = (limits.len(), mesh.triangles.len());
+            return Err(BuildError::Limits { limits, triangles });
+        }
+        match limits.iter().position(|limit| !possible.contains(limit)) {
+            Some(triangle) => Err(BuildError::Limit { triangle, limit: limits[triangle] }),
+            None => Ok(()),
+        }
     }
 
     fn check(&self, mesh: &Mesh) -> Result<(), BuildError> {
         if mesh.triangles.is_empty() {
             return Err(BuildError::NoTriangles);
         }
-        if !(1.0..=1e6).contains(&self.stretch) {
-            return Err(BuildError::Stretch { stretch: self.stretch });
-        }
+        self.check_limits(mesh)?;
         if let Some(triangles) = self.leaf_triangles
             && !(1..=MAX_LEAF_TRIANGLES as usize).contains(&triangles)
         {
@@ -243,6 +278,3 @@ impl<'p> Builder<'p> {
 
 /// Triangles a leaf of the default construction.
 const DEFAULT_LEAF: usize = 4;
-
-/// Edges that a chord of the default construction crosses.
-const DEFAULT_CROSSINGS: u32 = 2;

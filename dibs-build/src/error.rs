@@ -44,6 +44,26 @@ pub enum BuildError {
         /// The limit asked for.
         stretch: f32,
     },
+    /// Not as many limits as triangles.
+    #[error(
+        "{limits} stretch limits for a mesh of {triangles} triangles: there must be one for each"
+    )]
+    Limits {
+        /// Limits given.
+        limits: usize,
+        /// Triangles of the mesh.
+        triangles: usize,
+    },
+    /// A triangle's stretch limit that is not a number of at least 1.
+    #[error(
+        "triangle {triangle} has a stretch limit of {limit}: it is a factor of at least 1 (at most 1e6)"
+    )]
+    Limit {
+        /// The triangle.
+        triangle: usize,
+        /// Its limit.
+        limit: f32,
+    },
     /// A leaf size outside 1 to 8.
     #[error("leaves of {triangles} triangles cannot be stored: 1 to 8 are possible")]
     LeafSize {

@@ -28,6 +28,7 @@ mod pc2;
 mod read;
 #[cfg(feature = "stream")]
 pub mod stream;
+mod stretch;
 mod write;
 
 pub use array::{BuiltTree, ModesSummary, Summary, summarise};
@@ -37,4 +38,5 @@ pub use geodesic::Paths;
 pub use mesh::{Mesh, Motion};
 pub use pc2::MotionMismatch;
 pub use read::{Format, Import, ReadError, ReadErrorKind, ReadOptions, Report, read};
+pub use stretch::{LimitsError, LimitsErrorKind, MotionStretch, Needed, read_limits, write_limits};
 pub use write::{WriteError, WriteErrorKind, write_atomically};

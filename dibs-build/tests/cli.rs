@@ -162,10 +162,8 @@ fn modes_are_fitted_shown_and_written() {
         source.contains("pub static HEART_MODES: ") && source.contains("_MODE_COUNT: usize = 2")
     );
 
-    let warned = dibs(folder, &format!("{line} 2 --stretch 1.2"));
-    assert!(warned.status.success());
-    let warning = String::from_utf8(warned.stderr).unwrap();
-    assert!(warning.contains("beyond the limit of 1.2"), "{warning}");
+    let error = fails(folder, &format!("{line} 2 --stretch 1.2"));
+    assert!(error.contains("triangles beyond their limits"), "{error}");
 
     std::fs::write(folder.join("old.dibs"), "what was there before").unwrap();
     succeeds(folder, "generate heart --triangles 998 -o other.ply --motion other.pc2");
@@ -211,5 +209,73 @@ fn malformed_files_end_as_the_library_says() {
                 assert!(!output.exists(), "{line}");
             }
         }
+    }
+}
+
+#[test]
+fn limits_are_learned_from_a_motion_and_hold_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeeds(folder, "generate heart --triangles 1000 -o heart.ply --motion heart.pc2");
+    let line =
+        "stretch heart.ply heart.pc2 --margin 0.05 --limits heart.limits --picture heart.svg";
+    let learned = json(folder, &format!("{line} --json"));
+    let worst = &learned["worst"][0];
+    let (largest, uniform) =
+        (worst["stretch"].as_f64().unwrap(), learned["uniform_limit"].as_f64());
+    assert!((largest * 1.05 - uniform.unwrap()).abs() < 1e-3, "{learned}");
+    assert_eq!(learned["percentiles"][5][1], worst["stretch"]);
+    assert!(std::fs::read_to_string(folder.join("heart.svg")).unwrap().contains("<svg"));
+    assert!(succeeds(folder, "stretch heart.ply heart.pc2 --edges").contains("worst    triangle"));
+
+    // What is learned holds the motion; less does not, and says which triangle and what to do.
+    let built = json(
+        folder,
+        "build heart.ply -o heart.dibs --limits heart.limits --motion heart.pc2 --json",
+    );
+    let limit = built["tree"]["stretch"].as_f64().unwrap();
+    assert!((limit - uniform.unwrap()).abs() < 1e-6);
+    assert!(built["tree"]["least_stretch_limit"].as_f64().unwrap() < limit - 0.05);
+    let plain =
+        json(folder, "build heart.ply -o plain.dibs --stretch 1.5 --motion heart.pc2 --json");
+    assert_eq!(plain["tree"]["least_stretch_limit"], plain["tree"]["stretch"]);
+    let error = fails(folder, "build heart.ply -o old.dibs --stretch 1.02 --motion heart.pc2");
+    let named = format!("most of all triangle {} in frame {}", worst["triangle"], worst["frame"]);
+    assert!(error.contains(&named) && error.contains("dibs stretch --limits"), "{error}");
+    assert!(!folder.join("old.dibs").exists());
+
+    // Both trees give the same distances on a frame of the motion.
+    let tool = "--tool sphere:-70,5,20,3 --vertices heart.pc2 --frame 9 --stretch 2 --json";
+    let [one, other] =
+        ["heart", "plain"].map(|tree| json(folder, &format!("query {tree}.dibs {tool}")));
+    assert_eq!(one["separation"], other["separation"]);
+}
+
+#[test]
+fn limits_that_cannot_be_used_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeeds(folder, "generate heart --triangles 1000 -o heart.ply --motion heart.pc2");
+    succeeds(folder, "generate heart --triangles 998 -o other.ply --motion other.pc2");
+    succeeds(folder, "stretch heart.ply heart.pc2 --limits heart.limits");
+    let text = std::fs::read_to_string(folder.join("heart.limits")).unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    write("short.limits", &lines[..500].join("\n"));
+    write("low.limits", &text.replace(lines[700], "0.5"));
+    write("none.limits", "v 1 2 3");
+    for (line, expected) in [
+        ("build other.ply -o t.dibs --limits heart.limits", "is of mesh"),
+        ("build heart.ply -o t.dibs --limits short.limits", "limits for 1000 triangles"),
+        ("build heart.ply -o t.dibs --limits low.limits", "'0.5' is not a limit"),
+        ("build heart.ply -o t.dibs --limits none.limits", "no file of stretch limits"),
+        ("build heart.ply -o t.dibs --limits missing.limits", "cannot be read"),
+        ("stretch heart.ply other.pc2", "vertices and the mesh has"),
+        ("stretch heart.ply heart.pc2 --margin=-1", "a margin of -1 makes no sense"),
+        ("build heart.ply -o t.dibs --stretch 0.5", "a stretch limit of 0.5 makes no sense"),
+    ] {
+        let error = fails(folder, line);
+        assert!(error.contains(expected), "{line}: {error}");
+        assert!(!folder.join("t.dibs").exists());
     }
 }

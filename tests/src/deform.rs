@@ -50,6 +50,18 @@ impl Deformation {
     /// of at most `limit`, then turned and moved as a whole.
     #[must_use]
     pub fn apply(self, mesh: &Mesh, paths: PathKind, limit: f32, rng: &mut Rng) -> Vec<Vec3> {
+        let most = f64::from(limit) * 0.999;
+        self.apply_while(mesh, |moved| stretch::largest(mesh, moved, paths) <= most, rng)
+    }
+
+    /// The same at any strength for which the deformed mesh still fits.
+    #[must_use]
+    pub fn apply_while(
+        self,
+        mesh: &Mesh,
+        is_fit: impl Fn(&[Vec3]) -> bool,
+        rng: &mut Rng,
+    ) -> Vec<Vec3> {
         let low = mesh.positions.iter().copied().fold(Vec3::INFINITY, Vec3::min);
         let high = mesh.positions.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
         let (middle, size) = ((low + high) / 2.0, (high - low).length());
@@ -60,7 +72,7 @@ impl Deformation {
             let moved = mesh.positions.iter().zip(&target).map(|(&p, &q)| p + (q - p) * t);
             moved.map(|p| turn * (p - middle) + shift).collect()
         };
-        let fits = |t: f32| stretch::largest(mesh, &blend(t), paths) <= f64::from(limit) * 0.999;
+        let fits = |t: f32| is_fit(&blend(t));
         let strength = if fits(1.0) { 1.0 } else { bisect(fits) };
         blend(strength)
     }

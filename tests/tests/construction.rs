@@ -1,9 +1,10 @@
 //! The builder: coverage against distances computed another way, determinism, cost, refusals.
 
 use dibs_build::{BuildError, Builder, BuiltTree, Construction, IndexWidth, Mesh, Paths, generate};
-use dibs_nostd::format::Link;
+use dibs_nostd::format::{Link, PathKind};
 use dibs_nostd::{Index, Options, Query, Sphere, Tree, measure_stretch};
 use dibs_tests::deform::{Deformation, unit};
+use dibs_tests::stretch;
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -128,6 +129,63 @@ fn spheres_cover_their_sections_up_to_the_limit() {
     }
 }
 
+/// The same with a limit for each triangle: random ones, and ones that one deformation needs and no more,
+/// which then stretches every triangle to its limit.
+#[test]
+fn spheres_cover_their_sections_up_to_each_triangles_limit() {
+    let mesh = heart(320);
+    let mut rng = Rng::with_seed(12);
+    let mut narrowest = f64::INFINITY;
+    let kinds = [Paths::Edges, Paths::Surface { crossings: 1 }, Paths::Surface { crossings: 3 }];
+    for (paths, deformation) in kinds.into_iter().flat_map(|p| Deformation::ALL.map(|d| (p, d))) {
+        let kind = if paths == Paths::Edges { PathKind::EdgePath } else { PathKind::Surface };
+        let of = |moved: &[Vec3], t: usize| stretch::of_triangle(&mesh, moved, t, kind);
+        let triangles = 0..mesh.triangles.len();
+        let full = deformation.apply(&mesh, kind, 2.5, &mut rng);
+        let needed = triangles.clone().map(|t| of(&full, t).max(1.0) as f32 * 1.0001).collect();
+        let random = triangles.clone().map(|_| 1.05 + rng.f32() * rng.f32() * 2.0).collect();
+        for limits in [needed, random] {
+            let limits: Vec<f32> = limits;
+            // A little within, for the f32 rounding of what is measured.
+            let fits = |moved: &[Vec3]| {
+                triangles.clone().all(|t| of(moved, t) <= f64::from(limits[t]) * 0.99998)
+            };
+            let mut shapes: Vec<Vec<Vec3>> = Vec::new();
+            if fits(&full) {
+                shapes.push(full.clone());
+            }
+            for other in Deformation::ALL {
+                shapes.push(other.apply_while(&mesh, fits, &mut rng));
+            }
+            let built = Builder::new().paths(paths).limits(limits.clone()).build(&mesh);
+            let built = built.expect("a valid mesh");
+            let tree = built.tree::<u16>().expect("valid");
+            for moved in shapes {
+                let sigma = measure_stretch(&tree, built.to_rows(&moved).as_slice());
+                let sigma = f64::from(sigma.expect("within the limits").sigma());
+                let share = |t: usize| of(&moved, t) / f64::from(limits[t]);
+                let largest = triangles.clone().map(share).fold(0.0, f64::max);
+                let truth = largest * f64::from(tree.stretch());
+                assert!(sigma >= truth * (1.0 - 1e-4), "{sigma} for {truth}");
+                assert!(sigma <= truth.max(0.5) * 1.0001, "{sigma} for {truth}");
+                each_node(&tree, &mut |pin, radius, vertices| {
+                    for &v in vertices {
+                        let reach =
+                            moved[pin as usize].as_dvec3().distance(moved[v as usize].as_dvec3());
+                        // Positions are rounded to f32 after the deformation.
+                        assert!(reach <= sigma * radius + 1e-4, "{deformation:?}: {reach}");
+                        if reach > 5.0 {
+                            narrowest = narrowest.min(sigma * radius / reach);
+                        }
+                    }
+                });
+            }
+        }
+    }
+    println!("the narrowest sphere is {narrowest:.6} times what it covers");
+    assert!(narrowest < 1.01, "no case comes near the limit: {narrowest}");
+}
+
 /// A stretch beyond the limit is refused and named; a tree that is told too little misses.
 #[test]
 fn a_violated_limit_is_reported_not_tolerated() {
@@ -198,6 +256,12 @@ fn what_cannot_be_built_is_named() {
         let error = built(&mesh, new().leaf_triangles(leaf));
         assert!(matches!(error, BuildError::LeafSize { triangles } if triangles == leaf));
     }
+    let error = built(&mesh, new().limits(vec![1.5; 319]));
+    assert!(matches!(error, BuildError::Limits { limits: 319, triangles: 320 }), "{error}");
+    let mut limits = vec![1.5; 320];
+    limits[7] = 0.9;
+    let error = built(&mesh, new().limits(limits));
+    assert!(matches!(error, BuildError::Limit { triangle: 7, .. }), "{error}");
     let mut broken = mesh.clone();
     broken.positions[7].y = f32::NAN;
     assert!(matches!(built(&broken, new()), BuildError::Coordinate { vertex: 7 }));

@@ -35,8 +35,10 @@ pub struct Summary {
     pub depth: u32,
     /// Bits of an index.
     pub index_bits: u32,
-    /// The stretch limit.
+    /// The stretch limit: the largest, where triangles have their own.
     pub stretch: f32,
+    /// The least stretch limit of any triangle.
+    pub least_stretch_limit: f32,
     /// Whether radii were measured across triangles (else along edges).
     pub surface_paths: bool,
     /// Radius of the root at rest, in the mesh's unit.
@@ -263,6 +265,9 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
         depth: tree.depth(),
         index_bits: 8 * I::BYTES as u32,
         stretch: tree.stretch(),
+        least_stretch_limit: (0..tree.triangle_count())
+            .filter_map(|row| tree.stretch_limit(row))
+            .fold(tree.stretch(), f32::min),
         surface_paths: tree.paths() == PathKind::Surface,
         root_radius: tree.root().1,
         mesh_id: tree.mesh_id(),

@@ -11,6 +11,7 @@ use super::metric::metric;
 use crate::Mesh;
 use crate::construct::{Cluster, Content};
 use crate::error::BuildError;
+use crate::stretch::Shares;
 
 /// A tree in the order of its array.
 #[derive(Debug, Default)]
@@ -49,9 +50,10 @@ impl Flat {
 
 /// What goes into the header besides the tree.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Facts {
+pub(crate) struct Facts<'a> {
     pub paths: PathKind,
     pub stretch: f32,
+    pub shares: &'a Shares,
     pub with_order: bool,
     pub with_rest: bool,
     pub with_metric: bool,
@@ -61,7 +63,7 @@ pub(crate) struct Facts {
 pub(crate) fn flatten<I: Index>(
     mesh: &Mesh,
     root: &Cluster,
-    facts: Facts,
+    facts: Facts<'_>,
 ) -> Result<(Vec<u8>, Vec<u32>), BuildError> {
     let mut flat = Flat::default();
     let root_link = flat.add(mesh, root, 0);
@@ -105,6 +107,10 @@ pub(crate) fn flatten<I: Index>(
     if facts.with_metric {
         sections.push((section::METRIC, metrics(mesh, &flat.triangles, facts)));
     }
+    if !facts.shares.is_uniform() {
+        let codes = flat.triangles.iter().map(|placed| facts.shares.code(placed.triangle));
+        sections.push((section::LIMITS, codes.flat_map(u16::to_le_bytes).collect()));
+    }
     let header = [
         identity.finalize(),
         order.len() as u32,
@@ -131,12 +137,17 @@ fn vertex_order(mesh: &Mesh, triangles: &[Placed]) -> Vec<u32> {
 }
 
 /// The metric of each triangle, marked where it continues the fan of the triangle before.
-fn metrics(mesh: &Mesh, triangles: &[Placed], facts: Facts) -> Vec<u8> {
+fn metrics(mesh: &Mesh, triangles: &[Placed], facts: Facts<'_>) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(METRIC_BYTES * triangles.len());
     let mut last = None;
     for placed in triangles {
         let corners = placed.corners.map(|v| mesh.positions[v as usize]);
-        let mut row = metric(corners, 1.0, f64::from(facts.stretch), facts.paths);
+        let mut row = metric(
+            corners,
+            facts.shares.share(placed.triangle),
+            f64::from(facts.stretch),
+            facts.paths,
+        );
         let [a, b, c] = placed.corners;
         if last == Some((a, b)) {
             row[0] = -row[0];

@@ -3,12 +3,18 @@
 //! Its arcs are the mesh's edges and, for [`Paths::Surface`], *chords*: straight lines across a strip
 //! of triangles that is unfolded into a plane. Both are paths on the surface, so no distance is ever
 //! under-estimated.
+//!
+//! Where triangles have stretch limits of their own, lengths are weighted by each limit's share of the
+//! largest: a path grows to at most the largest limit times its weighted length. An edge stretches no
+//! more than any of its triangles does, so the least of their limits is its; a chord is the sum of its
+//! parts in each triangle.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::Topology;
 use crate::Mesh;
+use crate::stretch::Shares;
 
 /// How far along-surface distances look beyond the mesh's edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,7 +29,14 @@ pub enum Paths {
     },
 }
 
-/// Arcs from each vertex, in compressed rows. Weights are lengths at rest, rounded up.
+impl Default for Paths {
+    /// Those of the default construction.
+    fn default() -> Self {
+        Self::Surface { crossings: 2 }
+    }
+}
+
+/// Arcs from each vertex, in compressed rows. Lengths are weighted ones at rest, rounded up.
 #[derive(Debug)]
 pub(crate) struct Graph {
     start: Vec<u32>,
@@ -37,12 +50,13 @@ pub(crate) struct Arc {
 }
 
 impl Graph {
-    pub fn new(mesh: &Mesh, topology: &Topology, paths: Paths) -> Self {
+    pub fn new(mesh: &Mesh, topology: &Topology, paths: Paths, shares: &Shares) -> Self {
         let rows: Vec<Vec<Arc>> = (0..mesh.positions.len() as u32)
             .into_par_iter()
             .map_init(Vec::new, |found, vertex| {
                 found.clear();
-                Unfolding { mesh, topology, paths, source: vertex, found }.run();
+                let crossed = Vec::new();
+                Unfolding { mesh, topology, paths, shares, source: vertex, crossed, found }.run();
                 found.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
                 found.dedup_by_key(|&mut (to, _)| to);
                 found.iter().map(|&(to, length)| Arc { to, length: round_up(length) }).collect()
@@ -75,12 +89,23 @@ fn round_up(length: f64) -> f32 {
     if f64::from(near) < raised { near.next_up() } else { near }
 }
 
+/// Sine of the angle between a chord and an edge below which it is not certain where they cross.
+const GRAZING: f64 = 1e-5;
+
+/// What covers the rounding of where they cross otherwise, as a part of the chord: some 10 units of
+/// 2^-53, over [`GRAZING`].
+const CROSSING: f64 = 1e-9;
+
 /// All vertices that one vertex sees across a strip of unfolded triangles.
 struct Unfolding<'a> {
     mesh: &'a Mesh,
     topology: &'a Topology,
     paths: Paths,
+    shares: &'a Shares,
     source: u32,
+    /// The edges between the source and the triangle that was unfolded last, each with the share of the
+    /// triangle before it.
+    crossed: Vec<([DVec2; 2], f64)>,
     found: &'a mut Vec<(u32, f64)>,
 }
 
@@ -99,8 +124,8 @@ impl Unfolding<'_> {
         for &triangle in topology.triangles_at(self.source) {
             let [a, b] = topology.others(self.mesh, triangle, self.source);
             let (to_a, to_b) = (self.edge(self.source, a), self.edge(self.source, b));
-            self.found.push((a, to_a.length()));
-            self.found.push((b, to_b.length()));
+            self.found.push((a, to_a.length() * self.edge_share(triangle, a)));
+            self.found.push((b, to_b.length() * self.edge_share(triangle, b)));
             let Paths::Surface { crossings } = self.paths else { continue };
             let axis = to_a.normalize();
             let across = to_a.cross(to_b).length() / to_a.length();
@@ -108,6 +133,40 @@ impl Unfolding<'_> {
             let edge = [(a, at_a), (b, at_b)];
             self.cross(&Window { edge, low: at_a, high: at_b, triangle, crossings });
         }
+    }
+
+    /// The share of the edge from the source to `to`, one of a triangle's.
+    fn edge_share(&self, triangle: u32, to: u32) -> f64 {
+        let own = self.shares.share(triangle);
+        if self.shares.is_uniform() {
+            return own;
+        }
+        let others = self.topology.across(self.mesh, triangle, self.source, to);
+        others.map(|t| self.shares.share(t)).fold(own, f64::min)
+    }
+
+    /// The weighted length of the chord to `end`, a corner of `last`.
+    fn chord(&self, end: DVec2, last: u32) -> f64 {
+        let length = end.length();
+        if self.shares.is_uniform() {
+            return length;
+        }
+        let mut share = self.shares.share(last);
+        let mut largest = share;
+        // From the end to the source, as parts of the chord.
+        let (mut weighted, mut from) = (0.0, 1.0);
+        let mut is_certain = true;
+        for &([a, b], before) in self.crossed.iter().rev() {
+            let across = end.perp_dot(b - a);
+            let at = (a.perp_dot(b - a) / across).clamp(0.0, from);
+            is_certain &= across.abs() > GRAZING * length * (b - a).length();
+            weighted += share * (from - at);
+            (share, from) = (before, at);
+            largest = largest.max(before);
+        }
+        weighted += share * from;
+        // Where a chord only grazes an edge, rounding decides where it crosses.
+        length * if is_certain { weighted + CROSSING } else { largest }
     }
 
     fn edge(&self, from: u32, to: u32) -> DVec3 {
@@ -122,6 +181,7 @@ impl Unfolding<'_> {
         }
         let [(a, at_a), (b, at_b)] = window.edge;
         let topology = self.topology;
+        self.crossed.push(([at_a, at_b], self.shares.share(window.triangle)));
         for next in topology.across(self.mesh, window.triangle, a, b) {
             let apex = topology.apex(self.mesh, next, a, b);
             let (along, to_apex) = (self.edge(a, b), self.edge(a, apex));
@@ -133,7 +193,7 @@ impl Unfolding<'_> {
             let (after_low, before_high) =
                 (window.low.perp_dot(at_apex), at_apex.perp_dot(window.high));
             if after_low >= 0.0 && before_high >= 0.0 {
-                self.found.push((apex, at_apex.length()));
+                self.found.push((apex, self.chord(at_apex, next)));
             }
             let crossings = window.crossings - 1;
             if after_low > 0.0 {
@@ -147,5 +207,6 @@ impl Unfolding<'_> {
                 self.cross(&Window { edge, low, high: window.high, triangle: next, crossings });
             }
         }
+        self.crossed.pop();
     }
 }

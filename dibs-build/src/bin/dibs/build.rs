@@ -1,10 +1,12 @@
 //! `dibs build`: a mesh file becomes a blob or Rust source.
 
-use crate::{modes, tree_file};
-use anyhow::{Result, bail};
+use crate::mesh_file::{self, MeshArgs};
+use crate::{modes, stretch, tree_file};
+use anyhow::{Result, anyhow, bail};
 use clap::ValueEnum;
-use dibs_build::{Builder, BuiltTree, Construction, Import, IndexWidth, Mesh, ReadOptions};
-use indicatif::{ProgressBar, ProgressStyle};
+use dibs_build::{
+    Builder, BuiltTree, Construction, Import, IndexWidth, Mesh, Motion, Needed, Paths, read_limits,
+};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -13,6 +15,7 @@ Examples:
   dibs build heart.ply -o heart.dibs --stretch 1.5
   dibs build heart.stl -o heart.rs --name HEART --weld 0.001
   dibs build scan.obj -o scan.dibs --largest-component --json
+  dibs build heart.ply -o heart.dibs --limits heart.limits --motion heart.pc2
   dibs build heart.ply -o heart.dibs --motion heart.pc2 --modes 16")]
 pub struct Args {
     /// The rest shape: OBJ, STL, PLY or OFF, told apart by content
@@ -23,6 +26,9 @@ pub struct Args {
     /// The largest stretch that the tree must cover: a factor of at least 1
     #[arg(long, default_value_t = 1.5)]
     stretch: f32,
+    /// A limit for each triangle instead, as `dibs stretch` writes them
+    #[arg(long, value_name = "FILE", conflicts_with = "stretch")]
+    limits: Option<PathBuf>,
     /// How sections are pinned, measured and split
     #[arg(long, value_enum, default_value = "default")]
     construction: ConstructionName,
@@ -32,20 +38,13 @@ pub struct Args {
     /// Name of the Rust static; by default the output file's name in capitals
     #[arg(long)]
     name: Option<String>,
-    /// Fail on degenerate and duplicate triangles, instead of dropping them
-    #[arg(long)]
-    strict: bool,
-    /// Weld vertices at most this far apart (0: equal ones); by default only soup is welded, exactly
-    #[arg(long, value_name = "TOLERANCE")]
-    weld: Option<f32>,
-    /// Keep the largest of several separate surfaces
-    #[arg(long)]
-    largest_component: bool,
+    #[command(flatten)]
+    reading: MeshArgs,
     /// Add displacement modes fitted to the motion, so that as many weights drive the surface
     #[arg(long, value_name = "COUNT", requires = "motion")]
     modes: Option<usize>,
-    /// The recorded motion of the mesh, a .pc2 file
-    #[arg(long, requires = "modes")]
+    /// A recorded motion of the mesh, a .pc2 file: fail if it stretches the surface beyond the limits
+    #[arg(long)]
     motion: Option<PathBuf>,
     /// Print a JSON object
     #[arg(long)]
@@ -75,20 +74,20 @@ pub fn run(args: &Args) -> Result<()> {
         Some("dibs") => false,
         _ => bail!("{}: the output's name must end in .dibs or .rs", args.output.display()),
     };
-    let options = ReadOptions {
-        weld_tolerance: args.weld,
-        strict: args.strict,
-        largest_component: args.largest_component,
-    };
-    let Import { mesh, report } = options.read(&args.mesh)?;
+    let Import { mesh, report } = mesh_file::read(&args.mesh, &args.reading)?;
     let name = args.mesh.display();
-    for warning in report.warnings() {
-        eprintln!("warning: {name}: {warning}");
+    let limits = args.limits.as_ref().map(|path| read_limits(path, &mesh)).transpose()?;
+    if let Some(path) = &args.motion {
+        let uniform = || vec![args.stretch; mesh.triangles.len()];
+        check_covered(args, &mesh, path, &limits.clone().unwrap_or_else(uniform))?;
     }
     // A motion that does not fit is found before the work, too.
-    let fit = args.motion.as_deref().map(|path| modes::fit(&mesh, path)).transpose()?;
-    let mut tree = build(args, &mesh)
-        .map_err(|error| anyhow::anyhow!("{name}: no tree can be built: {error}"))?;
+    let fit = match (&args.motion, args.modes) {
+        (Some(path), Some(_)) => Some(modes::fit(&mesh, path)?),
+        _ => None,
+    };
+    let mut tree = build(args, &mesh, limits)
+        .map_err(|error| anyhow!("{name}: no tree can be built: {error}"))?;
     if let (Some(fit), Some(count)) = (&fit, args.modes) {
         tree = fit.add(&tree, count)?;
     }
@@ -119,14 +118,42 @@ pub fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-fn build(args: &Args, mesh: &Mesh) -> Result<BuiltTree, dibs_build::BuildError> {
-    let bar = ProgressBar::new(mesh.triangles.len() as u64);
-    if let Ok(style) = ProgressStyle::with_template("building {bar:40} {percent}% {elapsed}") {
-        bar.set_style(style);
-    }
+/// An error unless the limits cover a recorded motion: the controller would reject its frames.
+fn check_covered(args: &Args, mesh: &Mesh, path: &Path, limits: &[f32]) -> Result<()> {
+    let motion = Motion::read_pc2(path)?;
+    let paths = match args.construction {
+        ConstructionName::Default => Paths::default(),
+        ConstructionName::Paper => Paths::Edges,
+    };
+    let needed = stretch::measure(mesh, &motion, path, paths)?;
+    let Some((worst, limit)) = needed.beyond(limits) else { return Ok(()) };
+    let is_beyond = |(n, limit): &(&Needed, &f32)| n.stretch > f64::from(**limit);
+    let beyond = needed.triangles().iter().zip(limits).filter(is_beyond);
+    bail!(
+        "{}: the motion stretches {} triangles beyond their limits, most of all triangle {} in frame {}, \
+         by {:.4} where {limit} is allowed; let `dibs stretch --limits FILE` learn limits from it, or \
+         build with --stretch {:.2}",
+        path.display(),
+        beyond.count(),
+        worst.triangle,
+        worst.frame,
+        worst.stretch,
+        needed.worst().stretch * 1.1,
+    )
+}
+
+fn build(
+    args: &Args,
+    mesh: &Mesh,
+    limits: Option<Vec<f32>>,
+) -> Result<BuiltTree, dibs_build::BuildError> {
+    let bar = mesh_file::progress_bar("building", mesh.triangles.len());
     let progress = |done: usize| bar.set_position(done as u64);
-    let tree = Builder::new()
-        .stretch(args.stretch)
+    let builder = match limits {
+        Some(limits) => Builder::new().limits(limits),
+        None => Builder::new().stretch(args.stretch),
+    };
+    let tree = builder
         .construction(match args.construction {
             ConstructionName::Default => Construction::Geodesic,
             ConstructionName::Paper => Construction::Paper,

@@ -3,9 +3,11 @@
 mod build;
 mod generate;
 mod inspect;
+mod mesh_file;
 mod modes;
 mod query;
 mod stream;
+mod stretch;
 mod tree_file;
 
 use clap::{Parser, Subcommand};
@@ -23,6 +25,8 @@ struct Cli {
 enum Command {
     /// Build a tree from a mesh file (OBJ, STL, PLY or OFF)
     Build(build::Args),
+    /// Find the stretch limits that a recorded motion needs
+    Stretch(stretch::Args),
     /// Validate a tree file and show what it is and costs
     Inspect(inspect::Args),
     /// Find the surface point closest to a tool
@@ -37,6 +41,7 @@ const EXAMPLES: &str = "\
 Examples:
   dibs generate heart --triangles 10272 -o heart.ply --motion heart.pc2
   dibs build heart.ply -o heart.dibs --stretch 1.5
+  dibs stretch heart.ply heart.pc2 --limits heart.limits
   dibs inspect heart.dibs
   dibs query heart.dibs --tool capsule:0,0,60,0,0,200,4 --vertices heart.pc2 --frame 9
   dibs stream heart.dibs heart.pc2 --to serial:/dev/ttyUSB0@921600 --quantise --loop
@@ -47,6 +52,7 @@ standard output; --json makes them one JSON object. Bad input ends with exit cod
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Build(args) => build::run(&args),
+        Command::Stretch(args) => stretch::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Query(args) => query::run(&args),
         Command::Stream(args) => stream::run(&args),

@@ -30,7 +30,12 @@ pub fn print(summary: &Summary) {
         s.triangles, s.vertices, s.nodes, s.depth, s.index_bits
     );
     let paths = if s.surface_paths { "of triangles" } else { "of edges" };
-    println!("stretch  limit {} {paths}, root radius at rest {}", s.stretch, s.root_radius);
+    let limit = if s.least_stretch_limit < s.stretch {
+        format!("limits {} to {}", s.least_stretch_limit, s.stretch)
+    } else {
+        format!("limit {}", s.stretch)
+    };
+    println!("stretch  {limit} {paths}, root radius {}", s.root_radius);
     println!("mesh id  {:08x}", s.mesh_id);
     println!(
         "flash    {} bytes; of these a query reads {} ({:.1} a triangle)",

@@ -1,0 +1,163 @@
+//! `dibs stretch`: the stretch limits that a recorded motion needs.
+
+use crate::mesh_file::{self, MeshArgs};
+use anyhow::{Context, Result, anyhow, bail};
+use dibs_build::{Mesh, Motion, MotionStretch, Needed, Paths, write_atomically, write_limits};
+use plotters::prelude::*;
+use std::path::{Path, PathBuf};
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  dibs stretch heart.ply heart.pc2
+  dibs stretch heart.ply heart.pc2 --margin 0.1 --limits heart.limits --picture stretch.svg
+  dibs build heart.ply -o heart.dibs --limits heart.limits --motion heart.pc2
+
+A triangle's stretch is the largest singular value of its deformation gradient against the mesh file, or
+with --edges the longest of its edges over that edge's length there. Give the same options for reading
+the mesh as to `dibs build`.")]
+pub struct Args {
+    /// The rest shape: OBJ, STL, PLY or OFF, told apart by content
+    mesh: PathBuf,
+    /// The recorded motion of the mesh, a .pc2 file
+    motion: PathBuf,
+    /// What limits leave above the recorded stretch (0.1: a tenth of it)
+    #[arg(long, default_value_t = 0.1)]
+    margin: f32,
+    /// Write a limit for each triangle, for `dibs build --limits`
+    #[arg(long, value_name = "FILE")]
+    limits: Option<PathBuf>,
+    /// Draw how many triangles stretch how far, SVG
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
+    /// Measure edges, as trees of edge paths do (--construction paper)
+    #[arg(long)]
+    edges: bool,
+    #[command(flatten)]
+    reading: MeshArgs,
+    /// Print a JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Shares of the triangles, in per cent, whose largest stretch is reported.
+const PERCENTILES: [f64; 6] = [50.0, 90.0, 99.0, 99.9, 99.99, 100.0];
+
+/// Stretched most: how many are named.
+const NAMED: usize = 5;
+
+pub fn run(args: &Args) -> Result<()> {
+    if !(0.0..=1000.0).contains(&args.margin) {
+        bail!(
+            "a margin of {} makes no sense: it is a part of at least 0 (0.1: a tenth)",
+            args.margin
+        );
+    }
+    let import = mesh_file::read(&args.mesh, &args.reading)?;
+    let mesh = &import.mesh;
+    let motion = Motion::read_pc2(&args.motion)?;
+    let paths = if args.edges { Paths::Edges } else { Paths::default() };
+    let needed = measure(mesh, &motion, &args.motion, paths)?;
+    let ranked = needed.ranked();
+    let limits = needed.limits(args.margin);
+    if let Some(path) = &args.limits {
+        let comment = format!(
+            "Stretch limits of the triangles of {}: what {} needs, and {} of it more.",
+            args.mesh.display(),
+            args.motion.display(),
+            args.margin
+        );
+        write_limits(path, mesh, &limits, &comment)?;
+    }
+    if let Some(path) = &args.picture {
+        let picture = draw(&ranked).with_context(|| path.display().to_string())?;
+        write_atomically(path, |out| out.write_all(picture.as_bytes()))?;
+    }
+    let percentiles = PERCENTILES.map(|share| (share, percentile(&ranked, share)));
+    let uniform = limits.iter().copied().fold(1.0, f32::max);
+    let worst = ranked.get(..NAMED).unwrap_or(&ranked);
+    if args.json {
+        let worst = worst.iter().map(|needed| named(mesh, needed)).collect::<Vec<_>>();
+        println!(
+            "{:#}",
+            serde_json::json!({
+                "mesh": import.report, "frames": motion.frames.len(), "margin": args.margin,
+                "percentiles": percentiles, "worst": worst, "uniform_limit": uniform,
+                "limits": args.limits, "picture": args.picture,
+            })
+        );
+        return Ok(());
+    }
+    println!("read     {}: {}", args.mesh.display(), import.report);
+    println!("motion   {}: {} frames", args.motion.display(), motion.frames.len());
+    for (share, stretch) in percentiles {
+        println!("stretch  {share:6} % of the triangles stretch by at most {stretch:.4}");
+    }
+    for &Needed { triangle, stretch, frame } in worst {
+        let [a, b, c] = mesh.triangles[triangle];
+        println!(
+            "worst    triangle {triangle} (vertices {a} {b} {c}): {stretch:.4} in frame {frame}"
+        );
+    }
+    println!("needs    with a margin of {}: --stretch {uniform:.4} for all alike", args.margin);
+    match &args.limits {
+        Some(path) => println!("written  {}: a limit for each triangle", path.display()),
+        None => println!("         or a limit for each triangle: --limits FILE"),
+    }
+    if let Some(path) = &args.picture {
+        println!("written  {}", path.display());
+    }
+    Ok(())
+}
+
+/// Measures a motion, behind a progress bar.
+pub fn measure(mesh: &Mesh, motion: &Motion, path: &Path, paths: Paths) -> Result<MotionStretch> {
+    let bar = mesh_file::progress_bar("measuring", mesh.triangles.len());
+    let needed = MotionStretch::of(mesh, motion, paths, &|done| bar.set_position(done as u64));
+    bar.finish_and_clear();
+    needed.map_err(|error| anyhow!("{}: {error}", path.display()))
+}
+
+/// The least stretch that this share of the triangles, in per cent, keeps within.
+fn percentile(ranked: &[Needed], share: f64) -> f64 {
+    let beyond = ((1.0 - share / 100.0) * ranked.len() as f64).floor() as usize;
+    ranked[beyond.min(ranked.len() - 1)].stretch
+}
+
+fn named(mesh: &Mesh, needed: &Needed) -> serde_json::Value {
+    let Needed { triangle, stretch, frame } = *needed;
+    let vertices = mesh.triangles[triangle];
+    serde_json::json!({
+        "triangle": triangle, "vertices": vertices, "stretch": stretch, "frame": frame
+    })
+}
+
+/// The share of the triangles that stretch beyond each value, as SVG.
+fn draw(ranked: &[Needed]) -> Result<String> {
+    let mut picture = String::new();
+    {
+        let root = SVGBackend::with_string(&mut picture, (900, 420)).into_drawing_area();
+        root.fill(&WHITE)?;
+        let count = ranked.len() as f64;
+        let share = |beyond: usize| 100.0 * beyond as f64 / count;
+        let most = ranked[0].stretch.max(1.01);
+        let mut chart = ChartBuilder::on(&root)
+            .margin(14)
+            .x_label_area_size(40)
+            .y_label_area_size(70)
+            .build_cartesian_2d(1.0..most * 1.02, (share(1) * 0.7..100.0).log_scale())?;
+        chart
+            .configure_mesh()
+            .x_desc("largest stretch in the motion")
+            .y_desc("triangles beyond (%)")
+            .light_line_style(TRANSPARENT)
+            .draw()?;
+        let points = ranked.iter().enumerate().map(|(i, n)| (n.stretch.max(1.0), share(i + 1)));
+        let step = ranked.len().div_ceil(1_500);
+        // The tail whole, the rest thinned out.
+        let kept = points.enumerate().filter(|(i, _)| i % step == 0 || *i < 100).map(|(_, p)| p);
+        chart.draw_series(LineSeries::new(kept, RGBColor(31, 90, 160).stroke_width(2)))?;
+        root.present()?;
+    }
+    Ok(picture)
+}

@@ -1,0 +1,138 @@
+//! The file that `dibs stretch` writes and `dibs build` reads: a limit for each triangle.
+//!
+//! Text: lines that start with `#` are comments; then `dibs-limits 1`, `mesh` with the mesh's checksum
+//! in hexadecimal digits, `triangles` with their number, and one number a line, in the mesh's order.
+
+use std::path::{Path, PathBuf};
+
+use dibs_nostd::format::CRC;
+use thiserror::Error;
+
+use crate::{Mesh, WriteError, write_atomically};
+
+/// A file of limits that cannot be used.
+#[derive(Debug, Error)]
+#[error("{}: {kind}", path.display())]
+pub struct LimitsError {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong with it.
+    pub kind: LimitsErrorKind,
+}
+
+/// What is wrong with a file of limits.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum LimitsErrorKind {
+    /// The operating system refused.
+    #[error("cannot be read ({0})")]
+    Io(#[from] std::io::Error),
+    /// It does not start as such a file does.
+    #[error("is no file of stretch limits: `dibs stretch MESH MOTION --limits FILE` writes one")]
+    NotLimits,
+    /// The limits are of another mesh.
+    #[error(
+        "is of mesh {found:08x}, this one is {expected:08x}: write it anew for this mesh, with the same \
+         options for reading it"
+    )]
+    OtherMesh {
+        /// Checksum of the mesh.
+        expected: u32,
+        /// Checksum in the file.
+        found: u32,
+    },
+    /// There are not as many limits as triangles.
+    #[error("has {found} limits for {expected} triangles: it is cut off or was edited")]
+    Count {
+        /// Triangles of the mesh.
+        expected: usize,
+        /// Limits in the file.
+        found: usize,
+    },
+    /// A line is not a limit.
+    #[error("line {line}: '{text}' is not a limit: a number of at least 1")]
+    Line {
+        /// The line, counted from 1.
+        line: usize,
+        /// What it says.
+        text: String,
+    },
+}
+
+/// Writes limits for the triangles of a mesh, after a comment.
+///
+/// # Errors
+/// [`WriteError`]; the file is complete or untouched.
+///
+/// # Panics
+/// If there is not a limit for each triangle.
+pub fn write_limits(
+    path: impl AsRef<Path>,
+    mesh: &Mesh,
+    limits: &[f32],
+    comment: &str,
+) -> Result<(), WriteError> {
+    assert_eq!(limits.len(), mesh.triangles.len(), "a limit for each triangle");
+    write_atomically(path, |out| {
+        for line in comment.lines() {
+            writeln!(out, "# {line}")?;
+        }
+        writeln!(out, "dibs-limits 1\nmesh {:08x}\ntriangles {}", checksum(mesh), limits.len())?;
+        // The shortest digits that give the same number back.
+        limits.iter().try_for_each(|limit| writeln!(out, "{limit}"))
+    })
+}
+
+/// Reads the limits of a mesh's triangles.
+///
+/// # Errors
+/// [`LimitsError`] names the file and what is wrong, limits of another mesh among it.
+pub fn read_limits(path: impl AsRef<Path>, mesh: &Mesh) -> Result<Vec<f32>, LimitsError> {
+    let path = path.as_ref();
+    let text = std::fs::read_to_string(path).map_err(LimitsErrorKind::from);
+    text.and_then(|text| parse(&text, mesh))
+        .map_err(|kind| LimitsError { path: path.to_path_buf(), kind })
+}
+
+fn parse(text: &str, mesh: &Mesh) -> Result<Vec<f32>, LimitsErrorKind> {
+    let lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
+    let mut lines = lines.filter(|(_, line)| !line.starts_with('#') && !line.is_empty());
+    let mut field = |name: &str| {
+        let (_, line) = lines.next()?;
+        line.strip_prefix(name)?.strip_prefix(' ')
+    };
+    if field("dibs-limits") != Some("1") {
+        return Err(LimitsErrorKind::NotLimits);
+    }
+    let found = field("mesh").and_then(|digits| u32::from_str_radix(digits, 16).ok());
+    let count = field("triangles").and_then(|digits| digits.parse::<usize>().ok());
+    let (Some(found), Some(count)) = (found, count) else {
+        return Err(LimitsErrorKind::NotLimits);
+    };
+    let expected = checksum(mesh);
+    if found != expected {
+        return Err(LimitsErrorKind::OtherMesh { expected, found });
+    }
+    let limit = |(line, text): (usize, &str)| match text.parse::<f32>() {
+        Ok(limit) if (1.0..=1e6).contains(&limit) => Ok(limit),
+        _ => Err(LimitsErrorKind::Line { line, text: text.to_owned() }),
+    };
+    let limits = lines.map(limit).collect::<Result<Vec<f32>, _>>()?;
+    let triangles = mesh.triangles.len();
+    if limits.len() != triangles || count != triangles {
+        return Err(LimitsErrorKind::Count { expected: triangles, found: limits.len() });
+    }
+    Ok(limits)
+}
+
+/// Tells one mesh from another: CRC-32 of its positions and triangles.
+fn checksum(mesh: &Mesh) -> u32 {
+    let mut digest = CRC.digest();
+    for position in &mesh.positions {
+        position.to_array().iter().for_each(|x| digest.update(&x.to_le_bytes()));
+    }
+    for corner in mesh.triangles.iter().flatten() {
+        digest.update(&corner.to_le_bytes());
+    }
+    digest.finalize()
+}

@@ -1,0 +1,161 @@
+//! What a recorded motion asks of the stretch limits, and limits of single triangles.
+
+mod file;
+mod shares;
+
+use glam::{DMat2, DVec2, DVec3, Vec3};
+use rayon::prelude::*;
+
+pub use file::{LimitsError, LimitsErrorKind, read_limits, write_limits};
+pub(crate) use shares::Shares;
+
+use crate::pc2::MotionMismatch;
+use crate::{Mesh, Motion, Paths};
+
+/// How far a recorded motion stretches each triangle of its mesh.
+///
+/// The measure is the one that the paths of the tree ask for: a triangle's largest singular value, or
+/// for [`Paths::Edges`] its longest edge over that edge's rest length. Between two frames, on straight
+/// lines, neither is larger than in both: they are convex.
+///
+/// ```
+/// use dibs_build::{Builder, MotionStretch, Paths, generate};
+/// let (mesh, motion) = generate::heart(1_000)?;
+/// let needed = MotionStretch::of(&mesh, &motion, Paths::default(), &|_| ())?;
+/// let tree = Builder::new().limits(needed.limits(0.1)).build(&mesh)?;
+/// assert!(f64::from(tree.summary().stretch) >= needed.worst().stretch * 1.09);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct MotionStretch {
+    triangles: Vec<Needed>,
+}
+
+/// The largest stretch of a triangle in a motion.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Needed {
+    /// The triangle of the mesh.
+    pub triangle: usize,
+    /// Its largest stretch.
+    pub stretch: f64,
+    /// The first frame in which it is that large.
+    pub frame: usize,
+}
+
+impl MotionStretch {
+    /// Measures a motion, in f64. `progress` is called with the number of triangles done, from whichever
+    /// thread did them.
+    ///
+    /// # Errors
+    /// [`MotionMismatch`] where a frame does not fit the mesh.
+    ///
+    /// # Panics
+    /// If the mesh names vertices that it does not have.
+    pub fn of(
+        mesh: &Mesh,
+        motion: &Motion,
+        paths: Paths,
+        progress: &(dyn Fn(usize) + Sync),
+    ) -> Result<Self, MotionMismatch> {
+        motion.check_fits(mesh)?;
+        let done = std::sync::atomic::AtomicUsize::new(0);
+        let needed = |triangle: usize| {
+            let corners = mesh.triangles[triangle];
+            let at = |positions: &[Vec3]| corners.map(|v| positions[v as usize].as_dvec3());
+            let rest = at(&mesh.positions);
+            let mut worst = Needed { triangle, stretch: 0.0, frame: 0 };
+            for (frame, positions) in motion.frames.iter().enumerate() {
+                let stretch = stretch(rest, at(positions), paths);
+                // What is not a number, of a triangle without area, stays.
+                if !(stretch <= worst.stretch) {
+                    worst = Needed { stretch, frame, ..worst };
+                }
+            }
+            let count = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
+            if count.is_multiple_of(1024) {
+                progress(count);
+            }
+            worst
+        };
+        let triangles = (0..mesh.triangles.len()).into_par_iter().map(needed).collect();
+        Ok(Self { triangles })
+    }
+
+    /// What each triangle of the mesh needs.
+    #[must_use]
+    pub fn triangles(&self) -> &[Needed] {
+        &self.triangles
+    }
+
+    /// The triangles, most stretched first.
+    #[must_use]
+    pub fn ranked(&self) -> Vec<Needed> {
+        let mut ranked = self.triangles.clone();
+        ranked.sort_by(|a, b| b.stretch.total_cmp(&a.stretch));
+        ranked
+    }
+
+    /// The triangle that needs most.
+    ///
+    /// # Panics
+    /// If the mesh has no triangle.
+    #[must_use]
+    pub fn worst(&self) -> Needed {
+        self.ranked()[0]
+    }
+
+    /// Limits for the builder: each triangle's largest stretch, at least 1, and `margin` more (0.1: a
+    /// tenth); besides, a ten-thousandth for the rounding of the controller's measurement.
+    #[must_use]
+    pub fn limits(&self, margin: f32) -> Vec<f32> {
+        let limit = |needed: &Needed| {
+            (needed.stretch.max(1.0) * (1.0 + f64::from(margin)) * ROUNDING) as f32
+        };
+        self.triangles.iter().map(limit).collect()
+    }
+
+    /// The triangle that goes farthest beyond its limit, with that limit; `None` where all keep within.
+    ///
+    /// # Panics
+    /// If there is not a limit for each triangle.
+    #[must_use]
+    pub fn beyond(&self, limits: &[f32]) -> Option<(Needed, f32)> {
+        assert_eq!(limits.len(), self.triangles.len(), "a limit for each triangle");
+        let over = |&(needed, limit): &(Needed, f32)| needed.stretch / f64::from(limit);
+        let all = self.triangles.iter().copied().zip(limits.iter().copied());
+        let worst = all.max_by(|a, b| over(a).total_cmp(&over(b)))?;
+        // Written so that what is not a number is beyond.
+        if over(&worst) <= 1.0 { None } else { Some(worst) }
+    }
+}
+
+/// What limits have besides their margin.
+const ROUNDING: f64 = 1.0001;
+
+/// A triangle's stretch.
+fn stretch(rest: [DVec3; 3], now: [DVec3; 3], paths: Paths) -> f64 {
+    match paths {
+        Paths::Edges => {
+            let ratio = |i: usize| {
+                let other = (i + 1) % 3;
+                now[i].distance(now[other]) / rest[i].distance(rest[other])
+            };
+            (0..3).map(ratio).fold(0.0, f64::max)
+        }
+        Paths::Surface { .. } => {
+            // The deformation gradient in the plane, and the root of its metric's larger eigenvalue.
+            let gradient = flat(now) * flat(rest).inverse();
+            let metric = gradient.transpose() * gradient;
+            let (pp, pq, qq) = (metric.x_axis.x, metric.x_axis.y, metric.y_axis.y);
+            ((pp + qq) / 2.0 + ((pp - qq) / 2.0).hypot(pq)).sqrt()
+        }
+    }
+}
+
+/// Two edges of a triangle in a frame of its plane.
+fn flat([a, b, c]: [DVec3; 3]) -> DMat2 {
+    let (along, other) = (b - a, c - a);
+    let x = along.normalize_or(DVec3::X);
+    let height = (other - x * other.dot(x)).length();
+    DMat2::from_cols(DVec2::new(along.length(), 0.0), DVec2::new(other.dot(x), height))
+}
