@@ -29,11 +29,13 @@
 //! between its load and its store: at most once an exception, and never in the handler of highest
 //! priority.)
 
+use core::cell::Cell;
 use core::fmt;
+use core::ops::Range;
 
 use glam::Vec3;
 
-use crate::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
+use crate::atomic::{AtomicBool, AtomicU32, Ordering};
 use crate::constraint::Unknown;
 use crate::{MeasuredStretch, VertexTable};
 
@@ -59,9 +61,36 @@ pub struct FrameLabel {
     pub stretch: Option<MeasuredStretch>,
 }
 
+/// One position, as bits of `f32`.
+pub(crate) struct Position([AtomicU32; 3]);
+
+impl Position {
+    #[inline(always)]
+    pub fn get(&self) -> Vec3 {
+        let [x, y, z] = &self.0;
+        let load = |bits: &AtomicU32| f32::from_bits(bits.load(Ordering::Relaxed));
+        Vec3::new(load(x), load(y), load(z))
+    }
+
+    #[inline(always)]
+    pub fn set(&self, position: Vec3) {
+        let [x, y, z] = &self.0;
+        x.store(position.x.to_bits(), Ordering::Relaxed);
+        y.store(position.y.to_bits(), Ordering::Relaxed);
+        z.store(position.z.to_bits(), Ordering::Relaxed);
+    }
+
+    #[inline(always)]
+    fn copy(&self, from: &Self) {
+        for (to, from) in self.0.iter().zip(&from.0) {
+            to.store(from.load(Ordering::Relaxed), Ordering::Relaxed);
+        }
+    }
+}
+
 /// One buffer: positions as bits of `f32`, and the label of the frame in it.
 struct Buffer<const N: usize> {
-    positions: [[AtomicU32; 3]; N],
+    positions: [Position; N],
     epoch: AtomicU32,
     received: AtomicU32,
     position_error: AtomicU32,
@@ -73,7 +102,7 @@ impl<const N: usize> Buffer<N> {
     #[cfg(not(loom))]
     const fn new() -> Self {
         Self {
-            positions: [const { [const { AtomicU32::new(0) }; 3] }; N],
+            positions: [const { Position([const { AtomicU32::new(0) }; 3]) }; N],
             epoch: AtomicU32::new(0),
             received: AtomicU32::new(0),
             position_error: AtomicU32::new(0),
@@ -85,7 +114,7 @@ impl<const N: usize> Buffer<N> {
     fn new() -> Self {
         use core::array::from_fn;
         Self {
-            positions: from_fn(|_| from_fn(|_| AtomicU32::new(0))),
+            positions: from_fn(|_| Position(from_fn(|_| AtomicU32::new(0)))),
             epoch: AtomicU32::new(0),
             received: AtomicU32::new(0),
             position_error: AtomicU32::new(0),
@@ -95,9 +124,7 @@ impl<const N: usize> Buffer<N> {
 
     #[inline(always)]
     fn position(&self, vertex: u32) -> Option<Vec3> {
-        let [x, y, z] = self.positions.get(vertex as usize)?;
-        let load = |bits: &AtomicU32| f32::from_bits(bits.load(Ordering::Relaxed));
-        Some(Vec3::new(load(x), load(y), load(z)))
+        self.positions.get(vertex as usize).map(Position::get)
     }
 
     fn set_label(&self, label: FrameLabel) {
@@ -128,8 +155,8 @@ impl<const N: usize> Buffer<N> {
 
 /// A double buffer of `N` vertex positions, meant for a `static`.
 ///
-/// RAM: 25 bytes a vertex and 120 more (all zero at start, so it lives in `.bss`): two positions, and
-/// one byte that remembers in which frame the vertex was last written.
+/// RAM: 24 bytes a vertex, two positions, and a little over a hundred more. All zero at start, so it
+/// lives in `.bss`.
 ///
 /// ```
 /// use dibs_nostd::{FrameLabel, Frames, VertexTable, glam::Vec3};
@@ -139,8 +166,8 @@ impl<const N: usize> Buffer<N> {
 /// assert!(reader.read().is_none(), "nothing published yet");
 ///
 /// writer.begin();
-/// writer.write(0, Vec3::X).unwrap();
-/// writer.write(1, Vec3::Y).unwrap();
+/// writer.push(Vec3::X).unwrap();
+/// writer.push(Vec3::Y).unwrap();
 /// let label = FrameLabel { epoch: 7, received: 1000, position_error: 0.0, stretch: None };
 /// writer.publish(label).unwrap();
 ///
@@ -151,8 +178,6 @@ impl<const N: usize> Buffer<N> {
 /// ```
 pub struct Frames<const N: usize> {
     buffers: [Buffer<N>; 2],
-    /// In which of the last 255 frames each vertex was last written; 0 for none of them.
-    marks: [AtomicU8; N],
     state: AtomicU32,
     split: AtomicBool,
 }
@@ -164,7 +189,6 @@ impl<const N: usize> Frames<N> {
     pub const fn new() -> Self {
         Self {
             buffers: [const { Buffer::new() }; 2],
-            marks: [const { AtomicU8::new(0) }; N],
             state: AtomicU32::new(0),
             split: AtomicBool::new(false),
         }
@@ -177,7 +201,6 @@ impl<const N: usize> Frames<N> {
         use core::array::from_fn;
         Self {
             buffers: from_fn(|_| Buffer::new()),
-            marks: from_fn(|_| AtomicU8::new(0)),
             state: AtomicU32::new(0),
             split: AtomicBool::new(false),
         }
@@ -188,15 +211,8 @@ impl<const N: usize> Frames<N> {
         if self.split.swap(true, Ordering::AcqRel) {
             return None;
         }
-        let writer = FrameWriter {
-            frames: self,
-            back: &self.buffers[1],
-            state: 0,
-            generation: 0,
-            missing: N as u32,
-            scrub: 0,
-        };
-        Some((writer, FrameReader { frames: self }))
+        let writer = FrameWriter { frames: self, back: &self.buffers[1], state: 0, filled: 0 };
+        Some((writer, FrameReader { frames: self, oldest: Cell::new([0; 3]) }))
     }
 }
 
@@ -208,76 +224,59 @@ impl<const N: usize> Default for Frames<N> {
 
 /// The end that writes: owned by whoever receives vertices.
 ///
-/// A frame is [`begin`](Self::begin), one [`write`](Self::write) for every vertex in any order, and
-/// [`publish`](Self::publish). Between frames the back buffer holds the frame before the last one;
-/// a frame that only moves some vertices would start from a copy of [`front`](Self::front), which
-/// the writer may read at any time, because nobody else changes it.
+/// A frame is [`begin`](Self::begin), one [`push`](Self::push) for every vertex in the order of the
+/// rows, and [`publish`](Self::publish). An [`Assembler`](crate::Assembler) takes rows in the order in
+/// which they come, and proves by itself that all of them have.
 pub struct FrameWriter<'f, const N: usize> {
     frames: &'f Frames<N>,
     back: &'f Buffer<N>,
     /// The state word as the last publication left it: only the writer changes these bits.
     state: u32,
-    /// Mark of the frame being written: 1 to 255, reused after 255 frames.
-    generation: u8,
-    missing: u32,
-    /// Where the next share of old marks is wiped.
-    scrub: usize,
+    /// Rows pushed since the last `begin`.
+    filled: u32,
 }
 
 impl<const N: usize> FrameWriter<'_, N> {
-    /// Starts a frame and forgets an unfinished one. Cost: `N / 128` byte stores.
+    /// Starts a frame and forgets an unfinished one. O(1).
     pub fn begin(&mut self) {
-        self.generation = if self.generation == u8::MAX { 1 } else { self.generation + 1 };
-        self.missing = N as u32;
-        // A mark of 255 frames ago would pass for one of this frame. Wiping a 128th of the marks at
-        // every frame removes it in time, and costs less at once than wiping all of them.
-        let share = N.div_ceil(128);
-        let end = self.scrub.saturating_add(share);
-        for mark in self.frames.marks.iter().skip(self.scrub).take(share) {
-            mark.store(0, Ordering::Relaxed);
-        }
-        self.scrub = if end < N { end } else { 0 };
+        self.filled = 0;
     }
 
-    /// Stores one position (mm) in the back buffer. Cost: O(1).
+    /// Stores the position (mm) of the next row in the back buffer. O(1).
     ///
     /// # Errors
-    /// [`OutOfTable`] when there is no such vertex; nothing is stored.
+    /// [`OutOfTable`] when the frame is full; nothing is stored.
     #[inline]
-    pub fn write(&mut self, vertex: u32, position: Vec3) -> Result<(), OutOfTable> {
-        let index = vertex as usize;
-        let (Some([x, y, z]), Some(mark)) =
-            (self.back.positions.get(index), self.frames.marks.get(index))
-        else {
-            return Err(OutOfTable { vertex, vertices: N as u32 });
+    pub fn push(&mut self, position: Vec3) -> Result<(), OutOfTable> {
+        let row = self.filled;
+        let Some([place]) = self.rows(row..row.saturating_add(1)).and_then(<[_]>::as_array) else {
+            return Err(OutOfTable { vertex: row, vertices: N as u32 });
         };
-        x.store(position.x.to_bits(), Ordering::Relaxed);
-        y.store(position.y.to_bits(), Ordering::Relaxed);
-        z.store(position.z.to_bits(), Ordering::Relaxed);
-        // Before the first `begin` nothing counts as written.
-        if self.generation != 0 && mark.load(Ordering::Relaxed) != self.generation {
-            mark.store(self.generation, Ordering::Relaxed);
-            self.missing = self.missing.saturating_sub(1);
-        }
+        place.set(position);
+        self.filled = row.saturating_add(1);
         Ok(())
-    }
-
-    /// Whether this frame has this vertex already.
-    #[must_use]
-    #[inline]
-    pub fn is_written(&self, vertex: u32) -> bool {
-        self.generation != 0
-            && self
-                .frames
-                .marks
-                .get(vertex as usize)
-                .is_some_and(|mark| mark.load(Ordering::Relaxed) == self.generation)
     }
 
     /// Vertices that this frame still lacks.
     #[must_use]
     pub const fn missing(&self) -> u32 {
-        self.missing
+        (N as u32).saturating_sub(self.filled)
+    }
+
+    /// Rows of the back buffer; `None` unless all of them are in it.
+    #[inline]
+    pub(crate) fn rows(&self, rows: Range<u32>) -> Option<&[Position]> {
+        self.back.positions.get(rows.start as usize..rows.end as usize)
+    }
+
+    /// Copies rows of the published frame to the back buffer. O(rows).
+    pub(crate) fn copy(&self, rows: Range<u32>) {
+        let range = rows.start as usize..rows.end as usize;
+        let front = self.front_buffer().positions.get(range.clone()).unwrap_or_default();
+        let back = self.back.positions.get(range).unwrap_or_default();
+        for (to, from) in back.iter().zip(front) {
+            to.copy(from);
+        }
     }
 
     /// The frame being written, complete or not: for a check before it is published.
@@ -289,9 +288,12 @@ impl<const N: usize> FrameWriter<'_, N> {
     /// The published frame, `None` before the first.
     #[must_use]
     pub fn front(&self) -> Option<FrameView<'_, N>> {
+        (self.state & PUBLISHED != 0).then_some(FrameView { buffer: self.front_buffer() })
+    }
+
+    fn front_buffer(&self) -> &Buffer<N> {
         let [first, second] = &self.frames.buffers;
-        let buffer = if self.state & FRONT == 0 { first } else { second };
-        (self.state & PUBLISHED != 0).then_some(FrameView { buffer })
+        if self.state & FRONT == 0 { first } else { second }
     }
 
     /// Makes the frame the published one, by one compare-exchange. The next frame begins with
@@ -301,9 +303,14 @@ impl<const N: usize> FrameWriter<'_, N> {
     /// [`PublishError::Incomplete`] while vertices are missing. [`PublishError::Busy`] while a read is
     /// in progress: nothing is lost, call again later.
     pub fn publish(&mut self, label: FrameLabel) -> Result<(), PublishError> {
-        if self.missing != 0 || self.generation == 0 {
-            return Err(PublishError::Incomplete { missing: self.missing });
+        if self.missing() != 0 {
+            return Err(PublishError::Incomplete { missing: self.missing() });
         }
+        self.publish_complete(label)
+    }
+
+    /// The same for a frame whose completeness the caller has proved.
+    pub(crate) fn publish_complete(&mut self, label: FrameLabel) -> Result<(), PublishError> {
         self.back.set_label(label);
         let next = (self.state ^ FRONT) | PUBLISHED;
         self.frames
@@ -314,7 +321,7 @@ impl<const N: usize> FrameWriter<'_, N> {
         self.back = if next & FRONT == 0 { second } else { first };
         self.state = next;
         // What the back buffer holds now is an old frame: it must be begun before it is published.
-        self.missing = N as u32;
+        self.filled = 0;
         Ok(())
     }
 }
@@ -322,6 +329,8 @@ impl<const N: usize> FrameWriter<'_, N> {
 /// The end that reads: owned by the control tick.
 pub struct FrameReader<'f, const N: usize> {
     frames: &'f Frames<N>,
+    /// Epoch and clock of the frame asked last, and the greatest age that it was found to have.
+    oldest: Cell<[u32; 3]>,
 }
 
 impl<const N: usize> FrameReader<'_, N> {
@@ -335,7 +344,8 @@ impl<const N: usize> FrameReader<'_, N> {
         let [first, second] = &self.frames.buffers;
         let buffer = if state & FRONT == 0 { first } else { second };
         // Made before the check, so that it clears READING on both ways out.
-        let guard = FrameGuard { state: &self.frames.state, view: FrameView { buffer } };
+        let view = FrameView { buffer };
+        let guard = FrameGuard { state: &self.frames.state, view, oldest: &self.oldest };
         (state & PUBLISHED != 0).then_some(guard)
     }
 }
@@ -343,6 +353,7 @@ impl<const N: usize> FrameReader<'_, N> {
 /// The published frame, held still: a [`VertexTable`].
 pub struct FrameGuard<'f, const N: usize> {
     state: &'f AtomicU32,
+    oldest: &'f Cell<[u32; 3]>,
     view: FrameView<'f, N>,
 }
 
@@ -353,11 +364,22 @@ impl<const N: usize> FrameGuard<'_, N> {
         self.view.buffer.label()
     }
 
-    /// Time since the frame's first packet arrived, in the unit of the receiver's clock. Right over
-    /// one wrap of the clock.
+    /// Time since the frame's first packet arrived, in the unit of the receiver's clock.
+    ///
+    /// The clock may wrap. If ages are asked for at least once in 2^31 units, a frame never seems
+    /// younger than it once was: from 2^32 units on its age is `u32::MAX`.
     #[must_use]
     pub fn age(&self, now: u32) -> u32 {
-        now.wrapping_sub(self.view.buffer.received.load(Ordering::Relaxed))
+        let received = self.view.buffer.received.load(Ordering::Relaxed);
+        let epoch = self.view.buffer.epoch.load(Ordering::Relaxed);
+        let [last_epoch, last_received, oldest] = self.oldest.get();
+        let is_same = last_epoch == epoch && last_received == received;
+        let mut age = now.wrapping_sub(received);
+        if is_same && age < oldest {
+            age = u32::MAX;
+        }
+        self.oldest.set([epoch, received, age]);
+        age
     }
 
     /// What a constraint has to be told when the frame is older than `limit`.

@@ -73,7 +73,9 @@ mod vertices;
 pub mod wire;
 
 pub use answer::Proximity;
-pub use assembler::{Assembler, Changed, Counters, Gate, Progress, Rejection, Unchecked, Verdict};
+pub use assembler::{
+    Advance, Assembler, Changed, Gate, LastHeartbeat, Progress, Rejection, Unchecked, Verdict,
+};
 pub use check::FormatError;
 pub use frames::{
     FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames, OutOfTable, PublishError,

@@ -1,6 +1,6 @@
 //! Bus reception: bytes in, published frames out.
 
-use dibs_nostd::wire::Deframer;
+use dibs_nostd::wire::{Deframer, Event};
 use dibs_nostd::{Assembler, FrameWriter};
 
 use crate::BusStatus;
@@ -41,6 +41,7 @@ impl Receiver {
             // Rejections are counted by cause in the assembler.
             Some(Ok(packet)) => {
                 self.status.link.note(&self.assembler.accept(packet, tick), tick);
+                self.status.link.note_check(&self.assembler.advance(u32::MAX));
             }
             Some(Err(_)) => {
                 self.damaged = self.damaged.saturating_add(1);
@@ -50,6 +51,6 @@ impl Receiver {
         self.packets = self.packets.wrapping_add(1);
         let counters = self.assembler.counters();
         let rejected = counters.rejected().saturating_add(self.damaged);
-        self.status.set(self.packets, counters.published, rejected);
+        self.status.set(self.packets, counters.of(Event::Published), rejected);
     }
 }

@@ -1,7 +1,9 @@
 //! From packets to published frames: the gate between the bus and what the controller acts on.
 
+mod collector;
 mod gate;
 mod rejection;
+mod runs;
 
 use core::ops::Range;
 
@@ -10,82 +12,67 @@ use glam::Vec3;
 use crate::MAX_COORDINATE;
 use crate::frames::{FrameLabel, FrameView, FrameWriter, PublishError};
 use crate::wire::{
-    Begin, Body, Commit, Content, Encoding, Packet, Rows, Vertices, Weights, float_position,
-    quantised_row,
+    Begin, Body, Content, Counters, Encoding, Event, FrameId, Mac, NoMac, Packet, Rows, Status,
+    StreamError, Vertices, Weights, float_position, quantised_row,
 };
 
+use collector::Collector;
+pub use collector::LastHeartbeat;
 pub use gate::{Changed, Gate, Unchecked, Verdict};
-use rejection::increment;
-pub use rejection::{Counters, Rejection};
+pub use rejection::Rejection;
 
 /// Assembles frames of `N` vertices from packets, and publishes those that are complete and right.
 ///
-/// A frame is published when every vertex has come, the commit's digest confirms that all packets
-/// were of one frame, and the [`Gate`] admits the surface. Until then, and after any rejection, the
-/// frame published last stays. Packets between begin and end may come in any order and repeatedly.
+/// [`accept`](Self::accept) takes packets, in the bus interrupt. [`advance`](Self::advance) does what
+/// takes longer, in slices: it checks the surface ([`Gate`]), publishes it, and copies what partial
+/// frames build on. The two must not interrupt each other: call both in the bus interrupt, or `advance`
+/// elsewhere below the control tick's priority with the bus interrupt masked, for as short as its work.
 ///
-/// | what comes | what happens |
-/// |---|---|
-/// | begin, epoch newer than the frame in work | that frame is abandoned, a new one starts |
-/// | begin, same epoch, other contents | the sender restarted: the frame starts again |
-/// | any epoch not newer than the published one | [`Rejection::Stale`] |
-/// | vertices or commit without their begin | [`Rejection::Unexpected`] |
-/// | a packet that came before | [`Progress::Duplicate`], ignored |
-/// | commit before the last vertices | it waits for them |
-/// | digest or gate fails | the frame is abandoned |
+/// A frame is published when every row has come in a packet of its own place in the sequence, the
+/// commit's digest confirms that all packets were of one frame, and the gate admits the surface. Until
+/// then, and after any rejection, the frame published last stays. `docs/wire.md` has the whole table of
+/// what happens to which packet. With a [`Mac`], nothing without a genuine tag gets any further.
 ///
-/// Epochs are compared as serial numbers (RFC 1982): they wrap, and up to 2^31 ahead is newer.
+/// With a gate of modes, `N` is their number, and frames hold weights instead: see
+/// [`Gate::weight_range`].
 ///
-/// Cost of [`accept`](Self::accept): O(1) a vertex in the packet, O(`N / 128`) at a begin, and the
-/// gate's own cost at the end of a frame. No memory beyond the [`Frames`](crate::Frames).
+/// RAM: about half a kilobyte besides [`Frames`](crate::Frames) and gate, for any `N`.
 ///
 /// ```
 /// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
-/// use dibs_nostd::{Assembler, Frames, Progress, Unchecked, VertexTable, glam::Vec3};
+/// use dibs_nostd::{Advance, Assembler, Frames, Unchecked, VertexTable, glam::Vec3};
 ///
 /// static FRAMES: Frames<3> = Frames::new();
 /// let (writer, mut reader) = FRAMES.split().unwrap();
 /// let mut assembler = Assembler::new(writer, Unchecked, 0xB0D1, 1000.0);
 ///
 /// let positions = [Vec3::X, Vec3::Y, Vec3::Z];
-/// let mut sender = FrameEncoder::<_, 64>::new(
-///     FrameId { mesh_id: 0xB0D1, session: 1, epoch: 1 },
-///     Encoding::Float,
-///     &positions[..],
-/// )
-/// .unwrap();
+/// let id = FrameId { mesh_id: 0xB0D1, session: 1, epoch: 1 };
+/// let mut sender = FrameEncoder::<_, 64>::new(id, Encoding::Float, &positions[..]).unwrap();
 /// let mut buffer = [0; 64];
-/// let mut last = None;
 /// while let Some(packet) = sender.next_packet(&mut buffer) {
-///     last = Some(assembler.accept(packet, 0).unwrap());
+///     assembler.accept(packet, 0).unwrap();
 /// }
-/// assert_eq!(last, Some(Progress::Published { epoch: 1 }));
+/// assert_eq!(assembler.advance(100), Ok(Advance::Published { epoch: 1 }));
 /// assert_eq!(reader.read().unwrap().position(2), Some(Vec3::Z));
 /// ```
-pub struct Assembler<'f, G, const N: usize> {
+pub struct Assembler<'f, G, const N: usize, M = NoMac> {
     writer: FrameWriter<'f, N>,
     gate: G,
-    mesh_id: u32,
+    mac: M,
     max_coordinate: f32,
-    published: Option<u32>,
-    frame: Option<Frame>,
-    counters: Counters,
-}
-
-/// The frame in work.
-#[derive(Clone, Copy)]
-struct Frame {
-    epoch: u32,
-    received: u32,
-    encoding: Encoding,
-    /// Checksum of the begin packet: tells a repeated begin from a restarted sender's.
-    begin: u32,
-    /// Sum of the checksums so far.
-    sum: u32,
-    /// The digest that the commit stated, once it has come.
-    digest: Option<u32>,
-    /// Set once the gate has admitted the frame: only publication is left.
+    collector: Collector,
+    /// The frame in work has been admitted: only its publication is left.
     admitted: Option<FrameLabel>,
+    /// Rows of the back buffer, from the first on, that are as published but for what the partial
+    /// frame in work has changed.
+    copied: u32,
+    /// Rows were stored since the copying began: of a frame that was not published, they must go.
+    is_dirty: bool,
+    /// A partial frame has come: from then on the published rows are copied in time for the next.
+    takes_partial: bool,
+    /// No row of the quantisation box of the frame in work is beyond the limit.
+    is_box_inside: bool,
 }
 
 /// What a packet led to.
@@ -99,14 +86,29 @@ pub enum Progress {
         epoch: u32,
     },
     /// The packet was taken.
-    Stored {
-        /// Vertices still to come; at 0 the commit is.
-        missing: u32,
-    },
+    Stored,
     /// The packet had come before, and was ignored.
     Duplicate,
-    /// The frame is complete and admitted, but a read of the last one is in progress: the next
-    /// [`accept`](Assembler::accept) or [`poll`](Assembler::poll) publishes it.
+    /// The frame is complete: it is up to [`Assembler::advance`] now.
+    Complete {
+        /// Its number.
+        epoch: u32,
+    },
+    /// The sender lives: [`Assembler::last_heartbeat`].
+    Heartbeat,
+}
+
+/// What a slice of work led to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Advance {
+    /// No complete frame waits to be checked; rows may be left to copy or to check ahead.
+    Idle,
+    /// More work is left.
+    Pending,
+    /// The frame is admitted, but a read of the last one is in progress: a later call publishes it.
+    /// Never on one core where the reader preempts the writer.
     Held {
         /// Its number.
         epoch: u32,
@@ -125,55 +127,117 @@ impl<'f, G: Gate, const N: usize> Assembler<'f, G, N> {
     /// is ever published.
     #[must_use]
     pub fn new(writer: FrameWriter<'f, N>, gate: G, mesh_id: u32, max_coordinate: f32) -> Self {
+        Assembler::with_mac(writer, gate, mesh_id, max_coordinate, NoMac)
+    }
+}
+
+impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
+    /// The same, of packets with tags.
+    #[must_use]
+    pub fn with_mac(
+        writer: FrameWriter<'f, N>,
+        gate: G,
+        mesh_id: u32,
+        max_coordinate: f32,
+        mac: M,
+    ) -> Self {
         let max_coordinate =
             if max_coordinate > MAX_COORDINATE { MAX_COORDINATE } else { max_coordinate };
         Self {
             writer,
             gate,
-            mesh_id,
+            mac,
             max_coordinate,
-            published: None,
-            frame: None,
-            counters: Counters::default(),
+            collector: Collector::new(mesh_id),
+            admitted: None,
+            copied: 0,
+            is_dirty: false,
+            takes_partial: false,
+            is_box_inside: false,
         }
     }
 
-    /// Takes one packet, whole. `now` is the receiver's clock (any unit; wraps): the frame's label
-    /// keeps its value at the begin packet, because the surface is at least that old.
+    /// Takes one packet, whole. `now` is the receiver's clock (any unit, ms for
+    /// [`status`](Self::status); wraps): the frame's label keeps its value at the begin packet, because
+    /// the surface is at least that old.
+    ///
+    /// Cost: O(bytes).
     ///
     /// # Errors
     /// [`Rejection`] says why the packet or its frame was not taken; it has been counted.
+    #[inline]
     pub fn accept(&mut self, packet: &[u8], now: u32) -> Result<Progress, Rejection> {
-        self.poll();
         let outcome = self.take(packet, now);
         match &outcome {
-            Ok(Progress::Duplicate) => increment(&mut self.counters.duplicates),
+            Ok(Progress::Duplicate) => self.collector.counters.count(Event::Duplicate),
+            Ok(Progress::Heartbeat) => self.collector.counters.count(Event::Heartbeat),
             Ok(_) => (),
-            Err(rejection) => self.counters.count(rejection),
+            Err(rejection) => self.collector.counters.count(rejection.event()),
         }
         outcome
     }
 
-    /// Publishes a frame that was held because a read was in progress; the epoch if that succeeded.
-    /// Never needed on one core where the reader preempts the writer.
-    pub fn poll(&mut self) -> Option<u32> {
-        let frame = self.frame?;
-        match self.publish(frame.epoch, frame.admitted?) {
-            Ok(Progress::Published { epoch }) => Some(epoch),
-            _ => None,
+    /// Does some of the work that is due: checks at most `work` triangles or copies at most `work`
+    /// rows, and publishes a frame that has been admitted.
+    ///
+    /// Worth calling after each packet, so that the check runs along with the frame, and from time to
+    /// time when the bus is quiet. Cost: O(`work`), with a gate that is sliced.
+    ///
+    /// # Errors
+    /// [`Rejection::Stretch`] when the gate refuses the surface; it has been counted.
+    pub fn advance(&mut self, work: u32) -> Result<Advance, Rejection> {
+        let Some(frame) = &self.collector.frame else {
+            self.clean();
+            let has_base = self.takes_partial && self.collector.published_id().is_some();
+            if has_base && self.copied < N as u32 {
+                self.copy(work);
+            }
+            return Ok(Advance::Idle);
+        };
+        if let Some(label) = self.admitted {
+            return Ok(self.publish(label));
         }
+        let ready = match frame.begin.content {
+            Content::Partial { .. } => {
+                let (is_complete, ready) = (frame.is_complete, frame.runs.ready());
+                if self.copied < N as u32 {
+                    self.copy(work);
+                    return Ok(if is_complete { Advance::Pending } else { Advance::Idle });
+                }
+                if is_complete { N as u32 } else { ready }
+            }
+            _ => frame.runs.ready(),
+        };
+        self.check(ready, work)
     }
 
-    /// Number of the frame published last.
+    /// What the receiver tells the sender: [`encode_status`](crate::wire::encode_status) makes a packet
+    /// of it. `now` in ms; `safety` as in [`Status::safety`].
+    pub fn status(&mut self, now: u32, safety: u8) -> Status {
+        self.collector.status(now, safety, self.mac.challenge())
+    }
+
+    /// Name of the frame published last.
     #[must_use]
-    pub const fn published_epoch(&self) -> Option<u32> {
-        self.published
+    pub fn published(&self) -> Option<FrameId> {
+        self.collector.published_id()
+    }
+
+    /// The sender's last sign of life.
+    #[must_use]
+    pub const fn last_heartbeat(&self) -> Option<LastHeartbeat> {
+        self.collector.last_heartbeat()
     }
 
     /// What has happened since start.
     #[must_use]
     pub const fn counters(&self) -> &Counters {
-        &self.counters
+        &self.collector.counters
+    }
+
+    /// Counts bytes of a stream that were no packet: what a [`Deframer`](crate::wire::Deframer) reports.
+    pub fn count_framing(&mut self, _: &StreamError) {
+        self.collector.counters.count(Event::Framing);
     }
 
     /// The frame published last.
@@ -182,27 +246,38 @@ impl<'f, G: Gate, const N: usize> Assembler<'f, G, N> {
         self.writer.front()
     }
 
-    fn take(&mut self, packet: &[u8], now: u32) -> Result<Progress, Rejection> {
-        let packet = Packet::decode(packet)?;
-        if packet.mesh_id != self.mesh_id {
-            return Err(Rejection::WrongMesh { mesh_id: packet.mesh_id });
-        }
+    /// The gate.
+    #[must_use]
+    pub const fn gate(&self) -> &G {
+        &self.gate
+    }
+
+    /// What makes the tags.
+    #[must_use]
+    pub const fn mac(&self) -> &M {
+        &self.mac
+    }
+
+    #[inline]
+    fn take(&mut self, bytes: &[u8], now: u32) -> Result<Progress, Rejection> {
+        let packet = Packet::decode(bytes)?;
+        self.collector.check_mesh(&packet)?;
         let epoch = packet.epoch;
-        if self.published.is_some_and(|published| !is_newer(epoch, published)) {
-            return Err(Rejection::Stale { epoch });
-        }
-        match (packet.body, self.frame) {
-            (Body::Begin(begin), frame) => self.begin(&packet, begin, frame, now),
-            (Body::Vertices(vertices), Some(frame)) if frame.epoch == epoch => {
-                self.vertices(frame, packet.checksum, vertices)
+        match packet.body {
+            Body::Vertices(vertices) => self.vertices(&packet, vertices),
+            Body::Weights(weights) => self.weights(&packet, weights),
+            Body::Begin(begin) => self.begin(&packet, begin, now),
+            Body::Commit(commit) => {
+                Ok(match self.collector.commit(&packet, commit, &self.mac)? {
+                    None => Progress::Duplicate,
+                    Some(is_complete) => stored(is_complete, epoch),
+                })
             }
-            (Body::Weights(weights), Some(frame)) if frame.epoch == epoch => {
-                self.weights(frame, packet.checksum, weights)
+            Body::Heartbeat(heartbeat) => {
+                self.collector.heartbeat(&packet, heartbeat, &self.mac, now)?;
+                Ok(Progress::Heartbeat)
             }
-            (Body::Commit(commit), Some(frame)) if frame.epoch == epoch => {
-                self.commit(frame, commit)
-            }
-            _ => Err(Rejection::Unexpected { epoch }),
+            Body::Status(_) => Err(Rejection::Unexpected { epoch }),
         }
     }
 
@@ -210,187 +285,221 @@ impl<'f, G: Gate, const N: usize> Assembler<'f, G, N> {
         &mut self,
         packet: &Packet<'_>,
         begin: Begin,
-        frame: Option<Frame>,
         now: u32,
     ) -> Result<Progress, Rejection> {
-        let epoch = packet.epoch;
-        if begin.rows as usize != N {
-            return Err(Rejection::VertexCount { vertices: begin.rows });
+        // A frame that only waits for a reader is better published than in the way.
+        if let Some(label) = self.admitted {
+            self.publish(label);
         }
-        match begin.content {
-            Content::Whole if self.gate.weight_range(0).is_none() => (),
-            Content::Modal if self.gate.weight_range(0).is_some() => (),
-            _ => return Err(Rejection::OtherEncoding),
-        }
-        // A box within the limit holds no row beyond it: quantised vertices need no further check.
-        if let Encoding::Quantised(grid) = begin.encoding {
-            for corner in [grid.origin(), grid.upper_corner()] {
-                self.check(corner.to_array(), 0)?;
+        let takes_weights = self.gate.weight_range(0).is_some();
+        let is_acceptable = |begin: &Begin| {
+            if begin.rows as usize != N {
+                Err(Rejection::RowCount { rows: begin.rows })
+            } else if (begin.content == Content::Modal) != takes_weights {
+                Err(Rejection::Encoding)
+            } else {
+                Ok(())
             }
-        }
-        if let Some(frame) = frame {
-            if frame.epoch == epoch && frame.begin == packet.checksum {
-                return Ok(Progress::Duplicate);
+        };
+        let is_partial = matches!(begin.content, Content::Partial { .. });
+        // Whatever comes of this one: the next is to find the published rows copied.
+        self.takes_partial |= is_partial && packet.is_genuine(&self.mac, begin.session);
+        let begun = self.collector.begin(packet, begin, &self.mac, now, is_acceptable)?;
+        let Some(frame) = begun else { return Ok(Progress::Duplicate) };
+        self.admitted = None;
+        self.clean();
+        self.is_box_inside = match begin.encoding {
+            Encoding::Float => false,
+            Encoding::Quantised(grid) => {
+                let corners = [grid.origin(), grid.upper_corner()];
+                corners.into_iter().all(|corner| is_within(corner, self.max_coordinate))
             }
-            if frame.epoch != epoch && !is_newer(epoch, frame.epoch) {
-                return Err(Rejection::Stale { epoch });
-            }
-            increment(&mut self.counters.abandoned);
-        }
-        self.writer.begin();
-        self.frame = Some(Frame {
-            epoch,
-            received: now,
-            encoding: begin.encoding,
-            begin: packet.checksum,
-            sum: packet.checksum,
-            digest: None,
-            admitted: None,
-        });
-        Ok(Progress::Begun { epoch })
+        };
+        self.gate.begin(if is_partial { Changed::Partial } else { Changed::Whole });
+        Ok(Progress::Begun { epoch: frame.id.epoch })
     }
 
+    #[inline]
     fn vertices(
         &mut self,
-        mut frame: Frame,
-        checksum: u32,
-        vertices: Vertices<'_>,
+        packet: &Packet<'_>,
+        Vertices { first, rows }: Vertices<'_>,
     ) -> Result<Progress, Rejection> {
-        let Vertices { first, rows } = vertices;
+        let frame = self.collector.frame_of(packet, &self.mac)?;
         let count = rows.len() as u32;
-        let end = first.checked_add(count).filter(|&end| end as usize <= N);
-        let range = first..end.ok_or(Rejection::OutOfRange { first, count })?;
-        let is_repeated = self.is_repeated(range.clone(), first);
-        // A write fails only outside the table, and the range is inside.
-        match (rows, frame.encoding) {
-            (Rows::Quantised(rows), Encoding::Quantised(grid)) => {
-                if is_repeated? {
-                    return Ok(Progress::Duplicate);
-                }
-                for (vertex, row) in range.zip(rows) {
-                    let _ = self.writer.write(vertex, grid.position(quantised_row(row)));
-                }
-            }
-            (Rows::Float(rows), Encoding::Float) if self.gate.weight_range(0).is_none() => {
-                if is_repeated? {
-                    return Ok(Progress::Duplicate);
-                }
-                for (vertex, row) in range.clone().zip(rows) {
-                    self.check(float_position(row).to_array(), vertex)?;
-                }
-                for (vertex, row) in range.zip(rows) {
-                    let _ = self.writer.write(vertex, float_position(row));
-                }
-            }
-            _ => return Err(Rejection::OtherEncoding),
+        let out_of_range = Rejection::OutOfRange { first, count };
+        let range = first..first.checked_add(count).ok_or(out_of_range)?;
+        let limit = self.max_coordinate;
+        let grid = match (&rows, frame.begin.encoding, frame.begin.content) {
+            (_, _, Content::Modal) => return Err(Rejection::Encoding),
+            (Rows::Float(_), Encoding::Float, _) => None,
+            (Rows::Quantised(_), Encoding::Quantised(grid), _) => Some(grid),
+            _ => return Err(Rejection::Encoding),
+        };
+        let places = self.writer.rows(range.clone()).ok_or(out_of_range)?;
+        let Some(place) = frame.locate(packet.sequence, range.clone())? else {
+            return Ok(Progress::Duplicate);
+        };
+        let is_partial = matches!(frame.begin.content, Content::Partial { .. });
+        if is_partial && range.end > self.copied {
+            self.collector.want_whole();
+            return Err(Rejection::NotReady { first });
         }
-        frame.sum = frame.sum.wrapping_add(checksum);
-        self.frame = Some(frame);
-        self.finish(frame)
+        match (rows, grid) {
+            (Rows::Quantised(rows), Some(grid)) => {
+                let decode = |row| grid.position(quantised_row(row));
+                if !self.is_box_inside {
+                    check(rows.iter().map(decode), first, limit)?;
+                }
+                for (place, row) in places.iter().zip(rows) {
+                    place.set(decode(row));
+                }
+            }
+            (Rows::Float(rows), _) => {
+                check(rows.iter().map(float_position), first, limit)?;
+                for (place, row) in places.iter().zip(rows) {
+                    place.set(float_position(row));
+                }
+            }
+            _ => return Err(Rejection::Encoding),
+        }
+        self.stored(packet, place, range)
     }
 
     fn weights(
         &mut self,
-        mut frame: Frame,
-        checksum: u32,
-        weights: Weights<'_>,
+        packet: &Packet<'_>,
+        Weights { first, values }: Weights<'_>,
     ) -> Result<Progress, Rejection> {
-        let Weights { first, values } = weights;
+        let frame = self.collector.frame_of(packet, &self.mac)?;
         let count = values.len() as u32;
-        let end = first.checked_add(count).filter(|&end| end as usize <= N);
-        let range = first..end.ok_or(Rejection::OutOfRange { first, count })?;
-        if self.is_repeated(range.clone(), first)? {
-            return Ok(Progress::Duplicate);
+        let out_of_range = Rejection::OutOfRange { first, count };
+        let range = first..first.checked_add(count).ok_or(out_of_range)?;
+        if frame.begin.content != Content::Modal {
+            return Err(Rejection::Encoding);
         }
-        for (mode, value) in range.clone().zip(values) {
-            let weight = f32::from_le_bytes(*value);
-            match self.gate.weight_range(mode) {
-                Some([low, high]) if weight >= low && weight <= high => (),
-                Some(_) if weight.is_finite() => return Err(Rejection::TooFar { vertex: mode }),
-                Some(_) => return Err(Rejection::NotFinite { vertex: mode }),
-                None => return Err(Rejection::OtherEncoding),
+        let places = self.writer.rows(range.clone()).ok_or(out_of_range)?;
+        let Some(place) = frame.locate(packet.sequence, range.clone())? else {
+            return Ok(Progress::Duplicate);
+        };
+        for (row, value) in range.clone().zip(values) {
+            let value = f32::from_le_bytes(*value);
+            let [low, high] = self.gate.weight_range(row).ok_or(out_of_range)?;
+            if !value.is_finite() {
+                return Err(Rejection::NotFinite { row });
+            }
+            if !(low <= value && value <= high) {
+                return Err(Rejection::TooFar { row });
             }
         }
-        for (mode, value) in range.zip(values) {
-            let _ = self.writer.write(mode, Vec3::new(f32::from_le_bytes(*value), 0.0, 0.0));
+        for (place, value) in places.iter().zip(values) {
+            place.set(Vec3::new(f32::from_le_bytes(*value), 0.0, 0.0));
         }
-        frame.sum = frame.sum.wrapping_add(checksum);
-        self.frame = Some(frame);
-        self.finish(frame)
+        self.stored(packet, place, range)
     }
 
-    /// Whether all of these vertices came before; an error if only some did.
-    fn is_repeated(&self, range: Range<u32>, first: u32) -> Result<bool, Rejection> {
-        let count = range.len();
-        match range.filter(|&vertex| self.writer.is_written(vertex)).count() {
-            0 => Ok(false),
-            written if written == count => Ok(true),
-            _ => Err(Rejection::Overlap { first }),
+    /// Notes rows that have been stored.
+    #[inline]
+    fn stored(
+        &mut self,
+        packet: &Packet<'_>,
+        place: runs::Place,
+        rows: Range<u32>,
+    ) -> Result<Progress, Rejection> {
+        self.is_dirty = true;
+        self.gate.moved(rows);
+        Ok(stored(self.collector.take_rows(packet, place)?, packet.epoch))
+    }
+
+    /// Forgets what was copied, if rows of a frame that was not published have been stored over it.
+    fn clean(&mut self) {
+        if self.is_dirty {
+            self.is_dirty = false;
+            self.copied = 0;
         }
     }
 
-    fn commit(&mut self, mut frame: Frame, commit: Commit) -> Result<Progress, Rejection> {
-        if frame.digest == Some(commit.digest) {
-            return Ok(Progress::Duplicate);
-        }
-        frame.digest = Some(commit.digest);
-        self.frame = Some(frame);
-        self.finish(frame)
+    /// Copies rows from the published buffer to the back buffer.
+    fn copy(&mut self, work: u32) {
+        let end = self.copied.saturating_add(work);
+        let end = if end < N as u32 { end } else { N as u32 };
+        self.writer.copy(self.copied..end);
+        self.copied = end;
     }
 
-    /// Publishes the frame if nothing is missing any more.
-    fn finish(&mut self, mut frame: Frame) -> Result<Progress, Rejection> {
-        let missing = self.writer.missing();
-        let (Some(stated), 0) = (frame.digest, missing) else {
-            return Ok(Progress::Stored { missing });
-        };
-        // From here on the frame is published, held, or gone.
-        self.frame = None;
-        let computed = frame.sum;
-        if stated != computed {
-            return Err(Rejection::Digest { stated, computed });
-        }
-        self.gate.begin(Changed::Whole);
-        let verdict = self.gate.advance(&self.writer.back(), N as u32, u32::MAX);
-        let Verdict::Admitted(stretch) = verdict.map_err(Rejection::Stretch)? else {
-            return Ok(Progress::Stored { missing });
-        };
-        let position_error = frame.encoding.error() + self.gate.position_error();
-        let label =
-            FrameLabel { epoch: frame.epoch, received: frame.received, position_error, stretch };
-        frame.admitted = Some(label);
-        self.frame = Some(frame);
-        self.publish(frame.epoch, label)
-    }
-
-    fn publish(&mut self, epoch: u32, label: FrameLabel) -> Result<Progress, Rejection> {
-        match self.writer.publish(label) {
-            Ok(()) => {
-                self.frame = None;
-                self.published = Some(epoch);
-                increment(&mut self.counters.published);
-                Ok(Progress::Published { epoch })
+    /// Has the gate check some more of the frame in work.
+    fn check(&mut self, ready: u32, work: u32) -> Result<Advance, Rejection> {
+        let verdict = self.gate.advance(&self.writer.back(), ready, work);
+        let Some(frame) = &self.collector.frame else { return Ok(Advance::Idle) };
+        match verdict {
+            Err(error) => {
+                let rejection = Rejection::Stretch(error);
+                self.collector.frame = None;
+                self.collector.counters.count(rejection.event());
+                Err(rejection)
             }
-            Err(PublishError::Busy) => Ok(Progress::Held { epoch }),
-            Err(PublishError::Incomplete { missing }) => Ok(Progress::Stored { missing }),
+            Ok(_) if !frame.is_complete => Ok(Advance::Idle),
+            Ok(Verdict::Pending) => Ok(Advance::Pending),
+            Ok(Verdict::Admitted(stretch)) => {
+                let label = FrameLabel {
+                    epoch: frame.id.epoch,
+                    received: frame.received,
+                    position_error: frame.begin.encoding.error() + self.gate.position_error(),
+                    stretch,
+                };
+                self.admitted = Some(label);
+                Ok(self.publish(label))
+            }
         }
     }
 
-    /// An error unless every coordinate is finite and within the limit.
-    fn check(&self, position: [f32; 3], vertex: u32) -> Result<(), Rejection> {
-        // Not a number compares false, so one comparison an axis is all it takes.
-        if position.iter().all(|coordinate| coordinate.abs() <= self.max_coordinate) {
-            return Ok(());
-        }
-        if position.iter().all(|coordinate| coordinate.is_finite()) {
-            Err(Rejection::TooFar { vertex })
-        } else {
-            Err(Rejection::NotFinite { vertex })
+    fn publish(&mut self, label: FrameLabel) -> Advance {
+        let epoch = label.epoch;
+        match (self.writer.publish_complete(label), self.collector.frame) {
+            (Ok(()), Some(frame)) => {
+                self.admitted = None;
+                self.copied = 0;
+                self.is_dirty = false;
+                self.collector.published(&frame, label.stretch.map(|stretch| stretch.sigma()));
+                self.gate.published();
+                Advance::Published { epoch }
+            }
+            (Err(PublishError::Busy), _) => Advance::Held { epoch },
+            _ => Advance::Idle,
         }
     }
 }
 
-/// Serial number order: whether `a` comes after `b`, up to 2^31 ahead.
-const fn is_newer(a: u32, b: u32) -> bool {
-    a.wrapping_sub(b) as i32 > 0
+const fn stored(is_complete: bool, epoch: u32) -> Progress {
+    if is_complete { Progress::Complete { epoch } } else { Progress::Stored }
+}
+
+/// Whether every coordinate is within the limit; false for one that is not a number.
+#[inline(always)]
+fn is_within(position: Vec3, limit: f32) -> bool {
+    let Vec3 { x, y, z } = position.abs();
+    // No short cut: three comparisons cost less than branches.
+    (x <= limit) & (y <= limit) & (z <= limit)
+}
+
+/// An error unless every position is finite and within the limit. It names the first that is not.
+#[inline]
+fn check(
+    positions: impl Iterator<Item = Vec3> + Clone,
+    first: u32,
+    limit: f32,
+) -> Result<(), Rejection> {
+    let all = positions.clone().fold(true, |all, position| all & is_within(position, limit));
+    if all {
+        return Ok(());
+    }
+    for (row, position) in (first..).zip(positions) {
+        if !position.is_finite() {
+            return Err(Rejection::NotFinite { row });
+        }
+        if !is_within(position, limit) {
+            return Err(Rejection::TooFar { row });
+        }
+    }
+    Ok(())
 }

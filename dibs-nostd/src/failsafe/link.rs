@@ -3,7 +3,7 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use super::elapsed;
-use crate::{Progress, Rejection};
+use crate::{Advance, Progress, Rejection};
 
 /// The health of the bus at one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,7 +26,7 @@ pub struct Link {
 ///
 /// static LINK: LinkStatus = LinkStatus::new();
 /// assert_eq!(LINK.read(5).silence, u32::MAX, "nothing came yet");
-/// LINK.note(&Ok(Progress::Published { epoch: 7 }), 10); // what `Assembler::accept` returned, when
+/// LINK.note(&Ok(Progress::Complete { epoch: 7 }), 10); // what `Assembler::accept` returned, when
 /// assert_eq!(LINK.read(12).silence, 2);
 /// ```
 #[derive(Debug, Default)]
@@ -59,12 +59,21 @@ impl LinkStatus {
             Err(_) => self.damaged(),
             Ok(progress) => {
                 self.packet.store(now, Ordering::Relaxed);
-                if matches!(progress, Progress::Published { .. } | Progress::Held { .. }) {
-                    self.rejections.store(0, Ordering::Relaxed);
-                }
                 let seen = self.seen.load(Ordering::Relaxed);
                 self.seen.store(seen | PACKET, Ordering::Release);
+                if *progress == Progress::Heartbeat {
+                    self.heartbeat(now);
+                }
             }
+        }
+    }
+
+    /// Notes what a slice of checking came to: `Assembler::advance`.
+    pub fn note_check(&self, outcome: &Result<Advance, Rejection>) {
+        match outcome {
+            Err(_) => self.damaged(),
+            Ok(Advance::Published { .. }) => self.rejections.store(0, Ordering::Relaxed),
+            Ok(_) => (),
         }
     }
 

@@ -168,7 +168,6 @@ impl Counters {
         }
     }
 
-    #[allow(dead_code)]
     pub(crate) fn count(&mut self, event: Event) {
         if let Some(counter) = self.0.get_mut(event as usize) {
             *counter = counter.saturating_add(1);

@@ -31,7 +31,7 @@ fn no_order_of_steps_tears_a_frame() {
             let mut published = 0;
             for epoch in 1..=3 {
                 writer.begin();
-                writer.write(0, position(epoch)).expect("inside the table");
+                writer.push(position(epoch)).expect("inside the table");
                 match writer.publish(label(epoch)) {
                     Ok(()) => published = epoch,
                     Err(PublishError::Busy) => {}

@@ -1,0 +1,317 @@
+//! The order of frames and packets: what is new, what is old, and when a frame is complete.
+//!
+//! Nothing here knows what a frame holds: vertices or weights, and where they are stored.
+
+use super::Rejection;
+use super::runs::{Misplaced, Place, Runs};
+use crate::wire::{
+    Begin, Commit, Content, Counters, Event, FrameId, Heartbeat, Mac, Packet, PublishedStatus,
+    Status, is_newer,
+};
+
+/// The frame in work.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    pub id: FrameId,
+    pub begin: Begin,
+    /// The receiver's clock at the begin.
+    pub received: u32,
+    /// Checksum of the begin packet: tells a repeated begin from a restarted sender's.
+    begin_checksum: u32,
+    /// Sum of the checksums so far.
+    sum: u32,
+    pub runs: Runs,
+    /// The commit's sequence number and digest, once it has come.
+    commit: Option<(u16, u32)>,
+    /// An earlier frame began, and nothing came of this one since.
+    is_doubted: bool,
+    /// All packets have come, and the digest is right.
+    pub is_complete: bool,
+}
+
+/// What was published last.
+#[derive(Clone, Copy, Debug)]
+struct Published {
+    id: FrameId,
+    received: u32,
+    stretch: Option<f32>,
+    /// The greatest age that was reported: a wrap of the clock does not make it young again.
+    oldest: u32,
+}
+
+/// The last heartbeat.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct LastHeartbeat {
+    /// The sender's session.
+    pub session: u32,
+    /// Number of the heartbeat.
+    pub beat: u32,
+    /// The newest epoch that the sender had begun.
+    pub epoch: u32,
+    /// The receiver's clock when it came.
+    pub received: u32,
+}
+
+/// Keeps order.
+pub(super) struct Collector {
+    mesh_id: u32,
+    published: Option<Published>,
+    pub frame: Option<Frame>,
+    heartbeat: Option<LastHeartbeat>,
+    wants_whole: bool,
+    /// Statuses made so far.
+    statuses: u32,
+    pub counters: Counters,
+}
+
+impl Collector {
+    pub const fn new(mesh_id: u32) -> Self {
+        Self {
+            mesh_id,
+            published: None,
+            frame: None,
+            heartbeat: None,
+            wants_whole: false,
+            statuses: 0,
+            counters: Counters::new(),
+        }
+    }
+
+    pub fn check_mesh(&self, packet: &Packet<'_>) -> Result<(), Rejection> {
+        if packet.mesh_id == self.mesh_id {
+            return Ok(());
+        }
+        Err(Rejection::WrongMesh { mesh_id: packet.mesh_id })
+    }
+
+    /// Whether a begin may start a frame: `None` for one that is repeated. Checks what only this
+    /// receiver can with `is_acceptable`.
+    pub fn begin<M: Mac>(
+        &mut self,
+        packet: &Packet<'_>,
+        begin: Begin,
+        mac: &M,
+        now: u32,
+        is_acceptable: impl FnOnce(&Begin) -> Result<(), Rejection>,
+    ) -> Result<Option<Frame>, Rejection> {
+        let epoch = packet.epoch;
+        let id = FrameId { mesh_id: self.mesh_id, session: begin.session, epoch };
+        if !packet.is_genuine(mac, begin.session) {
+            return Err(Rejection::Forged { epoch });
+        }
+        if self.published.is_some_and(|published| !id.is_after(&published.id)) {
+            return Err(Rejection::Stale { epoch });
+        }
+        is_acceptable(&begin)?;
+        if let Content::Partial { base_epoch } = begin.content {
+            let base = FrameId { epoch: base_epoch, ..id };
+            if self.published.is_none_or(|published| published.id != base) {
+                self.wants_whole = true;
+                return Err(Rejection::Base { epoch: base_epoch });
+            }
+        }
+        if let Some(frame) = &mut self.frame {
+            if frame.id == id && frame.begin_checksum == packet.checksum {
+                return Ok(None);
+            }
+            if frame.is_complete {
+                return Err(Rejection::Busy { epoch });
+            }
+            if frame.id.is_after(&id) && !frame.is_doubted {
+                frame.is_doubted = true;
+                return Err(Rejection::Stale { epoch });
+            }
+            self.counters.count(Event::Abandoned);
+        }
+        let frame = Frame {
+            id,
+            begin,
+            received: now,
+            begin_checksum: packet.checksum,
+            sum: packet.checksum,
+            runs: Runs::new(!matches!(begin.content, Content::Partial { .. })),
+            commit: None,
+            is_doubted: false,
+            is_complete: false,
+        };
+        self.frame = Some(frame);
+        Ok(Some(frame))
+    }
+
+    /// The frame in work, if the packet belongs to it.
+    #[inline]
+    pub fn frame_of<M: Mac>(&self, packet: &Packet<'_>, mac: &M) -> Result<&Frame, Rejection> {
+        let epoch = packet.epoch;
+        match &self.frame {
+            Some(frame)
+                if frame.id.epoch == epoch && frame.id.session as u16 == packet.session_low =>
+            {
+                if packet.is_genuine(mac, frame.id.session) {
+                    Ok(frame)
+                } else {
+                    Err(Rejection::Forged { epoch })
+                }
+            }
+            _ => {
+                let is_stale = self.published.is_some_and(|published| {
+                    published.id.session as u16 == packet.session_low
+                        && !is_newer(epoch, published.id.epoch)
+                });
+                Err(if is_stale {
+                    Rejection::Stale { epoch }
+                } else {
+                    Rejection::Unexpected { epoch }
+                })
+            }
+        }
+    }
+
+    /// Notes rows that were stored where `place` says. `Ok(true)` once the frame is complete.
+    #[inline]
+    pub fn take_rows(&mut self, packet: &Packet<'_>, place: Place) -> Result<bool, Rejection> {
+        let Some(frame) = &mut self.frame else { return Ok(false) };
+        frame.runs.insert(place);
+        frame.sum = frame.sum.wrapping_add(packet.checksum);
+        frame.is_doubted = false;
+        self.finish()
+    }
+
+    /// Takes the commit: `None` for one that is repeated, `Some(true)` once the frame is complete.
+    pub fn commit<M: Mac>(
+        &mut self,
+        packet: &Packet<'_>,
+        commit: Commit,
+        mac: &M,
+    ) -> Result<Option<bool>, Rejection> {
+        self.frame_of(packet, mac)?;
+        let Some(frame) = &mut self.frame else { return Ok(None) };
+        let sequence = packet.sequence;
+        match frame.commit {
+            Some((known, _)) if known == sequence => return Ok(None),
+            Some(_) => return Err(Rejection::Order { sequence }),
+            None if frame.runs.reaches(sequence) => return Err(Rejection::Order { sequence }),
+            None => frame.commit = Some((sequence, commit.digest)),
+        }
+        frame.is_doubted = false;
+        self.finish().map(Some)
+    }
+
+    /// Whether the frame is complete; where it is and cannot be right, it is dropped.
+    #[inline]
+    fn finish(&mut self) -> Result<bool, Rejection> {
+        let Some(frame) = &mut self.frame else { return Ok(false) };
+        let Some((sequence, stated)) = frame.commit else { return Ok(false) };
+        if frame.runs.next() != sequence {
+            return Ok(false);
+        }
+        let computed = frame.sum;
+        let rows = frame.runs.ready();
+        if stated != computed {
+            self.frame = None;
+            return Err(Rejection::Digest { stated, computed });
+        }
+        let is_partial = matches!(frame.begin.content, Content::Partial { .. });
+        if !is_partial && rows != frame.begin.rows {
+            self.frame = None;
+            return Err(Rejection::RowCount { rows });
+        }
+        frame.is_complete = true;
+        Ok(true)
+    }
+
+    pub fn heartbeat<M: Mac>(
+        &mut self,
+        packet: &Packet<'_>,
+        heartbeat: Heartbeat,
+        mac: &M,
+        now: u32,
+    ) -> Result<(), Rejection> {
+        let Heartbeat { session, beat } = heartbeat;
+        let epoch = packet.epoch;
+        if !packet.is_genuine(mac, session) {
+            return Err(Rejection::Forged { epoch });
+        }
+        let before_published =
+            self.published.is_some_and(|published| is_newer(published.id.session, session));
+        let before_last = self.heartbeat.is_some_and(|last| {
+            if last.session == session {
+                !is_newer(beat, last.beat)
+            } else {
+                !is_newer(session, last.session)
+            }
+        });
+        if before_published || before_last {
+            return Err(Rejection::Stale { epoch });
+        }
+        self.heartbeat = Some(LastHeartbeat { session, beat, epoch, received: now });
+        Ok(())
+    }
+
+    /// The frame in work has become the published one.
+    pub fn published(&mut self, frame: &Frame, stretch: Option<f32>) {
+        self.frame = None;
+        self.wants_whole = false;
+        let Frame { id, received, .. } = *frame;
+        self.published = Some(Published { id, received, stretch, oldest: 0 });
+        // A session that published is the sender's, whatever a stray heartbeat said.
+        self.heartbeat = self.heartbeat.filter(|last| last.session == id.session);
+        self.counters.count(Event::Published);
+    }
+
+    pub fn want_whole(&mut self) {
+        self.wants_whole = true;
+    }
+
+    pub fn published_id(&self) -> Option<FrameId> {
+        self.published.map(|published| published.id)
+    }
+
+    pub const fn last_heartbeat(&self) -> Option<LastHeartbeat> {
+        self.heartbeat
+    }
+
+    pub fn status(&mut self, now: u32, safety: u8, challenge: u32) -> Status {
+        let number = self.statuses;
+        self.statuses = number.wrapping_add(1);
+        let published = self.published.as_mut().map(|published| {
+            let age = now.wrapping_sub(published.received);
+            published.oldest = if age < published.oldest { u32::MAX } else { age };
+            PublishedStatus {
+                session: published.id.session,
+                epoch: published.id.epoch,
+                age_ms: published.oldest,
+                stretch: published.stretch,
+            }
+        });
+        Status { published, wants_whole: self.wants_whole, safety, number, challenge }
+    }
+}
+
+impl Misplaced {
+    pub fn rejection(self, sequence: u16) -> Option<Rejection> {
+        match self {
+            Self::Duplicate => None,
+            Self::Order => Some(Rejection::Order { sequence }),
+            Self::Gaps => Some(Rejection::Gaps { sequence }),
+        }
+    }
+}
+
+impl Frame {
+    /// Where rows belong; `None` for a packet that came before.
+    #[inline]
+    pub fn locate(
+        &self,
+        sequence: u16,
+        rows: core::ops::Range<u32>,
+    ) -> Result<Option<Place>, Rejection> {
+        if self.commit.is_some_and(|(commit, _)| sequence >= commit) {
+            return Err(Rejection::Order { sequence });
+        }
+        match self.runs.locate(sequence, rows) {
+            Ok(place) => Ok(Some(place)),
+            Err(misplaced) => misplaced.rejection(sequence).map_or(Ok(None), Err),
+        }
+    }
+}
