@@ -1,8 +1,10 @@
 //! A small surface on a bus: what the bus tests share.
 
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::wire::{CHECKSUM_BYTES, Encoding, FrameEncoder, FrameId, QuantisedBox};
-use dibs_nostd::{Assembler, FrameReader, Frames, Gate, Unchecked, VertexTable};
+use dibs_nostd::wire::{CHECKSUM_BYTES, Encoding, FrameEncoder, FrameId, Mac, QuantisedBox};
+use dibs_nostd::{
+    Advance, Assembler, FrameReader, Frames, Gate, Rejection, Unchecked, VertexTable,
+};
 
 /// Mesh id of the packets.
 pub const MESH: u32 = 0xD1B5_0001;
@@ -57,8 +59,13 @@ pub fn packets<const MTU: usize>(
     encoding: Encoding,
     positions: &[Vec3],
 ) -> Vec<Vec<u8>> {
-    let id = FrameId { mesh_id: MESH, session: 1, epoch };
-    let mut encoder = FrameEncoder::<_, MTU>::new(id, encoding, positions).unwrap();
+    collect(FrameEncoder::<_, MTU>::new(id(epoch), encoding, positions).unwrap())
+}
+
+/// All packets of an encoder.
+pub fn collect<T: VertexTable + ?Sized, M: Mac, const MTU: usize>(
+    mut encoder: FrameEncoder<'_, T, MTU, M>,
+) -> Vec<Vec<u8>> {
     let mut buffer = [0; MTU];
     let mut packets = Vec::new();
     while let Some(packet) = encoder.next_packet(&mut buffer) {
@@ -67,10 +74,83 @@ pub fn packets<const MTU: usize>(
     packets
 }
 
+/// A frame of session 1.
+pub const fn id(epoch: u32) -> FrameId {
+    FrameId { mesh_id: MESH, session: 1, epoch }
+}
+
 /// The packets of an epoch of [`surface`], for CAN-FD.
 pub fn frame(epoch: u32, quantised: bool) -> Vec<Vec<u8>> {
     let positions = surface(epoch);
     packets::<64>(epoch, encoding(quantised, &positions), &positions)
+}
+
+/// Gives a packet to the assembler, and has it do all the work that follows, in slices. The epoch that
+/// was published, if any.
+///
+/// # Errors
+/// What the assembler rejected.
+pub fn give<G: Gate, M: Mac, const N: usize>(
+    assembler: &mut Assembler<'_, G, N, M>,
+    packet: &[u8],
+) -> Result<Option<u32>, Rejection> {
+    assembler.accept(packet, 0)?;
+    for _ in 0..1000 {
+        match assembler.advance(7)? {
+            Advance::Published { epoch } => return Ok(Some(epoch)),
+            Advance::Pending => {}
+            // A little more: rows that are copied ahead.
+            _ => {
+                for _ in 0..N / 7 + 1 {
+                    assembler.advance(7)?;
+                }
+                return Ok(None);
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// A packet by the specification alone: kind, session, epoch, sequence, count, first and body, with
+/// padding and checksum.
+pub fn raw(
+    kind: u8,
+    session: u32,
+    epoch: u32,
+    [sequence, count]: [u16; 2],
+    first: u32,
+    body: &[u8],
+) -> Vec<u8> {
+    let mut packet = vec![2, kind];
+    packet.extend((session as u16).to_le_bytes());
+    packet.extend(MESH.to_le_bytes());
+    packet.extend(epoch.to_le_bytes());
+    packet.extend(sequence.to_le_bytes());
+    packet.push(count as u8);
+    packet.extend(&first.to_le_bytes()[..3]);
+    packet.extend(body);
+    let bytes = packet.len() + CHECKSUM_BYTES;
+    let padded = [24, 32, 48, 64].into_iter().find(|&length| bytes <= length).unwrap_or(bytes);
+    packet.resize(padded, 0);
+    reseal(packet)
+}
+
+/// A begin packet of a float frame, by the specification alone.
+pub fn raw_begin(session: u32, epoch: u32, content: u8, rows: u32, base: u32) -> Vec<u8> {
+    let mut body = ((session >> 16) as u16).to_le_bytes().to_vec();
+    body.extend([content, 0]);
+    body.extend(rows.to_le_bytes());
+    body.extend(base.to_le_bytes());
+    body.extend([0; 24]);
+    raw(1, session, epoch, [0, 0], 0, &body)
+}
+
+/// Checksum that a packet carries.
+///
+/// # Panics
+/// For a packet without room for one.
+pub fn checksum(packet: &[u8]) -> u32 {
+    u32::from_le_bytes(packet[packet.len() - CHECKSUM_BYTES..].try_into().unwrap())
 }
 
 /// Epoch and positions (as bits) of the published frame.

@@ -7,6 +7,7 @@ use dibs_nostd::{
     Assembler, Changed, Frames, Gate, MeasuredStretch, Options, Query, QueryError, REGIONS,
     Rejection, Sphere, StretchError, StretchMonitor, Tree, Verdict, VertexTable, measure_stretch,
 };
+use dibs_tests::bus::give;
 use dibs_tests::deform::{Deformation, unit};
 use dibs_tests::stretch;
 use fastrand::Rng;
@@ -352,13 +353,14 @@ fn a_surface_beyond_the_stretch_limit_is_refused() {
         let mut encoder =
             FrameEncoder::<_, 512>::new(id, Encoding::Float, &moved[..]).expect("can be sent");
         let mut buffer = [0; 512];
-        let mut last = None;
         while let Some(packet) = encoder.next_packet(&mut buffer) {
-            last = Some(assembler.accept(packet, epoch));
+            if let Some(epoch) = give(&mut assembler, packet)? {
+                return Ok(epoch);
+            }
         }
-        last.expect("at least one packet")
+        panic!("frame {epoch} was neither published nor refused");
     };
-    assert!(send(1, 1.15).is_ok());
+    assert_eq!(send(1, 1.15), Ok(Some(1)));
     let refused = send(2, 1.25).expect_err("beyond 1.2");
     assert!(matches!(refused, Rejection::Stretch(_)), "{refused:?}");
     let frame = reader.read().expect("the good one stays");

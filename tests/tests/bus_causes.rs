@@ -1,0 +1,275 @@
+//! Every way to be rejected: named by its cause, counted once, and without a trace.
+
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::wire::{
+    Content, Counters, Encoding, Event, NoMac, PacketError, QuantisedBox, Status, StreamError,
+    WeightsEncoder, encode_status,
+};
+use dibs_nostd::{Progress, Rejection, VertexTable};
+use dibs_tests::bus::*;
+
+/// A packet with some bytes changed, and a right checksum.
+fn edit(packet: &[u8], at: usize, value: &[u8]) -> Vec<u8> {
+    let mut packet = packet.to_vec();
+    packet[at..at + value.len()].copy_from_slice(value);
+    reseal(packet)
+}
+
+/// What a fault within frame 1 is rejected as, after its begin and third packet have come.
+fn rejection_of(fault: &[u8]) -> Rejection {
+    let good = frame(1, false);
+    let (mut assembler, mut reader) = bus();
+    give(&mut assembler, &good[0]).unwrap();
+    give(&mut assembler, &good[3]).unwrap();
+    let rejection = give(&mut assembler, fault).unwrap_err();
+    assert_eq!(assembler.counters().rejected(), 1);
+    assert_eq!(assembler.counters().of(rejection.event()), 1);
+    assert!(rejection.event().is_rejection());
+    assert!(!rejection.to_string().is_empty());
+    // The fault leaves no trace: the frame goes on and is published.
+    for packet in &good[1..] {
+        give(&mut assembler, packet).unwrap();
+    }
+    let sent: Vec<_> = surface(1).iter().map(|p| p.to_array().map(f32::to_bits)).collect();
+    assert_eq!(published(&mut reader), Some((1, sent)));
+    rejection
+}
+
+#[test]
+fn what_is_no_packet() {
+    let good = frame(1, false);
+    let (begin, vertices, commit) = (&good[0], &good[1], &good[good.len() - 1]);
+    let packet = |error| Rejection::Packet(error);
+    assert_eq!(rejection_of(&[0; 21]), packet(PacketError::TooShort { bytes: 21 }));
+    let flipped = rejection_of(&{
+        let mut damaged = vertices.clone();
+        damaged[30] ^= 4;
+        damaged
+    });
+    assert!(matches!(flipped, Rejection::Packet(PacketError::Checksum { .. })));
+    for version in [0, 1, 3, 255] {
+        let fault = edit(vertices, 0, &[version]);
+        assert_eq!(rejection_of(&fault), packet(PacketError::Version { version }));
+    }
+    for (fault, expected) in [
+        (edit(vertices, 1, &[9]), PacketError::Kind { kind: 9 }),
+        (edit(vertices, 1, &[0]), PacketError::Kind { kind: 0 }),
+        (edit(vertices, 1, &[0x89]), PacketError::Kind { kind: 0x89 }),
+        // Length, count and padding.
+        (edit(vertices, 14, &[2]), PacketError::Length { bytes: 64, expected: 48 }),
+        (edit(vertices, 14, &[4]), PacketError::Length { bytes: 64, expected: 70 }),
+        (
+            reseal([&vertices[..60], &[0; 5]].concat()),
+            PacketError::Length { bytes: 65, expected: 64 },
+        ),
+        (
+            reseal([&commit[..24], &[0; 4]].concat()),
+            PacketError::Length { bytes: 28, expected: 32 },
+        ),
+        (edit(vertices, 59, &[1]), PacketError::Reserved { offset: 54 }),
+        (edit(commit, 27, &[1]), PacketError::Reserved { offset: 22 }),
+        (edit(&raw(2, 1, 1, [1, 0], 0, &[]), 0, &[2]), PacketError::Empty),
+        // Sequence.
+        (edit(vertices, 12, &[0, 0]), PacketError::Sequence { sequence: 0 }),
+        (edit(commit, 12, &[0, 0]), PacketError::Sequence { sequence: 0 }),
+        (edit(begin, 12, &[1, 0]), PacketError::Sequence { sequence: 1 }),
+        // The begin's fields.
+        (edit(begin, 14, &[1]), PacketError::Reserved { offset: 14 }),
+        (edit(begin, 15, &[1]), PacketError::Reserved { offset: 15 }),
+        (edit(begin, 20, &[7]), PacketError::Content { content: 7 }),
+        (edit(begin, 21, &[7]), PacketError::Encoding { encoding: 7 }),
+        (edit(begin, 22, &[0; 4]), PacketError::Rows { rows: 0 }),
+        (edit(begin, 22, &[1, 0, 0, 1]), PacketError::Rows { rows: 0x0100_0001 }),
+        (edit(begin, 26, &[1]), PacketError::Reserved { offset: 26 }),
+        (edit(begin, 30, &[1]), PacketError::Reserved { offset: 30 }),
+        (edit(begin, 53, &[1]), PacketError::Reserved { offset: 30 }),
+        (edit(begin, 21, &[1]), PacketError::Box),
+        (raw_begin(1, 1, 2, 65, 0), PacketError::Rows { rows: 65 }),
+        (edit(&raw_begin(1, 1, 2, 6, 0), 21, &[1]), PacketError::Encoding { encoding: 1 }),
+        // A heartbeat's and a status's.
+        (raw(6, 1, 1, [0, 0], 0, &[0, 0, 1, 0, 0, 0, 0, 0]), PacketError::Reserved { offset: 20 }),
+        (
+            raw(7, 1, 1, [0, 0], 0, &{
+                let mut body = [0; 20];
+                body[2] = 4;
+                body
+            }),
+            PacketError::Reserved { offset: 20 },
+        ),
+        (raw(7, 0, 1, [0, 0], 0, &[0; 20]), PacketError::Reserved { offset: 18 }),
+        (raw(7, 0, 0, [0, 0], 256, &[0; 20]), PacketError::Reserved { offset: 16 }),
+    ] {
+        assert_eq!(rejection_of(&fault), packet(expected), "{fault:02x?}");
+        assert_eq!(packet(expected).event(), Event::Malformed);
+    }
+    // A tag where the receiver has no key.
+    let tagged = rejection_of(&raw(0x84, 1, 1, [2, 0], 0, &[0; 10]));
+    assert_eq!(tagged, Rejection::Forged { epoch: 1 });
+}
+
+#[test]
+fn what_is_a_packet_and_not_right() {
+    let good = frame(1, false);
+    let (begin, vertices) = (&good[0], &good[1]);
+    let rejected = |fault: &[u8], expected| assert_eq!(rejection_of(fault), expected);
+    rejected(&edit(vertices, 4, &[0xFF]), Rejection::WrongMesh { mesh_id: MESH | 0xFF });
+    rejected(&edit(vertices, 8, &[2]), Rejection::Unexpected { epoch: 2 });
+    rejected(&edit(vertices, 2, &[2]), Rejection::Unexpected { epoch: 1 });
+    let status = Status { published: None, wants_whole: false, safety: 0, number: 0, challenge: 0 };
+    let mut buffer = [0; 64];
+    let status = encode_status(MESH, &status, &Counters::new(), &NoMac, &mut buffer);
+    rejected(status, Rejection::Unexpected { epoch: 0 });
+    rejected(&edit(begin, 22, &41_u32.to_le_bytes()), Rejection::RowCount { rows: 41 });
+    rejected(&frame(1, true)[1], Rejection::Encoding);
+    let weights = WeightsEncoder::<64>::new(id(2), &[0.5; N])
+        .unwrap()
+        .next_packet(&mut [0; 64])
+        .unwrap()
+        .to_vec();
+    rejected(&weights, Rejection::Encoding);
+    rejected(&raw(5, 1, 1, [1, 1], 0, &[0; 4]), Rejection::Encoding);
+    for first in [38, 40, 0x00FF_FFFF] {
+        let fault = edit(vertices, 15, &u32::to_le_bytes(first)[..3]);
+        rejected(&fault, Rejection::OutOfRange { first, count: 3 });
+    }
+    // Packet 3 has come, with rows 6 to 8: in packet 2 there is room for rows 3 to 5 only.
+    for first in [0, 2, 4, 5, 6, 7, 9, 20] {
+        let fault = edit(&good[2], 15, &u32::to_le_bytes(first)[..3]);
+        rejected(&fault, Rejection::Order { sequence: 2 });
+    }
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        for axis in 0..3 {
+            let fault = edit(vertices, 18 + 2 * 12 + 4 * axis, &bad.to_le_bytes());
+            rejected(&fault, Rejection::NotFinite { row: 2 });
+        }
+    }
+    for (far, axis) in [(100.01_f32, 0), (-100.01, 1), (1e30, 2)] {
+        let fault = edit(vertices, 18 + 12 + 4 * axis, &far.to_le_bytes());
+        rejected(&fault, Rejection::TooFar { row: 1 });
+    }
+    rejected(&raw_begin(1, 2, 1, N as u32, 1), Rejection::Base { epoch: 1 });
+}
+
+/// A quantisation box may reach beyond the receiver's limit, a vertex may not.
+#[test]
+fn a_box_may_be_larger_than_the_surface() {
+    let coarse = QuantisedBox::new(Vec3::splat(-60.0), Vec3::splat(0.1)).unwrap();
+    let (mut assembler, mut reader) = bus();
+    let positions = surface(1);
+    for packet in packets::<64>(1, Encoding::Quantised(coarse), &positions) {
+        give(&mut assembler, &packet).unwrap();
+    }
+    assert_eq!(reader.read().unwrap().label().position_error, coarse.error());
+    let mut far = positions;
+    far[9].y = 100.2;
+    let packets = packets::<64>(2, Encoding::Quantised(coarse), &far);
+    let outcomes: Vec<_> = packets.iter().map(|packet| give(&mut assembler, packet)).collect();
+    assert_eq!(outcomes[2], Err(Rejection::TooFar { row: 9 }));
+    assert_eq!(published(&mut reader).unwrap().0, 1);
+}
+
+#[test]
+fn packets_beyond_the_commit_do_not_belong() {
+    let good = frame(1, false);
+    let (commit, others) = good.split_last().unwrap();
+    // The commit comes first and says that there are fewer packets.
+    let (mut assembler, mut reader) = bus();
+    give(&mut assembler, &good[0]).unwrap();
+    give(&mut assembler, &edit(commit, 12, &3_u16.to_le_bytes())).unwrap();
+    for (sequence, packet) in (1..).zip(&others[1..]) {
+        let outcome = give(&mut assembler, packet);
+        match sequence {
+            1 => assert_eq!(outcome, Ok(None)),
+            // With it the frame would be complete, but the digest is that of all packets.
+            2 => assert!(matches!(outcome, Err(Rejection::Digest { .. }))),
+            _ => assert_eq!(outcome, Err(Rejection::Unexpected { epoch: 1 })),
+        }
+    }
+    let (mut again, _) = bus();
+    give(&mut again, &good[0]).unwrap();
+    give(&mut again, &edit(commit, 12, &3_u16.to_le_bytes())).unwrap();
+    assert_eq!(give(&mut again, &good[3]), Err(Rejection::Order { sequence: 3 }));
+    assert_eq!(give(&mut again, commit), Err(Rejection::Order { sequence: good.len() as u16 - 1 }));
+    // Or last.
+    let (mut last, _) = bus();
+    for packet in others {
+        give(&mut last, packet).unwrap();
+    }
+    let early = edit(commit, 12, &3_u16.to_le_bytes());
+    assert_eq!(give(&mut last, &early), Err(Rejection::Order { sequence: 3 }));
+    assert_eq!(give(&mut last, commit), Ok(Some(1)));
+    assert!(published(&mut reader).is_none());
+}
+
+/// A frame that ends early, with a digest that is right.
+#[test]
+fn a_frame_without_its_last_rows_is_not_published() {
+    let good = frame(1, false);
+    let (commit, others) = good.split_last().unwrap();
+    let (mut assembler, mut reader) = bus();
+    let (_, short) = others.split_last().unwrap();
+    let mut digest = 0_u32;
+    for packet in short {
+        give(&mut assembler, packet).unwrap();
+        digest = digest.wrapping_add(checksum(packet));
+    }
+    let mut commit = edit(commit, 12, &(short.len() as u16).to_le_bytes());
+    commit = edit(&commit, 18, &digest.to_le_bytes());
+    assert_eq!(give(&mut assembler, &commit), Err(Rejection::RowCount { rows: 39 }));
+    assert!(published(&mut reader).is_none());
+    assert_eq!(give(&mut assembler, &good[1]), Err(Rejection::Unexpected { epoch: 1 }));
+}
+
+/// Every second packet: more gaps than can be noted.
+#[test]
+fn gaps_are_bounded() {
+    let positions: Vec<Vec3> = (0..200).map(|i| Vec3::splat(i as f32 * 0.01)).collect();
+    let frames: &'static dibs_nostd::Frames<200> = Box::leak(Box::new(dibs_nostd::Frames::new()));
+    let (writer, mut reader) = frames.split().unwrap();
+    let mut assembler = dibs_nostd::Assembler::new(writer, dibs_nostd::Unchecked, MESH, 100.0);
+    let packets = packets::<64>(1, Encoding::Float, &positions);
+    give(&mut assembler, &packets[0]).unwrap();
+    let mut refused = Vec::new();
+    for packet in packets[1..].iter().skip(1).step_by(2) {
+        if let Err(rejection) = give(&mut assembler, packet) {
+            assert!(matches!(rejection, Rejection::Gaps { .. }));
+            refused.push(packet);
+        }
+    }
+    let gaps = packets.len() / 2 - 1 - refused.len();
+    assert!((5..=20).contains(&gaps), "{gaps} gaps are noted");
+    assert_eq!(assembler.counters().of(Event::Gaps) as usize, refused.len());
+    // Everything comes again, in order.
+    for packet in &packets {
+        give(&mut assembler, packet).unwrap();
+    }
+    let frame = reader.read().expect("complete");
+    for (row, position) in (0..).zip(&positions) {
+        assert_eq!(frame.position(row), Some(*position));
+    }
+}
+
+#[test]
+fn damage_to_the_stream_is_counted_too() {
+    let (mut assembler, _) = bus();
+    assembler.count_framing(&StreamError::Cut { bytes: 9 });
+    assert_eq!(assembler.counters().of(Event::Framing), 1);
+    assert_eq!(assembler.counters().rejected(), 1);
+    let good = frame(1, true);
+    give(&mut assembler, &good[0]).unwrap();
+    assert_eq!(assembler.accept(&good[0], 0), Ok(Progress::Duplicate));
+    assert_eq!(assembler.counters().of(Event::Duplicate), 1);
+    assert_eq!(assembler.counters().rejected(), 1, "a duplicate is none");
+}
+
+#[test]
+fn every_event_has_its_place_and_name() {
+    let document = include_str!("../../docs/wire.md");
+    let list = document.split("number 0 on:\n\n").nth(1).unwrap().split("\n\n").next().unwrap();
+    let list = list.replace("> ", "").replace('\n', " ");
+    let names: Vec<_> = list.split(", ").collect();
+    let all: Vec<_> = Event::ALL.iter().map(ToString::to_string).collect();
+    assert_eq!(names, all);
+    assert!(Event::ALL.iter().enumerate().all(|(i, event)| *event as usize == i));
+    assert_ne!(Content::Whole, Content::Modal);
+}
