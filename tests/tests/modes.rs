@@ -13,7 +13,7 @@ use dibs_nostd::modes::{
 };
 use dibs_nostd::wire::{self, Encoding, FrameEncoder, FrameId, WeightsEncoder};
 use dibs_nostd::{
-    Assembler, Changed, Frames, Gate, Index, Options, Progress, Query, Rejection, Sphere,
+    Advance, Assembler, Changed, Frames, Gate, Index, Options, Query, Rejection, Sphere,
     StretchError, Tree, Verdict, VertexTable, measure_stretch,
 };
 use dibs_tests::bus::reseal;
@@ -369,9 +369,12 @@ impl Bus {
     }
 
     /// What the last packet led to, or the first that was rejected.
-    fn send(&mut self, epoch: u32, weights: &[f32]) -> Result<Progress, Rejection> {
+    fn send(&mut self, epoch: u32, weights: &[f32]) -> Result<Advance, Rejection> {
         let packets = self.packets(epoch, weights);
-        packets.iter().try_fold(Progress::Duplicate, |_, p| self.assembler.accept(p, 7 * epoch))
+        packets.iter().try_fold(Advance::Idle, |_, packet| {
+            self.assembler.accept(packet, 7 * epoch)?;
+            self.assembler.advance(u32::MAX)
+        })
     }
 }
 
@@ -381,7 +384,7 @@ fn weights_come_over_the_bus() {
     let mut bus = bus();
     assert!(bus.reader.read().is_none());
     for (epoch, weights) in (1..).zip(bus.recorded.clone()) {
-        assert_eq!(bus.send(epoch, &weights), Ok(Progress::Published { epoch }));
+        assert_eq!(bus.send(epoch, &weights), Ok(Advance::Published { epoch }));
         let frame = bus.reader.read().expect("published");
         let surface = bus.modes.surface::<4>(&weights).expect("recorded");
         assert_eq!(positions(&frame), positions(&surface));
@@ -411,12 +414,12 @@ fn hostile_frames_of_weights_are_rejected_and_counted() {
     let mut epoch = 1;
     for mode in 0..4 {
         let [low, high] = bus.modes.range(mode).expect("there");
-        let vertex = mode as u32;
+        let row = mode as u32;
         for weight in [low.next_down(), high.next_up(), f32::MAX] {
             let mut weights = good.clone();
             weights[mode] = weight;
             epoch += 1;
-            assert_eq!(bus.send(epoch, &weights), Err(Rejection::TooFar { vertex }));
+            assert_eq!(bus.send(epoch, &weights), Err(Rejection::TooFar { row }));
         }
         for weight in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             // An encoder refuses to send these.
@@ -427,7 +430,7 @@ fn hostile_frames_of_weights_are_rejected_and_counted() {
             let hostile = reseal(packets[1].clone());
             assert!(bus.assembler.accept(&packets[0], 0).is_ok());
             let outcome = bus.assembler.accept(&hostile, 0);
-            assert_eq!(outcome, Err(Rejection::NotFinite { vertex }));
+            assert_eq!(outcome, Err(Rejection::NotFinite { row }));
         }
     }
     assert!(bus.send(97, &good[1..]).is_err());
@@ -435,7 +438,7 @@ fn hostile_frames_of_weights_are_rejected_and_counted() {
     let mut vertices = FrameEncoder::<_, 64>::new(id, Encoding::Float, &[Vec3::ZERO; 4][..]);
     let mut buffer = [0; 64];
     let begin = vertices.as_mut().expect("can be sent").next_packet(&mut buffer).expect("begins");
-    assert_eq!(bus.assembler.accept(begin, 0), Err(Rejection::OtherEncoding));
+    assert_eq!(bus.assembler.accept(begin, 0), Err(Rejection::Encoding));
     // Two frames' packets under one number.
     let mixed = [bus.packets(99, &good), bus.packets(99, &bus.recorded[8])];
     assert!(bus.assembler.accept(&mixed[0][0], 0).is_ok());
@@ -456,7 +459,7 @@ fn a_receiver_of_vertices_refuses_weights() {
     let mut encoder = WeightsEncoder::<64>::new(id, &weights).expect("can be sent");
     let mut buffer = [0; 64];
     let begin = encoder.next_packet(&mut buffer).expect("begins");
-    assert_eq!(assembler.accept(begin, 0), Err(Rejection::OtherEncoding));
+    assert_eq!(assembler.accept(begin, 0), Err(Rejection::Encoding));
 }
 
 /// Where the bound cannot tell, the surface is measured; what is published is within the limit, what is

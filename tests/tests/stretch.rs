@@ -360,7 +360,7 @@ fn a_surface_beyond_the_stretch_limit_is_refused() {
         }
         panic!("frame {epoch} was neither published nor refused");
     };
-    assert_eq!(send(1, 1.15), Ok(Some(1)));
+    assert_eq!(send(1, 1.15), Ok(1));
     let refused = send(2, 1.25).expect_err("beyond 1.2");
     assert!(matches!(refused, Rejection::Stretch(_)), "{refused:?}");
     let frame = reader.read().expect("the good one stays");
