@@ -24,6 +24,6 @@ mod sender;
 mod target;
 mod transport;
 
-pub use sender::{SendError, Sender, Sent, Settings, SurfaceOrder, Totals};
+pub use sender::{Prepared, SendError, Sender, Sent, Settings, SurfaceOrder, Totals};
 pub use target::{Target, TargetError};
 pub use transport::{Line, Transport};

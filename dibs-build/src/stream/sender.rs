@@ -188,11 +188,21 @@ impl<T: Transport, const MTU: usize> Sender<T, MTU> {
     }
 
     /// Sends a frame: positions (mm) in the mesh's order. Whole, or only what moved, as the settings
-    /// and the receiver ask for.
+    /// and the receiver ask for; with heartbeats in between, where they are due.
     ///
     /// # Errors
     /// [`SendError`] names the vertex that cannot be sent, or what the line said.
     pub fn send(&mut self, positions: &[Vec3]) -> Result<Sent, SendError> {
+        let frame = self.prepare(positions)?;
+        self.transmit(frame)
+    }
+
+    /// The first half of [`send`](Self::send): makes the packets. From here on [`held`](Self::held) is
+    /// what the receiver will have. A frame that was prepared must be transmitted next.
+    ///
+    /// # Errors
+    /// [`SendError`] names the vertex that cannot be sent.
+    pub fn prepare(&mut self, positions: &[Vec3]) -> Result<Prepared, SendError> {
         let rows = self.surface.to_rows(positions)?;
         let encoding = self.encoding(&rows)?;
         let is_partial = self.is_partial_wanted();
@@ -211,37 +221,45 @@ impl<T: Transport, const MTU: usize> Sender<T, MTU> {
             None => Content::Whole,
         };
         let mut held = base.map_or_else(|| vec![Vec3::ZERO; rows.len()], |(_, held)| held);
-        let mut sent = Sent { epoch: id.epoch, content, error: encoding.error(), ..Sent::NOTHING };
-        for packet in &packets {
-            sent.rows += apply(packet, encoding, &mut held);
-            self.transmit(packet, &mut sent)?;
-        }
+        let rows_sent = packets.iter().map(|packet| apply(packet, encoding, &mut held)).sum();
         self.held = Some((id.epoch, held));
         if content == Content::Whole {
-            self.whole = Some((id.epoch, Instant::now()));
             self.since_whole = 0;
             self.whole_wanted = false;
         } else {
             self.since_whole += 1;
-            self.totals.partial += 1;
         }
-        self.totals.frames += 1;
-        Ok(sent)
+        Ok(Prepared::new(id.epoch, content, rows_sent, encoding.error(), packets))
     }
 
-    /// Sends a modal frame: the weights of the receiver's displacement modes.
+    /// Makes the packets of a modal frame: the weights of the receiver's displacement modes.
     ///
     /// # Errors
-    /// [`SendError`] names the weight that cannot be sent, or what the line said.
-    pub fn send_weights(&mut self, weights: &[f32]) -> Result<Sent, SendError> {
+    /// [`SendError`] names the weight that cannot be sent.
+    pub fn prepare_weights(&mut self, weights: &[f32]) -> Result<Prepared, SendError> {
         let id = self.next_id();
         let mut frame = WeightsEncoder::<MTU>::new(id, weights).map_err(SendError::Frame)?;
-        let mut buffer = [0; MTU];
-        let rows = weights.len();
-        let mut sent = Sent { epoch: id.epoch, content: Content::Modal, rows, ..Sent::NOTHING };
+        let (mut buffer, mut packets) = ([0; MTU], Vec::new());
         while let Some(packet) = frame.next_packet(&mut buffer) {
-            self.transmit(packet, &mut sent)?;
+            packets.push(packet.to_vec());
         }
+        Ok(Prepared::new(id.epoch, Content::Modal, weights.len(), 0.0, packets))
+    }
+
+    /// Sends a frame that was prepared, with heartbeats in between, where they are due.
+    ///
+    /// # Errors
+    /// [`SendError::Line`] when the connection is gone.
+    pub fn transmit(&mut self, frame: Prepared) -> Result<Sent, SendError> {
+        let Prepared { sent, packets } = frame;
+        for packet in &packets {
+            self.heartbeat()?;
+            self.put(packet)?;
+        }
+        if sent.content == Content::Whole {
+            self.whole = Some((sent.epoch, Instant::now()));
+        }
+        self.totals.partial += u64::from(matches!(sent.content, Content::Partial { .. }));
         self.totals.frames += 1;
         Ok(sent)
     }
@@ -252,15 +270,7 @@ impl<T: Transport, const MTU: usize> Sender<T, MTU> {
     /// # Errors
     /// [`SendError::Line`] when the connection is gone.
     pub fn poll(&mut self) -> Result<(), SendError> {
-        if let Some(interval) = self.settings.heartbeat
-            && self.last_beat.is_none_or(|last| last.elapsed() >= interval)
-        {
-            self.last_beat = Some(Instant::now());
-            self.beat = self.beat.wrapping_add(1);
-            let mut buffer = [0; 64];
-            let beat = encode_heartbeat(&self.id(), self.beat, &NoMac, &mut buffer).to_vec();
-            self.transmit(&beat, &mut Sent::NOTHING.clone())?;
-        }
+        self.heartbeat()?;
         while let Some(packet) = self.transport.receive().map_err(SendError::Line)? {
             self.take(&packet);
         }
@@ -341,10 +351,20 @@ impl<T: Transport, const MTU: usize> Sender<T, MTU> {
         Ok(Encoding::Quantised(coarsened(grid, tolerance)))
     }
 
-    fn transmit(&mut self, packet: &[u8], sent: &mut Sent) -> Result<(), SendError> {
+    fn heartbeat(&mut self) -> Result<(), SendError> {
+        let Some(interval) = self.settings.heartbeat else { return Ok(()) };
+        if self.last_beat.is_some_and(|last| last.elapsed() < interval) {
+            return Ok(());
+        }
+        self.last_beat = Some(Instant::now());
+        self.beat = self.beat.wrapping_add(1);
+        let mut buffer = [0; 64];
+        let beat = encode_heartbeat(&self.id(), self.beat, &NoMac, &mut buffer).to_vec();
+        self.put(&beat)
+    }
+
+    fn put(&mut self, packet: &[u8]) -> Result<(), SendError> {
         self.transport.send(packet).map_err(SendError::Line)?;
-        sent.packets += 1;
-        sent.bytes += packet.len();
         self.totals.packets += 1;
         self.totals.bytes += packet.len() as u64;
         Ok(())
@@ -385,9 +405,25 @@ impl<T: Transport, const MTU: usize> Sender<T, MTU> {
     }
 }
 
-impl Sent {
-    const NOTHING: Self =
-        Self { epoch: 0, content: Content::Whole, rows: 0, packets: 0, bytes: 0, error: 0.0 };
+/// A frame whose packets are made and not sent.
+#[derive(Debug)]
+pub struct Prepared {
+    sent: Sent,
+    packets: Vec<Vec<u8>>,
+}
+
+impl Prepared {
+    fn new(epoch: u32, content: Content, rows: usize, error: f32, packets: Vec<Vec<u8>>) -> Self {
+        let bytes = packets.iter().map(Vec::len).sum();
+        let sent = Sent { epoch, content, rows, packets: packets.len(), bytes, error };
+        Self { sent, packets }
+    }
+
+    /// What will have been sent.
+    #[must_use]
+    pub const fn sent(&self) -> &Sent {
+        &self.sent
+    }
 }
 
 fn packets_of<M: Mac, const MTU: usize>(

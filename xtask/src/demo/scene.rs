@@ -3,7 +3,6 @@
 use anyhow::{Context, Result, ensure};
 use dibs_build::{Builder, BuiltTree, Mesh, Motion, generate};
 use dibs_nostd::{Index, measure_stretch};
-use glam::Vec3;
 
 use super::Options;
 use crate::firmware::{HEART_STRETCH, Surface};
@@ -23,8 +22,8 @@ pub struct Scene {
     pub surface: Surface,
     /// The tree; the firmware builds the same one, byte for byte.
     pub tree: BuiltTree,
-    /// The motion's frames, in the tree's order of vertices.
-    pub frames: Vec<Vec<Vec3>>,
+    /// The motion, in the mesh's order of vertices.
+    pub motion: Motion,
     /// Frames a second at which the motion was recorded.
     pub rate: f32,
     /// The mesh's triangles by rows of the vertex table, without the tree's help.
@@ -55,10 +54,10 @@ impl Scene {
         Ok(Self {
             name: given.unwrap_or_else(|| "generated heart".to_owned()),
             surface: Surface { mesh: path, stretch },
-            frames: motion.frames.iter().map(|frame| tree.to_rows(frame)).collect(),
             rate: if motion.rate > 0.0 { motion.rate } else { 25.0 },
             triangles: mesh.triangles.iter().map(|t| t.map(|v| row[v as usize])).collect(),
             tree,
+            motion,
         })
     }
 
@@ -70,7 +69,7 @@ impl Scene {
             self.name,
             summary.triangles,
             summary.vertices,
-            self.frames.len(),
+            self.motion.frames.len(),
             summary.stretch
         )
     }

@@ -1,16 +1,16 @@
 //! The imaging side: sends one frame after the other over the bus.
 
 use std::collections::HashMap;
-use std::io::Write;
+use std::io;
 use std::os::unix::net::UnixStream;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use controller::{MTU, TICK_RATE};
-use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, QuantisedBox, enframe, framed_bytes};
+use dibs_build::stream::{Line, SendError, Sender, Settings, SurfaceOrder, Transport};
 use glam::Vec3;
 
 use super::scene::Scene;
@@ -21,6 +21,9 @@ const WINDOW: u32 = 4;
 
 /// Between two looks at the telemetry.
 const PAUSE: Duration = Duration::from_micros(300);
+
+/// Real time in which a packet arrives, unless it was lost.
+const ARRIVAL: Duration = Duration::from_millis(500);
 
 /// What sender and listener tell each other.
 #[derive(Default)]
@@ -48,37 +51,63 @@ impl Link {
     }
 }
 
+/// A line that takes no packet before most of those before have arrived: an emulated serial line lets
+/// the computer run seconds ahead.
+struct Paced<'l> {
+    line: Line,
+    link: &'l Link,
+    sent: u32,
+}
+
+impl Transport for Paced<'_> {
+    fn send(&mut self, packet: &[u8]) -> io::Result<()> {
+        let mut start = Instant::now();
+        let mut arrived = self.link.packets.load(Ordering::Relaxed);
+        while self.sent.wrapping_sub(arrived) >= WINDOW {
+            if self.link.over.load(Ordering::Relaxed) {
+                return Err(io::ErrorKind::BrokenPipe.into());
+            }
+            thread::sleep(PAUSE);
+            let now = self.link.packets.load(Ordering::Relaxed);
+            if now != arrived {
+                (arrived, start) = (now, Instant::now());
+            } else if start.elapsed() > ARRIVAL {
+                // What has not come by now was lost on the way.
+                self.sent = arrived;
+            }
+        }
+        self.line.send(packet)?;
+        self.sent = self.sent.wrapping_add(1);
+        Ok(())
+    }
+
+    fn receive(&mut self) -> io::Result<Option<Vec<u8>>> {
+        self.line.receive()
+    }
+}
+
 /// Sends the motion, over and over, until the controller is gone: at the recorded rate, or as fast
 /// as the line allows.
-pub fn send(scene: &Scene, link: &Link, mut bus: UnixStream) -> Result<()> {
+pub fn send(scene: &Scene, link: &Link, bus: UnixStream) -> Result<()> {
     let interval = (TICK_RATE as f32 / scene.rate) as u32;
-    let mut packets = 0_u32;
-    for (epoch, exact) in (1_u32..).zip(scene.frames.iter().cycle()) {
-        let grid = QuantisedBox::covering(exact)
-            .with_context(|| format!("frame {epoch} has a position that is not finite"))?;
-        let decode = |&position: &Vec3| grid.quantise(position).map(|row| grid.position(row));
-        let decoded: Option<Vec<Vec3>> = exact.iter().map(decode).collect();
-        link.lock().insert(epoch, Arc::new(decoded.context("a vertex outside its box")?));
-
+    let line = Paced { line: Line::unix(bus)?, link, sent: 0 };
+    let order = match scene.tree.index_bits() {
+        16 => SurfaceOrder::of(&scene.tree.tree::<u16>()?),
+        _ => SurfaceOrder::of(&scene.tree.tree::<u32>()?),
+    };
+    let settings = Settings { heartbeat: None, session: 1, ..Settings::default() };
+    let mut sender = Sender::<_, MTU>::new(line, order, settings);
+    for positions in scene.motion.frames.iter().cycle() {
         let start = link.tick.load(Ordering::Relaxed);
-        let encoding = Encoding::Quantised(grid);
-        let id = FrameId { mesh_id: scene.tree.summary().mesh_id, session: 1, epoch };
-        let mut encoder = FrameEncoder::<_, MTU>::new(id, encoding, &exact[..])?;
-        let mut packet = [0; MTU];
-        let mut line = [0; framed_bytes(MTU)];
-        while let Some(packet) = encoder.next_packet(&mut packet) {
-            while packets.wrapping_sub(link.packets.load(Ordering::Relaxed)) >= WINDOW {
-                if link.over.load(Ordering::Relaxed) {
-                    return Ok(());
-                }
-                thread::sleep(PAUSE);
-            }
-            let bytes = enframe(packet, &mut line).context("a packet larger than the bus takes")?;
-            if bus.write_all(bytes).is_err() {
-                // The controller has ended its run; the listener tells whether it should have.
-                return Ok(());
-            }
-            packets = packets.wrapping_add(1);
+        let frame = sender.prepare(positions).context("the motion cannot be sent")?;
+        if let Some((epoch, held)) = sender.held() {
+            link.lock().insert(epoch, Arc::new(held.to_vec()));
+        }
+        match sender.transmit(frame) {
+            Ok(_) => (),
+            // The controller has ended its run; the listener tells whether it should have.
+            Err(SendError::Line(_)) => return Ok(()),
+            Err(error) => return Err(error.into()),
         }
         link.frames_sent.fetch_add(1, Ordering::Relaxed);
         while link.tick.load(Ordering::Relaxed) < start + interval {

@@ -31,7 +31,7 @@ pub struct Args {
     surface: PathBuf,
     /// The motion: a PC2 file with a position for each of the mesh's vertices in every frame
     motion: PathBuf,
-    /// Where to: serial:PORT[@BAUD], tcp:HOST:PORT, udp:HOST:PORT or unix:PATH
+    /// Where to: serial:PORT or serial:PORT@BAUD, tcp:HOST:PORT, udp:HOST:PORT or unix:PATH
     #[arg(long)]
     to: Target,
     /// Frames a second; by default the motion's own rate
