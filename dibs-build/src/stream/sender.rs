@@ -73,6 +73,9 @@ pub struct Settings {
     pub whole_every: u32,
     /// Between two heartbeats; `None` sends none.
     pub heartbeat: Option<Duration>,
+    /// How long a whole frame may be on its way: a status that asks for one before it arrives is not
+    /// heeded.
+    pub patience: Duration,
     /// Number of this run: later than that of every run before, which the receiver remembers. By
     /// default the time in tenths of a second, which wraps after 13 years.
     pub session: u32,
@@ -86,6 +89,7 @@ impl Default for Settings {
             partial: None,
             whole_every: 250,
             heartbeat: Some(Duration::from_millis(100)),
+            patience: Duration::from_millis(500),
             session: (now.as_millis() / 100) as u32,
         }
     }
@@ -142,8 +146,12 @@ pub struct Totals {
 /// assert_eq!(sender.totals().frames, motion.frames.len() as u64);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub struct Sender<T, const MTU: usize> {
+pub struct Sender<T, const MTU: usize, M = NoMac> {
     transport: T,
+    /// What makes the tags; `None` until the receiver's challenge is known.
+    mac: Option<M>,
+    /// What makes tags under a challenge.
+    mac_of: Box<dyn Fn(u32) -> M + Send>,
     surface: SurfaceOrder,
     settings: Settings,
     epoch: u32,
@@ -160,9 +168,6 @@ pub struct Sender<T, const MTU: usize> {
     totals: Totals,
 }
 
-/// How long a whole frame may be on its way before the receiver's request for one is heeded again.
-const PATIENCE: Duration = Duration::from_secs(2);
-
 /// Statuses that may be overtaken on their way.
 const OVERTAKEN: u32 = 8;
 
@@ -170,8 +175,28 @@ impl<T: Transport, const MTU: usize> Sender<T, MTU> {
     /// A sender that has sent nothing yet.
     #[must_use]
     pub fn new(transport: T, surface: SurfaceOrder, settings: Settings) -> Self {
+        let sender = Self::with_mac(transport, surface, settings, |_| NoMac);
+        Self { mac: Some(NoMac), ..sender }
+    }
+}
+
+impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
+    /// A sender of packets with tags. `mac_of` makes what makes the tags under a challenge: the
+    /// receiver's, which it draws when it starts and reports in its status. Until a status has come
+    /// nothing can be sent.
+    ///
+    /// For a receiver without a way back, which uses the challenge 0: [`challenge`](Self::challenge).
+    #[must_use]
+    pub fn with_mac(
+        transport: T,
+        surface: SurfaceOrder,
+        settings: Settings,
+        mac_of: impl Fn(u32) -> M + Send + 'static,
+    ) -> Self {
         Self {
             transport,
+            mac: None,
+            mac_of: Box::new(mac_of),
             surface,
             settings,
             epoch: 0,
@@ -185,6 +210,17 @@ impl<T: Transport, const MTU: usize> Sender<T, MTU> {
             counters: Counters::new(),
             totals: Totals::default(),
         }
+    }
+
+    /// Takes a challenge as the receiver's.
+    pub fn challenge(&mut self, challenge: u32) {
+        self.mac = Some((self.mac_of)(challenge));
+    }
+
+    /// Whether frames can be sent: without tags always, with tags once the challenge is known.
+    #[must_use]
+    pub const fn is_ready(&self) -> bool {
+        self.mac.is_some()
     }
 
     /// Sends a frame: positions (mm) in the mesh's order. Whole, or only what moved, as the settings
@@ -203,6 +239,9 @@ impl<T: Transport, const MTU: usize> Sender<T, MTU> {
     /// # Errors
     /// [`SendError`] names the vertex that cannot be sent.
     pub fn prepare(&mut self, positions: &[Vec3]) -> Result<Prepared, SendError> {
+        if !self.is_ready() {
+            return Err(SendError::NoChallenge);
+        }
         let rows = self.surface.to_rows(positions)?;
         let encoding = self.encoding(&rows)?;
         let is_partial = self.is_partial_wanted();
@@ -214,6 +253,8 @@ impl<T: Transport, const MTU: usize> Sender<T, MTU> {
             }
             None => FrameEncoder::new(id, encoding, &rows[..]),
         };
+        let mac = self.mac.as_ref().ok_or(SendError::NoChallenge)?;
+        let frame = frame.and_then(|frame| frame.with_mac(mac));
         let packets = packets_of::<_, MTU>(frame.map_err(SendError::Frame)?);
 
         let content = match base {
@@ -238,7 +279,9 @@ impl<T: Transport, const MTU: usize> Sender<T, MTU> {
     /// [`SendError`] names the weight that cannot be sent.
     pub fn prepare_weights(&mut self, weights: &[f32]) -> Result<Prepared, SendError> {
         let id = self.next_id();
-        let mut frame = WeightsEncoder::<MTU>::new(id, weights).map_err(SendError::Frame)?;
+        let mac = self.mac.as_ref().ok_or(SendError::NoChallenge)?;
+        let frame = WeightsEncoder::<MTU>::new(id, weights).map_err(SendError::Frame)?;
+        let mut frame = frame.with_mac(mac);
         let (mut buffer, mut packets) = ([0; MTU], Vec::new());
         while let Some(packet) = frame.next_packet(&mut buffer) {
             packets.push(packet.to_vec());
@@ -352,14 +395,17 @@ impl<T: Transport, const MTU: usize> Sender<T, MTU> {
     }
 
     fn heartbeat(&mut self) -> Result<(), SendError> {
-        let Some(interval) = self.settings.heartbeat else { return Ok(()) };
+        let Some(interval) = self.settings.heartbeat.filter(|_| self.is_ready()) else {
+            return Ok(());
+        };
         if self.last_beat.is_some_and(|last| last.elapsed() < interval) {
             return Ok(());
         }
         self.last_beat = Some(Instant::now());
         self.beat = self.beat.wrapping_add(1);
         let mut buffer = [0; 64];
-        let beat = encode_heartbeat(&self.id(), self.beat, &NoMac, &mut buffer).to_vec();
+        let Some(mac) = &self.mac else { return Ok(()) };
+        let beat = encode_heartbeat(&self.id(), self.beat, mac, &mut buffer).to_vec();
         self.put(&beat)
     }
 
@@ -377,10 +423,24 @@ impl<T: Transport, const MTU: usize> Sender<T, MTU> {
         if packet.mesh_id != self.surface.mesh_id {
             return;
         }
-        // Datagrams may overtake each other; farther back is a receiver that has started anew.
-        let is_late = self
-            .status
-            .is_some_and(|last| last.number.wrapping_sub(report.status.number) < OVERTAKEN);
+        let challenge = report.status.challenge;
+        let is_new = self.mac.as_ref().is_none_or(|mac| mac.challenge() != challenge);
+        let mac = (self.mac_of)(challenge);
+        let session = report.status.published.map_or(0, |published| published.session);
+        if !packet.is_genuine(&mac, session) {
+            return;
+        }
+        if is_new {
+            // A receiver that has started anew: it has nothing.
+            self.mac = Some(mac);
+            self.whole_wanted = true;
+        }
+        // Datagrams may overtake each other; farther back, or with nothing published, is a receiver
+        // that has started anew.
+        let is_late = report.status.published.is_some()
+            && self
+                .status
+                .is_some_and(|last| last.number.wrapping_sub(report.status.number) < OVERTAKEN);
         if is_late {
             return;
         }
@@ -397,7 +457,7 @@ impl<T: Transport, const MTU: usize> Sender<T, MTU> {
         }
         let is_answered = self.whole.is_some_and(|(epoch, at)| {
             let has_come = self.acknowledged().is_some_and(|newest| !is_newer(epoch, newest));
-            has_come || at.elapsed() > PATIENCE
+            has_come || at.elapsed() >= self.settings.patience
         });
         if is_answered && (report.status.wants_whole || self.acknowledged().is_none()) {
             self.whole_wanted = true;
@@ -489,6 +549,9 @@ pub enum SendError {
     /// The positions cannot be put into packets.
     #[error("the frame cannot be sent: {0}")]
     Frame(EncodeError),
+    /// Packets are to carry tags, and the receiver's challenge is not known: no status has come.
+    #[error("no genuine status came from the receiver: is it on, and has it the same key?")]
+    NoChallenge,
     /// The connection is gone.
     #[error("the connection broke: {0}")]
     Line(std::io::Error),

@@ -1,0 +1,353 @@
+//! One fault at a time, and then as many undisturbed frames as recovery takes.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::mem::take;
+
+use anyhow::{Result, ensure};
+use dibs_build::stream::faults::{Fault, Injector};
+use dibs_nostd::Frames;
+use dibs_nostd::wire::{Event, Mac, NoMac};
+use fastrand::Rng;
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::subject::{
+    Case, Controller, Key, Log, N, Source, TREE, framed, noticed, source, surface,
+};
+
+/// Faults that one sender and one receiver see.
+const CHUNK: u64 = 500;
+
+/// Undisturbed frames after which a receiver that still publishes nothing has failed.
+const PATIENCE: u32 = 20;
+
+/// What became of the faults of one kind.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Row {
+    pub fault: &'static str,
+    pub injected: u64,
+    /// Something was rejected, abandoned or ignored as a duplicate, or the frame was not published.
+    pub detected: u64,
+    /// Nothing was noticed, and the frame was published as it was sent.
+    pub harmless: u64,
+    /// Nothing was noticed, and something else was published; or anything wrong was.
+    pub published_wrong: u64,
+    /// How often each cause was counted.
+    pub rejected: BTreeMap<&'static str, u64>,
+    /// Undisturbed frames until one was published; 0 where the disturbed one was.
+    pub recovered_frames_mean: f64,
+    pub recovered_frames_max: u32,
+    /// Packets from the fault to the next publication.
+    pub recovered_packets_mean: f64,
+    pub recovered_packets_max: u32,
+    /// Faults after which nothing was published any more.
+    pub not_recovered: u64,
+    #[serde(skip)]
+    sums: [u64; 2],
+}
+
+impl fmt::Display for Row {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let causes: Vec<_> =
+            self.rejected.iter().map(|(cause, n)| format!("{cause} {n}")).collect();
+        write!(
+            f,
+            "{:<20} {:>7} injected, {:>7} detected, {:>6} harmless, {} published wrong, recovered \
+             within {:.2} frames ({} at most), {:.1} packets ({} at most); {}",
+            self.fault,
+            self.injected,
+            self.detected,
+            self.harmless,
+            self.published_wrong,
+            self.recovered_frames_mean,
+            self.recovered_frames_max,
+            self.recovered_packets_mean,
+            self.recovered_packets_max,
+            causes.join(", ")
+        )
+    }
+}
+
+/// Runs all kinds of faults.
+pub fn run(per_fault: u64, seed: u64) -> Result<Vec<Row>> {
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} faults  {msg}")?;
+    let bar = ProgressBar::new(per_fault * Fault::ALL.len() as u64).with_style(style);
+    let rows = Fault::ALL
+        .into_iter()
+        .map(|fault| {
+            bar.set_message(fault.name());
+            let chunks = per_fault.div_ceil(CHUNK);
+            let total = (0..chunks)
+                .into_par_iter()
+                .map(|chunk| {
+                    let count = CHUNK.min(per_fault - chunk * CHUNK);
+                    let row = life(fault, count, chunk, seed);
+                    bar.inc(count);
+                    row
+                })
+                .reduce(Row::default, Row::plus);
+            total.finished(fault)
+        })
+        .collect::<Vec<_>>();
+    bar.finish_and_clear();
+    ensure!(rows.iter().all(|row| row.injected == per_fault), "a fault found no packet");
+    Ok(rows)
+}
+
+/// Some faults of one kind: every way to send in turn.
+fn life(fault: Fault, count: u64, chunk: u64, seed: u64) -> Row {
+    let case = Case { quantised: chunk & 1 == 0, partial: chunk & 2 == 0 };
+    // Tags would catch what the other layers are meant to: with tags go forgeries, and every second
+    // run of what no checksum was made right for.
+    let is_sealed = matches!(
+        fault,
+        Fault::StaleEpoch
+            | Fault::WrongMesh
+            | Fault::OutOfRange
+            | Fault::NotFinite
+            | Fault::TooFar
+            | Fault::Stretch
+    );
+    let seed = seed ^ (chunk << 8 | fault as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    if fault == Fault::Forgery || (!is_sealed && chunk & 4 != 0) {
+        Life::run(fault, count, case, seed, Key::new)
+    } else {
+        Life::run(fault, count, case, seed, |_| NoMac)
+    }
+}
+
+/// One sender, and the receivers that it sees.
+struct Life<M> {
+    source: Source<M>,
+    mac_of: fn(u32) -> M,
+    log: Log,
+    injector: Injector,
+    rng: Rng,
+    case: Case,
+    session: u32,
+    moment: u32,
+    is_stream: bool,
+    row: Row,
+}
+
+impl<M: Mac + 'static> Life<M> {
+    fn run(fault: Fault, count: u64, case: Case, seed: u64, mac_of: fn(u32) -> M) -> Row {
+        let mut rng = Rng::with_seed(seed);
+        // Sessions wrap.
+        let session = u32::MAX - rng.u32(..20);
+        let mut life = Self {
+            source: source(case, session, mac_of),
+            mac_of,
+            log: Log::default(),
+            injector: Injector::new(seed),
+            is_stream: rng.bool(),
+            rng,
+            case,
+            session,
+            moment: 0,
+            row: Row { injected: count, ..Row::default() },
+        };
+        if fault == Fault::ReceiverRestart {
+            for _ in 0..count {
+                life.restart_of_receiver();
+            }
+            return life.row;
+        }
+        let frames = Frames::<N>::new();
+        let tree = TREE.tree::<u16>().expect("16-bit indices");
+        let mut controller = Controller::new(&frames, &tree, life.any_mac());
+        life.recover(&mut controller);
+        for _ in 0..count {
+            if fault == Fault::SenderRestart {
+                life.restart_of_sender(&mut controller);
+            } else {
+                life.disturb(fault, &mut controller);
+            }
+        }
+        life.take_counters(&controller);
+        life.row
+    }
+
+    /// What a receiver draws when it starts.
+    fn any_mac(&mut self) -> M {
+        (self.mac_of)(if M::TAGGED { self.rng.u32(..) } else { 0 })
+    }
+
+    /// The next frame's packets.
+    fn next_frame(&mut self, controller: &mut Controller<'_, M>) -> Vec<Vec<u8>> {
+        self.source.transport().inbox.push_back(controller.status());
+        self.source.poll().expect("a mailbox does not fail");
+        self.moment += 1;
+        let frame = self.source.prepare(&surface(self.moment)).expect("a finite surface");
+        self.log.note(&self.source);
+        self.source.transmit(frame).expect("a mailbox does not fail");
+        take(&mut self.source.transport().sent)
+    }
+
+    fn deliver(&self, packet: &[u8], controller: &mut Controller<'_, M>) {
+        if self.is_stream {
+            controller.bytes(&framed(packet), &self.log);
+        } else {
+            controller.message(packet, &self.log);
+        }
+    }
+
+    /// One fault, and the frames that it takes to recover.
+    fn disturb(&mut self, fault: Fault, controller: &mut Controller<'_, M>) {
+        let mut since = None;
+        let (mut before, mut published) = (Vec::new(), 0);
+        while since.is_none() {
+            (before, published) = (noticed(controller.counters()), controller.published);
+            let packets = self.next_frame(controller);
+            // The begin is the only one for some faults.
+            let first = if self.rng.bool() { 0 } else { self.rng.usize(..packets.len()) };
+            for (place, packet) in packets.iter().enumerate() {
+                let is_due = since.is_none() && place >= first;
+                let faulty = if is_due && fault.is_damage() && self.is_stream {
+                    let mut line = framed(packet);
+                    self.injector.damage(fault, &mut line);
+                    self.injector.pass(packet);
+                    controller.bytes(&line, &self.log);
+                    since = Some(0);
+                    continue;
+                } else if is_due {
+                    self.injector.inject(fault, packet)
+                } else {
+                    None
+                };
+                since = since.map(|n| n + 1);
+                let arriving = match faulty {
+                    Some(packets) => {
+                        since = Some(0);
+                        packets
+                    }
+                    None => self.injector.pass(packet),
+                };
+                for packet in arriving {
+                    self.deliver(&packet, controller);
+                }
+            }
+            if since.is_none() {
+                assert!(controller.published > published, "an undisturbed frame is published");
+            }
+        }
+        let is_published = controller.published > published;
+        let is_noticed = noticed(controller.counters()) != before || !is_published;
+        self.judge(is_noticed, is_published, since.unwrap_or(0), controller);
+    }
+
+    /// The sender starts anew in the middle of a frame.
+    fn restart_of_sender(&mut self, controller: &mut Controller<'_, M>) {
+        let before = noticed(controller.counters());
+        let packets = self.next_frame(controller);
+        let cut = self.rng.usize(1..packets.len());
+        for packet in &packets[..cut] {
+            self.deliver(packet, controller);
+        }
+        self.log.forget_last();
+        self.session = self.session.wrapping_add(1);
+        self.source = source(self.case, self.session, self.mac_of);
+        let (published, packets) = (controller.published, self.next_frame(controller));
+        for packet in &packets {
+            self.deliver(packet, controller);
+        }
+        let is_noticed = noticed(controller.counters()) != before;
+        let is_published = controller.published > published;
+        self.judge(is_noticed, is_published, packets.len() as u32, controller);
+    }
+
+    /// The receiver starts anew in the middle of a frame.
+    fn restart_of_receiver(&mut self) {
+        let (before, after) = (Frames::<N>::new(), Frames::<N>::new());
+        let tree = TREE.tree::<u16>().expect("16-bit indices");
+        let mut controller = Controller::new(&before, &tree, self.any_mac());
+        self.recover(&mut controller);
+        let packets = self.next_frame(&mut controller);
+        let cut = self.rng.usize(1..packets.len());
+        for packet in &packets[..cut] {
+            self.deliver(packet, &mut controller);
+        }
+        self.row.published_wrong += controller.wrong;
+
+        let mut controller = Controller::new(&after, &tree, self.any_mac());
+        for packet in &packets[cut..] {
+            self.deliver(packet, &mut controller);
+        }
+        let is_published = controller.published > 0;
+        let is_noticed = noticed(controller.counters()).iter().any(|&n| n > 0) || !is_published;
+        self.judge(is_noticed, is_published, (packets.len() - cut) as u32, &mut controller);
+        self.take_counters(&controller);
+    }
+
+    fn judge(
+        &mut self,
+        is_noticed: bool,
+        is_published: bool,
+        packets: u32,
+        controller: &mut Controller<'_, M>,
+    ) {
+        self.row.detected += u64::from(is_noticed);
+        self.row.harmless += u64::from(!is_noticed && is_published);
+        let (frames, more) = if is_published { (0, 0) } else { self.recover(controller) };
+        let packets = packets + more;
+        self.row.sums[0] += u64::from(frames);
+        self.row.sums[1] += u64::from(packets);
+        self.row.recovered_frames_max = self.row.recovered_frames_max.max(frames);
+        self.row.recovered_packets_max = self.row.recovered_packets_max.max(packets);
+    }
+
+    /// Undisturbed frames until one is published: how many, and in how many packets.
+    fn recover(&mut self, controller: &mut Controller<'_, M>) -> (u32, u32) {
+        let published = controller.published;
+        let mut packets = 0;
+        for frames in 1..=PATIENCE {
+            for packet in self.next_frame(controller) {
+                for packet in self.injector.pass(&packet) {
+                    self.deliver(&packet, controller);
+                }
+                packets += 1;
+            }
+            if controller.published > published {
+                return (frames, packets);
+            }
+        }
+        self.row.not_recovered += 1;
+        (PATIENCE, packets)
+    }
+
+    fn take_counters(&mut self, controller: &Controller<'_, M>) {
+        self.row.published_wrong += controller.wrong;
+        for event in Event::ALL {
+            let n = u64::from(controller.counters().of(event));
+            if n > 0 && !matches!(event, Event::Published | Event::Heartbeat) {
+                *self.row.rejected.entry(event.name()).or_default() += n;
+            }
+        }
+    }
+}
+
+impl Row {
+    fn plus(mut self, other: Self) -> Self {
+        self.injected += other.injected;
+        self.detected += other.detected;
+        self.harmless += other.harmless;
+        self.published_wrong += other.published_wrong;
+        self.not_recovered += other.not_recovered;
+        self.recovered_frames_max = self.recovered_frames_max.max(other.recovered_frames_max);
+        self.recovered_packets_max = self.recovered_packets_max.max(other.recovered_packets_max);
+        self.sums = [self.sums[0] + other.sums[0], self.sums[1] + other.sums[1]];
+        for (cause, n) in other.rejected {
+            *self.rejected.entry(cause).or_default() += n;
+        }
+        self
+    }
+
+    fn finished(mut self, fault: Fault) -> Self {
+        self.fault = fault.name();
+        let [frames, packets] = self.sums.map(|sum| sum as f64 / self.injected.max(1) as f64);
+        (self.recovered_frames_mean, self.recovered_packets_mean) = (frames, packets);
+        self
+    }
+}

@@ -1,0 +1,257 @@
+//! A small surface with its tree, a sender and a receiver of it.
+
+use std::collections::VecDeque;
+use std::f32::consts::{PI, TAU};
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::io;
+use std::sync::LazyLock;
+use std::time::Duration;
+
+use dibs_build::stream::{Sender, Settings, SurfaceOrder, Transport};
+use dibs_build::{Builder, BuiltTree, Mesh};
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::wire::{
+    Counters, Deframer, Event, Mac, TAG_BYTES, encode_status, enframe, framed_bytes,
+};
+use dibs_nostd::{Advance, Assembler, FrameReader, Frames, Tree, VertexTable};
+
+/// Rings of vertices between the poles, and vertices of a ring.
+const RINGS: usize = 8;
+/// Vertices of the surface.
+pub const N: usize = RINGS * RINGS + 2;
+/// Largest packet: some packets a frame.
+pub const MTU: usize = 128;
+/// The stretch that the receiver admits.
+const STRETCH: f32 = 1.3;
+/// No coordinate is larger, in mm.
+const LIMIT: f32 = 400.0;
+
+/// An egg of some 12 cm: the smallest heart takes ten times as long.
+static MESH: LazyLock<Mesh> = LazyLock::new(|| {
+    let ring = |i: usize| {
+        (0..RINGS).map(move |j| {
+            let (down, around) = ((i + 1) as f32 * PI / 9.0, j as f32 * TAU / RINGS as f32);
+            let out = down.sin() * 50.0;
+            Vec3::new(out * around.cos(), out * around.sin(), 60.0 * down.cos())
+        })
+    };
+    let mut positions = vec![Vec3::Z * 60.0];
+    positions.extend((0..RINGS).flat_map(ring));
+    positions.push(Vec3::Z * -60.0);
+    let at = |ring: usize, place: usize| (1 + ring * RINGS + place % RINGS) as u32;
+    let mut triangles = Vec::new();
+    for j in 0..RINGS {
+        triangles.push([0, at(0, j), at(0, j + 1)]);
+        for i in 1..RINGS {
+            triangles.push([at(i - 1, j), at(i, j), at(i, j + 1)]);
+            triangles.push([at(i - 1, j), at(i, j + 1), at(i - 1, j + 1)]);
+        }
+        triangles.push([at(RINGS - 1, j), N as u32 - 1, at(RINGS - 1, j + 1)]);
+    }
+    Mesh { positions, triangles }
+});
+
+/// The surface's tree.
+pub static TREE: LazyLock<BuiltTree> =
+    LazyLock::new(|| Builder::new().stretch(STRETCH).build(&MESH).expect("a tree"));
+
+/// The surface at a moment: a bump that wanders, so that from moment to moment some vertices move and
+/// some do not.
+pub fn surface(moment: u32) -> Vec<Vec3> {
+    let rest = &MESH.positions;
+    let at = rest[(moment as usize * 7) % rest.len()];
+    let push = at.normalize_or(Vec3::X) * 2.0;
+    let near = |p: Vec3| (1.0 - (p - at).length_squared() / 2_500.0).max(0.0);
+    rest.iter().map(|&p| p + push * near(p)).collect()
+}
+
+/// How a run sends.
+#[derive(Clone, Copy, Debug)]
+pub struct Case {
+    pub quantised: bool,
+    pub partial: bool,
+}
+
+/// Where the packets of a sender go, and those for it come from.
+#[derive(Default)]
+pub struct Mailbox {
+    pub sent: Vec<Vec<u8>>,
+    pub inbox: VecDeque<Vec<u8>>,
+}
+
+impl Transport for Mailbox {
+    fn send(&mut self, packet: &[u8]) -> io::Result<()> {
+        self.sent.push(packet.to_vec());
+        Ok(())
+    }
+
+    fn receive(&mut self) -> io::Result<Option<Vec<u8>>> {
+        Ok(self.inbox.pop_front())
+    }
+}
+
+/// A sender whose packets are collected.
+pub type Source<M> = Sender<Mailbox, MTU, M>;
+
+pub fn source<M: Mac>(
+    case: Case,
+    session: u32,
+    mac_of: impl Fn(u32) -> M + Send + 'static,
+) -> Source<M> {
+    let tree = TREE.tree::<u16>().expect("16-bit indices");
+    let settings = Settings {
+        quantised: case.quantised,
+        partial: case.partial.then_some(0.0),
+        heartbeat: None,
+        patience: Duration::ZERO,
+        session,
+        ..Settings::default()
+    };
+    Sender::with_mac(Mailbox::default(), SurfaceOrder::of(&tree), settings, mac_of)
+}
+
+/// The frames that were sent to the last packet, each as the receiver must have it.
+#[derive(Default)]
+pub struct Log(VecDeque<(u32, Vec<[u32; 3]>)>);
+
+/// More frames than any fault looks back.
+const REMEMBERED: usize = 64;
+
+impl Log {
+    /// Notes the frame that the sender has prepared last.
+    pub fn note<M: Mac>(&mut self, source: &Source<M>) {
+        if let Some((epoch, positions)) = source.held() {
+            let bits = positions.iter().map(|p| p.to_array().map(f32::to_bits)).collect();
+            self.0.push_back((epoch, bits));
+        }
+        if self.0.len() > REMEMBERED {
+            self.0.pop_front();
+        }
+    }
+
+    /// Takes the last frame back: it was not sent to its end.
+    pub fn forget_last(&mut self) {
+        self.0.pop_back();
+    }
+
+    /// Whether a frame of this number was sent with exactly these positions.
+    fn has(&self, epoch: u32, positions: &impl VertexTable) -> bool {
+        let is_equal = |bits: &[[u32; 3]]| {
+            (0..).zip(bits).all(|(row, bits)| {
+                positions.position(row).is_some_and(|p| p.to_array().map(f32::to_bits) == *bits)
+            })
+        };
+        self.0.iter().rev().any(|(number, bits)| *number == epoch && is_equal(bits))
+    }
+}
+
+/// The receiving end: what the bus interrupt does, and a look at what the control tick would see.
+pub struct Controller<'f, M> {
+    deframer: Deframer<MTU>,
+    assembler: Assembler<'f, &'f Tree<'f, u16>, N, M>,
+    reader: FrameReader<'f, N>,
+    /// Frames published since the start.
+    pub published: u32,
+    /// Frames that were published and had not been sent.
+    pub wrong: u64,
+}
+
+impl<'f, M: Mac> Controller<'f, M> {
+    pub fn new(frames: &'f Frames<N>, tree: &'f Tree<'f, u16>, mac: M) -> Self {
+        let (writer, reader) = frames.split().expect("new frames");
+        let assembler = Assembler::with_mac(writer, tree, tree.mesh_id(), LIMIT, mac);
+        Self { deframer: Deframer::new(), assembler, reader, published: 0, wrong: 0 }
+    }
+
+    pub fn counters(&self) -> &Counters {
+        self.assembler.counters()
+    }
+
+    /// What the receiver would report now.
+    pub fn status(&mut self) -> Vec<u8> {
+        let mesh_id = TREE.summary().mesh_id;
+        let status = self.assembler.status(0, 0);
+        let (counters, mac) = (*self.assembler.counters(), self.assembler.mac());
+        encode_status(mesh_id, &status, &counters, mac, &mut [0; MTU]).to_vec()
+    }
+
+    /// A packet arrives as a message of its own.
+    pub fn message(&mut self, packet: &[u8], log: &Log) {
+        let _ = self.assembler.accept(packet, 0);
+        self.work(log);
+    }
+
+    /// Bytes arrive on a stream.
+    pub fn bytes(&mut self, bytes: &[u8], log: &Log) {
+        for &byte in bytes {
+            match self.deframer.push(byte) {
+                None => continue,
+                Some(Ok(packet)) => drop(self.assembler.accept(packet, 0)),
+                Some(Err(error)) => self.assembler.count_framing(&error),
+            }
+            self.work(log);
+        }
+    }
+
+    /// Checks and publishes, in slices, and compares what is published with what was sent.
+    fn work(&mut self, log: &Log) {
+        for _ in 0..100 {
+            match self.assembler.advance(64) {
+                Ok(Advance::Pending) => (),
+                Ok(Advance::Published { epoch }) => {
+                    self.published += 1;
+                    let frame = self.reader.read();
+                    let is_right = frame.is_some_and(|frame| {
+                        frame.label().epoch == epoch && log.has(epoch, &frame)
+                    });
+                    self.wrong += u64::from(!is_right);
+                }
+                _ => return,
+            }
+        }
+        panic!("a check without end");
+    }
+}
+
+/// What makes tags: the hash of the standard library under a key. What is tested here is what the
+/// receiver does with tags that are wrong, not how hard they are to guess.
+#[derive(Clone, Copy)]
+pub struct Key {
+    challenge: u32,
+}
+
+impl Key {
+    pub fn new(challenge: u32) -> Self {
+        Self { challenge }
+    }
+}
+
+impl Mac for Key {
+    const TAGGED: bool = true;
+
+    fn tag(&self, session: u32, packet: &[u8]) -> [u8; TAG_BYTES] {
+        let mut hasher = DefaultHasher::new();
+        ("a key", self.challenge, session, packet).hash(&mut hasher);
+        let [tag @ .., _, _] = hasher.finish().to_le_bytes();
+        tag
+    }
+
+    fn challenge(&self) -> u32 {
+        self.challenge
+    }
+}
+
+/// A packet as it goes over a byte stream.
+pub fn framed(packet: &[u8]) -> Vec<u8> {
+    let mut line = [0; framed_bytes(MTU)];
+    enframe(packet, &mut line).expect("packets fit").to_vec()
+}
+
+/// Rejections of each cause, and what else tells of a fault: abandoned frames and duplicates.
+pub fn noticed(counters: &Counters) -> Vec<u32> {
+    Event::ALL
+        .into_iter()
+        .filter(|event| !matches!(event, Event::Published | Event::Heartbeat))
+        .map(|event| counters.of(event))
+        .collect()
+}
