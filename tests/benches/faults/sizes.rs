@@ -1,12 +1,15 @@
 //! Bytes of a frame of a beating heart, by how it is sent.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::path::Path;
 
 use anyhow::Result;
+use dibs_build::modes::ModalFit;
 use dibs_build::stream::{Sender, Settings, SurfaceOrder};
 use dibs_build::{Builder, Mesh, Motion, generate};
 use dibs_nostd::glam::Vec3;
+use dibs_nostd::modes::MAX_MODES;
 use serde::Serialize;
 
 /// Triangles of the generated heart: those of the real one.
@@ -15,8 +18,12 @@ const TRIANGLES: u32 = 10_272;
 const MTU: usize = 1024;
 /// Tolerances of partial frames, in mm.
 const TOLERANCES: [f32; 4] = [0.01, 0.05, 0.1, 0.5];
+/// Numbers of displacement modes.
+const MODES: [usize; 4] = [2, 8, 16, 64];
 /// Ticks of a control loop a second.
 const TICKS: f32 = 1_000.0;
+/// Seconds of a heartbeat, which is what both motions are.
+const BEAT: f32 = 1.0;
 
 /// One heart, sent in one way.
 #[derive(Clone, Debug, Serialize)]
@@ -30,7 +37,7 @@ pub struct Row {
     pub bytes_per_frame: f64,
     pub bytes_max: usize,
     pub packets_per_frame: f64,
-    /// No vertex is farther from where the receiver has it, in mm.
+    /// No vertex is farther from where the receiver has it, in mm; of modes, in any recorded frame.
     pub error_mm: f32,
     pub bytes_per_second: f64,
 }
@@ -72,7 +79,7 @@ fn heart(name: &'static str, mesh: &Mesh, motion: &Motion) -> Result<Vec<Row>> {
     // Any limit: what is sent does not depend on it.
     let tree = Builder::new().stretch(4.0).build(mesh)?;
     let order = SurfaceOrder::of(&tree.tree::<u16>()?);
-    let recorded = if motion.rate > 0.0 { motion.rate } else { 25.0 };
+    let recorded = motion.frames.len() as f32 / BEAT;
     let whole = |quantised| Settings { quantised, heartbeat: None, ..Settings::default() };
     let partial =
         |tolerance| Settings { partial: Some(tolerance), whole_every: u32::MAX, ..whole(true) };
@@ -113,7 +120,42 @@ fn heart(name: &'static str, mesh: &Mesh, motion: &Motion) -> Result<Vec<Row>> {
             bytes_per_second: mean * f64::from(rate),
         })
     };
-    ways.into_iter().map(row).collect()
+    let mut rows = ways.into_iter().map(row).collect::<Result<Vec<Row>>>()?;
+    rows.extend(modal(name, mesh, motion, &order)?);
+    Ok(rows)
+}
+
+/// Modal frames: nothing but the weights, one frame a control tick.
+fn modal(
+    heart: &'static str,
+    mesh: &Mesh,
+    motion: &Motion,
+    order: &SurfaceOrder,
+) -> Result<Vec<Row>> {
+    let fit = ModalFit::new(mesh, motion)?;
+    let numbers = MODES.into_iter().filter(|&modes| modes <= fit.available());
+    let last = fit.available().min(MAX_MODES).min(MODES[MODES.len() - 1]);
+    let numbers: BTreeSet<usize> = numbers.chain([last]).collect();
+    numbers
+        .into_iter()
+        .map(|modes| {
+            let settings = Settings { heartbeat: None, ..Settings::default() };
+            let mut sender = Sender::<_, MTU>::new(Vec::new(), order.clone(), settings);
+            let frame = sender.prepare_weights(&vec![1.0; modes])?;
+            let sent = sender.transmit(frame)?;
+            Ok(Row {
+                heart,
+                vertices: order.rows(),
+                frames: format!("modal, {modes} modes"),
+                rate: TICKS,
+                bytes_per_frame: sent.bytes as f64,
+                bytes_max: sent.bytes,
+                packets_per_frame: sent.packets as f64,
+                error_mm: fit.errors()[modes - 1].max as f32,
+                bytes_per_second: sent.bytes as f64 * f64::from(TICKS),
+            })
+        })
+        .collect()
 }
 
 /// The motion at a moment, in frames: between the two around it.
