@@ -66,7 +66,14 @@ fn run(arguments: &Arguments) -> Result<()> {
         println!("{row}");
     }
     println!("{per_fault} faults of each kind in {matrix_seconds:.0} s");
-    let record = record::Record { per_fault, seed: arguments.seed, matrix, corruption, sizes };
+    let record = record::Record {
+        per_fault,
+        seed: arguments.seed,
+        undetectable: record::UNDETECTABLE,
+        matrix,
+        corruption,
+        sizes,
+    };
     if let Some(path) = &arguments.write {
         // From the folder that cargo was called in, not from the package's own.
         let path = if path.is_absolute() {

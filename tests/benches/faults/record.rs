@@ -12,10 +12,22 @@ use super::{corruption, matrix, sizes};
 pub struct Record {
     pub per_fault: u64,
     pub seed: u64,
+    /// What no receiver can tell from the truth.
+    pub undetectable: [&'static str; 4],
     pub matrix: Vec<matrix::Row>,
     pub corruption: Vec<corruption::Row>,
     pub sizes: Vec<sizes::Row>,
 }
+
+/// What no receiver can tell from the truth.
+pub const UNDETECTABLE: [&str; 4] = [
+    "damage after which the CRC-32 is right again: none of up to 32 neighbouring bits, one in 2^32 of \
+     the rest; it must then pass the limits on coordinates and stretch too",
+    "without a key: a sealed frame of plausible positions, from whoever can write to the bus",
+    "without a key, or without a way back: frames of an earlier run of the sender, repeated to a \
+     receiver that has just started and has published nothing",
+    "a sender that is wrong itself, about positions within the limits",
+];
 
 impl Record {
     /// The promises that were broken.

@@ -13,7 +13,7 @@ use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
     Counters, Deframer, Event, Mac, TAG_BYTES, encode_status, enframe, framed_bytes,
 };
-use dibs_nostd::{Advance, Assembler, FrameReader, Frames, Tree, VertexTable};
+use dibs_nostd::{Advance, Assembler, FrameReader, Frames, StretchMonitor, Tree, VertexTable};
 
 /// Rings of vertices between the poles, and vertices of a ring.
 const RINGS: usize = 8;
@@ -148,7 +148,7 @@ impl Log {
 /// The receiving end: what the bus interrupt does, and a look at what the control tick would see.
 pub struct Controller<'f, M> {
     deframer: Deframer<MTU>,
-    assembler: Assembler<'f, &'f Tree<'f, u16>, N, M>,
+    assembler: Assembler<'f, StretchMonitor<'f, u16>, N, M>,
     reader: FrameReader<'f, N>,
     /// Frames published since the start.
     pub published: u32,
@@ -159,7 +159,8 @@ pub struct Controller<'f, M> {
 impl<'f, M: Mac> Controller<'f, M> {
     pub fn new(frames: &'f Frames<N>, tree: &'f Tree<'f, u16>, mac: M) -> Self {
         let (writer, reader) = frames.split().expect("new frames");
-        let assembler = Assembler::with_mac(writer, tree, tree.mesh_id(), LIMIT, mac);
+        let monitor = StretchMonitor::new(tree).expect("a tree with a metric");
+        let assembler = Assembler::with_mac(writer, monitor, tree.mesh_id(), LIMIT, mac);
         Self { deframer: Deframer::new(), assembler, reader, published: 0, wrong: 0 }
     }
 
