@@ -6,6 +6,7 @@ pub mod bus;
 pub mod deform;
 pub mod dibs;
 pub mod method;
+pub mod motions;
 pub mod oracle;
 pub mod poses;
 pub mod streams;

@@ -17,29 +17,12 @@ use dibs_nostd::{
     StretchError, Tree, Verdict, VertexTable, measure_stretch,
 };
 use dibs_tests::bus::reseal;
+use dibs_tests::motions::trembling;
 use dibs_tests::oracle::exhaustive;
 use dibs_tests::poses::pose;
 use dibs_tests::{ask, stretch};
 use fastrand::Rng;
 use glam::Vec3;
-
-/// A heart that beats, breathes and trembles: a motion with `2 waves` modes.
-fn trembling(triangles: u32, waves: usize, seed: u64) -> (Mesh, Motion) {
-    let (mesh, mut motion) = generate::heart(triangles).expect("a valid size");
-    let mut rng = Rng::with_seed(seed);
-    let mut vector = |size: f32| Vec3::from([(); 3].map(|()| (rng.f32() - 0.5) * size));
-    let waves: Vec<[Vec3; 2]> = (0..waves).map(|_| [vector(0.12), vector(1.0)]).collect();
-    let frames = motion.frames.len() as f32;
-    for (time, frame) in motion.frames.iter_mut().enumerate() {
-        for (position, rest) in frame.iter_mut().zip(&mesh.positions) {
-            for (number, [wave, size]) in (1..).zip(&waves) {
-                let turn = std::f32::consts::TAU * (number * time) as f32 / frames;
-                *position += *size * ((wave.dot(*rest) + turn).sin() - wave.dot(*rest).sin());
-            }
-        }
-    }
-    (mesh, motion)
-}
 
 fn positions(surface: &impl VertexTable) -> Vec<Vec3> {
     let rows = 0..surface.len() as u32;

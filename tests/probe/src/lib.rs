@@ -6,9 +6,10 @@
 #![forbid(unsafe_code)]
 
 use dibs_nostd::glam::Vec3;
+use dibs_nostd::modes::{MAX_MODES, Memo, ModalSurface, Modes};
 use dibs_nostd::{
-    Budget, Capsule, MeasuredStretch, Options, Proximity, Query, Sphere, Tool, Tree,
-    measure_stretch,
+    Budget, Capsule, MeasuredStretch, Options, Proximity, Query, QueryError, Sphere, Tool, Tree,
+    VertexTable, measure_stretch,
 };
 
 /// What a word at the start of a record means.
@@ -22,6 +23,10 @@ pub mod command {
     pub const FRAME: u32 = 2;
     /// A query: [`QUERY_WORDS`](super::QUERY_WORDS). Answered by [`ANSWER_WORDS`](super::ANSWER_WORDS).
     pub const QUERY: u32 = 3;
+    /// A modal frame, of a tree with modes: 1 for queries that remember positions and 0 for others, the
+    /// number of weights, then an `f32` each. Answered by what bounding its stretch took and the
+    /// bound's bits; then by what computing every position took, and a hash of their bits.
+    pub const WEIGHTS: u32 = 4;
 }
 
 /// Words of a query: the axis' ends, the radius, 1 for a capsule and 0 for a sphere, 1 to use the
@@ -33,6 +38,19 @@ pub const ANSWER_WORDS: usize = 24;
 pub const TREE_BYTES: usize = 1 << 20;
 /// Most vertices.
 pub const VERTICES: usize = 1 << 15;
+
+/// Positions that a query of a modal frame remembers, if it does.
+const SLOTS: usize = 256;
+
+/// Where positions come from.
+enum Table<'a> {
+    /// From the rows of a frame.
+    Rows,
+    /// From weights.
+    Modal(ModalSurface<'a, MAX_MODES>),
+    /// From weights, and from memory.
+    Remembered(ModalSurface<'a, MAX_MODES>),
+}
 
 /// What a program must offer to run a script.
 pub trait Machine {
@@ -102,6 +120,7 @@ fn queries(
     let mut query = Query::<_, 64>::new(tree).map_err(|_| Fault)?;
     let rows = rows.get_mut(..tree.vertex_count() as usize).ok_or(Fault)?;
     let mut measured = None;
+    let mut table = Table::Rows;
     loop {
         match word(machine)? {
             command::FRAME => {
@@ -112,19 +131,55 @@ fn queries(
                 let stretch = measure_stretch(tree, &*rows).map_err(|_| Fault)?;
                 let took = machine.clock().wrapping_sub(start);
                 measured = Some(stretch);
+                table = Table::Rows;
                 put(machine, &[took, stretch.sigma().to_bits()])?;
             }
             command::QUERY => {
-                let answer = ask(&mut query, rows, measured, machine)?;
+                let answer = ask(&mut query, &table, rows, measured, machine)?;
                 put(machine, &answer)?;
+            }
+            command::WEIGHTS => {
+                let remembers = word(machine)? != 0;
+                let (surface, bound) = modal(&Modes::of(tree).map_err(|_| Fault)?, machine)?;
+                measured = Some(bound);
+                table = if remembers { Table::Remembered(surface) } else { Table::Modal(surface) };
             }
             other => return Ok(other),
         }
     }
 }
 
+/// The surface of a modal frame, and the bound of its stretch.
+fn modal<'a>(
+    modes: &Modes<'a>,
+    machine: &mut impl Machine,
+) -> Result<(ModalSurface<'a, MAX_MODES>, MeasuredStretch), Fault> {
+    let mut weights = [0.0; MAX_MODES];
+    let count = word(machine)? as usize;
+    let weights = weights.get_mut(..count).ok_or(Fault)?;
+    for weight in weights.iter_mut() {
+        *weight = f32::from_bits(word(machine)?);
+    }
+    let start = machine.clock();
+    let bound = modes.stretch_bound(weights).map_err(|_| Fault)?;
+    let took = machine.clock().wrapping_sub(start);
+    put(machine, &[took, bound.sigma().to_bits()])?;
+    let start = machine.clock();
+    let surface = modes.surface(weights).map_err(|_| Fault)?;
+    let mut hash = 0;
+    for row in 0..modes.vertex_count() {
+        for axis in surface.position(row).ok_or(Fault)?.to_array() {
+            hash = u32::rotate_left(hash, 5) ^ axis.to_bits();
+        }
+    }
+    let took = machine.clock().wrapping_sub(start);
+    put(machine, &[took, hash])?;
+    Ok((surface, bound))
+}
+
 fn ask(
     query: &mut Query<'_, u16, 64>,
+    table: &Table<'_>,
     rows: &[Vec3],
     measured: Option<MeasuredStretch>,
     machine: &mut impl Machine,
@@ -144,22 +199,36 @@ fn ask(
     }
     if is_capsule {
         let tool = Capsule::new(start, end, radius).map_err(|_| Fault)?;
-        timed(query, rows, &tool, &options, machine)
+        timed(query, table, rows, &tool, &options, machine)
     } else {
         let tool = Sphere::new(start, radius).map_err(|_| Fault)?;
-        timed(query, rows, &tool, &options, machine)
+        timed(query, table, rows, &tool, &options, machine)
     }
 }
 
 fn timed(
     query: &mut Query<'_, u16, 64>,
+    table: &Table<'_>,
     rows: &[Vec3],
     tool: &impl Tool,
     options: &Options,
     machine: &impl Machine,
 ) -> Result<[u32; ANSWER_WORDS], Fault> {
+    match table {
+        Table::Rows => clocked(machine, || query.closest(rows, tool, options)),
+        Table::Modal(surface) => clocked(machine, || query.closest(surface, tool, options)),
+        Table::Remembered(surface) => {
+            clocked(machine, || query.closest(&Memo::<_, SLOTS>::new(surface), tool, options))
+        }
+    }
+}
+
+fn clocked(
+    machine: &impl Machine,
+    ask: impl FnOnce() -> Result<Proximity, QueryError>,
+) -> Result<[u32; ANSWER_WORDS], Fault> {
     let before = machine.clock();
-    let answer = query.closest(rows, tool, options);
+    let answer = ask();
     let took = machine.clock().wrapping_sub(before);
     Ok(words(took, &answer.map_err(|_| Fault)?))
 }

@@ -115,7 +115,7 @@ fn usual(answers: &Answers, figures: &mut Figures) {
     }
     let a_triangle = answers.iter().filter_map(|answer| match answer.record {
         Record::Stretch(triangles) => Some(f64::from(answer.instructions()) / f64::from(triangles)),
-        Record::Query { .. } => None,
+        _ => None,
     });
     figures.note("m7.stretch", a_triangle.fold(0.0, f64::max).round());
 }

@@ -3,6 +3,7 @@
 mod bits;
 mod cost;
 mod figures;
+mod modes;
 mod probe;
 mod script;
 
@@ -30,5 +31,6 @@ pub fn run(options: &Options) -> Result<()> {
     }
     bits::check(&cross, options.queries, &mut figures)?;
     cost::check(&cross, options.queries, &mut figures)?;
+    modes::check(&cross, &mut figures)?;
     Ok(())
 }

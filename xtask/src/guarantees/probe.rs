@@ -66,7 +66,7 @@ impl Answers {
 
 fn length(record: Record) -> usize {
     match record {
-        Record::Stretch(_) => 2,
+        Record::Stretch(_) | Record::Bound | Record::Positions(_) => 2,
         Record::Query { .. } => ANSWER_WORDS,
     }
 }

@@ -1,8 +1,11 @@
 //! Scripts for the probe: surfaces, frames and queries, as words.
 
+use dibs_build::modes::ModalFit;
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
-use dibs_nostd::{Budget, Cost};
+use dibs_nostd::modes::{MAX_MODES, Modes};
+use dibs_nostd::{Budget, Cost, VertexTable};
 use dibs_tests::deform::Deformation;
+use dibs_tests::motions::trembling;
 use dibs_tests::oracle::Instrument;
 use dibs_tests::poses::pose;
 use dibs_tests::surfaces;
@@ -23,6 +26,10 @@ pub struct Script {
 pub enum Record {
     /// The stretch of a frame of this many triangles.
     Stretch(u32),
+    /// The bound of a modal frame's stretch.
+    Bound,
+    /// Every position of a modal frame of this many vertices.
+    Positions(u32),
     /// A query.
     Query {
         /// Whether the tool is a capsule.
@@ -83,13 +90,46 @@ impl Script {
             let rows = built.to_rows(positions);
             script.rows(&rows, triangles.len() as u32);
             for number in 0..queries.div_ceil(8) {
-                let [a, ..] = triangles[rng.usize(..triangles.len())].map(|v| rows[v as usize]);
-                let away = a.normalize_or(Vec3::Z) * 60.0 * rng.f32();
-                let tool = match number % 2 {
-                    0 => Instrument::sphere(a + away, 2.5),
-                    _ => Instrument::capsule(a + away, a + away * 1.5 + Vec3::Z * 60.0, 2.5),
-                };
+                let tool = about(&rows, &triangles, number, &mut rng);
                 script.query(&tool, number % 2 == 1, true, u32::MAX, Budget::UNLIMITED, None);
+            }
+        }
+        script.words.push(command::END);
+        script
+    }
+
+    /// A heart with this many modes: each frame as rows, as weights, and as weights with a memory of
+    /// positions, and the same queries of each.
+    pub fn modal(modes: usize, queries: usize, seed: u64) -> Self {
+        let mut rng = Rng::with_seed(seed);
+        let (mesh, motion) = trembling(10_272, modes.div_ceil(2), seed);
+        let fit = ModalFit::new(&mesh, &motion).expect("a motion");
+        let built = build(&mesh, 4).with_modes(&fit, modes).expect("so many");
+        let tree = built.tree::<u16>().expect("16-bit indices");
+        let shape = Modes::of(&tree).expect("with modes");
+        let triangles = surfaces::triangles(&tree);
+        let mut script = Self::default();
+        script.tree(&built);
+        for weights in built.modal_motion().expect("with modes").weights.iter().step_by(3) {
+            let surface = shape.surface::<MAX_MODES>(weights).expect("recorded");
+            let rows = 0..tree.vertex_count();
+            let rows: Vec<Vec3> = rows.filter_map(|row| surface.position(row)).collect();
+            let tools: Vec<Instrument> =
+                (0..queries).map(|number| about(&rows, &triangles, number, &mut rng)).collect();
+            for table in [None, Some(0), Some(1)] {
+                match table {
+                    None => script.rows(&rows, triangles.len() as u32),
+                    Some(remembers) => {
+                        script.words.extend([command::WEIGHTS, remembers, weights.len() as u32]);
+                        script.words.extend(weights.iter().map(|weight| weight.to_bits()));
+                        script.records.push(Record::Bound);
+                        script.records.push(Record::Positions(rows.len() as u32));
+                    }
+                }
+                for tool in &tools {
+                    let is_capsule = tool.start != tool.end;
+                    script.query(tool, is_capsule, true, u32::MAX, Budget::UNLIMITED, None);
+                }
             }
         }
         script.words.push(command::END);
@@ -177,6 +217,16 @@ impl Script {
         self.words.extend([u32::from(is_capsule), u32::from(measured), warm]);
         self.words.extend([budget.node_tests, budget.triangle_tests]);
         self.records.push(Record::Query { is_capsule, deadline });
+    }
+}
+
+/// A tool that wanders about a surface: a sphere and a capsule by turns.
+fn about(rows: &[Vec3], triangles: &[[u32; 3]], number: usize, rng: &mut Rng) -> Instrument {
+    let [a, ..] = triangles[rng.usize(..triangles.len())].map(|v| rows[v as usize]);
+    let away = a.normalize_or(Vec3::Z) * 60.0 * rng.f32();
+    match number % 2 {
+        0 => Instrument::sphere(a + away, 2.5),
+        _ => Instrument::capsule(a + away, a + away * 1.5 + Vec3::Z * 60.0, 2.5),
     }
 }
 

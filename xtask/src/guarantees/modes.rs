@@ -1,0 +1,69 @@
+//! Modal surfaces on the board: the host's bits, and what a vertex, a bound and a query take.
+
+use anyhow::{Result, ensure};
+
+use super::bits::compare;
+use super::figures::Figures;
+use super::probe::{Answers, Build, build_for_board, on_board};
+use super::script::{Record, Script};
+use crate::toolchain::Cross;
+
+/// Numbers of modes that are measured.
+const MODES: [usize; 2] = [8, 16];
+
+/// Queries of each frame.
+const QUERIES: usize = 40;
+
+pub fn check(cross: &Cross, figures: &mut Figures) -> Result<()> {
+    let program = build_for_board(cross, "probe")?;
+    for modes in MODES {
+        let script = Script::modal(modes, QUERIES, 41);
+        let answers = on_board(&program, &script, true)?;
+        compare(&Build::Release.answers(&script)?, &answers, "modal surfaces on the M7")?;
+        ensure!(agree(&answers), "a modal surface and its rows gave different answers");
+        let note = |figures: &mut Figures, name: &str, value: f64| {
+            figures.note(&format!("modes.{modes}.{name}"), value.round());
+        };
+        let mut vertices = Vec::new();
+        let mut bounds = Vec::new();
+        let mut queries: [Vec<f64>; 3] = Default::default();
+        let mut table = 0;
+        for answer in answers.iter() {
+            let instructions = f64::from(answer.instructions());
+            match answer.record {
+                Record::Stretch(_) => table = 0,
+                Record::Bound => {
+                    bounds.push(instructions);
+                    table = if table == 1 { 2 } else { 1 };
+                }
+                Record::Positions(count) => vertices.push(instructions / f64::from(count)),
+                Record::Query { .. } => queries[table].push(instructions),
+            }
+        }
+        note(figures, "vertex", mean(&vertices));
+        note(figures, "bound", mean(&bounds));
+        for (name, queries) in ["rows", "weights", "remembered"].iter().zip(&queries) {
+            note(figures, &format!("query.{name}"), mean(queries));
+            let most = queries.iter().copied().fold(0.0, f64::max);
+            note(figures, &format!("query.{name}.largest"), most);
+        }
+    }
+    Ok(())
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Whether each query of a frame found the same separation in rows, weights and memory.
+fn agree(answers: &Answers) -> bool {
+    let separations: Vec<u32> = answers
+        .iter()
+        .filter(|answer| matches!(answer.record, Record::Query { .. }))
+        .map(|answer| answer.words[3])
+        .collect();
+    separations.chunks(3 * QUERIES).all(|of_frame| {
+        let (rows, modal) = of_frame.split_at(QUERIES);
+        modal.chunks(QUERIES).all(|queries| queries == rows)
+    })
+}
