@@ -202,8 +202,8 @@ fn largest([low, high]: &[f32; 2]) -> f64 {
 }
 
 /// How far an axis of a computed position is, at most, from the sum that it stands for: gains are
-/// rounded and cut to integers, the sum is cut to its unit, then converted, and added to the rest
-/// position.
+/// rounded and cut to integers, each mode's share is cut to the unit of the sum, and that is converted
+/// and added to the rest position.
 fn evaluation_error(
     rest: &[Vec3],
     modes: &[QuantisedMode],
@@ -211,9 +211,9 @@ fn evaluation_error(
     weights: impl Iterator<Item = f64>,
 ) -> f64 {
     const U: f64 = 1.0 / 16_777_216.0;
-    let (mut units, mut reach) = (1.0, 0.0);
+    let (mut units, mut reach) = (0.0, 0.0);
     for (mode, weight) in modes.iter().zip(weights) {
-        units += 0.5 * (weight * f64::from(gain(mode, unit)) * U + 1.0);
+        units += 0.5 * (weight * f64::from(gain(mode, unit)) * U + 1.0) + 1.0;
         reach += weight * mode.step * 32_768.0;
     }
     let farthest = rest.iter().map(|p| f64::from(p.abs().max_element())).fold(0.0, f64::max);

@@ -29,7 +29,7 @@ pub fn quantise(mode: &[DVec3]) -> Option<QuantisedMode> {
     Some(QuantisedMode { rows: mode.iter().map(|d| d.to_array().map(code)).collect(), step })
 }
 
-/// Unit of a displacement sum (mm), a power of two: the largest sum takes 28 bits of it, or little
+/// Unit of a displacement sum (mm), a power of two: the largest sum takes 27 bits of it, or one
 /// less.
 pub fn unit(modes: &[QuantisedMode], largest_weights: impl Iterator<Item = f64>) -> f64 {
     let steps = modes.iter().map(|mode| mode.step * 32_768.0);

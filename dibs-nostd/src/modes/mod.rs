@@ -37,10 +37,10 @@ use crate::{Index, Tree, format};
 /// Most modes of a surface.
 pub const MAX_MODES: usize = 64;
 
-/// Bits of a displacement sum below its unit.
+/// Bits of a weight times a displacement below the unit of their sum.
 pub const FRACTION_BITS: u32 = 16;
 
-/// Largest sum, over the modes, of largest weight times gain: a displacement sum then fits 46 bits.
+/// Largest sum, over the modes, of largest weight times gain: a displacement sum then fits 29 bits.
 pub const MAX_GAIN: f32 = 536_870_912.0;
 
 /// The displacement modes that a tree carries, validated once: a view of bytes in flash.

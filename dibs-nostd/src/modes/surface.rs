@@ -10,9 +10,9 @@ use crate::{VertexTable, format};
 /// A copy of its weights and a view of flash; nothing else is stored, and nothing is computed for a
 /// vertex that nobody asks for. `K` is the room for weights, at least [`Modes::count`].
 ///
-/// The displacement is summed in integers: a 16-bit displacement times a 32-bit weight is exact in 64
-/// bits, in any order, and on a Cortex-M7 one instruction. What is rounded is the sum, once, to 32
-/// bits, its conversion, and its sum with the rest position: the same bits on host and target.
+/// The displacement is summed in integers: a 32-bit weight times a 16-bit displacement, the upper 32 of
+/// 48 bits, added up. That is one instruction on a Cortex-M7 and three of floats, and the same bits in
+/// any order. Its conversion and its sum with the rest position are rounded as all floats are.
 ///
 /// RAM: `4 K` bytes and a copy of [`Modes`].
 #[derive(Clone, Copy, Debug)]
@@ -48,15 +48,19 @@ impl<const K: usize> VertexTable for ModalSurface<'_, K> {
     #[inline(always)]
     fn position(&self, vertex: u32) -> Option<Vec3> {
         let rest = format::rest_position(self.modes.rest, vertex)?;
-        let (mut x, mut y, mut z) = (0_i64, 0_i64, 0_i64);
+        let (mut x, mut y, mut z) = (0_i32, 0_i32, 0_i32);
         for (&gain, &[x0, x1, y0, y1, z0, z1]) in self.gains.iter().zip(self.modes.row(vertex)?) {
-            let gain = i64::from(gain);
-            x += gain * i64::from(i16::from_le_bytes([x0, x1]));
-            y += gain * i64::from(i16::from_le_bytes([y0, y1]));
-            z += gain * i64::from(i16::from_le_bytes([z0, z1]));
+            // The layout's check bounds the sums: nothing wraps.
+            x = x.wrapping_add(scaled(gain, [x0, x1]));
+            y = y.wrapping_add(scaled(gain, [y0, y1]));
+            z = z.wrapping_add(scaled(gain, [z0, z1]));
         }
-        // The layout's check bounds the sums: below 2^31 after the shift.
-        let [x, y, z] = [x, y, z].map(|sum| (sum >> FRACTION_BITS) as i32 as f32);
-        Some(rest + Vec3::new(x, y, z) * self.modes.header.unit)
+        Some(rest + Vec3::new(x as f32, y as f32, z as f32) * self.modes.header.unit)
     }
+}
+
+/// One axis of one mode's share, in units: `smlawb` or `smlawt` on ARM, with the sum that it goes to.
+#[inline(always)]
+const fn scaled(gain: i32, displacement: [u8; 2]) -> i32 {
+    ((gain as i64 * i16::from_le_bytes(displacement) as i64) >> FRACTION_BITS) as i32
 }
