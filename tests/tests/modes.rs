@@ -11,7 +11,7 @@ use dibs_nostd::format::CRC;
 use dibs_nostd::modes::{
     self, MAX_MODES, Memo, ModalGate, ModalReader, ModalSurface, Modes, WeightsError,
 };
-use dibs_nostd::wire::{self, Encoding, FrameEncoder, FrameId, WeightsEncoder};
+use dibs_nostd::wire::{self, Encoding, Event, FrameEncoder, FrameId, WeightsEncoder};
 use dibs_nostd::{
     Advance, Assembler, Changed, Frames, Gate, Index, Options, Query, Rejection, Sphere,
     StretchError, Tree, Verdict, VertexTable, measure_stretch,
@@ -416,7 +416,11 @@ fn hostile_frames_of_weights_are_rejected_and_counted() {
             assert_eq!(outcome, Err(Rejection::NotFinite { row }));
         }
     }
+    let counted = |bus: &Bus, event| bus.assembler.counters().of(event);
+    assert_eq!(counted(&bus, Event::TooFar), 12);
+    assert_eq!(counted(&bus, Event::NotFinite), 12);
     assert!(bus.send(97, &good[1..]).is_err());
+    assert_eq!(counted(&bus, Event::RowCount), 1);
     let id = FrameId { mesh_id: bus.tree.mesh_id(), session: 1, epoch: 98 };
     let mut vertices = FrameEncoder::<_, 64>::new(id, Encoding::Float, &[Vec3::ZERO; 4][..]);
     let mut buffer = [0; 64];
