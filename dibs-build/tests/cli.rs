@@ -1,8 +1,12 @@
 //! The `dibs` program, as a script would run it.
 
+use dibs_nostd::modes::{ModalGate, ModalReader, Modes};
+use dibs_nostd::{Advance, Assembler, Frames, Tree, VertexTable};
 use serde_json::Value;
+use std::net::UdpSocket;
 use std::path::Path;
 use std::process::{Command, Output};
+use std::time::Duration;
 
 fn dibs(folder: &Path, line: &str) -> Output {
     Command::new(env!("CARGO_BIN_EXE_dibs"))
@@ -179,6 +183,52 @@ fn modes_are_fitted_shown_and_written() {
     }
     let before = std::fs::read_to_string(folder.join("old.dibs")).unwrap();
     assert_eq!(before, "what was there before");
+}
+
+/// From the program, over UDP, to the surface that a controller searches.
+#[test]
+fn weights_are_streamed() {
+    const MODES: usize = 2;
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeeds(folder, "generate heart --triangles 1000 -o heart.ply --motion heart.pc2");
+    succeeds(folder, "build heart.ply -o heart.dibs --motion heart.pc2 --modes 2");
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    socket.set_read_timeout(Some(Duration::from_millis(500))).unwrap();
+    let to = format!("--to udp:{} --modes", socket.local_addr().unwrap());
+    let sent = json(folder, &format!("stream heart.dibs heart.pc2 {to} --rate 500 --json"));
+    assert_eq!(sent["frames"], 25);
+    // A begin of 64 bytes, two weights in 32, and a commit of 32.
+    assert!(sent["bytes_per_frame"].as_f64().unwrap() >= 128.0, "{sent}");
+
+    let blob: &'static [u8] = std::fs::read(folder.join("heart.dibs")).unwrap().leak();
+    let tree = Tree::<u16>::from_bytes(blob).unwrap();
+    let modes = Modes::of(&tree).unwrap();
+    let frames: &'static Frames<MODES> = Box::leak(Box::new(Frames::new()));
+    let (writer, reader) = frames.split().unwrap();
+    let gate = ModalGate::<_, MODES>::new(&modes, &tree).unwrap();
+    let mut assembler = Assembler::new(writer, gate, tree.mesh_id(), 1e4);
+    let mut reader = ModalReader::new(reader, &modes).unwrap();
+    let motion = dibs_build::Motion::read_pc2(folder.join("heart.pc2")).unwrap();
+    let (mut buffer, mut published) = ([0; 2048], 0);
+    while let Ok(length) = socket.recv(&mut buffer) {
+        assembler.accept(&buffer[..length], 0).unwrap();
+        let Ok(Advance::Published { .. }) = assembler.advance(u32::MAX) else { continue };
+        let (frame, recorded) = (reader.read().unwrap(), &motion.frames[published]);
+        for row in 0..tree.vertex_count() {
+            let exact = recorded[tree.vertex_number(row).unwrap() as usize];
+            let away = frame.position(row).unwrap().distance(exact);
+            assert!(away <= frame.label().position_error, "frame {published}, row {row}: {away}");
+        }
+        published += 1;
+    }
+    assert_eq!(published, 25);
+
+    succeeds(folder, "build heart.ply -o bare.dibs");
+    let error = fails(folder, &format!("stream bare.dibs heart.pc2 {to}"));
+    assert!(error.contains("--motion and --modes"), "{error}");
+    let error = fails(folder, &format!("stream heart.ply heart.pc2 {to}"));
+    assert!(error.contains("heart.ply"), "{error}");
 }
 
 /// The program and the library agree on every malformed file; what the library must say about

@@ -46,7 +46,11 @@ impl SurfaceOrder {
         self.order.len()
     }
 
-    fn to_rows(&self, positions: &[Vec3]) -> Result<Vec<Vec3>, SendError> {
+    /// Puts positions in the mesh's order into that of the tree's rows.
+    ///
+    /// # Errors
+    /// [`SendError::Vertices`] where a vertex of the tree has none.
+    pub fn to_rows(&self, positions: &[Vec3]) -> Result<Vec<Vec3>, SendError> {
         let row = |&vertex: &u32| {
             positions
                 .get(vertex as usize)

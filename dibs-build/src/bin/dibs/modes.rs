@@ -1,8 +1,11 @@
-//! Displacement modes for `dibs build`.
+//! Displacement modes for `dibs build` and `dibs stream`.
 
+use crate::tree_file::{self, AnyTree};
 use anyhow::{Result, anyhow};
-use dibs_build::modes::{ModalError, ModalFit};
+use dibs_build::modes::{ModalError, ModalFit, Projector};
+use dibs_build::stream::SurfaceOrder;
 use dibs_build::{BuiltTree, Mesh, Motion};
+use dibs_nostd::modes::Modes;
 use std::path::{Path, PathBuf};
 
 /// The modes of a motion file.
@@ -55,4 +58,28 @@ impl Fit {
             }
         }
     }
+}
+
+/// The weights of a motion's frames for the modes of a tree file, all of them such as a receiver takes.
+pub fn weights(path: &Path, order: &SurfaceOrder, motion: &Motion) -> Result<Vec<Vec<f32>>> {
+    let bytes = tree_file::load(path)?;
+    let name = path.display();
+    let modes = match tree_file::validate(&bytes, path)? {
+        AnyTree::Narrow(tree) => Modes::of(&tree),
+        AnyTree::Wide(tree) => Modes::of(&tree),
+    }
+    .map_err(|error| anyhow!("{name}: {error}; build it with --motion and --modes"))?;
+    let projector = Projector::new(&modes).map_err(|error| anyhow!("{name}: {error}"))?;
+    let of_frame = |(frame, positions): (usize, &Vec<_>)| {
+        let rows = order.to_rows(positions).map_err(|error| anyhow!("{name}: {error}"))?;
+        let weights = projector.weights(&rows);
+        modes.check(&weights).map_err(|error| {
+            anyhow!(
+                "{name}: frame {frame} cannot be sent: {error}; build the tree with modes of this \
+                 motion"
+            )
+        })?;
+        Ok(weights)
+    };
+    motion.frames.iter().enumerate().map(of_frame).collect()
 }

@@ -1,5 +1,6 @@
 //! `dibs stream`: a recorded motion, sent to a controller.
 
+use crate::modes;
 use crate::tree_file::{self, AnyTree};
 use anyhow::{Context, Result, anyhow, bail};
 use dibs_build::stream::{Line, Sender, Sent, Settings, SurfaceOrder, Target};
@@ -22,6 +23,7 @@ const SILENT: Duration = Duration::from_secs(2);
 Examples:
   dibs stream heart.dibs heart.pc2 --to serial:/dev/ttyUSB0@921600 --quantise --partial 0.05 --loop
   dibs stream heart.dibs heart.pc2 --to tcp:192.168.1.20:5000 --rate 40
+  dibs stream heart.dibs heart.pc2 --to udp:192.168.1.20:5000 --rate 1000 --modes
   dibs stream heart.ply heart.pc2 --to unix:/tmp/uart --frames 100 --json
 
 An emulated serial line is a server for this: qemu-system-arm -serial unix:/tmp/uart,server=on,wait=off")]
@@ -43,6 +45,9 @@ pub struct Args {
     /// Send only the vertices that moved by more than this (in the mesh's unit)
     #[arg(long, value_name = "TOLERANCE")]
     partial: Option<f32>,
+    /// Send the weights of the displacement modes that the tree was built with, instead of positions
+    #[arg(long, conflicts_with_all = ["quantise", "partial"])]
+    modes: bool,
     /// A file with the 16 bytes of the key that the receiver has: every packet gets a tag
     #[arg(long)]
     key: Option<PathBuf>,
@@ -78,6 +83,8 @@ pub fn run(args: &Args) -> Result<()> {
     if args.partial.is_some_and(|tolerance| !(tolerance >= 0.0 && tolerance.is_finite())) {
         bail!("--partial: a tolerance is a length of at least 0");
     }
+    let weights =
+        if args.modes { Some(modes::weights(&args.surface, &order, &motion)?) } else { None };
     let settings =
         Settings { quantised: args.quantise, partial: args.partial, ..Settings::default() };
     let line = args.to.open().map_err(|error| anyhow!("{error}"))?;
@@ -99,8 +106,14 @@ pub fn run(args: &Args) -> Result<()> {
             due = now;
         }
         due += interval;
-        let frame = &motion.frames[(number % motion.frames.len() as u64) as usize];
-        let sent = sender.send(frame).map_err(|error| anyhow!("{name}: {error}"))?;
+        let frame = (number % motion.frames.len() as u64) as usize;
+        let sent = match &weights {
+            Some(weights) => {
+                sender.prepare_weights(&weights[frame]).and_then(|frame| sender.transmit(frame))
+            }
+            None => sender.send(&motion.frames[frame]),
+        };
+        let sent = sent.map_err(|error| anyhow!("{name}: {error}"))?;
         display.show(&sender, &sent);
     }
     // What is on its way is to be acknowledged, where anybody does.
@@ -193,11 +206,12 @@ impl Display {
 
 fn line(sender: &Sender<Line, MTU>, sent: &Sent) -> String {
     let kind = match sent.content {
-        Content::Whole => "whole",
-        _ => "partial",
+        Content::Whole => "whole, of vertices:",
+        Content::Modal => "modal, of weights:",
+        _ => "partial, of vertices:",
     };
     let Sent { epoch, bytes, rows, .. } = sent;
-    let mut text = format!("frame {epoch}: {bytes} bytes, {kind}, {rows} vertices");
+    let mut text = format!("frame {epoch}: {bytes} bytes, {kind} {rows}");
     match (sender.status(), sender.acknowledged()) {
         (None, _) => text += "; no status from the receiver yet",
         (Some(_), None) => text += "; nothing published yet",
