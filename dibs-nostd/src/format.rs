@@ -244,6 +244,12 @@ pub(crate) const fn metric(metric: &[u8], row: u32) -> Option<([f32; 3], bool)> 
     Some(([first.abs(), second, third], first.is_sign_negative()))
 }
 
+/// Whether a row of the metric section continues the fan of the row before.
+#[inline(always)]
+pub(crate) const fn continues_fan(row: &[u8; METRIC_BYTES]) -> bool {
+    row[3] & 0x80 != 0
+}
+
 #[inline(always)]
 pub(crate) const fn limit_code(limits: &[u8], row: u32) -> Option<u32> {
     let Some(tail) = rows_from(limits, row, LIMIT_BYTES) else { return None };

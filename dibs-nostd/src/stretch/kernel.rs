@@ -155,55 +155,69 @@ fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
         return Err(corrupt);
     };
     let at = |row: u32| surface.position(row).ok_or(StretchError::Corrupt { row });
-    let mut row = rows.start;
+    // Here, not behind the reference: it is compared with at every triangle.
+    let mut largest = worst.squared;
     // The fan's centre, and the edge from it that the next triangle shares.
     let mut centre = Vec3::ZERO;
     let mut first = Vec3::ZERO;
     let mut first_squared = 0.0;
     // No triangle before this run was looked at: it starts its fan anew.
     let mut fresh = true;
-    for (metric, corners) in metrics.iter().zip(triangles) {
-        let Some((rest, continues)) = format::metric(metric, 0) else { return Err(corrupt) };
-        let Some([a, b, c]) = format::triangle::<I>(corners, 0) else { return Err(corrupt) };
-        if !continues || fresh {
+    for ((metric, corners), row) in metrics.iter().zip(triangles).zip(rows.clone()) {
+        let corner = |number| format::vertex_number::<I>(corners, number);
+        if fresh || !format::continues_fan(metric) {
+            let (Some(a), Some(b)) = (corner(0), corner(1)) else { return Err(corrupt) };
             if a >= ready || b >= ready {
-                break;
+                return Ok(row);
             }
             centre = at(a)?;
             first = at(b)? - centre;
             first_squared = first.length_squared();
             fresh = false;
         }
+        let Some(c) = corner(2) else { return Err(corrupt) };
         if c >= ready {
-            break;
+            return Ok(row);
         }
         let second = at(c)? - centre;
         let second_squared = second.length_squared();
         let now = [first_squared, M::between(first, second), second_squared];
-        if !M::within(&rest, &now, worst.squared) {
-            raise::<I, M>(tree, row, &rest, &now, worst)?;
+        let Some((rest, _)) = format::metric(metric, 0) else { return Err(corrupt) };
+        if !M::within(&rest, &now, largest) {
+            let ([a, h, d], [g1, g2, g3]) = (rest, now);
+            match squared_stretch::<M>(a, h, d, g1, g2, g3, squared_limit(tree.stretch())) {
+                Ok(squared) if squared > largest => {
+                    largest = squared;
+                    *worst = Worst { squared, triangle: row };
+                }
+                Ok(_) => (),
+                Err(squared) => return Err(exceeded(tree, row, squared)),
+            }
         }
         first = second;
         first_squared = second_squared;
-        row += 1;
     }
-    Ok(row)
+    Ok(rows.end)
 }
 
-/// A triangle beyond the largest stretch so far: the new one, if it is within the limit.
+/// The squared stretch of a triangle, rounded up; as an error if it is not certainly within the limit.
+///
+/// Takes numbers, not arrays: those would be written to memory for every triangle.
 #[cold]
 #[inline(never)]
-fn raise<I: Index, M: Measure>(
-    tree: &Tree<'_, I>,
-    triangle: u32,
-    rest: &Squares,
-    now: &Squares,
-    worst: &mut Worst,
-) -> Result<(), StretchError> {
-    let limit = squared_limit(tree.stretch());
+fn squared_stretch<M: Measure>(
+    a: f32,
+    h: f32,
+    d: f32,
+    g1: f32,
+    g2: f32,
+    g3: f32,
+    limit: f32,
+) -> Result<f32, f32> {
+    let (rest, now) = (&[a, h, d], &[g1, g2, g3]);
     let estimate = M::estimate(rest, now);
+    let mut squared = if estimate.is_nan() { estimate } else { f32::INFINITY };
     // The estimate may be too low by its rounding: a step more, and twice that, until it passes.
-    let mut squared = f32::INFINITY;
     let mut step = 4.0 * U;
     for _ in 0..24 {
         let candidate = estimate * (1.0 + step);
@@ -213,19 +227,13 @@ fn raise<I: Index, M: Measure>(
         }
         step *= 2.0;
     }
-    if estimate.is_nan() {
-        squared = estimate;
+    if squared <= limit {
+        Ok(squared)
+    } else if M::within(rest, now, limit) {
+        Ok(limit)
+    } else {
+        Err(squared)
     }
-    if !(squared <= limit) {
-        if !M::within(rest, now, limit) {
-            return Err(exceeded(tree, triangle, squared));
-        }
-        squared = limit;
-    }
-    if squared > worst.squared {
-        *worst = Worst { squared, triangle };
-    }
-    Ok(())
 }
 
 /// The square of a stretch limit, rounded down.
@@ -239,6 +247,7 @@ pub(super) fn root_up(squared: f32) -> f32 {
 }
 
 /// Names a triangle beyond its limit, both in terms of its rest shape.
+#[cold]
 fn exceeded<I: Index>(tree: &Tree<'_, I>, triangle: u32, squared: f32) -> StretchError {
     let limit = tree.stretch_limit(triangle).unwrap_or(tree.stretch());
     let stretch = root_up(squared) * (limit / tree.stretch());
