@@ -1,6 +1,6 @@
 //! The measured stretch against f64, and the gate that it is.
 
-use dibs_build::{Builder, BuiltTree, Mesh, Paths, generate};
+use dibs_build::{Builder, BuiltTree, Mesh, Motion, MotionStretch, Paths, generate};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 use dibs_nostd::{
@@ -9,6 +9,7 @@ use dibs_nostd::{
 };
 use dibs_tests::bus::give;
 use dibs_tests::deform::{Deformation, unit};
+use dibs_tests::oracle::{Instrument, exhaustive};
 use dibs_tests::stretch;
 use fastrand::Rng;
 
@@ -367,4 +368,68 @@ fn a_surface_beyond_the_stretch_limit_is_refused() {
     assert_eq!(frame.label().epoch, 1);
     let sigma = frame.label().stretch.expect("measured").sigma();
     assert!((1.15..1.1501).contains(&sigma), "{sigma}");
+}
+
+/// A real heart stretches by 2.4 somewhere, and hardly anywhere else: limits for each triangle spare what
+/// one limit for all costs, and answer the same. Prints mean node and triangle tests.
+#[test]
+fn limits_of_single_triangles_spare_tests_on_a_real_heart() {
+    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/heart_10272");
+    let (Ok(import), Ok(motion)) =
+        (dibs_build::read(format!("{data}.ply")), Motion::read_pc2(format!("{data}.pc2")))
+    else {
+        println!("skipped: there is no real heart beside the repository");
+        return;
+    };
+    let mesh = import.mesh;
+    let needed = MotionStretch::of(&mesh, &motion, Paths::default(), &|_| ()).expect("fits");
+    let uniform = Builder::new().stretch(2.5).build(&mesh).expect("a valid mesh");
+    let limits = needed.limits(0.02);
+    let learned = Builder::new().limits(limits).build(&mesh).expect("a valid mesh");
+    let built = [&uniform, &learned];
+    let trees = built.map(|built| built.tree::<u16>().expect("valid"));
+    let mut queries = trees.each_ref().map(|tree| Query::<_, 64>::new(tree).expect("deep enough"));
+    let mut rng = Rng::with_seed(27);
+    let mut sums = [[[0u64; 2]; 2]; 2];
+    const EACH: usize = 120;
+    for frame in &motion.frames {
+        let rows = built.map(|built| built.to_rows(frame));
+        let measured: [MeasuredStretch; 2] = std::array::from_fn(|i| {
+            measure_stretch(&trees[i], rows[i].as_slice()).expect("within the limits")
+        });
+        for round in 0..EACH {
+            let from = frame[rng.usize(..frame.len())];
+            let at = from + unit(&mut rng) * rng.f32() * 60.0;
+            let tool = Sphere::new(at, 3.0).expect("valid");
+            let mut found = Vec::new();
+            for i in 0..2 {
+                let known = [Options::new(), Options::new().stretch(measured[i])];
+                for (options, sums) in known.iter().zip(&mut sums[i]) {
+                    let answer = queries[i].closest(rows[i].as_slice(), &tool, options);
+                    let answer = answer.expect("finite positions");
+                    sums[0] += u64::from(answer.node_tests);
+                    sums[1] += u64::from(answer.triangle_tests);
+                    found.push(answer);
+                }
+            }
+            if round % 10 == 0 {
+                let truth = exhaustive(frame, &mesh.triangles, &Instrument::sphere(at, 3.0));
+                let truth = truth.expect("has triangles").separation;
+                for answer in found {
+                    let off = (f64::from(answer.separation) - truth).abs();
+                    assert!(off <= f64::from(answer.accuracy), "{off} off at {at}");
+                }
+            }
+        }
+    }
+    let mean = |sum: u64| sum as f64 / (EACH * motion.frames.len()) as f64;
+    for (name, sums) in ["2.5 for all", "for each triangle"].into_iter().zip(sums) {
+        let [[nodes, triangles], [known_nodes, known_triangles]] = sums.map(|s| s.map(mean));
+        println!(
+            "limit {name}: {nodes:.0} node and {triangles:.0} triangle tests, \
+             measured stretch {known_nodes:.0} and {known_triangles:.0}"
+        );
+    }
+    let [[[uniform, _], _], [[learned, _], _]] = sums;
+    assert!(learned * 2 < uniform, "{learned} node tests, {uniform} with one limit");
 }
