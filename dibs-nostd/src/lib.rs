@@ -46,7 +46,8 @@
 //!
 //! # Features
 //!
-//! `defmt`: `defmt::Format` for every public value and error.
+//! - `defmt`: `defmt::Format` for every public value and error.
+//! - `authenticity`: [`wire`]'s `AesCmac`, by which a receiver believes only packets with a genuine tag.
 #![no_std]
 #![deny(unsafe_code)]
 

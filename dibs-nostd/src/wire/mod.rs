@@ -13,6 +13,9 @@
 
 mod body;
 pub mod canfd;
+mod checksum;
+#[cfg(feature = "authenticity")]
+mod cmac;
 mod counters;
 mod encode;
 mod error;
@@ -24,6 +27,8 @@ mod quantised;
 mod status;
 mod stream;
 
+#[cfg(feature = "authenticity")]
+pub use self::cmac::AesCmac;
 pub use body::{Begin, Body, Commit, Content, Encoding, Heartbeat, Rows, Vertices, Weights};
 pub(crate) use body::{float_position, quantised_row};
 pub use counters::{Counters, Event};

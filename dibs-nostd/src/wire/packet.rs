@@ -1,12 +1,12 @@
 //! One packet, decoded in place.
 
+use super::checksum::checksum;
 use super::fields::Fields;
 use super::{
     Begin, Body, BoxError, CHECKSUM_BYTES, Commit, Content, Encoding, HEADER_BYTES, Heartbeat,
     MAX_ROWS, MAX_WEIGHTS, Mac, PacketError, PublishedStatus, QuantisedBox, Rows, Status,
     StatusReport, TAG_BYTES, VERSION, Vertices, Weights, float_position, kind, padded,
 };
-use crate::format::CRC;
 
 /// A packet whose checksum and form are right. It borrows the bytes that it was decoded from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +44,7 @@ impl<'a> Packet<'a> {
         let (covered, stated) = bytes.split_last_chunk::<CHECKSUM_BYTES>().ok_or(too_short)?;
         let (header, rest) = covered.split_first_chunk::<HEADER_BYTES>().ok_or(too_short)?;
         let stated = u32::from_le_bytes(*stated);
-        let computed = CRC.checksum(covered);
+        let computed = checksum(covered);
         if stated != computed {
             return Err(PacketError::Checksum { stated, computed });
         }

@@ -8,13 +8,13 @@ pub use weights::WeightsEncoder;
 
 use core::fmt;
 
+use super::checksum::checksum;
 use super::fields::Bytes;
 use super::{
     Begin, CHECKSUM_BYTES, Content, Counters, Encoding, FrameId, HEADER_BYTES, Heartbeat,
     MAX_CONTENT_PACKETS, MAX_ROWS, MAX_WEIGHTS, MIN_MTU, Mac, Status, TAG_BYTES, VERSION, kind,
     padded,
 };
-use crate::format::CRC;
 
 /// Writes a heartbeat to the buffer. `id` has the newest epoch that the sender has begun; before the
 /// first frame, one less than the first will have. `beat` is one more in each.
@@ -141,7 +141,7 @@ impl<'b, M: Mac> PacketWriter<'b, M> {
             let tag = mac.tag(session, self.bytes.written());
             self.put(&tag);
         }
-        let checksum = CRC.checksum(self.bytes.written());
+        let checksum = checksum(self.bytes.written());
         self.put(&checksum.to_le_bytes());
         (self.bytes.into_written().unwrap_or_default(), checksum)
     }

@@ -1,0 +1,233 @@
+//! Packets with tags: without the right key nothing is published, replays and forgeries are counted.
+
+use dibs_nostd::wire::{
+    AesCmac, Body, Counters, Encoding, Event, FrameEncoder, FrameId, Mac, NoMac, Packet, Status,
+    TAG_BYTES, WeightsEncoder, encode_heartbeat, encode_status,
+};
+use dibs_nostd::{Assembler, FrameReader, Frames, Progress, Rejection, Unchecked};
+use dibs_tests::bus::*;
+use proptest::prelude::*;
+
+const KEY: [u8; 16] = *b"0123456789abcdef";
+const CHALLENGE: u32 = 0x00C0_FFEE;
+
+type Guarded = (Assembler<'static, Unchecked, N, AesCmac>, FrameReader<'static, N>);
+
+fn mac() -> AesCmac {
+    AesCmac::new(&KEY, CHALLENGE)
+}
+
+fn guarded() -> Guarded {
+    let frames: &'static Frames<N> = Box::leak(Box::new(Frames::new()));
+    let (writer, reader) = frames.split().unwrap();
+    (Assembler::with_mac(writer, Unchecked, MESH, 100.0, mac()), reader)
+}
+
+fn tagged(session: u32, epoch: u32, mac: &AesCmac) -> Vec<Vec<u8>> {
+    let positions = surface(epoch);
+    let id = FrameId { mesh_id: MESH, session, epoch };
+    let encoder = FrameEncoder::<_, 64>::new(id, Encoding::Float, &positions[..]).unwrap();
+    collect(encoder.with_mac(mac).unwrap())
+}
+
+/// The vectors of RFC 4493: what a tag is cut from.
+#[test]
+fn the_code_is_that_of_rfc_4493() {
+    let hex = |text: &str| -> Vec<u8> {
+        (0..text.len() / 2)
+            .map(|i| u8::from_str_radix(&text[2 * i..2 * i + 2], 16).unwrap())
+            .collect()
+    };
+    let key: [u8; 16] = hex("2b7e151628aed2a6abf7158809cf4f3c").try_into().unwrap();
+    let message = hex("6bc1bee22e409f96e93d7e117393172aae2d8a571e03ac9c9eb76fac45af8e51\
+         30c81c46a35ce411e5fbc1191a0a52eff69f2445df4f9b17ad2b417be66c3710");
+    for (length, expected) in [(16, "070a16b46b4d"), (40, "dfa66747de9a"), (64, "51f0bebf7e3b")] {
+        // Challenge and session are the message's first eight bytes.
+        let word = |at: usize| u32::from_le_bytes(message[at..at + 4].try_into().unwrap());
+        let tag = AesCmac::new(&key, word(0)).tag(word(4), &message[8..length]);
+        assert_eq!(tag.to_vec(), hex(expected));
+    }
+}
+
+#[test]
+fn everything_fits_a_can_message() {
+    let (mut assembler, mut reader) = guarded();
+    let packets = tagged(1, 1, &mac());
+    assert_eq!(packets.len(), 2 + N.div_ceil(3), "three float rows a packet");
+    assert!(packets.iter().all(|packet| packet.len() <= 64));
+    for packet in &packets {
+        give(&mut assembler, packet).unwrap();
+    }
+    assert_eq!(published(&mut reader).unwrap().0, 1);
+    let positions = surface(2);
+    let encoder = FrameEncoder::<_, 64>::new(id(2), encoding(true, &positions), &positions[..]);
+    let packets = collect(encoder.unwrap().with_mac(mac()).unwrap());
+    assert_eq!(packets.len(), 2 + N.div_ceil(6), "six quantised rows");
+    let mut last = None;
+    for packet in &packets {
+        assert!(packet.len() <= 64);
+        last = give(&mut assembler, packet).unwrap();
+    }
+    assert_eq!(last, Some(2));
+    let mut weights = WeightsEncoder::<64>::new(id(3), &[0.5; 10]).unwrap().with_mac(mac());
+    let mut buffer = [0; 64];
+    let mut packets = 0;
+    while weights.next_packet(&mut buffer).is_some() {
+        packets += 1;
+    }
+    assert_eq!(packets, 4, "nine weights");
+}
+
+/// Each bit of each packet of a frame, with a checksum that was made right again.
+#[test]
+fn no_changed_bit_passes() {
+    let packets = tagged(1, 1, &mac());
+    for which in [0, 1, packets.len() - 1] {
+        let (mut assembler, mut reader) = guarded();
+        for packet in &packets[..which] {
+            give(&mut assembler, packet).unwrap();
+        }
+        let content = packets[which].len() - 4;
+        for bit in 0..8 * content {
+            let mut forged = packets[which].clone();
+            forged[bit / 8] ^= 1 << (bit % 8);
+            let outcome = give(&mut assembler, &reseal(forged));
+            assert!(outcome.is_err(), "bit {bit} of packet {which}: {outcome:?}");
+        }
+        assert!(assembler.counters().of(Event::Forged) >= 60);
+        // The genuine ones are still taken.
+        let mut last = None;
+        for packet in &packets[which..] {
+            last = give(&mut assembler, packet).unwrap();
+        }
+        assert_eq!(last, Some(1));
+        assert_eq!(published(&mut reader).unwrap().0, 1);
+    }
+}
+
+/// Another key, another challenge, none at all.
+#[test]
+fn without_key_and_challenge_nothing_is_published() {
+    let wrong_key = AesCmac::new(b"0123456789abcdeF", CHALLENGE);
+    let before_restart = mac().with_challenge(CHALLENGE - 1);
+    let forgeries = [tagged(1, 1, &wrong_key), tagged(1, 1, &before_restart), frame(1, false)];
+    for packets in forgeries {
+        let (mut assembler, mut reader) = guarded();
+        assert_eq!(give(&mut assembler, &packets[0]), Err(Rejection::Forged { epoch: 1 }));
+        for packet in &packets[1..] {
+            assert_eq!(give(&mut assembler, packet), Err(Rejection::Unexpected { epoch: 1 }));
+        }
+        // Within a genuine frame too.
+        let genuine = tagged(1, 1, &mac());
+        give(&mut assembler, &genuine[0]).unwrap();
+        for packet in &packets {
+            assert_eq!(give(&mut assembler, packet), Err(Rejection::Forged { epoch: 1 }));
+        }
+        assert!(published(&mut reader).is_none());
+        for packet in &genuine[1..] {
+            give(&mut assembler, packet).unwrap();
+        }
+        assert_eq!(published(&mut reader).unwrap().0, 1);
+        assert_eq!(assembler.counters().of(Event::Forged) as usize, packets.len() + 1);
+    }
+    // A receiver without a key takes no tags.
+    let (mut open, _) = bus();
+    assert_eq!(give(&mut open, &tagged(1, 1, &mac())[0]), Err(Rejection::Forged { epoch: 1 }));
+}
+
+/// Everything that was ever sent, sent again in any order: no frame comes back.
+#[test]
+fn recordings_are_worth_nothing() {
+    let (mut assembler, mut reader) = guarded();
+    let mut recorded = Vec::new();
+    for (session, epoch) in [(1, 5), (1, 6), (2, 1), (2, 2), (0x0001_0002, 1)] {
+        let packets = tagged(session, epoch, &mac());
+        for packet in &packets {
+            give(&mut assembler, packet).unwrap();
+        }
+        recorded.extend(packets);
+        let name = FrameId { mesh_id: MESH, session, epoch };
+        assert_eq!(assembler.published(), Some(name));
+        let before = *assembler.counters();
+        for packet in &recorded {
+            assert!(give(&mut assembler, packet).is_err());
+            assert_eq!(published(&mut reader).unwrap().0, epoch);
+        }
+        let refused = assembler.counters().rejected() - before.rejected();
+        assert_eq!(refused as usize, recorded.len());
+        assert_eq!(assembler.published(), Some(name));
+    }
+    // Nor to a receiver that has started again, with another challenge.
+    let frames = Frames::<N>::new();
+    let (writer, _reader) = frames.split().unwrap();
+    let other = mac().with_challenge(CHALLENGE + 1);
+    let mut restarted = Assembler::with_mac(writer, Unchecked, MESH, 100.0, other);
+    for packet in &recorded {
+        assert!(give(&mut restarted, packet).is_err());
+    }
+    assert_eq!(restarted.published(), None);
+}
+
+/// A packet of a frame with the same epoch, sequence and lower half of the session.
+#[test]
+fn the_whole_session_is_under_the_tag() {
+    let (mut assembler, _) = guarded();
+    let (old, new) = (tagged(0x0001_0007, 4, &mac()), tagged(0x0002_0007, 4, &mac()));
+    assert_eq!(old[1][..54], new[1][..54], "but for the tag they are the same");
+    give(&mut assembler, &new[0]).unwrap();
+    assert_eq!(give(&mut assembler, &old[1]), Err(Rejection::Forged { epoch: 4 }));
+    assert_eq!(give(&mut assembler, &new[1]), Ok(None));
+}
+
+#[test]
+fn heartbeats_and_statuses_are_under_the_tag() {
+    let (mut assembler, _) = guarded();
+    let mut buffer = [0; 64];
+    let genuine = encode_heartbeat(&id(9), 1, &mac(), &mut buffer).to_vec();
+    let forged = encode_heartbeat(&id(9), 1, &NoMac, &mut buffer).to_vec();
+    let other = encode_heartbeat(&id(9), 1, &mac().with_challenge(1), &mut buffer).to_vec();
+    assert_eq!(genuine.len(), 48);
+    for packet in [&forged, &other] {
+        assert_eq!(assembler.accept(packet, 0), Err(Rejection::Forged { epoch: 9 }));
+    }
+    assert_eq!(assembler.accept(&genuine, 0), Ok(Progress::Heartbeat));
+    assert_eq!(assembler.accept(&genuine, 0), Err(Rejection::Stale { epoch: 9 }));
+
+    let status = assembler.status(0, 1);
+    assert_eq!(status.challenge, CHALLENGE);
+    let packet = encode_status(MESH, &status, assembler.counters(), &mac(), &mut buffer).to_vec();
+    assert_eq!(packet.len(), 64, "four counters");
+    let decoded = Packet::decode(&packet).unwrap();
+    let Body::Status(report) = decoded.body else { panic!() };
+    assert_eq!((report.status, report.counters.len()), (status, 4));
+    assert!(decoded.is_genuine(&mac(), 0));
+    assert!(!decoded.is_genuine(&mac(), 1));
+    assert!(!decoded.is_genuine(&NoMac, 0));
+    assert!(!decoded.is_genuine(&AesCmac::new(&[0; 16], CHALLENGE), 0));
+    let plain = Status { challenge: 0, ..status };
+    let plain = encode_status(MESH, &plain, &Counters::new(), &NoMac, &mut buffer).to_vec();
+    assert!(!Packet::decode(&plain).unwrap().is_genuine(&mac(), 0));
+}
+
+proptest! {
+    /// Guessed tags, and any bytes at all.
+    #[test]
+    fn guesses_are_forgeries(
+        tags in prop::collection::vec(any::<[u8; TAG_BYTES]>(), 1..20),
+        noise in prop::collection::vec(any::<u8>(), 0..100),
+    ) {
+        let (mut assembler, mut reader) = guarded();
+        let packets = tagged(1, 1, &mac());
+        for tag in &tags {
+            for packet in &packets {
+                let mut forged = packet.clone();
+                let end = forged.len() - 4;
+                forged[end - TAG_BYTES..end].copy_from_slice(tag);
+                prop_assert!(give(&mut assembler, &reseal(forged)).is_err());
+            }
+        }
+        let _ = give(&mut assembler, &noise);
+        prop_assert!(published(&mut reader).is_none());
+        prop_assert_eq!(assembler.counters().of(Event::Forged) as usize, tags.len());
+    }
+}
