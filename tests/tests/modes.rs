@@ -155,8 +155,12 @@ fn lazy_is_eager<I: Index>(tree: &Tree<'_, I>) {
 fn the_stretch_bound_is_sound_and_tight() {
     let (mesh, motion) = trembling(1_000, 5, 4);
     let fit = ModalFit::new(&mesh, &motion).expect("a motion");
-    for paths in [Paths::Edges, Paths::Surface { crossings: 2 }] {
+    let mut rng = Rng::with_seed(12);
+    let limits: Vec<f32> = mesh.triangles.iter().map(|_| 1.6 + 1.4 * rng.f32()).collect();
+    let surface = Paths::Surface { crossings: 2 };
+    for (paths, limited) in [(Paths::Edges, false), (surface, false), (surface, true)] {
         let builder = Builder::new().stretch(3.0).paths(paths);
+        let builder = if limited { builder.limits(limits.clone()) } else { builder };
         let built =
             builder.build(&mesh).expect("a valid mesh").with_modes(&fit, 10).expect("so many");
         let tree = built.tree::<u16>().expect("valid");
@@ -167,7 +171,14 @@ fn the_stretch_bound_is_sound_and_tight() {
         let mut rng = Rng::with_seed(5);
         let check = |weights: &[f32], most: f64| {
             let surface = modes.surface::<10>(weights).expect("in range");
-            let truth = stretch::largest(&rows, &positions(&surface), tree.paths());
+            let now = positions(&surface);
+            // Counted as the part of its limit that it takes.
+            let share = |triangle: u32| {
+                let limit = tree.stretch_limit(triangle).expect("in the table");
+                let own = stretch::of_triangle(&rows, &now, triangle as usize, tree.paths());
+                own * f64::from(tree.stretch()) / f64::from(limit)
+            };
+            let truth = (0..tree.triangle_count()).map(share).fold(0.0, f64::max);
             let bound = modes.stretch_bound(weights).expect("in range");
             let sigma = f64::from(bound.sigma());
             assert!(sigma >= truth, "{sigma} is below {truth}");

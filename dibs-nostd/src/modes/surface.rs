@@ -11,8 +11,8 @@ use crate::{VertexTable, format};
 /// vertex that nobody asks for. `K` is the room for weights, at least [`Modes::count`].
 ///
 /// The displacement is summed in integers: a 32-bit weight times a 16-bit displacement, the upper 32 of
-/// 48 bits, added up. That is one instruction on a Cortex-M7 and three of floats, and the same bits in
-/// any order. Its conversion and its sum with the rest position are rounded as all floats are.
+/// 48 bits, added up. That is one instruction on a Cortex-M7, where floats take a conversion, a
+/// product and a sum, and the same bits in any order. Its conversion and its sum with the rest position are rounded as all floats are.
 ///
 /// RAM: `4 K` bytes and a copy of [`Modes`].
 #[derive(Clone, Copy, Debug)]
