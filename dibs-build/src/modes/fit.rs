@@ -1,5 +1,6 @@
 //! Proper orthogonal decomposition: the few displacement fields that a recorded motion is made of.
 
+use dibs_nostd::modes::MAX_MODES;
 use glam::{DVec3, Vec3};
 use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
@@ -80,7 +81,7 @@ impl ModalFit {
         &self.errors
     }
 
-    /// Modes that the motion has: as many as it has independent frames.
+    /// Modes that the motion has: as many as it has independent frames, at most 64.
     #[must_use]
     pub fn available(&self) -> usize {
         self.modes.len()
@@ -107,6 +108,7 @@ fn decompose(displacements: &[Vec<DVec3>]) -> Vec<Vec<DVec3>> {
     order
         .into_iter()
         .take_while(significant)
+        .take(MAX_MODES)
         .map(|i| {
             // The weights are `sqrt(value) u`, the mode `sum of u_f d_f / sqrt(value)`: scaled so that
             // the largest weight is 1, and positive.

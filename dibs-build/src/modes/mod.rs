@@ -17,7 +17,7 @@ use crate::{BuildError, MotionMismatch};
 use dibs_nostd::modes::MAX_MODES;
 
 /// Most frames of a motion that modes are fitted to: the decomposition takes the cube of their number.
-pub const MAX_FRAMES: usize = 2_000;
+pub const MAX_FRAMES: usize = 1_000;
 
 /// How far a number of modes is from the motion that they were fitted to.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]

@@ -6,7 +6,9 @@ use dibs_build::modes::{ModalError, ModalFit, Projector};
 use dibs_build::stream::SurfaceOrder;
 use dibs_build::{BuiltTree, Mesh, Motion};
 use dibs_nostd::modes::Modes;
+use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// The modes of a motion file.
 pub struct Fit {
@@ -17,8 +19,11 @@ pub struct Fit {
 /// Fits modes to a motion file.
 pub fn fit(mesh: &Mesh, path: &Path) -> Result<Fit> {
     let motion = Motion::read_pc2(path)?;
-    let fit =
-        ModalFit::new(mesh, &motion).map_err(|error| anyhow!("{}: {error}", path.display()))?;
+    let spinner = ProgressBar::new_spinner().with_message("fitting modes to the motion");
+    spinner.enable_steady_tick(Duration::from_millis(100));
+    let fit = ModalFit::new(mesh, &motion);
+    spinner.finish_and_clear();
+    let fit = fit.map_err(|error| anyhow!("{}: {error}", path.display()))?;
     Ok(Fit { path: path.to_path_buf(), fit })
 }
 
