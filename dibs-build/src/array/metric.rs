@@ -4,7 +4,7 @@
 use dibs_nostd::format::PathKind;
 use glam::{DVec3, Vec3};
 
-use super::fans::openness_of;
+use super::fans::openness;
 
 /// Rounding of the controller's check in f32, in units of 2^-24: derived in `dibs_nostd`'s
 /// `stretch/kernel.rs`.
@@ -35,7 +35,7 @@ pub(crate) fn metric(corners: [Vec3; 3], share: f64, stretch: f64, paths: PathKi
             edges.map(|squared| round_down(squared * share / (1.0 + EDGE_ROUNDING * U)))
         }
         _ => {
-            let scale = share / (1.0 + SURFACE_ROUNDING * U / openness_of(e1, e2));
+            let scale = share / (1.0 + SURFACE_ROUNDING * U / openness(e1, e2));
             let [first, _, second] = edges.map(|squared| round_down(squared * scale));
             [first, (e1.dot(e2) * scale) as f32, second]
         }
