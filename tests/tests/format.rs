@@ -160,3 +160,71 @@ fn a_query_on_rotten_bytes_ends() {
     println!("{answers} answers, {errors} errors");
     assert!(answers > 0 && errors > 0);
 }
+
+/// The metric and the limits, read by the specification alone, and what is refused of them.
+#[test]
+fn metric_and_limits_stand_where_the_specification_says() {
+    let (mesh, _) = generate::heart(320).expect("a valid size");
+    let limits: Vec<f32> = (0..320).map(|t| 1.1 + (t % 10) as f32 * 0.1).collect();
+    for (index, width) in [(IndexWidth::Bits16, 2), (IndexWidth::Bits32, 4)] {
+        let built = Builder::new().index(index).limits(limits.clone()).build(&mesh);
+        let built = built.expect("a valid mesh");
+        let bytes = built.blob();
+        assert_eq!(f32::from_bits(word(bytes, 32)), 2.0);
+        let [(triangles, _), (metric, length), (codes, codes_length)] =
+            [2, 5, 6].map(|kind| section(bytes, kind));
+        assert_eq!((length, codes_length), (320 * 12, 320 * 2));
+        let index = |at: usize| match width {
+            2 => u32::from(u16::from_le_bytes([bytes[at], bytes[at + 1]])),
+            _ => word(bytes, at),
+        };
+        let rows = |row: usize| [0, 1, 2].map(|c| index(triangles + (3 * row + c) * width));
+        let mut fans = 0;
+        for row in 0..320 {
+            let corners = rows(row).map(|r| built.vertex_order()[r as usize]);
+            let is_same =
+                |t: &[u32; 3]| (0..3).any(|i| [t[i], t[(i + 1) % 3], t[(i + 2) % 3]] == corners);
+            let triangle =
+                mesh.triangles.iter().position(is_same).expect("of the mesh, as oriented");
+            let code = u16::from_le_bytes([bytes[codes + 2 * row], bytes[codes + 2 * row + 1]]);
+            let share = f64::from(code) / 65_535.0;
+            let limit = f64::from(limits[triangle]);
+            assert!(share * 2.0 >= limit && share * 2.0 < limit + 4e-5, "{share} for {limit}");
+            let [a, b, c] = corners.map(|v| mesh.positions[v as usize].as_dvec3());
+            let (e1, e2) = (b - a, c - a);
+            let expected = [e1.dot(e1), e1.dot(e2), e2.dot(e2)].map(|x| x * share * share);
+            let at = |i: usize| f32::from_bits(word(bytes, metric + 12 * row + 4 * i));
+            for (i, expected) in expected.into_iter().enumerate() {
+                let found = f64::from(at(i).abs() * if i == 1 { at(i).signum() } else { 1.0 });
+                let scale = share * share * e1.length() * e2.length();
+                assert!(
+                    (found - expected).abs() < 1e-4 * scale.max(expected),
+                    "{found} {expected}"
+                );
+                assert!(i == 1 || found < expected, "{found} must be below {expected}");
+            }
+            if at(0).is_sign_negative() {
+                assert_eq!([rows(row)[0], rows(row)[1]], [rows(row - 1)[0], rows(row - 1)[2]]);
+                fans += 1;
+            }
+        }
+        assert!(fans > 100, "{fans} triangles continue a fan");
+
+        let refuse = |at: usize, value: u32| {
+            let changed = with_word(bytes, at, value);
+            match width {
+                2 => Tree::<u16>::from_bytes(&changed).map(|_| ()),
+                _ => Tree::<u32>::from_bytes(&changed).map(|_| ()),
+            }
+        };
+        for wrong in [f32::NAN, f32::INFINITY] {
+            let refused = refuse(metric + 24, wrong.to_bits());
+            assert_eq!(refused, Err(FormatError::Metric { triangle: 2 }));
+        }
+        let alone = (1..320).find(|&row| rows(row)[0] != rows(row - 1)[0]).expect("not one fan");
+        let at = metric + 12 * alone;
+        let refused = refuse(at, word(bytes, at) | 1 << 31);
+        assert_eq!(refused, Err(FormatError::Metric { triangle: alone as u32 }));
+        assert_eq!(refuse(codes + 8, 0), Err(FormatError::Limit { triangle: 4 }));
+    }
+}

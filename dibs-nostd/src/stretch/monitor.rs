@@ -14,6 +14,7 @@ const BLOCKS: usize = 64;
 /// All regions, one bit each.
 const ALL: u32 = u32::MAX;
 const _: () = assert!(REGIONS == u32::BITS as usize);
+const _: () = assert!(size_of::<StretchMonitor<'_, u16>>() <= size_of::<Tree<'_, u16>>() + 800);
 
 /// Measures every frame before it is published, a few triangles at a time: the [`Gate`] that keeps what
 /// is stretched beyond its limit from the controller, and gives the query the measured stretch.
@@ -25,8 +26,36 @@ const _: () = assert!(REGIONS == u32::BITS as usize);
 /// surface, to the bit.
 ///
 /// Cost: [`advance`](Gate::advance) checks at most as many triangles as it is told, and takes
-/// O([`REGIONS`]) besides. RAM: 776 bytes and the tree's view, whatever the surface. Making one
+/// O([`REGIONS`]) besides. RAM: at most 800 bytes and the tree's view, whatever the surface. Making one
 /// takes one pass over the triangles.
+///
+/// ```
+/// use dibs_build::{Builder, generate};
+/// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
+/// use dibs_nostd::{Advance, Assembler, Frames, StretchMonitor, Tree};
+///
+/// let (heart, motion) = generate::heart(320)?;
+/// let built = Builder::new().stretch(1.5).build(&heart)?;
+/// let tree = Tree::<u16>::from_bytes(built.blob())?;
+///
+/// static FRAMES: Frames<162> = Frames::new();
+/// let (writer, mut reader) = FRAMES.split().ok_or("taken")?;
+/// let mut assembler = Assembler::new(writer, StretchMonitor::new(&tree)?, tree.mesh_id(), 1e3);
+/// let rows = built.to_rows(&motion.frames[9]);
+/// let id = FrameId { mesh_id: tree.mesh_id(), session: 1, epoch: 1 };
+/// let mut sender = FrameEncoder::<_, 512>::new(id, Encoding::Float, rows.as_slice())?;
+/// let mut buffer = [0; 512];
+/// while let Some(packet) = sender.next_packet(&mut buffer) {
+///     assembler.accept(packet, 0)?;
+///     assembler.advance(60)?; // at most 60 triangles
+/// }
+/// while assembler.advance(60)? == Advance::Pending {}
+///
+/// let frame = reader.read().ok_or("nothing published")?;
+/// let measured = frame.label().stretch.ok_or("not measured")?;
+/// assert!(measured.sigma() < 1.5 && measured.epoch() == Some(1));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct StretchMonitor<'t, I> {
     tree: Tree<'t, I>,
