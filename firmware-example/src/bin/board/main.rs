@@ -54,6 +54,8 @@ fn main() -> ! {
 /// Sends records until the run is over; a run length of 0 never is.
 fn idle(mut records: Consumer<'static, Tick>, ticks: u32) -> ! {
     let mut line = [0; MAX_FRAMED];
+    #[cfg(feature = "planted-overflow")]
+    line.fill(overflow(1));
     #[cfg(feature = "planted-panic")]
     core::hint::black_box([0; 4][core::hint::black_box(0_usize)]);
     loop {
@@ -82,6 +84,17 @@ fn idle(mut records: Consumer<'static, Tick>, ticks: u32) -> ! {
         summary.stack_bytes
     );
     semihosting::exit(summary.deadline_misses == 0)
+}
+
+/// Calls itself until the stack is used up.
+#[cfg(feature = "planted-overflow")]
+#[inline(never)]
+fn overflow(depth: u8) -> u8 {
+    let below = core::hint::black_box([depth; 64]);
+    if core::hint::black_box(depth) == 0 {
+        return 0;
+    }
+    overflow(depth | 1).wrapping_add(below.iter().fold(0, |sum, byte| sum ^ byte))
 }
 
 fn send(bytes: Option<&[u8]>) {

@@ -18,8 +18,29 @@ fn panic(_info: &core::panic::PanicInfo) -> ! {
     crate::semihosting::exit(false)
 }
 
-/// A fault means broken hardware or an unsound `unsafe`: stop, so that a test sees it.
-#[exception]
-unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
+unsafe extern "C" {
+    // Defined by memory.x.
+    static _stack_start: u32;
+}
+
+/// A fault means broken hardware, an unsound `unsafe`, or a stack that ran out of its memory: stop, so
+/// that a test sees it. The stack pointer cannot be trusted any more, and starts anew.
+#[exception(trampoline = false)]
+unsafe fn HardFault() -> ! {
+    // SAFETY: nothing of the old stack is used again.
+    unsafe {
+        core::arch::asm!(
+            "movw r0, #:lower16:{start}",
+            "movt r0, #:upper16:{start}",
+            "mov sp, r0",
+            "b {stop}",
+            start = sym _stack_start,
+            stop = sym stop,
+            options(noreturn)
+        )
+    }
+}
+
+extern "C" fn stop() -> ! {
     crate::semihosting::exit(false)
 }
