@@ -1,0 +1,98 @@
+//! Any tree that passes validation, with any floats as vertices, tool and options: an answer whose
+//! interval is one, within the tree's count of records and the budget; or an error.
+#![no_main]
+
+use std::sync::LazyLock;
+
+use dibs_build::{Builder, IndexWidth, generate};
+use dibs_nostd::format::{CHECKSUM_AT, CRC};
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::{Budget, Capsule, Options, Query, Sphere, Tool, Tree, measure_stretch};
+use libfuzzer_sys::fuzz_target;
+
+static SOUND: LazyLock<(Vec<u8>, Vec<Vec3>)> = LazyLock::new(|| {
+    let (mesh, _) = generate::heart(320).expect("a valid size");
+    let built = Builder::new().index(IndexWidth::Bits16).build(&mesh).expect("a valid mesh");
+    (built.blob().into(), built.to_rows(&mesh.positions))
+});
+
+/// Words of the input, zeros after its end.
+struct Words<'a>(&'a [u8]);
+
+impl Words<'_> {
+    fn next(&mut self) -> u32 {
+        let (word, rest) = self.0.split_at(self.0.len().min(4));
+        self.0 = rest;
+        let mut bytes = [0; 4];
+        bytes[..word.len()].copy_from_slice(word);
+        u32::from_le_bytes(bytes)
+    }
+
+    fn float(&mut self) -> f32 {
+        f32::from_bits(self.next())
+    }
+
+    fn point(&mut self) -> Vec3 {
+        Vec3::new(self.float(), self.float(), self.float())
+    }
+}
+
+fuzz_target!(|input: &[u8]| {
+    let mut words = Words(input);
+    let (mut bytes, mut rows) = SOUND.clone();
+    let places = bytes.len() / 4;
+    for _ in 0..words.next() % 8 {
+        let at = words.next() as usize % places * 4;
+        bytes[at..at + 4].copy_from_slice(&words.next().to_le_bytes());
+    }
+    let mut digest = CRC.digest();
+    digest.update(&bytes[..CHECKSUM_AT]);
+    digest.update(&bytes[CHECKSUM_AT + 4..]);
+    bytes[CHECKSUM_AT..CHECKSUM_AT + 4].copy_from_slice(&digest.finalize().to_le_bytes());
+    let Ok(tree) = Tree::<u16>::from_bytes(&bytes) else { return };
+    let Ok(mut query) = Query::<_, 64>::new(&tree) else { return };
+
+    for _ in 0..words.next() % 8 {
+        let row = words.next() as usize % rows.len();
+        rows[row] = words.point();
+    }
+    let mut options = Options::new();
+    let flags = words.next();
+    let budget = Budget { node_tests: words.next() % 1_000, triangle_tests: words.next() % 100 };
+    if flags & 1 != 0 {
+        options = options.budget(budget);
+    }
+    if flags & 2 != 0 {
+        options = options.warm_start(Some(words.next()));
+    }
+    if flags & 4 != 0
+        && let Ok(measured) = measure_stretch(&tree, rows.as_slice())
+    {
+        options = options.stretch(measured);
+    }
+    let budget = if flags & 1 != 0 { budget } else { Budget::UNLIMITED };
+    if flags & 8 != 0 {
+        if let Ok(tool) = Sphere::new(words.point(), words.float()) {
+            ask(&mut query, &rows, &tool, &options, budget);
+        }
+    } else if let Ok(tool) = Capsule::new(words.point(), words.point(), words.float()) {
+        ask(&mut query, &rows, &tool, &options, budget);
+    }
+});
+
+fn ask(
+    query: &mut Query<'_, u16, 64>,
+    rows: &[Vec3],
+    tool: &impl Tool,
+    options: &Options,
+    budget: Budget,
+) {
+    let tree = *query.tree();
+    let Ok(answer) = query.closest(rows, tool, options) else { return };
+    let most = 2 * tree.node_count() + tree.triangle_count();
+    assert!(answer.node_tests <= budget.node_tests.min(most) + 1);
+    assert!(answer.triangle_tests <= budget.triangle_tests.min(tree.triangle_count() + 1));
+    assert!(answer.lower >= 0.0 && answer.lower <= answer.separation);
+    assert!(answer.separation.is_finite() && answer.accuracy > 0.0);
+    assert!(answer.corners.iter().all(|&corner| corner < tree.vertex_count()));
+}
