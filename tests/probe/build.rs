@@ -11,6 +11,7 @@ fn main() -> io::Result<()> {
         println!("cargo:rustc-link-search={}", out.display());
         for argument in ["--nmagic", "-Tlink.x"] {
             println!("cargo:rustc-link-arg-bin=probe={argument}");
+            println!("cargo:rustc-link-arg-bin=torn={argument}");
         }
     }
     Ok(())

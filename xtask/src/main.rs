@@ -5,8 +5,10 @@ mod bench;
 mod demo;
 mod firmware;
 mod guarantees;
+mod nightly;
 mod process;
 mod qemu;
+mod steps;
 mod test;
 mod toolchain;
 mod workspace;
@@ -30,6 +32,11 @@ enum Task {
     Test(test::Options),
     Bench(bench::Options),
     Guarantees(guarantees::Options),
+    Fuzz(nightly::FuzzOptions),
+    /// Runs the tests of frames, bus and format under the address and the thread sanitizer.
+    Sanitize,
+    /// Runs the tests of the frames under Miri, where it is installed.
+    Miri,
 }
 
 fn main() -> ExitCode {
@@ -38,6 +45,12 @@ fn main() -> ExitCode {
         Task::Test(options) => test::test(&options),
         Task::Bench(options) => bench::run(&options),
         Task::Guarantees(options) => guarantees::run(&options),
+        Task::Fuzz(options) => or_say(nightly::missing(), || nightly::fuzz(&options).map(drop)),
+        Task::Sanitize => or_say(nightly::missing(), || {
+            nightly::sanitize("address")?;
+            nightly::sanitize("thread")
+        }),
+        Task::Miri => or_say(nightly::miri_missing(), nightly::miri),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -45,5 +58,16 @@ fn main() -> ExitCode {
             eprintln!("error: {error:#}");
             ExitCode::FAILURE
         }
+    }
+}
+
+/// Runs a task, or says why it cannot run here.
+fn or_say(reason: Option<String>, task: impl FnOnce() -> anyhow::Result<()>) -> anyhow::Result<()> {
+    match reason {
+        Some(reason) => {
+            println!("skipped: {reason}");
+            Ok(())
+        }
+        None => task(),
     }
 }

@@ -1,13 +1,14 @@
 //! `cargo xtask test`: everything that CI runs.
 
 use std::process::Command;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use anyhow::{Result, ensure};
+use anyhow::Result;
 
 use crate::demo;
-use crate::firmware::{self, Footprint, Surface};
+use crate::guarantees::{self, Effort};
 use crate::process::{quiet, run};
+use crate::steps::{Outcome, Steps};
 use crate::toolchain::Cross;
 use crate::workspace;
 
@@ -18,21 +19,6 @@ pub struct Options {
     /// Seconds of the controller's time in the demo.
     #[arg(long, default_value_t = 5)]
     pub demo_seconds: u32,
-}
-
-/// What a step came to.
-enum Outcome {
-    Passed,
-    /// It could not run here; the reason.
-    Skipped(String),
-}
-
-/// The steps so far.
-#[derive(Default)]
-struct Steps {
-    lines: Vec<String>,
-    passed: usize,
-    failed: usize,
 }
 
 /// Runs all steps, whatever fails, and lists them at the end.
@@ -56,54 +42,13 @@ pub fn test(options: &Options) -> Result<()> {
             println!("\nboard: {}", cross.describe());
             steps.run("core crate for the board", || core_crate(&cross));
             steps.run("lints of the firmware", || firmware_lints(&cross));
-            steps.run("firmware without panic and allocator", || firmware_build(&cross));
         }
         Err(error) => steps.run("toolchain for the board", || Err(error)),
     }
-    steps.run("demo on the emulated board", || demo_on_board(options.demo_seconds));
+    guarantees::test(Effort { demo_seconds: options.demo_seconds, ..Effort::TEST }, &mut steps);
     steps.run("demo on this computer", || demo_on_host(options.demo_seconds));
-    steps.finish()
-}
-
-impl Steps {
-    fn cargo(&mut self, name: &str, arguments: &[&str], variables: &[(&str, &str)]) {
-        self.run(name, || {
-            let mut command = Command::new("cargo");
-            command.args(arguments).envs(variables.iter().copied()).current_dir(workspace::root());
-            run(&mut command).map(|()| Outcome::Passed)
-        });
-    }
-
-    fn run(&mut self, name: &str, step: impl FnOnce() -> Result<Outcome>) {
-        println!("\n=== {name}");
-        let start = Instant::now();
-        let result = step();
-        let seconds = start.elapsed().as_secs();
-        let line = match result {
-            Ok(Outcome::Passed) => {
-                self.passed += 1;
-                format!("passed   {seconds:4} s  {name}")
-            }
-            Ok(Outcome::Skipped(reason)) => format!("skipped  {seconds:4} s  {name}: {reason}"),
-            Err(error) => {
-                self.failed += 1;
-                eprintln!("error: {error:#}");
-                let first = format!("{error:#}").lines().next().unwrap_or_default().to_owned();
-                format!("FAILED   {seconds:4} s  {name}: {first}")
-            }
-        };
-        self.lines.push(line);
-    }
-
-    fn finish(self) -> Result<()> {
-        println!("\n{}", self.lines.join("\n"));
-        println!("{} passed, {} failed", self.passed, self.failed);
-        // The list above says what; a message of its own would no longer be its last line.
-        if self.failed > 0 {
-            std::process::exit(1);
-        }
-        Ok(())
-    }
+    steps.finish();
+    Ok(())
 }
 
 /// `cargo check` with the compiler that `rust-version` names.
@@ -147,27 +92,6 @@ fn firmware_lints(cross: &Cross) -> Result<Outcome> {
     command.args(["--quiet", "--package", "firmware-example", "--bin", "board"]);
     command.args(["--features", "board", "--profile", "firmware", "--", "-D", "warnings"]);
     run(&mut command).map(|()| Outcome::Passed)
-}
-
-/// The firmware links, which it does only without panic paths; it has no allocator; and a panic
-/// path put in on purpose breaks the link, so that the first check is known to check.
-fn firmware_build(cross: &Cross) -> Result<Outcome> {
-    let surface = Surface::default();
-    let footprint = Footprint::read(&firmware::build(cross, &surface)?)?;
-    let allocators = footprint.allocators.join(", ");
-    ensure!(allocators.is_empty(), "the firmware has an allocator: {allocators}");
-
-    let mut planted = firmware::command(cross, &surface);
-    let build = planted.args(["--features", "planted-panic"]).output()?;
-    let said = String::from_utf8_lossy(&build.stderr);
-    ensure!(!build.status.success(), "a planted panic path did not break the link");
-    ensure!(said.contains("a_panic_path_survived"), "it broke something else:\n{said}");
-    Ok(Outcome::Passed)
-}
-
-fn demo_on_board(seconds: u32) -> Result<Outcome> {
-    demo::run(&demo::Options { seconds, board_only: true, ..demo::Options::default() })
-        .map(|()| Outcome::Passed)
 }
 
 fn demo_on_host(seconds: u32) -> Result<Outcome> {

@@ -63,6 +63,8 @@ impl Cross {
                     .env("RUSTC", DEBIAN_RUSTC)
                     .env("RUSTC_BOOTSTRAP", "1")
                     .env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker)
+                    // The compiler's own account of every function's frame.
+                    .env("RUSTFLAGS", "-Zemit-stack-sizes")
                     .env_remove("RUSTUP_TOOLCHAIN");
                 command
             }

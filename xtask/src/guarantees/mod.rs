@@ -1,36 +1,185 @@
 //! `cargo xtask guarantees`: every promise measured, and docs/guarantees.* written from it.
+//!
+//! Each check puts its figures under their names into [`Figures`]; `promises` says what every figure
+//! promises and what bounds it; `record` joins the two into docs/guarantees.json, and `markdown` makes
+//! docs/guarantees.md of that. `cargo xtask test` runs the same checks, and fails where a figure breaks its
+//! bound or falls behind the committed one by more than its tolerance.
 
 mod bits;
+mod callgrind;
 mod cost;
+mod demo;
 mod figures;
+mod markdown;
 mod modes;
 mod probe;
+mod promises;
+mod record;
 mod script;
+mod stack;
+mod torn;
+
+use std::fs;
+use std::process::Command;
 
 use anyhow::Result;
 
+use crate::nightly::{self, FuzzOptions};
+use crate::process::run as run_command;
+use crate::steps::{Outcome, Steps};
 use crate::toolchain::Cross;
+use crate::{qemu, workspace};
 use figures::Figures;
 
 /// Measures every promise, and writes docs/guarantees.json and docs/guarantees.md.
 #[derive(clap::Args)]
 pub struct Options {
-    /// Fits the constants of the cost model anew before they are checked.
+    /// Fits the constants of the cost model anew, and ends; the checks are another run, of a program that
+    /// has them.
     #[arg(long)]
     fit: bool,
-    /// Queries of the cost model's check and the comparison of bits.
-    #[arg(long, default_value_t = 100_000)]
-    queries: usize,
+    /// Seconds of each fuzz target.
+    #[arg(long, default_value_t = 60)]
+    fuzz_seconds: u32,
+    /// Makes docs/guarantees.md anew from docs/guarantees.json, and measures nothing.
+    #[arg(long)]
+    render: bool,
+    /// As few cases as `cargo xtask test` takes, for a quick look.
+    #[arg(long)]
+    quick: bool,
+    /// Only checks whose names contain this; the other records stay as they are.
+    #[arg(long)]
+    only: Option<String>,
 }
 
+/// How much is tried.
+#[derive(Clone, Copy)]
+pub struct Effort {
+    /// Cases on this computer.
+    pub cases: usize,
+    /// Queries that must give the same bits.
+    pub bits: usize,
+    /// Queries that must keep to their bound.
+    pub costs: usize,
+    /// Queries under which frames are published.
+    pub torn: u32,
+    /// Seconds of the controller's time.
+    pub demo_seconds: u32,
+    pub fuzz_seconds: u32,
+}
+
+impl Effort {
+    /// What the documents state.
+    const FULL: Self = Self {
+        cases: 1_000_000,
+        bits: 100_000,
+        costs: 100_000,
+        torn: 100_000,
+        demo_seconds: 60,
+        fuzz_seconds: 60,
+    };
+    /// What every run of the tests can afford.
+    pub const TEST: Self = Self {
+        cases: 150_000,
+        bits: 20_000,
+        costs: 8_000,
+        torn: 20_000,
+        demo_seconds: 5,
+        fuzz_seconds: 60,
+    };
+}
+
+/// Measures, and writes the documents.
 pub fn run(options: &Options) -> Result<()> {
-    let cross = Cross::find()?;
-    let mut figures = Figures::default();
     if options.fit {
-        return cost::fit(&cross, 4_000);
+        return cost::fit(&Cross::find()?, 4_000);
     }
-    bits::check(&cross, options.queries, &mut figures)?;
-    cost::check(&cross, options.queries, &mut figures)?;
-    modes::check(&cross, &mut figures)?;
+    if options.render {
+        return record::render();
+    }
+    let effort = if options.quick { Effort::TEST } else { Effort::FULL };
+    let effort = Effort { fuzz_seconds: options.fuzz_seconds, ..effort };
+    let mut steps = Steps::default();
+    let figures = check(effort, options.only.as_deref(), &mut steps);
+    steps.run("documents", || {
+        record::write(&figures)?;
+        Ok(Outcome::Passed)
+    });
+    steps.finish();
     Ok(())
+}
+
+/// Runs the checks as steps of `cargo xtask test`, and compares their figures with the committed ones.
+pub fn test(effort: Effort, steps: &mut Steps) {
+    let figures = check(effort, None, steps);
+    steps.run("figures within their bounds", || record::compare(&figures));
+}
+
+/// Runs every check as a step.
+fn check(effort: Effort, only: Option<&str>, steps: &mut Steps) -> Figures {
+    let mut figures = Figures::default();
+    let mut step = |name: &str, check: &dyn Fn(&mut Figures) -> Result<Outcome>| {
+        if only.is_none_or(|only| name.contains(only)) {
+            steps.run(name, || check(&mut figures));
+        }
+    };
+    let passed = |result: Result<()>| result.map(|()| Outcome::Passed);
+    step("budgets and corruption on this computer", &|f| passed(on_this_computer(effort, f)));
+    step("every interleaving of the frames", &|f| {
+        f.note("frames.interleavings", nightly::interleavings()? as f64);
+        Ok(Outcome::Passed)
+    });
+    step("instructions on this computer", &|f| passed(callgrind::check(f)));
+    step("the same bits everywhere", &|f| passed(bits::check(&board()?, effort.bits, f)));
+    step("cost model on the board", &|f| passed(cost::check(&board()?, effort.costs, f)));
+    step("modal surfaces on the board", &|f| passed(modes::check(&board()?, f)));
+    step("torn reads on the board", &|f| passed(torn::check(&board()?, effort.torn, f)));
+    step("demo on the emulated board", &|f| passed(demo::check(effort.demo_seconds, f)));
+    step("firmware without panic and allocator", &|f| passed(demo::link(&board()?, f)));
+    step("stack of the firmware", &|f| passed(demo::stack(&board()?, f)));
+    for sanitizer in ["address", "thread"] {
+        step(&format!("{sanitizer} sanitizer"), &|f| {
+            if let Some(reason) = nightly::missing() {
+                return Ok(Outcome::Skipped(reason));
+            }
+            nightly::sanitize(sanitizer)?;
+            f.note(&format!("sanitizer.{sanitizer}"), 0.0);
+            Ok(Outcome::Passed)
+        });
+    }
+    step("miri", &|_| match nightly::miri_missing() {
+        Some(reason) => Ok(Outcome::Skipped(reason)),
+        None => passed(nightly::miri()),
+    });
+    step("fuzzers", &|f| {
+        if let Some(reason) = nightly::missing() {
+            return Ok(Outcome::Skipped(reason));
+        }
+        let options = FuzzOptions { seconds: effort.fuzz_seconds, target: None };
+        for (target, inputs) in nightly::fuzz(&options)? {
+            f.note(&format!("fuzz.{target}.inputs"), inputs as f64);
+        }
+        f.note("fuzz.seconds", f64::from(effort.fuzz_seconds));
+        f.note("fuzz.findings", 0.0);
+        Ok(Outcome::Passed)
+    });
+    figures
+}
+
+fn board() -> Result<Cross> {
+    let cross = Cross::find()?;
+    qemu::find()?;
+    Ok(cross)
+}
+
+/// The checks of `tests/benches/guarantees`.
+fn on_this_computer(effort: Effort, figures: &mut Figures) -> Result<()> {
+    let folder = workspace::root().join("target").join("guarantees");
+    fs::create_dir_all(&folder)?;
+    let file = folder.join("host.json");
+    let mut cargo = Command::new("cargo");
+    cargo.args(["bench", "--quiet", "--package", "dibs-tests", "--bench", "guarantees", "--"]);
+    cargo.args(["--cases", &effort.cases.to_string(), "--out"]).arg(&file);
+    run_command(cargo.current_dir(workspace::root()))?;
+    figures.read(&file)
 }

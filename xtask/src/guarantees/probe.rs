@@ -81,17 +81,29 @@ pub fn build_for_board(cross: &Cross, name: &str) -> Result<PathBuf> {
 
 /// Answers on the emulated board; with `count`, its clock counts instructions.
 pub fn on_board(program: &Path, script: &Script, count: bool) -> Result<Answers> {
+    let shift = count.then_some(6);
+    run_on_board(program, &script.bytes(), shift, |file| Answers::read(file, script))
+}
+
+/// Runs a program on the emulated board that reads a script, and reads its answers. With a shift,
+/// an instruction takes 2 to its power nanoseconds of the board's time.
+pub fn run_on_board<T>(
+    program: &Path,
+    script: &[u8],
+    shift: Option<u32>,
+    read: impl FnOnce(&Path) -> Result<T>,
+) -> Result<T> {
     let folder = tempfile::tempdir()?;
-    fs::write(folder.path().join("script.bin"), script.bytes())?;
+    fs::write(folder.path().join("script.bin"), script)?;
     let mut qemu = Command::new("qemu-system-arm");
     qemu.args(["-machine", "mps2-an500", "-cpu", "cortex-m7", "-display", "none"]);
     qemu.args(["-monitor", "none", "-serial", "none"]);
-    if count {
-        qemu.args(["-icount", "shift=6"]);
+    if let Some(shift) = shift {
+        qemu.args(["-icount", &format!("shift={shift}")]);
     }
     qemu.args(["-semihosting-config", "enable=on,target=native", "-kernel"]).arg(program);
     run(qemu.current_dir(folder.path()).stdin(Stdio::null()))?;
-    Answers::read(&folder.path().join("answers.bin"), script)
+    read(&folder.path().join("answers.bin"))
 }
 
 /// One way to build the probe for this computer.
@@ -104,9 +116,6 @@ pub enum Build {
 }
 
 impl Build {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Debug, Self::Release, Self::Native];
-
     /// For people.
     pub fn name(self) -> &'static str {
         match self {

@@ -2,7 +2,7 @@
 
 use cortex_m_semihosting::{nr, syscall};
 
-const BUFFER: usize = 32 * 1024;
+const BUFFER: usize = 2 * 1024;
 /// Modes of `fopen`: "rb" and "wb".
 const READ: usize = 1;
 const WRITE: usize = 5;

@@ -1,0 +1,108 @@
+//! The firmware's own promises: deadlines in the demo, and its stack.
+
+use std::fs;
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail, ensure};
+use serde_json::Value;
+
+use super::figures::Figures;
+use super::stack::Binary;
+use crate::firmware::{self, Footprint, Surface};
+use crate::toolchain::Cross;
+use crate::{demo, workspace};
+
+/// Runs the demo on the emulated board, and takes over its report.
+pub fn check(seconds: u32, figures: &mut Figures) -> Result<()> {
+    let output = workspace::root().join("target").join("guarantees").join("demo");
+    demo::run(&demo::Options {
+        seconds,
+        board_only: true,
+        output: Some(output.clone()),
+        ..demo::Options::default()
+    })?;
+    let text = fs::read_to_string(output.join("report.json"))?;
+    let report: Value = serde_json::from_str(&text)?;
+    for (name, field) in [
+        ("demo.ticks", "ticks"),
+        ("demo.misses", "deadline_misses"),
+        ("demo.latency", "latency_max_us"),
+        ("demo.tick", "tick_max_us"),
+        ("demo.mismatches", "mismatches"),
+        ("stack.measured", "stack_bytes"),
+    ] {
+        let value = report[field].as_f64().with_context(|| format!("no {field} in the report"))?;
+        figures.note(name, value);
+    }
+    Ok(())
+}
+
+/// The firmware links, which it does only without panic paths; it has no allocator; and a panic
+/// path put in on purpose breaks the link, so that the first check is known to check.
+pub fn link(cross: &Cross, figures: &mut Figures) -> Result<()> {
+    let surface = Surface::default();
+    let footprint = Footprint::read(&firmware::build(cross, &surface)?)?;
+    let allocators = footprint.allocators.join(", ");
+    ensure!(allocators.is_empty(), "the firmware has an allocator: {allocators}");
+    figures.note("allocators", 0.0);
+
+    let mut planted = firmware::command(cross, &surface);
+    let build = planted.args(["--features", "planted-panic"]).output()?;
+    let said = String::from_utf8_lossy(&build.stderr);
+    ensure!(!build.status.success(), "a planted panic path did not break the link");
+    ensure!(said.contains("a_panic_path_survived"), "it broke something else:\n{said}");
+    figures.note("panics", 0.0);
+    Ok(())
+}
+
+/// Bounds the firmware's stack, and lets it overflow on purpose.
+pub fn stack(cross: &Cross, figures: &mut Figures) -> Result<()> {
+    let program = firmware::build(cross, &Surface::default())?;
+    let binary = Binary::read(&program)?;
+    let worst = binary.worst()?;
+    figures.note("stack.idle", f64::from(worst.idle));
+    figures.note("stack.bus", f64::from(worst.bus));
+    figures.note("stack.control", f64::from(worst.control));
+    figures.note("stack.bound", f64::from(worst.total));
+    figures.note("stack.room", f64::from(binary.stack_room));
+    let indirect = binary.indirect_when_idle();
+    ensure!(indirect.is_empty(), "start-up calls through a register: {}", indirect.join(", "));
+    figures.note("stack.indirect", 0.0);
+    figures.note("interrupts.masking", binary.masking.len() as f64);
+    if !binary.masking.is_empty() {
+        println!("functions that mask interrupts: {}", binary.masking.join(", "));
+    }
+    overflow(cross)?;
+    figures.note("stack.overflow-unnoticed", 0.0);
+    Ok(())
+}
+
+/// A stack that overflows stops the firmware at once, through its fault handler.
+fn overflow(cross: &Cross) -> Result<()> {
+    let mut cargo = firmware::command(cross, &Surface::default());
+    crate::process::run(cargo.args(["--features", "planted-overflow"]))?;
+    let mut qemu = Command::new("qemu-system-arm");
+    qemu.args(["-machine", "mps2-an500", "-cpu", "cortex-m7", "-display", "none"]);
+    qemu.args(["-monitor", "none", "-serial", "none"]);
+    qemu.args(["-semihosting-config", "enable=on,target=native,arg=board,arg=100", "-kernel"]);
+    qemu.arg(cross.program("firmware", "board")).stdin(Stdio::null()).stdout(Stdio::null());
+    let mut child = qemu.spawn()?;
+    let start = Instant::now();
+    let status = loop {
+        match child.try_wait()? {
+            Some(status) => break status,
+            None if start.elapsed() > Duration::from_secs(20) => {
+                child.kill()?;
+                child.wait()?;
+                bail!("an overflowing stack did not stop the firmware");
+            }
+            None => thread::sleep(Duration::from_millis(20)),
+        }
+    };
+    // The program of before, for whoever comes next.
+    firmware::build(cross, &Surface::default())?;
+    ensure!(status.code() == Some(1), "an overflowing stack ended in {status}, not in the handler");
+    Ok(())
+}
