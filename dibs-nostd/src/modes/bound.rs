@@ -10,8 +10,8 @@
 //!
 //! The builder stores the weights of recorded shapes with their measured stretch, the *anchors*. The
 //! bound is the least of: from each anchor; from the nearest point of the two segments that join the
-//! nearest anchor to its neighbours in time. At a recorded frame it is that frame's stretch, between two
-//! of them hardly more, and away from them it grows with the distance.
+//! nearest recorded anchor to its neighbours in time, the last to the first. At a recorded frame it is
+//! that frame's stretch, between two of them hardly more, and away from them it grows with the distance.
 //!
 //! Rounding. The arithmetic here is some tens of roundings deep: a relative 2^-16 covers it. The slack
 //! that the builder stores covers the positions' (a rounded vertex moves the gradient by its error over
@@ -42,11 +42,12 @@ impl Modes<'_> {
     /// The same, of weights that were checked.
     pub(super) fn bound(&self, weights: &[f32]) -> MeasuredStretch {
         let mut sigma = f32::INFINITY;
-        let (mut nearest, mut shortest) = (0, f32::INFINITY);
+        // Among the recorded shapes, which stand in a ring: a beat ends where the next begins.
+        let (mut nearest, mut shortest) = (1, f32::INFINITY);
         for row in 0..self.anchor_count() {
             let Some(anchor) = self.anchor(row) else { break };
             let away = self.growth_from(weights, anchor);
-            if away < shortest {
+            if row > 0 && away < shortest {
                 (nearest, shortest) = (row, away);
             }
             if anchor.sigma + away < sigma {
@@ -54,8 +55,8 @@ impl Modes<'_> {
             }
         }
         let last = self.anchor_count().saturating_sub(1);
-        let before = nearest.checked_sub(1).unwrap_or(last);
-        let after = if nearest < last { nearest + 1 } else { 0 };
+        let before = if nearest > 1 { nearest - 1 } else { last };
+        let after = if nearest < last { nearest + 1 } else { 1 };
         let mut triangle = 0;
         if let Some(here) = self.anchor(nearest) {
             triangle = here.triangle;

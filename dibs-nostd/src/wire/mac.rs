@@ -3,7 +3,7 @@
 /// Bytes of a tag: the first 48 bits of a message authentication code.
 ///
 /// With 48 bits a CAN-FD message holds six quantised positions or three `f32` ones, and a guess is
-/// right once in 2^48. AUTOSAR SecOC takes 24 to 64 bits.
+/// right once in 2^48. AUTOSAR's `SecOC` takes 24 to 64 bits.
 pub const TAG_BYTES: usize = 6;
 
 /// Makes the tags of packets, and so decides what is genuine.
