@@ -104,7 +104,7 @@ pub fn run(args: &Args) -> Result<()> {
             "{:#}",
             serde_json::json!({
                 "output": output, "mesh": report, "warnings": warnings, "tree": summary,
-                "mode_errors": fit.as_ref().map(|fit| fit.errors()),
+                "mode_errors": fit.as_ref().map(modes::Fit::errors),
             })
         );
     } else {

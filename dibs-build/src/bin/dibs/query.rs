@@ -95,7 +95,9 @@ fn ask<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<Answer> {
     let stretch = match measure_stretch(tree, positions.as_slice()) {
         Ok(measured) => Some(measured),
         Err(StretchError::NoMetric) => None,
-        Err(error) => bail!("{name}: {error}; build the tree with a larger --stretch"),
+        Err(error) => bail!(
+            "{name}: {error}; build the tree with a larger --stretch, or with --limits that allow it"
+        ),
     };
     let mut options = Options::new();
     if let Some(limit) = args.stretch {
