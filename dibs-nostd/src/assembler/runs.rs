@@ -4,7 +4,7 @@ use core::ops::Range;
 
 /// Separate runs of sequence numbers that can be noted besides the first: so many places of a frame
 /// can be missing at once.
-pub(super) const GAPS: usize = 15;
+pub(super) const GAPS: usize = 7;
 
 /// The packets that have come: consecutive in sequence, and their rows.
 #[derive(Clone, Copy, Debug)]

@@ -1,4 +1,4 @@
-//! AES-128-CMAC, as AUTOSAR SecOC takes it on CAN.
+//! AES-128-CMAC, as AUTOSAR takes it for secure onboard communication.
 
 use core::fmt;
 
@@ -9,7 +9,7 @@ use super::{Mac, TAG_BYTES};
 
 /// Tags by AES-128-CMAC (RFC 4493, NIST SP 800-38B), cut to 48 bits.
 ///
-/// The cipher is RustCrypto's, in constant time, without tables. A board with a hardware cipher
+/// The cipher is that of the crate `aes`, in constant time, without tables. A board with a hardware cipher
 /// implements [`Mac`] with that.
 ///
 /// RAM: the expanded key, some 700 bytes while a tag is made. The key is not erased when this is
