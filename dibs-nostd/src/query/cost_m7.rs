@@ -4,7 +4,7 @@ use super::Cost;
 
 impl Cost {
     /// A sphere on a Cortex-M7.
-    pub const M7_SPHERE: Self = Self { base: 1368, node_test: 113, triangle_test: 986 };
+    pub const M7_SPHERE: Self = Self { base: 1428, node_test: 110, triangle_test: 979 };
     /// A capsule on a Cortex-M7.
-    pub const M7_CAPSULE: Self = Self { base: 1465, node_test: 124, triangle_test: 1077 };
+    pub const M7_CAPSULE: Self = Self { base: 1424, node_test: 122, triangle_test: 1106 };
 }

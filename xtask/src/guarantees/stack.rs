@@ -74,8 +74,8 @@ impl Binary {
                 let start = symbol.address() as u32 & !1;
                 let from = (start - base) as usize;
                 let body = code.get(from..from + symbol.size() as usize).unwrap_or_default();
-                let mut function = Function::default();
-                function.name = format!("{:#}", rustc_demangle::demangle(symbol.name()?));
+                let name = format!("{:#}", rustc_demangle::demangle(symbol.name()?));
+                let mut function = Function { name, ..Function::default() };
                 decode(start, body, &marks, &mut function, &mut masking);
                 functions.insert(start, function);
             }
