@@ -14,7 +14,7 @@ use crate::toolchain::Cross;
 use crate::workspace;
 
 /// Added to the fitted constants, in per cent: the queries that bound the bound are a sample.
-const MARGIN: f64 = 5.0;
+const MARGIN: f64 = 10.0;
 
 /// What a query cost.
 #[derive(Clone, Copy)]

@@ -92,7 +92,7 @@ impl Effort {
 /// Measures, and writes the documents.
 pub fn run(options: &Options) -> Result<()> {
     if options.fit {
-        return cost::fit(&Cross::find()?, 4_000);
+        return cost::fit(&Cross::find()?, 12_000);
     }
     if options.render {
         return record::render();

@@ -135,7 +135,7 @@ pub const PROMISES: &[Promise] = &[
         XTASK,
         Bound::Is(0.0),
         "of {cost.queries} adversarial queries on the emulated Cortex-M7",
-        "A plane above measured queries, with 5 % on top, not a proof; other queries than it was fitted \
+        "A plane above measured queries, with a margin, not a proof; other queries than it was fitted \
          to. Vertex tables that are slices of `Vec3`; instructions, not cycles.",
     ),
     promise(
