@@ -1,11 +1,11 @@
 //! The builder: what a `build.rs` or the `dibs` program calls.
 
 use dibs_nostd::Index;
-use dibs_nostd::format::{MAX_LEAF_TRIANGLES, PathKind};
+use dibs_nostd::format::{MAX_CHILDREN, MAX_LEAF_TRIANGLES, PathKind};
 
 use crate::Mesh;
 use crate::array::{BuiltTree, Facts, flatten};
-use crate::construct::{Cluster, Constructor, Surface};
+use crate::construct::{Cluster, Constructor, Surface, widen};
 use crate::error::BuildError;
 use crate::geodesic::{Graph, Paths, Topology};
 use crate::stretch::Shares;
@@ -232,7 +232,13 @@ impl<'p> Builder<'p> {
         let graph = Graph::new(mesh, &topology, paths, shares);
         let restricted = self.construction == Construction::Paper;
         let surface = Surface { mesh, graph: &graph, restricted };
-        Constructor::new(surface, self.construction, leaf_triangles, self.progress).run()
+        let constructor =
+            Constructor::new(surface, self.construction, leaf_triangles, self.progress);
+        let children = match self.construction {
+            Construction::Paper => 2,
+            _ => MAX_CHILDREN as usize,
+        };
+        Ok(widen(constructor.run()?, children))
     }
 
     fn check_limits(&self, mesh: &Mesh) -> Result<(), BuildError> {
@@ -277,4 +283,4 @@ impl<'p> Builder<'p> {
 }
 
 /// Triangles a leaf of the default construction.
-const DEFAULT_LEAF: usize = 4;
+const DEFAULT_LEAF: usize = 8;

@@ -4,7 +4,7 @@ use core::fmt;
 
 use crate::Index;
 use crate::format::{
-    CHECKSUM_AT, CRC, HEADER_BYTES, Link, MAGIC, MAX_DEPTH, PathKind, VERSION, limit_code, u32_at,
+    CHECKSUM_AT, CRC, HEADER_BYTES, Link, MAGIC, MAX_STACK, PathKind, VERSION, limit_code, u32_at,
 };
 use crate::tree::{Header, Tree};
 
@@ -56,9 +56,9 @@ pub enum FormatError {
         /// The section's kind, see [`crate::format::section`].
         kind: u32,
     },
-    /// A node's children do not follow it in depth-first order.
+    /// A node's children do not follow those of the node before it.
     NodeOrder {
-        /// Row of the child that is out of place.
+        /// Row of the first child that is out of place.
         node: u32,
     },
     /// A pin is not a vertex of the mesh.
@@ -79,6 +79,13 @@ pub enum FormatError {
     Leaf {
         /// First triangle of the leaf.
         first: u32,
+    },
+    /// A corner of a leaf is neither a corner of its first triangle nor the third of a later one.
+    Patch {
+        /// Row of the triangle.
+        triangle: u32,
+        /// The corner.
+        vertex: u32,
     },
     /// A triangle's corner is not a vertex of the mesh.
     Corner {
@@ -102,11 +109,11 @@ pub enum FormatError {
         /// Row of the triangle.
         triangle: u32,
     },
-    /// The tree is deeper or shallower than the header states.
-    Depth {
-        /// The depth in the header.
+    /// A traversal's stack needs more or fewer entries than the header states.
+    Stack {
+        /// Entries in the header.
         stated: u32,
-        /// The depth found (or a bound that was passed).
+        /// Entries found.
         found: u32,
     },
 }
@@ -131,18 +138,21 @@ impl fmt::Display for FormatError {
                 write!(f, "header field at {offset} holds {value:#x}, which is not valid")
             }
             Self::Section { kind } => write!(f, "section {kind} is missing or has a wrong size"),
-            Self::NodeOrder { node } => write!(f, "node {node} is out of depth-first order"),
+            Self::NodeOrder { node } => write!(f, "node {node} is out of order"),
             Self::Pin { node, pin } => write!(f, "node {node} is pinned to missing vertex {pin}"),
             Self::Radius { node, code } => write!(f, "node {node} has radius code {code}"),
             Self::Leaf { first } => write!(f, "the leaf at triangle {first} is out of order"),
+            Self::Patch { triangle, vertex } => {
+                write!(f, "corner {vertex} of triangle {triangle} is not where its leaf needs it")
+            }
             Self::Corner { triangle, vertex } => {
                 write!(f, "triangle {triangle} uses missing vertex {vertex}")
             }
             Self::Order { row } => write!(f, "vertex order row {row} is not a vertex"),
             Self::Metric { triangle } => write!(f, "triangle {triangle} has an impossible metric"),
             Self::Limit { triangle } => write!(f, "triangle {triangle} has no stretch limit"),
-            Self::Depth { stated, found } => {
-                write!(f, "depth {found} found, the header states {stated}")
+            Self::Stack { stated, found } => {
+                write!(f, "{found} stack entries are needed, the header states {stated}")
             }
         }
     }
@@ -202,34 +212,35 @@ pub(crate) const fn header<I: Index>(bytes: &[u8]) -> Result<Header, FormatError
         vertices: tri!(field(bytes, 12)),
         triangles: tri!(field(bytes, 16)),
         nodes: tri!(field(bytes, 20)),
-        root: tri!(field(bytes, 24)),
-        depth: tri!(field(bytes, 28)),
-        stretch: f32::from_bits(tri!(field(bytes, 32))),
-        radius_unit: f32::from_bits(tri!(field(bytes, 36))),
-        root_pin: tri!(field(bytes, 40)),
-        root_radius_code: tri!(field(bytes, 44)),
+        stack: tri!(field(bytes, 24)),
+        stretch: f32::from_bits(tri!(field(bytes, 28))),
+        radius_unit: f32::from_bits(tri!(field(bytes, 32))),
         sections: tri!(field(bytes, 48)),
         checksum: tri!(field(bytes, CHECKSUM_AT)),
     };
-    let reserved = tri!(field(bytes, 56));
+    let mut reserved = 36;
+    while reserved < 48 {
+        let value = tri!(field(bytes, reserved));
+        if value != 0 {
+            return Err(FormatError::Field { offset: reserved as u8, value });
+        }
+        reserved += 4;
+    }
+    let last = tri!(field(bytes, 56));
     let wrong = if header.vertices == 0 || header.vertices > I::MAX_VERTICES {
         Some((12, header.vertices))
     } else if header.triangles == 0 || header.triangles >= 1 << 28 {
         Some((16, header.triangles))
-    } else if header.nodes >= 1 << 28 {
+    } else if header.nodes == 0 || header.nodes >= 1 << 28 {
         Some((20, header.nodes))
-    } else if header.depth > MAX_DEPTH {
-        Some((28, header.depth))
+    } else if header.stack > MAX_STACK {
+        Some((24, header.stack))
     } else if !(header.stretch >= 1.0 && header.stretch <= 1e6) {
-        Some((32, header.stretch.to_bits()))
+        Some((28, header.stretch.to_bits()))
     } else if !(header.radius_unit >= 0.0 && header.radius_unit <= 1e18) {
-        Some((36, header.radius_unit.to_bits()))
-    } else if header.root_pin >= header.vertices {
-        Some((40, header.root_pin))
-    } else if header.root_radius_code > I::MAX_RADIUS_CODE {
-        Some((44, header.root_radius_code))
-    } else if reserved != 0 {
-        Some((56, reserved))
+        Some((32, header.radius_unit.to_bits()))
+    } else if last != 0 {
+        Some((56, last))
     } else {
         None
     };
@@ -250,75 +261,130 @@ const fn checksum(bytes: &[u8]) -> Result<(), FormatError> {
     if computed == stated { Ok(()) } else { Err(FormatError::Checksum { stated, computed }) }
 }
 
-/// Walks the whole tree once, depth first, near child before far one. Since the array must come out
-/// in exactly that order, meeting rows 0, 1, 2, ... proves that it is a tree and that nothing is left
-/// over, without a mark a node.
 pub(crate) const fn well_formed<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatError> {
+    tri!(nodes(tree));
+    tri!(tables(tree));
+    leaves(tree)
+}
+
+/// Reads every node once, in order. Since they stand breadth first, each link to children must point
+/// to exactly the rows that no link before it has: that proves a tree, with nothing left over.
+const fn nodes<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatError> {
     let header = tree.header();
-    // Links still to visit, each with the inner nodes above it: never more than MAX_DEPTH + 1. The
-    // mask is there so that no index can panic.
-    const SLOTS: usize = (MAX_DEPTH as usize + 1).next_power_of_two();
-    const MASK: usize = SLOTS - 1;
-    let mut stack = [(0u32, 0u32); SLOTS];
-    stack[0] = (header.root, 0);
+    // The root is a level of its own.
+    let (mut level_end, mut next_node) = (1, 1);
+    let (mut stack, mut most_siblings) = (1, 1);
+    let mut row = 0;
+    while row < header.nodes {
+        if row >= next_node {
+            return Err(FormatError::NodeOrder { node: row });
+        }
+        if row == level_end {
+            stack += most_siblings - 1;
+            most_siblings = 1;
+            level_end = next_node;
+        }
+        let Some(node) = tree.record(row) else {
+            return Err(FormatError::NodeOrder { node: row });
+        };
+        if node.pin >= header.vertices {
+            return Err(FormatError::Pin { node: row, pin: node.pin });
+        }
+        if node.radius_code > I::MAX_RADIUS_CODE {
+            return Err(FormatError::Radius { node: row, code: node.radius_code });
+        }
+        if let Link::Children { first, count } = Link::decode(node.link) {
+            if first != next_node || count > header.nodes - next_node {
+                return Err(FormatError::NodeOrder { node: first });
+            }
+            next_node += count;
+            if count > most_siblings {
+                most_siblings = count;
+            }
+        }
+        row += 1;
+    }
+    let stack = stack + most_siblings - 1;
+    if stack == header.stack {
+        Ok(())
+    } else {
+        Err(FormatError::Stack { stated: header.stack, found: stack })
+    }
+}
+
+/// Walks the tree once, depth first: the leaves' triangles must come as 0, 1, 2, ..., so that every
+/// triangle is in one leaf. `nodes` has proven that it is a tree and how many entries may wait.
+const fn leaves<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatError> {
+    let header = tree.header();
+    // The mask is there so that no index can panic.
+    const MASK: usize = MAX_STACK as usize - 1;
+    let mut stack = [0u32; MAX_STACK as usize];
     let mut waiting = 1;
-    let mut next_node = 0;
     let mut next_triangle = 0;
-    let mut deepest = 0;
     while waiting > 0 {
         waiting -= 1;
-        let (link, above) = stack[waiting & MASK];
-        match Link::decode(link) {
-            Link::Node(row) => {
-                if row != next_node {
-                    return Err(FormatError::NodeOrder { node: row });
+        let row = stack[waiting & MASK];
+        let Some(node) = tree.record(row) else {
+            return Err(FormatError::NodeOrder { node: row });
+        };
+        match Link::decode(node.link) {
+            Link::Children { first, count } => {
+                let mut child = count;
+                while child > 0 {
+                    child -= 1;
+                    stack[waiting & MASK] = first + child;
+                    waiting += 1;
                 }
-                next_node += 1;
-                let depth = above + 1;
-                if depth > header.depth {
-                    return Err(FormatError::Depth { stated: header.depth, found: depth });
-                }
-                if depth > deepest {
-                    deepest = depth;
-                }
-                let Some(node) = tree.node(row) else {
-                    return Err(FormatError::NodeOrder { node: row });
-                };
-                let mut child = 0;
-                while child < 2 {
-                    if node.pin[child] >= header.vertices {
-                        return Err(FormatError::Pin { node: row, pin: node.pin[child] });
-                    }
-                    if node.radius_code[child] > I::MAX_RADIUS_CODE {
-                        return Err(FormatError::Radius {
-                            node: row,
-                            code: node.radius_code[child],
-                        });
-                    }
-                    child += 1;
-                }
-                stack[waiting & MASK] = (node.link[1], depth);
-                stack[(waiting + 1) & MASK] = (node.link[0], depth);
-                waiting += 2;
             }
             Link::Leaf { first, count } => {
                 if first != next_triangle || count > header.triangles - next_triangle {
                     return Err(FormatError::Leaf { first });
                 }
+                tri!(patch(tree, first, count));
                 next_triangle += count;
             }
         }
     }
-    if next_node != header.nodes {
-        return Err(FormatError::NodeOrder { node: next_node });
+    if next_triangle == header.triangles {
+        Ok(())
+    } else {
+        Err(FormatError::Leaf { first: next_triangle })
     }
-    if next_triangle != header.triangles {
-        return Err(FormatError::Leaf { first: next_triangle });
+}
+
+const _: () = assert!(MAX_STACK.is_power_of_two());
+
+/// Whether the corners of a leaf's first triangle and the third corners of the others are all of its
+/// vertices: the only ones that a query looks at to reject the leaf.
+const fn patch<I: Index>(tree: &Tree<'_, I>, first: u32, count: u32) -> Result<(), FormatError> {
+    let mut triangle = first + 1;
+    while triangle < first + count {
+        let [v0, v1, _] = corners(tree, triangle);
+        let mut corner = 0;
+        while corner < 2 {
+            let vertex = if corner == 0 { v0 } else { v1 };
+            let [a, b, c] = corners(tree, first);
+            let mut found = vertex == a || vertex == b || vertex == c;
+            let mut other = first + 1;
+            while other < first + count && !found {
+                found = vertex == corners(tree, other)[2];
+                other += 1;
+            }
+            if !found {
+                return Err(FormatError::Patch { triangle, vertex });
+            }
+            corner += 1;
+        }
+        triangle += 1;
     }
-    if deepest != header.depth {
-        return Err(FormatError::Depth { stated: header.depth, found: deepest });
+    Ok(())
+}
+
+const fn corners<I: Index>(tree: &Tree<'_, I>, triangle: u32) -> [u32; 3] {
+    match tree.triangle(triangle) {
+        Some(corners) => corners,
+        None => [u32::MAX; 3],
     }
-    tables(tree)
 }
 
 /// Whether every index in the triangle and vertex order tables is a vertex.

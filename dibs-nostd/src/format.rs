@@ -9,7 +9,7 @@ use crate::Index;
 /// First bytes of every tree.
 pub const MAGIC: [u8; 4] = *b"DIBS";
 /// Version of the layout that this crate reads.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 /// Bytes of the fixed header; the section table follows it.
 pub const HEADER_BYTES: usize = 64;
 /// Bytes of one row of the section table: kind, offset, length.
@@ -18,8 +18,10 @@ pub const SECTION_BYTES: usize = 12;
 pub const CHECKSUM_AT: usize = 60;
 /// Every section starts at a multiple of this.
 pub const SECTION_ALIGN: usize = 16;
-/// Bound on the records from root to leaf, whatever the tree.
-pub const MAX_DEPTH: u32 = 64;
+/// Most entries that a traversal's stack may need, whatever the tree.
+pub const MAX_STACK: u32 = 512;
+/// Most children of one node.
+pub const MAX_CHILDREN: u32 = 8;
 /// Most triangles in one leaf.
 pub const MAX_LEAF_TRIANGLES: u32 = 8;
 
@@ -41,9 +43,9 @@ pub static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 /// What a section holds.
 pub mod section {
-    /// One record an inner node, in depth-first order.
+    /// One record a node, breadth first from the root.
     pub const NODES: u32 = 1;
-    /// Three vertex rows a triangle, leaf by leaf.
+    /// Three vertex rows a triangle, leaf by leaf, depth first.
     pub const TRIANGLES: u32 = 2;
     /// The mesh's own vertex number of every row (optional: hosts need it, a controller does not).
     pub const VERTEX_ORDER: u32 = 3;
@@ -90,11 +92,16 @@ impl PathKind {
     }
 }
 
-/// Where a child stands: an inner node's record, or a leaf's run of triangles.
+/// What is below a node: its children, or a leaf's triangles. Both are one run of rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Link {
-    /// Row of the node table.
-    Node(u32),
+    /// Rows `first..first + count` of the node table.
+    Children {
+        /// First row.
+        first: u32,
+        /// 1 to [`MAX_CHILDREN`].
+        count: u32,
+    },
     /// Rows `first..first + count` of the triangle table.
     Leaf {
         /// First row.
@@ -109,42 +116,42 @@ const COUNT_SHIFT: u32 = 28;
 const FIRST_MASK: u32 = (1 << COUNT_SHIFT) - 1;
 
 impl Link {
-    /// The link as it is stored: bit 31 marks a leaf, whose bits 28 to 30 hold `count - 1` and whose
-    /// bits 0 to 27 hold `first`.
+    /// The link as it is stored: bit 31 marks a leaf, bits 28 to 30 hold `count - 1`, bits 0 to 27
+    /// `first`.
     #[must_use]
     pub const fn encode(self) -> u32 {
-        match self {
-            Self::Node(row) => row,
-            Self::Leaf { first, count } => {
-                LEAF_BIT | ((count.wrapping_sub(1) & 7) << COUNT_SHIFT) | (first & FIRST_MASK)
-            }
-        }
+        let (mark, first, count) = match self {
+            Self::Children { first, count } => (0, first, count),
+            Self::Leaf { first, count } => (LEAF_BIT, first, count),
+        };
+        mark | ((count.wrapping_sub(1) & 7) << COUNT_SHIFT) | (first & FIRST_MASK)
     }
 
     /// The inverse of [`Link::encode`].
     #[inline(always)]
     #[must_use]
     pub const fn decode(word: u32) -> Self {
+        let (first, count) = (word & FIRST_MASK, ((word >> COUNT_SHIFT) & 7) + 1);
         if word & LEAF_BIT == 0 {
-            Self::Node(word)
+            Self::Children { first, count }
         } else {
-            Self::Leaf { first: word & FIRST_MASK, count: ((word >> COUNT_SHIFT) & 7) + 1 }
+            Self::Leaf { first, count }
         }
     }
 }
 
-/// An inner node: both children in one record, so that one read serves both tests.
+/// A node as it is stored.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Node {
-    pub pin: [u32; 2],
-    pub radius_code: [u32; 2],
-    pub link: [u32; 2],
+    pub pin: u32,
+    pub radius_code: u32,
+    pub link: u32,
 }
 
 /// Bytes of one node record.
 #[must_use]
 pub const fn node_bytes<I: Index>() -> usize {
-    4 * I::BYTES + 8
+    2 * I::BYTES + 4
 }
 
 /// Bytes of one triangle row.
@@ -167,30 +174,18 @@ const fn rows_from(bytes: &[u8], row: u32, stride: usize) -> Option<&[u8]> {
 pub(crate) const fn node<I: Index>(nodes: &[u8], row: u32) -> Option<Node> {
     let Some(tail) = rows_from(nodes, row, node_bytes::<I>()) else { return None };
     if I::BYTES == 2 {
-        let Some(r) = tail.first_chunk::<16>() else { return None };
+        let Some(r) = tail.first_chunk::<8>() else { return None };
         Some(Node {
-            pin: [short(r[0], r[1]), short(r[2], r[3])],
-            radius_code: [short(r[4], r[5]), short(r[6], r[7])],
-            link: [
-                u32::from_le_bytes([r[8], r[9], r[10], r[11]]),
-                u32::from_le_bytes([r[12], r[13], r[14], r[15]]),
-            ],
+            pin: short(r[0], r[1]),
+            radius_code: short(r[2], r[3]),
+            link: u32::from_le_bytes([r[4], r[5], r[6], r[7]]),
         })
     } else {
-        let Some(r) = tail.first_chunk::<24>() else { return None };
+        let Some(r) = tail.first_chunk::<12>() else { return None };
         Some(Node {
-            pin: [
-                u32::from_le_bytes([r[0], r[1], r[2], r[3]]),
-                u32::from_le_bytes([r[4], r[5], r[6], r[7]]),
-            ],
-            radius_code: [
-                u32::from_le_bytes([r[8], r[9], r[10], r[11]]),
-                u32::from_le_bytes([r[12], r[13], r[14], r[15]]),
-            ],
-            link: [
-                u32::from_le_bytes([r[16], r[17], r[18], r[19]]),
-                u32::from_le_bytes([r[20], r[21], r[22], r[23]]),
-            ],
+            pin: u32::from_le_bytes([r[0], r[1], r[2], r[3]]),
+            radius_code: u32::from_le_bytes([r[4], r[5], r[6], r[7]]),
+            link: u32::from_le_bytes([r[8], r[9], r[10], r[11]]),
         })
     }
 }

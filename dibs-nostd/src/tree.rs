@@ -27,12 +27,9 @@ pub(crate) struct Header {
     pub vertices: u32,
     pub triangles: u32,
     pub nodes: u32,
-    pub root: u32,
-    pub depth: u32,
+    pub stack: u32,
     pub stretch: f32,
     pub radius_unit: f32,
-    pub root_pin: u32,
-    pub root_radius_code: u32,
     /// Rows of the section table.
     pub sections: u32,
     pub checksum: u32,
@@ -105,17 +102,17 @@ impl<'a, I: Index> Tree<'a, I> {
         self.header.triangles
     }
 
-    /// Number of inner nodes.
+    /// Number of nodes: inner ones, leaves and the root.
     #[must_use]
     pub const fn node_count(&self) -> u32 {
         self.header.nodes
     }
 
-    /// Inner nodes on the longest way from the root to a leaf: the traversal's stack must hold this
-    /// many entries.
+    /// Entries that a traversal's stack must hold: one, and on every level of the tree all siblings
+    /// but one, where there are most.
     #[must_use]
-    pub const fn depth(&self) -> u32 {
-        self.header.depth
+    pub const fn stack(&self) -> u32 {
+        self.header.stack
     }
 
     /// The stretch limit `s` that the tree was built for (1 = no stretch).
@@ -178,30 +175,21 @@ impl<'a, I: Index> Tree<'a, I> {
         }
     }
 
-    /// Pin, geodesic radius (mm, rounded up) and link of the root, for tools that walk the tree.
+    /// Pin, geodesic radius (mm, rounded up) and link of a node, for tools that walk the tree; `None`
+    /// outside the table. Row 0 is the root.
     #[must_use]
-    pub const fn root(&self) -> (u32, f32, Link) {
-        let header = &self.header;
-        let radius = header.root_radius_code as f32 * header.radius_unit;
-        (header.root_pin, radius, Link::decode(header.root))
-    }
-
-    /// Pin, geodesic radius (mm, rounded up) and link of both children of an inner node, for tools
-    /// that walk the tree; `None` outside the table.
-    #[must_use]
-    pub const fn children(&self, row: u32) -> Option<[(u32, f32, Link); 2]> {
-        let unit = self.header.radius_unit;
-        match self.node(row) {
-            Some(n) => Some([
-                (n.pin[0], n.radius_code[0] as f32 * unit, Link::decode(n.link[0])),
-                (n.pin[1], n.radius_code[1] as f32 * unit, Link::decode(n.link[1])),
-            ]),
+    pub const fn node(&self, row: u32) -> Option<(u32, f32, Link)> {
+        match self.record(row) {
+            Some(node) => {
+                let radius = node.radius_code as f32 * self.header.radius_unit;
+                Some((node.pin, radius, Link::decode(node.link)))
+            }
             None => None,
         }
     }
 
     #[inline(always)]
-    pub(crate) const fn node(&self, row: u32) -> Option<Node> {
+    pub(crate) const fn record(&self, row: u32) -> Option<Node> {
         format::node::<I>(self.sections.nodes, row)
     }
 

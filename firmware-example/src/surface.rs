@@ -16,4 +16,4 @@ pub type SurfaceAssembler =
     Assembler<'static, &'static Tree<'static, SurfaceIndex>, SURFACE_VERTICES>;
 
 /// A query with the stack that this tree needs.
-pub type SurfaceQuery = Query<'static, SurfaceIndex, SURFACE_DEPTH>;
+pub type SurfaceQuery = Query<'static, SurfaceIndex, SURFACE_STACK>;

@@ -1,6 +1,7 @@
 //! The library under test, as a method of the benchmark.
 
 use dibs_build::BuiltTree;
+use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
     Index, MeasuredStretch, Options, Query, StretchError, Tree, VertexTable, measure_stretch,
 };
@@ -9,7 +10,7 @@ use glam::Vec3;
 use crate::method::{Found, Method, Probe};
 
 /// Entries of the traversal's stack: enough for every tree that the builder makes.
-const DEPTH: usize = 64;
+const STACK: usize = MAX_STACK as usize;
 
 /// What a query may know besides the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -64,7 +65,7 @@ pub fn stretch(built: &BuiltTree, positions: &[Vec3]) -> Option<f32> {
 }
 
 struct Dibs<'t, I> {
-    query: Query<'t, I, DEPTH>,
+    query: Query<'t, I, STACK>,
     order: &'t [u32],
     rows: Vec<Vec3>,
     knowledge: Knowledge,
@@ -74,7 +75,7 @@ struct Dibs<'t, I> {
 
 impl<'t, I: Index> Dibs<'t, I> {
     fn new(built: &'t BuiltTree, tree: Tree<'t, I>, knowledge: Knowledge) -> Self {
-        let query = Query::new(&tree).expect("64 entries are enough");
+        let query = Query::new(&tree).expect("enough for any tree");
         let order = built.vertex_order();
         Self { query, order, rows: Vec::new(), knowledge, stretch: None, last: None }
     }
@@ -108,7 +109,7 @@ impl<I: Index> Method for Dibs<'_, I> {
 }
 
 struct Unordered<'t, I> {
-    query: Query<'t, I, DEPTH>,
+    query: Query<'t, I, STACK>,
     table: Looked<'t>,
 }
 
@@ -131,7 +132,7 @@ impl VertexTable for Looked<'_> {
 
 impl<'t, I: Index> Unordered<'t, I> {
     fn new(built: &'t BuiltTree, tree: Tree<'t, I>) -> Self {
-        let query = Query::new(&tree).expect("64 entries are enough");
+        let query = Query::new(&tree).expect("enough for any tree");
         Self { query, table: Looked { order: built.vertex_order(), positions: Vec::new() } }
     }
 }
@@ -150,7 +151,7 @@ impl<I: Index> Method for Unordered<'_, I> {
 }
 
 fn ask<I: Index>(
-    query: &mut Query<'_, I, DEPTH>,
+    query: &mut Query<'_, I, STACK>,
     vertices: &(impl VertexTable + ?Sized),
     tool: &Probe,
     options: &Options,

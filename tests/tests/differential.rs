@@ -2,6 +2,7 @@
 //! capsules, deformations up to the limit. Nothing may be off by more than the stated accuracy.
 
 use dibs_build::{Builder, BuiltTree, Construction, IndexWidth, Mesh, Paths, generate};
+use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Index, Options, Proximity, Query, Tree, measure_stretch};
 use dibs_tests::ask;
 use dibs_tests::deform::Deformation;
@@ -41,7 +42,7 @@ fn run(case: &Case<'_>, seed: u64) -> Tally {
 
 fn run_with<I: Index>(case: &Case<'_>, tree: &Tree<'_, I>, seed: u64) -> Tally {
     let mut rng = Rng::with_seed(seed);
-    let mut query = Query::<I, 64>::new(tree).expect("64 entries are enough");
+    let mut query = Query::<I, { MAX_STACK as usize }>::new(tree).expect("enough for any tree");
     let mut tally = Tally::default();
     let triangles = triangle_rows(tree);
     while tally.queries < case.queries {

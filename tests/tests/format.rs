@@ -1,7 +1,7 @@
 //! The tree's bytes against their specification, `docs/format.md`, and against corruption.
 
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
-use dibs_nostd::format::CRC;
+use dibs_nostd::format::{CRC, Link, MAX_STACK};
 use dibs_nostd::{FormatError, Options, Query, QueryError, Sphere, Tree};
 use fastrand::Rng;
 use glam::Vec3;
@@ -53,12 +53,12 @@ fn every_field_and_section_stands_where_the_specification_says() {
         let (mesh, built) = heart(index);
         let bytes = built.blob();
         assert_eq!(&bytes[..4], b"DIBS");
-        assert_eq!(bytes[4..8], [1, 0, width as u8, 1]);
+        assert_eq!(bytes[4..8], [2, 0, width as u8, 1]);
         let (vertices, triangles, nodes) = (word(bytes, 12), word(bytes, 16), word(bytes, 20));
         assert_eq!(triangles as usize, mesh.triangles.len());
         assert_eq!(vertices as usize, mesh.positions.len());
         assert_eq!(word(bytes, 52) as usize, bytes.len());
-        assert_eq!(section(bytes, 1).1, nodes as usize * (4 * width + 8));
+        assert_eq!(section(bytes, 1).1, nodes as usize * (2 * width + 4));
         assert_eq!(section(bytes, 2).1, triangles as usize * 3 * width);
         let (order, length) = section(bytes, 3);
         assert_eq!(length, vertices as usize * width);
@@ -101,33 +101,70 @@ fn a_wrong_value_with_a_right_checksum_is_named() {
     let (_, built) = heart(IndexWidth::Bits16);
     let bytes = built.blob();
     let (nodes, triangles) = (section(bytes, 1).0, section(bytes, 2).0);
-    let vertices = word(bytes, 12);
     let refuse = |at: usize, value: u32| {
         Tree::<u16>::from_bytes(&with_word(bytes, at, value)).expect_err("is wrong")
     };
     assert!(matches!(Tree::<u32>::from_bytes(bytes), Err(FormatError::Width { found: 2, .. })));
     assert!(matches!(refuse(0, 0), FormatError::Magic { .. }));
-    assert!(matches!(refuse(4, 0x0102_0002), FormatError::Version { found: 2 }));
-    assert!(matches!(refuse(4, 0x0702_0001), FormatError::Field { offset: 7, value: 7 }));
-    for (at, value) in [(12, 0), (12, 65_537), (16, 0), (28, 65), (40, vertices), (56, 1)] {
+    assert!(matches!(refuse(4, 0x0102_0001), FormatError::Version { found: 1 }));
+    assert!(matches!(refuse(4, 0x0702_0002), FormatError::Field { offset: 7, value: 7 }));
+    for (at, value) in
+        [(12, 0), (12, 65_537), (16, 0), (20, 0), (24, 513), (36, 1), (40, 1), (44, 1), (56, 1)]
+    {
         let expected = FormatError::Field { offset: at as u8, value };
         assert_eq!(refuse(at, value), expected, "field at {at}");
     }
     for wrong in [0.5f32, f32::NAN, f32::INFINITY] {
-        assert!(matches!(refuse(32, wrong.to_bits()), FormatError::Field { offset: 32, .. }));
-        assert!(wrong == 0.5 || matches!(refuse(36, wrong.to_bits()), FormatError::Field { .. }));
+        assert!(matches!(refuse(28, wrong.to_bits()), FormatError::Field { offset: 28, .. }));
+        assert!(wrong == 0.5 || matches!(refuse(32, wrong.to_bits()), FormatError::Field { .. }));
     }
     assert!(matches!(refuse(20, word(bytes, 20) - 1), FormatError::Section { kind: 1 }));
     assert!(matches!(refuse(64, 99), FormatError::Section { kind: 1 }));
     assert!(matches!(refuse(68, 7), FormatError::Section { kind: 1 }));
-    assert!(matches!(refuse(28, word(bytes, 28) - 1), FormatError::Depth { .. }));
-    assert!(matches!(refuse(28, word(bytes, 28) + 1), FormatError::Depth { .. }));
-    assert!(matches!(refuse(24, 1), FormatError::NodeOrder { node: 1 }));
+    assert!(matches!(refuse(24, word(bytes, 24) - 1), FormatError::Stack { .. }));
+    assert!(matches!(refuse(24, word(bytes, 24) + 1), FormatError::Stack { .. }));
     assert!(matches!(refuse(nodes, 0xFFFF_FFFF), FormatError::Pin { node: 0, pin: 0xFFFF }));
-    assert!(matches!(refuse(nodes + 8, 0), FormatError::NodeOrder { node: 0 }));
-    assert!(matches!(refuse(nodes + 8, 1 << 31), FormatError::NodeOrder { .. }));
+    let root = word(bytes, nodes + 4);
+    assert!(matches!(refuse(nodes + 4, root - 1), FormatError::NodeOrder { node: 0 }));
+    assert!(matches!(refuse(nodes + 4, root + 1), FormatError::NodeOrder { node: 2 }));
+    assert!(matches!(refuse(nodes + 4, root - (1 << 28)), FormatError::NodeOrder { .. }));
+    assert!(matches!(refuse(nodes + 4, 1 << 31), FormatError::NodeOrder { .. }));
     let corner = refuse(triangles, 0xFFFF_FFFF);
     assert!(matches!(corner, FormatError::Corner { triangle: 0, vertex: 0xFFFF }));
+}
+
+/// A leaf's vertices must be where a query looks for them, or it would reject the leaf too early.
+#[test]
+fn a_leaf_whose_vertices_are_not_at_their_places_is_refused() {
+    let (mesh, _) = heart(IndexWidth::Bits16);
+    // The rest metric, which is checked too, would be the first to object.
+    let built = Builder::new().with_metric(false).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let bytes = built.blob();
+    let table = section(bytes, 2).0;
+    let mut refused = 0;
+    for row in 0..tree.node_count() {
+        let Some((.., Link::Leaf { first, count })) = tree.node(row) else { continue };
+        for triangle in first + 1..first + count {
+            let [a, b, c] = tree.triangle(triangle).expect("in the tree");
+            let others = (first..first + count).filter(|&t| t != triangle);
+            let is_new = |v| others.clone().all(|t| !tree.triangle(t).unwrap().contains(&v));
+            if !is_new(c) {
+                continue;
+            }
+            let mut wrong = bytes.to_vec();
+            let at = table + 6 * triangle as usize;
+            for (corner, vertex) in [c, a, b].into_iter().enumerate() {
+                let place = at + 2 * corner..at + 2 * corner + 2;
+                wrong[place].copy_from_slice(&(vertex as u16).to_le_bytes());
+            }
+            let sealed = with_word(&wrong, 0, word(&wrong, 0));
+            let error = Tree::<u16>::from_bytes(&sealed).expect_err("a new corner, not the third");
+            assert_eq!(error, FormatError::Patch { triangle, vertex: c });
+            refused += 1;
+        }
+    }
+    assert!(refused > 50, "{refused} leaves tried");
 }
 
 /// What a validated tree does when its bytes rot afterwards: an error or an answer, but it ends.
@@ -146,7 +183,7 @@ fn a_query_on_rotten_bytes_ends() {
             rotten[nodes + rng.usize(..length)] ^= 1 << rng.u32(..8);
         }
         let view = tree.moved_to(&rotten).expect("same layout");
-        let mut query = Query::<u16, 64>::new(&view).expect("deep enough");
+        let mut query = Query::<u16, { MAX_STACK as usize }>::new(&view).expect("deep enough");
         let tool = Sphere::new(rows[rng.usize(..rows.len())] * 1.3, 1.0).expect("valid");
         match query.closest(rows.as_slice(), &tool, &Options::new()) {
             Ok(found) => {

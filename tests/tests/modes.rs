@@ -600,7 +600,7 @@ fn the_generated_static_holds_the_modes() {
     });
     assert_eq!(generated, built);
     assert_eq!(generated.0.len(), HEART_VERTICES);
-    assert_eq!(HEART_DEPTH, HEART.depth() as usize);
+    assert_eq!(HEART_STACK, HEART.stack() as usize);
 }
 
 /// All 24 modes of the real heart's 25 frames: driven whole by as many numbers a tick.

@@ -2,6 +2,9 @@
 //!
 //! A triangle whose first two corners are the first and the third of the one before shares an edge
 //! with it, and the controller has two of its corners and one of its edges at hand.
+//!
+//! The corners of the leaf's first triangle and the third ones of the others are all of its vertices:
+//! a query looks at no others to reject the leaf.
 
 use glam::DVec3;
 
@@ -20,38 +23,68 @@ pub(crate) struct Placed {
 struct Choice {
     placed: Placed,
     openness: f64,
+    /// Whether the first corner is neither too pointed nor too flat to measure the stretch from, or at
+    /// least the triangle's best.
+    is_fit: bool,
     /// The triangle's bit among the leaf's.
     bit: u32,
 }
 
 /// Orders a leaf's triangles by fans, the first of which may continue the last triangle before.
+///
+/// Where that leaves a triangle at a corner too pointed to measure from, the leaf starts at whichever
+/// triangle leaves the fewest.
 pub(crate) fn arrange(mesh: &Mesh, leaf: &[u32], before: Option<Placed>) -> Vec<Placed> {
     let choices: Vec<Choice> =
         leaf.iter().zip(0..).flat_map(|(&t, i)| rotations(mesh, t, 1 << i)).collect();
-    let mut left: u32 = (1 << leaf.len()) - 1;
-    let mut placed = Vec::with_capacity(leaf.len());
-    let mut last = before;
+    let all: u32 = (1 << leaf.len()) - 1;
+    let first = before.and_then(|last| continuation(&choices, all, last));
+    let Some(first) = first.or_else(|| start(&choices, all, &[])) else { return Vec::new() };
+    let (greedy, unfit) = arrange_from(&choices, all, first);
+    if unfit == 0 {
+        return greedy;
+    }
+    let starts = choices.iter().filter(|choice| choice.is_fit);
+    let others = starts.map(|&first| arrange_from(&choices, all, first));
+    // Of equally good ones the first.
+    let best = std::iter::once((greedy, unfit)).chain(others).min_by_key(|&(_, unfit)| unfit);
+    best.map_or_else(Vec::new, |(placed, _)| placed)
+}
+
+/// The order from this start, and how many triangles it stores at a bad corner.
+fn arrange_from(choices: &[Choice], all: u32, first: Choice) -> (Vec<Placed>, usize) {
+    let mut left = all & !first.bit;
+    let mut placed = vec![first.placed];
+    let (mut last, mut unfit) = (first, usize::from(!first.is_fit));
     while left != 0 {
-        let next = last.and_then(|last| continuation(&choices, left, last));
-        let next = next.unwrap_or_else(|| start(&choices, left));
+        let next = continuation(choices, left, last.placed);
+        let Some(next) = next.or_else(|| start(choices, left, &placed)) else { break };
         left &= !next.bit;
         placed.push(next.placed);
-        last = Some(next.placed);
+        unfit += usize::from(!next.is_fit);
+        last = next;
     }
-    placed
+    (placed, unfit)
 }
 
 /// The triangle that continues the fan of `last`.
 fn continuation(choices: &[Choice], left: u32, last: Placed) -> Option<Choice> {
     let [a, _, c] = last.corners;
     let continues = |choice: &&Choice| {
-        left & choice.bit != 0 && choice.placed.corners[0] == a && choice.placed.corners[1] == c
+        let [first, second, _] = choice.placed.corners;
+        left & choice.bit != 0 && choice.is_fit && first == a && second == c
     };
     choices.iter().find(continues).copied()
 }
 
-/// The triangle and corner from which the longest fan starts.
-fn start(choices: &[Choice], left: u32) -> Choice {
+/// The triangle and corner from which the longest fan starts. Only its third corner may be new to the
+/// leaf, unless it is the first: since a leaf hangs together by edges, there is one.
+fn start(choices: &[Choice], left: u32, placed: &[Placed]) -> Option<Choice> {
+    let is_known = |v: u32| placed.is_empty() || placed.iter().any(|p| p.corners.contains(&v));
+    let possible = |choice: &&Choice| {
+        let [first, second, _] = choice.placed.corners;
+        left & choice.bit != 0 && is_known(first) && is_known(second)
+    };
     let length = |first: &Choice| {
         let (mut left, mut last, mut length) = (left & !first.bit, *first, 0);
         while let Some(next) = continuation(choices, left, last.placed) {
@@ -59,25 +92,30 @@ fn start(choices: &[Choice], left: u32) -> Choice {
         }
         length
     };
-    let possible = choices.iter().filter(|choice| left & choice.bit != 0);
-    let best = possible
-        .map(|choice| (length(choice), *choice))
-        // Of equally long fans the one at the best corner, then the first.
-        .reduce(|a, b| if (b.0, b.1.openness) > (a.0, a.1.openness) { b } else { a });
-    best.map_or(choices[0], |(_, choice)| choice)
+    // Of equally long fans the one at the best corner, then the first.
+    let key = |choice: &Choice| (choice.is_fit, length(choice), choice.openness);
+    let mut possible = choices.iter().filter(possible);
+    let first = possible.next()?;
+    let mut best = (first, key(first));
+    for choice in possible {
+        let key = key(choice);
+        if key > best.1 {
+            best = (choice, key);
+        }
+    }
+    Some(*best.0)
 }
 
-/// The ways to store a triangle: those whose first corner is neither too pointed nor too flat to measure
-/// the stretch from.
-fn rotations(mesh: &Mesh, triangle: u32, bit: u32) -> impl Iterator<Item = Choice> {
+/// The ways to store a triangle.
+fn rotations(mesh: &Mesh, triangle: u32, bit: u32) -> [Choice; 3] {
     let [a, b, c] = mesh.triangles[triangle as usize];
     let all = [[a, b, c], [b, c, a], [c, a, b]].map(|corners| {
         let [a, b, c] = corners.map(|v| mesh.positions[v as usize].as_dvec3());
         let placed = Placed { triangle, corners };
-        Choice { placed, openness: openness(b - a, c - a), bit }
+        Choice { placed, openness: openness(b - a, c - a), is_fit: false, bit }
     });
     let best = all.iter().map(|choice| choice.openness).fold(0.0, f64::max);
-    all.into_iter().filter(move |choice| choice.openness >= OPEN.min(best))
+    all.map(|choice| Choice { is_fit: choice.openness >= OPEN.min(best), ..choice })
 }
 
 /// Openness of a corner that is good enough: 18 degrees.

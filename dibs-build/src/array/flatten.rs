@@ -14,37 +14,55 @@ use crate::error::BuildError;
 use crate::stretch::Shares;
 
 /// A tree in the order of its array.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Flat {
-    /// Pins, radii and links of both children, a node.
-    nodes: Vec<[(u32, f64, Link); 2]>,
+    /// Pin, radius and link of each node.
+    nodes: Vec<(u32, f64, Link)>,
     /// Triangles, leaf by leaf.
     triangles: Vec<Placed>,
-    depth: u32,
+    /// Entries that a traversal's stack needs.
+    stack: u32,
 }
 
 impl Flat {
-    /// Depth first, so that children follow their parents and the triangles of a section are one run.
-    fn add(&mut self, mesh: &Mesh, cluster: &Cluster, above: u32) -> Link {
-        match &cluster.content {
-            Content::Leaf(triangles) => {
-                let first = self.triangles.len() as u32;
-                let before = self.triangles.last().copied();
-                self.triangles.extend(arrange(mesh, triangles, before));
-                Link::Leaf { first, count: triangles.len() as u32 }
+    /// Nodes breadth first, so that children follow their parents and siblings are one run; leaves
+    /// depth first, so that what is near on the surface is near in the tables.
+    fn new(mesh: &Mesh, root: &Cluster) -> Self {
+        let mut flat = Self { nodes: Vec::new(), triangles: Vec::new(), stack: 1 };
+        let mut leaves = Vec::new();
+        let mut level = vec![(root, 0)];
+        let mut placed = 1;
+        while !level.is_empty() {
+            let mut below = Vec::new();
+            let mut most_siblings = 1;
+            for (cluster, mut triangle) in level {
+                let link = match &cluster.content {
+                    Content::Leaf(triangles) => {
+                        leaves.push((triangle, triangles));
+                        Link::Leaf { first: triangle, count: triangles.len() as u32 }
+                    }
+                    Content::Inner(children) => {
+                        let (first, count) = (placed, children.len() as u32);
+                        placed += count;
+                        most_siblings = most_siblings.max(count);
+                        for child in children {
+                            below.push((child, triangle));
+                            triangle += child.triangles();
+                        }
+                        Link::Children { first, count }
+                    }
+                };
+                flat.nodes.push((cluster.pin, cluster.radius, link));
             }
-            Content::Inner(children) => {
-                self.depth = self.depth.max(above + 1);
-                let row = self.nodes.len();
-                let mut record = children.each_ref().map(|c| (c.pin, c.radius, Link::Node(0)));
-                self.nodes.push(record);
-                for (entry, child) in record.iter_mut().zip(children.iter()) {
-                    entry.2 = self.add(mesh, child, above + 1);
-                }
-                self.nodes[row] = record;
-                Link::Node(row as u32)
-            }
+            flat.stack += most_siblings - 1;
+            level = below;
         }
+        leaves.sort_unstable_by_key(|&(first, _)| first);
+        for (_, leaf) in leaves {
+            let before = flat.triangles.last().copied();
+            flat.triangles.extend(arrange(mesh, leaf, before));
+        }
+        flat
     }
 }
 
@@ -65,20 +83,19 @@ pub(crate) fn flatten<I: Index>(
     root: &Cluster,
     facts: Facts<'_>,
 ) -> Result<(Vec<u8>, Vec<u32>), BuildError> {
-    let mut flat = Flat::default();
-    let root_link = flat.add(mesh, root, 0);
+    let flat = Flat::new(mesh, root);
     let order = vertex_order(mesh, &flat.triangles);
     let mut row_of = vec![u32::MAX; mesh.positions.len()];
     for (row, &vertex) in order.iter().enumerate() {
         row_of[vertex as usize] = row as u32;
     }
-    let unit = radius_unit::<I>(root, &flat);
+    let unit = radius_unit::<I>(&flat);
 
     let mut nodes = Vec::new();
-    for children in &flat.nodes {
-        children.iter().for_each(|&(pin, ..)| put::<I>(&mut nodes, row_of[pin as usize]));
-        children.iter().for_each(|&(_, radius, _)| put::<I>(&mut nodes, code(radius, unit)));
-        children.iter().for_each(|(.., link)| nodes.extend(link.encode().to_le_bytes()));
+    for &(pin, radius, link) in &flat.nodes {
+        put::<I>(&mut nodes, row_of[pin as usize]);
+        put::<I>(&mut nodes, code(radius, unit));
+        nodes.extend(link.encode().to_le_bytes());
     }
     let mut triangles = Vec::new();
     for triangle in &flat.triangles {
@@ -116,12 +133,12 @@ pub(crate) fn flatten<I: Index>(
         order.len() as u32,
         flat.triangles.len() as u32,
         flat.nodes.len() as u32,
-        root_link.encode(),
-        flat.depth,
+        flat.stack,
         facts.stretch.to_bits(),
         unit.to_bits(),
-        row_of[root.pin as usize],
-        code(root.radius, unit),
+        0,
+        0,
+        0,
     ];
     let bytes = assemble::<I>(facts.paths, header, &sections)?;
     Tree::<I>::from_bytes(&bytes)?;
@@ -159,9 +176,8 @@ fn metrics(mesh: &Mesh, triangles: &[Placed], facts: Facts<'_>) -> Vec<u8> {
 }
 
 /// The length of one radius code: the largest radius takes nearly the largest code.
-fn radius_unit<I: Index>(root: &Cluster, flat: &Flat) -> f32 {
-    let radii = flat.nodes.iter().flatten().map(|&(_, radius, _)| radius);
-    let largest = radii.fold(root.radius, f64::max);
+fn radius_unit<I: Index>(flat: &Flat) -> f32 {
+    let largest = flat.nodes.iter().map(|&(_, radius, _)| radius).fold(0.0, f64::max);
     // One part in a million covers the rounding of the unit to f32.
     (largest / f64::from(I::MAX_RADIUS_CODE) * (1.0 + 1e-6)) as f32
 }

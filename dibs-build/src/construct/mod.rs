@@ -1,19 +1,21 @@
 //! Top-down construction: from one section of all triangles to the tree of sections.
 
 mod paper;
+mod patch;
 mod pin;
 mod section;
 mod split;
+mod widen;
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::Construction;
 use crate::error::BuildError;
-use dibs_nostd::format::MAX_DEPTH;
 use pin::Pin;
 pub(crate) use section::Surface;
 use section::{Searches, Section};
+pub(crate) use widen::widen;
 
 /// A node before it is flattened.
 #[derive(Debug)]
@@ -23,9 +25,21 @@ pub(crate) struct Cluster {
     pub content: Content,
 }
 
+impl Cluster {
+    /// Number of triangles below.
+    pub fn triangles(&self) -> u32 {
+        match &self.content {
+            Content::Leaf(triangles) => triangles.len() as u32,
+            Content::Inner(children) => children.iter().map(Self::triangles).sum(),
+        }
+    }
+}
+
 #[derive(Debug)]
 pub(crate) enum Content {
-    Inner(Box<[Cluster; 2]>),
+    /// Two after construction, more once it is widened.
+    Inner(Vec<Cluster>),
+    /// Triangles that hang together by edges.
     Leaf(Vec<u32>),
 }
 
@@ -40,6 +54,9 @@ pub(crate) struct Constructor<'a> {
     /// Memory for searches that no thread is using.
     idle: Mutex<Vec<Searches>>,
 }
+
+/// Deeper sections than this are halved, whatever the cost.
+const MAX_DEPTH: u32 = 64;
 
 /// Sections of fewer triangles are built by the thread that has them.
 const PARALLEL_ABOVE: usize = 512;
@@ -70,14 +87,21 @@ impl<'a> Constructor<'a> {
         if !pin.radius.is_finite() {
             return Err(BuildError::NotConnected { vertex: pin.vertex });
         }
-        if section.triangles.len() <= self.leaf_triangles {
-            self.give_back(searches);
-            let count = section.triangles.len();
-            (self.progress)(self.done.fetch_add(count, Ordering::Relaxed) + count);
-            let content = Content::Leaf(section.triangles);
-            return Ok(Cluster { pin: pin.vertex, radius: pin.radius, content });
-        }
-        let sides = self.split(&section, &mut searches, depth);
+        let sides = if section.triangles.len() <= self.leaf_triangles {
+            let mesh = &self.surface.mesh.triangles;
+            let mut parts = patch::parts(mesh, &section.triangles);
+            let part = parts.remove(0);
+            if parts.is_empty() {
+                self.give_back(searches);
+                let count = part.len();
+                (self.progress)(self.done.fetch_add(count, Ordering::Relaxed) + count);
+                let content = Content::Leaf(part);
+                return Ok(Cluster { pin: pin.vertex, radius: pin.radius, content });
+            }
+            [part, parts.concat()]
+        } else {
+            self.split(&section, &mut searches, depth)
+        };
         let [left, right] = sides.map(|triangles| Section::new(self.surface.mesh, triangles));
         // A child's search starts at its far border, seen from the seed that it belongs to.
         let borders = [(&left, 0), (&right, 1)].map(|(side, seed)| {
@@ -94,7 +118,7 @@ impl<'a> Constructor<'a> {
         let build_right = || self.cluster(right, borders[1], depth + 1);
         let (left, right) =
             if big { rayon::join(build_left, build_right) } else { (build_left(), build_right()) };
-        let content = Content::Inner(Box::new([left?, right?]));
+        let content = Content::Inner(vec![left?, right?]);
         Ok(Cluster { pin: pin.vertex, radius: pin.radius, content })
     }
 

@@ -1,9 +1,14 @@
 //! Dividing a section in two by distance along the surface.
 
+use super::patch;
 use super::section::{Searches, Section, Surface};
 
 /// No side of a split gets less than this share of the triangles: it bounds the depth.
 const LEAST_SHARE: f64 = 0.1;
+
+/// Smaller sections are mended after their split. Larger ones would only cost time: what is wrong at
+/// their borders is mended further down.
+const MEND_BELOW: usize = 64;
 
 /// Each triangle goes to the nearer of the two far seeds that the pin's search left in `searches`.
 ///
@@ -20,7 +25,28 @@ pub(crate) fn by_geodesic(
     let key = |t: u32| -> f64 { surface.mesh.triangles[t as usize].into_iter().map(nearer).sum() };
     let keyed = section.triangles.iter().map(|&t| (key(t), t)).collect();
     let share = if even { 0.5 } else { LEAST_SHARE };
-    at_zero(keyed, share)
+    let sides = at_zero(keyed, share);
+    if section.triangles.len() <= MEND_BELOW && !even {
+        let mesh = &surface.mesh.triangles;
+        let [left, right] = sides.map(|side| mainland(mesh, &side));
+        [[left.0, right.1], [right.0, left.1]].map(|parts| {
+            let mut side = parts.concat();
+            side.sort_unstable();
+            side
+        })
+    } else {
+        sides
+    }
+}
+
+/// The largest part that hangs together by edges, and the rest: triangles at the border of a split that
+/// only touch their side at a corner are better off on the other, or they become leaves of their own.
+fn mainland(mesh: &[[u32; 3]], side: &[u32]) -> (Vec<u32>, Vec<u32>) {
+    let mut parts = patch::parts(mesh, side);
+    let sizes = parts.iter().map(Vec::len).enumerate();
+    let largest = sizes.max_by_key(|&(at, size)| (size, std::cmp::Reverse(at)));
+    let mainland = parts.swap_remove(largest.map_or(0, |(at, _)| at));
+    (mainland, parts.concat())
 }
 
 /// Divides by the sign of the key, but gives either side at least `least_share` of the triangles.

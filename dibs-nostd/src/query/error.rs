@@ -7,11 +7,11 @@ use core::fmt;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum QueryError {
-    /// The tree is deeper than the query's stack.
-    Depth {
-        /// The tree's depth.
+    /// The query's stack is smaller than the tree needs.
+    Stack {
+        /// Entries that the tree needs.
         needed: u32,
-        /// The stack's entries.
+        /// Entries of the query.
         available: u32,
     },
     /// The vertex table does not have one row for each of the tree's vertices.
@@ -56,7 +56,7 @@ pub enum QueryError {
 impl fmt::Display for QueryError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::Depth { needed, available } => {
+            Self::Stack { needed, available } => {
                 write!(f, "the tree needs a stack of {needed} entries, the query has {available}")
             }
             Self::VertexCount { expected, found } => {

@@ -10,30 +10,29 @@ pub use cost::Cost;
 pub use error::QueryError;
 pub use options::{Budget, Options};
 
-use crate::format::Link;
 use crate::{Index, Proximity, Tool, Tree, VertexTable};
-use search::{Search, Step, Waiting};
+use search::{Search, Waiting};
 
 /// A query on one tree, with the fixed stack that its traversal needs: 8 bytes an entry.
 ///
-/// `DEPTH` must be at least the tree's depth, checked once, here; [`Tree::depth`] tells it, and the
-/// builder prints it. Make it once, in a `static` or at start-up, and use it at every tick.
+/// `STACK` must be at least [`Tree::stack`], checked once, here; the builder prints it. Make it once,
+/// in a `static` or at start-up, and use it at every tick.
 #[derive(Clone, Debug)]
-pub struct Query<'t, I, const DEPTH: usize> {
+pub struct Query<'t, I, const STACK: usize> {
     tree: Tree<'t, I>,
-    stack: [Waiting; DEPTH],
+    stack: [Waiting; STACK],
 }
 
-impl<'t, I: Index, const DEPTH: usize> Query<'t, I, DEPTH> {
+impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     /// A query on `tree`.
     ///
     /// # Errors
-    /// [`QueryError::Depth`] if the stack cannot hold the tree's depth.
+    /// [`QueryError::Stack`] if `STACK` is less than the tree needs.
     pub const fn new(tree: &Tree<'t, I>) -> Result<Self, QueryError> {
-        if tree.depth() as usize > DEPTH {
-            return Err(QueryError::Depth { needed: tree.depth(), available: DEPTH as u32 });
+        if tree.stack() as usize > STACK {
+            return Err(QueryError::Stack { needed: tree.stack(), available: STACK as u32 });
         }
-        Ok(Self { tree: *tree, stack: [Waiting { lower: 0.0, link: 0 }; DEPTH] })
+        Ok(Self { tree: *tree, stack: [Waiting { lower: 0.0, row: 0 }; STACK] })
     }
 
     /// The tree that is searched.
@@ -60,46 +59,6 @@ impl<'t, I: Index, const DEPTH: usize> Query<'t, I, DEPTH> {
         tool: &T,
         options: &Options,
     ) -> Result<Proximity, QueryError> {
-        let mut search = Search::start(&self.tree, vertices, tool, options)?;
-        let header = self.tree.header();
-        let mut waiting = 0usize;
-        let mut next = Some(Waiting { lower: search.root_lower, link: header.root });
-        while let Some(subtree) = next {
-            let deeper = if subtree.lower > search.reach {
-                Step::Done
-            } else {
-                match Link::decode(subtree.link) {
-                    Link::Node(row) => search.expand(row, subtree.lower)?,
-                    Link::Leaf { first, count } => search.leaf(first, count)?,
-                }
-            };
-            next = match deeper {
-                Step::One(near) => Some(near),
-                Step::Two(near, far) => {
-                    let slot =
-                        self.stack.get_mut(waiting).ok_or(QueryError::Corrupt { row: far.link })?;
-                    *slot = far;
-                    waiting += 1;
-                    Some(near)
-                }
-                Step::Done => match waiting.checked_sub(1) {
-                    Some(top) => {
-                        waiting = top;
-                        self.stack.get(top).copied()
-                    }
-                    None => None,
-                },
-                Step::OutOfBudget => {
-                    let mut lower = subtree.lower;
-                    for left in self.stack.iter().take(waiting) {
-                        if left.lower < lower {
-                            lower = left.lower;
-                        }
-                    }
-                    return search.finish(lower);
-                }
-            };
-        }
-        search.finish(f32::INFINITY)
+        Search::start(&self.tree, &mut self.stack, vertices, tool, options)?.run()
     }
 }

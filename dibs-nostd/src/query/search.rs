@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::{Budget, Options, QueryError};
+use crate::format::Link;
 use crate::sqrt::sqrt;
 use crate::tool::{AxisPair, Tool};
 use crate::{Index, Proximity, Tree, VertexTable};
@@ -12,56 +13,83 @@ use crate::{Index, Proximity, Tree, VertexTable};
 pub(super) struct Waiting {
     /// No point of the subtree is closer to the tool's axis than this.
     pub lower: f32,
-    pub link: u32,
+    /// Row of its node.
+    pub row: u32,
 }
 
 /// Slack of the pruning comparison, in units of the query's scale: the f32 rounding of both sides.
 ///
 /// With `u = 2^-24`, all lengths in a query are at most the scale `S` (distance to the farthest point
 /// of the root sphere, plus twice the axis). A pin's distance is off by at most `8 u S`, a bound
-/// `d - R` by `12 u S`, a triangle's distance by the kernel's [`crate::ACCURACY`]` S`, `16 u S`: a
-/// comparison of any two by at most `28 u S`.
+/// `d - R` by `12 u S`, a plane's by `11 u S`, a triangle's distance by the kernel's
+/// [`crate::ACCURACY`]` S`, `16 u S`: a comparison of any two by at most `28 u S`.
 const SLACK: f32 = 48.0 / 16_777_216.0;
 
 /// What [`Proximity::accuracy`] promises, in units of the scale: the kernel's error plus that of the
 /// pair's last operations.
 const ACCURACY: f32 = 24.0 / 16_777_216.0;
 
-/// Share of the coordinates that counts into the scale: a computed centroid is off by up to three `u`
-/// of them, and the distances to it by a few `u` of that. It shows only where a whole surface lies
-/// within rounding of the tool.
-const CENTROID: f32 = 1.0 / 1_048_576.0;
+/// Slack of a plane's comparison in units of the coordinates' size `C`, since positions enter it as
+/// they are: each of two dot products is off by at most `3 u C` times the normal's length, the point
+/// on the axis by `2 u C`.
+const COORDINATES: f32 = 16.0 / 16_777_216.0;
+
+/// Slack of a plane's comparison in units of `S^2`: an axis is perpendicular to the shortest vector to
+/// a point within `16 u S`, so that its ends, at most `S / 2` away, are beyond the plane by no more
+/// than half of this.
+const TILT: f32 = 16.0 / 16_777_216.0;
 
 /// Lengths that the kernels count as zero, times a few: what is left of slack and accuracy where tool
 /// and surface are one point.
 const FLOOR: f32 = 1e-14;
 
-/// Centres of elastic spheres are centroids: a third of the corners' sum.
+/// The direction that a triangle's plane is taken in is that of its corners' mean.
 const THIRD: f32 = 1.0 / 3.0;
 
-/// What to do after a subtree was looked at.
-pub(super) enum Step {
-    /// Nothing of it is left.
+/// What is left after a subtree was looked at.
+enum Step {
+    /// What waits on the stack.
     Done,
-    One(Waiting),
-    /// The nearer first.
-    Two(Waiting, Waiting),
+    /// All of it: the budget ran out.
     OutOfBudget,
 }
 
-/// The state of one search besides the stack.
+/// A plane that separates what is beyond it from the tool's axis by more than the reach.
+///
+/// For any vector `n` from the axis' nearest point `q` to some point, the axis lies where
+/// `n . (x - q) <= 0`: it is convex. So all points of a patch with `n . (x - q) > reach |n|` at its
+/// vertices are farther than the reach. No root is taken of what it rejects, and it is tighter than
+/// any sphere around the patch: a sphere's lower bound is that of its farthest tangent plane.
+struct Plane {
+    normal: Vec3,
+    limit: f32,
+}
+
+impl Plane {
+    /// Written so that not a number is not beyond.
+    #[inline(always)]
+    fn has_beyond(&self, point: Vec3) -> bool {
+        self.normal.dot(point) > self.limit
+    }
+}
+
+/// The state of one search.
 pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     tree: &'s Tree<'t, I>,
     vertices: &'s V,
     tool: &'s T,
+    stack: &'s mut [Waiting],
+    waiting: usize,
     budget: Budget,
     /// Turns a radius code into the sphere's radius under the stretch in use.
     radius_scale: f32,
     scale: f32,
     slack: f32,
-    pub root_lower: f32,
+    /// Added to the reach where a plane is compared.
+    coordinate_slack: f32,
+    tilt_slack: f32,
     /// Distance of the nearest surface point known, plus the slack: what is farther cannot win.
-    pub reach: f32,
+    reach: f32,
     reach_squared: f32,
     pin: (u32, f32),
     best: Option<AxisPair>,
@@ -75,6 +103,7 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T> {
     pub fn start(
         tree: &'s Tree<'t, I>,
+        stack: &'s mut [Waiting],
         vertices: &'s V,
         tool: &'s T,
         options: &Options,
@@ -101,25 +130,25 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
                 measured.sigma()
             }
         };
+        let root = tree.record(0).ok_or(QueryError::Corrupt { row: 0 })?;
         let radius_scale = header.radius_unit * stretch;
-        let radius = header.root_radius_code as f32 * radius_scale;
-        let pin = vertices
-            .position(header.root_pin)
-            .ok_or(QueryError::Corrupt { row: header.root_pin })?;
+        let radius = root.radius_code as f32 * radius_scale;
+        let pin = vertices.position(root.pin).ok_or(QueryError::Corrupt { row: root.pin })?;
         let distance = sqrt(tool.axis_distance_squared(pin));
-        let far_out = pin.abs().max_element() * CENTROID;
-        let scale = distance + radius + 2.0 * tool.axis_length() + tool.radius() + far_out;
-        if !(scale < 1e18) {
-            return Err(QueryError::Position { vertex: header.root_pin });
+        let scale = distance + radius + 2.0 * tool.axis_length() + tool.radius();
+        let coordinates = 2.0 * pin.abs().max_element() + scale;
+        if !(coordinates < 1e18) {
+            return Err(QueryError::Position { vertex: root.pin });
         }
-        let slack = SLACK * scale + FLOOR;
-        // A sound tree visits each record once. If its bytes rot into a loop, this ends the search
-        // with an interval that is still right.
+        // A sound tree visits each record twice and each triangle once. If its bytes rot into a loop,
+        // this ends the search with an interval that is still right.
         let most = header.nodes.saturating_mul(2).saturating_add(header.triangles);
         let mut search = Self {
             tree,
             vertices,
             tool,
+            stack,
+            waiting: 0,
             budget: Budget {
                 node_tests: if options.budget.node_tests < most {
                     options.budget.node_tests
@@ -130,18 +159,19 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             },
             radius_scale,
             scale,
-            slack,
-            root_lower: distance - radius,
+            slack: SLACK * scale + FLOOR,
+            coordinate_slack: COORDINATES * coordinates,
+            tilt_slack: TILT * scale * scale,
             reach: f32::INFINITY,
             reach_squared: f32::INFINITY,
-            pin: (header.root_pin, f32::INFINITY),
+            pin: (root.pin, f32::INFINITY),
             best: None,
             best_squared: f32::INFINITY,
             best_triangle: u32::MAX,
             node_tests: 0,
             triangle_tests: 0,
         };
-        search.pull_in(header.root_pin, distance);
+        search.pull_in(root.pin, distance);
         if let Some(triangle) = options.warm_start
             && triangle < header.triangles
             && options.budget.triangle_tests > 0
@@ -149,7 +179,33 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             let corners = search.corners(triangle)?;
             search.test_triangle(triangle, &corners);
         }
+        search.push(0, Waiting { lower: distance - radius, row: 0 })?;
         Ok(search)
+    }
+
+    /// Looks at subtrees, near ones first, until none within reach is left or the budget runs out.
+    pub fn run(mut self) -> Result<Proximity, QueryError> {
+        while let Some(top) = self.waiting.checked_sub(1) {
+            self.waiting = top;
+            let &Waiting { lower, row } =
+                self.stack.get(top).ok_or(QueryError::Corrupt { row: top as u32 })?;
+            if lower > self.reach {
+                continue;
+            }
+            let node = self.tree.record(row).ok_or(QueryError::Corrupt { row })?;
+            let step = match Link::decode(node.link) {
+                Link::Children { first, count } => self.expand(first, count, lower)?,
+                Link::Leaf { first, count } => self.leaf(node.pin, first, count)?,
+            };
+            if matches!(step, Step::OutOfBudget) {
+                let waiting = self.stack.iter().take(self.waiting);
+                let least =
+                    |least, left: &Waiting| if left.lower < least { left.lower } else { least };
+                let lower = waiting.fold(lower, least);
+                return self.finish(lower);
+            }
+        }
+        self.finish(f32::INFINITY)
     }
 
     /// A pin at this distance is a point of the surface: nothing farther can win.
@@ -170,57 +226,67 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         }
     }
 
-    /// Tests both children of an inner node.
+    /// Lets a subtree wait above those from `base` on that are nearer.
     #[inline(always)]
-    pub fn expand(&mut self, row: u32, parent_lower: f32) -> Result<Step, QueryError> {
-        if self.budget.node_tests.saturating_sub(self.node_tests) < 2 {
+    fn push(&mut self, base: usize, subtree: Waiting) -> Result<(), QueryError> {
+        let full = QueryError::Corrupt { row: subtree.row };
+        let mut at = self.waiting;
+        while at > base
+            && let Some(&below) = self.stack.get(at - 1)
+            && below.lower < subtree.lower
+        {
+            *self.stack.get_mut(at).ok_or(full)? = below;
+            at -= 1;
+        }
+        *self.stack.get_mut(at).ok_or(full)? = subtree;
+        self.waiting += 1;
+        Ok(())
+    }
+
+    /// Tests the spheres of a node's children.
+    #[inline(always)]
+    fn expand(&mut self, first: u32, count: u32, parent_lower: f32) -> Result<Step, QueryError> {
+        if self.budget.node_tests.saturating_sub(self.node_tests) < count {
             return Ok(Step::OutOfBudget);
         }
-        self.node_tests += 2;
-        let node = self.tree.node(row).ok_or(QueryError::Corrupt { row })?;
-        let [left_pin, right_pin] = node.pin;
-        let [left_code, right_code] = node.radius_code;
-        let [left_link, right_link] = node.link;
-        let left = self.child(left_pin, left_code, left_link, parent_lower)?;
-        let right = self.child(right_pin, right_code, right_link, parent_lower)?;
-        Ok(match (left, right) {
-            (Some(left), Some(right)) if right.lower < left.lower => Step::Two(right, left),
-            (Some(left), Some(right)) => Step::Two(left, right),
-            (Some(one), None) | (None, Some(one)) => Step::One(one),
-            (None, None) => Step::Done,
-        })
+        self.node_tests += count;
+        let base = self.waiting;
+        for row in first..first + count {
+            let node = self.tree.record(row).ok_or(QueryError::Corrupt { row })?;
+            let pin = node.pin;
+            let position = self.position(pin)?;
+            let radius = node.radius_code as f32 * self.radius_scale;
+            let squared = self.tool.axis_distance_squared(position);
+            let far = self.reach + radius;
+            if squared > far * far {
+                continue;
+            }
+            if squared.is_nan() {
+                return Err(QueryError::Position { vertex: pin });
+            }
+            let distance = sqrt(squared);
+            self.pull_in(pin, distance);
+            let own = distance - radius;
+            // A child lies inside its parent, whatever its own sphere says.
+            let lower = if own > parent_lower { own } else { parent_lower };
+            self.push(base, Waiting { lower, row })?;
+        }
+        Ok(Step::Done)
     }
 
-    /// A child that may hold the closest point, or `None`.
+    /// Tests a leaf: its vertices against one plane, then each triangle against its own.
     #[inline(always)]
-    fn child(
-        &mut self,
-        pin: u32,
-        radius_code: u32,
-        link: u32,
-        parent_lower: f32,
-    ) -> Result<Option<Waiting>, QueryError> {
-        let position = self.vertices.position(pin).ok_or(QueryError::Corrupt { row: pin })?;
-        let radius = radius_code as f32 * self.radius_scale;
-        let squared = self.tool.axis_distance_squared(position);
-        let far = self.reach + radius;
-        if squared > far * far {
-            return Ok(None);
+    fn leaf(&mut self, pin: u32, first: u32, count: u32) -> Result<Step, QueryError> {
+        if count > 1 {
+            if self.node_tests >= self.budget.node_tests {
+                return Ok(Step::OutOfBudget);
+            }
+            self.node_tests += 1;
+            let plane = self.plane_towards(self.position(pin)?);
+            if self.is_beyond(&plane, first, count)? {
+                return Ok(Step::Done);
+            }
         }
-        if squared.is_nan() {
-            return Err(QueryError::Position { vertex: pin });
-        }
-        let distance = sqrt(squared);
-        self.pull_in(pin, distance);
-        let own = distance - radius;
-        // A child lies inside its parent, whatever its own sphere says.
-        let lower = if own > parent_lower { own } else { parent_lower };
-        Ok(Some(Waiting { lower, link }))
-    }
-
-    /// Tests a leaf's triangles, each behind its elastic sphere.
-    #[inline(always)]
-    pub fn leaf(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
         for triangle in first..first + count {
             if triangle == self.best_triangle {
                 continue;
@@ -233,18 +299,12 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             self.node_tests += 1;
             let corners = self.corners(triangle)?;
             let [a, b, c] = corners;
-            let centre = (a + b + c) * THIRD;
-            let (to_a, to_b, to_c) = (a - centre, b - centre, c - centre);
-            let larger = |x: f32, y: f32| if x > y { x } else { y };
-            let elastic =
-                larger(larger(to_a.length_squared(), to_b.length_squared()), to_c.length_squared());
-            let far = self.reach + sqrt(elastic);
-            let squared = self.tool.axis_distance_squared(centre);
-            if squared > far * far {
+            let plane = self.plane_towards((a + b + c) * THIRD);
+            if plane.has_beyond(a) && plane.has_beyond(b) && plane.has_beyond(c) {
                 continue;
             }
-            // One corner that is not a number makes the centre none.
-            if squared.is_nan() {
+            // One corner that is not a number makes the mean none.
+            if plane.limit.is_nan() {
                 return Err(QueryError::Position { vertex: self.not_a_number(triangle) });
             }
             self.test_triangle(triangle, &corners);
@@ -253,11 +313,43 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     }
 
     #[inline(always)]
+    fn plane_towards(&self, point: Vec3) -> Plane {
+        let normal = self.tool.from_axis(point);
+        let on_axis = point - normal;
+        let beyond = (self.reach + self.coordinate_slack) * sqrt(normal.dot(normal));
+        Plane { normal, limit: normal.dot(on_axis) + beyond + self.tilt_slack }
+    }
+
+    /// Whether a whole leaf is beyond a plane. Its vertices are the corners of its first triangle and
+    /// the third corners of the others: the builder sees to it, the checker checks it.
+    #[inline(always)]
+    fn is_beyond(&self, plane: &Plane, first: u32, count: u32) -> Result<bool, QueryError> {
+        let rows = |row| self.tree.triangle(row).ok_or(QueryError::Corrupt { row });
+        let [a, b, c] = rows(first)?;
+        for corner in [a, b, c] {
+            if !plane.has_beyond(self.position(corner)?) {
+                return Ok(false);
+            }
+        }
+        for triangle in first + 1..first + count {
+            let [_, _, corner] = rows(triangle)?;
+            if !plane.has_beyond(self.position(corner)?) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    #[inline(always)]
+    fn position(&self, row: u32) -> Result<Vec3, QueryError> {
+        self.vertices.position(row).ok_or(QueryError::Corrupt { row })
+    }
+
+    #[inline(always)]
     fn corners(&self, triangle: u32) -> Result<[Vec3; 3], QueryError> {
         let rows = self.tree.triangle(triangle).ok_or(QueryError::Corrupt { row: triangle })?;
         let [a, b, c] = rows;
-        let at = |row| self.vertices.position(row).ok_or(QueryError::Corrupt { row });
-        Ok([at(a)?, at(b)?, at(c)?])
+        Ok([self.position(a)?, self.position(b)?, self.position(c)?])
     }
 
     #[inline(always)]
@@ -282,7 +374,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     }
 
     /// The answer, where `lower` bounds what was left unexplored.
-    pub fn finish(&self, lower: f32) -> Result<Proximity, QueryError> {
+    fn finish(&self, lower: f32) -> Result<Proximity, QueryError> {
         let (pin, pin_distance) = self.pin;
         let radius = self.tool.radius();
         let cut_short = lower < f32::INFINITY;
@@ -293,8 +385,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
                 (pair, Some(row), corners)
             }
             _ if cut_short => {
-                let position =
-                    self.vertices.position(pin).ok_or(QueryError::Corrupt { row: pin })?;
+                let position = self.position(pin)?;
                 let point = self.tool.closest_on_triangle(&[position; 3], f32::INFINITY);
                 (point.ok_or(QueryError::Position { vertex: pin })?, None, [pin; 3])
             }

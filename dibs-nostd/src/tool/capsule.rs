@@ -100,12 +100,16 @@ impl Tool for Capsule {
         self.axis.length * (1.0 + 2.0 * f32::EPSILON)
     }
 
-    #[inline]
-    fn axis_distance_squared(&self, point: Vec3) -> f32 {
+    #[inline(always)]
+    fn from_axis(&self, point: Vec3) -> Vec3 {
         let Axis { start, direction, length, .. } = self.axis;
         let offset = point - start;
-        let across = offset - clamp(offset.dot(direction), length) * direction;
-        across.dot(across)
+        offset - clamp(offset.dot(direction), length) * direction
+    }
+
+    #[inline(always)]
+    fn axis_distance_squared(&self, point: Vec3) -> f32 {
+        self.from_axis(point).length_squared()
     }
 
     #[inline]

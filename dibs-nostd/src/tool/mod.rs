@@ -42,6 +42,10 @@ pub trait Tool: Copy + sealed::Sealed {
     /// Length of the axis, rounded up: 0 for a sphere.
     fn axis_length(&self) -> f32;
 
+    /// The shortest vector from the axis to a point. Each component is within 8 * 2^-24 * `S`, `S`
+    /// being the point's distance from the axis' start plus the axis' length.
+    fn from_axis(&self, point: Vec3) -> Vec3;
+
     /// Square of the distance from the axis to a point. The root is within 8 * 2^-24 * `S` of the
     /// true distance, `S` being the point's distance from the axis' start plus the axis' length.
     fn axis_distance_squared(&self, point: Vec3) -> f32;

@@ -56,10 +56,14 @@ impl Tool for Sphere {
         0.0
     }
 
-    #[inline]
+    #[inline(always)]
+    fn from_axis(&self, point: Vec3) -> Vec3 {
+        point - self.center
+    }
+
+    #[inline(always)]
     fn axis_distance_squared(&self, point: Vec3) -> f32 {
-        let offset = point - self.center;
-        offset.dot(offset)
+        self.from_axis(point).length_squared()
     }
 
     #[inline]

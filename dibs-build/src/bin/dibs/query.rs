@@ -10,8 +10,8 @@ use dibs_nostd::{
 };
 use std::path::{Path, PathBuf};
 
-/// More than any tree's depth: 8 bytes each, and this is a host.
-const STACK: usize = 4096;
+/// As much as any tree needs.
+const STACK: usize = dibs_nostd::format::MAX_STACK as usize;
 
 #[derive(clap::Args)]
 #[command(after_help = "\

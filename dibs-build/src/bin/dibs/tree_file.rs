@@ -26,8 +26,8 @@ pub fn validate<'a>(bytes: &'a [u8], path: &Path) -> Result<AnyTree<'a>> {
 pub fn print(summary: &Summary) {
     let s = summary;
     println!(
-        "tree     {} triangles, {} vertices, {} nodes, depth {}, {}-bit indices",
-        s.triangles, s.vertices, s.nodes, s.depth, s.index_bits
+        "tree     {} triangles, {} vertices, {} nodes, stack {}, {}-bit indices",
+        s.triangles, s.vertices, s.nodes, s.stack, s.index_bits
     );
     let paths = if s.surface_paths { "of triangles" } else { "of edges" };
     let limit = if s.least_stretch_limit < s.stretch {
