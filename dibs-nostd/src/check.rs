@@ -4,7 +4,8 @@ use core::fmt;
 
 use crate::Index;
 use crate::format::{
-    CHECKSUM_AT, CRC, HEADER_BYTES, Link, MAGIC, MAX_STACK, PathKind, VERSION, limit_code, u32_at,
+    CHECKSUM_AT, CRC, HEADER_BYTES, Link, MAGIC, MAX_LEAF_TRIANGLES, MAX_STACK, PathKind, VERSION,
+    limit_code, u32_at,
 };
 use crate::tree::{Header, Tree};
 
@@ -352,30 +353,39 @@ const fn leaves<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatError> {
     }
 }
 
-const _: () = assert!(MAX_STACK.is_power_of_two());
+const _: () = assert!(MAX_STACK.is_power_of_two() && MAX_LEAF_TRIANGLES.is_power_of_two());
 
 /// Whether the corners of a leaf's first triangle and the third corners of the others are all of its
 /// vertices: the only ones that a query looks at to reject the leaf.
 const fn patch<I: Index>(tree: &Tree<'_, I>, first: u32, count: u32) -> Result<(), FormatError> {
-    let mut triangle = first + 1;
-    while triangle < first + count {
-        let [v0, v1, _] = corners(tree, triangle);
+    // Third corners of the leaf's triangles; the mask is there so that no index can panic.
+    const MASK: usize = MAX_LEAF_TRIANGLES as usize - 1;
+    let mut thirds = [u32::MAX; MASK + 1];
+    let [a, b, _] = corners(tree, first);
+    let mut at = 0;
+    while at < count {
+        let [_, _, third] = corners(tree, first + at);
+        thirds[at as usize & MASK] = third;
+        at += 1;
+    }
+    let mut at = 1;
+    while at < count {
+        let [mut vertex, second, _] = corners(tree, first + at);
         let mut corner = 0;
         while corner < 2 {
-            let vertex = if corner == 0 { v0 } else { v1 };
-            let [a, b, c] = corners(tree, first);
-            let mut found = vertex == a || vertex == b || vertex == c;
-            let mut other = first + 1;
-            while other < first + count && !found {
-                found = vertex == corners(tree, other)[2];
+            let mut found = vertex == a || vertex == b;
+            let mut other = 0;
+            while other < count && !found {
+                found = vertex == thirds[other as usize & MASK];
                 other += 1;
             }
             if !found {
-                return Err(FormatError::Patch { triangle, vertex });
+                return Err(FormatError::Patch { triangle: first + at, vertex });
             }
+            vertex = second;
             corner += 1;
         }
-        triangle += 1;
+        at += 1;
     }
     Ok(())
 }
