@@ -234,7 +234,7 @@ pub(crate) const fn header<I: Index>(bytes: &[u8]) -> Result<Header, FormatError
         Some((16, header.triangles))
     } else if header.nodes == 0 || header.nodes >= 1 << 28 {
         Some((20, header.nodes))
-    } else if header.stack > MAX_STACK {
+    } else if header.stack as usize > MAX_STACK {
         Some((24, header.stack))
     } else if !(header.stretch >= 1.0 && header.stretch <= 1e6) {
         Some((28, header.stretch.to_bits()))
@@ -318,8 +318,8 @@ const fn nodes<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatError> {
 const fn leaves<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatError> {
     let header = tree.header();
     // The mask is there so that no index can panic.
-    const MASK: usize = MAX_STACK as usize - 1;
-    let mut stack = [0u32; MAX_STACK as usize];
+    const MASK: usize = MAX_STACK - 1;
+    let mut stack = [0u32; MAX_STACK];
     let mut waiting = 1;
     let mut next_triangle = 0;
     while waiting > 0 {

@@ -19,7 +19,7 @@ pub const CHECKSUM_AT: usize = 60;
 /// Every section starts at a multiple of this.
 pub const SECTION_ALIGN: usize = 16;
 /// Most entries that a traversal's stack may need, whatever the tree.
-pub const MAX_STACK: u32 = 512;
+pub const MAX_STACK: usize = 512;
 /// Most children of one node.
 pub const MAX_CHILDREN: u32 = 8;
 /// Most triangles in one leaf.

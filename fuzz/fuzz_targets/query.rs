@@ -5,6 +5,7 @@
 use std::sync::LazyLock;
 
 use dibs_build::{Builder, IndexWidth, generate};
+use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::format::{CHECKSUM_AT, CRC};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{Budget, Capsule, Options, Query, Sphere, Tool, Tree, measure_stretch};
@@ -50,7 +51,7 @@ fuzz_target!(|input: &[u8]| {
     digest.update(&bytes[CHECKSUM_AT + 4..]);
     bytes[CHECKSUM_AT..CHECKSUM_AT + 4].copy_from_slice(&digest.finalize().to_le_bytes());
     let Ok(tree) = Tree::<u16>::from_bytes(&bytes) else { return };
-    let Ok(mut query) = Query::<_, 64>::new(&tree) else { return };
+    let Ok(mut query) = Query::<_, MAX_STACK>::new(&tree) else { return };
 
     for _ in 0..words.next() % 8 {
         let row = words.next() as usize % rows.len();
@@ -81,7 +82,7 @@ fuzz_target!(|input: &[u8]| {
 });
 
 fn ask(
-    query: &mut Query<'_, u16, 64>,
+    query: &mut Query<'_, u16, MAX_STACK>,
     rows: &[Vec3],
     tool: &impl Tool,
     options: &Options,

@@ -10,7 +10,7 @@ use glam::Vec3;
 use crate::method::{Found, Method, Probe};
 
 /// Entries of the traversal's stack: enough for every tree that the builder makes.
-const STACK: usize = MAX_STACK as usize;
+const STACK: usize = MAX_STACK;
 
 /// What a query may know besides the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use dibs_tests::stretch;
 use fastrand::Rng;
 use glam::Vec3;
 
-const STACK: usize = MAX_STACK as usize;
+const STACK: usize = MAX_STACK;
 
 fn heart(triangles: u32) -> Mesh {
     generate::heart(triangles).expect("a valid size").0

@@ -42,7 +42,7 @@ fn run(case: &Case<'_>, seed: u64) -> Tally {
 
 fn run_with<I: Index>(case: &Case<'_>, tree: &Tree<'_, I>, seed: u64) -> Tally {
     let mut rng = Rng::with_seed(seed);
-    let mut query = Query::<I, { MAX_STACK as usize }>::new(tree).expect("enough for any tree");
+    let mut query = Query::<I, MAX_STACK>::new(tree).expect("enough for any tree");
     let mut tally = Tally::default();
     let triangles = triangle_rows(tree);
     while tally.queries < case.queries {

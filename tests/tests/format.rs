@@ -183,7 +183,7 @@ fn a_query_on_rotten_bytes_ends() {
             rotten[nodes + rng.usize(..length)] ^= 1 << rng.u32(..8);
         }
         let view = tree.moved_to(&rotten).expect("same layout");
-        let mut query = Query::<u16, { MAX_STACK as usize }>::new(&view).expect("deep enough");
+        let mut query = Query::<u16, MAX_STACK>::new(&view).expect("deep enough");
         let tool = Sphere::new(rows[rng.usize(..rows.len())] * 1.3, 1.0).expect("valid");
         match query.closest(rows.as_slice(), &tool, &Options::new()) {
             Ok(found) => {

@@ -8,6 +8,7 @@ use std::path::Path;
 use dibs_build::modes::{MARGIN, ModalFit, ModesError, Projector};
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, Motion, MotionStretch, Paths, generate};
 use dibs_nostd::format::CRC;
+use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::modes::{
     self, MAX_MODES, Memo, ModalGate, ModalReader, ModalSurface, Modes, WeightsError,
 };
@@ -120,7 +121,7 @@ fn lazy_is_eager<I: Index>(tree: &Tree<'_, I>) {
     let mut rng = Rng::with_seed(3);
     let modes = Modes::of(tree).expect("valid");
     let triangles = triangle_rows(tree);
-    let mut query = Query::<I, 64>::new(tree).expect("deep enough");
+    let mut query = Query::<I, MAX_STACK>::new(tree).expect("deep enough");
     let (mut queries, mut computed) = (0, 0);
     while queries < 400 {
         let weights = anywhere(&modes, &mut rng);
@@ -628,7 +629,7 @@ fn the_real_heart_is_driven_by_its_modes() {
         assert!(count < 24 || recorded.beyond_limit.is_empty());
         assert!(count < 24 || modes.position_error() < 0.002);
         let triangles = triangle_rows(&tree);
-        let mut query = Query::<u16, 64>::new(&tree).expect("deep enough");
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
         let (mut queries, mut asked, mut distinct) = (0, 0, 0);
         let mut above: [Vec<f32>; 3] = Default::default();
         for (frame, weights) in recorded.weights.iter().enumerate() {

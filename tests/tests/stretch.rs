@@ -1,6 +1,7 @@
 //! The measured stretch against f64, and the gate that it is.
 
 use dibs_build::{Builder, BuiltTree, Mesh, Motion, MotionStretch, Paths, generate};
+use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 use dibs_nostd::{
@@ -306,9 +307,9 @@ fn a_query_takes_no_stretch_of_another_tree() {
     let measured = measure_stretch(&tree, rows.as_slice()).expect("at rest");
     let tool = Sphere::new(Vec3::new(0.0, 0.0, 90.0), 2.0).expect("valid");
     let options = Options::new().stretch(measured);
-    let mut query = Query::<_, 64>::new(&tree).expect("deep enough");
+    let mut query = Query::<_, MAX_STACK>::new(&tree).expect("deep enough");
     assert!(query.closest(rows.as_slice(), &tool, &options).is_ok());
-    let mut query = Query::<_, 64>::new(&other).expect("deep enough");
+    let mut query = Query::<_, MAX_STACK>::new(&other).expect("deep enough");
     let refused = query.closest(rows.as_slice(), &tool, &options).expect_err("another tree's");
     assert!(matches!(refused, QueryError::OtherTree { .. }), "{refused}");
 }
@@ -388,7 +389,8 @@ fn limits_of_single_triangles_spare_tests_on_a_real_heart() {
     let learned = Builder::new().limits(limits).build(&mesh).expect("a valid mesh");
     let built = [&uniform, &learned];
     let trees = built.map(|built| built.tree::<u16>().expect("valid"));
-    let mut queries = trees.each_ref().map(|tree| Query::<_, 64>::new(tree).expect("deep enough"));
+    let mut queries =
+        trees.each_ref().map(|tree| Query::<_, MAX_STACK>::new(tree).expect("deep enough"));
     let mut rng = Rng::with_seed(27);
     let mut sums = [[[0u64; 2]; 2]; 2];
     const EACH: usize = 120;

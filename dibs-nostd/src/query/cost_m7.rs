@@ -4,7 +4,7 @@ use super::Cost;
 
 impl Cost {
     /// A sphere on a Cortex-M7.
-    pub const M7_SPHERE: Self = Self { base: 1428, node_test: 110, triangle_test: 979 };
+    pub const M7_SPHERE: Self = Self { base: 1662, node_test: 196, triangle_test: 925 };
     /// A capsule on a Cortex-M7.
-    pub const M7_CAPSULE: Self = Self { base: 1424, node_test: 122, triangle_test: 1106 };
+    pub const M7_CAPSULE: Self = Self { base: 1701, node_test: 212, triangle_test: 1052 };
 }

@@ -314,7 +314,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
 
     #[inline(always)]
     fn plane_towards(&self, point: Vec3) -> Plane {
-        let normal = self.tool.from_axis(point);
+        let normal = self.tool.axis_to(point);
         let on_axis = point - normal;
         let beyond = (self.reach + self.coordinate_slack) * sqrt(normal.dot(normal));
         Plane { normal, limit: normal.dot(on_axis) + beyond + self.tilt_slack }

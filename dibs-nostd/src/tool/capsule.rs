@@ -101,7 +101,7 @@ impl Tool for Capsule {
     }
 
     #[inline(always)]
-    fn from_axis(&self, point: Vec3) -> Vec3 {
+    fn axis_to(&self, point: Vec3) -> Vec3 {
         let Axis { start, direction, length, .. } = self.axis;
         let offset = point - start;
         offset - clamp(offset.dot(direction), length) * direction
@@ -109,7 +109,7 @@ impl Tool for Capsule {
 
     #[inline(always)]
     fn axis_distance_squared(&self, point: Vec3) -> f32 {
-        self.from_axis(point).length_squared()
+        self.axis_to(point).length_squared()
     }
 
     #[inline]

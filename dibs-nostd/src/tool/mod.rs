@@ -44,7 +44,7 @@ pub trait Tool: Copy + sealed::Sealed {
 
     /// The shortest vector from the axis to a point. Each component is within 8 * 2^-24 * `S`, `S`
     /// being the point's distance from the axis' start plus the axis' length.
-    fn from_axis(&self, point: Vec3) -> Vec3;
+    fn axis_to(&self, point: Vec3) -> Vec3;
 
     /// Square of the distance from the axis to a point. The root is within 8 * 2^-24 * `S` of the
     /// true distance, `S` being the point's distance from the axis' start plus the axis' length.

@@ -57,13 +57,13 @@ impl Tool for Sphere {
     }
 
     #[inline(always)]
-    fn from_axis(&self, point: Vec3) -> Vec3 {
+    fn axis_to(&self, point: Vec3) -> Vec3 {
         point - self.center
     }
 
     #[inline(always)]
     fn axis_distance_squared(&self, point: Vec3) -> f32 {
-        self.from_axis(point).length_squared()
+        self.axis_to(point).length_squared()
     }
 
     #[inline]

@@ -4,6 +4,7 @@
 use std::ops::AddAssign;
 
 use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
+use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Options, Proximity, Query, measure_stretch};
 use dibs_tests::ask;
 use dibs_tests::deform::Deformation;
@@ -78,7 +79,7 @@ pub fn check(cases: usize, figures: &mut Figures) {
 fn on_one_frame(surface: &Surface, deformation: Deformation, rng: &mut Rng) -> Tally {
     let tree = surface.tree.tree::<u16>().expect("16-bit indices");
     let triangles = surfaces::triangles(&tree);
-    let mut query = Query::<_, 64>::new(&tree).expect("64 entries are enough");
+    let mut query = Query::<_, MAX_STACK>::new(&tree).expect("enough for any tree");
     let moved = deformation.apply(&surface.mesh, tree.paths(), tree.stretch(), rng);
     let rows = surface.tree.to_rows(&moved);
     let measured = measure_stretch(&tree, rows.as_slice()).expect("within the limit");

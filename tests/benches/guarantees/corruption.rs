@@ -3,6 +3,7 @@
 use std::ops::AddAssign;
 
 use dibs_build::BuiltTree;
+use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Options, Query, Scrub, Tree};
 use dibs_tests::ask;
 use dibs_tests::oracle::exhaustive;
@@ -81,7 +82,7 @@ fn on_one_pose(surface: &Surface, rng: &mut Rng) -> Tally {
         tally.damages += 1;
         tally.unscrubbed += u64::from(scrub(&bytes).is_ok());
         match rotten(&sound, &bytes).map(|tree| {
-            let mut query = Query::<_, 64>::new(&tree).expect("64 entries are enough");
+            let mut query = Query::<_, MAX_STACK>::new(&tree).expect("enough for any tree");
             ask::closest(&mut query, rows.as_slice(), &tool, &Options::new())
         }) {
             None | Some(Err(_)) => tally.errors += 1,

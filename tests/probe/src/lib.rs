@@ -39,6 +39,9 @@ pub const TREE_BYTES: usize = 1 << 20;
 /// Most vertices.
 pub const VERTICES: usize = 1 << 15;
 
+/// Entries of the query's stack: more than the scripts' trees need.
+const STACK: usize = 128;
+
 /// Positions that a query of a modal frame remembers, if it does.
 const SLOTS: usize = 256;
 
@@ -117,7 +120,7 @@ fn queries(
     rows: &mut [Vec3],
     machine: &mut impl Machine,
 ) -> Result<u32, Fault> {
-    let mut query = Query::<_, 64>::new(tree).map_err(|_| Fault)?;
+    let mut query = Query::<_, STACK>::new(tree).map_err(|_| Fault)?;
     let rows = rows.get_mut(..tree.vertex_count() as usize).ok_or(Fault)?;
     let mut measured = None;
     let mut table = Table::Rows;
@@ -178,7 +181,7 @@ fn modal<'a>(
 }
 
 fn ask(
-    query: &mut Query<'_, u16, 64>,
+    query: &mut Query<'_, u16, STACK>,
     table: &Table<'_>,
     rows: &[Vec3],
     measured: Option<MeasuredStretch>,
@@ -207,7 +210,7 @@ fn ask(
 }
 
 fn timed(
-    query: &mut Query<'_, u16, 64>,
+    query: &mut Query<'_, u16, STACK>,
     table: &Table<'_>,
     rows: &[Vec3],
     tool: &impl Tool,

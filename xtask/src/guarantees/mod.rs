@@ -80,12 +80,12 @@ impl Effort {
     };
     /// What every run of the tests can afford.
     pub const TEST: Self = Self {
-        cases: 150_000,
-        bits: 20_000,
-        costs: 8_000,
-        torn: 20_000,
+        cases: 100_000,
+        bits: 8_000,
+        costs: 6_000,
+        torn: 8_000,
         demo_seconds: 5,
-        fuzz_seconds: 60,
+        fuzz_seconds: 20,
     };
 }
 

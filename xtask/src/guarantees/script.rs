@@ -59,7 +59,7 @@ impl Script {
         let mut rng = Rng::with_seed(seed);
         let heart = generate::heart(1_280).expect("a valid size").0;
         let brain = generate::brain(1_200).expect("a valid size");
-        let meshes = [(heart, 1), (brain, 4), (surfaces::ball(3), 1), (surfaces::slivers(60), 2)];
+        let meshes = [(heart, 8), (brain, 4), (surfaces::ball(3), 8), (surfaces::slivers(60), 1)];
         let mut script = Self::default();
         let of_each = queries.div_ceil(meshes.len());
         for (mesh, leaf) in meshes {
@@ -81,7 +81,7 @@ impl Script {
     pub fn usual(queries: usize, seed: u64) -> Self {
         let mut rng = Rng::with_seed(seed);
         let (mesh, motion) = generate::heart(10_272).expect("a valid size");
-        let built = build(&mesh, 4);
+        let built = build(&mesh, 8);
         let tree = built.tree::<u16>().expect("16-bit indices");
         let triangles = surfaces::triangles(&tree);
         let mut script = Self::default();
@@ -104,7 +104,7 @@ impl Script {
         let mut rng = Rng::with_seed(seed);
         let (mesh, motion) = trembling(10_272, modes.div_ceil(2), seed);
         let fit = ModalFit::new(&mesh, &motion).expect("a motion");
-        let built = build(&mesh, 4).with_modes(&fit, modes).expect("so many");
+        let built = build(&mesh, 8).with_modes(&fit, modes).expect("so many");
         let tree = built.tree::<u16>().expect("16-bit indices");
         let shape = Modes::of(&tree).expect("with modes");
         let triangles = surfaces::triangles(&tree);

@@ -11,7 +11,7 @@ use dibs_nostd::{
 use std::path::{Path, PathBuf};
 
 /// As much as any tree needs.
-const STACK: usize = dibs_nostd::format::MAX_STACK as usize;
+const STACK: usize = dibs_nostd::format::MAX_STACK;
 
 #[derive(clap::Args)]
 #[command(after_help = "\

@@ -18,6 +18,7 @@ use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{Peripherals, SYST};
 use cortex_m_rt::{entry, exception};
 use cortex_m_semihosting::debug;
+use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{FrameLabel, FrameWriter, Frames, Options, Query, Sphere, Tree, VertexTable};
 
@@ -174,7 +175,7 @@ fn run() -> Option<()> {
         // whose borrow has ended.
         unsafe { interrupt::enable() };
 
-        let mut query = Query::<_, 64>::new(&tree).ok()?;
+        let mut query = Query::<_, MAX_STACK>::new(&tree).ok()?;
         let (mut mixed, mut mixed_plain, mut done) = (0, 0, 0_u32);
         while done < queries {
             let angle = done as f32 * 0.37;
