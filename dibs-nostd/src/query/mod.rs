@@ -45,8 +45,8 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     ///
     /// Exact within [`Proximity::accuracy`] as long as the surface keeps to the stretch limit (or to
     /// the measured stretch in `options`). Pins are vertices of the surface, so their distances are
-    /// upper bounds from the first node on. Near child first; squares are compared, and a root is
-    /// taken only where an order is needed.
+    /// upper bounds from the first node on. Near children first; squares are compared, and a root is
+    /// taken only where an order is needed. A leaf is rejected by one plane, a triangle by another.
     ///
     /// Cost: the budget at most; typical counts are in `docs/benchmarks.md`.
     ///

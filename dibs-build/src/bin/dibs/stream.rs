@@ -48,9 +48,6 @@ pub struct Args {
     /// Send the weights of the displacement modes that the tree was built with, instead of positions
     #[arg(long, conflicts_with_all = ["quantise", "partial"])]
     modes: bool,
-    /// A file with the 16 bytes of the key that the receiver has: every packet gets a tag
-    #[arg(long)]
-    key: Option<PathBuf>,
     /// Start over at the end of the motion
     #[arg(long = "loop")]
     repeat: bool,
