@@ -43,7 +43,7 @@ impl<'a, I: Index> Tree<'a, I> {
     /// inside its table, every triangle in exactly one leaf, depth as stated. What it cannot check is
     /// that the radii cover this mesh: that is the builder's promise, tied to the mesh id.
     ///
-    /// Cost: linear in the bytes, no memory beyond a fixed stack of [`format::MAX_DEPTH`] words.
+    /// Cost: linear in the bytes, no memory beyond a fixed stack of [`format::MAX_STACK`] words.
     ///
     /// # Errors
     /// [`FormatError`] names the first thing that is wrong and its value.

@@ -19,7 +19,7 @@ include!(concat!(env!("OUT_DIR"), "/heart.rs"));
 
 /// A query on the heart at rest.
 struct Scene {
-    query: Query<'static, u16, HEART_DEPTH>,
+    query: Query<'static, u16, HEART_STACK>,
     rows: Vec<Vec3>,
     options: Options,
 }

@@ -27,7 +27,6 @@ pub fn test(options: &Options) -> Result<()> {
     let workspace = ["--workspace", "--all-targets"];
     steps.cargo("format", &["fmt", "--all", "--check"], &[]);
     steps.cargo("lints", &[&["clippy"], &workspace[..], &["--", "-D", "warnings"]].concat(), &[]);
-    steps.cargo("plain build", &["build"], &[]);
     steps.cargo("tests", &[&["test", "--release", "--no-fail-fast"], &workspace[..]].concat(), &[]);
     steps.cargo("documentation examples", &["test", "--release", "--workspace", "--doc"], &[]);
     steps.cargo(
