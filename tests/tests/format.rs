@@ -207,7 +207,7 @@ fn metric_and_limits_stand_where_the_specification_says() {
         let built = Builder::new().index(index).limits(limits.clone()).build(&mesh);
         let built = built.expect("a valid mesh");
         let bytes = built.blob();
-        assert_eq!(f32::from_bits(word(bytes, 32)), 2.0);
+        assert_eq!(f32::from_bits(word(bytes, 28)), 2.0);
         let [(triangles, _), (metric, length), (codes, codes_length)] =
             [2, 5, 6].map(|kind| section(bytes, kind));
         assert_eq!((length, codes_length), (320 * 12, 320 * 2));

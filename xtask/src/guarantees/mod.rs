@@ -66,6 +66,9 @@ pub struct Effort {
     /// Seconds of the controller's time.
     pub demo_seconds: u32,
     pub fuzz_seconds: u32,
+    /// Whether what the nightly compiler builds runs too: sanitizers, Miri, fuzzers. Their builds take
+    /// longer than all other checks together.
+    pub nightly: bool,
 }
 
 impl Effort {
@@ -77,6 +80,7 @@ impl Effort {
         torn: 100_000,
         demo_seconds: 60,
         fuzz_seconds: 60,
+        nightly: true,
     };
     /// What every run of the tests can afford.
     pub const TEST: Self = Self {
@@ -86,6 +90,7 @@ impl Effort {
         torn: 8_000,
         demo_seconds: 5,
         fuzz_seconds: 20,
+        nightly: false,
     };
 }
 
@@ -98,7 +103,7 @@ pub fn run(options: &Options) -> Result<()> {
         return record::render();
     }
     let effort = if options.quick { Effort::TEST } else { Effort::FULL };
-    let effort = Effort { fuzz_seconds: options.fuzz_seconds, ..effort };
+    let effort = Effort { fuzz_seconds: options.fuzz_seconds, nightly: true, ..effort };
     let mut steps = Steps::default();
     let figures = check(effort, options.only.as_deref(), &mut steps);
     steps.run("documents", || {
@@ -137,6 +142,9 @@ fn check(effort: Effort, only: Option<&str>, steps: &mut Steps) -> Figures {
     step("demo on the emulated board", &|f| passed(demo::check(effort.demo_seconds, f)));
     step("firmware without panic and allocator", &|f| passed(demo::link(&board()?, f)));
     step("stack of the firmware", &|f| passed(demo::stack(&board()?, f)));
+    if !effort.nightly {
+        return figures;
+    }
     for sanitizer in ["address", "thread"] {
         step(&format!("{sanitizer} sanitizer"), &|f| {
             if let Some(reason) = nightly::missing() {
