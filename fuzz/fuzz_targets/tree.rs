@@ -24,16 +24,12 @@ fuzz_target!(|bytes: &[u8]| {
 fn walk<I: Index>(bytes: &[u8]) {
     let Ok(tree) = Tree::<I>::from_bytes(bytes) else { return };
     let mut triangles = 0;
-    let mut links = vec![tree.root().2];
-    while let Some(link) = links.pop() {
+    let mut rows = vec![0];
+    while let Some(row) = rows.pop() {
+        let (pin, _, link) = tree.node(row).expect("a valid tree has its nodes");
+        assert!(pin < tree.vertex_count());
         match link {
-            Link::Node(row) => {
-                let children = tree.children(row).expect("a valid tree has its nodes");
-                for (pin, _, link) in children {
-                    assert!(pin < tree.vertex_count());
-                    links.push(link);
-                }
-            }
+            Link::Children { first, count } => rows.extend(first..first + count),
             Link::Leaf { first, count } => {
                 for row in first..first + count {
                     let corners = tree.triangle(row).expect("a valid tree has its triangles");

@@ -37,7 +37,7 @@ impl Cluster {
 
 #[derive(Debug)]
 pub(crate) enum Content {
-    /// Two after construction, more once it is widened.
+    /// Mostly two after construction, more once it is widened.
     Inner(Vec<Cluster>),
     /// Triangles that hang together by edges.
     Leaf(Vec<u32>),
@@ -87,21 +87,11 @@ impl<'a> Constructor<'a> {
         if !pin.radius.is_finite() {
             return Err(BuildError::NotConnected { vertex: pin.vertex });
         }
-        let sides = if section.triangles.len() <= self.leaf_triangles {
-            let mesh = &self.surface.mesh.triangles;
-            let mut parts = patch::parts(mesh, &section.triangles);
-            let part = parts.remove(0);
-            if parts.is_empty() {
-                self.give_back(searches);
-                let count = part.len();
-                (self.progress)(self.done.fetch_add(count, Ordering::Relaxed) + count);
-                let content = Content::Leaf(part);
-                return Ok(Cluster { pin: pin.vertex, radius: pin.radius, content });
-            }
-            [part, parts.concat()]
-        } else {
-            self.split(&section, &mut searches, depth)
-        };
+        if section.triangles.len() <= self.leaf_triangles {
+            self.give_back(searches);
+            return self.leaves(&section, pin, depth);
+        }
+        let sides = self.split(&section, &mut searches, depth);
         let [left, right] = sides.map(|triangles| Section::new(self.surface.mesh, triangles));
         // A child's search starts at its far border, seen from the seed that it belongs to.
         let borders = [(&left, 0), (&right, 1)].map(|(side, seed)| {
@@ -119,6 +109,25 @@ impl<'a> Constructor<'a> {
         let (left, right) =
             if big { rayon::join(build_left, build_right) } else { (build_left(), build_right()) };
         let content = Content::Inner(vec![left?, right?]);
+        Ok(Cluster { pin: pin.vertex, radius: pin.radius, content })
+    }
+
+    /// A leaf, or one for each part of the section where it does not hang together by edges.
+    fn leaves(&self, section: &Section, pin: Pin, depth: u32) -> Result<Cluster, BuildError> {
+        let mesh = self.surface.mesh;
+        let mut parts = patch::parts(&mesh.triangles, &section.triangles);
+        let content = if parts.len() == 1 {
+            let count = section.triangles.len();
+            (self.progress)(self.done.fetch_add(count, Ordering::Relaxed) + count);
+            Content::Leaf(parts.remove(0))
+        } else {
+            let leaves = parts.into_iter().map(|part| {
+                let section = Section::new(mesh, part);
+                let start = section.vertices[0];
+                self.cluster(section, start, depth + 1)
+            });
+            Content::Inner(leaves.collect::<Result<_, _>>()?)
+        };
         Ok(Cluster { pin: pin.vertex, radius: pin.radius, content })
     }
 
