@@ -51,7 +51,7 @@ pub struct Summary {
     pub query_bytes_per_triangle: f64,
     /// Flash of the whole tree with all its optional sections.
     pub flash_bytes: usize,
-    /// RAM of the surface: `dibs_nostd::Frames`, two buffers of f32 positions and a mark a vertex.
+    /// RAM of the surface: `dibs_nostd::Frames`, two buffers of f32 positions, and their labels.
     pub ram_bytes: usize,
     /// RAM of one query's stack.
     pub stack_bytes: usize,

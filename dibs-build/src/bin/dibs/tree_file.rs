@@ -42,7 +42,7 @@ pub fn print(summary: &Summary) {
         s.flash_bytes, s.query_bytes, s.query_bytes_per_triangle
     );
     println!(
-        "RAM      {} bytes for two buffers of positions and a mark a vertex, {} for a query's stack",
+        "RAM      {} bytes for two buffers of positions, {} for a query's stack",
         s.ram_bytes, s.stack_bytes
     );
     if let Some(m) = s.modes {

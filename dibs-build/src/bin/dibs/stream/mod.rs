@@ -1,19 +1,18 @@
 //! `dibs stream`: a recorded motion, sent to a controller.
 
+mod key;
+mod report;
+
 use crate::modes;
 use crate::tree_file::{self, AnyTree};
 use anyhow::{Context, Result, anyhow, bail};
-use dibs_build::stream::{Line, Sender, Sent, Settings, SurfaceOrder, Target};
+use dibs_build::stream::{Line, Sender, Settings, SurfaceOrder, Target};
 use dibs_build::{Builder, Motion};
-use dibs_nostd::wire::{Content, Counters, Event};
-use indicatif::{ProgressBar, ProgressStyle};
-use std::fmt::Write;
-use std::io::IsTerminal;
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::wire::{AesCmac, Mac};
+use report::Display;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-
-/// Largest packet: must be what the receiver was built for.
-const MTU: usize = 1024;
 
 /// A receiver that reports at all reports this often.
 const SILENT: Duration = Duration::from_secs(2);
@@ -25,6 +24,7 @@ Examples:
   dibs stream heart.dibs heart.pc2 --to tcp:192.168.1.20:5000 --rate 40
   dibs stream heart.dibs heart.pc2 --to udp:192.168.1.20:5000 --rate 1000 --modes
   dibs stream heart.ply heart.pc2 --to unix:/tmp/uart --frames 100 --json
+  dibs stream heart.dibs heart.pc2 --to serial:/dev/ttyUSB0 --key heart.key
 
 An emulated serial line is a server for this: qemu-system-arm -serial unix:/tmp/uart,server=on,wait=off")]
 pub struct Args {
@@ -48,6 +48,16 @@ pub struct Args {
     /// Send the weights of the displacement modes that the tree was built with, instead of positions
     #[arg(long, conflicts_with_all = ["quantise", "partial"])]
     modes: bool,
+    /// Put a tag on every packet, by the 128-bit key in this file: 32 hexadecimal digits. Waits for the
+    /// receiver's challenge
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
+    /// The receiver's challenge, where it has no way to report one: 0, if it was made with none
+    #[arg(long, value_name = "NUMBER", requires = "key")]
+    challenge: Option<u32>,
+    /// Largest packet, in bytes: no more than the receiver takes. 64 is a CAN-FD message
+    #[arg(long, value_name = "BYTES", default_value = "1024", value_parser = ["64", "1024"])]
+    mtu: String,
     /// Start over at the end of the motion
     #[arg(long = "loop")]
     repeat: bool,
@@ -63,6 +73,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<()> {
+    let key = args.key.as_deref().map(key::read).transpose()?;
     let order = order(&args.surface)?;
     let motion = Motion::read_pc2(&args.motion)?;
     let name = args.motion.display();
@@ -82,19 +93,80 @@ pub fn run(args: &Args) -> Result<()> {
     }
     let weights =
         if args.modes { Some(modes::weights(&args.surface, &order, &motion)?) } else { None };
+    let recording = Recording { frames: motion.frames, weights, rate };
+    if args.mtu == "64" {
+        connect::<64>(args, key, order, &recording)
+    } else {
+        connect::<1024>(args, key, order, &recording)
+    }
+}
+
+/// What is sent.
+struct Recording {
+    /// Positions, in the mesh's order.
+    frames: Vec<Vec<Vec3>>,
+    /// The weights of each frame, where these are sent instead.
+    weights: Option<Vec<Vec<f32>>>,
+    /// Frames a second.
+    rate: f64,
+}
+
+/// Makes the sender: without tags, or with them once the receiver's challenge is known.
+fn connect<const MTU: usize>(
+    args: &Args,
+    key: Option<[u8; 16]>,
+    order: SurfaceOrder,
+    recording: &Recording,
+) -> Result<()> {
     let settings =
         Settings { quantised: args.quantise, partial: args.partial, ..Settings::default() };
-    let line = args.to.open().map_err(|error| anyhow!("{error}"))?;
-    let mut sender = Sender::<Line, MTU>::new(line, order, settings);
+    let line = args.to.open()?;
+    let Some(key) = key else {
+        return play(args, recording, Sender::<_, MTU>::new(line, order, settings));
+    };
+    let mac_of = move |challenge| AesCmac::new(&key, challenge);
+    let mut sender = Sender::<_, MTU, _>::with_mac(line, order, settings, mac_of);
+    match args.challenge {
+        Some(challenge) => sender.challenge(challenge),
+        None => await_challenge(&mut sender, &args.to)?,
+    }
+    play(args, recording, sender)
+}
 
+/// Until the receiver has reported its challenge.
+fn await_challenge<M: Mac, const MTU: usize>(
+    sender: &mut Sender<Line, MTU, M>,
+    to: &Target,
+) -> Result<()> {
+    let start = Instant::now();
+    while !sender.is_ready() {
+        if start.elapsed() > SILENT {
+            bail!(
+                "{to}: no genuine status came within {} s: is the receiver on, and has it the same \
+                 key? One that cannot report needs --challenge",
+                SILENT.as_secs()
+            );
+        }
+        sender.poll()?;
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    Ok(())
+}
+
+/// Sends the frames, each when it is due.
+fn play<M: Mac, const MTU: usize>(
+    args: &Args,
+    recording: &Recording,
+    mut sender: Sender<Line, MTU, M>,
+) -> Result<()> {
+    let name = args.motion.display();
     let mut display = Display::new();
-    let interval = Duration::from_secs_f64(1.0 / rate);
+    let interval = Duration::from_secs_f64(1.0 / recording.rate);
     let mut due = Instant::now();
     let mut late = 0_u64;
-    let ends = if args.repeat { u64::MAX } else { motion.frames.len() as u64 };
-    for number in
-        0..args.frames.unwrap_or(ends).min(if args.frames.is_some() { u64::MAX } else { ends })
-    {
+    let recorded = recording.frames.len() as u64;
+    let end = args.frames.unwrap_or(if args.repeat { u64::MAX } else { recorded });
+    for number in 0..end {
         wait(&mut sender, due, args.window)?;
         let now = Instant::now();
         if now > due + interval {
@@ -103,12 +175,12 @@ pub fn run(args: &Args) -> Result<()> {
             due = now;
         }
         due += interval;
-        let frame = (number % motion.frames.len() as u64) as usize;
-        let sent = match &weights {
+        let frame = (number % recorded) as usize;
+        let sent = match &recording.weights {
             Some(weights) => {
                 sender.prepare_weights(&weights[frame]).and_then(|frame| sender.transmit(frame))
             }
-            None => sender.send(&motion.frames[frame]),
+            None => sender.send(&recording.frames[frame]),
         };
         let sent = sent.map_err(|error| anyhow!("{name}: {error}"))?;
         display.show(&sender, &sent);
@@ -120,7 +192,7 @@ pub fn run(args: &Args) -> Result<()> {
         std::thread::sleep(Duration::from_millis(2));
     }
     display.finish();
-    print(&sender, late, args.json);
+    report::print(&sender, late, args.json);
     Ok(())
 }
 
@@ -145,7 +217,11 @@ fn order(path: &Path) -> Result<SurfaceOrder> {
 }
 
 /// Heartbeats and statuses until the next frame is due, and has room.
-fn wait(sender: &mut Sender<Line, MTU>, due: Instant, window: u32) -> Result<()> {
+fn wait<M: Mac, const MTU: usize>(
+    sender: &mut Sender<Line, MTU, M>,
+    due: Instant,
+    window: u32,
+) -> Result<()> {
     let mut heard = (sender.totals().statuses, Instant::now());
     loop {
         sender.poll()?;
@@ -163,129 +239,5 @@ fn wait(sender: &mut Sender<Line, MTU>, due: Instant, window: u32) -> Result<()>
                 .min(due.saturating_duration_since(now))
                 .max(Duration::from_micros(100)),
         );
-    }
-}
-
-/// What happens, as it happens: one line on a terminal, a line a second elsewhere.
-struct Display {
-    bar: ProgressBar,
-    last: Instant,
-}
-
-impl Display {
-    fn new() -> Self {
-        let bar = ProgressBar::new_spinner();
-        if let Ok(style) = ProgressStyle::with_template("{spinner} {wide_msg}") {
-            bar.set_style(style);
-        }
-        Self { bar, last: Instant::now() }
-    }
-
-    fn show(&mut self, sender: &Sender<Line, MTU>, sent: &Sent) {
-        let pause = Duration::from_millis(if std::io::stderr().is_terminal() { 100 } else { 1000 });
-        if self.last.elapsed() < pause {
-            return;
-        }
-        self.last = Instant::now();
-        let text = line(sender, sent);
-        if std::io::stderr().is_terminal() {
-            self.bar.set_message(text);
-            self.bar.tick();
-        } else {
-            eprintln!("{text}");
-        }
-    }
-
-    fn finish(&self) {
-        self.bar.finish_and_clear();
-    }
-}
-
-fn line(sender: &Sender<Line, MTU>, sent: &Sent) -> String {
-    let kind = match sent.content {
-        Content::Whole => "whole, of vertices:",
-        Content::Modal => "modal, of weights:",
-        _ => "partial, of vertices:",
-    };
-    let Sent { epoch, bytes, rows, .. } = sent;
-    let mut text = format!("frame {epoch}: {bytes} bytes, {kind} {rows}");
-    match (sender.status(), sender.acknowledged()) {
-        (None, _) => text += "; no status from the receiver yet",
-        (Some(_), None) => text += "; nothing published yet",
-        (Some(status), Some(newest)) => {
-            let published = status.published;
-            let age = published.map_or(0, |p| p.age_ms);
-            let _ = write!(text, "; published {newest}, {age} ms old");
-            if let Some(stretch) = published.and_then(|p| p.stretch) {
-                let _ = write!(text, ", stretch {stretch:.3}");
-            }
-        }
-    }
-    let safety = sender.status().map_or("", |status| match status.safety {
-        1 => ", nominal",
-        2 => ", degraded",
-        3 => ", SAFE",
-        _ => "",
-    });
-    text += safety;
-    let rejected = sender.counters().rejected();
-    if rejected > 0 {
-        let _ = write!(text, "; {rejected} rejected: {}", causes(sender.counters()).join(", "));
-    }
-    text
-}
-
-/// The causes of rejection that have occurred, with their counts.
-fn causes(counters: &Counters) -> Vec<String> {
-    Event::ALL
-        .into_iter()
-        .filter(|&event| event.is_rejection() && counters.of(event) > 0)
-        .map(|event| format!("{} {event}", counters.of(event)))
-        .collect()
-}
-
-fn print(sender: &Sender<Line, MTU>, late: u64, json: bool) {
-    let totals = sender.totals();
-    let per_frame = totals.bytes as f64 / totals.frames.max(1) as f64;
-    let (published, rejected) =
-        (sender.counters().of(Event::Published), sender.counters().rejected());
-    if json {
-        let causes: serde_json::Map<String, serde_json::Value> = Event::ALL
-            .into_iter()
-            .filter(|event| event.is_rejection())
-            .map(|event| (event.name().to_owned(), sender.counters().of(event).into()))
-            .collect();
-        println!(
-            "{:#}",
-            serde_json::json!({
-                "frames": totals.frames,
-                "partial": totals.partial,
-                "packets": totals.packets,
-                "bytes": totals.bytes,
-                "bytes_per_frame": per_frame,
-                "late": late,
-                "statuses": totals.statuses,
-                "acknowledged": sender.acknowledged(),
-                "published": published,
-                "rejected": causes,
-            })
-        );
-        return;
-    }
-    println!(
-        "sent      {} frames, {} of them partial; {} packets, {per_frame:.0} bytes a frame",
-        totals.frames, totals.partial, totals.packets
-    );
-    if late > 0 {
-        println!("late      {late} frames: the line is slower than the motion");
-    }
-    if totals.statuses == 0 {
-        println!("receiver  no status came back");
-        return;
-    }
-    let newest = sender.acknowledged().map_or("none of these".to_owned(), |n| n.to_string());
-    println!("receiver  published {published} since its start, the newest {newest}");
-    if rejected > 0 {
-        println!("rejected  {rejected}: {}", causes(sender.counters()).join(", "));
     }
 }

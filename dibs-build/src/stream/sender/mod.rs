@@ -1,120 +1,25 @@
 //! From positions to packets, and what comes back.
 
-use std::time::{Duration, Instant, SystemTime};
+mod error;
+mod frame;
+mod order;
+mod settings;
+
+pub use error::SendError;
+pub use frame::{Prepared, Sent};
+pub use order::SurfaceOrder;
+pub use settings::Settings;
+
+use std::time::Instant;
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
-    Body, Content, Counters, EncodeError, Encoding, FrameEncoder, FrameId, Mac, NoMac, Packet,
-    QuantisedBox, Rows, Status, WeightsEncoder, encode_heartbeat, is_newer,
+    Body, Content, Counters, Encoding, FrameEncoder, FrameId, Mac, NoMac, Packet, QuantisedBox,
+    Status, WeightsEncoder, encode_heartbeat, is_newer,
 };
-use dibs_nostd::{Index, Tree};
-use thiserror::Error;
 
 use super::Transport;
-
-/// Which mesh, and in which order its vertices are sent.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SurfaceOrder {
-    mesh_id: u32,
-    /// The mesh's vertex of each row.
-    order: Vec<u32>,
-}
-
-impl SurfaceOrder {
-    /// That of a tree: the tree that the receiver has, or one built from the same mesh in the same way.
-    #[must_use]
-    pub fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
-        let order = (0..tree.vertex_count()).map(|row| tree.vertex_number(row).unwrap_or(row));
-        Self { mesh_id: tree.mesh_id(), order: order.collect() }
-    }
-
-    /// An order of one's own: `order` has the mesh's vertex for each row of the vertex table.
-    #[must_use]
-    pub const fn new(mesh_id: u32, order: Vec<u32>) -> Self {
-        Self { mesh_id, order }
-    }
-
-    /// Identity of the mesh.
-    #[must_use]
-    pub const fn mesh_id(&self) -> u32 {
-        self.mesh_id
-    }
-
-    /// Rows of the vertex table.
-    #[must_use]
-    pub fn rows(&self) -> usize {
-        self.order.len()
-    }
-
-    /// Puts positions in the mesh's order into that of the tree's rows.
-    ///
-    /// # Errors
-    /// [`SendError::Vertices`] where a vertex of the tree has none.
-    pub fn to_rows(&self, positions: &[Vec3]) -> Result<Vec<Vec3>, SendError> {
-        let row = |&vertex: &u32| {
-            positions
-                .get(vertex as usize)
-                .copied()
-                .ok_or(SendError::Vertices { vertex, found: positions.len() })
-        };
-        self.order.iter().map(row).collect()
-    }
-}
-
-/// How a [`Sender`] sends.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// 6 bytes a vertex instead of 12, in a box that is fitted to each frame.
-    pub quantised: bool,
-    /// Sends only the vertices that moved by more than this, in mm. With quantised positions the box
-    /// is as coarse as that, so that the error that it states covers what was not sent; it then
-    /// reaches 73 m a mm of tolerance, and the receiver must allow coordinates that large. With float
-    /// positions there is no error to state: whatever the tolerance, only vertices that did not move
-    /// at all are left out.
-    pub partial: Option<f32>,
-    /// With partial frames: at least every this many frames a whole one. What a receiver that cannot
-    /// answer needs after a loss.
-    pub whole_every: u32,
-    /// Between two heartbeats; `None` sends none.
-    pub heartbeat: Option<Duration>,
-    /// How long a whole frame may be on its way: a status that asks for one before it arrives is not
-    /// heeded.
-    pub patience: Duration,
-    /// Number of this run: later than that of every run before, which the receiver remembers. By
-    /// default the time in tenths of a second, which wraps after 13 years.
-    pub session: u32,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-        Self {
-            quantised: true,
-            partial: None,
-            whole_every: 250,
-            heartbeat: Some(Duration::from_millis(100)),
-            patience: Duration::from_millis(500),
-            session: (now.as_millis() / 100) as u32,
-        }
-    }
-}
-
-/// A frame that was sent.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sent {
-    /// Its number.
-    pub epoch: u32,
-    /// Whether whole, partial or modal.
-    pub content: Content,
-    /// Vertices, or weights, in it.
-    pub rows: usize,
-    /// Packets that it took.
-    pub packets: usize,
-    /// Bytes of these, without what a byte stream adds.
-    pub bytes: usize,
-    /// No vertex is farther than this from where the receiver has it, in mm.
-    pub error: f32,
-}
+use frame::{apply, coarsened, packets_of};
 
 /// What was sent since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -467,96 +372,4 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
             self.whole_wanted = true;
         }
     }
-}
-
-/// A frame whose packets are made and not sent.
-#[derive(Debug)]
-pub struct Prepared {
-    sent: Sent,
-    packets: Vec<Vec<u8>>,
-}
-
-impl Prepared {
-    fn new(epoch: u32, content: Content, rows: usize, error: f32, packets: Vec<Vec<u8>>) -> Self {
-        let bytes = packets.iter().map(Vec::len).sum();
-        let sent = Sent { epoch, content, rows, packets: packets.len(), bytes, error };
-        Self { sent, packets }
-    }
-
-    /// What will have been sent.
-    #[must_use]
-    pub const fn sent(&self) -> &Sent {
-        &self.sent
-    }
-}
-
-fn packets_of<M: Mac, const MTU: usize>(
-    mut frame: FrameEncoder<'_, [Vec3], MTU, M>,
-) -> Vec<Vec<u8>> {
-    let mut buffer = [0; MTU];
-    let mut packets = Vec::new();
-    while let Some(packet) = frame.next_packet(&mut buffer) {
-        packets.push(packet.to_vec());
-    }
-    packets
-}
-
-/// Does to the positions what the receiver will do; how many there were.
-fn apply(packet: &[u8], encoding: Encoding, held: &mut [Vec3]) -> usize {
-    let Ok(Packet { body: Body::Vertices(vertices), .. }) = Packet::decode(packet) else {
-        return 0;
-    };
-    let rows = held.iter_mut().skip(vertices.first as usize);
-    match (vertices.rows, encoding) {
-        (Rows::Float(floats), _) => {
-            for (row, bytes) in rows.zip(floats) {
-                let (words, _) = bytes.as_chunks::<4>();
-                *row = Vec3::from_array([0, 1, 2].map(|axis| f32::from_le_bytes(words[axis])));
-            }
-        }
-        (Rows::Quantised(numbers), Encoding::Quantised(grid)) => {
-            for (row, bytes) in rows.zip(numbers) {
-                let (words, _) = bytes.as_chunks::<2>();
-                *row = grid.position([0, 1, 2].map(|axis| u16::from_le_bytes(words[axis])));
-            }
-        }
-        _ => (),
-    }
-    vertices.rows.len()
-}
-
-/// The same box in coarser steps, so that its error is nearly `error` (mm), where it is less.
-fn coarsened(grid: QuantisedBox, error: f32) -> QuantisedBox {
-    // Half a step along each of three axes, and the rounding of the 65,536 steps that the box reaches.
-    let step = error * 1.119 - grid.origin().abs().max_element() * 1e-6;
-    if step <= grid.step().max_element() {
-        return grid;
-    }
-    QuantisedBox::new(grid.origin() - step, Vec3::splat(step)).unwrap_or(grid)
-}
-
-/// Why a frame was not sent.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum SendError {
-    /// The frame has too few vertices.
-    #[error(
-        "the frame has {found} vertices and the tree uses vertex {vertex}: send the positions of \
-         the mesh that the tree was built from"
-    )]
-    Vertices {
-        /// A vertex of the tree.
-        vertex: u32,
-        /// Vertices of the frame.
-        found: usize,
-    },
-    /// The positions cannot be put into packets.
-    #[error("the frame cannot be sent: {0}")]
-    Frame(EncodeError),
-    /// Packets are to carry tags, and the receiver's challenge is not known: no status has come.
-    #[error("no genuine status came from the receiver: is it on, and has it the same key?")]
-    NoChallenge,
-    /// The connection is gone.
-    #[error("the connection broke: {0}")]
-    Line(std::io::Error),
 }

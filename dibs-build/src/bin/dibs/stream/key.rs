@@ -1,0 +1,30 @@
+//! `--key FILE`: what packets are authenticated by.
+
+use anyhow::{Context, Result, ensure};
+use std::path::Path;
+
+/// Digits of a key of 128 bits.
+const DIGITS: usize = 32;
+
+/// Reads a key: 32 hexadecimal digits, whatever white space around them. What the file says is not
+/// repeated in an error: it may be a key after all.
+pub fn read(path: &Path) -> Result<[u8; 16]> {
+    let name = path.display();
+    let what = format!(
+        "{name}: a key file holds {DIGITS} hexadecimal digits and nothing else, as \
+         `openssl rand -hex 16` prints"
+    );
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(error) => anyhow::bail!("{name}: cannot be read: {error}"),
+    };
+    let digits = bytes.trim_ascii();
+    ensure!(digits.len() == DIGITS, "{what}; this one has {} characters", digits.len());
+    let mut key = [0; 16];
+    for (byte, pair) in key.iter_mut().zip(digits.as_chunks::<2>().0) {
+        let [high, low] = pair.map(|digit| char::from(digit).to_digit(16));
+        let (high, low) = high.zip(low).with_context(|| what.clone())?;
+        *byte = (high << 4 | low) as u8;
+    }
+    Ok(key)
+}

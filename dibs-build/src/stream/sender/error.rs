@@ -1,0 +1,30 @@
+//! Why a frame was not sent.
+
+use dibs_nostd::wire::EncodeError;
+use thiserror::Error;
+
+/// Why a frame was not sent.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SendError {
+    /// The frame has too few vertices.
+    #[error(
+        "the frame has {found} vertices and the tree uses vertex {vertex}: send the positions of \
+         the mesh that the tree was built from"
+    )]
+    Vertices {
+        /// A vertex of the tree.
+        vertex: u32,
+        /// Vertices of the frame.
+        found: usize,
+    },
+    /// The positions cannot be put into packets.
+    #[error("the frame cannot be sent: {0}")]
+    Frame(EncodeError),
+    /// Packets are to carry tags, and the receiver's challenge is not known: no status has come.
+    #[error("no genuine status came from the receiver: is it on, and has it the same key?")]
+    NoChallenge,
+    /// The connection is gone.
+    #[error("the connection broke: {0}")]
+    Line(std::io::Error),
+}

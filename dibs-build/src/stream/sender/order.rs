@@ -1,0 +1,55 @@
+//! Which row of the receiver's table is which vertex of the mesh.
+
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::{Index, Tree};
+
+use super::SendError;
+
+/// Which mesh, and in which order its vertices are sent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SurfaceOrder {
+    pub(super) mesh_id: u32,
+    /// The mesh's vertex of each row.
+    order: Vec<u32>,
+}
+
+impl SurfaceOrder {
+    /// That of a tree: the tree that the receiver has, or one built from the same mesh in the same way.
+    #[must_use]
+    pub fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
+        let order = (0..tree.vertex_count()).map(|row| tree.vertex_number(row).unwrap_or(row));
+        Self { mesh_id: tree.mesh_id(), order: order.collect() }
+    }
+
+    /// An order of one's own: `order` has the mesh's vertex for each row of the vertex table.
+    #[must_use]
+    pub const fn new(mesh_id: u32, order: Vec<u32>) -> Self {
+        Self { mesh_id, order }
+    }
+
+    /// Identity of the mesh.
+    #[must_use]
+    pub const fn mesh_id(&self) -> u32 {
+        self.mesh_id
+    }
+
+    /// Rows of the vertex table.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.order.len()
+    }
+
+    /// Puts positions in the mesh's order into that of the tree's rows.
+    ///
+    /// # Errors
+    /// [`SendError::Vertices`] where a vertex of the tree has none.
+    pub fn to_rows(&self, positions: &[Vec3]) -> Result<Vec<Vec3>, SendError> {
+        let row = |&vertex: &u32| {
+            positions
+                .get(vertex as usize)
+                .copied()
+                .ok_or(SendError::Vertices { vertex, found: positions.len() })
+        };
+        self.order.iter().map(row).collect()
+    }
+}

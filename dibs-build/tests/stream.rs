@@ -1,0 +1,348 @@
+//! `dibs stream`, from the program over a socket to what a controller would act on: the packets go
+//! through the assembler and the stretch monitor, and what is published is compared with the motion.
+
+use std::io::{Read, Write};
+use std::net::{TcpListener, UdpSocket};
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use dibs_build::Motion;
+use dibs_nostd::wire::{
+    AesCmac, Deframer, Event, Mac, NoMac, encode_status, enframe, framed_bytes,
+};
+use dibs_nostd::{
+    Advance, Assembler, Frames, Progress, Rejection, StretchMonitor, Tree, VertexTable,
+};
+use serde_json::Value;
+
+/// Vertices of the heart of 1,000 triangles.
+const N: usize = 502;
+const FRAMES: usize = 25;
+/// A test that hangs fails after this long.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+fn program(folder: &Path, line: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_dibs"));
+    command.current_dir(folder).args(line.split_whitespace());
+    command
+}
+
+fn run(folder: &Path, line: &str) {
+    let output = program(folder, line).output().unwrap();
+    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// A folder with a heart, its motion, and its tree.
+fn heart() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    run(folder.path(), "generate heart --triangles 1000 -o heart.ply --motion heart.pc2");
+    run(folder.path(), "build heart.ply -o heart.dibs --stretch 1.5 --motion heart.pc2");
+    folder
+}
+
+fn stream(folder: &Path, line: &str) -> Child {
+    program(folder, &format!("stream heart.dibs heart.pc2 --json {line}"))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+/// The totals that the program printed.
+fn totals(output: &Output) -> Value {
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Where packets come from, and statuses go to.
+trait Link {
+    /// The packets that have come; `None` once there will be no more.
+    fn receive(&mut self) -> Option<Vec<Vec<u8>>>;
+    fn reply(&mut self, packet: &[u8]);
+}
+
+/// A byte stream.
+struct Bytes<S> {
+    stream: S,
+    deframer: Deframer<1024>,
+}
+
+impl<S: Read + Write> Bytes<S> {
+    fn new(stream: S) -> Self {
+        Self { stream, deframer: Deframer::new() }
+    }
+}
+
+impl<S: Read + Write> Link for Bytes<S> {
+    fn receive(&mut self) -> Option<Vec<Vec<u8>>> {
+        let mut buffer = [0; 4096];
+        match self.stream.read(&mut buffer) {
+            Ok(0) => None,
+            Ok(bytes) => {
+                let pushed = buffer[..bytes].iter();
+                let packets = pushed.filter_map(|&byte| {
+                    self.deframer.push(byte).map(|packet| packet.expect("no damage").to_vec())
+                });
+                Some(packets.collect())
+            }
+            Err(_) => Some(Vec::new()),
+        }
+    }
+
+    fn reply(&mut self, packet: &[u8]) {
+        let mut framed = [0; framed_bytes(1024)];
+        // The program may have ended, with all that it sent acknowledged.
+        let _ = self.stream.write_all(enframe(packet, &mut framed).expect("room"));
+    }
+}
+
+/// Datagrams. The receiver knows whom to answer once something has come.
+struct Datagrams(UdpSocket);
+
+impl Link for Datagrams {
+    fn receive(&mut self) -> Option<Vec<Vec<u8>>> {
+        let mut buffer = [0; 2048];
+        let Ok((bytes, from)) = self.0.recv_from(&mut buffer) else { return Some(Vec::new()) };
+        self.0.connect(from).unwrap();
+        Some(vec![buffer[..bytes].to_vec()])
+    }
+
+    fn reply(&mut self, packet: &[u8]) {
+        let _ = self.0.send(packet);
+    }
+}
+
+/// What a receiver saw.
+#[derive(Default)]
+struct Seen {
+    epochs: Vec<u32>,
+    published: u32,
+    rejected: u32,
+    heartbeats: u32,
+    /// When the last frame began to come.
+    last_begun: Option<Instant>,
+    /// Largest packet.
+    largest: usize,
+    /// The largest error of a position, and the largest that was stated.
+    error: f32,
+    stated: f32,
+}
+
+/// Receives until the program ends, reports the status 50 times a second, and compares each published
+/// position with the motion's: off by no more than `stated + tolerance`.
+fn receive<M: Mac>(
+    folder: &Path,
+    link: &mut impl Link,
+    mac: M,
+    mut child: Child,
+) -> (Seen, Output) {
+    let blob = std::fs::read(folder.join("heart.dibs")).unwrap();
+    let tree = Tree::<u16>::from_bytes(&blob).unwrap();
+    let motion = Motion::read_pc2(folder.join("heart.pc2")).unwrap();
+    assert_eq!((tree.vertex_count() as usize, motion.frames.len()), (N, FRAMES));
+    let frames = Frames::<N>::new();
+    let (writer, mut reader) = frames.split().unwrap();
+    let monitor = StretchMonitor::new(&tree).unwrap();
+    let mut assembler = Assembler::with_mac(writer, monitor, tree.mesh_id(), 1e4, mac);
+
+    let mut seen = Seen::default();
+    let (start, mut reported, mut is_over) = (Instant::now(), None::<Instant>, false);
+    while !is_over {
+        assert!(start.elapsed() < PATIENCE, "the program does not end");
+        let has_ended = child.try_wait().unwrap().is_some();
+        let packets = link.receive();
+        is_over = packets.is_none() || has_ended && packets.as_ref().is_some_and(Vec::is_empty);
+        for packet in packets.unwrap_or_default() {
+            seen.largest = seen.largest.max(packet.len());
+            let now = start.elapsed().as_millis() as u32;
+            match assembler.accept(&packet, now) {
+                Ok(Progress::Begun { .. }) => seen.last_begun = Some(Instant::now()),
+                Ok(_) | Err(Rejection::Forged { .. } | Rejection::Unexpected { .. }) => (),
+                Err(rejection) => panic!("{rejection}"),
+            }
+            loop {
+                match assembler.advance(200).unwrap() {
+                    Advance::Pending => (),
+                    Advance::Published { epoch } => {
+                        seen.epochs.push(epoch);
+                        let frame = reader.read().unwrap();
+                        let label = frame.label();
+                        assert_eq!(label.epoch, epoch);
+                        assert!(label.stretch.is_some_and(|stretch| stretch.sigma() <= 1.5));
+                        seen.stated = seen.stated.max(label.position_error);
+                        let recorded = &motion.frames[(epoch as usize - 1) % FRAMES];
+                        for row in 0..tree.vertex_count() {
+                            let exact = recorded[tree.vertex_number(row).unwrap() as usize];
+                            let error = frame.position(row).unwrap().distance(exact);
+                            assert!(error <= label.position_error, "frame {epoch}: {error}");
+                            seen.error = seen.error.max(error);
+                        }
+                        break;
+                    }
+                    _ => break,
+                }
+            }
+        }
+        if reported.is_none_or(|at| at.elapsed() > Duration::from_millis(20)) {
+            reported = Some(Instant::now());
+            let status = assembler.status(start.elapsed().as_millis() as u32, 1);
+            let mut buffer = [0; 1024];
+            let (id, counters) = (tree.mesh_id(), assembler.counters());
+            link.reply(encode_status(id, &status, counters, assembler.mac(), &mut buffer));
+        }
+    }
+    let counters = assembler.counters();
+    seen.published = counters.of(Event::Published);
+    seen.rejected = counters.rejected();
+    seen.heartbeats = counters.of(Event::Heartbeat);
+    (seen, child.wait_with_output().unwrap())
+}
+
+fn over_tcp<M: Mac>(folder: &Path, line: &str, mac: M) -> (Seen, Output) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let child = stream(folder, &format!("--to tcp:{} {line}", listener.local_addr().unwrap()));
+    let (socket, _) = listener.accept().unwrap();
+    socket.set_read_timeout(Some(Duration::from_millis(5))).unwrap();
+    receive(folder, &mut Bytes::new(socket), mac, child)
+}
+
+/// Every frame is published, in order, and the program knows.
+fn assert_all(seen: &Seen, totals: &Value) {
+    assert_eq!(seen.epochs, (1..=FRAMES as u32).collect::<Vec<_>>());
+    assert_eq!((seen.published, seen.rejected), (FRAMES as u32, 0));
+    assert_eq!(totals["frames"], FRAMES);
+    assert_eq!(totals["acknowledged"], FRAMES);
+    assert_eq!(totals["published"], FRAMES);
+    assert!(totals["statuses"].as_u64().unwrap() >= 1, "{totals}");
+    assert!(totals["rejected"].as_object().unwrap().values().all(|count| count == 0), "{totals}");
+}
+
+#[test]
+fn floats_over_tcp_arrive_to_the_bit() {
+    let folder = heart();
+    let (seen, output) = over_tcp(folder.path(), "--rate 200", NoMac);
+    let totals = totals(&output);
+    assert_all(&seen, &totals);
+    assert_eq!((seen.error, seen.stated), (0.0, 0.0));
+    assert!(seen.heartbeats >= 1 && seen.largest > 64 && seen.largest <= 1024);
+    // 12 bytes a vertex, and what packets and heartbeats take besides.
+    let bytes = totals["bytes_per_frame"].as_f64().unwrap() / N as f64;
+    assert!((12.0..13.5).contains(&bytes), "{bytes} bytes a vertex");
+}
+
+#[test]
+fn quantised_frames_are_half_as_long_and_keep_their_stated_error() {
+    let folder = heart();
+    let (seen, output) = over_tcp(folder.path(), "--rate 200 --quantise", NoMac);
+    let totals = totals(&output);
+    assert_all(&seen, &totals);
+    assert!(seen.error > 0.0 && seen.stated < 0.01, "{} of {}", seen.error, seen.stated);
+    let bytes = totals["bytes_per_frame"].as_f64().unwrap() / N as f64;
+    assert!((6.0..7.5).contains(&bytes), "{bytes} bytes a vertex");
+}
+
+#[test]
+fn partial_frames_carry_what_moved() {
+    let folder = heart();
+    let (seen, output) =
+        over_tcp(folder.path(), "--rate 100 --quantise --partial 1 --mtu 64", NoMac);
+    let totals = totals(&output);
+    assert_all(&seen, &totals);
+    assert_eq!(seen.largest, 64);
+    assert!(seen.stated <= 1.0, "{} mm", seen.stated);
+    let partial = totals["partial"].as_u64().unwrap();
+    assert!(partial >= 20, "{partial} partial frames");
+}
+
+#[cfg(unix)]
+#[test]
+fn unix_socket_and_loop() {
+    let folder = heart();
+    let path = folder.path().join("bus");
+    let listener = std::os::unix::net::UnixListener::bind(&path).unwrap();
+    let child = stream(folder.path(), "--to unix:bus --rate 200 --loop --frames 40");
+    let (socket, _) = listener.accept().unwrap();
+    socket.set_read_timeout(Some(Duration::from_millis(5))).unwrap();
+    let (seen, output) = receive(folder.path(), &mut Bytes::new(socket), NoMac, child);
+    assert_eq!(seen.epochs, (1..=40).collect::<Vec<_>>(), "the motion starts over");
+    assert_eq!(totals(&output)["acknowledged"], 40);
+}
+
+#[test]
+fn datagrams() {
+    let folder = heart();
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    socket.set_read_timeout(Some(Duration::from_millis(100))).unwrap();
+    let line = format!("--to udp:{} --rate 100 --quantise", socket.local_addr().unwrap());
+    let child = stream(folder.path(), &line);
+    let (seen, output) = receive(folder.path(), &mut Datagrams(socket), NoMac, child);
+    assert_all(&seen, &totals(&output));
+}
+
+/// Frames are never sent earlier than the rate says. How late a busy system makes them is not tested.
+#[test]
+fn the_rate_is_kept() {
+    let folder = heart();
+    let start = Instant::now();
+    let (seen, output) = over_tcp(folder.path(), "--rate 20 --quantise", NoMac);
+    assert_all(&seen, &totals(&output));
+    let last = seen.last_begun.expect("frames came");
+    assert!(last - start >= Duration::from_millis(50 * (FRAMES as u64 - 1)));
+}
+
+const KEY: [u8; 16] = *b"\x00\x11\x22\x33\x44\x55\x66\x77\x88\x99\xaa\xbb\xcc\xdd\xee\xff";
+
+#[test]
+fn with_a_key_the_receiver_believes_and_without_it_nothing() {
+    let folder = heart();
+    let folder = folder.path();
+    std::fs::write(folder.join("heart.key"), "00112233445566778899aabbCCDDEEFF\n").unwrap();
+    std::fs::write(folder.join("other.key"), "00112233445566778899aabbccddeefe").unwrap();
+    let mac = || AesCmac::new(&KEY, 0xC0FFEE);
+    for line in ["--key heart.key --quantise", "--key heart.key --quantise --mtu 64"] {
+        let (seen, output) = over_tcp(folder, &format!("--rate 200 {line}"), mac());
+        assert_all(&seen, &totals(&output));
+    }
+
+    let (seen, output) = over_tcp(folder, "--key other.key", mac());
+    assert_eq!((seen.published, output.status.code()), (0, Some(1)));
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains("has it the same key?") && error.lines().count() == 1, "{error}");
+    // Sent all the same, under the right challenge and a wrong key; and without one.
+    for line in ["--key other.key --challenge 12648430", ""] {
+        let (seen, _) = over_tcp(folder, &format!("--rate 500 {line}"), mac());
+        assert_eq!(seen.published, 0);
+        assert!(seen.rejected > 100, "{} rejected", seen.rejected);
+    }
+    // A receiver without a way back: the challenge is given.
+    let (seen, output) = over_tcp(folder, "--rate 200 --key heart.key --challenge 12648430", mac());
+    assert_all(&seen, &totals(&output));
+}
+
+#[test]
+fn what_cannot_be_streamed_is_one_sentence() {
+    let folder = heart();
+    let folder = folder.path();
+    let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+    write("short.key", "00112233");
+    write("text.key", "this is no hexadecimal, is it?!!");
+    let to = "--to udp:127.0.0.1:9";
+    let cases = [
+        (format!("{to} --key absent.key"), "absent.key: cannot be read"),
+        (format!("{to} --key short.key"), "short.key: a key file holds 32 hexadecimal digits"),
+        (format!("{to} --key text.key"), "text.key: a key file holds 32 hexadecimal digits"),
+        (format!("{to} --rate 0"), "--rate 0: a rate is above 0"),
+        (format!("{to} --partial=-1"), "--partial: a tolerance"),
+        (format!("{to} --modes"), "--motion and --modes"),
+        ("--to unix:absent/bus".to_owned(), "unix:absent/bus: cannot be opened"),
+    ];
+    for (line, part) in cases {
+        let output = stream(folder, &line).wait_with_output().unwrap();
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{line}: {error}");
+        assert!(output.stdout.is_empty() && error.contains(part), "{line}: {error}");
+        assert_eq!(error.lines().count(), 1, "{line}: {error}");
+        assert!(!error.contains("hexadecimal, is"), "a key is not repeated");
+    }
+}
