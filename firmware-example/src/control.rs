@@ -28,6 +28,9 @@ pub const SILENCE_WARNING: u32 = TICK_RATE;
 /// Ticks without any good packet after which the output is safe.
 pub const SILENCE_LIMIT: u32 = 2 * TICK_RATE;
 
+/// Ticks without a heartbeat after which the state is degraded, and after which it is safe.
+const HEARTBEAT: (u32, u32) = (TICK_RATE, 3 * TICK_RATE);
+
 /// Packets and frames rejected in a row after which the state is degraded, and after which it is safe.
 const REJECTIONS: (u32, u32) = (50, 500);
 
@@ -87,7 +90,7 @@ impl Control {
     pub fn tick(&mut self, clock: impl Fn() -> u32) -> Tick {
         let mut record = Tick { kind: Tick::KIND, tick: self.tick, ..Tick::zeroed() };
         record.triangle = u32::MAX;
-        record.packets = self.bus.packets();
+        record.bytes = self.bus.bytes();
         record.frames_published = self.bus.published();
         record.rejected = self.bus.rejected();
 
@@ -99,12 +102,15 @@ impl Control {
             // A pose that is not finite: nothing to ask with.
             None => (None, Err(Unknown::NotFinite)),
         };
+        let link = self.bus.link.read(self.tick);
         let verdict = self.failsafe.step(&Observation {
             now: self.tick,
             frame,
-            link: self.bus.link.read(self.tick),
+            link,
             query_failed: answer == Err(Unknown::Query),
+            has_rotted: self.bus.has_rotted(),
         });
+        self.bus.set_state(verdict.state);
         let admitted = answer.and_then(|closest| verdict.admit(closest));
         let along = answer.map_or(0.5, |closest| closest.axis_parameter);
         let velocity = match (before, tool) {
@@ -118,6 +124,8 @@ impl Control {
         record.state = verdict.state as u32;
         record.cause = verdict.cause.map_or(0, |cause| cause_code(&cause));
         record.margin = verdict.margin;
+        record.silence = link.silence;
+        (record.read_epoch, record.read_digest) = self.bus.fingerprint();
         record.force = force.force.to_array();
         self.tick = self.tick.wrapping_add(1);
         record
@@ -169,9 +177,10 @@ const fn limits() -> Result<Limits, LimitError> {
     }
     let age = tri!(Watch::new(SURFACE_AGE_WARNING, SURFACE_AGE_LIMIT));
     let silence = tri!(Watch::new(SILENCE_WARNING, SILENCE_LIMIT));
+    let heartbeat = tri!(Watch::new(HEARTBEAT.0, HEARTBEAT.1));
     let rejections = tri!(Watch::new(REJECTIONS.0, REJECTIONS.1));
     let limits = tri!(tri!(Limits::new(age, TISSUE_SPEED)).recovery(RECOVERY_FRAMES));
-    Ok(limits.silence(silence).rejections(rejections).automatic())
+    Ok(limits.silence(silence).heartbeat(heartbeat).rejections(rejections).automatic())
 }
 
 /// Velocity of the point at `along` (0 to 1) of the instrument's axis, in mm/s.

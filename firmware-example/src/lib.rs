@@ -1,32 +1,37 @@
 //! The control logic of a robot that keeps its instrument off a beating heart.
 //!
 //! It compiles for the board and for the host alike: `no_std`, no allocation, no panic, and nothing
-//! that belongs to a board. Two contexts share it:
+//! that belongs to a board. Three contexts share it:
 //!
 //! - the control tick, 1 kHz, highest priority: [`Control::tick`] poses the instrument, asks for the
 //!   closest pair on the frame published last, judges how far that frame may be trusted, and turns
 //!   the answer into a force;
-//! - bus reception, any lower priority: [`Receiver::byte`] takes vertices as they come and publishes
-//!   complete frames.
+//! - bus reception, any lower priority: [`Receiver::byte`] takes vertices as they come;
+//! - the background: [`Receiver::work`] checks complete frames in slices and publishes them,
+//!   [`Receiver::report`] tells the sender, and [`Upkeep::step`] checks the tree in flash.
 //!
 //! Between them stand [`Frames`](dibs_nostd::Frames), where a frame is published by one atomic
-//! operation, and [`BusStatus`], plain counters. [`telemetry`] is what the tick tells the world.
+//! operation, and [`BusStatus`], plain counters and marks. [`telemetry`] is what the tick tells the world.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
 mod control;
+mod fingerprint;
 mod instrument;
 mod receiver;
 mod status;
 pub mod surface;
 pub mod telemetry;
+mod upkeep;
 
 pub use control::{
     Control, SILENCE_LIMIT, SILENCE_WARNING, SURFACE_AGE_LIMIT, SURFACE_AGE_WARNING, SetupError,
 };
+pub use fingerprint::fingerprint;
 pub use instrument::instrument;
-pub use receiver::{MTU, Receiver};
+pub use receiver::{MTU, Receiver, STATUS_FRAMED};
 pub use status::BusStatus;
+pub use upkeep::Upkeep;
 
 /// Control ticks a second.
 pub const TICK_RATE: u32 = 1_000;

@@ -1,56 +1,125 @@
-//! Bus reception: bytes in, published frames out.
+//! Bus reception: bytes in, published frames and statuses out.
 
-use dibs_nostd::wire::{Deframer, Event};
-use dibs_nostd::{Assembler, FrameWriter};
+use dibs_nostd::wire::{Counters, Deframer, encode_status, enframe, framed_bytes};
+use dibs_nostd::{Advance, Assembler, FrameWriter, StretchError, StretchMonitor};
 
-use crate::BusStatus;
+use crate::fingerprint::Fingerprint;
 use crate::surface::{SURFACE, SURFACE_CENTER, SURFACE_REACH, SURFACE_VERTICES, SurfaceAssembler};
+use crate::{BusStatus, TICK_RATE};
 
 /// Largest packet on the serial bus, in bytes: 167 quantised vertices.
 pub const MTU: usize = 1024;
 
+/// Largest status, in bytes: ten counters; all of them in three.
+const STATUS_MTU: usize = 96;
+
+/// Largest status on the line.
+pub const STATUS_FRAMED: usize = framed_bytes(STATUS_MTU);
+
+/// Ticks between two statuses to the sender, unless there is news before.
+const REPORT_INTERVAL: u32 = TICK_RATE / 10;
+
 /// No vertex may be farther out on any axis than this many times the size of the rest shape.
 const ROOM: f32 = 4.0;
 
+/// Triangles checked, or rows copied, in one slice.
+const WORK: u32 = 32;
+
+/// Rows of the published frame read through in one slice.
+const ROWS: u32 = 8;
+
 /// The receiving end of the serial bus.
 ///
-/// Cost of a byte: O(1), except the last of a packet, which pays for the packet's vertices, and the
-/// last of a frame, which pays for the stretch check of the whole surface. All of it happens below
-/// the control tick's priority.
+/// Two contexts use it, and keep each other out: the bus interrupt calls [`byte`](Self::byte), which
+/// takes O(1), and O(vertices) for the last byte of a packet; what is left of the processor's time goes
+/// to [`work`](Self::work), which checks and publishes, in slices, and to [`report`](Self::report). All
+/// of it is below the control tick's priority.
 pub struct Receiver {
     deframer: Deframer<MTU>,
     assembler: SurfaceAssembler,
+    fingerprint: Fingerprint,
     status: &'static BusStatus,
-    packets: u32,
-    damaged: u32,
+    /// Tick of the last status.
+    reported: u32,
+    /// A frame was published or refused since.
+    has_news: bool,
 }
 
 impl Receiver {
     /// A receiver that publishes through `writer`.
-    #[must_use]
-    pub fn new(writer: FrameWriter<'static, SURFACE_VERTICES>, status: &'static BusStatus) -> Self {
+    ///
+    /// # Errors
+    /// [`StretchError`] when the tree lacks what the stretch is measured against.
+    pub fn new(
+        writer: FrameWriter<'static, SURFACE_VERTICES>,
+        status: &'static BusStatus,
+    ) -> Result<Self, StretchError> {
         let limit = SURFACE_CENTER.abs().max_element() + ROOM * SURFACE_REACH;
-        let assembler = Assembler::new(writer, &SURFACE, SURFACE.mesh_id(), limit);
-        Self { deframer: Deframer::new(), assembler, status, packets: 0, damaged: 0 }
+        let monitor = StretchMonitor::new(&SURFACE)?;
+        Ok(Self {
+            deframer: Deframer::new(),
+            assembler: Assembler::new(writer, monitor, SURFACE.mesh_id(), limit),
+            fingerprint: Fingerprint::new(),
+            status,
+            reported: 0,
+            has_news: false,
+        })
     }
 
     /// Takes one byte. `tick` is the present control tick: the age of a surface counts from it.
     pub fn byte(&mut self, byte: u8, tick: u32) {
+        self.status.count_byte();
         match self.deframer.push(byte) {
             None => return,
             // Rejections are counted by cause in the assembler.
             Some(Ok(packet)) => {
                 self.status.link.note(&self.assembler.accept(packet, tick), tick);
-                self.status.link.note_check(&self.assembler.advance(u32::MAX));
             }
-            Some(Err(_)) => {
-                self.damaged = self.damaged.saturating_add(1);
+            Some(Err(error)) => {
+                self.assembler.count_framing(&error);
                 self.status.link.damaged();
             }
         }
-        self.packets = self.packets.wrapping_add(1);
-        let counters = self.assembler.counters();
-        let rejected = counters.rejected().saturating_add(self.damaged);
-        self.status.set(self.packets, counters.of(Event::Published), rejected);
+        self.status.set(self.assembler.counters());
+    }
+
+    /// One slice of checking, copying and publishing; whether more is to be done at once.
+    pub fn work(&mut self) -> bool {
+        let outcome = self.assembler.advance(WORK);
+        self.status.link.note_check(&outcome);
+        match outcome {
+            Ok(Advance::Pending) => return true,
+            Ok(Advance::Published { epoch }) => self.fingerprint.begin(epoch),
+            // The published frame is read through while the next one comes.
+            Ok(_) => {
+                if let Some(surface) = self.assembler.surface() {
+                    self.fingerprint.step(&surface, ROWS, self.status);
+                }
+                return false;
+            }
+            Err(_) => (),
+        }
+        self.has_news = true;
+        self.status.set(self.assembler.counters());
+        false
+    }
+
+    /// What has happened on the bus since start.
+    #[must_use]
+    pub const fn counters(&self) -> &Counters {
+        self.assembler.counters()
+    }
+
+    /// What goes back to the sender now, framed for the line: `None` unless a status is due. `tick` is
+    /// the present control tick, 1 ms.
+    pub fn report<'b>(&mut self, tick: u32, line: &'b mut [u8; STATUS_FRAMED]) -> Option<&'b [u8]> {
+        if !self.has_news && tick.wrapping_sub(self.reported) < REPORT_INTERVAL {
+            return None;
+        }
+        (self.reported, self.has_news) = (tick, false);
+        let status = self.assembler.status(tick, self.status.safety());
+        let (counters, mac) = (self.assembler.counters(), self.assembler.mac());
+        let mut packet = [0; STATUS_MTU];
+        enframe(encode_status(SURFACE.mesh_id(), &status, counters, mac, &mut packet), line)
     }
 }

@@ -1,18 +1,24 @@
-//! What the bus side tells the control side besides the frames themselves.
+//! What control tick, bus and background tell each other besides the frames themselves.
 
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-use dibs_nostd::failsafe::LinkStatus;
+use dibs_nostd::failsafe::{LinkStatus, State};
+use dibs_nostd::wire::{Counters, Event};
 
-/// Counters since start, written by the bus interrupt and read by anybody. Each is exact; together
-/// they may be of two moments.
+/// Counters since start, written by the bus side and read by anybody, and the controller's state, the
+/// other way. Each is exact; together they may be of two moments.
 #[derive(Debug, Default)]
 pub struct BusStatus {
     /// What the fail-safe machine watches.
     pub link: LinkStatus,
-    packets: AtomicU32,
+    bytes: AtomicU32,
     published: AtomicU32,
     rejected: AtomicU32,
+    safety: AtomicU32,
+    /// Epoch and digest of a published frame: [`fingerprint`](Self::fingerprint).
+    epoch: AtomicU32,
+    digest: AtomicU32,
+    has_rotted: AtomicBool,
 }
 
 impl BusStatus {
@@ -21,16 +27,20 @@ impl BusStatus {
     pub const fn new() -> Self {
         Self {
             link: LinkStatus::new(),
-            packets: AtomicU32::new(0),
+            bytes: AtomicU32::new(0),
             published: AtomicU32::new(0),
             rejected: AtomicU32::new(0),
+            safety: AtomicU32::new(0),
+            epoch: AtomicU32::new(0),
+            digest: AtomicU32::new(0),
+            has_rotted: AtomicBool::new(false),
         }
     }
 
-    /// Packets that came, good and bad.
+    /// Bytes that came over the bus; wraps.
     #[must_use]
-    pub fn packets(&self) -> u32 {
-        self.packets.load(Ordering::Relaxed)
+    pub fn bytes(&self) -> u32 {
+        self.bytes.load(Ordering::Relaxed)
     }
 
     /// Frames published.
@@ -39,15 +49,55 @@ impl BusStatus {
         self.published.load(Ordering::Relaxed)
     }
 
-    /// Packets rejected, for any cause, and frames with them.
+    /// Packets and frames rejected.
     #[must_use]
     pub fn rejected(&self) -> u32 {
         self.rejected.load(Ordering::Relaxed)
     }
 
-    pub(crate) fn set(&self, packets: u32, published: u32, rejected: u32) {
-        self.packets.store(packets, Ordering::Relaxed);
-        self.published.store(published, Ordering::Relaxed);
-        self.rejected.store(rejected, Ordering::Relaxed);
+    /// The controller's state as the wire protocol's status has it; 0 before the first tick.
+    #[must_use]
+    pub fn safety(&self) -> u8 {
+        self.safety.load(Ordering::Relaxed) as u8
+    }
+
+    /// Epoch of the frame that was read through last, and the CRC-32 of its positions as they stand in
+    /// memory; epoch 0 while there is none.
+    #[must_use]
+    pub fn fingerprint(&self) -> (u32, u32) {
+        let epoch = self.epoch.load(Ordering::Acquire);
+        let digest = self.digest.load(Ordering::Acquire);
+        let is_one = epoch == self.epoch.load(Ordering::Relaxed);
+        if is_one { (epoch, digest) } else { (0, 0) }
+    }
+
+    /// Whether the tree was ever found changed. It is not taken back: flash that read wrong once is not
+    /// to be trusted.
+    #[must_use]
+    pub fn has_rotted(&self) -> bool {
+        self.has_rotted.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn count_byte(&self) {
+        self.bytes.store(self.bytes().wrapping_add(1), Ordering::Relaxed);
+    }
+
+    pub(crate) fn set(&self, counters: &Counters) {
+        self.published.store(counters.of(Event::Published), Ordering::Relaxed);
+        self.rejected.store(counters.rejected(), Ordering::Relaxed);
+    }
+
+    pub(crate) fn set_state(&self, state: State) {
+        self.safety.store(state as u32 + 1, Ordering::Relaxed);
+    }
+
+    pub(crate) fn set_fingerprint(&self, epoch: u32, digest: u32) {
+        self.epoch.store(0, Ordering::Relaxed);
+        self.digest.store(digest, Ordering::Release);
+        self.epoch.store(epoch, Ordering::Release);
+    }
+
+    pub(crate) fn set_rotted(&self) {
+        self.has_rotted.store(true, Ordering::Relaxed);
     }
 }

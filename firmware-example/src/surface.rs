@@ -1,7 +1,7 @@
 //! The surface: its tree in flash, as `build.rs` generated it.
 
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Assembler, FrameReader, Frames, Query, Tree};
+use dibs_nostd::{Assembler, FrameReader, Frames, Query, StretchMonitor};
 
 include!(concat!(env!("OUT_DIR"), "/surface.rs"));
 
@@ -13,7 +13,7 @@ pub type SurfaceReader = FrameReader<'static, SURFACE_VERTICES>;
 
 /// The bus's end: publishes frames that are complete and within the tree's stretch limit.
 pub type SurfaceAssembler =
-    Assembler<'static, &'static Tree<'static, SurfaceIndex>, SURFACE_VERTICES>;
+    Assembler<'static, StretchMonitor<'static, SurfaceIndex>, SURFACE_VERTICES>;
 
 /// A query with the stack that this tree needs.
 pub type SurfaceQuery = Query<'static, SurfaceIndex, SURFACE_STACK>;

@@ -5,15 +5,19 @@
 
 use bytemuck::{NoUninit, Pod, Zeroable};
 use dibs_nostd::constraint::Unknown;
-use dibs_nostd::wire::{enframe, framed_bytes};
+use dibs_nostd::wire::{Event, enframe, framed_bytes};
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 /// Bytes of a checksum.
 const CHECKSUM: usize = 4;
 
+/// Largest record, in bytes.
+const LARGEST: usize =
+    if size_of::<Tick>() > size_of::<Summary>() { size_of::<Tick>() } else { size_of::<Summary>() };
+
 /// Largest record on the line, in bytes.
-pub const MAX_FRAMED: usize = framed_bytes(size_of::<Tick>() + CHECKSUM);
+pub const MAX_FRAMED: usize = framed_bytes(LARGEST + CHECKSUM);
 
 /// What happened in one control tick.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -62,12 +66,18 @@ pub struct Tick {
     pub force: [f32; 3],
     /// Clock counts that the query took; 0 where there is no clock.
     pub query_counts: u32,
-    /// Packets that the bus had brought.
-    pub packets: u32,
+    /// Bytes that the bus had brought; wraps.
+    pub bytes: u32,
+    /// Ticks since the last good packet; `u32::MAX` before the first.
+    pub silence: u32,
     /// Frames published so far.
     pub frames_published: u32,
     /// Packets and frames rejected so far.
     pub rejected: u32,
+    /// Epoch of the frame that the background read through last; 0 while there is none.
+    pub read_epoch: u32,
+    /// The CRC-32 of its positions: [`fingerprint`](crate::fingerprint).
+    pub read_digest: u32,
 }
 
 /// A cause as a number.
@@ -80,7 +90,8 @@ pub const fn cause_code(cause: &Unknown) -> u32 {
         Unknown::LinkLost { .. } => 4,
         Unknown::HeartbeatLost { .. } => 5,
         Unknown::Rejections { .. } => 6,
-        _ => 7,
+        Unknown::Rot => 7,
+        _ => 8,
     }
 }
 
@@ -95,6 +106,7 @@ pub const fn cause_name(code: u32) -> &'static str {
         4 => "link lost",
         5 => "heartbeat lost",
         6 => "rejections in a row",
+        7 => "tree changed",
         _ => "number not finite",
     }
 }
@@ -130,6 +142,15 @@ pub struct Summary {
     pub bus_overrun: u32,
     /// Largest stack use, in bytes.
     pub stack_bytes: u32,
+    /// Longest section with all interrupts disabled, in clock counts.
+    pub masked_counts: u32,
+    /// Longest section with the bus interrupt disabled, without the control ticks in it, in clock
+    /// counts.
+    pub bus_masked_counts: u32,
+    /// Rounds of the background check of the tree.
+    pub scrub_rounds: u32,
+    /// What happened on the bus: `dibs_nostd::wire::Event::ALL`, in that order.
+    pub events: [u32; Event::ALL.len()],
 }
 
 impl Summary {
@@ -150,7 +171,7 @@ pub enum Record {
 /// too small.
 pub fn frame<'b, T: NoUninit>(record: &T, out: &'b mut [u8; MAX_FRAMED]) -> Option<&'b [u8]> {
     const { assert!(cfg!(target_endian = "little"), "records are little-endian") };
-    let mut bytes = [0; size_of::<Tick>() + CHECKSUM];
+    let mut bytes = [0; LARGEST + CHECKSUM];
     let fields = bytemuck::bytes_of(record);
     let (place, rest) = bytes.split_at_mut_checked(fields.len())?;
     for (to, from) in place.iter_mut().zip(fields) {

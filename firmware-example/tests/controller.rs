@@ -12,7 +12,9 @@ use dibs_build::{Builder, generate};
 use dibs_nostd::constraint::Unknown;
 use dibs_nostd::failsafe::State;
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, QuantisedBox, enframe, framed_bytes};
+use dibs_nostd::wire::{
+    Encoding, FrameEncoder, FrameId, NoMac, QuantisedBox, encode_heartbeat, enframe, framed_bytes,
+};
 use dibs_tests::oracle::{Instrument, exhaustive};
 
 /// The sending side: the generated heart, in the tree's order.
@@ -49,6 +51,9 @@ impl Sender {
         let id = FrameId { mesh_id: SURFACE.mesh_id(), session: 1, epoch };
         let mut encoder = FrameEncoder::<_, MTU>::new(id, encoding, &exact[..]).unwrap();
         let (mut packet, mut line, mut all) = ([0; MTU], [0; framed_bytes(MTU)], Vec::new());
+        let mut beat = [0; 64];
+        let beat = encode_heartbeat(&id, epoch, &NoMac, &mut beat);
+        all.extend_from_slice(enframe(beat, &mut line).expect("room"));
         while let Some(packet) = encoder.next_packet(&mut packet) {
             all.extend_from_slice(enframe(packet, &mut line).expect("room"));
         }
@@ -75,7 +80,7 @@ fn every_answer_is_that_of_one_whole_frame() {
     static FRAMES: SurfaceFrames = SurfaceFrames::new();
     static BUS: BusStatus = BusStatus::new();
     let (writer, reader) = FRAMES.split().unwrap();
-    let mut receiver = Receiver::new(writer, &BUS);
+    let mut receiver = Receiver::new(writer, &BUS).unwrap();
     let mut control = Control::new(reader, &BUS).unwrap();
     let mut sender = Sender::new();
 
@@ -89,6 +94,7 @@ fn every_answer_is_that_of_one_whole_frame() {
         for chunk in sender.bytes(epoch).chunks(61) {
             for &byte in chunk {
                 receiver.byte(byte, control.now());
+                while receiver.work() {}
             }
             let tick = control.tick(|| 0);
             if tick.is_answered() {
@@ -110,12 +116,13 @@ fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
     static FRAMES: SurfaceFrames = SurfaceFrames::new();
     static BUS: BusStatus = BusStatus::new();
     let (writer, reader) = FRAMES.split().unwrap();
-    let mut receiver = Receiver::new(writer, &BUS);
+    let mut receiver = Receiver::new(writer, &BUS).unwrap();
     let mut control = Control::new(reader, &BUS).unwrap();
     let mut sender = Sender::new();
     let mut feed = |bytes: &[u8], now: u32| {
         for &byte in bytes {
             receiver.byte(byte, now);
+            while receiver.work() {}
         }
     };
 

@@ -218,14 +218,18 @@ pub const {name}_STACK: usize = {stack};
 
 /// Tree of mesh {mesh_id:08x}, {length} bytes, validated while this is compiled.
 #[allow(long_running_const_eval)]
-pub static {name}: ::dibs_nostd::Tree<'static, u{bits}> = {{
+pub static {name}: ::dibs_nostd::Tree<'static, u{bits}> =
+    match ::dibs_nostd::Tree::from_bytes({name}_BYTES) {{
+        Ok(tree) => tree,
+        Err(_) => panic!("the generated tree does not pass its validation"),
+    }};
+
+/// The bytes of [`{name}`]: what `dibs_nostd::Scrub` checks while the program runs.
+pub static {name}_BYTES: &[u8] = {{
     #[repr(align(16))]
     struct Aligned([u8; {length}]);
     static BYTES: Aligned = Aligned(*b"{literal}");
-    match ::dibs_nostd::Tree::from_bytes(&BYTES.0) {{
-        Ok(tree) => tree,
-        Err(_) => panic!("the generated tree does not pass its validation"),
-    }}
+    &BYTES.0
 }};
 {modes}"#
         ))

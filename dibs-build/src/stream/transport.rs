@@ -128,8 +128,9 @@ impl Line {
         ))
     }
 
-    /// A byte stream with a reading and a writing end.
-    fn stream(
+    /// Any byte stream with a reading and a writing end. A read that waits for long should time out from
+    /// time to time, or end when `hang_up` is called: the reading thread lives as long as it waits.
+    pub fn stream(
         writer: impl Write + Send + 'static,
         mut reader: impl Read + Send + 'static,
         hang_up: impl Fn() + Send + 'static,

@@ -105,6 +105,8 @@ pub enum Unknown {
     },
     /// The query returned an error.
     Query,
+    /// The tree's bytes changed since they were validated: [`Scrub`](crate::Scrub).
+    Rot,
     /// No good packet came for longer than allowed.
     LinkLost {
         /// Time since the last one, on the receiver's clock.
@@ -132,6 +134,7 @@ impl fmt::Display for Unknown {
             Self::NoSurface => write!(f, "no surface was published yet"),
             Self::Stale { age } => write!(f, "the surface is {age} old"),
             Self::Query => write!(f, "the query failed"),
+            Self::Rot => write!(f, "the tree's bytes changed"),
             Self::LinkLost { silence } => write!(f, "no good packet came for {silence}"),
             Self::HeartbeatLost { silence } => write!(f, "no heartbeat came for {silence}"),
             Self::Rejections { streak } => {

@@ -18,14 +18,14 @@
 //! # Transitions
 //!
 //! Each input has two limits, a [`Watch`]. *Clear* is a step at which every input is within its first
-//! limit, a surface is there and the query gave an answer. The *run* counts the frames that were
+//! limit, a surface is there, the query gave an answer and the tree is sound. The *run* counts the frames that were
 //! published since the last step that was not clear; two frames between two steps count as one.
 //!
 //! | from | to | when |
 //! |---|---|---|
 //! | (start) | safe | always: no surface was published yet |
 //! | nominal | degraded | an input is beyond its first limit |
-//! | nominal, degraded | safe | an input is beyond its second limit, the query failed, or there is no surface |
+//! | nominal, degraded | safe | an input is beyond its second limit, the query failed, the tree's bytes changed, or there is no surface |
 //! | degraded | nominal | the run reaches [`Limits::recovery`]'s frames |
 //! | safe | nominal | the same, and [`FailSafe::acknowledge`] was accepted since; or alone, with [`Limits::automatic`] |
 //!
@@ -67,6 +67,9 @@ pub struct Observation {
     pub link: Link,
     /// Whether the query on that frame returned an error.
     pub query_failed: bool,
+    /// Whether the tree's bytes were found changed: [`Scrub`](crate::Scrub). Leave it set for the rest
+    /// of the run, unless what is wrong with the memory is known and gone.
+    pub has_rotted: bool,
 }
 
 /// How far the surface may be trusted, from the best on.
@@ -120,7 +123,8 @@ impl Verdict {
 /// let link = Link { silence: 0, heartbeat: 0, rejections: 0 };
 /// let mut state = |now, epoch, received| {
 ///     let frame = Some((epoch, received));
-///     machine.step(&Observation { now, frame, link, query_failed: false }).state
+///     let seen = Observation { now, frame, link, query_failed: false, has_rotted: false };
+///     machine.step(&seen).state
 /// };
 /// assert_eq!(state(1000, 1, 1000), State::Safe); // it starts safe
 /// assert_eq!(state(1001, 2, 1001), State::Nominal); // the second frame
@@ -166,7 +170,7 @@ impl FailSafe {
         self.state
     }
 
-    /// One control tick. O(1): six comparisons of two limits.
+    /// One control tick. O(1): seven comparisons of two limits.
     pub fn step(&mut self, seen: &Observation) -> Verdict {
         let age = seen.frame.map_or(u32::MAX, |(_, received)| elapsed(seen.now, received));
         let (level, cause) = self.worst(seen, age);
@@ -236,6 +240,7 @@ impl FailSafe {
         for (level, cause) in [
             (safe_if(seen.frame.is_none()), Unknown::NoSurface),
             (safe_if(seen.query_failed), Unknown::Query),
+            (safe_if(seen.has_rotted), Unknown::Rot),
             (limits.age.level(age), stale),
             (limits.silence.level(link.silence), silent),
             (limits.heartbeat.level(link.heartbeat), heartbeat),

@@ -42,6 +42,7 @@ fn seen(now: u32, epoch: u32, age: u32) -> Observation {
         frame: Some((epoch, now.wrapping_sub(age))),
         link: GOOD,
         query_failed: false,
+        has_rotted: false,
     }
 }
 
@@ -72,6 +73,7 @@ fn requests() -> Vec<(State, Observation, Option<Unknown>)> {
         Observation { query_failed: true, ..seen(2000, 100, 0) },
         Some(Unknown::Query),
     ));
+    all.push((Safe, Observation { has_rotted: true, ..seen(2000, 100, 0) }, Some(Unknown::Rot)));
     for (level, age) in [(Nominal, 50), (Degraded, 51), (Degraded, 200), (Safe, 201)] {
         let cause = (level != Nominal).then_some(Unknown::Stale { age });
         all.push((level, seen(2000, 100, age), cause));
@@ -229,6 +231,7 @@ struct Step {
     delay: u32,
     link: Link,
     query_failed: bool,
+    has_rotted: bool,
     acknowledge: bool,
 }
 
@@ -245,6 +248,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
             delay,
             link,
             query_failed: fault == 0,
+            has_rotted: fault == 1,
             acknowledge,
         },
     );
@@ -261,7 +265,8 @@ fn run(steps: &[Step], limits: Limits, start: u32) -> (Vec<Observation>, Vec<Ver
             epoch = epoch.wrapping_add(1);
             frame = Some((epoch, now.wrapping_sub(step.delay)));
         }
-        let seen = Observation { now, frame, link: step.link, query_failed: step.query_failed };
+        let Step { link, query_failed, has_rotted, .. } = *step;
+        let seen = Observation { now, frame, link, query_failed, has_rotted };
         verdicts.push(machine.step(&seen));
         acknowledged.push(step.acknowledge && machine.acknowledge().is_ok());
         observations.push(seen);
@@ -274,6 +279,7 @@ fn is_beyond(seen: &Observation, second: bool) -> bool {
     let limit = |watch: Watch| if second { watch.safe() } else { watch.degraded() };
     let Some((_, received)) = seen.frame else { return true };
     seen.query_failed
+        || seen.has_rotted
         || seen.now.wrapping_sub(received) > limit(AGE)
         || seen.link.silence > limit(SILENCE)
         || seen.link.heartbeat > limit(HEARTBEAT)

@@ -3,20 +3,26 @@
 //!
 //! `host BUS TELEMETRY TICKS`: two Unix sockets to connect to, and how long to run.
 
-use std::io::{BufWriter, Read, Write};
+use std::io::{BufWriter, ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use std::{env, thread};
 
 use anyhow::{Context, Result, anyhow};
 use controller::surface::SurfaceFrames;
 use controller::telemetry::{MAX_FRAMED, Summary, frame};
-use controller::{BusStatus, Control, Receiver, TICK_RATE};
+use controller::{BusStatus, Control, Receiver, STATUS_FRAMED, TICK_RATE, Upkeep};
+use dibs_nostd::wire::{Counters, Event};
+
+/// Slices of background work between two looks at the bus.
+const SLICES: u32 = 1_000;
 
 static FRAMES: SurfaceFrames = SurfaceFrames::new();
 static BUS: BusStatus = BusStatus::new();
 static TICKS: AtomicU32 = AtomicU32::new(0);
+static COUNTERS: Mutex<Counters> = Mutex::new(Counters::new());
 
 fn main() -> Result<()> {
     let mut arguments = env::args_os().skip(1);
@@ -26,12 +32,33 @@ fn main() -> Result<()> {
     let ticks: u32 = argument("TICKS")?.to_str().and_then(|t| t.parse().ok()).context("TICKS")?;
 
     let (writer, reader) = FRAMES.split().context("the buffers are split once")?;
-    let mut receiver = Receiver::new(writer, &BUS);
+    let mut receiver = Receiver::new(writer, &BUS).map_err(|error| anyhow!("{error}"))?;
+    bus.set_read_timeout(Some(Duration::from_millis(1)))?;
     thread::spawn(move || {
-        let mut buffer = [0; 1024];
-        while let Ok(bytes @ 1..) = bus.read(&mut buffer) {
-            for &byte in &buffer[..bytes] {
-                receiver.byte(byte, TICKS.load(Ordering::Relaxed));
+        let (mut buffer, mut line) = ([0; 1024], [0; STATUS_FRAMED]);
+        let mut upkeep = Upkeep::new(&BUS);
+        loop {
+            let tick = TICKS.load(Ordering::Relaxed);
+            match bus.read(&mut buffer) {
+                Ok(0) => return,
+                Ok(bytes) => {
+                    for &byte in &buffer[..bytes] {
+                        receiver.byte(byte, tick);
+                        while receiver.work() {}
+                    }
+                }
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+                Err(_) => return,
+            }
+            // What the board's idle loop would do meanwhile.
+            for _ in 0..SLICES {
+                receiver.work();
+                upkeep.step();
+            }
+            *counters() = *receiver.counters();
+            let status = receiver.report(tick, &mut line).unwrap_or_default();
+            if bus.write_all(status).is_err() {
+                return;
             }
         }
     });
@@ -48,8 +75,13 @@ fn main() -> Result<()> {
         out.write_all(frame(&record, &mut line).context("a record fits its line")?)?;
         out.flush()?;
     }
-    let summary = Summary { kind: Summary::KIND, ticks, ..bytemuck::Zeroable::zeroed() };
+    let mut summary = Summary { kind: Summary::KIND, ticks, ..bytemuck::Zeroable::zeroed() };
+    summary.events = Event::ALL.map(|event| counters().of(event));
     out.write_all(frame(&summary, &mut line).context("a summary fits its line")?)?;
     out.flush()?;
     Ok(())
+}
+
+fn counters() -> MutexGuard<'static, Counters> {
+    COUNTERS.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,6 +1,7 @@
 //! Whether an answer is right: exhaustive search in f64 on the vertices of the same frame.
 
 use anyhow::{Context, Result};
+use controller::fingerprint;
 use controller::telemetry::Tick;
 use dibs_nostd::Index;
 use dibs_tests::oracle::{Instrument, closest_pair, exhaustive};
@@ -52,6 +53,25 @@ pub fn check(scene: &Scene, link: &Link, tick: &Tick) -> Result<Checked> {
     };
     let largest = separation.max(interval).max(off_surface);
     Ok(Checked { tick: tick.tick, error: largest / accuracy })
+}
+
+/// A published frame, held as a whole against what was sent.
+#[derive(Clone, Copy, Debug)]
+pub struct Compared {
+    /// Its epoch.
+    pub epoch: u32,
+    /// Whether every vertex is, to the bit, what was sent.
+    pub is_same: bool,
+}
+
+/// Compares the frames that the controller has read through: each once.
+pub fn compare(link: &Link, tick: &Tick, compared: &mut Vec<Compared>) {
+    let epoch = tick.read_epoch;
+    if epoch == 0 || compared.last().is_some_and(|last| last.epoch == epoch) {
+        return;
+    }
+    let is_same = link.frame(epoch).is_some_and(|sent| fingerprint(&sent) == tick.read_digest);
+    compared.push(Compared { epoch, is_same });
 }
 
 fn corners(scene: &Scene, triangle: u32) -> Option<[u32; 3]> {

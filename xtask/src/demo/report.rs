@@ -1,14 +1,16 @@
 //! The report: `report.json`, the readable summary, and the verdict.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
-use controller::telemetry::{Tick, cause_code, cause_name};
+use controller::telemetry::{Summary, Tick, cause_code, cause_name};
 use controller::{SURFACE_AGE_LIMIT, TICK_RATE};
 use dibs_nostd::constraint::Unknown;
 use dibs_nostd::failsafe::State;
+use dibs_nostd::wire::Event;
 use serde::Serialize;
 
 use super::machine::Machine;
@@ -26,6 +28,8 @@ pub struct Report {
     frames_sent: u32,
     frames_published: u32,
     frames_rejected: u32,
+    /// What happened on the bus, by what the wire protocol calls it.
+    bus_events: BTreeMap<&'static str, u32>,
     ticks: u32,
     queries: usize,
     /// Answers off by more than their stated accuracy.
@@ -60,6 +64,18 @@ pub struct Report {
     /// Variables and the deepest stack.
     ram_bytes: Option<u64>,
     stack_bytes: Option<u32>,
+    /// Longest section with all interrupts disabled, in microseconds, rounded up to the clock's next
+    /// count: 0.04 us.
+    masked_max_us: Option<f64>,
+    /// Longest section with the bus interrupt disabled, without the control ticks in it.
+    bus_masked_max_us: Option<f64>,
+    /// Rounds of the background check of the tree in flash.
+    scrub_rounds: Option<u32>,
+    /// Frames whose vertices were compared, all of them, with what was sent, as they stood in the
+    /// controller's memory after publication.
+    frames_compared: usize,
+    /// Of these, the ones that differed.
+    frames_published_wrong: usize,
     records_lost: u32,
     real_seconds: f64,
     surface: String,
@@ -117,6 +133,7 @@ impl Report {
             frames_sent: outcome.frames_sent,
             frames_published: last.frames_published,
             frames_rejected: last.rejected,
+            bus_events: events(&summary),
             ticks: summary.ticks,
             queries: answered.len(),
             mismatches: outcome.checked.iter().filter(|c| c.is_wrong()).count(),
@@ -141,6 +158,11 @@ impl Report {
             flash_bytes: footprint.map(|f| f.flash),
             ram_bytes: footprint.map(|f| f.ram + u64::from(summary.stack_bytes)),
             stack_bytes: on_board.then_some(summary.stack_bytes),
+            masked_max_us: on_board.then(|| microseconds(summary.masked_counts + 1)),
+            bus_masked_max_us: on_board.then(|| microseconds(summary.bus_masked_counts + 1)),
+            scrub_rounds: on_board.then_some(summary.scrub_rounds),
+            frames_compared: outcome.compared.len(),
+            frames_published_wrong: outcome.compared.iter().filter(|c| !c.is_same).count(),
             records_lost: summary.records_dropped.max(expected),
             real_seconds: outcome.took.as_secs_f64(),
             surface: scene.describe(),
@@ -173,6 +195,14 @@ impl Report {
         promise(
             wrong == 0,
             format!("{wrong} answers differ from exhaustive search, the first at tick {tick}"),
+        );
+        let wrong = self.frames_published_wrong;
+        promise(wrong == 0, format!("{wrong} published frames differ from what was sent"));
+        // The last frame may have been published too late to be read through.
+        let (compared, published) = (self.frames_compared, self.frames_published);
+        promise(
+            compared + 1 >= published as usize,
+            format!("{compared} of {published} published frames were compared"),
         );
         promise(faults == 0, format!("{faults} queries returned an error"));
         let rejected = self.frames_rejected;
@@ -219,6 +249,9 @@ impl Report {
                 self.frames_sent, self.frames_published, self.frames_rejected
             ),
         );
+        let events: Vec<String> =
+            self.bus_events.iter().map(|(name, count)| format!("{name} {count}")).collect();
+        row("", events.join(", "));
         row("control ticks", format!("{} at {TICK_RATE} Hz", self.ticks));
         row(
             "surface trusted",
@@ -236,6 +269,13 @@ impl Report {
             format!(
                 "{}, {} differ from exhaustive f64 search (largest error {:.2} of the stated {:.1e} mm)",
                 self.queries, self.mismatches, self.largest_error, self.accuracy_mm
+            ),
+        );
+        row(
+            "frames read back",
+            format!(
+                "{}, {} differ from what was sent",
+                self.frames_compared, self.frames_published_wrong
             ),
         );
         row(
@@ -271,6 +311,15 @@ impl Report {
             (self.flash_bytes, self.ram_bytes, self.stack_bytes)
         {
             row("memory", format!("{flash} bytes flash, {ram} RAM, {stack} of them stack"));
+        }
+        if let (Some(masked), Some(bus), Some(rounds)) =
+            (self.masked_max_us, self.bus_masked_max_us, self.scrub_rounds)
+        {
+            row(
+                "interrupts off",
+                format!("{masked:.2} us at most, once; the bus's alone {bus:.2} us at most"),
+            );
+            row("tree in flash", format!("checked {rounds} times"));
         }
         row("took", format!("{:.1} s", self.real_seconds));
         row("report and pictures", folder.display().to_string());
@@ -320,6 +369,12 @@ fn state_name(state: u32) -> &'static str {
         1 => "degraded",
         _ => "safe",
     }
+}
+
+/// What happened on the bus at all.
+fn events(summary: &Summary) -> BTreeMap<&'static str, u32> {
+    let counted = Event::ALL.into_iter().zip(summary.events);
+    counted.filter(|&(_, count)| count > 0).map(|(event, count)| (event.name(), count)).collect()
 }
 
 /// Size of a tick's force, in N.

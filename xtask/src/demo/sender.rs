@@ -1,7 +1,8 @@
 //! The imaging side: sends one frame after the other over the bus.
 
 use std::collections::HashMap;
-use std::io;
+use std::io::{self, Write};
+use std::net::Shutdown;
 use std::os::unix::net::UnixStream;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
@@ -10,26 +11,26 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use controller::{MTU, TICK_RATE};
-use dibs_build::stream::{Line, SendError, Sender, Settings, SurfaceOrder, Transport};
+use dibs_build::stream::{Line, SendError, Sender, Settings, SurfaceOrder};
 use glam::Vec3;
 
 use super::scene::Scene;
 
-/// Packets on their way that the controller has not counted yet: enough to keep the line busy, few
-/// enough that a frame is young when it arrives.
-const WINDOW: u32 = 4;
-
 /// Between two looks at the telemetry.
 const PAUSE: Duration = Duration::from_micros(300);
 
-/// Real time in which a packet arrives, unless it was lost.
+/// Real time in which a byte arrives, unless it was lost.
 const ARRIVAL: Duration = Duration::from_millis(500);
+
+/// Ticks in which the controller says what became of a frame. Longer than any check takes: a frame that
+/// is not acknowledged by then was lost.
+const ANSWER: u32 = TICK_RATE / 20;
 
 /// What sender and listener tell each other.
 #[derive(Default)]
 pub struct Link {
-    /// Packets that the controller has counted.
-    pub packets: AtomicU32,
+    /// Bytes that the controller has counted.
+    pub bytes: AtomicU32,
     /// The controller's tick.
     pub tick: AtomicU32,
     /// Frames sent to the last byte.
@@ -49,26 +50,40 @@ impl Link {
     fn lock(&self) -> std::sync::MutexGuard<'_, HashMap<u32, Arc<Vec<Vec3>>>> {
         self.frames.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
+
+    fn is_over(&self) -> bool {
+        self.over.load(Ordering::Relaxed)
+    }
+
+    fn now(&self) -> u32 {
+        self.tick.load(Ordering::Relaxed)
+    }
 }
 
-/// A line that takes no packet before most of those before have arrived: an emulated serial line lets
-/// the computer run seconds ahead.
-struct Paced<'l> {
-    line: Line,
-    link: &'l Link,
+/// A socket that is flushed once all has arrived: an emulated serial line lets the computer run seconds
+/// ahead.
+struct Paced {
+    socket: UnixStream,
+    link: Arc<Link>,
     sent: u32,
 }
 
-impl Transport for Paced<'_> {
-    fn send(&mut self, packet: &[u8]) -> io::Result<()> {
+impl Write for Paced {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let taken = self.socket.write(bytes)?;
+        self.sent = self.sent.wrapping_add(taken as u32);
+        Ok(taken)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
         let mut start = Instant::now();
-        let mut arrived = self.link.packets.load(Ordering::Relaxed);
-        while self.sent.wrapping_sub(arrived) >= WINDOW {
-            if self.link.over.load(Ordering::Relaxed) {
+        let mut arrived = self.link.bytes.load(Ordering::Relaxed);
+        while self.sent != arrived {
+            if self.link.is_over() {
                 return Err(io::ErrorKind::BrokenPipe.into());
             }
             thread::sleep(PAUSE);
-            let now = self.link.packets.load(Ordering::Relaxed);
+            let now = self.link.bytes.load(Ordering::Relaxed);
             if now != arrived {
                 (arrived, start) = (now, Instant::now());
             } else if start.elapsed() > ARRIVAL {
@@ -76,29 +91,30 @@ impl Transport for Paced<'_> {
                 self.sent = arrived;
             }
         }
-        self.line.send(packet)?;
-        self.sent = self.sent.wrapping_add(1);
         Ok(())
-    }
-
-    fn receive(&mut self) -> io::Result<Option<Vec<u8>>> {
-        self.line.receive()
     }
 }
 
+fn paced(socket: UnixStream, link: &Arc<Link>) -> Result<Line> {
+    // So that the reading thread looks from time to time whether it is still wanted.
+    socket.set_read_timeout(Some(Duration::from_millis(50)))?;
+    let (reader, handle) = (socket.try_clone()?, socket.try_clone()?);
+    let writer = Paced { socket, link: Arc::clone(link), sent: 0 };
+    Ok(Line::stream(writer, reader, move || drop(handle.shutdown(Shutdown::Both))))
+}
+
 /// Sends the motion, over and over, until the controller is gone: at the recorded rate, or as fast
-/// as the line allows.
-pub fn send(scene: &Scene, link: &Link, bus: UnixStream) -> Result<()> {
+/// as the line allows and the controller acknowledges.
+pub fn send(scene: &Scene, link: &Arc<Link>, bus: UnixStream) -> Result<()> {
     let interval = (TICK_RATE as f32 / scene.rate) as u32;
-    let line = Paced { line: Line::unix(bus)?, link, sent: 0 };
     let order = match scene.tree.index_bits() {
         16 => SurfaceOrder::of(&scene.tree.tree::<u16>()?),
         _ => SurfaceOrder::of(&scene.tree.tree::<u32>()?),
     };
-    let settings = Settings { heartbeat: None, session: 1, ..Settings::default() };
-    let mut sender = Sender::<_, MTU>::new(line, order, settings);
+    let settings = Settings { session: 1, ..Settings::default() };
+    let mut sender = Sender::<_, MTU>::new(paced(bus, link)?, order, settings);
     for positions in scene.motion.frames.iter().cycle() {
-        let start = link.tick.load(Ordering::Relaxed);
+        let start = link.now();
         let frame = sender.prepare(positions).context("the motion cannot be sent")?;
         if let Some((epoch, held)) = sender.held() {
             link.lock().insert(epoch, Arc::new(held.to_vec()));
@@ -110,8 +126,14 @@ pub fn send(scene: &Scene, link: &Link, bus: UnixStream) -> Result<()> {
             Err(error) => return Err(error.into()),
         }
         link.frames_sent.fetch_add(1, Ordering::Relaxed);
-        while link.tick.load(Ordering::Relaxed) < start + interval {
-            if link.over.load(Ordering::Relaxed) {
+        let sent = link.now();
+        // A frame that begins while the one before is being checked would be refused.
+        let is_waiting = |in_flight: u32| {
+            let now = link.now();
+            now < start + interval || in_flight > 0 && now < sent + ANSWER
+        };
+        while is_waiting(sender.in_flight()) {
+            if link.is_over() || sender.poll().is_err() {
                 return Ok(());
             }
             thread::sleep(PAUSE);

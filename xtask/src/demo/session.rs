@@ -6,7 +6,7 @@ use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::Path;
 use std::process::Child;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc;
+use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -16,7 +16,7 @@ use controller::telemetry::{MAX_FRAMED, Record, Summary, Tick};
 use dibs_nostd::wire::Deframer;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::check::{Checked, check};
+use super::check::{Checked, Compared, check, compare};
 use super::machine::Machine;
 use super::scene::Scene;
 use super::sender::{Link, send};
@@ -34,6 +34,8 @@ pub struct Outcome {
     pub summary: Summary,
     /// The check of every answer.
     pub checked: Vec<Checked>,
+    /// The comparison of every published frame.
+    pub compared: Vec<Compared>,
     /// Ticks that were asked for.
     pub ticks_asked: u32,
     /// Frames sent to the last byte.
@@ -66,7 +68,7 @@ pub fn run(scene: &Scene, machine: &Machine, seconds: u32, folder: &Path) -> Res
     let bus = accept(&bus_socket, &mut child.0)?;
     let telemetry = accept(&telemetry_socket, &mut child.0)?;
 
-    let link = Link::default();
+    let link = Arc::new(Link::default());
     let (to_check, answers) = mpsc::channel::<Tick>();
     let (listened, sent, checked) = thread::scope(|scope| {
         let sender = scope.spawn(|| send(scene, &link, bus));
@@ -80,11 +82,16 @@ pub fn run(scene: &Scene, machine: &Machine, seconds: u32, folder: &Path) -> Res
     });
     let (ticks, summary) = listened?;
     sent?;
+    let mut compared = Vec::new();
+    for tick in &ticks {
+        compare(&link, tick, &mut compared);
+    }
     let status = child.0.wait()?;
     Ok(Outcome {
         ticks,
         summary,
         checked: checked?,
+        compared,
         ticks_asked,
         frames_sent: link.frames_sent.load(Ordering::Relaxed),
         exited_well: status.success(),
@@ -155,7 +162,7 @@ fn listen(
                     return Ok((ticks, summary));
                 }
                 Record::Tick(tick) => {
-                    link.packets.store(tick.packets, Ordering::Relaxed);
+                    link.bytes.store(tick.bytes, Ordering::Relaxed);
                     link.tick.store(tick.tick, Ordering::Relaxed);
                     if tick.is_answered() {
                         to_check.send(tick)?;

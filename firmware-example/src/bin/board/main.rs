@@ -2,7 +2,8 @@
 //!
 //! Three priorities share the core. The control tick (`SysTick`, 1 kHz) is the highest: nothing
 //! delays it but its own last run. Bus reception (UART 0) is one below. What is left, the idle
-//! loop, sends telemetry over UART 1.
+//! loop, checks complete frames and the tree in flash a slice at a time, sends statuses back over UART 0
+//! and telemetry over UART 1.
 #![no_std]
 #![no_main]
 
@@ -19,7 +20,7 @@ mod vectors;
 
 use controller::surface::{SURFACE, SurfaceFrames};
 use controller::telemetry::{MAX_FRAMED, Tick, frame};
-use controller::{BusStatus, Control, Receiver};
+use controller::{BusStatus, Control, Receiver, STATUS_FRAMED, Upkeep};
 use cortex_m_rt::entry;
 use heapless::spsc::{Consumer, Queue};
 
@@ -46,7 +47,11 @@ fn main() -> ! {
         defmt::error!("the controller's constants are out of range");
         semihosting::exit(false)
     };
-    schedule::start(control, producer, Receiver::new(writer, &BUS));
+    let Ok(receiver) = Receiver::new(writer, &BUS) else {
+        defmt::error!("the tree has nothing to measure stretch against");
+        semihosting::exit(false)
+    };
+    schedule::start(control, producer, receiver);
     uart::TELEMETRY.start_sending();
     idle(consumer, semihosting::run_length())
 }
@@ -56,6 +61,8 @@ fn idle(mut records: Consumer<'static, Tick>, ticks: u32) -> ! {
     let mut line = [0; MAX_FRAMED];
     #[cfg(feature = "planted-overflow")]
     line.fill(overflow(1));
+    let mut status = [0; STATUS_FRAMED];
+    let mut upkeep = Upkeep::new(&BUS);
     #[cfg(feature = "planted-panic")]
     core::hint::black_box([0; 4][core::hint::black_box(0_usize)]);
     loop {
@@ -65,16 +72,20 @@ fn idle(mut records: Consumer<'static, Tick>, ticks: u32) -> ! {
         match record {
             Some(record) => send(frame(&record, &mut line)),
             None if ticks != 0 && schedule::ticks() >= ticks => break,
-            // On silicon `wfi` would save power here. While an emulated processor sleeps, its time
-            // follows the computer's, which oversleeps; as long as it is awake, its time is exact.
-            None => cortex_m::asm::nop(),
+            None => (),
+        }
+        // There is always something to check. Where `wfi` is to save power, do without between a round
+        // of `upkeep` and the next tick; an emulated processor that sleeps loses its exact time.
+        upkeep.step();
+        for &byte in schedule::background(&mut status).unwrap_or_default() {
+            uart::BUS.write(byte);
         }
     }
     schedule::stop();
     while let Some(record) = records.dequeue() {
         send(frame(&record, &mut line));
     }
-    let summary = schedule::summary(stack::high_water());
+    let summary = schedule::summary(stack::high_water(), upkeep.rounds());
     send(frame(&summary, &mut line));
     defmt::info!(
         "{} ticks, {} deadlines missed, {} frames published, {} bytes of stack",

@@ -3,11 +3,12 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use controller::telemetry::{Summary, Tick};
-use controller::{Control, Receiver};
+use controller::{Control, Receiver, STATUS_FRAMED};
 use cortex_m::peripheral::scb::SystemHandler;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{NVIC, Peripherals, SYST};
 use cortex_m_rt::exception;
+use dibs_nostd::wire::Event;
 use heapless::spsc::Producer;
 
 use crate::exclusive::Exclusive;
@@ -22,6 +23,12 @@ static TIMELINE: Exclusive<Option<Timeline>> = Exclusive::new(None);
 static RECEIVER: Exclusive<Option<Receiver>> = Exclusive::new(None);
 /// Control ticks run so far.
 static TICKS: AtomicU32 = AtomicU32::new(0);
+/// Clock counts that they took.
+static CONTROL_COUNTS: AtomicU32 = AtomicU32::new(0);
+/// Longest section with all interrupts disabled, in clock counts: there is one, at start-up.
+static MASKED: AtomicU32 = AtomicU32::new(0);
+/// Longest section with the bus interrupt disabled, in clock counts.
+static BUS_MASKED: AtomicU32 = AtomicU32::new(0);
 
 /// What the control interrupt owns.
 struct Timeline {
@@ -37,7 +44,12 @@ struct Timeline {
 
 /// Starts the clock and both interrupts.
 pub fn start(control: Control, records: Producer<'static, Tick>, receiver: Receiver) {
-    let Some(mut core) = Peripherals::take() else { semihosting::exit(false) };
+    clock::start();
+    // The one place where this program disables interrupts: inside `take`.
+    let before = clock::now();
+    let core = Peripherals::take();
+    MASKED.store(clock::now().wrapping_sub(before), Ordering::Relaxed);
+    let Some(mut core) = core else { semihosting::exit(false) };
     TIMELINE.with(|timeline| {
         *timeline = Some(Timeline {
             control,
@@ -50,7 +62,6 @@ pub fn start(control: Control, records: Producer<'static, Tick>, receiver: Recei
         });
     });
     RECEIVER.with(|place| *place = Some(receiver));
-    clock::start();
     uart::BUS.start_receiving();
     // SAFETY: no critical section relies on priorities, and the handlers' state is in place.
     unsafe {
@@ -63,6 +74,32 @@ pub fn start(control: Control, records: Producer<'static, Tick>, receiver: Recei
     core.SYST.clear_current();
     core.SYST.enable_counter();
     core.SYST.enable_interrupt();
+}
+
+/// A slice of the work that complete frames need; what goes back to the sender, if anything does. The bus
+/// interrupt is kept out: for some microseconds no byte is taken.
+pub fn background(line: &mut [u8; STATUS_FRAMED]) -> Option<&[u8]> {
+    NVIC::mask(BusInterrupt);
+    let before = own_time();
+    let status = RECEIVER.with(|receiver| {
+        let receiver = receiver.as_mut()?;
+        receiver.work();
+        receiver.report(ticks(), line)
+    });
+    if let (Some(before), Some(after)) = (before, own_time()) {
+        BUS_MASKED.fetch_max(after.wrapping_sub(before), Ordering::Relaxed);
+    }
+    // SAFETY: the handler's state is in place and free again.
+    unsafe { NVIC::unmask(BusInterrupt) };
+    status.flatten()
+}
+
+/// The clock without the control ticks, which keep the bus waiting anyway; `None` where one came while it
+/// was read.
+fn own_time() -> Option<u32> {
+    let control = CONTROL_COUNTS.load(Ordering::Relaxed);
+    let now = clock::now();
+    (control == CONTROL_COUNTS.load(Ordering::Relaxed)).then_some(now.wrapping_sub(control))
 }
 
 /// Stops both interrupts.
@@ -78,7 +115,7 @@ pub fn ticks() -> u32 {
 }
 
 /// The run so far; after `stop`, all of it.
-pub fn summary(stack_bytes: u32) -> Summary {
+pub fn summary(stack_bytes: u32, scrub_rounds: u32) -> Summary {
     let mut summary = Summary {
         kind: Summary::KIND,
         ticks: ticks(),
@@ -88,7 +125,16 @@ pub fn summary(stack_bytes: u32) -> Summary {
         records_dropped: 0,
         bus_overrun: u32::from(uart::BUS.has_overrun()),
         stack_bytes,
+        masked_counts: MASKED.load(Ordering::Relaxed),
+        bus_masked_counts: BUS_MASKED.load(Ordering::Relaxed),
+        scrub_rounds,
+        events: [0; Event::ALL.len()],
     };
+    RECEIVER.with(|receiver| {
+        if let Some(receiver) = receiver {
+            summary.events = Event::ALL.map(|event| receiver.counters().of(event));
+        }
+    });
     TIMELINE.with(|timeline| {
         if let Some(timeline) = timeline {
             summary.deadline_misses = timeline.deadline_misses;
@@ -112,6 +158,7 @@ fn SysTick() {
         }
     });
     TICKS.fetch_add(1, Ordering::Relaxed);
+    CONTROL_COUNTS.fetch_add(clock::now().wrapping_sub(now), Ordering::Relaxed);
 }
 
 impl Timeline {

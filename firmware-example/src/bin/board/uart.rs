@@ -21,7 +21,7 @@ pub struct Uart {
     divisor: Register,
 }
 
-/// UART 0: vertices arrive here, interrupt 0.
+/// UART 0: vertices arrive here, interrupt 0; statuses leave, polled.
 pub const BUS: Uart = Uart::at(0x4000_4000);
 /// UART 1: telemetry leaves here, polled.
 pub const TELEMETRY: Uart = Uart::at(0x4000_5000);
@@ -40,9 +40,10 @@ impl Uart {
         }
     }
 
+    /// Both ways; what arrives asks for an interrupt, what leaves is polled.
     pub fn start_receiving(&self) {
         self.divisor.write(DIVISOR);
-        self.control.write(RECEIVE_ENABLE | RECEIVE_INTERRUPT_ENABLE);
+        self.control.write(TRANSMIT_ENABLE | RECEIVE_ENABLE | RECEIVE_INTERRUPT_ENABLE);
     }
 
     pub fn start_sending(&self) {

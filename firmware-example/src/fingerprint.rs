@@ -1,0 +1,57 @@
+//! Proof of what was published: a checksum of the whole surface, for whoever knows what was sent.
+
+use dibs_nostd::VertexTable;
+use dibs_nostd::format::CRC;
+use dibs_nostd::glam::Vec3;
+
+use crate::BusStatus;
+
+/// Reads the published frame in slices.
+pub struct Fingerprint {
+    epoch: u32,
+    digest: crc::Digest<'static, u32>,
+    /// The next row; `None` once all have been read.
+    next: Option<u32>,
+}
+
+impl Fingerprint {
+    pub fn new() -> Self {
+        Self { epoch: 0, digest: CRC.digest(), next: None }
+    }
+
+    /// Starts anew, with a frame that has just been published.
+    pub fn begin(&mut self, epoch: u32) {
+        *self = Self { epoch, digest: CRC.digest(), next: Some(0) };
+    }
+
+    /// Reads up to `rows` rows, and after the last one tells the checksum.
+    pub fn step(&mut self, surface: &impl VertexTable, rows: u32, status: &BusStatus) {
+        let Some(first) = self.next else { return };
+        for row in first..first.saturating_add(rows) {
+            let Some(position) = surface.position(row) else {
+                let digest = core::mem::replace(&mut self.digest, CRC.digest());
+                status.set_fingerprint(self.epoch, digest.finalize());
+                self.next = None;
+                return;
+            };
+            take(&mut self.digest, position);
+        }
+        self.next = Some(first.saturating_add(rows));
+    }
+}
+
+fn take(digest: &mut crc::Digest<'_, u32>, position: Vec3) {
+    for coordinate in position.to_array() {
+        digest.update(&coordinate.to_bits().to_le_bytes());
+    }
+}
+
+/// The checksum that [`BusStatus::fingerprint`] must have of a frame with these positions.
+#[must_use]
+pub fn fingerprint(positions: &[Vec3]) -> u32 {
+    let mut digest = CRC.digest();
+    for &position in positions {
+        take(&mut digest, position);
+    }
+    digest.finalize()
+}

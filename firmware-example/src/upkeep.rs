@@ -1,0 +1,36 @@
+//! What the background does besides the bus: it keeps an eye on the tree in flash.
+
+use dibs_nostd::Scrub;
+
+use crate::BusStatus;
+use crate::surface::SURFACE_BYTES;
+
+/// Bytes checked in one slice.
+const SLICE: usize = 256;
+
+/// The background check of the tree. What it finds goes to the control tick, which is safe from then on.
+pub struct Upkeep {
+    scrub: Scrub<'static>,
+    status: &'static BusStatus,
+}
+
+impl Upkeep {
+    /// A check that begins at the tree's first byte.
+    #[must_use]
+    pub fn new(status: &'static BusStatus) -> Self {
+        Self { scrub: Scrub::new(SURFACE_BYTES), status }
+    }
+
+    /// One slice: some thousand instructions.
+    pub fn step(&mut self) {
+        if self.scrub.step(SLICE).is_err() {
+            self.status.set_rotted();
+        }
+    }
+
+    /// Rounds finished; wraps.
+    #[must_use]
+    pub const fn rounds(&self) -> u32 {
+        self.scrub.rounds()
+    }
+}
