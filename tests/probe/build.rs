@@ -10,8 +10,9 @@ fn main() -> io::Result<()> {
         fs::copy("../../memory.x", out.join("memory.x"))?;
         println!("cargo:rustc-link-search={}", out.display());
         for argument in ["--nmagic", "-Tlink.x"] {
-            println!("cargo:rustc-link-arg-bin=probe={argument}");
-            println!("cargo:rustc-link-arg-bin=torn={argument}");
+            for name in ["probe", "torn", "receive"] {
+                println!("cargo:rustc-link-arg-bin={name}={argument}");
+            }
         }
     }
     Ok(())

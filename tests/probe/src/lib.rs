@@ -5,6 +5,8 @@
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
+pub mod receive;
+
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::modes::{MAX_MODES, Memo, ModalSurface, Modes};
 use dibs_nostd::{

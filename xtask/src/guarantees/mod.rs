@@ -14,6 +14,7 @@ mod markdown;
 mod modes;
 mod probe;
 mod promises;
+mod receive;
 mod record;
 mod script;
 mod stack;
@@ -138,6 +139,7 @@ fn check(effort: Effort, only: Option<&str>, steps: &mut Steps) -> Figures {
     step("the same bits everywhere", &|f| passed(bits::check(&board()?, effort.bits, f)));
     step("cost model on the board", &|f| passed(cost::check(&board()?, effort.costs, f)));
     step("modal surfaces on the board", &|f| passed(modes::check(&board()?, f)));
+    step("receiving on the board", &|f| passed(receive::check(&board()?, f)));
     step("torn reads on the board", &|f| passed(torn::check(&board()?, effort.torn, f)));
     step("demo on the emulated board", &|f| passed(demo::check(effort.demo_seconds, f)));
     step("firmware without panic and allocator", &|f| passed(demo::link(&board()?, f)));

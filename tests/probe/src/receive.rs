@@ -1,0 +1,15 @@
+//! What the program `receive` and whoever writes its script agree on.
+
+/// Vertices of the surface: the heart of 10,272 triangles.
+pub const VERTICES: usize = 5_138;
+/// Largest tree, in bytes.
+pub const TREE_BYTES: usize = 1 << 19;
+/// A frame without tags.
+pub const UNTAGGED: u32 = 1;
+/// A frame with tags, under [`KEY`] and the challenge 0.
+pub const TAGGED: u32 = 2;
+/// The key.
+pub const KEY: [u8; 16] = *b"a key for a test";
+/// Words of an answer: packets; what accepting them took on the clock, and the dearest of them; what
+/// checking and publishing took, and the longest slice of it.
+pub const ANSWER_WORDS: usize = 5;
