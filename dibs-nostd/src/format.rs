@@ -232,17 +232,37 @@ pub(crate) const fn rest_position(rest: &[u8], row: u32) -> Option<glam::Vec3> {
 #[inline(always)]
 pub(crate) const fn metric(metric: &[u8], row: u32) -> Option<([f32; 3], bool)> {
     let Some(tail) = rows_from(metric, row, METRIC_BYTES) else { return None };
-    let Some(r) = tail.first_chunk::<METRIC_BYTES>() else { return None };
-    let first = f32::from_le_bytes([r[0], r[1], r[2], r[3]]);
-    let second = f32::from_le_bytes([r[4], r[5], r[6], r[7]]);
-    let third = f32::from_le_bytes([r[8], r[9], r[10], r[11]]);
-    Some(([first.abs(), second, third], first.is_sign_negative()))
+    let Some(row) = tail.first_chunk::<METRIC_BYTES>() else { return None };
+    Some((metric_row(row), continues_fan(row)))
+}
+
+/// The metric in one row.
+#[inline(always)]
+pub(crate) const fn metric_row(row: &[u8; METRIC_BYTES]) -> [f32; 3] {
+    [metric_square(row, 0), metric_square(row, 1), metric_square(row, 2)]
+}
+
+/// One of the three numbers of a row of the metric section: 0, 1 or 2.
+#[inline(always)]
+pub(crate) const fn metric_square(row: &[u8; METRIC_BYTES], square: usize) -> f32 {
+    let number = f32::from_bits(metric_word(row, square));
+    if square == 0 { number.abs() } else { number }
+}
+
+#[inline(always)]
+const fn metric_word(row: &[u8; METRIC_BYTES], square: usize) -> u32 {
+    let &[a0, a1, a2, a3, h0, h1, h2, h3, d0, d1, d2, d3] = row;
+    match square {
+        0 => u32::from_le_bytes([a0, a1, a2, a3]),
+        1 => u32::from_le_bytes([h0, h1, h2, h3]),
+        _ => u32::from_le_bytes([d0, d1, d2, d3]),
+    }
 }
 
 /// Whether a row of the metric section continues the fan of the row before.
 #[inline(always)]
 pub(crate) const fn continues_fan(row: &[u8; METRIC_BYTES]) -> bool {
-    row[3] & 0x80 != 0
+    metric_word(row, 0) >> 31 != 0
 }
 
 #[inline(always)]

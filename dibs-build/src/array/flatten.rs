@@ -1,8 +1,8 @@
 //! From a tree of sections to the flat array: order, round up, write.
 
 use dibs_nostd::format::{
-    CHECKSUM_AT, CRC, HEADER_BYTES, Link, MAGIC, METRIC_BYTES, PathKind, SECTION_ALIGN,
-    SECTION_BYTES, VERSION, section,
+    CHECKSUM_AT, CRC, HEADER_BYTES, Link, MAGIC, PathKind, SECTION_ALIGN, SECTION_BYTES, VERSION,
+    section,
 };
 use dibs_nostd::{Index, Tree};
 
@@ -155,24 +155,28 @@ fn vertex_order(mesh: &Mesh, triangles: &[Placed]) -> Vec<u32> {
 
 /// The metric of each triangle, marked where it continues the fan of the triangle before.
 fn metrics(mesh: &Mesh, triangles: &[Placed], facts: Facts<'_>) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(METRIC_BYTES * triangles.len());
-    let mut last = None;
-    for placed in triangles {
-        let corners = placed.corners.map(|v| mesh.positions[v as usize]);
-        let mut row = metric(
-            corners,
-            facts.shares.share(placed.triangle),
-            f64::from(facts.stretch),
-            facts.paths,
-        );
-        let [a, b, c] = placed.corners;
-        if last == Some((a, b)) {
-            row[0] = -row[0];
+    let mut rows: Vec<[f32; 3]> = triangles
+        .iter()
+        .map(|placed| {
+            let corners = placed.corners.map(|v| mesh.positions[v as usize]);
+            let share = facts.shares.share(placed.triangle);
+            metric(corners, share, f64::from(facts.stretch), facts.paths)
+        })
+        .collect();
+    for at in 1..rows.len() {
+        let ([a, _, c], [first, second, _]) = (triangles[at - 1].corners, triangles[at].corners);
+        let is_measurable = rows[at][0] > 0.0 && rows[at - 1][2] > 0.0;
+        if [a, c] != [first, second] || !is_measurable {
+            continue;
         }
-        last = Some((a, c));
-        row.iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+        // The edge that both have: of two roundings the lower, which is right for both.
+        if facts.shares.is_uniform() {
+            let shared = rows[at][0].min(rows[at - 1][2]);
+            (rows[at][0], rows[at - 1][2]) = (shared, shared);
+        }
+        rows[at][0] = -rows[at][0];
     }
-    bytes
+    rows.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect()
 }
 
 /// The length of one radius code: the largest radius takes nearly the largest code.

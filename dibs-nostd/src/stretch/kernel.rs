@@ -53,25 +53,37 @@ impl Worst {
 /// Squares that a triangle is judged by: now, or at rest.
 type Squares = [f32; 3];
 
+/// A triangle as it is now: the edges from its first corner to the second and to the third.
+#[derive(Clone, Copy)]
+struct Edges {
+    first: Vec3,
+    second: Vec3,
+}
+
 /// What a path kind measures.
 trait Measure {
-    /// The second of the three squares; the others are those of `first` and `second`.
-    fn between(first: Vec3, second: Vec3) -> f32;
+    /// The squares of a triangle as it is now.
+    fn squares(now: Edges) -> Squares;
 
     /// Whether the stretch is certainly at most `sqrt(limit)`. False for what is not a number.
     fn within(rest: &Squares, now: &Squares, limit: f32) -> bool;
 
     /// About the square of the stretch.
     fn estimate(rest: &Squares, now: &Squares) -> f32;
+
+    /// The same as [`within`](Self::within), of what is left of the limit: `first` by the first edge, known
+    /// to be positive, and `second` by the second one; `between` is the limit times the rest square.
+    /// Where it is true, `second` is positive.
+    fn is_within(first: f32, second: f32, between: f32, now: Edges) -> bool;
 }
 
 /// The largest singular value.
-struct Surface;
+struct SingularValue;
 
-impl Measure for Surface {
+impl Measure for SingularValue {
     #[inline(always)]
-    fn between(first: Vec3, second: Vec3) -> f32 {
-        first.dot(second)
+    fn squares(Edges { first, second }: Edges) -> Squares {
+        [first.length_squared(), first.dot(second), second.length_squared()]
     }
 
     #[inline(always)]
@@ -91,15 +103,22 @@ impl Measure for Surface {
         let (mean, half) = (0.5 * (pp + qq), 0.5 * (pp - qq));
         mean + sqrt(half * half + pq * pq)
     }
+
+    /// What is above a square is positive, and with `first` so is `second`.
+    #[inline(always)]
+    fn is_within(first: f32, second: f32, between: f32, now: Edges) -> bool {
+        let between = between - now.first.dot(now.second);
+        first * second > between * between
+    }
 }
 
 /// The longest of the three edges, each against its rest length.
-struct Edges;
+struct LongestEdge;
 
-impl Measure for Edges {
+impl Measure for LongestEdge {
     #[inline(always)]
-    fn between(first: Vec3, second: Vec3) -> f32 {
-        (second - first).length_squared()
+    fn squares(Edges { first, second }: Edges) -> Squares {
+        [first.length_squared(), (second - first).length_squared(), second.length_squared()]
     }
 
     #[inline(always)]
@@ -118,6 +137,11 @@ impl Measure for Edges {
         }
         worst
     }
+
+    #[inline(always)]
+    fn is_within(_: f32, second: f32, between: f32, now: Edges) -> bool {
+        second > 0.0 && between >= (now.second - now.first).length_squared()
+    }
 }
 
 /// Checks the triangles of `rows`, as far as all their corners are below row `ready`, and raises `worst`
@@ -130,15 +154,15 @@ pub(super) fn scan<I: Index, V: VertexTable + ?Sized>(
     worst: &mut Worst,
 ) -> Result<u32, StretchError> {
     match (tree.paths(), I::BYTES) {
-        (PathKind::Surface, 2) => run::<I, V, Surface, 6>(tree, surface, rows, ready, worst),
-        (PathKind::Surface, _) => run::<I, V, Surface, 12>(tree, surface, rows, ready, worst),
-        (PathKind::EdgePath, 2) => run::<I, V, Edges, 6>(tree, surface, rows, ready, worst),
-        (PathKind::EdgePath, _) => run::<I, V, Edges, 12>(tree, surface, rows, ready, worst),
+        (PathKind::Surface, 2) => run::<I, V, SingularValue, 6>(tree, surface, rows, ready, worst),
+        (PathKind::Surface, _) => run::<I, V, SingularValue, 12>(tree, surface, rows, ready, worst),
+        (PathKind::EdgePath, 2) => run::<I, V, LongestEdge, 6>(tree, surface, rows, ready, worst),
+        (PathKind::EdgePath, _) => run::<I, V, LongestEdge, 12>(tree, surface, rows, ready, worst),
     }
 }
 
-/// The run for one measure and `CORNERS` bytes a triangle.
-#[inline(always)]
+/// The run for one measure and `CORNERS` bytes a triangle: past what [`passing`] lets pass, with a closer
+/// look at what it does not.
 fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
     tree: &Tree<'_, I>,
     surface: &V,
@@ -146,75 +170,125 @@ fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
     ready: u32,
     worst: &mut Worst,
 ) -> Result<u32, StretchError> {
-    let corrupt = StretchError::Corrupt { row: rows.start };
     let range = rows.start as usize..rows.end as usize;
     let (metrics, _) = tree.sections().metric.as_chunks::<METRIC_BYTES>();
     let (triangles, _) = tree.sections().triangles.as_chunks::<CORNERS>();
-    let (Some(metrics), Some(triangles)) = (metrics.get(range.clone()), triangles.get(range))
+    let (Some(mut metrics), Some(mut triangles)) =
+        (metrics.get(range.clone()), triangles.get(range))
     else {
-        return Err(corrupt);
+        return Err(StretchError::Corrupt { row: rows.start });
     };
-    let at = |row: u32| surface.position(row).ok_or(StretchError::Corrupt { row });
-    // Here, not behind the reference: it is compared with at every triangle.
-    let mut largest = worst.squared;
-    // The fan's centre, and the edge from it that the next triangle shares.
-    let mut centre = Vec3::ZERO;
-    let mut first = Vec3::ZERO;
-    let mut first_squared = 0.0;
-    // No triangle before this run was looked at: it starts its fan anew.
-    let mut fresh = true;
-    for ((metric, corners), row) in metrics.iter().zip(triangles).zip(rows.clone()) {
-        let corner = |number| format::vertex_number::<I>(corners, number);
-        if fresh || !format::continues_fan(metric) {
-            let (Some(a), Some(b)) = (corner(0), corner(1)) else { return Err(corrupt) };
-            if a >= ready || b >= ready {
-                return Ok(row);
-            }
-            centre = at(a)?;
-            first = at(b)? - centre;
-            first_squared = first.length_squared();
-            fresh = false;
-        }
-        let Some(c) = corner(2) else { return Err(corrupt) };
-        if c >= ready {
-            return Ok(row);
-        }
-        let second = at(c)? - centre;
-        let second_squared = second.length_squared();
-        let now = [first_squared, M::between(first, second), second_squared];
-        let Some((rest, _)) = format::metric(metric, 0) else { return Err(corrupt) };
-        if !M::within(&rest, &now, largest) {
-            let ([a, h, d], [g1, g2, g3]) = (rest, now);
-            match squared_stretch::<M>(a, h, d, g1, g2, g3, squared_limit(tree.stretch())) {
-                Ok(squared) if squared > largest => {
-                    largest = squared;
-                    *worst = Worst { squared, triangle: row };
-                }
+    let is_uniform = tree.sections().limits.is_empty();
+    let mut row = rows.start;
+    // Every turn takes a triangle.
+    for _ in rows {
+        let passed = if is_uniform {
+            passing::<I, V, M, CORNERS, true>(surface, metrics, triangles, ready, worst.squared)
+        } else {
+            passing::<I, V, M, CORNERS, false>(surface, metrics, triangles, ready, worst.squared)
+        };
+        row = row.saturating_add(passed as u32);
+        let (Some([metric, metrics_after @ ..]), Some([corners, triangles_after @ ..])) =
+            (metrics.get(passed..), triangles.get(passed..))
+        else {
+            break;
+        };
+        let Some(now) = edges::<I, V>(surface, corners, ready)? else { break };
+        let (rest, now) = (format::metric_row(metric), M::squares(now));
+        if !M::within(&rest, &now, worst.squared) {
+            match squared_stretch::<M>(&rest, &now, squared_limit(tree.stretch())) {
+                Ok(squared) if squared > worst.squared => *worst = Worst { squared, triangle: row },
                 Ok(_) => (),
                 Err(squared) => return Err(exceeded(tree, row, squared)),
             }
         }
-        first = second;
-        first_squared = second_squared;
+        row = row.saturating_add(1);
+        (metrics, triangles) = (metrics_after, triangles_after);
     }
-    Ok(rows.end)
+    Ok(row)
+}
+
+/// How many of the first triangles have all their corners below row `ready` and certainly are not stretched
+/// beyond `sqrt(limit)`. The next one may be fine, too: this is where the time goes, and what is not likely is
+/// left to others.
+///
+/// What an edge leaves of the limit, `L r - g` for its squares at rest and now, is carried along a fan, where
+/// it is the edge of two triangles. In a tree that is not `UNIFORM`, whose triangles have limits of their
+/// own, `r` is not the same for both.
+#[inline(never)]
+fn passing<
+    I: Index,
+    V: VertexTable + ?Sized,
+    M: Measure,
+    const CORNERS: usize,
+    const UNIFORM: bool,
+>(
+    surface: &V,
+    metrics: &[[u8; METRIC_BYTES]],
+    triangles: &[[u8; CORNERS]],
+    ready: u32,
+    limit: f32,
+) -> usize {
+    // One comparison does for both.
+    let vertices = surface.len() as u32;
+    let ready = if ready < vertices { ready } else { vertices };
+    let at = |row: u32| if row < ready { surface.position(row) } else { None };
+    let (mut centre, mut first, mut left_by_first) = (Vec3::ZERO, Vec3::ZERO, 0.0);
+    // No triangle before these was looked at: they start a fan anew.
+    let mut is_new = true;
+    for (passed, (metric, corners)) in metrics.iter().zip(triangles).enumerate() {
+        let corner = |number| format::vertex_number::<I>(corners, number).and_then(at);
+        let [rest_first, rest_between, rest_second] = format::metric_row(metric);
+        is_new |= !format::continues_fan(metric);
+        if is_new {
+            let Some(a) = corner(0) else { return passed };
+            let Some(b) = corner(1) else { return passed };
+            (centre, first) = (a, b - a);
+        }
+        if is_new || !UNIFORM {
+            is_new = false;
+            left_by_first = limit * rest_first - first.length_squared();
+            if !(left_by_first > 0.0) {
+                return passed;
+            }
+        }
+        let Some(c) = corner(2) else { return passed };
+        let second = c - centre;
+        let left_by_second = limit * rest_second - second.length_squared();
+        if !M::is_within(
+            left_by_first,
+            left_by_second,
+            limit * rest_between,
+            Edges { first, second },
+        ) {
+            return passed;
+        }
+        (first, left_by_first) = (second, left_by_second);
+    }
+    if metrics.len() < triangles.len() { metrics.len() } else { triangles.len() }
+}
+
+/// A triangle's edges; `None` while a corner is not below row `ready`.
+fn edges<I: Index, V: VertexTable + ?Sized>(
+    surface: &V,
+    corners: &[u8],
+    ready: u32,
+) -> Result<Option<Edges>, StretchError> {
+    let mut positions = [Vec3::ZERO; 3];
+    for (number, position) in (0..).zip(&mut positions) {
+        let row = format::vertex_number::<I>(corners, number).unwrap_or(u32::MAX);
+        if row >= ready && (row as usize) < surface.len() {
+            return Ok(None);
+        }
+        *position = surface.position(row).ok_or(StretchError::Corrupt { row })?;
+    }
+    let [centre, first, second] = positions;
+    Ok(Some(Edges { first: first - centre, second: second - centre }))
 }
 
 /// The squared stretch of a triangle, rounded up; as an error if it is not certainly within the limit.
-///
-/// Takes numbers, not arrays: those would be written to memory for every triangle.
 #[cold]
-#[inline(never)]
-fn squared_stretch<M: Measure>(
-    a: f32,
-    h: f32,
-    d: f32,
-    g1: f32,
-    g2: f32,
-    g3: f32,
-    limit: f32,
-) -> Result<f32, f32> {
-    let (rest, now) = (&[a, h, d], &[g1, g2, g3]);
+fn squared_stretch<M: Measure>(rest: &Squares, now: &Squares, limit: f32) -> Result<f32, f32> {
     let estimate = M::estimate(rest, now);
     let mut squared = if estimate.is_nan() { estimate } else { f32::INFINITY };
     // The estimate may be too low by its rounding: a step more, and twice that, until it passes.

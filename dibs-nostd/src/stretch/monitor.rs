@@ -9,12 +9,11 @@ use crate::assembler::{Changed, Gate, Verdict};
 use crate::{Index, Tree, VertexTable};
 
 /// Blocks of vertex rows, at most: what a partial frame moved is remembered by them.
-const BLOCKS: usize = 64;
+const BLOCKS: usize = 32;
 
 /// All regions, one bit each.
 const ALL: u32 = u32::MAX;
 const _: () = assert!(REGIONS == u32::BITS as usize);
-const _: () = assert!(size_of::<StretchMonitor<'_, u16>>() <= size_of::<Tree<'_, u16>>() + 800);
 
 /// Measures every frame before it is published, a few triangles at a time: the [`Gate`] that keeps what
 /// is stretched beyond its limit from the controller, and gives the query the measured stretch.
@@ -26,8 +25,8 @@ const _: () = assert!(size_of::<StretchMonitor<'_, u16>>() <= size_of::<Tree<'_,
 /// surface, to the bit.
 ///
 /// Cost: [`advance`](Gate::advance) checks at most as many triangles as it is told, and takes
-/// O([`REGIONS`]) besides. RAM: at most 800 bytes and the tree's view, whatever the surface. Making one
-/// takes one pass over the triangles.
+/// O([`REGIONS`]) besides. RAM: half a kilobyte at most, whatever the surface. Making one takes one pass over
+/// the triangles.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -58,18 +57,19 @@ const _: () = assert!(size_of::<StretchMonitor<'_, u16>>() <= size_of::<Tree<'_,
 /// ```
 #[derive(Clone, Debug)]
 pub struct StretchMonitor<'t, I> {
-    tree: Tree<'t, I>,
+    tree: &'t Tree<'t, I>,
     /// Which regions have corners in each block of `1 << block_shift` vertex rows.
     touched: [u32; BLOCKS],
     block_shift: u32,
     changed: Changed,
     /// Regions still to be measured.
     left: u32,
+    /// Regions whose entry below is not that of the published surface: of a frame that was abandoned, or in
+    /// work. The next partial frame measures them, whether it changes them or not.
+    unpublished: u32,
     /// The next triangle of the region that is being measured.
     next: Option<u32>,
     regions: [Worst; REGIONS],
-    /// The regions of the published frame; `None` before the first.
-    published: Option<[Worst; REGIONS]>,
 }
 
 impl<'t, I: Index> StretchMonitor<'t, I> {
@@ -77,7 +77,7 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
     ///
     /// # Errors
     /// [`StretchError::NoMetric`] where the tree was emitted without what it takes.
-    pub fn new(tree: &Tree<'t, I>) -> Result<Self, StretchError> {
+    pub fn new(tree: &'t Tree<'t, I>) -> Result<Self, StretchError> {
         if tree.sections().metric.is_empty() {
             return Err(StretchError::NoMetric);
         }
@@ -97,21 +97,21 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
             }
         }
         Ok(Self {
-            tree: *tree,
+            tree,
             touched,
             block_shift,
             changed: Changed::Whole,
             left: ALL,
+            unpublished: ALL,
             next: None,
             regions: [Worst::none(0); REGIONS],
-            published: None,
         })
     }
 
     /// The tree whose surfaces are measured.
     #[must_use]
-    pub const fn tree(&self) -> &Tree<'t, I> {
-        &self.tree
+    pub const fn tree(&self) -> &'t Tree<'t, I> {
+        self.tree
     }
 
     /// Triangles that a frame of which every row moved takes: the sum of its slices' work.
@@ -122,7 +122,7 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
 
     /// The rows of a region's triangles.
     fn rows(&self, region: u32) -> Range<u32> {
-        let rows = region_rows(&self.tree);
+        let rows = region_rows(self.tree);
         let triangles = self.tree.triangle_count();
         let first = rows.saturating_mul(region);
         let end = first.saturating_add(rows);
@@ -134,14 +134,10 @@ impl<I: Index> Gate for StretchMonitor<'_, I> {
     fn begin(&mut self, changed: Changed) {
         self.changed = changed;
         self.next = None;
-        match (changed, self.published) {
-            (Changed::Partial, Some(published)) => {
-                self.left = 0;
-                self.regions = published;
-            }
-            // Nothing to go on from: everything is measured.
-            _ => self.left = ALL,
-        }
+        self.left = match changed {
+            Changed::Whole => ALL,
+            Changed::Partial => self.unpublished,
+        };
     }
 
     fn moved(&mut self, rows: Range<u32>) {
@@ -161,7 +157,7 @@ impl<I: Index> Gate for StretchMonitor<'_, I> {
         ready: u32,
         mut work: u32,
     ) -> Result<Verdict, StretchError> {
-        check_tables(&self.tree, surface)?;
+        check_tables(self.tree, surface)?;
         let is_complete = ready >= self.tree.vertex_count();
         if self.changed == Changed::Partial && !is_complete {
             return Ok(Verdict::Pending);
@@ -174,9 +170,10 @@ impl<I: Index> Gate for StretchMonitor<'_, I> {
             let slot = slot.ok_or(StretchError::Corrupt { row: rows.start })?;
             if self.next.is_none() {
                 *slot = Worst::none(rows.start);
+                self.unpublished |= 1 << region;
             }
             let stop = if rows.end - next < work { rows.end } else { next + work };
-            let at = kernel::scan(&self.tree, surface, next..stop, ready, slot)?;
+            let at = kernel::scan(self.tree, surface, next..stop, ready, slot)?;
             work -= at - next;
             if at < rows.end {
                 self.next = Some(at);
@@ -188,11 +185,11 @@ impl<I: Index> Gate for StretchMonitor<'_, I> {
         if !is_complete {
             return Ok(Verdict::Pending);
         }
-        let measured = MeasuredStretch::of_regions(&self.tree, &self.regions, surface.epoch());
+        let measured = MeasuredStretch::of_regions(self.tree, &self.regions, surface.epoch());
         Ok(Verdict::Admitted(Some(measured)))
     }
 
     fn published(&mut self) {
-        self.published = Some(self.regions);
+        self.unpublished = 0;
     }
 }

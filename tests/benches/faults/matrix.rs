@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::subject::{
-    Case, Controller, Key, Log, N, Source, TREE, framed, noticed, source, surface,
+    Case, Controller, Log, N, Source, TREE, framed, mac_under, noticed, source, surface,
 };
 
 /// Faults that one sender and one receiver see.
@@ -112,7 +112,7 @@ fn life(fault: Fault, count: u64, chunk: u64, seed: u64) -> Row {
     );
     let seed = seed ^ (chunk << 8 | fault as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     if fault == Fault::Forgery || (!is_sealed && chunk & 4 != 0) {
-        Life::run(fault, count, case, seed, Key::new)
+        Life::run(fault, count, case, seed, mac_under)
     } else {
         Life::run(fault, count, case, seed, |_| NoMac)
     }

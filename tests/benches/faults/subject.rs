@@ -2,7 +2,6 @@
 
 use std::collections::VecDeque;
 use std::f32::consts::{PI, TAU};
-use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
 use std::sync::LazyLock;
 use std::time::Duration;
@@ -11,7 +10,7 @@ use dibs_build::stream::{Sender, Settings, SurfaceOrder, Transport};
 use dibs_build::{Builder, BuiltTree, Mesh};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
-    Counters, Deframer, Event, Mac, TAG_BYTES, encode_status, enframe, framed_bytes,
+    AesCmac, Counters, Deframer, Event, Mac, encode_status, enframe, framed_bytes,
 };
 use dibs_nostd::{Advance, Assembler, FrameReader, Frames, StretchMonitor, Tree, VertexTable};
 
@@ -214,32 +213,9 @@ impl<'f, M: Mac> Controller<'f, M> {
     }
 }
 
-/// What makes tags: the hash of the standard library under a key. What is tested here is what the
-/// receiver does with tags that are wrong, not how hard they are to guess.
-#[derive(Clone, Copy)]
-pub struct Key {
-    challenge: u32,
-}
-
-impl Key {
-    pub fn new(challenge: u32) -> Self {
-        Self { challenge }
-    }
-}
-
-impl Mac for Key {
-    const TAGGED: bool = true;
-
-    fn tag(&self, session: u32, packet: &[u8]) -> [u8; TAG_BYTES] {
-        let mut hasher = DefaultHasher::new();
-        ("a key", self.challenge, session, packet).hash(&mut hasher);
-        let [tag @ .., _, _] = hasher.finish().to_le_bytes();
-        tag
-    }
-
-    fn challenge(&self) -> u32 {
-        self.challenge
-    }
+/// What makes tags under a challenge.
+pub fn mac_under(challenge: u32) -> AesCmac {
+    AesCmac::new(b"the fault matrix", challenge)
 }
 
 /// A packet as it goes over a byte stream.
