@@ -23,6 +23,7 @@ mod error;
 pub mod generate;
 mod geodesic;
 mod mesh;
+#[cfg(feature = "modes")]
 pub mod modes;
 mod pc2;
 mod read;

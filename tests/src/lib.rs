@@ -1,16 +1,25 @@
 //! Shared by the tests.
 
 pub mod ask;
+#[cfg(feature = "builder")]
 pub mod baselines;
 pub mod bus;
+#[cfg(feature = "builder")]
 pub mod deform;
+#[cfg(feature = "builder")]
 pub mod dibs;
+#[cfg(feature = "builder")]
 pub mod method;
+#[cfg(feature = "builder")]
 pub mod motions;
 pub mod oracle;
+#[cfg(feature = "builder")]
 pub mod poses;
+#[cfg(feature = "builder")]
 pub mod streams;
+#[cfg(feature = "builder")]
 pub mod stretch;
+#[cfg(feature = "builder")]
 pub mod surfaces;
 
 /// The README's code: it compiles, and its control loop runs.

@@ -71,6 +71,8 @@ pub struct Footprint {
     pub ram: u64,
     /// Names of allocator functions, of which there must be none.
     pub allocators: Vec<String>,
+    /// Names of functions that panic, of which there must be none either.
+    pub panics: Vec<String>,
 }
 
 impl Footprint {
@@ -95,12 +97,12 @@ impl Footprint {
                 ram += section.size();
             }
         }
-        let allocators = file
-            .symbols()
-            .filter_map(|symbol| symbol.name().ok().map(str::to_owned))
-            .filter(|name| ["alloc", "malloc", "sbrk"].iter().any(|word| is_allocator(name, word)))
-            .collect();
-        Ok(Self { flash, ram, allocators })
+        let mut names: Vec<String> =
+            file.symbols().filter_map(|s| s.name().ok().map(str::to_owned)).collect();
+        let panics = names.extract_if(.., |name| name.contains("panicking")).collect();
+        names
+            .retain(|name| ["alloc", "malloc", "sbrk"].iter().any(|word| is_allocator(name, word)));
+        Ok(Self { flash, ram, allocators: names, panics })
     }
 }
 

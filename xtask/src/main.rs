@@ -45,11 +45,8 @@ fn main() -> ExitCode {
         Task::Test(options) => test::test(&options),
         Task::Bench(options) => bench::run(&options),
         Task::Guarantees(options) => guarantees::run(&options),
-        Task::Fuzz(options) => or_say(nightly::missing(), || nightly::fuzz(&options).map(drop)),
-        Task::Sanitize => or_say(nightly::missing(), || {
-            nightly::sanitize("address")?;
-            nightly::sanitize("thread")
-        }),
+        Task::Fuzz(options) => or_say(nightly::missing(), || nightly::fuzz_by_hand(&options)),
+        Task::Sanitize => or_say(nightly::missing(), nightly::sanitize_by_hand),
         Task::Miri => or_say(nightly::miri_missing(), nightly::miri),
     };
     match result {

@@ -7,11 +7,12 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::process::{quiet, run};
+use crate::process::{quiet, run, shown};
 use crate::workspace;
 
 const HOST: &str = "x86_64-unknown-linux-gnu";
 const MOMENT: Duration = Duration::from_secs(20);
+const DOWNLOAD: Duration = Duration::from_secs(300);
 
 /// The fuzz targets in `fuzz/`.
 pub const TARGETS: [&str; 4] = ["tree", "packets", "mesh", "query"];
@@ -27,14 +28,49 @@ pub struct FuzzOptions {
     pub target: Option<String>,
 }
 
-/// Why there is nothing to run, or `None`.
-pub fn missing() -> Option<String> {
-    let found = quiet(Command::new("cargo").args(["+nightly", "--version"]), MOMENT).is_ok();
-    (!found).then(|| "no nightly compiler here (rustup toolchain install nightly)".to_owned())
+/// What came of a fuzz target.
+pub struct Fuzzed {
+    pub target: &'static str,
+    /// Inputs that it ran.
+    pub inputs: u64,
+    /// What it said, where it found something.
+    pub finding: Option<String>,
 }
 
-/// Inputs that the fuzz targets ran, by target.
-pub fn fuzz(options: &FuzzOptions) -> Result<Vec<(&'static str, u64)>> {
+/// What came of the tests under a sanitizer.
+pub struct Sanitized {
+    /// Tests that passed.
+    pub tests: u64,
+    /// Reports of the sanitizer.
+    pub findings: u64,
+}
+
+/// Why there is nothing to run, or `None`. Tries to install the nightly compiler first.
+pub fn missing() -> Option<String> {
+    let found = || quiet(Command::new("cargo").args(["+nightly", "--version"]), MOMENT).is_ok();
+    if found() {
+        return None;
+    }
+    eprintln!("installing the nightly compiler ...");
+    let install = ["toolchain", "install", "nightly", "--profile", "minimal"];
+    let said = quiet(Command::new("rustup").args(install), DOWNLOAD);
+    if found() {
+        return None;
+    }
+    let why = said.err().map_or_else(String::new, |error| format!(": {error:#}"));
+    Some(format!("no nightly compiler here (rustup toolchain install nightly{why})"))
+}
+
+/// `cargo +nightly SUBCOMMAND`.
+fn nightly(arguments: &[&str]) -> Command {
+    let mut cargo = Command::new("cargo");
+    cargo.arg("+nightly").args(arguments).current_dir(workspace::root());
+    cargo.env_remove("RUSTUP_TOOLCHAIN").env_remove("CARGO").env_remove("RUSTC");
+    cargo
+}
+
+/// Runs the fuzz targets. What they find is for the caller to judge.
+pub fn fuzz(options: &FuzzOptions) -> Result<Vec<Fuzzed>> {
     if quiet(Command::new("cargo").args(["fuzz", "--version"]), MOMENT).is_err() {
         let mut cargo = Command::new("cargo");
         run(cargo.args(["install", "--quiet", "cargo-fuzz", "--locked"]))
@@ -42,18 +78,12 @@ pub fn fuzz(options: &FuzzOptions) -> Result<Vec<(&'static str, u64)>> {
     }
     let folder = workspace::root().join("fuzz");
     let built = workspace::target().join("fuzz");
-    let cargo = |arguments: &[&str]| {
-        let mut cargo = Command::new("cargo");
-        cargo.args(["+nightly", "fuzz"]).args(arguments).arg("--target-dir").arg(&built);
-        cargo.env_remove("RUSTUP_TOOLCHAIN").env_remove("CARGO").env_remove("RUSTC");
-        cargo.current_dir(workspace::root());
-        cargo
-    };
-    run(&mut cargo(&["build", "--release"])).context("the fuzz targets do not build")?;
+    let mut build = nightly(&["fuzz", "build", "--release", "--target-dir"]);
+    run(build.arg(&built)).context("the fuzz targets do not build")?;
     let wanted = |target: &&str| options.target.as_ref().is_none_or(|only| only == target);
     let targets: Vec<&'static str> = TARGETS.into_iter().filter(|target| wanted(target)).collect();
     ensure!(!targets.is_empty(), "the targets are {}", TARGETS.join(", "));
-    let mut runs = Vec::new();
+    let mut fuzzed = Vec::new();
     for pair in targets.chunks(2) {
         let started = pair.iter().map(|&target| {
             // New inputs go to a folder of their own: the committed corpus stays as it is.
@@ -74,21 +104,29 @@ pub fn fuzz(options: &FuzzOptions) -> Result<Vec<(&'static str, u64)>> {
             let status = fuzzer.wait()?;
             let text = fs::read(&log)?;
             let text = String::from_utf8_lossy(&text);
-            ensure!(
-                status.success(),
-                "{target} found something, see {}:\n{}",
-                log.display(),
-                end(&text)
-            );
-            let executed = text.lines().rev().find_map(|line| {
+            let inputs = text.lines().rev().find_map(|line| {
                 line.strip_prefix("stat::number_of_executed_units:")?.trim().parse().ok()
             });
-            let executed = executed.with_context(|| format!("{target} tells no count"))?;
-            println!("{target}: {executed} inputs in {} s, no finding", options.seconds);
-            runs.push((target, executed));
+            let finding = (!status.success())
+                .then(|| format!("{target}: see {}\n{}", log.display(), end(&text)));
+            if finding.is_none() {
+                ensure!(inputs.is_some(), "{target} tells no count, see {}", log.display());
+            }
+            fuzzed.push(Fuzzed { target, inputs: inputs.unwrap_or_default(), finding });
         }
     }
-    Ok(runs)
+    Ok(fuzzed)
+}
+
+/// Runs the fuzz targets for their user: an error names what was found.
+pub fn fuzz_by_hand(options: &FuzzOptions) -> Result<()> {
+    for Fuzzed { target, inputs, finding } in fuzz(options)? {
+        println!("{target}: {inputs} inputs in {} s", options.seconds);
+        if let Some(finding) = finding {
+            anyhow::bail!("{finding}");
+        }
+    }
+    Ok(())
 }
 
 fn end(text: &str) -> String {
@@ -96,42 +134,77 @@ fn end(text: &str) -> String {
     lines[lines.len().saturating_sub(20)..].join("\n")
 }
 
-/// Runs the tests of frames, bus and format under a sanitizer: `address` or `thread`.
-pub fn sanitize(sanitizer: &str) -> Result<()> {
-    let mut cargo = Command::new("cargo");
-    cargo.args(["+nightly", "test", "--quiet", "--package", "dibs-soundness", "--target", HOST]);
-    cargo.args(["--test", "frames", "--test", "bus"]);
-    if sanitizer == "address" {
-        cargo.args(["--test", "format"]);
+/// Runs the tests of frames and bus under a sanitizer, `address` or `thread`, and those of the format under
+/// the address sanitizer. Before that, what it must find: a fault put in on purpose.
+pub fn sanitize(sanitizer: &str) -> Result<Sanitized> {
+    let (tests, planted) = match sanitizer {
+        "address" => (&["frames", "bus", "format"][..], "an_access_out_of_bounds"),
+        _ => (&["frames", "bus"][..], "a_race"),
+    };
+    let test = |names: &[&str], arguments: &[&str]| {
+        let mut cargo = nightly(&["test", "--package", "dibs-soundness", "--target", HOST]);
+        for name in names {
+            cargo.args(["--test", name]);
+        }
+        cargo.arg("--target-dir").arg(workspace::target().join(sanitizer));
+        // One test at a time: those with two threads wait for each other long enough.
+        cargo.args(["--", "--test-threads=1"]).args(arguments);
+        let flags = format!("-Zsanitizer={sanitizer} -Cunsafe-allow-abi-mismatch=sanitizer");
+        cargo.env("RUSTFLAGS", flags).env("CARGO_PROFILE_DEV_DEBUG", "line-tables-only");
+        // A test's frames live for ever on purpose.
+        cargo.env("ASAN_OPTIONS", "detect_leaks=0");
+        let suppressions = workspace::root().join("tests/soundness/tsan.txt");
+        cargo.env("TSAN_OPTIONS", format!("suppressions={}", suppressions.display()));
+        cargo
+    };
+    let reports = |text: &str| {
+        let marks = ["ERROR: AddressSanitizer:", "WARNING: ThreadSanitizer:"];
+        text.lines().filter(|line| marks.iter().any(|mark| line.contains(mark))).count() as u64
+    };
+    let found = test(&["planted"], &["--ignored", planted]).output()?;
+    let text = [&found.stderr[..], &found.stdout].concat();
+    let text = String::from_utf8_lossy(&text);
+    ensure!(
+        !found.status.success() && reports(&text) > 0 && text.contains(planted),
+        "the {sanitizer} sanitizer does not find what was put in on purpose:\n{}",
+        end(&text)
+    );
+
+    let mut cargo = test(tests, &[]);
+    let output = cargo.output()?;
+    let text = [&output.stdout[..], &output.stderr].concat();
+    let text = String::from_utf8_lossy(&text);
+    print!("{text}");
+    let findings = reports(&text);
+    let passed = text.lines().filter_map(|line| {
+        line.strip_prefix("test result: ok. ")?.split(' ').next()?.parse::<u64>().ok()
+    });
+    ensure!(findings > 0 || output.status.success(), "`{}` failed", shown(&cargo));
+    Ok(Sanitized { tests: passed.sum(), findings })
+}
+
+/// Runs both sanitizers for their user.
+pub fn sanitize_by_hand() -> Result<()> {
+    for sanitizer in ["address", "thread"] {
+        let Sanitized { tests, findings } = sanitize(sanitizer)?;
+        println!("{sanitizer} sanitizer: {tests} tests, {findings} findings");
+        ensure!(findings == 0, "{findings} findings of the {sanitizer} sanitizer");
     }
-    cargo.arg("--target-dir");
-    cargo.arg(workspace::target().join(sanitizer)).current_dir(workspace::root());
-    let flags = format!("-Zsanitizer={sanitizer} -Cunsafe-allow-abi-mismatch=sanitizer");
-    cargo.env("RUSTFLAGS", flags);
-    // A test's frames live for ever on purpose.
-    cargo.env("ASAN_OPTIONS", "detect_leaks=0");
-    let suppressions = workspace::root().join("tests/soundness/tsan.txt");
-    cargo.env("TSAN_OPTIONS", format!("suppressions={}", suppressions.display()));
-    cargo.env_remove("RUSTUP_TOOLCHAIN").env_remove("CARGO").env_remove("RUSTC");
-    run(&mut cargo).with_context(|| format!("under the {sanitizer} sanitizer"))
+    Ok(())
 }
 
 /// Why Miri cannot run here, or `None`.
 pub fn miri_missing() -> Option<String> {
-    let found =
-        quiet(Command::new("cargo").args(["+nightly", "miri", "--version"]), MOMENT).is_ok();
+    let found = quiet(&mut nightly(&["miri", "--version"]), MOMENT).is_ok();
     (!found).then(|| {
         "Miri is not installed here (rustup +nightly component add miri rust-src)".to_owned()
     })
 }
 
-/// Runs the core crate's own tests and those of the frames under Miri.
+/// Runs the tests of the frames under Miri.
 pub fn miri() -> Result<()> {
-    let mut cargo = Command::new("cargo");
-    cargo.args(["+nightly", "miri", "test", "--package", "dibs-soundness", "--test", "frames"]);
-    cargo.arg("--target-dir").arg(workspace::target().join("miri"));
-    cargo.env_remove("RUSTUP_TOOLCHAIN").env_remove("CARGO").env_remove("RUSTC");
-    run(cargo.current_dir(workspace::root()))
+    let mut cargo = nightly(&["miri", "test", "--package", "dibs-soundness", "--test", "frames"]);
+    run(cargo.arg("--target-dir").arg(workspace::target().join("miri")))
 }
 
 /// Tries every interleaving of the frames' two ends. Returns how many there were.

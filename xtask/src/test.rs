@@ -26,12 +26,14 @@ pub fn test(options: &Options) -> Result<()> {
     let mut steps = Steps::default();
     let workspace = ["--workspace", "--all-targets"];
     steps.cargo("format", &["fmt", "--all", "--check"], &[]);
-    steps.cargo("lints", &[&["clippy"], &workspace[..], &["--", "-D", "warnings"]].concat(), &[]);
+    // In the tests' profile, as the documentation below: what all three need is built once.
+    let clippy = [&["clippy", "--release"], &workspace[..], &["--", "-D", "warnings"]].concat();
+    steps.cargo("lints", &clippy, &[]);
     steps.cargo("tests", &[&["test", "--release", "--no-fail-fast"], &workspace[..]].concat(), &[]);
     steps.cargo("documentation examples", &["test", "--release", "--workspace", "--doc"], &[]);
     steps.cargo(
         "documentation",
-        &["doc", "--workspace", "--no-deps"],
+        &["doc", "--release", "--workspace", "--no-deps"],
         &[("RUSTDOCFLAGS", "-D warnings")],
     );
     steps.run("oldest compiler", oldest_compiler);
@@ -53,6 +55,11 @@ pub fn test(options: &Options) -> Result<()> {
 /// `cargo check` with the compiler that `rust-version` names.
 fn oldest_compiler() -> Result<Outcome> {
     let version = env!("CARGO_PKG_RUST_VERSION");
+    let in_use = quiet(Command::new("rustc").arg("--version"), Duration::from_secs(20))?;
+    if in_use.strip_prefix("rustc ").is_some_and(|name| name.starts_with(&format!("{version}."))) {
+        println!("all steps above ran with it: {}", in_use.trim());
+        return Ok(Outcome::Passed);
+    }
     let installed =
         quiet(Command::new("rustup").args(["toolchain", "list"]), Duration::from_secs(20));
     let toolchain = installed.unwrap_or_default();

@@ -3,22 +3,21 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use dibs_nostd::format::{PathKind, section};
+use dibs_nostd::format::PathKind;
 use dibs_nostd::modes::Modes;
 use dibs_nostd::{FormatError, Index, Tree};
 
-use super::append::append;
 use crate::error::BuildError;
-use crate::modes::{self, ModalFit, ModalMotion, ModesError};
 use crate::write_atomically;
 
 /// A tree as bytes, with what a host needs to know about it.
 #[derive(Clone, Debug)]
 pub struct BuiltTree {
-    bytes: Vec<u8>,
-    order: Vec<u32>,
-    index_bytes: usize,
-    motion: Option<ModalMotion>,
+    pub(super) bytes: Vec<u8>,
+    pub(super) order: Vec<u32>,
+    pub(super) index_bytes: usize,
+    #[cfg(feature = "modes")]
+    pub(super) motion: Option<crate::modes::ModalMotion>,
 }
 
 /// What a tree is and what it costs.
@@ -81,7 +80,13 @@ pub struct ModesSummary {
 
 impl BuiltTree {
     pub(crate) fn new<I: Index>(bytes: Vec<u8>, order: Vec<u32>) -> Self {
-        Self { bytes, order, index_bytes: I::BYTES, motion: None }
+        Self {
+            bytes,
+            order,
+            index_bytes: I::BYTES,
+            #[cfg(feature = "modes")]
+            motion: None,
+        }
     }
 
     /// The tree's bytes, as a `.dibs` file holds them (`docs/format.md`).
@@ -117,40 +122,6 @@ impl BuiltTree {
     #[must_use]
     pub fn to_rows<T: Copy>(&self, of_mesh: &[T]) -> Vec<T> {
         self.order.iter().map(|&vertex| of_mesh[vertex as usize]).collect()
-    }
-
-    /// The same tree with the first `count` modes of a fitted motion: `docs/format.md`, section 7.
-    ///
-    /// Errors and stretch are those of the surface as the controller will compute it, at every
-    /// recorded frame. A weight may go a quarter of its recorded range beyond it
-    /// ([`modes::MARGIN`](crate::modes::MARGIN)).
-    ///
-    /// Cost: linear in modes, frames and vertices; seconds at most.
-    ///
-    /// # Errors
-    /// [`ModesError`] for a number of modes that cannot be had, a fit on another mesh, or a tree
-    /// without a rest shape.
-    pub fn with_modes(&self, fit: &ModalFit, count: usize) -> Result<Self, ModesError> {
-        match self.index_bytes {
-            2 => self.with_modes_in::<u16>(fit, count),
-            _ => self.with_modes_in::<u32>(fit, count),
-        }
-    }
-
-    fn with_modes_in<I: Index>(&self, fit: &ModalFit, count: usize) -> Result<Self, ModesError> {
-        if self.motion.is_some() {
-            return Err(ModesError::OtherMesh);
-        }
-        let tree = self.tree::<I>().map_err(BuildError::from)?;
-        let append = |content: &[u8]| append(&self.bytes, section::MODES, content);
-        let (bytes, motion) = modes::encode(fit, count, &tree, &self.order, append)?;
-        Ok(Self { bytes, motion: Some(motion), order: self.order.clone(), ..*self })
-    }
-
-    /// The motion that the modes were fitted to, as their weights; `None` for a tree without modes.
-    #[must_use]
-    pub fn modal_motion(&self) -> Option<&ModalMotion> {
-        self.motion.as_ref()
     }
 
     /// What the tree is and what it costs.

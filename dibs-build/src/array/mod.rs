@@ -1,10 +1,13 @@
 //! The tree as a flat array: its bytes, and the files that hold them.
 
+#[cfg(feature = "modes")]
 mod append;
 mod emit;
 mod fans;
 mod flatten;
 mod metric;
+#[cfg(feature = "modes")]
+mod modal;
 
 pub use emit::{BuiltTree, ModesSummary, Summary, summarise};
 pub(crate) use flatten::{Facts, flatten};

@@ -2,6 +2,7 @@
 
 mod cost;
 mod cost_m7;
+mod cost_x86_64;
 mod error;
 mod options;
 mod search;

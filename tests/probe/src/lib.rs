@@ -228,6 +228,8 @@ fn timed(
     }
 }
 
+/// What is measured: the function that callgrind looks for, so it must stay one.
+#[inline(never)]
 fn clocked(
     machine: &impl Machine,
     ask: impl FnOnce() -> Result<Proximity, QueryError>,

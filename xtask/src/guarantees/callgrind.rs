@@ -32,14 +32,18 @@ pub fn check(figures: &mut Figures) -> Result<()> {
     Ok(())
 }
 
-/// Finds valgrind and the runner of its benches, or installs them.
-fn install() -> Result<()> {
-    let found = |program: &str| {
-        quiet(Command::new(program).arg("--version"), Duration::from_secs(20)).is_ok()
-    };
-    if !found("valgrind") {
+/// Finds valgrind, or installs it.
+pub fn find() -> Result<()> {
+    let version = quiet(Command::new("valgrind").arg("--version"), Duration::from_secs(20));
+    if version.is_err() {
         apt::install(&["valgrind"]).context("no valgrind: sudo apt-get install valgrind")?;
     }
+    Ok(())
+}
+
+/// Finds valgrind and the runner of its benches, or installs them.
+fn install() -> Result<()> {
+    find()?;
     let runner = Command::new("gungraun-runner").stdin(Stdio::null()).output();
     if runner.is_err() {
         let mut cargo = Command::new("cargo");

@@ -2,14 +2,17 @@
 //! queries and checked on others.
 
 use std::fs;
+use std::process::Command;
+use std::thread;
 
 use anyhow::{Context, Result, bail, ensure};
 use dibs_nostd::Cost;
 use microlp::{ComparisonOp, OptimizationDirection, Problem, SolveOutcome};
 
 use super::figures::Figures;
-use super::probe::{Answers, build_for_board, on_board};
+use super::probe::{Answers, Build, build_for_board, on_board};
 use super::script::{Draw, Record, Script};
+use crate::process::run;
 use crate::toolchain::Cross;
 use crate::workspace;
 
@@ -23,15 +26,63 @@ struct Sample {
     instructions: u32,
 }
 
+/// Where instructions are counted.
+pub enum Machine<'a> {
+    /// The emulated Cortex-M7.
+    M7(&'a Cross),
+    /// This computer, by callgrind.
+    Host,
+}
+
+impl Machine<'_> {
+    fn answers(&self, script: &Script) -> Result<Answers> {
+        match self {
+            Self::M7(cross) => on_board(&build_for_board(cross, "probe")?, script, true),
+            Self::Host => Build::Release.counted(script),
+        }
+    }
+
+    /// The answers to several scripts, counted side by side.
+    fn all(&self, scripts: &[Script]) -> Result<Vec<Answers>> {
+        thread::scope(|scope| {
+            let running: Vec<_> =
+                scripts.iter().map(|script| scope.spawn(|| self.answers(script))).collect();
+            let joined = running.into_iter().map(|thread| match thread.join() {
+                Ok(answers) => answers,
+                Err(panic) => std::panic::resume_unwind(panic),
+            });
+            joined.collect()
+        })
+    }
+
+    /// The committed constants, of a sphere and a capsule.
+    fn costs(&self) -> [Cost; 2] {
+        match self {
+            Self::M7(_) => [Cost::M7_SPHERE, Cost::M7_CAPSULE],
+            Self::Host => [Cost::X86_64_SPHERE, Cost::X86_64_CAPSULE],
+        }
+    }
+
+    /// What the figures' names begin with.
+    fn prefix(&self) -> &'static str {
+        match self {
+            Self::M7(_) => "cost",
+            Self::Host => "cost.host",
+        }
+    }
+}
+
 /// Fits the constants, and writes them into the core crate.
-pub fn fit(cross: &Cross, queries: usize) -> Result<()> {
-    let program = build_for_board(cross, "probe")?;
+pub fn fit(machine: &Machine<'_>, queries: usize) -> Result<()> {
     let mut spheres = Vec::new();
     let mut capsules = Vec::new();
     let draws = [(Draw::Exhausting, 1), (Draw::Any, 1), (Draw::Short, 8)];
-    for (seed, (draw, times)) in draws.into_iter().enumerate() {
-        let script = Script::adversarial(times * queries, draw, 11 + seed as u64);
-        let answers = on_board(&program, &script, true)?;
+    let scripts: Vec<Script> = draws
+        .into_iter()
+        .enumerate()
+        .map(|(i, (draw, times))| Script::adversarial(times * queries, draw, 11 + i as u64))
+        .collect();
+    for answers in machine.all(&scripts)? {
         spheres.extend(samples(&answers, false));
         capsules.extend(samples(&answers, true));
     }
@@ -40,65 +91,73 @@ pub fn fit(cross: &Cross, queries: usize) -> Result<()> {
         let Cost { base, node_test, triangle_test } = c;
         format!("Self {{ base: {base}, node_test: {node_test}, triangle_test: {triangle_test} }}")
     });
-    let file = workspace::root().join("dibs-nostd/src/query/cost_m7.rs");
+    let (file, name, on, how) = match machine {
+        Machine::M7(_) => ("cost_m7.rs", "M7", "on a Cortex-M7", "on an emulated Cortex-M7"),
+        Machine::Host => ("cost_x86_64.rs", "X86_64", "on x86-64, optimised", "by callgrind"),
+    };
+    let file = workspace::root().join("dibs-nostd/src/query").join(file);
     fs::write(
         &file,
         format!(
-            "//! Measured on an emulated Cortex-M7. Written by `cargo xtask guarantees`: do not edit.
+            "//! Measured {how}. Written by `cargo xtask guarantees --fit`: do not edit.
 
 use super::Cost;
 
 impl Cost {{
-    /// A sphere on a Cortex-M7.
-    pub const M7_SPHERE: Self =
-        {sphere};
-    /// A capsule on a Cortex-M7.
-    pub const M7_CAPSULE: Self =
-        {capsule};
+    /// A sphere {on}.
+    pub const {name}_SPHERE: Self = {sphere};
+    /// A capsule {on}.
+    pub const {name}_CAPSULE: Self = {capsule};
 }}
 "
         ),
     )
     .with_context(|| format!("cannot write {}", file.display()))?;
+    run(Command::new("rustfmt").args(["--edition", "2024"]).arg(&file))?;
     println!("sphere: {sphere}\ncapsule: {capsule}");
     Ok(())
 }
 
 /// Checks the constants on queries that they were not fitted to.
-pub fn check(cross: &Cross, queries: usize, figures: &mut Figures) -> Result<()> {
-    let program = build_for_board(cross, "probe")?;
+pub fn check(machine: &Machine<'_>, queries: usize, figures: &mut Figures) -> Result<()> {
+    let (prefix, costs) = (machine.prefix(), machine.costs());
     let (mut beyond, mut late, mut checked) = (0, 0, 0_usize);
     let mut tightness: [Vec<f64>; 2] = [Vec::new(), Vec::new()];
     // Half with the whole search, half with a budget made for a deadline.
-    for (draw, seed) in [(Draw::Exhausting, 21), (Draw::Deadline, 22)] {
-        let answers = on_board(&program, &Script::adversarial(queries / 2, draw, seed), true)?;
+    let scripts = [(Draw::Exhausting, 21), (Draw::Deadline(costs), 22)]
+        .map(|(draw, seed)| Script::adversarial(queries / 2, draw, seed));
+    for answers in machine.all(&scripts)? {
         for answer in answers.iter() {
             let Record::Query { is_capsule, deadline } = answer.record else { continue };
-            let cost = if is_capsule { Cost::M7_CAPSULE } else { Cost::M7_SPHERE };
             let [node_tests, triangle_tests] = answer.tests();
-            let bound = cost.instructions(dibs_nostd::Budget { node_tests, triangle_tests });
-            let took = answer.instructions();
+            let bound = costs[usize::from(is_capsule)]
+                .instructions(dibs_nostd::Budget { node_tests, triangle_tests });
+            let took = answer.instructions;
             checked += 1;
             beyond += u32::from(u64::from(took) > bound);
             late += u32::from(deadline.is_some_and(|deadline| took > deadline));
             tightness[usize::from(is_capsule)].push(f64::from(took) / bound as f64);
         }
     }
-    figures.note("cost.queries", checked as f64);
-    figures.note("cost.beyond", f64::from(beyond));
-    figures.note("cost.late", f64::from(late));
-    for (name, shares) in ["sphere", "capsule"].iter().zip(&tightness) {
+    figures.note(&format!("{prefix}.queries"), checked as f64);
+    figures.note(&format!("{prefix}.beyond"), f64::from(beyond));
+    figures.note(&format!("{prefix}.late"), f64::from(late));
+    for ((name, shares), cost) in ["sphere", "capsule"].iter().zip(&tightness).zip(costs) {
         let mean = shares.iter().sum::<f64>() / shares.len() as f64;
         let most = shares.iter().copied().fold(0.0, f64::max);
-        figures.note(&format!("cost.{name}.mean-share"), 100.0 * mean);
-        figures.note(&format!("cost.{name}.largest-share"), 100.0 * most);
+        for (figure, value) in [
+            ("mean-share", 100.0 * mean),
+            ("largest-share", 100.0 * most),
+            ("base", f64::from(cost.base)),
+            ("node-test", f64::from(cost.node_test)),
+            ("triangle-test", f64::from(cost.triangle_test)),
+        ] {
+            figures.note(&format!("{prefix}.{name}.{figure}"), value);
+        }
     }
-    for (name, cost) in [("sphere", Cost::M7_SPHERE), ("capsule", Cost::M7_CAPSULE)] {
-        figures.note(&format!("cost.{name}.base"), f64::from(cost.base));
-        figures.note(&format!("cost.{name}.node-test"), f64::from(cost.node_test));
-        figures.note(&format!("cost.{name}.triangle-test"), f64::from(cost.triangle_test));
+    if matches!(machine, Machine::M7(_)) {
+        usual(&machine.answers(&Script::usual(800, 31))?, figures);
     }
-    usual(&on_board(&program, &Script::usual(800, 31), true)?, figures);
     ensure!(beyond == 0, "{beyond} of {checked} queries cost more than their bound");
     ensure!(late == 0, "{late} of {checked} queries were later than their budget's deadline");
     Ok(())
@@ -114,7 +173,7 @@ fn usual(answers: &Answers, figures: &mut Figures) {
         figures.note(&format!("m7.{name}.largest"), f64::from(most));
     }
     let a_triangle = answers.iter().filter_map(|answer| match answer.record {
-        Record::Stretch(triangles) => Some(f64::from(answer.instructions()) / f64::from(triangles)),
+        Record::Stretch(triangles) => Some(f64::from(answer.instructions) / f64::from(triangles)),
         _ => None,
     });
     figures.note("m7.stretch", a_triangle.fold(0.0, f64::max).round());
@@ -126,7 +185,7 @@ fn samples(answers: &Answers, capsules: bool) -> Vec<Sample> {
     answers
         .iter()
         .filter(|answer| wanted(answer.record))
-        .map(|answer| Sample { tests: answer.tests(), instructions: answer.instructions() })
+        .map(|answer| Sample { tests: answer.tests(), instructions: answer.instructions })
         .collect()
 }
 

@@ -23,20 +23,21 @@ mod torn;
 use std::fs;
 use std::process::Command;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 
-use crate::nightly::{self, FuzzOptions};
+use crate::nightly::{self, FuzzOptions, Fuzzed};
 use crate::process::run as run_command;
 use crate::steps::{Outcome, Steps};
 use crate::toolchain::Cross;
 use crate::{qemu, workspace};
+use cost::Machine;
 use figures::Figures;
 
 /// Measures every promise, and writes docs/guarantees.json and docs/guarantees.md.
 #[derive(clap::Args)]
 pub struct Options {
-    /// Fits the constants of the cost model anew, and ends; the checks are another run, of a program that
-    /// has them.
+    /// Fits the constants of the cost model anew (`--only board`, `--only host`: of one machine), and ends; the
+    /// checks are another run, of a program that has them.
     #[arg(long)]
     fit: bool,
     /// Seconds of each fuzz target.
@@ -62,14 +63,14 @@ pub struct Effort {
     pub bits: usize,
     /// Queries that must keep to their bound.
     pub costs: usize,
+    /// The same on this computer, under callgrind.
+    pub host_costs: usize,
     /// Queries under which frames are published.
     pub torn: u32,
     /// Seconds of the controller's time.
     pub demo_seconds: u32,
+    /// Seconds of each fuzz target.
     pub fuzz_seconds: u32,
-    /// Whether what the nightly compiler builds runs too: sanitizers, Miri, fuzzers. Their builds take
-    /// longer than all other checks together.
-    pub nightly: bool,
 }
 
 impl Effort {
@@ -78,33 +79,40 @@ impl Effort {
         cases: 1_000_000,
         bits: 100_000,
         costs: 100_000,
+        host_costs: 100_000,
         torn: 100_000,
         demo_seconds: 60,
         fuzz_seconds: 60,
-        nightly: true,
     };
     /// What every run of the tests can afford.
     pub const TEST: Self = Self {
-        cases: 100_000,
-        bits: 8_000,
-        costs: 6_000,
-        torn: 8_000,
+        cases: 200_000,
+        bits: 30_000,
+        costs: 30_000,
+        host_costs: 6_000,
+        torn: 20_000,
         demo_seconds: 5,
-        fuzz_seconds: 20,
-        nightly: false,
+        fuzz_seconds: 60,
     };
 }
 
 /// Measures, and writes the documents.
 pub fn run(options: &Options) -> Result<()> {
     if options.fit {
-        return cost::fit(&Cross::find()?, 12_000);
+        let wanted = |name: &str| options.only.as_deref().is_none_or(|only| name.contains(only));
+        if wanted("host") {
+            cost::fit(&Machine::Host, 2_000)?;
+        }
+        if wanted("board") {
+            cost::fit(&Machine::M7(&board()?), 12_000)?;
+        }
+        return Ok(());
     }
     if options.render {
         return record::render();
     }
     let effort = if options.quick { Effort::TEST } else { Effort::FULL };
-    let effort = Effort { fuzz_seconds: options.fuzz_seconds, nightly: true, ..effort };
+    let effort = Effort { fuzz_seconds: options.fuzz_seconds, ..effort };
     let mut steps = Steps::default();
     let figures = check(effort, options.only.as_deref(), &mut steps);
     steps.run("documents", || {
@@ -137,23 +145,28 @@ fn check(effort: Effort, only: Option<&str>, steps: &mut Steps) -> Figures {
     });
     step("instructions on this computer", &|f| passed(callgrind::check(f)));
     step("the same bits everywhere", &|f| passed(bits::check(&board()?, effort.bits, f)));
-    step("cost model on the board", &|f| passed(cost::check(&board()?, effort.costs, f)));
+    step("cost model on the board", &|f| {
+        passed(cost::check(&Machine::M7(&board()?), effort.costs, f))
+    });
+    step("cost model on this computer", &|f| {
+        passed(cost::check(&Machine::Host, effort.host_costs, f))
+    });
     step("modal surfaces on the board", &|f| passed(modes::check(&board()?, f)));
     step("receiving on the board", &|f| passed(receive::check(&board()?, f)));
     step("torn reads on the board", &|f| passed(torn::check(&board()?, effort.torn, f)));
     step("demo on the emulated board", &|f| passed(demo::check(effort.demo_seconds, f)));
     step("firmware without panic and allocator", &|f| passed(demo::link(&board()?, f)));
     step("stack of the firmware", &|f| passed(demo::stack(&board()?, f)));
-    if !effort.nightly {
-        return figures;
-    }
     for sanitizer in ["address", "thread"] {
         step(&format!("{sanitizer} sanitizer"), &|f| {
             if let Some(reason) = nightly::missing() {
+                f.skip("sanitizer.");
                 return Ok(Outcome::Skipped(reason));
             }
-            nightly::sanitize(sanitizer)?;
-            f.note(&format!("sanitizer.{sanitizer}"), 0.0);
+            let sanitized = nightly::sanitize(sanitizer)?;
+            f.note(&format!("sanitizer.{sanitizer}"), sanitized.findings as f64);
+            f.note(&format!("sanitizer.{sanitizer}.tests"), sanitized.tests as f64);
+            ensure!(sanitized.findings == 0, "{} findings", sanitized.findings);
             Ok(Outcome::Passed)
         });
     }
@@ -163,14 +176,18 @@ fn check(effort: Effort, only: Option<&str>, steps: &mut Steps) -> Figures {
     });
     step("fuzzers", &|f| {
         if let Some(reason) = nightly::missing() {
+            f.skip("fuzz.");
             return Ok(Outcome::Skipped(reason));
         }
         let options = FuzzOptions { seconds: effort.fuzz_seconds, target: None };
-        for (target, inputs) in nightly::fuzz(&options)? {
-            f.note(&format!("fuzz.{target}.inputs"), inputs as f64);
+        let fuzzed = nightly::fuzz(&options)?;
+        for Fuzzed { target, inputs, .. } in &fuzzed {
+            f.note(&format!("fuzz.{target}.inputs"), *inputs as f64);
         }
+        let findings: Vec<String> = fuzzed.into_iter().filter_map(|f| f.finding).collect();
         f.note("fuzz.seconds", f64::from(effort.fuzz_seconds));
-        f.note("fuzz.findings", 0.0);
+        f.note("fuzz.findings", findings.len() as f64);
+        ensure!(findings.is_empty(), "{}", findings.join("\n"));
         Ok(Outcome::Passed)
     });
     figures

@@ -1,12 +1,14 @@
 //! The probe: a program that answers a script, on the emulated board and on this computer.
 
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
 use probe::ANSWER_WORDS;
 
+use super::callgrind;
 use super::script::{Record, Script};
 use crate::process::run;
 use crate::toolchain::Cross;
@@ -18,14 +20,11 @@ pub struct Answer<'a> {
     pub record: Record,
     /// What came back.
     pub words: &'a [u32],
+    /// Instructions that it took, where they were counted.
+    pub instructions: u32,
 }
 
 impl Answer<'_> {
-    /// Instructions on the emulated board, whose clock counted 1.6 to each.
-    pub fn instructions(&self) -> u32 {
-        (u64::from(self.words[0]) * 5 / 8) as u32
-    }
-
     /// Node tests that the budget counts, and triangle tests.
     pub fn tests(&self) -> [u32; 2] {
         [self.words[1].saturating_sub(1), self.words[2]]
@@ -41,6 +40,8 @@ impl Answer<'_> {
 pub struct Answers {
     words: Vec<u32>,
     records: Vec<Record>,
+    /// Instructions of each query, where callgrind counted them.
+    counts: Option<Vec<u32>>,
 }
 
 impl Answers {
@@ -50,16 +51,22 @@ impl Answers {
         let words: Vec<u32> = words.collect();
         let expected: usize = script.records.iter().map(|&record| length(record)).sum();
         ensure!(words.len() == expected, "{} words answered, not {expected}", words.len());
-        Ok(Self { words, records: script.records.clone() })
+        Ok(Self { words, records: script.records.clone(), counts: None })
     }
 
     /// All answers, in order.
     pub fn iter(&self) -> impl Iterator<Item = Answer<'_>> {
         let mut rest = self.words.as_slice();
+        let mut counts = self.counts.as_ref().map(|counts| counts.iter());
         self.records.iter().map(move |&record| {
             let (words, after) = rest.split_at(length(record));
             rest = after;
-            Answer { record, words }
+            let instructions = match (&mut counts, record) {
+                (Some(counts), Record::Query { .. }) => counts.next().copied().unwrap_or_default(),
+                // The board's clock counts 1.6 to each instruction.
+                _ => (u64::from(words[0]) * 5 / 8) as u32,
+            };
+            Answer { record, words, instructions }
         })
     }
 }
@@ -127,6 +134,40 @@ impl Build {
 
     /// Answers on this computer.
     pub fn answers(self, script: &Script) -> Result<Answers> {
+        let program = self.program()?;
+        let files = tempfile::tempdir()?;
+        answer(&mut Command::new(program), files.path(), script)
+    }
+
+    /// Answers on this computer, under callgrind, which counts the instructions of each query.
+    pub fn counted(self, script: &Script) -> Result<Answers> {
+        callgrind::find()?;
+        let program = self.program()?;
+        let files = tempfile::tempdir()?;
+        let profile = files.path().join("profile");
+        let mut valgrind = Command::new("valgrind");
+        valgrind.args(["--quiet", "--tool=callgrind", "--dump-line=no", "--combine-dumps=yes"]);
+        // Counted is what is below the function that asks; each time that it begins, so does a part of the
+        // profile.
+        valgrind.args(["--collect-atstart=no", "--toggle-collect=probe::clocked"]);
+        valgrind.arg("--dump-before=probe::clocked");
+        valgrind.arg(format!("--callgrind-out-file={}", profile.display()));
+        let mut answers = answer(valgrind.arg(program), files.path(), script)?;
+        let mut counts = Vec::new();
+        for line in BufReader::new(fs::File::open(&profile)?).lines() {
+            if let Some(count) = line?.strip_prefix("totals: ") {
+                counts.push(count.trim().parse()?);
+            }
+        }
+        let queries = script.queries();
+        ensure!(counts.len() == queries + 1, "{} counts of {queries} queries", counts.len());
+        // The first part is what comes before the first query.
+        answers.counts = Some(counts.split_off(1));
+        Ok(answers)
+    }
+
+    /// Builds the program.
+    fn program(self) -> Result<PathBuf> {
         let target = match self {
             Self::Native => workspace::target().join("native"),
             Self::Debug | Self::Release => workspace::target(),
@@ -145,10 +186,14 @@ impl Build {
             cargo.env("RUSTFLAGS", "-C target-cpu=native");
         }
         run(&mut cargo)?;
-        let files = tempfile::tempdir()?;
-        let (script_file, answers) = (files.path().join("script"), files.path().join("answers"));
-        fs::write(&script_file, script.bytes())?;
-        run(Command::new(target.join(folder).join("answer")).arg(&script_file).arg(&answers))?;
-        Answers::read(&answers, script)
+        Ok(target.join(folder).join("answer"))
     }
+}
+
+/// Has a program of this computer answer a script.
+fn answer(program: &mut Command, folder: &Path, script: &Script) -> Result<Answers> {
+    let (script_file, answers) = (folder.join("script"), folder.join("answers"));
+    fs::write(&script_file, script.bytes())?;
+    run(program.arg(&script_file).arg(&answers))?;
+    Answers::read(&answers, script)
 }

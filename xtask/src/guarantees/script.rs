@@ -48,8 +48,8 @@ pub enum Draw {
     Exhausting,
     /// With a budget of a few tests, so that the dearest of them shows.
     Short,
-    /// With a budget made for a random number of instructions.
-    Deadline,
+    /// With a budget made for a random number of instructions, at these costs of a sphere and a capsule.
+    Deadline([Cost; 2]),
 }
 
 impl Script {
@@ -183,8 +183,8 @@ impl Script {
                     Budget { node_tests: rng.u32(..300), triangle_tests: rng.u32(..60) }
                 }
                 Draw::Short => Budget { node_tests: rng.u32(..24), triangle_tests: rng.u32(..6) },
-                Draw::Deadline => {
-                    let cost = if is_capsule { Cost::M7_CAPSULE } else { Cost::M7_SPHERE };
+                Draw::Deadline(costs) => {
+                    let cost = costs[usize::from(is_capsule)];
                     let instructions = cost.base + rng.u32(..100_000);
                     deadline = Some(instructions);
                     Budget::for_instructions(instructions, &cost)

@@ -1,0 +1,45 @@
+//! A built tree with displacement modes.
+
+use dibs_nostd::Index;
+use dibs_nostd::format::section;
+
+use super::append::append;
+use super::emit::BuiltTree;
+use crate::error::BuildError;
+use crate::modes::{self, ModalFit, ModalMotion, ModesError};
+
+impl BuiltTree {
+    /// The same tree with the first `count` modes of a fitted motion: `docs/format.md`, section 7.
+    ///
+    /// Errors and stretch are those of the surface as the controller will compute it, at every
+    /// recorded frame. A weight may go a quarter of its recorded range beyond it
+    /// ([`modes::MARGIN`](crate::modes::MARGIN)).
+    ///
+    /// Cost: linear in modes, frames and vertices; seconds at most.
+    ///
+    /// # Errors
+    /// [`ModesError`] for a number of modes that cannot be had, a fit on another mesh, or a tree
+    /// without a rest shape.
+    pub fn with_modes(&self, fit: &ModalFit, count: usize) -> Result<Self, ModesError> {
+        match self.index_bytes {
+            2 => self.with_modes_in::<u16>(fit, count),
+            _ => self.with_modes_in::<u32>(fit, count),
+        }
+    }
+
+    fn with_modes_in<I: Index>(&self, fit: &ModalFit, count: usize) -> Result<Self, ModesError> {
+        if self.motion.is_some() {
+            return Err(ModesError::OtherMesh);
+        }
+        let tree = self.tree::<I>().map_err(BuildError::from)?;
+        let append = |content: &[u8]| append(&self.bytes, section::MODES, content);
+        let (bytes, motion) = modes::encode(fit, count, &tree, &self.order, append)?;
+        Ok(Self { bytes, motion: Some(motion), order: self.order.clone(), ..*self })
+    }
+
+    /// The motion that the modes were fitted to, as their weights; `None` for a tree without modes.
+    #[must_use]
+    pub fn modal_motion(&self) -> Option<&ModalMotion> {
+        self.motion.as_ref()
+    }
+}
