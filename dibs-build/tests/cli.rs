@@ -329,3 +329,27 @@ fn limits_that_cannot_be_used_are_named() {
         assert!(!folder.join("t.dibs").exists());
     }
 }
+
+/// A triangle that no f32 arithmetic can measure is named when the tree is built, not when the controller
+/// refuses every frame.
+#[test]
+fn what_the_stretch_check_cannot_measure_is_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let square = "v 0 0 0\nv 10 0 0\nv 10 10 0\nv 0 10 0\n";
+    let write = |name: &str, rest: &str| {
+        std::fs::write(folder.join(name), format!("{square}{rest}")).unwrap();
+    };
+    write("good.obj", "f 1 2 3\nf 1 3 4\n");
+    write("flat.obj", "v 0.01 0.00001 0\nf 1 2 3\nf 1 3 4\nf 2 1 5\n");
+    for (mesh, unmeasurable) in [("good", 0), ("flat", 1)] {
+        let output = dibs(folder, &format!("build {mesh}.obj -o {mesh}.dibs --json"));
+        let errors = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{errors}");
+        let built: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(built["tree"]["unmeasurable"], unmeasurable, "{built}");
+        let warned = built["warnings"].to_string().contains("4, 1 and 0) are too flat");
+        assert_eq!(warned, unmeasurable > 0, "{built}");
+        assert_eq!(errors.contains("weld or drop them"), unmeasurable > 0, "{errors}");
+    }
+}

@@ -38,6 +38,11 @@ pub struct Summary {
     pub stretch: f32,
     /// The least stretch limit of any triangle.
     pub least_stretch_limit: f32,
+    /// Triangles that the controller's stretch check refuses even at rest, because they are too flat or too
+    /// small for its arithmetic: with them no frame is ever published.
+    pub unmeasurable: u32,
+    /// The vertices of the first of them, by the mesh's numbers.
+    pub first_unmeasurable: Option<[u32; 3]>,
     /// Whether radii were measured across triangles (else along edges).
     pub surface_paths: bool,
     /// Radius of the root at rest, in the mesh's unit.
@@ -233,6 +238,8 @@ fn write(path: &Path, content: &[u8]) -> Result<(), BuildError> {
 #[must_use]
 pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
     let vertices = tree.vertex_count();
+    let unmeasurable = || (0..tree.triangle_count()).filter(|&row| !is_measurable(tree, row));
+    let in_mesh = |row: u32| row_of(tree.triangle(row)?, |v| tree.vertex_number(v).or(Some(v)));
     Summary {
         triangles: tree.triangle_count(),
         vertices,
@@ -243,6 +250,8 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
         least_stretch_limit: (0..tree.triangle_count())
             .filter_map(|row| tree.stretch_limit(row))
             .fold(tree.stretch(), f32::min),
+        unmeasurable: unmeasurable().count() as u32,
+        first_unmeasurable: unmeasurable().next().and_then(in_mesh),
         surface_paths: tree.paths() == PathKind::Surface,
         root_radius: tree.node(0).map_or(0.0, |(_, radius, _)| radius),
         mesh_id: tree.mesh_id(),
@@ -261,4 +270,20 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
             flash_bytes_per_vertex: modes.flash_bytes() as f64 / f64::from(vertices),
         }),
     }
+}
+
+/// Whether the stretch check can pass a triangle at rest; true where there is nothing to check with.
+fn is_measurable<I: Index>(tree: &Tree<'_, I>, row: u32) -> bool {
+    let Some(([first, ..], _)) = tree.metric(row) else { return true };
+    let corners = tree.triangle(row).and_then(|c| row_of(c, |v| tree.rest_position(v)));
+    let Some([a, b, _]) = corners else { return first > 0.0 };
+    // The builder has made the metric smaller by what the check's rounding may amount to.
+    let allowed = f64::from(first) * f64::from(tree.stretch()).powi(2);
+    first > 0.0 && allowed >= (b - a).as_dvec3().length_squared()
+}
+
+/// Something of each corner, if all have it.
+fn row_of<T>(corners: [u32; 3], of: impl Fn(u32) -> Option<T>) -> Option<[T; 3]> {
+    let [a, b, c] = corners.map(of);
+    Some([a?, b?, c?])
 }

@@ -5,8 +5,8 @@ use std::fmt::Write;
 use anyhow::Result;
 use serde_json::Value;
 
+use super::faults;
 use super::record::Record;
-use crate::workspace;
 
 /// The document.
 pub fn render(records: &[Record]) -> Result<String> {
@@ -39,19 +39,9 @@ pub fn render(records: &[Record]) -> Result<String> {
         }
     }
     out.push('\n');
-    out.push_str(&faults()?);
+    out.push_str(&faults::render()?);
     out.push_str(include_str!("texts/tail.md"));
     Ok(out)
-}
-
-/// The fault matrix, where there is one.
-fn faults() -> Result<String> {
-    let file = workspace::root().join("docs").join("faults.md");
-    if !file.is_file() {
-        return Ok(String::new());
-    }
-    Ok("## Faults\n\nWhat is done to the bus, and what comes of it: [faults.md](faults.md).\n\n"
-        .into())
 }
 
 /// `{id}` in a text stands for the figure of that record.
@@ -74,7 +64,12 @@ fn shown(figure: &Value) -> String {
     if number.fract() != 0.0 {
         return if number < 1.0 { format!("{number:.3}") } else { format!("{number:.1}") };
     }
-    let digits = format!("{number:.0}");
+    grouped(number as u64)
+}
+
+/// A number with its thousands apart.
+pub fn grouped(number: u64) -> String {
+    let digits = number.to_string();
     let mut grouped = String::new();
     for (place, digit) in digits.chars().enumerate() {
         if place > 0 && (digits.len() - place).is_multiple_of(3) {

@@ -9,6 +9,7 @@ mod bits;
 mod callgrind;
 mod cost;
 mod demo;
+mod faults;
 mod figures;
 mod markdown;
 mod modes;

@@ -97,8 +97,18 @@ pub fn run(args: &Args) -> Result<()> {
         tree.write_blob(&args.output)?;
     }
     let summary = tree.summary();
+    let unmeasurable = summary.first_unmeasurable.map(|[a, b, c]| {
+        format!(
+            "{} triangles (the first has the vertices {a}, {b} and {c}) are too flat or too small for \
+             the controller's stretch check, which would refuse every frame: weld or drop them",
+            summary.unmeasurable
+        )
+    });
+    if let Some(warning) = &unmeasurable {
+        eprintln!("warning: {name}: {warning}");
+    }
     if args.json {
-        let warnings: Vec<String> = report.warnings().collect();
+        let warnings: Vec<String> = report.warnings().chain(unmeasurable).collect();
         let output = args.output.display().to_string();
         println!(
             "{:#}",
