@@ -13,6 +13,7 @@ mod faults;
 mod figures;
 mod markdown;
 mod modes;
+mod path;
 mod probe;
 mod promises;
 mod receive;
@@ -152,6 +153,7 @@ fn check(effort: Effort, only: Option<&str>, steps: &mut Steps) -> Figures {
     step("cost model on this computer", &|f| {
         passed(cost::check(&Machine::Host, effort.host_costs, f))
     });
+    step("queries on the board", &|f| passed(path::check(&board()?, effort.costs / 10, f)));
     step("modal surfaces on the board", &|f| passed(modes::check(&board()?, f)));
     step("receiving on the board", &|f| passed(receive::check(&board()?, f)));
     step("torn reads on the board", &|f| passed(torn::check(&board()?, effort.torn, f)));

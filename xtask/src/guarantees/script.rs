@@ -3,11 +3,13 @@
 use dibs_build::modes::ModalFit;
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
 use dibs_nostd::modes::{MAX_MODES, Modes};
-use dibs_nostd::{Budget, Cost, VertexTable};
+use dibs_nostd::{Budget, Cost, Options, Query, Tool, VertexTable};
 use dibs_tests::deform::Deformation;
+use dibs_tests::method::Probe;
 use dibs_tests::motions::trembling;
 use dibs_tests::oracle::Instrument;
 use dibs_tests::poses::pose;
+use dibs_tests::streams::Beat;
 use dibs_tests::surfaces;
 use fastrand::Rng;
 use glam::Vec3;
@@ -39,6 +41,11 @@ pub enum Record {
     },
 }
 
+/// Ticks until the tool of table 3 repeats itself, roughly: 77 s.
+const PATH_TICKS: u32 = 77_000;
+/// Frames of the heart's motion that poses are tried on.
+const FRAMES_OF_POSES: usize = 10;
+
 /// How the queries of a script are drawn.
 #[derive(Clone, Copy)]
 pub enum Draw {
@@ -50,6 +57,15 @@ pub enum Draw {
     Short,
     /// With a budget made for a random number of instructions, at these costs of a sphere and a capsule.
     Deadline([Cost; 2]),
+}
+
+/// What a query is told beforehand.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Knows {
+    /// Nothing: cold, with the tree's limit on stretch.
+    Nothing,
+    /// The last tick's triangle, and the measured stretch of its own frame.
+    Everything,
 }
 
 impl Script {
@@ -92,6 +108,57 @@ impl Script {
             for number in 0..queries.div_ceil(8) {
                 let tool = about(&rows, &triangles, number, &mut rng);
                 script.query(&tool, number % 2 == 1, true, u32::MAX, Budget::UNLIMITED, None);
+            }
+        }
+        script.words.push(command::END);
+        script
+    }
+
+    /// The generated heart as it beats and the capsule of table 3, at ticks spread over the whole path:
+    /// each on the surface of its own tick.
+    pub fn beating(ticks: u32, knows: Knows) -> Self {
+        let (mesh, motion) = generate::heart(10_272).expect("a valid size");
+        let built = build(&mesh, 8);
+        let tree = built.tree::<u16>().expect("16-bit indices");
+        let beat = Beat::new(&motion);
+        let mut query = Query::<_, 512>::new(&tree).expect("a stack that is large enough");
+        let mut positions = Vec::new();
+        let mut script = Self::default();
+        script.tree(&built);
+        for tick in (1..PATH_TICKS).step_by((PATH_TICKS / ticks) as usize) {
+            let mut at = |tick| {
+                beat.deform(tick, &mut positions);
+                let Probe::Capsule(tool) = beat.tool(tick) else { panic!("a capsule") };
+                (built.to_rows(&positions), tool)
+            };
+            let (rows, tool) = at(tick - 1);
+            let before = query.closest(&rows[..], &tool, &Options::new()).expect("a query");
+            let (rows, tool) = at(tick);
+            script.rows(&rows, tree.triangle_count());
+            let tool = Instrument::capsule(tool.start(), tool.end(), tool.radius());
+            let knows = knows == Knows::Everything;
+            let warm = before.triangle.filter(|_| knows).unwrap_or(u32::MAX);
+            script.query(&tool, true, knows, warm, Budget::UNLIMITED, None);
+        }
+        script.words.push(command::END);
+        script
+    }
+
+    /// The same heart in its motion, with capsules where it hurts: on, in, through and far from it.
+    pub fn poses(queries: usize, seed: u64) -> Self {
+        let mut rng = Rng::with_seed(seed);
+        let (mesh, motion) = generate::heart(10_272).expect("a valid size");
+        let built = build(&mesh, 8);
+        let triangles = surfaces::triangles(&built.tree::<u16>().expect("16-bit indices"));
+        let mut script = Self::default();
+        script.tree(&built);
+        let frames = motion.frames.iter().step_by(motion.frames.len().div_ceil(FRAMES_OF_POSES));
+        for positions in frames {
+            let rows = built.to_rows(positions);
+            script.rows(&rows, triangles.len() as u32);
+            for _ in 0..queries.div_ceil(FRAMES_OF_POSES) {
+                let tool = pose(&rows, &triangles, &mut rng);
+                script.query(&tool, true, true, u32::MAX, Budget::UNLIMITED, None);
             }
         }
         script.words.push(command::END);
