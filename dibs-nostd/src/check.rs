@@ -81,7 +81,7 @@ pub enum FormatError {
         /// First triangle of the leaf.
         first: u32,
     },
-    /// A corner of a leaf is neither a corner of its first triangle nor the third of a later one.
+    /// The first or second corner of a triangle, not a leaf's first, is new to the leaf.
     Patch {
         /// Row of the triangle.
         triangle: u32,
@@ -355,29 +355,24 @@ const fn leaves<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatError> {
 
 const _: () = assert!(MAX_STACK.is_power_of_two() && MAX_LEAF_TRIANGLES.is_power_of_two());
 
-/// Whether the corners of a leaf's first triangle and the third corners of the others are all of its
-/// vertices: the only ones that a query looks at to reject the leaf.
+/// Whether only the third corner of a leaf's triangle is new to the leaf, but for its first triangle: a
+/// query looks at no others to reject the triangles up to there.
 const fn patch<I: Index>(tree: &Tree<'_, I>, first: u32, count: u32) -> Result<(), FormatError> {
     // Third corners of the leaf's triangles; the mask is there so that no index can panic.
     const MASK: usize = MAX_LEAF_TRIANGLES as usize - 1;
     let mut thirds = [u32::MAX; MASK + 1];
-    let [a, b, _] = corners(tree, first);
-    let mut at = 0;
-    while at < count {
-        let [_, _, third] = corners(tree, first + at);
-        thirds[at as usize & MASK] = third;
-        at += 1;
-    }
+    let [a, b, third] = corners(tree, first);
+    thirds[0] = third;
     let mut at = 1;
     while at < count {
-        let [mut vertex, second, _] = corners(tree, first + at);
+        let [mut vertex, second, third] = corners(tree, first + at);
         let mut corner = 0;
         while corner < 2 {
             let mut found = vertex == a || vertex == b;
-            let mut other = 0;
-            while other < count && !found {
-                found = vertex == thirds[other as usize & MASK];
-                other += 1;
+            let mut before = 0;
+            while before < at && !found {
+                found = vertex == thirds[before as usize & MASK];
+                before += 1;
             }
             if !found {
                 return Err(FormatError::Patch { triangle: first + at, vertex });
@@ -385,6 +380,7 @@ const fn patch<I: Index>(tree: &Tree<'_, I>, first: u32, count: u32) -> Result<(
             vertex = second;
             corner += 1;
         }
+        thirds[at as usize & MASK] = third;
         at += 1;
     }
     Ok(())

@@ -170,39 +170,64 @@ const fn rows_from(bytes: &[u8], row: u32, stride: usize) -> Option<&[u8]> {
     }
 }
 
+/// `count` rows of `stride` bytes from row `first` on; `None` unless all of them are there.
+#[inline(always)]
+pub(crate) fn run(bytes: &[u8], first: u32, count: u32, stride: usize) -> Option<&[u8]> {
+    let start = (first as usize).checked_mul(stride)?;
+    let end = start.checked_add((count as usize).checked_mul(stride)?)?;
+    bytes.get(start..end)
+}
+
+/// The node at the start of these bytes, and the bytes after it. (Each field is read whole, so that it
+/// takes one load.)
+#[inline(always)]
+pub(crate) const fn split_node<I: Index>(rows: &[u8]) -> Option<(Node, &[u8])> {
+    if I::BYTES == 2 {
+        let Some((pin, rest)) = rows.split_first_chunk() else { return None };
+        let Some((radius, rest)) = rest.split_first_chunk() else { return None };
+        let Some((link, rest)) = rest.split_first_chunk() else { return None };
+        let (pin, radius) = (u16::from_le_bytes(*pin), u16::from_le_bytes(*radius));
+        let link = u32::from_le_bytes(*link);
+        Some((Node { pin: pin as u32, radius_code: radius as u32, link }, rest))
+    } else {
+        let Some((pin, rest)) = rows.split_first_chunk() else { return None };
+        let Some((radius, rest)) = rest.split_first_chunk() else { return None };
+        let Some((link, rest)) = rest.split_first_chunk() else { return None };
+        let (pin, radius_code) = (u32::from_le_bytes(*pin), u32::from_le_bytes(*radius));
+        Some((Node { pin, radius_code, link: u32::from_le_bytes(*link) }, rest))
+    }
+}
+
 #[inline(always)]
 pub(crate) const fn node<I: Index>(nodes: &[u8], row: u32) -> Option<Node> {
-    let Some(tail) = rows_from(nodes, row, node_bytes::<I>()) else { return None };
+    let Some(rows) = rows_from(nodes, row, node_bytes::<I>()) else { return None };
+    match split_node::<I>(rows) {
+        Some((node, _)) => Some(node),
+        None => None,
+    }
+}
+
+/// The corners at the start of these bytes, and the bytes after them.
+#[inline(always)]
+pub(crate) const fn split_triangle<I: Index>(rows: &[u8]) -> Option<([u32; 3], &[u8])> {
     if I::BYTES == 2 {
-        let Some(r) = tail.first_chunk::<8>() else { return None };
-        Some(Node {
-            pin: short(r[0], r[1]),
-            radius_code: short(r[2], r[3]),
-            link: u32::from_le_bytes([r[4], r[5], r[6], r[7]]),
-        })
+        let Some((r, rest)) = rows.split_first_chunk::<6>() else { return None };
+        Some(([short(r[0], r[1]), short(r[2], r[3]), short(r[4], r[5])], rest))
     } else {
-        let Some(r) = tail.first_chunk::<12>() else { return None };
-        Some(Node {
-            pin: u32::from_le_bytes([r[0], r[1], r[2], r[3]]),
-            radius_code: u32::from_le_bytes([r[4], r[5], r[6], r[7]]),
-            link: u32::from_le_bytes([r[8], r[9], r[10], r[11]]),
-        })
+        let Some((a, rest)) = rows.split_first_chunk() else { return None };
+        let Some((b, rest)) = rest.split_first_chunk() else { return None };
+        let Some((c, rest)) = rest.split_first_chunk() else { return None };
+        let corners = [u32::from_le_bytes(*a), u32::from_le_bytes(*b), u32::from_le_bytes(*c)];
+        Some((corners, rest))
     }
 }
 
 #[inline(always)]
 pub(crate) const fn triangle<I: Index>(triangles: &[u8], row: u32) -> Option<[u32; 3]> {
-    let Some(tail) = rows_from(triangles, row, triangle_bytes::<I>()) else { return None };
-    if I::BYTES == 2 {
-        let Some(r) = tail.first_chunk::<6>() else { return None };
-        Some([short(r[0], r[1]), short(r[2], r[3]), short(r[4], r[5])])
-    } else {
-        let Some(r) = tail.first_chunk::<12>() else { return None };
-        Some([
-            u32::from_le_bytes([r[0], r[1], r[2], r[3]]),
-            u32::from_le_bytes([r[4], r[5], r[6], r[7]]),
-            u32::from_le_bytes([r[8], r[9], r[10], r[11]]),
-        ])
+    let Some(rows) = rows_from(triangles, row, triangle_bytes::<I>()) else { return None };
+    match split_triangle::<I>(rows) {
+        Some((corners, _)) => Some(corners),
+        None => None,
     }
 }
 

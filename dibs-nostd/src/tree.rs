@@ -1,5 +1,6 @@
 //! The tree: a validated view of bytes that stay where they are, in flash or in a file.
 
+use core::iter;
 use core::marker::PhantomData;
 
 use glam::Vec3;
@@ -191,6 +192,33 @@ impl<'a, I: Index> Tree<'a, I> {
     #[inline(always)]
     pub(crate) const fn record(&self, row: u32) -> Option<Node> {
         format::node::<I>(self.sections.nodes, row)
+    }
+
+    /// The nodes of a run of rows; `None` unless all of them are there.
+    #[inline(always)]
+    pub(crate) fn records(&self, first: u32, count: u32) -> Option<impl Iterator<Item = Node>> {
+        let mut rows = format::run(self.sections.nodes, first, count, format::node_bytes::<I>())?;
+        Some(iter::from_fn(move || {
+            let (node, rest) = format::split_node::<I>(rows)?;
+            rows = rest;
+            Some(node)
+        }))
+    }
+
+    /// The corners of a run of triangles; `None` unless all of them are there.
+    #[inline(always)]
+    pub(crate) fn triangles(
+        &self,
+        first: u32,
+        count: u32,
+    ) -> Option<impl Iterator<Item = [u32; 3]>> {
+        let stride = format::triangle_bytes::<I>();
+        let mut rows = format::run(self.sections.triangles, first, count, stride)?;
+        Some(iter::from_fn(move || {
+            let (corners, rest) = format::split_triangle::<I>(rows)?;
+            rows = rest;
+            Some(corners)
+        }))
     }
 
     pub(crate) const fn header(&self) -> &Header {

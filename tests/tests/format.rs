@@ -167,6 +167,42 @@ fn a_leaf_whose_vertices_are_not_at_their_places_is_refused() {
     assert!(refused > 50, "{refused} leaves tried");
 }
 
+/// A query that looks at a leaf's first rows relies on them having no other vertices.
+#[test]
+fn a_leaf_whose_triangles_come_too_early_is_refused() {
+    let (mesh, _) = heart(IndexWidth::Bits16);
+    let built = Builder::new().with_metric(false).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let bytes = built.blob();
+    let table = section(bytes, 2).0;
+    let (mut refused, mut accepted) = (0, 0);
+    for row in 0..tree.node_count() {
+        let Some((.., Link::Leaf { first, count })) = tree.node(row) else { continue };
+        for triangle in first + 1..(first + count).saturating_sub(1) {
+            // The next one before this one.
+            let at = table + 6 * triangle as usize;
+            let mut swapped = bytes.to_vec();
+            swapped[at..at + 12].rotate_left(6);
+            let sealed = with_word(&swapped, 0, word(&swapped, 0));
+            let known: Vec<u32> =
+                (first..triangle).flat_map(|t| tree.triangle(t).expect("in the tree")).collect();
+            let [a, b, _] = tree.triangle(triangle + 1).expect("in the tree");
+            match [a, b].into_iter().find(|v| !known.contains(v)) {
+                Some(vertex) => {
+                    let error = Tree::<u16>::from_bytes(&sealed).expect_err("a new first corner");
+                    assert_eq!(error, FormatError::Patch { triangle, vertex });
+                    refused += 1;
+                }
+                None => {
+                    Tree::<u16>::from_bytes(&sealed).expect("both corners are known");
+                    accepted += 1;
+                }
+            }
+        }
+    }
+    assert!(refused > 50 && accepted > 5, "{refused} refused, {accepted} accepted");
+}
+
 /// What a validated tree does when its bytes rot afterwards: an error or an answer, but it ends.
 #[test]
 fn a_query_on_rotten_bytes_ends() {
@@ -188,7 +224,7 @@ fn a_query_on_rotten_bytes_ends() {
         match query.closest(rows.as_slice(), &tool, &Options::new()) {
             Ok(found) => {
                 answers += 1;
-                assert!(found.node_tests <= 2 * tree.node_count() + tree.triangle_count() + 1);
+                assert!(found.node_tests <= 3 * tree.node_count() + tree.triangle_count() + 1);
             }
             Err(QueryError::Corrupt { .. } | QueryError::Uncovered { .. }) => errors += 1,
             Err(other) => panic!("{other}"),

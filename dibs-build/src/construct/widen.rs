@@ -8,7 +8,7 @@
 use super::{Cluster, Content};
 
 /// A child whose radius is at least this share of its parent's gives way to its own children.
-const SHARE: f64 = 0.6;
+const SHARE: f64 = 0.7;
 
 /// Gives every node up to `most` children.
 pub(crate) fn widen(cluster: Cluster, most: usize) -> Cluster {

@@ -5,6 +5,7 @@ mod cost_m7;
 mod cost_x86_64;
 mod error;
 mod options;
+mod plane;
 mod search;
 
 pub use cost::Cost;
@@ -33,7 +34,7 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         if tree.stack() as usize > STACK {
             return Err(QueryError::Stack { needed: tree.stack(), available: STACK as u32 });
         }
-        Ok(Self { tree: *tree, stack: [Waiting { lower: 0.0, row: 0 }; STACK] })
+        Ok(Self { tree: *tree, stack: [Waiting { lower: 0.0, link: 0 }; STACK] })
     }
 
     /// The tree that is searched.

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::plane::Plane;
 use super::{Budget, Options, QueryError};
 use crate::format::Link;
 use crate::sqrt::sqrt;
@@ -13,8 +14,8 @@ use crate::{Index, Proximity, Tree, VertexTable};
 pub(super) struct Waiting {
     /// No point of the subtree is closer to the tool's axis than this.
     pub lower: f32,
-    /// Row of its node.
-    pub row: u32,
+    /// Link of its node.
+    pub link: u32,
 }
 
 /// Slack of the pruning comparison, in units of the query's scale: the f32 rounding of both sides.
@@ -54,25 +55,6 @@ enum Step {
     OutOfBudget,
 }
 
-/// A plane that separates what is beyond it from the tool's axis by more than the reach.
-///
-/// For any vector `n` from the axis' nearest point `q` to some point, the axis lies where
-/// `n . (x - q) <= 0`: it is convex. So all points of a patch with `n . (x - q) > reach |n|` at its
-/// vertices are farther than the reach. No root is taken of what it rejects, and it is tighter than
-/// any sphere around the patch: a sphere's lower bound is that of its farthest tangent plane.
-struct Plane {
-    normal: Vec3,
-    limit: f32,
-}
-
-impl Plane {
-    /// Written so that not a number is not beyond.
-    #[inline(always)]
-    fn has_beyond(&self, point: Vec3) -> bool {
-        self.normal.dot(point) > self.limit
-    }
-}
-
 /// The state of one search.
 pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     tree: &'s Tree<'t, I>,
@@ -95,9 +77,8 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     best: Option<AxisPair>,
     best_squared: f32,
     best_triangle: u32,
-    /// Besides the root's.
-    node_tests: u32,
-    triangle_tests: u32,
+    /// What is left of the budget.
+    left: Budget,
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T> {
@@ -140,23 +121,25 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         if !(coordinates < 1e18) {
             return Err(QueryError::Position { vertex: root.pin });
         }
-        // A sound tree visits each record twice and each triangle once. If its bytes rot into a loop,
-        // this ends the search with an interval that is still right.
-        let most = header.nodes.saturating_mul(2).saturating_add(header.triangles);
+        // A sound tree tests each node's sphere once, each leaf's plane twice and each triangle once. If its
+        // bytes rot into a loop, this ends the search with an interval that is still right.
+        let most = header.nodes.saturating_mul(3).saturating_add(header.triangles);
+        let budget = Budget {
+            node_tests: if options.budget.node_tests < most {
+                options.budget.node_tests
+            } else {
+                most
+            },
+            triangle_tests: options.budget.triangle_tests,
+        };
         let mut search = Self {
             tree,
             vertices,
             tool,
             stack,
             waiting: 0,
-            budget: Budget {
-                node_tests: if options.budget.node_tests < most {
-                    options.budget.node_tests
-                } else {
-                    most
-                },
-                triangle_tests: options.budget.triangle_tests,
-            },
+            budget,
+            left: budget,
             radius_scale,
             scale,
             slack: SLACK * scale + FLOOR,
@@ -168,8 +151,6 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             best: None,
             best_squared: f32::INFINITY,
             best_triangle: u32::MAX,
-            node_tests: 0,
-            triangle_tests: 0,
         };
         search.pull_in(root.pin, distance);
         if let Some(triangle) = options.warm_start
@@ -179,7 +160,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             let corners = search.corners(triangle)?;
             search.test_triangle(triangle, &corners);
         }
-        search.push(0, Waiting { lower: distance - radius, row: 0 })?;
+        let subtree = Waiting { lower: distance - radius, link: root.link };
+        search.push(0, subtree).ok_or(QueryError::Corrupt { row: 0 })?;
         Ok(search)
     }
 
@@ -187,21 +169,21 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     pub fn run(mut self) -> Result<Proximity, QueryError> {
         while let Some(top) = self.waiting.checked_sub(1) {
             self.waiting = top;
-            let &Waiting { lower, row } =
+            let &Waiting { lower, link } =
                 self.stack.get(top).ok_or(QueryError::Corrupt { row: top as u32 })?;
             if lower > self.reach {
                 continue;
             }
-            let node = self.tree.record(row).ok_or(QueryError::Corrupt { row })?;
-            let step = match Link::decode(node.link) {
-                Link::Children { first, count } => self.expand(first, count, lower)?,
-                Link::Leaf { first, count } => self.leaf(node.pin, first, count)?,
+            let step = match Link::decode(link) {
+                Link::Children { first, count } => self.expand(first, count)?,
+                Link::Leaf { first, count } => self.leaf(first, count)?,
             };
             if matches!(step, Step::OutOfBudget) {
-                let waiting = self.stack.iter().take(self.waiting);
-                let least =
-                    |least, left: &Waiting| if left.lower < least { left.lower } else { least };
-                let lower = waiting.fold(lower, least);
+                let waiting = self.stack.iter().take(self.waiting).map(|left| left.lower);
+                // A pin that is not a number bounds nothing.
+                let known = |lower: f32| if lower.is_nan() { 0.0 } else { lower };
+                let least = |least, lower| if known(lower) < least { known(lower) } else { least };
+                let lower = waiting.fold(known(lower), least);
                 return self.finish(lower);
             }
         }
@@ -226,79 +208,94 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         }
     }
 
-    /// Lets a subtree wait above those from `base` on that are nearer.
+    /// Lets a subtree wait above those from `base` on that are nearer; `None` if the stack is full.
     #[inline(always)]
-    fn push(&mut self, base: usize, subtree: Waiting) -> Result<(), QueryError> {
-        let full = QueryError::Corrupt { row: subtree.row };
+    fn push(&mut self, base: usize, subtree: Waiting) -> Option<()> {
         let mut at = self.waiting;
         while at > base
             && let Some(&below) = self.stack.get(at - 1)
             && below.lower < subtree.lower
         {
-            *self.stack.get_mut(at).ok_or(full)? = below;
+            *self.stack.get_mut(at)? = below;
             at -= 1;
         }
-        *self.stack.get_mut(at).ok_or(full)? = subtree;
+        *self.stack.get_mut(at)? = subtree;
         self.waiting += 1;
-        Ok(())
+        Some(())
     }
 
-    /// Tests the spheres of a node's children.
+    /// Tests the spheres of a node's children, and the planes of those that are leaves: what is left
+    /// waits.
     #[inline(always)]
-    fn expand(&mut self, first: u32, count: u32, parent_lower: f32) -> Result<Step, QueryError> {
-        if self.budget.node_tests.saturating_sub(self.node_tests) < count {
+    fn expand(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
+        let corrupt = QueryError::Corrupt { row: first };
+        let Some(left) = self.left.node_tests.checked_sub(count) else {
             return Ok(Step::OutOfBudget);
-        }
-        self.node_tests += count;
+        };
+        self.left.node_tests = left;
         let base = self.waiting;
-        for row in first..first + count {
-            let node = self.tree.record(row).ok_or(QueryError::Corrupt { row })?;
-            let pin = node.pin;
-            let position = self.position(pin)?;
+        let tree = self.tree;
+        for node in tree.records(first, count).ok_or(corrupt)? {
+            let position = self.position(node.pin)?;
             let radius = node.radius_code as f32 * self.radius_scale;
-            let squared = self.tool.axis_distance_squared(position);
+            let normal = self.tool.axis_to(position);
+            let squared = normal.dot(normal);
             let far = self.reach + radius;
+            // What is not a number is not far: the leaves below find out what it is.
             if squared > far * far {
                 continue;
             }
-            if squared.is_nan() {
-                return Err(QueryError::Position { vertex: pin });
-            }
             let distance = sqrt(squared);
-            self.pull_in(pin, distance);
-            let own = distance - radius;
-            // A child lies inside its parent, whatever its own sphere says.
-            let lower = if own > parent_lower { own } else { parent_lower };
-            self.push(base, Waiting { lower, row })?;
+            self.pull_in(node.pin, distance);
+            // At once, while the vector to its pin is at hand.
+            if let Link::Leaf { first, count } = Link::decode(node.link)
+                && let Some(left) = self.left.node_tests.checked_sub(1)
+            {
+                self.left.node_tests = left;
+                let plane = self.plane_across(normal, position, distance);
+                let beyond = plane.beyond(tree, self.vertices, first, count).ok_or(corrupt)?;
+                if beyond == count {
+                    continue;
+                }
+            }
+            let subtree = Waiting { lower: distance - radius, link: node.link };
+            self.push(base, subtree).ok_or(corrupt)?;
         }
         Ok(Step::Done)
     }
 
-    /// Tests a leaf: its vertices against one plane, then each triangle against its own.
+    /// Tests a leaf, now that nothing nearer waits: its vertices against one plane; then, from the first
+    /// triangle on that the plane does not reject, each against the same plane and its own.
     #[inline(always)]
-    fn leaf(&mut self, pin: u32, first: u32, count: u32) -> Result<Step, QueryError> {
-        if count > 1 {
-            if self.node_tests >= self.budget.node_tests {
-                return Ok(Step::OutOfBudget);
-            }
-            self.node_tests += 1;
-            let plane = self.plane_towards(self.position(pin)?);
-            if self.is_beyond(&plane, first, count)? {
-                return Ok(Step::Done);
-            }
+    fn leaf(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
+        let Some(left) = self.left.node_tests.checked_sub(1) else {
+            return Ok(Step::OutOfBudget);
+        };
+        self.left.node_tests = left;
+        let corrupt = QueryError::Corrupt { row: first };
+        let [corner, ..] = self.tree.triangle(first).ok_or(corrupt)?;
+        let patch_plane = self.plane_towards(self.position(corner)?);
+        let beyond = patch_plane.beyond(self.tree, self.vertices, first, count).ok_or(corrupt)?;
+        if beyond == count {
+            return Ok(Step::Done);
         }
-        for triangle in first..first + count {
+        let tree = self.tree;
+        let (first, count) = (first + beyond, count - beyond);
+        let triangles = tree.triangles(first, count).ok_or(corrupt)?;
+        for (triangle, corners) in (first..).zip(triangles) {
             if triangle == self.best_triangle {
                 continue;
             }
-            let spent = self.node_tests >= self.budget.node_tests
-                || self.triangle_tests >= self.budget.triangle_tests;
-            if spent {
+            let (Some(left), 1..) = (self.left.node_tests.checked_sub(1), self.left.triangle_tests)
+            else {
                 return Ok(Step::OutOfBudget);
-            }
-            self.node_tests += 1;
-            let corners = self.corners(triangle)?;
+            };
+            self.left.node_tests = left;
             let [a, b, c] = corners;
+            let [a, b, c] = [self.position(a)?, self.position(b)?, self.position(c)?];
+            if patch_plane.has_beyond(a) && patch_plane.has_beyond(b) && patch_plane.has_beyond(c) {
+                continue;
+            }
             let plane = self.plane_towards((a + b + c) * THIRD);
             if plane.has_beyond(a) && plane.has_beyond(b) && plane.has_beyond(c) {
                 continue;
@@ -307,7 +304,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             if plane.limit.is_nan() {
                 return Err(QueryError::Position { vertex: self.not_a_number(triangle) });
             }
-            self.test_triangle(triangle, &corners);
+            self.test_triangle(triangle, &[a, b, c]);
         }
         Ok(Step::Done)
     }
@@ -315,29 +312,15 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     #[inline(always)]
     fn plane_towards(&self, point: Vec3) -> Plane {
         let normal = self.tool.axis_to(point);
-        let on_axis = point - normal;
-        let beyond = (self.reach + self.coordinate_slack) * sqrt(normal.dot(normal));
-        Plane { normal, limit: normal.dot(on_axis) + beyond + self.tilt_slack }
+        self.plane_across(normal, point, sqrt(normal.dot(normal)))
     }
 
-    /// Whether a whole leaf is beyond a plane. Its vertices are the corners of its first triangle and
-    /// the third corners of the others: the builder sees to it, the checker checks it.
+    /// The plane across the shortest vector from the axis to a point, this long.
     #[inline(always)]
-    fn is_beyond(&self, plane: &Plane, first: u32, count: u32) -> Result<bool, QueryError> {
-        let rows = |row| self.tree.triangle(row).ok_or(QueryError::Corrupt { row });
-        let [a, b, c] = rows(first)?;
-        for corner in [a, b, c] {
-            if !plane.has_beyond(self.position(corner)?) {
-                return Ok(false);
-            }
-        }
-        for triangle in first + 1..first + count {
-            let [_, _, corner] = rows(triangle)?;
-            if !plane.has_beyond(self.position(corner)?) {
-                return Ok(false);
-            }
-        }
-        Ok(true)
+    fn plane_across(&self, normal: Vec3, point: Vec3, length: f32) -> Plane {
+        let on_axis = point - normal;
+        let beyond = (self.reach + self.coordinate_slack) * length;
+        Plane { normal, limit: normal.dot(on_axis) + beyond + self.tilt_slack }
     }
 
     #[inline(always)]
@@ -354,7 +337,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
 
     #[inline(always)]
     fn test_triangle(&mut self, triangle: u32, corners: &[Vec3; 3]) {
-        self.triangle_tests += 1;
+        self.left.triangle_tests = self.left.triangle_tests.saturating_sub(1);
         if let Some(pair) = self.tool.closest_on_triangle(corners, self.reach_squared)
             && pair.distance_squared < self.best_squared
         {
@@ -392,6 +375,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             _ => return Err(QueryError::Uncovered { pin }),
         };
         let axis_distance = sqrt(pair.distance_squared);
+        let used = u32::saturating_sub;
         let above_zero = |x: f32| if x > 0.0 { x } else { 0.0 };
         let separation = above_zero(axis_distance - radius);
         let left = above_zero(lower - radius);
@@ -412,8 +396,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             triangle,
             corners,
             barycentric: pair.barycentric,
-            node_tests: self.node_tests.saturating_add(1),
-            triangle_tests: self.triangle_tests,
+            node_tests: used(self.budget.node_tests, self.left.node_tests).saturating_add(1),
+            triangle_tests: used(self.budget.triangle_tests, self.left.triangle_tests),
         })
     }
 }

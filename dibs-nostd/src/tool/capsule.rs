@@ -1,6 +1,6 @@
 //! The capsule: a segment with a radius.
 
-use super::{AxisPair, Tool, ToolError, check_point, check_radius, clamp, sealed, triangle};
+use super::{AxisPair, Tool, ToolError, check_point, check_radius, clamp_bits, sealed, triangle};
 use crate::sqrt::sqrt;
 use glam::Vec3;
 
@@ -27,15 +27,12 @@ pub(super) struct Axis {
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub(super) direction: Vec3,
     pub(super) length: f32,
-    /// 2^-19 of the length's square. A projection onto the axis is off by a few 2^-24 of the distances
-    /// involved, and the axis' extent across it by that times the axis' length: at most this.
-    pub(super) slack: f32,
 }
 
 impl Axis {
     /// A segment of length zero.
     pub(super) fn point(start: Vec3) -> Self {
-        Self { start, direction: Vec3::ZERO, length: 0.0, slack: 0.0 }
+        Self { start, direction: Vec3::ZERO, length: 0.0 }
     }
 }
 
@@ -63,7 +60,7 @@ impl Capsule {
             // Three divisions rather than one: `length * direction` is then within two roundings of
             // `span`, however `length` was rounded.
             let direction = Vec3::new(span.x / length, span.y / length, span.z / length);
-            Axis { start, direction, length, slack: length * length * (16.0 * f32::EPSILON) }
+            Axis { start, direction, length }
         } else {
             Axis::point(start)
         };
@@ -104,7 +101,7 @@ impl Tool for Capsule {
     fn axis_to(&self, point: Vec3) -> Vec3 {
         let Axis { start, direction, length, .. } = self.axis;
         let offset = point - start;
-        offset - clamp(offset.dot(direction), length) * direction
+        offset - clamp_bits(offset.dot(direction), length) * direction
     }
 
     #[inline(always)]
@@ -114,9 +111,6 @@ impl Tool for Capsule {
 
     #[inline]
     fn closest_on_triangle(&self, corners: &[Vec3; 3], limit_squared: f32) -> Option<AxisPair> {
-        if triangle::far_from_segment(&self.axis, corners, limit_squared) {
-            return None;
-        }
         triangle::closest_to_segment(&self.axis, corners, limit_squared)
     }
 }

@@ -68,9 +68,6 @@ impl Tool for Sphere {
 
     #[inline]
     fn closest_on_triangle(&self, corners: &[Vec3; 3], limit_squared: f32) -> Option<AxisPair> {
-        if triangle::far_from_point(self.center, corners, limit_squared) {
-            return None;
-        }
         triangle::closest_to_point(self.center, corners, limit_squared)
     }
 }
