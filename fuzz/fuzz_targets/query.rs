@@ -90,7 +90,7 @@ fn ask(
 ) {
     let tree = *query.tree();
     let Ok(answer) = query.closest(rows, tool, options) else { return };
-    let most = 2 * tree.node_count() + tree.triangle_count();
+    let most = 3 * tree.node_count() + tree.triangle_count();
     assert!(answer.node_tests <= budget.node_tests.min(most) + 1);
     assert!(answer.triangle_tests <= budget.triangle_tests.min(tree.triangle_count() + 1));
     assert!(answer.lower >= 0.0 && answer.lower <= answer.separation);

@@ -4,7 +4,7 @@ use super::Cost;
 
 impl Cost {
     /// A sphere on a Cortex-M7.
-    pub const M7_SPHERE: Self = Self { base: 1662, node_test: 196, triangle_test: 925 };
+    pub const M7_SPHERE: Self = Self { base: 1846, node_test: 120, triangle_test: 1012 };
     /// A capsule on a Cortex-M7.
-    pub const M7_CAPSULE: Self = Self { base: 1701, node_test: 212, triangle_test: 1052 };
+    pub const M7_CAPSULE: Self = Self { base: 1650, node_test: 126, triangle_test: 1127 };
 }
