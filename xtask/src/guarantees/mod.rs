@@ -91,7 +91,7 @@ impl Effort {
         cases: 200_000,
         bits: 30_000,
         costs: 30_000,
-        host_costs: 6_000,
+        host_costs: 10_000,
         torn: 20_000,
         demo_seconds: 5,
         fuzz_seconds: 60,
@@ -103,7 +103,7 @@ pub fn run(options: &Options) -> Result<()> {
     if options.fit {
         let wanted = |name: &str| options.only.as_deref().is_none_or(|only| name.contains(only));
         if wanted("host") {
-            cost::fit(&Machine::Host, 2_000)?;
+            cost::fit(&Machine::Host, 4_000)?;
         }
         if wanted("board") {
             cost::fit(&Machine::M7(&board()?), 12_000)?;

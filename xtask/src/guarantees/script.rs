@@ -78,6 +78,8 @@ impl Script {
         let meshes = [(heart, 8), (brain, 4), (surfaces::ball(3), 8), (surfaces::slivers(60), 1)];
         let mut script = Self::default();
         let of_each = queries.div_ceil(meshes.len());
+        // Few enough of a frame that every mesh has every deformation, twice.
+        let of_frame = (of_each / (2 * Deformation::ALL.len())).clamp(1, 100);
         for (mesh, leaf) in meshes {
             let built = build(&mesh, leaf);
             script.tree(&built);
@@ -85,7 +87,7 @@ impl Script {
             while script.queries() < end {
                 for deformation in Deformation::ALL {
                     let left = end.saturating_sub(script.queries());
-                    script.frame(&built, &mesh, deformation, left.min(100), draw, &mut rng);
+                    script.frame(&built, &mesh, deformation, left.min(of_frame), draw, &mut rng);
                 }
             }
         }

@@ -80,11 +80,15 @@ impl Binary {
                 functions.insert(start, function);
             }
         }
+        let (mut found, mut larger) = (0, 0);
         for (address, size) in declared(&file)? {
             if let Some(function) = functions.get_mut(&(address & !1)) {
+                found += 1;
+                larger += u32::from(size > function.frame);
                 function.frame = function.frame.max(size);
             }
         }
+        println!("frames that the compiler tells: {found}, of them larger than decoded: {larger}");
         let vectors = file.section_by_name(".vector_table").context("no vector table")?;
         let vectors = vectors.data()?.chunks_exact(4).skip(1);
         let vectors = vectors.map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) & !1).collect();
