@@ -1,18 +1,22 @@
 //! `cargo xtask demo`: a beating heart streamed to the controller, every answer checked.
 
 mod check;
+mod faults;
 mod machine;
 mod plot;
 mod report;
+pub mod rot;
 mod scene;
 mod sender;
 mod session;
+mod timeline;
 
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 
 use crate::workspace;
+use faults::Plan;
 use machine::Machine;
 use report::Report;
 use scene::Scene;
@@ -38,6 +42,12 @@ pub struct Options {
     /// Runs the controller as a program on this computer, without cross toolchain and QEMU.
     #[arg(long)]
     pub host: bool,
+    /// Puts faults of every kind on the bus, and silences it for a while halfway.
+    #[arg(long)]
+    pub faults: bool,
+    /// What the faults are drawn from.
+    #[arg(long, default_value_t = 1, requires = "faults")]
+    pub seed: u64,
     /// Folder for the report and the pictures; `target/demo` if absent.
     #[arg(long)]
     pub output: Option<PathBuf>,
@@ -56,8 +66,12 @@ pub fn run(options: &Options) -> Result<()> {
     let folder = options.output.clone().unwrap_or_else(workspace::demo);
     std::fs::create_dir_all(&folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    let outcome = session::run(&scene, &machine, options.seconds, &folder)?;
+    let faults = options.faults.then(|| Plan::new(options.seed, options.seconds));
+    let outcome = session::run(&scene, &machine, options.seconds, faults, &folder)?;
     plot::draw(&outcome, &folder)?;
+    if faults.is_some() {
+        timeline::draw(&outcome, &folder)?;
+    }
     let report = Report::new(&scene, &machine, &outcome)?;
     report.write(&folder)?;
     report.print(&folder);

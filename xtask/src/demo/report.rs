@@ -7,12 +7,13 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 use controller::telemetry::{Summary, Tick, cause_code, cause_name};
-use controller::{SURFACE_AGE_LIMIT, TICK_RATE};
+use controller::{SILENCE_LIMIT, SURFACE_AGE_LIMIT, TICK_RATE};
 use dibs_nostd::constraint::Unknown;
 use dibs_nostd::failsafe::State;
 use dibs_nostd::wire::Event;
 use serde::Serialize;
 
+use super::faults::{Faults, Silence};
 use super::machine::Machine;
 use super::scene::Scene;
 use super::session::Outcome;
@@ -28,6 +29,10 @@ pub struct Report {
     frames_sent: u32,
     frames_published: u32,
     frames_rejected: u32,
+    /// What was done to the bus.
+    faults: Option<Faults>,
+    /// What a line that fell silent led to.
+    silence: Option<Silence>,
     /// What happened on the bus, by what the wire protocol calls it.
     bus_events: BTreeMap<&'static str, u32>,
     ticks: u32,
@@ -81,8 +86,6 @@ pub struct Report {
     surface: String,
     stretch_limit: f32,
     machine: Facts,
-    /// Nothing in a run is random: motion and instrument are functions of time.
-    seed: Option<u64>,
     command: String,
     controller_command: String,
     broken_promises: Vec<String>,
@@ -133,6 +136,8 @@ impl Report {
             frames_sent: outcome.frames_sent,
             frames_published: last.frames_published,
             frames_rejected: last.rejected,
+            faults: outcome.faults.clone(),
+            silence: Silence::of(outcome),
             bus_events: events(&summary),
             ticks: summary.ticks,
             queries: answered.len(),
@@ -168,7 +173,6 @@ impl Report {
             surface: scene.describe(),
             stretch_limit: scene.surface.stretch,
             machine: Facts::gather(machine),
-            seed: None,
             command: command_line(),
             controller_command: outcome.command.clone(),
             broken_promises: Vec::new(),
@@ -206,18 +210,25 @@ impl Report {
         );
         promise(faults == 0, format!("{faults} queries returned an error"));
         let rejected = self.frames_rejected;
-        promise(rejected == 0, format!("{rejected} packets or frames were rejected"));
         let (sent, published) = (self.frames_sent, self.frames_published);
-        // The last frame may have been on its way when the run ended.
-        promise(
-            published > 0 && published + 1 >= sent,
-            format!("{published} of {sent} frames were published"),
-        );
+        promise(published > 0, "no frame was published".to_owned());
+        if let Some(faults) = &self.faults {
+            promise(faults.total() > 0, "no fault happened".to_owned());
+            promise(rejected > 0, "nothing was rejected, whatever the faults".to_owned());
+            let recovered = self.silence.as_ref().and_then(|silence| silence.recovered_after);
+            promise(self.silence.is_some(), "the silent line did not make it safe".to_owned());
+            promise(recovered.is_some(), "it did not recover from the silence".to_owned());
+        } else {
+            promise(rejected == 0, format!("{rejected} packets or frames were rejected"));
+            // The last frame may have been on its way when the run ended.
+            promise(published + 1 >= sent, format!("{published} of {sent} frames were published"));
+        }
         // How often a frame comes is up to this computer; what is done without one is the promise.
-        let too_old =
-            |tick: &&Tick| tick.state != State::Safe as u32 && tick.age > SURFACE_AGE_LIMIT;
-        let trusted = outcome.ticks.iter().filter(too_old).count();
-        promise(trusted == 0, format!("{trusted} ticks acted on a surface that was too old"));
+        let acting = || outcome.ticks.iter().filter(|tick| tick.state != State::Safe as u32);
+        let too_old = acting().filter(|tick| tick.age > SURFACE_AGE_LIMIT).count();
+        promise(too_old == 0, format!("{too_old} ticks acted on a surface that was too old"));
+        let silent = acting().filter(|tick| tick.silence > SILENCE_LIMIT).count();
+        promise(silent == 0, format!("{silent} ticks acted after the link was lost"));
         let lost = self.records_lost;
         promise(lost == 0, format!("{lost} telemetry records were lost"));
         let missed = self.deadline_misses.unwrap_or(0);
@@ -252,6 +263,24 @@ impl Report {
         let events: Vec<String> =
             self.bus_events.iter().map(|(name, count)| format!("{name} {count}")).collect();
         row("", events.join(", "));
+        if let Some(faults) = &self.faults {
+            let list: Vec<String> =
+                faults.injected.iter().map(|(name, count)| format!("{name} {count}")).collect();
+            row("faults", format!("{}: {}", faults.total(), list.join(", ")));
+        }
+        if let Some(silence) = &self.silence {
+            let Silence { since_packet, since_frame, age, recovered_after, .. } = silence;
+            row(
+                "line cut",
+                format!(
+                    "safe {since_packet} ms after the last good packet, {since_frame} after the last \
+                     good frame, surface {age} ms old"
+                ),
+            );
+            if let Some(recovered) = recovered_after {
+                row("", format!("nominal again {recovered} ms later"));
+            }
+        }
         row("control ticks", format!("{} at {TICK_RATE} Hz", self.ticks));
         row(
             "surface trusted",

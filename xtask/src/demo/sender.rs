@@ -11,9 +11,11 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use controller::{MTU, TICK_RATE};
+use dibs_build::stream::faults::{Fault, FaultyLine};
 use dibs_build::stream::{Line, SendError, Sender, Settings, SurfaceOrder};
 use glam::Vec3;
 
+use super::faults::Plan;
 use super::scene::Scene;
 
 /// Between two looks at the telemetry.
@@ -105,16 +107,45 @@ fn paced(socket: UnixStream, link: &Arc<Link>) -> Result<Line> {
 
 /// Sends the motion, over and over, until the controller is gone: at the recorded rate, or as fast
 /// as the line allows and the controller acknowledges.
-pub fn send(scene: &Scene, link: &Arc<Link>, bus: UnixStream) -> Result<()> {
-    let interval = (TICK_RATE as f32 / scene.rate) as u32;
+///
+/// Returns how often each fault has happened.
+pub fn send(
+    scene: &Scene,
+    link: &Arc<Link>,
+    bus: UnixStream,
+    faults: Option<&Plan>,
+) -> Result<Vec<(Fault, u64)>> {
     let order = match scene.tree.index_bits() {
         16 => SurfaceOrder::of(&scene.tree.tree::<u16>()?),
         _ => SurfaceOrder::of(&scene.tree.tree::<u32>()?),
     };
     let settings = Settings { session: 1, ..Settings::default() };
-    let mut sender = Sender::<_, MTU>::new(paced(bus, link)?, order, settings);
+    let line = paced(bus, link)?;
+    let line = match faults {
+        Some(plan) => FaultyLine::new(line, plan.seed, Plan::KINDS, Plan::RATE),
+        None => FaultyLine::new(line, 0, &[], 0.0),
+    };
+    let mut sender = Sender::<_, MTU>::new(line, order, settings);
+    send_all(scene, link, &mut sender, faults)?;
+    Ok(sender.transport().counts().to_vec())
+}
+
+fn send_all(
+    scene: &Scene,
+    link: &Link,
+    sender: &mut Sender<FaultyLine, MTU>,
+    faults: Option<&Plan>,
+) -> Result<()> {
+    let interval = (TICK_RATE as f32 / scene.rate) as u32;
+    let rate = if faults.is_some() { Plan::RATE } else { 0.0 };
+    let mut silence = faults.map(Plan::silence_at);
     for positions in scene.motion.frames.iter().cycle() {
         let start = link.now();
+        // The last frame before the silence comes through, and the first after it: what is measured is the
+        // silence.
+        if silence.is_some_and(|at| start >= at) {
+            sender.transport().set_rate(0.0);
+        }
         let frame = sender.prepare(positions).context("the motion cannot be sent")?;
         if let Some((epoch, held)) = sender.held() {
             link.lock().insert(epoch, Arc::new(held.to_vec()));
@@ -133,11 +164,32 @@ pub fn send(scene: &Scene, link: &Arc<Link>, bus: UnixStream) -> Result<()> {
             now < start + interval || in_flight > 0 && now < sent + ANSWER
         };
         while is_waiting(sender.in_flight()) {
-            if link.is_over() || sender.poll().is_err() {
+            if !rest(link, sender) {
                 return Ok(());
             }
-            thread::sleep(PAUSE);
+        }
+        if sender.in_flight() > 0 {
+            continue;
+        }
+        sender.transport().set_rate(rate);
+        if silence.take_if(|at| link.now() >= *at).is_some() {
+            let line = sender.transport();
+            line.set_rate(0.0);
+            line.cut(true);
+            let end = link.now() + Plan::SILENCE;
+            while link.now() < end {
+                if !rest(link, sender) {
+                    return Ok(());
+                }
+            }
+            sender.transport().cut(false);
         }
     }
     Ok(())
+}
+
+/// A pause, in which heartbeats go on; false when the controller is gone.
+fn rest(link: &Link, sender: &mut Sender<FaultyLine, MTU>) -> bool {
+    thread::sleep(PAUSE);
+    !link.is_over() && sender.poll().is_ok()
 }

@@ -17,6 +17,7 @@ use dibs_nostd::wire::Deframer;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::check::{Checked, Compared, check, compare};
+use super::faults::{Faults, Plan};
 use super::machine::Machine;
 use super::scene::Scene;
 use super::sender::{Link, send};
@@ -36,6 +37,8 @@ pub struct Outcome {
     pub checked: Vec<Checked>,
     /// The comparison of every published frame.
     pub compared: Vec<Compared>,
+    /// What was done to the bus, if anything.
+    pub faults: Option<Faults>,
     /// Ticks that were asked for.
     pub ticks_asked: u32,
     /// Frames sent to the last byte.
@@ -49,7 +52,13 @@ pub struct Outcome {
 }
 
 /// Runs the controller for `seconds` of its own time.
-pub fn run(scene: &Scene, machine: &Machine, seconds: u32, folder: &Path) -> Result<Outcome> {
+pub fn run(
+    scene: &Scene,
+    machine: &Machine,
+    seconds: u32,
+    faults: Option<Plan>,
+    folder: &Path,
+) -> Result<Outcome> {
     let ticks_asked = seconds * TICK_RATE;
     let sockets = tempfile::tempdir()?;
     let (bus_path, telemetry_path) = (sockets.path().join("bus"), sockets.path().join("telemetry"));
@@ -71,7 +80,7 @@ pub fn run(scene: &Scene, machine: &Machine, seconds: u32, folder: &Path) -> Res
     let link = Arc::new(Link::default());
     let (to_check, answers) = mpsc::channel::<Tick>();
     let (listened, sent, checked) = thread::scope(|scope| {
-        let sender = scope.spawn(|| send(scene, &link, bus));
+        let sender = scope.spawn(|| send(scene, &link, bus, faults.as_ref()));
         let checker = scope.spawn(|| {
             answers.into_iter().map(|tick| check(scene, &link, &tick)).collect::<Result<Vec<_>>>()
         });
@@ -81,7 +90,7 @@ pub fn run(scene: &Scene, machine: &Machine, seconds: u32, folder: &Path) -> Res
         (listened, joined(sender.join()), joined(checker.join()))
     });
     let (ticks, summary) = listened?;
-    sent?;
+    let injected = sent?;
     let mut compared = Vec::new();
     for tick in &ticks {
         compare(&link, tick, &mut compared);
@@ -92,6 +101,7 @@ pub fn run(scene: &Scene, machine: &Machine, seconds: u32, folder: &Path) -> Res
         summary,
         checked: checked?,
         compared,
+        faults: faults.map(|plan| Faults::new(&plan, injected)),
         ticks_asked,
         frames_sent: link.frames_sent.load(Ordering::Relaxed),
         exited_well: status.success(),

@@ -16,27 +16,75 @@ use crate::{demo, workspace};
 
 /// Runs the demo on the emulated board, and takes over its report.
 pub fn check(seconds: u32, figures: &mut Figures) -> Result<()> {
-    let output = workspace::root().join("target").join("guarantees").join("demo");
-    demo::run(&demo::Options {
-        seconds,
-        board_only: true,
-        output: Some(output.clone()),
-        ..demo::Options::default()
-    })?;
-    let text = fs::read_to_string(output.join("report.json"))?;
-    let report: Value = serde_json::from_str(&text)?;
+    let report = report_of(seconds, false)?;
     for (name, field) in [
         ("demo.ticks", "ticks"),
         ("demo.misses", "deadline_misses"),
         ("demo.latency", "latency_max_us"),
         ("demo.tick", "tick_max_us"),
         ("demo.mismatches", "mismatches"),
+        ("demo.compared", "frames_compared"),
+        ("demo.wrong", "frames_published_wrong"),
+        ("interrupts.masked", "masked_max_us"),
+        ("interrupts.bus-masked", "bus_masked_max_us"),
         ("stack.measured", "stack_bytes"),
     ] {
-        let value = report[field].as_f64().with_context(|| format!("no {field} in the report"))?;
-        figures.note(name, value);
+        figures.note(name, number(&report[field], field)?);
     }
     Ok(())
+}
+
+/// The same with faults on the bus, which also falls silent for a while.
+pub fn faults(seconds: u32, figures: &mut Figures) -> Result<()> {
+    let report = report_of(seconds, true)?;
+    for (name, field) in [
+        ("demo.faults.ticks", "ticks"),
+        ("demo.faults.misses", "deadline_misses"),
+        ("demo.faults.mismatches", "mismatches"),
+        ("demo.faults.compared", "frames_compared"),
+        ("demo.faults.wrong", "frames_published_wrong"),
+        ("demo.faults.rejected", "frames_rejected"),
+    ] {
+        figures.note(name, number(&report[field], field)?);
+    }
+    let injected = report["faults"]["injected"].as_object().context("no faults in the report")?;
+    let injected: u64 = injected.values().filter_map(Value::as_u64).sum();
+    figures.note("demo.faults.injected", injected as f64);
+    for (name, field) in [
+        ("demo.faults.safe-after-packet", "since_packet"),
+        ("demo.faults.safe-after-frame", "since_frame"),
+        ("demo.faults.recovered-after", "recovered_after"),
+    ] {
+        figures.note(name, number(&report["silence"][field], field)?);
+    }
+    Ok(())
+}
+
+/// A bit of the tree in flash flips: nothing is acted on.
+pub fn rot(figures: &mut Figures) -> Result<()> {
+    let rotted = demo::rot::run(3)?;
+    figures.note("demo.rot.ticks", rotted.ticks as f64);
+    figures.note("demo.rot", rotted.acted as f64);
+    Ok(())
+}
+
+fn report_of(seconds: u32, faults: bool) -> Result<Value> {
+    let name = if faults { "demo-faults" } else { "demo" };
+    let output = workspace::root().join("target").join("guarantees").join(name);
+    demo::run(&demo::Options {
+        seconds,
+        faults,
+        seed: 1,
+        board_only: true,
+        output: Some(output.clone()),
+        ..demo::Options::default()
+    })?;
+    let text = fs::read_to_string(output.join("report.json"))?;
+    Ok(serde_json::from_str(&text)?)
+}
+
+fn number(value: &Value, field: &str) -> Result<f64> {
+    value.as_f64().with_context(|| format!("no {field} in the report"))
 }
 
 /// The firmware links, which it does only without panic paths; it has no allocator; and a panic

@@ -71,6 +71,8 @@ pub struct Effort {
     pub torn: u32,
     /// Seconds of the controller's time.
     pub demo_seconds: u32,
+    /// The same, with faults on the bus.
+    pub fault_seconds: u32,
     /// Seconds of each fuzz target.
     pub fuzz_seconds: u32,
 }
@@ -83,7 +85,8 @@ impl Effort {
         costs: 100_000,
         host_costs: 100_000,
         torn: 100_000,
-        demo_seconds: 60,
+        demo_seconds: 20,
+        fault_seconds: 60,
         fuzz_seconds: 60,
     };
     /// What every run of the tests can afford.
@@ -94,6 +97,7 @@ impl Effort {
         host_costs: 10_000,
         torn: 20_000,
         demo_seconds: 5,
+        fault_seconds: 12,
         fuzz_seconds: 60,
     };
 }
@@ -158,6 +162,8 @@ fn check(effort: Effort, only: Option<&str>, steps: &mut Steps) -> Figures {
     step("receiving on the board", &|f| passed(receive::check(&board()?, f)));
     step("torn reads on the board", &|f| passed(torn::check(&board()?, effort.torn, f)));
     step("demo on the emulated board", &|f| passed(demo::check(effort.demo_seconds, f)));
+    step("demo with faults on the bus", &|f| passed(demo::faults(effort.fault_seconds, f)));
+    step("demo with a tree that rots", &|f| passed(demo::rot(f)));
     step("firmware without panic and allocator", &|f| passed(demo::link(&board()?, f)));
     step("stack of the firmware", &|f| passed(demo::stack(&board()?, f)));
     for sanitizer in ["address", "thread"] {

@@ -1,0 +1,124 @@
+//! What is done to the bus, and what came of it.
+
+use std::collections::BTreeMap;
+
+use controller::telemetry::Tick;
+use controller::{SILENCE_LIMIT, TICK_RATE};
+use dibs_build::stream::faults::Fault;
+use dibs_nostd::failsafe::State;
+use serde::Serialize;
+
+use super::session::Outcome;
+
+/// What is to be done to the bus.
+#[derive(Clone, Copy)]
+pub struct Plan {
+    /// What the faults are drawn from.
+    pub seed: u64,
+    seconds: u32,
+}
+
+impl Plan {
+    /// Probability that a packet meets a fault.
+    pub const RATE: f64 = 0.03;
+
+    /// What happens: all that can happen on a line of packets without tags.
+    pub const KINDS: &[Fault] = &[
+        Fault::FlipOne,
+        Fault::FlipTwo,
+        Fault::Burst,
+        Fault::Drop,
+        Fault::Duplicate,
+        Fault::Reorder,
+        Fault::Truncate,
+        Fault::Overrun,
+        Fault::StaleEpoch,
+        Fault::Replay,
+        Fault::WrongMesh,
+        Fault::OutOfRange,
+        Fault::NotFinite,
+        Fault::TooFar,
+        Fault::Stretch,
+    ];
+
+    /// Faults in a run of so many seconds.
+    pub const fn new(seed: u64, seconds: u32) -> Self {
+        Self { seed, seconds }
+    }
+
+    /// Ticks for which the line is cut once: longer than the controller puts up with.
+    pub const SILENCE: u32 = SILENCE_LIMIT + TICK_RATE / 2;
+
+    /// The tick after which that is done, as soon as a frame has come through.
+    pub const fn silence_at(&self) -> u32 {
+        self.seconds * TICK_RATE / 3
+    }
+}
+
+/// What was done to the bus.
+#[derive(Clone, Serialize)]
+pub struct Faults {
+    /// What the faults were drawn from.
+    seed: u64,
+    /// Probability of a fault a packet.
+    rate: f64,
+    /// How often each has happened.
+    pub injected: BTreeMap<&'static str, u64>,
+}
+
+impl Faults {
+    /// What has happened by plan.
+    pub fn new(plan: &Plan, injected: Vec<(Fault, u64)>) -> Self {
+        let happened = injected.into_iter().filter(|&(_, count)| count > 0);
+        let injected = happened.map(|(fault, count)| (fault.name(), count)).collect();
+        Self { seed: plan.seed, rate: Plan::RATE, injected }
+    }
+
+    /// Faults of all kinds.
+    pub fn total(&self) -> u64 {
+        self.injected.values().sum()
+    }
+}
+
+/// What the silent line led to, as the controller's own records have it; in ms.
+#[derive(Clone, Serialize)]
+pub struct Silence {
+    /// Tick of the first safe output.
+    pub safe_at: u32,
+    /// From the last good packet to the first safe output.
+    pub since_packet: u32,
+    /// From the last publication of a frame.
+    pub since_frame: u32,
+    /// Age of the surface then: since its first packet.
+    pub age: u32,
+    /// From the first safe output to the next nominal one: the line was cut for part of it.
+    pub recovered_after: Option<u32>,
+}
+
+impl Silence {
+    /// The first time that the link was lost.
+    pub fn of(outcome: &Outcome) -> Option<Self> {
+        let ticks = &outcome.ticks;
+        let safe = State::Safe as u32;
+        let is_lost = |[before, after]: &[Tick; 2]| {
+            before.state != safe && after.state == safe && after.silence > SILENCE_LIMIT
+        };
+        let place = ticks.array_windows().position(is_lost)?;
+        let (before, [safe, after @ ..]) = ticks.split_at(place + 1) else { return None };
+        let earlier = |tick: &&Tick| tick.frames_published < safe.frames_published;
+        // The record after the last with fewer frames is the first that has it.
+        let published = before.iter().rev().find(earlier).map_or(0, |tick| tick.tick + 1);
+        let nominal = after.iter().find(|tick| tick.state == State::Nominal as u32);
+        Some(Self {
+            safe_at: safe.tick,
+            since_packet: milliseconds(safe.silence),
+            since_frame: milliseconds(safe.tick - published),
+            age: milliseconds(safe.age),
+            recovered_after: nominal.map(|tick| milliseconds(tick.tick - safe.tick)),
+        })
+    }
+}
+
+const fn milliseconds(ticks: u32) -> u32 {
+    ticks * 1_000 / TICK_RATE
+}
