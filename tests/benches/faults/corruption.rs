@@ -11,7 +11,7 @@ use fastrand::Rng;
 use plotters::prelude::*;
 use serde::Serialize;
 
-use super::subject::{Case, Controller, Log, N, TREE, framed, source, surface};
+use super::subject::{Case, Controller, Log, N, Receiver, TREE, framed, source, surface};
 
 /// Frames a second.
 const RATE: u32 = 50;
@@ -84,7 +84,7 @@ fn one(partial: bool, probability: f64, frames: u32, seed: u64) -> Result<Row> {
         log.note(&source);
         bytes += frame.sent().bytes;
         source.transmit(frame)?;
-        let published = controller.published;
+        let published = controller.published();
         for packet in take(&mut source.transport().sent) {
             let mut line = framed(&packet);
             if rng.f64() < probability {
@@ -92,7 +92,7 @@ fn one(partial: bool, probability: f64, frames: u32, seed: u64) -> Result<Row> {
             }
             controller.bytes(&line, &log);
         }
-        if controller.published > published {
+        if controller.published() > published {
             newest = Some(moment);
         }
         // Before the first frame there is no surface to be old.
@@ -104,13 +104,13 @@ fn one(partial: bool, probability: f64, frames: u32, seed: u64) -> Result<Row> {
         frames: if partial { "partial" } else { "whole" },
         packets_damaged: probability,
         frames_sent: frames,
-        frames_published: controller.published,
-        throughput: f64::from(controller.published) / f64::from(frames) * f64::from(RATE),
+        frames_published: controller.published(),
+        throughput: f64::from(controller.published()) / f64::from(frames) * f64::from(RATE),
         age_mean_ms: ages.iter().sum::<f64>() / count as f64,
         age_p99_ms: ages.get(count * 99 / 100).copied().unwrap_or(f64::NAN),
         age_max_ms: ages.last().copied().unwrap_or(f64::NAN),
         bytes_per_frame: bytes as f64 / f64::from(frames),
-        published_wrong: controller.wrong,
+        published_wrong: controller.wrong(),
     })
 }
 

@@ -2,9 +2,13 @@
 //!
 //! `cargo bench -p dibs-tests --bench faults -- [--per-fault N] [--write docs/faults.json]`
 //!
+//! The same on the emulated board, through its UART: `cargo xtask guarantees --only "faults on the board"`,
+//! which builds the program for `--board`.
+//!
 //! Ends with an error if anything was published that was never sent, if a fault was neither noticed nor
 //! harmless, or if the receiver did not recover.
 
+mod board;
 mod corruption;
 mod matrix;
 mod record;
@@ -17,6 +21,7 @@ use std::time::Instant;
 
 use anyhow::{Result, bail};
 use clap::Parser;
+use matrix::Place;
 
 /// What the fault matrix is asked.
 #[derive(Parser)]
@@ -30,6 +35,9 @@ struct Arguments {
     /// Where to write the record; the figure goes to the folder figures beside it.
     #[arg(long)]
     write: Option<PathBuf>,
+    /// The probe `bus` for the board: the receiver is there, and only the matrix is made.
+    #[arg(long)]
+    board: Option<PathBuf>,
     /// Set by `cargo bench`, not by `cargo test --benches`.
     #[arg(long)]
     bench: bool,
@@ -48,16 +56,17 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
     let per_fault = arguments.per_fault.unwrap_or(if arguments.bench { 100_000 } else { 300 });
-    let matrix = matrix::run(per_fault, arguments.seed)?;
+    let place = arguments.board.as_deref().map_or(Place::Here, Place::Board);
+    let matrix = matrix::run(per_fault, arguments.seed, place)?;
     let matrix_seconds = start.elapsed().as_secs_f64();
     for row in &matrix {
         println!("{row}");
     }
     let is_full = arguments.bench || arguments.write.is_some();
-    let (corruption, sizes) = if is_full {
-        (corruption::run(arguments.seed)?, sizes::run()?)
-    } else {
-        (corruption::smoke(arguments.seed)?, Vec::new())
+    let (corruption, sizes) = match place {
+        Place::Board(_) => (Vec::new(), Vec::new()),
+        Place::Here if is_full => (corruption::run(arguments.seed)?, sizes::run()?),
+        Place::Here => (corruption::smoke(arguments.seed)?, Vec::new()),
     };
     for row in &corruption {
         println!("{row}");

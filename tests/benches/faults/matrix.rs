@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::mem::take;
+use std::path::Path;
 
 use anyhow::{Result, ensure};
 use dibs_build::stream::faults::{Fault, Injector};
@@ -13,8 +14,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::board::Board;
 use super::subject::{
-    Case, Controller, Log, N, Source, TREE, framed, mac_under, noticed, source, surface,
+    Case, Controller, Log, N, Receiver, Source, TREE, framed, mac_under, noticed, source, surface,
 };
 
 /// Faults that one sender and one receiver see.
@@ -70,20 +72,48 @@ impl fmt::Display for Row {
     }
 }
 
+/// Where the receivers run.
+#[derive(Clone, Copy)]
+pub enum Place<'p> {
+    /// In this process.
+    Here,
+    /// On the emulated board, in this program.
+    Board(&'p Path),
+}
+
+impl Place<'_> {
+    /// Starts a receiver, and does something with it.
+    fn with<M: Mac>(self, mac: M, work: impl FnOnce(&mut dyn Receiver)) {
+        match self {
+            Self::Here => {
+                let frames = Frames::<N>::new();
+                let tree = TREE.tree::<u16>().expect("16-bit indices");
+                work(&mut Controller::new(&frames, &tree, mac));
+            }
+            Self::Board(program) => work(&mut Board::boot(program, &mac).expect("a board")),
+        }
+    }
+}
+
 /// Runs all kinds of faults.
-pub fn run(per_fault: u64, seed: u64) -> Result<Vec<Row>> {
+pub fn run(per_fault: u64, seed: u64, place: Place<'_>) -> Result<Vec<Row>> {
+    let of_one = match place {
+        Place::Here => CHUNK,
+        // Every way to send, however few the faults.
+        Place::Board(_) => per_fault.div_ceil(8),
+    };
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} faults  {msg}")?;
     let bar = ProgressBar::new(per_fault * Fault::ALL.len() as u64).with_style(style);
     let rows = Fault::ALL
         .into_iter()
         .map(|fault| {
             bar.set_message(fault.name());
-            let chunks = per_fault.div_ceil(CHUNK);
+            let chunks = per_fault.div_ceil(of_one);
             let total = (0..chunks)
                 .into_par_iter()
                 .map(|chunk| {
-                    let count = CHUNK.min(per_fault - chunk * CHUNK);
-                    let row = life(fault, count, chunk, seed);
+                    let count = of_one.min(per_fault - chunk * of_one);
+                    let row = life(fault, count, chunk, seed, place);
                     bar.inc(count);
                     row
                 })
@@ -97,7 +127,7 @@ pub fn run(per_fault: u64, seed: u64) -> Result<Vec<Row>> {
 }
 
 /// Some faults of one kind: every way to send in turn.
-fn life(fault: Fault, count: u64, chunk: u64, seed: u64) -> Row {
+fn life(fault: Fault, count: u64, chunk: u64, seed: u64, place: Place<'_>) -> Row {
     let case = Case { quantised: chunk & 1 == 0, partial: chunk & 2 == 0 };
     // Tags would catch what the other layers are meant to: with tags go forgeries, and every second
     // run of what no checksum was made right for.
@@ -112,14 +142,15 @@ fn life(fault: Fault, count: u64, chunk: u64, seed: u64) -> Row {
     );
     let seed = seed ^ (chunk << 8 | fault as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     if fault == Fault::Forgery || (!is_sealed && chunk & 4 != 0) {
-        Life::run(fault, count, case, seed, mac_under)
+        Life::run(fault, count, case, seed, mac_under, place)
     } else {
-        Life::run(fault, count, case, seed, |_| NoMac)
+        Life::run(fault, count, case, seed, |_| NoMac, place)
     }
 }
 
 /// One sender, and the receivers that it sees.
-struct Life<M> {
+struct Life<'p, M> {
+    place: Place<'p>,
     source: Source<M>,
     mac_of: fn(u32) -> M,
     log: Log,
@@ -132,17 +163,25 @@ struct Life<M> {
     row: Row,
 }
 
-impl<M: Mac + 'static> Life<M> {
-    fn run(fault: Fault, count: u64, case: Case, seed: u64, mac_of: fn(u32) -> M) -> Row {
+impl<'p, M: Mac + 'static> Life<'p, M> {
+    fn run(
+        fault: Fault,
+        count: u64,
+        case: Case,
+        seed: u64,
+        mac_of: fn(u32) -> M,
+        place: Place<'p>,
+    ) -> Row {
         let mut rng = Rng::with_seed(seed);
         // Sessions wrap.
         let session = u32::MAX - rng.u32(..20);
         let mut life = Self {
+            place,
             source: source(case, session, mac_of),
             mac_of,
             log: Log::default(),
             injector: Injector::new(seed),
-            is_stream: rng.bool(),
+            is_stream: rng.bool() || matches!(place, Place::Board(_)),
             rng,
             case,
             session,
@@ -155,18 +194,17 @@ impl<M: Mac + 'static> Life<M> {
             }
             return life.row;
         }
-        let frames = Frames::<N>::new();
-        let tree = TREE.tree::<u16>().expect("16-bit indices");
-        let mut controller = Controller::new(&frames, &tree, life.any_mac());
-        life.recover(&mut controller);
-        for _ in 0..count {
-            if fault == Fault::SenderRestart {
-                life.restart_of_sender(&mut controller);
-            } else {
-                life.disturb(fault, &mut controller);
+        place.with(life.any_mac(), |controller| {
+            life.recover(controller);
+            for _ in 0..count {
+                if fault == Fault::SenderRestart {
+                    life.restart_of_sender(controller);
+                } else {
+                    life.disturb(fault, controller);
+                }
             }
-        }
-        life.take_counters(&controller);
+            life.take_counters(controller);
+        });
         life.row
     }
 
@@ -176,7 +214,7 @@ impl<M: Mac + 'static> Life<M> {
     }
 
     /// The next frame's packets.
-    fn next_frame(&mut self, controller: &mut Controller<'_, M>) -> Vec<Vec<u8>> {
+    fn next_frame(&mut self, controller: &mut dyn Receiver) -> Vec<Vec<u8>> {
         self.source.transport().inbox.push_back(controller.status());
         self.source.poll().expect("a mailbox does not fail");
         self.moment += 1;
@@ -186,7 +224,7 @@ impl<M: Mac + 'static> Life<M> {
         take(&mut self.source.transport().sent)
     }
 
-    fn deliver(&self, packet: &[u8], controller: &mut Controller<'_, M>) {
+    fn deliver(&self, packet: &[u8], controller: &mut dyn Receiver) {
         if self.is_stream {
             controller.bytes(&framed(packet), &self.log);
         } else {
@@ -195,11 +233,11 @@ impl<M: Mac + 'static> Life<M> {
     }
 
     /// One fault, and the frames that it takes to recover.
-    fn disturb(&mut self, fault: Fault, controller: &mut Controller<'_, M>) {
+    fn disturb(&mut self, fault: Fault, controller: &mut dyn Receiver) {
         let mut since = None;
         let (mut before, mut published) = (Vec::new(), 0);
         while since.is_none() {
-            (before, published) = (noticed(controller.counters()), controller.published);
+            (before, published) = (noticed(controller.counters()), controller.published());
             let packets = self.next_frame(controller);
             // The begin is the only one for some faults.
             let first = if self.rng.bool() { 0 } else { self.rng.usize(..packets.len()) };
@@ -230,16 +268,16 @@ impl<M: Mac + 'static> Life<M> {
                 }
             }
             if since.is_none() {
-                assert!(controller.published > published, "an undisturbed frame is published");
+                assert!(controller.published() > published, "an undisturbed frame is published");
             }
         }
-        let is_published = controller.published > published;
+        let is_published = controller.published() > published;
         let is_noticed = noticed(controller.counters()) != before || !is_published;
         self.judge(is_noticed, is_published, since.unwrap_or(0), controller);
     }
 
     /// The sender starts anew in the middle of a frame.
-    fn restart_of_sender(&mut self, controller: &mut Controller<'_, M>) {
+    fn restart_of_sender(&mut self, controller: &mut dyn Receiver) {
         let before = noticed(controller.counters());
         let packets = self.next_frame(controller);
         let cut = self.rng.usize(1..packets.len());
@@ -249,36 +287,36 @@ impl<M: Mac + 'static> Life<M> {
         self.log.forget_last();
         self.session = self.session.wrapping_add(1);
         self.source = source(self.case, self.session, self.mac_of);
-        let (published, packets) = (controller.published, self.next_frame(controller));
+        let (published, packets) = (controller.published(), self.next_frame(controller));
         for packet in &packets {
             self.deliver(packet, controller);
         }
         let is_noticed = noticed(controller.counters()) != before;
-        let is_published = controller.published > published;
+        let is_published = controller.published() > published;
         self.judge(is_noticed, is_published, packets.len() as u32, controller);
     }
 
     /// The receiver starts anew in the middle of a frame.
     fn restart_of_receiver(&mut self) {
-        let (before, after) = (Frames::<N>::new(), Frames::<N>::new());
-        let tree = TREE.tree::<u16>().expect("16-bit indices");
-        let mut controller = Controller::new(&before, &tree, self.any_mac());
-        self.recover(&mut controller);
-        let packets = self.next_frame(&mut controller);
-        let cut = self.rng.usize(1..packets.len());
-        for packet in &packets[..cut] {
-            self.deliver(packet, &mut controller);
-        }
-        self.row.published_wrong += controller.wrong;
-
-        let mut controller = Controller::new(&after, &tree, self.any_mac());
-        for packet in &packets[cut..] {
-            self.deliver(packet, &mut controller);
-        }
-        let is_published = controller.published > 0;
-        let is_noticed = noticed(controller.counters()).iter().any(|&n| n > 0) || !is_published;
-        self.judge(is_noticed, is_published, (packets.len() - cut) as u32, &mut controller);
-        self.take_counters(&controller);
+        let (place, mut missed) = (self.place, Vec::new());
+        place.with(self.any_mac(), |controller| {
+            self.recover(controller);
+            let mut packets = self.next_frame(controller);
+            missed = packets.split_off(self.rng.usize(1..packets.len()));
+            for packet in &packets {
+                self.deliver(packet, controller);
+            }
+            self.row.published_wrong += controller.wrong();
+        });
+        place.with(self.any_mac(), |controller| {
+            for packet in &missed {
+                self.deliver(packet, controller);
+            }
+            let is_published = controller.published() > 0;
+            let is_noticed = noticed(controller.counters()).iter().any(|&n| n > 0) || !is_published;
+            self.judge(is_noticed, is_published, missed.len() as u32, controller);
+            self.take_counters(controller);
+        });
     }
 
     fn judge(
@@ -286,7 +324,7 @@ impl<M: Mac + 'static> Life<M> {
         is_noticed: bool,
         is_published: bool,
         packets: u32,
-        controller: &mut Controller<'_, M>,
+        controller: &mut dyn Receiver,
     ) {
         self.row.detected += u64::from(is_noticed);
         self.row.harmless += u64::from(!is_noticed && is_published);
@@ -299,8 +337,8 @@ impl<M: Mac + 'static> Life<M> {
     }
 
     /// Undisturbed frames until one is published: how many, and in how many packets.
-    fn recover(&mut self, controller: &mut Controller<'_, M>) -> (u32, u32) {
-        let published = controller.published;
+    fn recover(&mut self, controller: &mut dyn Receiver) -> (u32, u32) {
+        let published = controller.published();
         let mut packets = 0;
         for frames in 1..=PATIENCE {
             for packet in self.next_frame(controller) {
@@ -309,7 +347,7 @@ impl<M: Mac + 'static> Life<M> {
                 }
                 packets += 1;
             }
-            if controller.published > published {
+            if controller.published() > published {
                 return (frames, packets);
             }
         }
@@ -317,8 +355,8 @@ impl<M: Mac + 'static> Life<M> {
         (PATIENCE, packets)
     }
 
-    fn take_counters(&mut self, controller: &Controller<'_, M>) {
-        self.row.published_wrong += controller.wrong;
+    fn take_counters(&mut self, controller: &dyn Receiver) {
+        self.row.published_wrong += controller.wrong();
         for event in Event::ALL {
             let n = u64::from(controller.counters().of(event));
             if n > 0 && !matches!(event, Event::Published | Event::Heartbeat) {

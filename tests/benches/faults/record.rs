@@ -61,8 +61,12 @@ impl Record {
         let figures = path.parent().unwrap_or(Path::new(".")).join("figures");
         std::fs::create_dir_all(&figures)
             .with_context(|| format!("cannot make {}", figures.display()))?;
-        let figure = (figures.join("faults.svg"), corruption::figure(&self.corruption)?);
-        for (path, text) in [(path.to_path_buf(), json), figure] {
+        let mut files = vec![(path.to_path_buf(), json)];
+        // A matrix of the board's comes alone.
+        if !self.corruption.is_empty() {
+            files.push((figures.join("faults.svg"), corruption::figure(&self.corruption)?));
+        }
+        for (path, text) in files {
             dibs_build::write_atomically(&path, |out| out.write_all(text.as_bytes()))?;
         }
         Ok(())

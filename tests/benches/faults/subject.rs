@@ -8,22 +8,24 @@ use std::time::Duration;
 
 use dibs_build::stream::{Sender, Settings, SurfaceOrder, Transport};
 use dibs_build::{Builder, BuiltTree, Mesh};
+use dibs_nostd::format::CRC;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
     AesCmac, Counters, Deframer, Event, Mac, encode_status, enframe, framed_bytes,
 };
 use dibs_nostd::{Advance, Assembler, FrameReader, Frames, StretchMonitor, Tree, VertexTable};
+pub use probe::bus::MTU;
+use probe::bus::{KEY, VERTICES, WORK};
 
 /// Rings of vertices between the poles, and vertices of a ring.
 const RINGS: usize = 8;
 /// Vertices of the surface.
 pub const N: usize = RINGS * RINGS + 2;
-/// Largest packet: some packets a frame.
-pub const MTU: usize = 128;
+const _: () = assert!(N == VERTICES);
 /// The stretch that the receiver admits.
 const STRETCH: f32 = 1.3;
 /// No coordinate is larger, in mm.
-const LIMIT: f32 = 400.0;
+pub const LIMIT: f32 = 400.0;
 
 /// An egg of some 12 cm: the smallest heart takes ten times as long.
 static MESH: LazyLock<Mesh> = LazyLock::new(|| {
@@ -142,17 +144,47 @@ impl Log {
         };
         self.0.iter().rev().any(|(number, bits)| *number == epoch && is_equal(bits))
     }
+
+    /// The same, of positions of which there is only the CRC-32.
+    pub fn has_digest(&self, epoch: u32, digest: u32) -> bool {
+        let of = |bits: &[[u32; 3]]| {
+            let mut crc = CRC.digest();
+            bits.as_flattened().iter().for_each(|word| crc.update(&word.to_le_bytes()));
+            crc.finalize()
+        };
+        self.0.iter().rev().any(|(number, bits)| *number == epoch && of(bits) == digest)
+    }
 }
 
-/// The receiving end: what the bus interrupt does, and a look at what the control tick would see.
+/// A receiving end, wherever it runs.
+pub trait Receiver {
+    /// What it has counted.
+    fn counters(&self) -> &Counters;
+
+    /// What it would report now.
+    fn status(&mut self) -> Vec<u8>;
+
+    /// A packet arrives as a message of its own.
+    fn message(&mut self, packet: &[u8], log: &Log);
+
+    /// Bytes arrive on a stream.
+    fn bytes(&mut self, bytes: &[u8], log: &Log);
+
+    /// Frames published since the start.
+    fn published(&self) -> u32;
+
+    /// Frames that were published and had not been sent.
+    fn wrong(&self) -> u64;
+}
+
+/// The receiver on this computer: what the bus interrupt does, and a look at what the control tick would
+/// see.
 pub struct Controller<'f, M> {
     deframer: Deframer<MTU>,
     assembler: Assembler<'f, StretchMonitor<'f, u16>, N, M>,
     reader: FrameReader<'f, N>,
-    /// Frames published since the start.
-    pub published: u32,
-    /// Frames that were published and had not been sent.
-    pub wrong: u64,
+    published: u32,
+    wrong: u64,
 }
 
 impl<'f, M: Mac> Controller<'f, M> {
@@ -163,40 +195,10 @@ impl<'f, M: Mac> Controller<'f, M> {
         Self { deframer: Deframer::new(), assembler, reader, published: 0, wrong: 0 }
     }
 
-    pub fn counters(&self) -> &Counters {
-        self.assembler.counters()
-    }
-
-    /// What the receiver would report now.
-    pub fn status(&mut self) -> Vec<u8> {
-        let mesh_id = TREE.summary().mesh_id;
-        let status = self.assembler.status(0, 0);
-        let (counters, mac) = (*self.assembler.counters(), self.assembler.mac());
-        encode_status(mesh_id, &status, &counters, mac, &mut [0; MTU]).to_vec()
-    }
-
-    /// A packet arrives as a message of its own.
-    pub fn message(&mut self, packet: &[u8], log: &Log) {
-        let _ = self.assembler.accept(packet, 0);
-        self.work(log);
-    }
-
-    /// Bytes arrive on a stream.
-    pub fn bytes(&mut self, bytes: &[u8], log: &Log) {
-        for &byte in bytes {
-            match self.deframer.push(byte) {
-                None => continue,
-                Some(Ok(packet)) => drop(self.assembler.accept(packet, 0)),
-                Some(Err(error)) => self.assembler.count_framing(&error),
-            }
-            self.work(log);
-        }
-    }
-
     /// Checks and publishes, in slices, and compares what is published with what was sent.
     fn work(&mut self, log: &Log) {
         for _ in 0..100 {
-            match self.assembler.advance(64) {
+            match self.assembler.advance(WORK) {
                 Ok(Advance::Pending) => (),
                 Ok(Advance::Published { epoch }) => {
                     self.published += 1;
@@ -213,9 +215,46 @@ impl<'f, M: Mac> Controller<'f, M> {
     }
 }
 
+impl<M: Mac> Receiver for Controller<'_, M> {
+    fn counters(&self) -> &Counters {
+        self.assembler.counters()
+    }
+
+    fn status(&mut self) -> Vec<u8> {
+        let mesh_id = TREE.summary().mesh_id;
+        let status = self.assembler.status(0, 0);
+        let (counters, mac) = (*self.assembler.counters(), self.assembler.mac());
+        encode_status(mesh_id, &status, &counters, mac, &mut [0; MTU]).to_vec()
+    }
+
+    fn message(&mut self, packet: &[u8], log: &Log) {
+        let _ = self.assembler.accept(packet, 0);
+        self.work(log);
+    }
+
+    fn bytes(&mut self, bytes: &[u8], log: &Log) {
+        for &byte in bytes {
+            match self.deframer.push(byte) {
+                None => continue,
+                Some(Ok(packet)) => drop(self.assembler.accept(packet, 0)),
+                Some(Err(error)) => self.assembler.count_framing(&error),
+            }
+            self.work(log);
+        }
+    }
+
+    fn published(&self) -> u32 {
+        self.published
+    }
+
+    fn wrong(&self) -> u64 {
+        self.wrong
+    }
+}
+
 /// What makes tags under a challenge.
 pub fn mac_under(challenge: u32) -> AesCmac {
-    AesCmac::new(b"the fault matrix", challenge)
+    AesCmac::new(&KEY, challenge)
 }
 
 /// A packet as it goes over a byte stream.

@@ -5,6 +5,7 @@
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
+pub mod bus;
 pub mod receive;
 
 use dibs_nostd::glam::Vec3;

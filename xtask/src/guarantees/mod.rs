@@ -6,6 +6,7 @@
 //! bound or falls behind the committed one by more than its tolerance.
 
 mod bits;
+mod bus;
 mod callgrind;
 mod cost;
 mod demo;
@@ -69,6 +70,8 @@ pub struct Effort {
     pub host_costs: usize,
     /// Queries under which frames are published.
     pub torn: u32,
+    /// Faults of each kind on the board's bus.
+    pub board_faults: u32,
     /// Seconds of the controller's time.
     pub demo_seconds: u32,
     /// The same, with faults on the bus.
@@ -85,6 +88,7 @@ impl Effort {
         costs: 100_000,
         host_costs: 100_000,
         torn: 100_000,
+        board_faults: 100,
         demo_seconds: 20,
         fault_seconds: 60,
         fuzz_seconds: 60,
@@ -96,6 +100,7 @@ impl Effort {
         costs: 30_000,
         host_costs: 10_000,
         torn: 20_000,
+        board_faults: 2,
         demo_seconds: 5,
         fault_seconds: 12,
         fuzz_seconds: 60,
@@ -161,6 +166,7 @@ fn check(effort: Effort, only: Option<&str>, steps: &mut Steps) -> Figures {
     step("modal surfaces on the board", &|f| passed(modes::check(&board()?, f)));
     step("receiving on the board", &|f| passed(receive::check(&board()?, f)));
     step("torn reads on the board", &|f| passed(torn::check(&board()?, effort.torn, f)));
+    step("faults on the board", &|f| passed(bus::check(&board()?, effort.board_faults, f)));
     step("demo on the emulated board", &|f| passed(demo::check(effort.demo_seconds, f)));
     step("demo with faults on the bus", &|f| passed(demo::faults(effort.fault_seconds, f)));
     step("demo with a tree that rots", &|f| passed(demo::rot(f)));

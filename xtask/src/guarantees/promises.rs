@@ -389,6 +389,28 @@ pub const PROMISES: &[Promise] = &[
          nominal again {demo.faults.recovered-after} ms later",
         "The example's limit, for an emulated line of a frame a second; a real one is some tens of ms.",
     ),
+    note("board.faults.kinds"),
+    note("board.faults.injected"),
+    promise(
+        "board.faults.wrong",
+        "Of the faults of the matrix, sent to the board through its UART, none is published",
+        FAULTS,
+        XTASK,
+        Bound::Is(0.0),
+        "of {board.faults.injected} faults of {board.faults.kinds} kinds",
+        "Each published frame held as a whole, by a CRC-32 made on the board, against what was sent. The UART \
+         is polled; the demo takes it by interrupt.",
+    ),
+    promise(
+        "board.faults.not-recovered",
+        "After each of them the board publishes again",
+        FAULTS,
+        XTASK,
+        Bound::Is(0.0),
+        "did not; {board.faults.recovered-within} undisturbed frames at most until it did",
+        "",
+    ),
+    note("board.faults.recovered-within"),
     note("demo.rot.ticks"),
     promise(
         "demo.rot",

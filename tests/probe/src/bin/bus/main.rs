@@ -1,0 +1,204 @@
+//! A receiver of the bus on the emulated board, for the fault matrix: bytes come over UART 0, and what
+//! became of them goes back.
+//!
+//! Reads from `script.bin` four words and a tree of [`VERTICES`] vertices: whether packets carry tags, the
+//! challenge, the bits of the largest coordinate, the tree's length. Whenever the bytes that have come
+//! are dealt with, it reports, as one COBS frame: bytes, frames published, epoch of the last, the CRC-32 of
+//! all its positions as they stand in memory (a word each), and a status packet with every counter.
+//!
+//! UART 0 is polled here; the firmware, which takes it by interrupt, is what the demo runs.
+#![no_std]
+#![no_main]
+
+// It writes no file.
+#[allow(dead_code)]
+#[path = "../board/files.rs"]
+mod files;
+
+use core::ptr::{read_volatile, with_exposed_provenance_mut, write_volatile};
+
+use cortex_m_rt::{entry, exception};
+use cortex_m_semihosting::debug;
+use dibs_nostd::format::CRC;
+use dibs_nostd::wire::{AesCmac, Deframer, Mac, NoMac, encode_status, enframe, framed_bytes};
+use dibs_nostd::{
+    Advance, Assembler, FrameReader, FrameWriter, Frames, StretchMonitor, Tree, VertexTable,
+};
+use probe::bus::{HEAD_BYTES, KEY, MTU, REPORT_MTU, VERTICES, WORK};
+
+static FRAMES: Frames<VERTICES> = Frames::new();
+
+#[entry]
+fn main() -> ! {
+    static mut BYTES: [u8; 32 * 1024] = [0; 32 * 1024];
+    exit(run(BYTES).is_some());
+}
+
+fn run(bytes: &mut [u8]) -> Option<()> {
+    let mut script = files::Input::open()?;
+    let mut words = [[0; 4]; 4];
+    script.read(words.as_flattened_mut())?;
+    let [is_tagged, challenge, limit, length] = words.map(u32::from_le_bytes);
+    let bytes = bytes.get_mut(..length as usize)?;
+    script.read(bytes)?;
+    let tree = Tree::<u16>::from_bytes(bytes).ok()?;
+    let (writer, reader) = FRAMES.split()?;
+    let limit = f32::from_bits(limit);
+    uart::start();
+    if is_tagged == 0 {
+        Receiver::new(&tree, writer, reader, limit, NoMac)?.receive()
+    } else {
+        Receiver::new(&tree, writer, reader, limit, AesCmac::new(&KEY, challenge))?.receive()
+    }
+}
+
+/// What the bus does on the board.
+struct Receiver<'t, M> {
+    mesh_id: u32,
+    deframer: Deframer<MTU>,
+    assembler: Assembler<'static, StretchMonitor<'t, u16>, VERTICES, M>,
+    reader: FrameReader<'static, VERTICES>,
+    received: u32,
+    published: u32,
+    epoch: u32,
+    digest: u32,
+}
+
+impl<'t, M: Mac> Receiver<'t, M> {
+    fn new(
+        tree: &'t Tree<'t, u16>,
+        writer: FrameWriter<'static, VERTICES>,
+        reader: FrameReader<'static, VERTICES>,
+        limit: f32,
+        mac: M,
+    ) -> Option<Self> {
+        let monitor = StretchMonitor::new(tree).ok()?;
+        let mesh_id = tree.mesh_id();
+        let assembler = Assembler::with_mac(writer, monitor, mesh_id, limit, mac);
+        let deframer = Deframer::new();
+        let [received, published, epoch, digest] = [0; 4];
+        Some(Self { mesh_id, deframer, assembler, reader, received, published, epoch, digest })
+    }
+
+    /// Until the emulator is stopped.
+    fn receive(&mut self) -> ! {
+        let (mut has_work, mut reported) = (false, None);
+        loop {
+            if let Some(byte) = uart::read() {
+                self.received = self.received.wrapping_add(1);
+                match self.deframer.push(byte) {
+                    None => continue,
+                    Some(Ok(packet)) => drop(self.assembler.accept(packet, 0)),
+                    Some(Err(error)) => self.assembler.count_framing(&error),
+                }
+                has_work = true;
+            } else if has_work {
+                has_work = self.work();
+            } else if reported != Some(self.received) {
+                self.report();
+                reported = Some(self.received);
+            }
+        }
+    }
+
+    /// A slice of checking; whether more is to be done at once.
+    fn work(&mut self) -> bool {
+        match self.assembler.advance(WORK) {
+            Ok(Advance::Pending) => return true,
+            Ok(Advance::Published { .. }) => {
+                self.published = self.published.wrapping_add(1);
+                // What a control tick would see.
+                if let Some(frame) = self.reader.read() {
+                    let mut digest = CRC.digest();
+                    for row in 0..VERTICES as u32 {
+                        let position = frame.position(row).unwrap_or_default();
+                        for coordinate in position.to_array() {
+                            digest.update(&coordinate.to_bits().to_le_bytes());
+                        }
+                    }
+                    (self.epoch, self.digest) = (frame.label().epoch, digest.finalize());
+                }
+            }
+            _ => (),
+        }
+        false
+    }
+
+    fn report(&mut self) {
+        let mut record = [0; HEAD_BYTES + REPORT_MTU];
+        let (head, rest) = record.split_at_mut(HEAD_BYTES);
+        let words = [self.received, self.published, self.epoch, self.digest];
+        for (place, word) in head.as_chunks_mut().0.iter_mut().zip(words) {
+            *place = word.to_le_bytes();
+        }
+        let status = self.assembler.status(0, 0);
+        let mut packet = [0; REPORT_MTU];
+        let counters = self.assembler.counters();
+        let packet =
+            encode_status(self.mesh_id, &status, counters, self.assembler.mac(), &mut packet);
+        for (place, byte) in rest.iter_mut().zip(packet) {
+            *place = *byte;
+        }
+        let mut line = [0; framed_bytes(HEAD_BYTES + REPORT_MTU)];
+        let record = record.get(..HEAD_BYTES + packet.len()).unwrap_or_default();
+        for &byte in enframe(record, &mut line).unwrap_or_default() {
+            uart::write(byte);
+        }
+    }
+}
+
+/// UART 0 of the board: a CMSDK UART, one byte deep in each direction, polled.
+mod uart {
+    use super::{read_volatile, with_exposed_provenance_mut, write_volatile};
+
+    const DATA: usize = 0x4000_4000;
+    const STATE: usize = DATA + 4;
+    const CONTROL: usize = DATA + 8;
+    const DIVISOR: usize = DATA + 16;
+    const TRANSMIT_FULL: u32 = 1;
+    const RECEIVE_FULL: u32 = 2;
+
+    fn get(register: usize) -> u32 {
+        // SAFETY: only called with registers of UART 0, which tolerate any read.
+        unsafe { read_volatile(with_exposed_provenance_mut::<u32>(register)) }
+    }
+
+    fn set(register: usize, value: u32) {
+        // SAFETY: only called with registers of UART 0, which tolerate any write.
+        unsafe { write_volatile(with_exposed_provenance_mut::<u32>(register), value) }
+    }
+
+    /// Both ways.
+    pub fn start() {
+        set(DIVISOR, 16);
+        set(CONTROL, 0b11);
+    }
+
+    /// The byte that has arrived, if any.
+    pub fn read() -> Option<u8> {
+        (get(STATE) & RECEIVE_FULL != 0).then(|| get(DATA) as u8)
+    }
+
+    /// Sends one byte, after the one before has left.
+    pub fn write(byte: u8) {
+        while get(STATE) & TRANSMIT_FULL != 0 {}
+        set(DATA, byte.into());
+    }
+}
+
+fn exit(success: bool) -> ! {
+    debug::exit(if success { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
+    loop {
+        cortex_m::asm::wfi();
+    }
+}
+
+#[panic_handler]
+fn panic(_info: &core::panic::PanicInfo) -> ! {
+    exit(false)
+}
+
+#[exception]
+unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
+    exit(false)
+}
