@@ -84,6 +84,9 @@ impl Receiver {
     }
 
     /// One slice of checking, copying and publishing; whether more is to be done at once.
+    // As a part of a large loop its branches become jumps through a register, of which nobody can see where
+    // they lead.
+    #[inline(never)]
     pub fn work(&mut self) -> bool {
         let outcome = self.assembler.advance(WORK);
         self.status.link.note_check(&outcome);
