@@ -32,6 +32,8 @@ enum Task {
     Test(test::Options),
     Bench(bench::Options),
     Guarantees(guarantees::Options),
+    /// Writes docs/performance.md: where a query's instructions go on the emulated board.
+    Profile,
     Fuzz(nightly::FuzzOptions),
     /// Runs the tests of frames, bus and format under the address and the thread sanitizer.
     Sanitize,
@@ -45,6 +47,7 @@ fn main() -> ExitCode {
         Task::Test(options) => test::test(&options),
         Task::Bench(options) => bench::run(&options),
         Task::Guarantees(options) => guarantees::run(&options),
+        Task::Profile => guarantees::profile::run(),
         Task::Fuzz(options) => or_say(nightly::missing(), || nightly::fuzz_by_hand(&options)),
         Task::Sanitize => or_say(nightly::missing(), nightly::sanitize_by_hand),
         Task::Miri => or_say(nightly::miri_missing(), nightly::miri),

@@ -16,6 +16,7 @@ mod markdown;
 mod modes;
 mod path;
 mod probe;
+pub mod profile;
 mod promises;
 mod receive;
 mod record;
@@ -68,6 +69,10 @@ pub struct Effort {
     pub costs: usize,
     /// The same on this computer, under callgrind.
     pub host_costs: usize,
+    /// Ticks of table 3's path on the board.
+    pub ticks: u32,
+    /// Poses that hurt, on the board.
+    pub poses: usize,
     /// Queries under which frames are published.
     pub torn: u32,
     /// Faults of each kind on the board's bus.
@@ -87,6 +92,8 @@ impl Effort {
         bits: 100_000,
         costs: 100_000,
         host_costs: 100_000,
+        ticks: 2_000,
+        poses: 10_000,
         torn: 100_000,
         board_faults: 100,
         demo_seconds: 20,
@@ -95,14 +102,16 @@ impl Effort {
     };
     /// What every run of the tests can afford.
     pub const TEST: Self = Self {
-        cases: 200_000,
-        bits: 30_000,
-        costs: 30_000,
-        host_costs: 10_000,
-        torn: 20_000,
-        board_faults: 2,
+        cases: 100_000,
+        bits: 10_000,
+        costs: 10_000,
+        host_costs: 5_000,
+        ticks: 250,
+        poses: 1_000,
+        torn: 8_000,
+        board_faults: 1,
         demo_seconds: 5,
-        fault_seconds: 12,
+        fault_seconds: 8,
         fuzz_seconds: 60,
     };
 }
@@ -162,7 +171,7 @@ fn check(effort: Effort, only: Option<&str>, steps: &mut Steps) -> Figures {
     step("cost model on this computer", &|f| {
         passed(cost::check(&Machine::Host, effort.host_costs, f))
     });
-    step("queries on the board", &|f| passed(path::check(&board()?, effort.costs / 10, f)));
+    step("queries on the board", &|f| passed(path::check(&board()?, &effort, f)));
     step("modal surfaces on the board", &|f| passed(modes::check(&board()?, f)));
     step("receiving on the board", &|f| passed(receive::check(&board()?, f)));
     step("torn reads on the board", &|f| passed(torn::check(&board()?, effort.torn, f)));

@@ -2,25 +2,23 @@
 
 use anyhow::Result;
 
+use super::Effort;
 use super::figures::Figures;
 use super::probe::{Answers, build_for_board, on_board};
 use super::script::{Knows, Record, Script};
 use crate::toolchain::Cross;
 
 /// Notes the instructions of queries on the generated heart (table 3's path and limit, every tick's
-/// surface another), warm with measured stretch and cold with the limit alone, and of `poses` poses.
-pub fn check(cross: &Cross, poses: usize, figures: &mut Figures) -> Result<()> {
+/// surface another), warm with measured stretch and cold with the limit alone, and of poses.
+pub fn check(cross: &Cross, effort: &Effort, figures: &mut Figures) -> Result<()> {
     let program = build_for_board(cross, "probe")?;
     let ask = |script: Script| on_board(&program, &script, true);
     for (name, knows) in [("warm", Knows::Everything), ("cold", Knows::Nothing)] {
-        note(name, &ask(Script::beating(TICKS, knows))?, figures);
+        note(name, &ask(Script::beating(effort.ticks, knows))?, figures);
     }
-    note("poses", &ask(Script::poses(poses, 41))?, figures);
+    note("poses", &ask(Script::poses(effort.poses, 41))?, figures);
     Ok(())
 }
-
-/// Ticks of the path that are tried: spread over all of its 77 seconds.
-const TICKS: u32 = 2_000;
 
 fn note(name: &str, answers: &Answers, figures: &mut Figures) {
     let mut taken = Vec::new();

@@ -1,7 +1,9 @@
 //! The probe: a program that answers a script, on the emulated board and on this computer.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::{BufRead, BufReader};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -12,7 +14,7 @@ use super::callgrind;
 use super::script::{Record, Script};
 use crate::process::run;
 use crate::toolchain::Cross;
-use crate::workspace;
+use crate::{qemu, workspace};
 
 /// One answer: its words, of which the first is what it took on the clock.
 pub struct Answer<'a> {
@@ -111,6 +113,51 @@ pub fn run_on_board<T>(
     qemu.args(["-semihosting-config", "enable=on,target=native", "-kernel"]).arg(program);
     run(qemu.current_dir(folder.path()).stdin(Stdio::null()))?;
     read(&folder.path().join("answers.bin"))
+}
+
+/// How often each instruction of the functions between these addresses is executed while a script is
+/// answered: QEMU is told to execute one at a time, and to log them.
+pub fn executions(
+    program: &Path,
+    script: &Script,
+    ranges: &[Range<u64>],
+) -> Result<BTreeMap<u64, u64>> {
+    let folder = tempfile::tempdir()?;
+    fs::write(folder.path().join("script.bin"), script.bytes())?;
+    let filter: Vec<String> = ranges
+        .iter()
+        .map(|range| format!("0x{:x}..0x{:x}", range.start, range.end.saturating_sub(1)))
+        .collect();
+    let mut qemu = Command::new("qemu-system-arm");
+    qemu.args(["-machine", "mps2-an500", "-cpu", "cortex-m7", "-display", "none"]);
+    qemu.args(["-monitor", "none", "-serial", "none"]);
+    // Since QEMU 8.1 the option has another name, and since 9 the old one is gone.
+    if qemu_major()? >= 9 {
+        qemu.args(["-accel", "tcg,one-insn-per-tb=on"]);
+    } else {
+        qemu.arg("-singlestep");
+    }
+    qemu.args(["-d", "exec,nochain", "-dfilter", &filter.join(","), "-D", "log"]);
+    qemu.args(["-semihosting-config", "enable=on,target=native", "-kernel"]).arg(program);
+    run(qemu.current_dir(folder.path()).stdin(Stdio::null()))?;
+    let mut counts = BTreeMap::new();
+    for line in BufReader::new(fs::File::open(folder.path().join("log"))?).lines() {
+        // `Trace 0: HOST [flags/ADDRESS/...] name`
+        let line = line?;
+        let address = line.split('/').nth(1).and_then(|a| u64::from_str_radix(a, 16).ok());
+        if let Some(address) = address {
+            *counts.entry(address).or_insert(0) += 1;
+        }
+    }
+    ensure!(!counts.is_empty(), "QEMU logged no instruction");
+    Ok(counts)
+}
+
+/// The first number of `QEMU emulator version 7.2.22 (...)`.
+fn qemu_major() -> Result<u32> {
+    let version = qemu::find()?;
+    let number = version.split_whitespace().find_map(|word| word.split('.').next()?.parse().ok());
+    number.with_context(|| format!("no version in `{version}`"))
 }
 
 /// One way to build the probe for this computer.

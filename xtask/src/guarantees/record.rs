@@ -39,6 +39,15 @@ fn committed() -> Result<Vec<Record>> {
     Ok(serde_json::from_str(&text)?)
 }
 
+/// A committed number.
+pub fn figure(id: &str) -> Result<f64> {
+    let records = committed()?;
+    let record = records.iter().find(|record| record.id == id);
+    record
+        .and_then(|record| record.figure.as_f64())
+        .with_context(|| format!("no figure {id}: `cargo xtask guarantees` measures it"))
+}
+
 /// Writes both documents. A promise that was not measured keeps its record.
 pub fn write(figures: &Figures) -> Result<()> {
     let before = committed().unwrap_or_default();
