@@ -76,7 +76,9 @@ fn ranges(program: &Path) -> Result<Vec<Range<u64>>> {
     let file = object::File::parse(&*bytes)?;
     let is_ours = |name: &str| {
         let name = rustc_demangle::demangle(name).to_string();
-        ["probe::timed", "probe::clocked", "probe::ask", "query::", "tool::"].iter().any(|part| name.contains(part))
+        ["probe::timed", "probe::clocked", "probe::ask", "query::", "tool::"]
+            .iter()
+            .any(|part| name.contains(part))
     };
     Ok(file
         .symbols()
