@@ -175,7 +175,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
                 continue;
             }
             let step = match Link::decode(link) {
-                Link::Children { first, count } => self.expand(first, count)?,
+                Link::Children { first, count } => self.expand(lower, first, count)?,
                 Link::Leaf { first, count } => self.leaf(first, count)?,
             };
             if matches!(step, Step::OutOfBudget) {
@@ -225,9 +225,9 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     }
 
     /// Tests the spheres of a node's children, and the planes of those that are leaves: what is left
-    /// waits.
+    /// waits. What bounds the node bounds them, so that what is certified never falls back.
     #[inline(always)]
-    fn expand(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
+    fn expand(&mut self, parent: f32, first: u32, count: u32) -> Result<Step, QueryError> {
         let corrupt = QueryError::Corrupt { row: first };
         let Some(left) = self.left.node_tests.checked_sub(count) else {
             return Ok(Step::OutOfBudget);
@@ -258,8 +258,9 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
                     continue;
                 }
             }
-            let subtree = Waiting { lower: distance - radius, link: node.link };
-            self.push(base, subtree).ok_or(corrupt)?;
+            let own = distance - radius;
+            let lower = if own > parent { own } else { parent };
+            self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;
         }
         Ok(Step::Done)
     }
