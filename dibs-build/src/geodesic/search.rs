@@ -11,7 +11,8 @@ pub(crate) struct Distances {
     /// Distance and the run it belongs to, a vertex.
     rows: Vec<(f64, u32)>,
     run: u32,
-    heap: BinaryHeap<Reverse<(u64, u32)>>,
+    /// Distance and vertex of each in one number, so that one comparison orders them.
+    heap: BinaryHeap<Reverse<u128>>,
     /// Vertices in the order in which they were settled.
     settled: Vec<u32>,
 }
@@ -60,10 +61,9 @@ impl Distances {
         self.settled.clear();
         let mut farthest = Farthest { vertex: source, distance: 0.0, reached: 0 };
         self.rows[source as usize] = (0.0, self.run);
-        self.heap.push(Reverse((0, source)));
-        while let Some(Reverse((bits, vertex))) = self.heap.pop() {
-            // Distances are not negative, so their bits sort as they do.
-            let distance = f64::from_bits(bits);
+        self.heap.push(key(0.0, source));
+        while let Some(Reverse(key)) = self.heap.pop() {
+            let (distance, vertex) = (f64::from_bits((key >> 32) as u64), key as u32);
             if distance > self.rows[vertex as usize].0 {
                 continue;
             }
@@ -79,12 +79,17 @@ impl Distances {
                 let row = &mut self.rows[arc.to as usize];
                 if (row.1 != self.run || through < row.0) && allowed(arc.to) {
                     *row = (through, self.run);
-                    self.heap.push(Reverse((through.to_bits(), arc.to)));
+                    self.heap.push(self::key(through, arc.to));
                 }
             }
         }
         farthest
     }
+}
+
+/// Orders by distance, then by vertex: distances are not negative, so their bits sort as they do.
+fn key(distance: f64, vertex: u32) -> Reverse<u128> {
+    Reverse(u128::from(distance.to_bits()) << 32 | u128::from(vertex))
 }
 
 /// Where a search ended.
