@@ -50,7 +50,7 @@ impl Deformation {
     /// of at most `limit`, then turned and moved as a whole.
     #[must_use]
     pub fn apply(self, mesh: &Mesh, paths: PathKind, limit: f32, rng: &mut Rng) -> Vec<Vec3> {
-        let most = f64::from(limit) * 0.99;
+        let most = f64::from(limit) * 0.999;
         self.apply_while(mesh, |moved| stretch::largest(mesh, moved, paths) <= most, rng)
     }
 

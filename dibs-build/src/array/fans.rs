@@ -26,6 +26,8 @@ struct Choice {
     /// Whether the first corner is neither too pointed nor too flat to measure the stretch from, or at
     /// least the triangle's best.
     is_fit: bool,
+    /// Whether it is so pointed that the stretch measured from it is off by a thousandth, and not the best.
+    is_misfit: bool,
     /// The triangle's bit among the leaf's.
     bit: u32,
 }
@@ -35,33 +37,53 @@ struct Choice {
 /// Where that leaves a triangle at a corner too pointed to measure from, the leaf starts at whichever
 /// triangle leaves the fewest.
 pub(crate) fn arrange(mesh: &Mesh, leaf: &[u32], before: Option<Placed>) -> Vec<Placed> {
+    best_order(mesh, leaf, before).0
+}
+
+/// The triangles of a leaf that even its best order stores at far too pointed a corner, though they have a
+/// better one: alone in a leaf, they are stored at that.
+pub(crate) fn misfits(mesh: &Mesh, leaf: &[u32]) -> Vec<u32> {
+    let (_, unfit) = best_order(mesh, leaf, None);
+    unfit.iter().filter(|choice| choice.is_misfit).map(|choice| choice.placed.triangle).collect()
+}
+
+/// The best order, and what it stores at a bad corner.
+fn best_order(mesh: &Mesh, leaf: &[u32], before: Option<Placed>) -> (Vec<Placed>, Vec<Choice>) {
     let choices: Vec<Choice> =
         leaf.iter().zip(0..).flat_map(|(&t, i)| rotations(mesh, t, 1 << i)).collect();
     let all: u32 = (1 << leaf.len()) - 1;
     let first = before.and_then(|last| continuation(&choices, all, last));
-    let Some(first) = first.or_else(|| start(&choices, all, &[])) else { return Vec::new() };
-    let (greedy, unfit) = arrange_from(&choices, all, first);
-    if unfit == 0 {
+    let Some(first) = first.or_else(|| start(&choices, all, &[])) else {
+        return Default::default();
+    };
+    let greedy = arrange_from(&choices, all, first);
+    if greedy.1.is_empty() {
         return greedy;
     }
     let starts = choices.iter().filter(|choice| choice.is_fit);
     let others = starts.map(|&first| arrange_from(&choices, all, first));
     // Of equally good ones the first.
-    let best = std::iter::once((greedy, unfit)).chain(others).min_by_key(|&(_, unfit)| unfit);
-    best.map_or_else(Vec::new, |(placed, _)| placed)
+    let orders = std::iter::once(greedy).chain(others);
+    let misfits = |unfit: &[Choice]| unfit.iter().filter(|choice| choice.is_misfit).count();
+    orders.min_by_key(|(_, unfit)| (misfits(unfit), unfit.len())).unwrap_or_default()
 }
 
-/// The order from this start, and how many triangles it stores at a bad corner.
-fn arrange_from(choices: &[Choice], all: u32, first: Choice) -> (Vec<Placed>, usize) {
+/// The order from this start, and which triangles it stores at a bad corner.
+fn arrange_from(choices: &[Choice], all: u32, first: Choice) -> (Vec<Placed>, Vec<Choice>) {
     let mut left = all & !first.bit;
     let mut placed = vec![first.placed];
-    let (mut last, mut unfit) = (first, usize::from(!first.is_fit));
+    let (mut last, mut unfit) = (first, Vec::new());
+    if !first.is_fit {
+        unfit.push(first);
+    }
     while left != 0 {
         let next = continuation(choices, left, last.placed);
         let Some(next) = next.or_else(|| start(choices, left, &placed)) else { break };
         left &= !next.bit;
         placed.push(next.placed);
-        unfit += usize::from(!next.is_fit);
+        if !next.is_fit {
+            unfit.push(next);
+        }
         last = next;
     }
     (placed, unfit)
@@ -112,14 +134,21 @@ fn rotations(mesh: &Mesh, triangle: u32, bit: u32) -> [Choice; 3] {
     let all = [[a, b, c], [b, c, a], [c, a, b]].map(|corners| {
         let [a, b, c] = corners.map(|v| mesh.positions[v as usize].as_dvec3());
         let placed = Placed { triangle, corners };
-        Choice { placed, openness: openness(b - a, c - a), is_fit: false, bit }
+        Choice { placed, openness: openness(b - a, c - a), is_fit: false, is_misfit: false, bit }
     });
     let best = all.iter().map(|choice| choice.openness).fold(0.0, f64::max);
-    all.map(|choice| Choice { is_fit: choice.openness >= OPEN.min(best), ..choice })
+    all.map(|choice| Choice {
+        is_fit: choice.openness >= OPEN.min(best),
+        is_misfit: choice.openness < POINTED.min(best),
+        ..choice
+    })
 }
 
 /// Openness of a corner that is good enough: 18 degrees.
 const OPEN: f64 = 0.05;
+
+/// Openness of a corner that is far too pointed: 3 degrees.
+const POINTED: f64 = 0.0014;
 
 /// `1 - |cos|` of the angle between two edges, without its cancellation: the check's rounding grows with its
 /// inverse.

@@ -3,7 +3,7 @@
 #[cfg(feature = "modes")]
 mod append;
 mod emit;
-mod fans;
+pub(crate) mod fans;
 mod flatten;
 mod metric;
 #[cfg(feature = "modes")]

@@ -11,6 +11,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::Construction;
+use crate::array::fans;
 use crate::error::BuildError;
 use pin::Pin;
 pub(crate) use section::Surface;
@@ -112,10 +113,19 @@ impl<'a> Constructor<'a> {
         Ok(Cluster { pin: pin.vertex, radius: pin.radius, content })
     }
 
-    /// A leaf, or one for each part of the section where it does not hang together by edges.
+    /// A leaf, or one for each part of the section where it does not hang together by edges, or where its
+    /// stretch could not be measured in one.
     fn leaves(&self, section: &Section, pin: Pin, depth: u32) -> Result<Cluster, BuildError> {
         let mesh = self.surface.mesh;
         let mut parts = patch::parts(&mesh.triangles, &section.triangles);
+        if let [whole] = &mut parts[..] {
+            let misfits = fans::misfits(mesh, whole);
+            if whole.len() > 1 && !misfits.is_empty() {
+                whole.retain(|triangle| !misfits.contains(triangle));
+                parts.extend(misfits.into_iter().map(|triangle| vec![triangle]));
+                parts.retain(|part| !part.is_empty());
+            }
+        }
         let content = if parts.len() == 1 {
             let count = section.triangles.len();
             (self.progress)(self.done.fetch_add(count, Ordering::Relaxed) + count);
