@@ -61,7 +61,7 @@ fn extent(mesh: &Mesh) -> (Vec3, f32) {
     ((low + high) / 2.0, (high - low).max_element() / 2.0)
 }
 
-/// The linker scripts of the binary `board`: `memory.x` at the top of the repository is the board.
+/// The linker scripts of the binaries `board` and `cycles`: `memory.x` at the top of the repository is the board.
 fn link(out: &Path) -> Result<()> {
     println!("cargo:rerun-if-changed=../memory.x");
     fs::copy("../memory.x", out.join("memory.x")).context("memory.x at the repository's top")?;
@@ -70,6 +70,9 @@ fn link(out: &Path) -> Result<()> {
     println!("cargo:rustc-link-search={}", out.display());
     for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
         println!("cargo:rustc-link-arg-bin=board={argument}");
+    }
+    for argument in ["--nmagic", "-Tlink.x"] {
+        println!("cargo:rustc-link-arg-bin=cycles={argument}");
     }
     println!("cargo:rustc-env=DEFMT_LOG=info");
     Ok(())

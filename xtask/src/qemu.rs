@@ -30,6 +30,16 @@ fn version() -> Result<String> {
     Ok(text.lines().next().unwrap_or_default().to_owned())
 }
 
+/// The command that boots a program which needs nothing but semihosting.
+pub fn alone(program: &Path) -> Command {
+    let mut command = Command::new(PROGRAM);
+    command.args(["-machine", "mps2-an500", "-cpu", "cortex-m7"]);
+    command.args(["-display", "none", "-monitor", "none", "-serial", "none"]);
+    command.args(["-icount", &format!("shift={SHIFT}")]);
+    command.args(["-semihosting-config", "enable=on,target=native", "-kernel"]).arg(program);
+    command
+}
+
 /// The command that boots `program` for `ticks` control ticks. Its bus is UART 0, connected to the
 /// socket `bus`; its telemetry UART 1, connected to the socket `telemetry`.
 pub fn command(program: &Path, bus: &Path, telemetry: &Path, ticks: u32) -> Command {

@@ -1,0 +1,187 @@
+//! What a query costs in cycles, on a board of your own: its `Cost`, from the cycle counter of the debug
+//! watchpoint unit (DWT). Where that stands still, as in an emulator, `SysTick` takes its place, and says so.
+//!
+//! Change `memory.x` to your part, raise its clock before the measurement as your product does, and run
+//! this with a debugger that shows semihosting output:
+//!
+//! ```text
+//! cargo build -p firmware-example --bin cycles --features cycles --profile firmware --target thumbv7em-none-eabihf
+//! ```
+//!
+//! It searches the heart at rest from many poses, each with caches as the last query left them and with
+//! empty ones, and with three budgets: of nothing, of node tests only, and of all that it takes. The
+//! constants that come out are above every query that was measured. Add a margin for what was not.
+#![no_std]
+#![no_main]
+
+use controller::surface::{SURFACE, SURFACE_CENTER, SURFACE_REACH, SurfaceFrames, SurfaceQuery};
+use core::panic::PanicInfo;
+use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m::peripheral::{DCB, DWT, Peripherals, SYST};
+use cortex_m_rt::entry;
+use cortex_m_semihosting::{debug, hprintln};
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::{Budget, Capsule, Cost, FrameLabel, Options, Proximity, Query};
+
+const POSES: u32 = 2_000;
+
+/// Half the capsule's axis, and its radius: those of the paper's table 3, in mm.
+const HALF_AXIS: f32 = 75.0;
+const RADIUS: f32 = 3.0;
+
+static FRAMES: SurfaceFrames = SurfaceFrames::new();
+
+#[entry]
+fn main() -> ! {
+    let measured = measure();
+    if let Err(reason) = measured {
+        hprintln!("{}", reason);
+    }
+    exit(measured.is_ok())
+}
+
+fn measure() -> Result<(), &'static str> {
+    let mut core = Peripherals::take().ok_or("the peripherals are taken")?;
+    let counter = Counter::start(&mut core.DCB, &mut core.DWT, &mut core.SYST);
+    core.SCB.enable_icache();
+    core.SCB.enable_dcache(&mut core.CPUID);
+
+    let (mut writer, mut reader) = FRAMES.split().ok_or("the buffers are taken")?;
+    writer.begin();
+    for row in 0..SURFACE.vertex_count() {
+        let position = SURFACE.rest_position(row).ok_or("the tree has no rest shape")?;
+        writer.push(position).map_err(|_| "more vertices than rows")?;
+    }
+    let label = FrameLabel { epoch: 1, received: 0, position_error: 0.0, stretch: None };
+    writer.publish(label).map_err(|_| "the frame is not complete")?;
+    let frame = reader.read().ok_or("nothing is published")?;
+
+    let mut query: SurfaceQuery = Query::new(&SURFACE).map_err(|_| "the stack is too small")?;
+    let mut random = Random(1);
+    let mut bound = Cost { base: 0, node_test: 0, triangle_test: 0 };
+    let (mut sum, mut largest) = (0_u64, 0_u32);
+    for pose in 0..POSES {
+        let centre = SURFACE_CENTER + random.within() * SURFACE_REACH;
+        let half = random.within().normalize_or(Vec3::X) * HALF_AXIS;
+        let Ok(tool) = Capsule::new(centre - half, centre + half, RADIUS) else { continue };
+        let mut cycles = |node_tests, triangle_tests| {
+            // Every other pose finds both caches empty: nothing is worse than that.
+            if pose % 2 == 1 {
+                core.SCB.clean_invalidate_dcache(&mut core.CPUID);
+                core.SCB.invalidate_icache();
+            }
+            let budget = Budget { node_tests, triangle_tests };
+            let start = counter.now();
+            let answer = query.closest(&frame, &tool, &Options::new().budget(budget));
+            let cycles = counter.since(start);
+            answer.map(|answer| (cycles, answer)).map_err(|_| "the query failed")
+        };
+        let most = u32::MAX;
+        let [none, nodes, all] = [cycles(0, 0)?, cycles(most, 0)?, cycles(most, most)?];
+        raise(&mut bound, none, nodes, all);
+        sum += u64::from(all.0);
+        largest = largest.max(all.0);
+    }
+    let mean = sum / u64::from(POSES);
+    let unit = counter.unit();
+    hprintln!("{POSES} poses, {mean} {unit} in the mean, {largest} at the most");
+    let Cost { base, node_test, triangle_test } = bound;
+    hprintln!("Cost {{ base: {base}, node_test: {node_test}, triangle_test: {triangle_test} }}");
+    Ok(())
+}
+
+/// What counts.
+#[derive(Clone, Copy, PartialEq)]
+enum Counter {
+    /// The core's cycles, in 32 bits.
+    Cycles,
+    /// Counts of `SysTick`, downwards in 24 bits: all that an emulator has.
+    SysTick,
+}
+
+impl Counter {
+    fn start(dcb: &mut DCB, dwt: &mut DWT, systick: &mut SYST) -> Self {
+        dcb.enable_trace();
+        DWT::unlock(); // the M7's lock access register
+        dwt.set_cycle_count(0);
+        dwt.enable_cycle_counter();
+        let before = DWT::cycle_count();
+        cortex_m::asm::delay(1_000);
+        if DWT::cycle_count() != before {
+            return Self::Cycles;
+        }
+        systick.set_clock_source(SystClkSource::Core);
+        systick.set_reload(SYSTICK_BITS);
+        systick.clear_current();
+        systick.enable_counter();
+        Self::SysTick
+    }
+
+    fn now(self) -> u32 {
+        match self {
+            Self::Cycles => DWT::cycle_count(),
+            Self::SysTick => SYSTICK_BITS - SYST::get_current(),
+        }
+    }
+
+    fn since(self, start: u32) -> u32 {
+        let passed = self.now().wrapping_sub(start);
+        if self == Self::SysTick { passed & SYSTICK_BITS } else { passed }
+    }
+
+    fn unit(self) -> &'static str {
+        match self {
+            Self::Cycles => "cycles",
+            Self::SysTick => "counts of SysTick (the cycle counter stands still)",
+        }
+    }
+}
+
+const SYSTICK_BITS: u32 = 0x00FF_FFFF;
+
+/// Raises the constants until none of the three queries costs more than they say.
+fn raise(bound: &mut Cost, none: (u32, Proximity), nodes: (u32, Proximity), all: (u32, Proximity)) {
+    bound.base = bound.base.max(none.0);
+    for (cycles, answer) in [nodes, all] {
+        let tests = Budget { node_tests: answer.node_tests, triangle_tests: 0 };
+        let beyond = u64::from(cycles).saturating_sub(bound.instructions(tests)) as u32;
+        match answer.triangle_tests {
+            0 => bound.node_test += beyond.div_ceil(answer.node_tests.max(1)),
+            tests => bound.triangle_test = bound.triangle_test.max(beyond.div_ceil(tests)),
+        }
+    }
+}
+
+/// Marsaglia's xorshift: the same poses on every run.
+struct Random(u32);
+
+impl Random {
+    fn next(&mut self) -> f32 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 17;
+        self.0 ^= self.0 << 5;
+        self.0 as f32 / u32::MAX as f32
+    }
+
+    /// A point of the cube from -1 to 1.
+    fn within(&mut self) -> Vec3 {
+        Vec3::new(self.next(), self.next(), self.next()) * 2.0 - 1.0
+    }
+}
+
+fn exit(success: bool) -> ! {
+    debug::exit(if success { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
+    loop {
+        cortex_m::asm::wfi();
+    }
+}
+
+#[panic_handler]
+fn panic(_: &PanicInfo) -> ! {
+    exit(false)
+}
+
+/// No interrupt is enabled.
+#[unsafe(link_section = ".vector_table.interrupts")]
+#[unsafe(no_mangle)]
+pub static __INTERRUPTS: [u32; 1] = [0];
