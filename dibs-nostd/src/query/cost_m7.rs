@@ -4,7 +4,7 @@ use super::Cost;
 
 impl Cost {
     /// A sphere on a Cortex-M7.
-    pub const M7_SPHERE: Self = Self { base: 1774, node_test: 114, triangle_test: 1003 };
+    pub const M7_SPHERE: Self = Self { base: 2463, node_test: 117, triangle_test: 1109 };
     /// A capsule on a Cortex-M7.
-    pub const M7_CAPSULE: Self = Self { base: 1648, node_test: 136, triangle_test: 1125 };
+    pub const M7_CAPSULE: Self = Self { base: 1877, node_test: 148, triangle_test: 1280 };
 }
