@@ -232,40 +232,45 @@ fn passing<
     // One comparison does for both.
     let vertices = surface.len() as u32;
     let ready = if ready < vertices { ready } else { vertices };
-    let at = |row: u32| if row < ready { surface.position(row) } else { None };
+    let corner = |corners, number| corner::<I, V, CORNERS>(surface, corners, number, ready);
     let (mut centre, mut first, mut left_by_first) = (Vec3::ZERO, Vec3::ZERO, 0.0);
-    // No triangle before these was looked at: they start a fan anew.
-    let mut is_new = true;
     for (passed, (metric, corners)) in metrics.iter().zip(triangles).enumerate() {
-        let corner = |number| format::vertex_number::<I>(corners, number).and_then(at);
         let [rest_first, rest_between, rest_second] = format::metric_row(metric);
-        is_new |= !format::continues_fan(metric);
+        // Of the triangle before the first nothing is known.
+        let is_new = passed == 0 || !format::continues_fan(metric);
         if is_new {
-            let Some(a) = corner(0) else { return passed };
-            let Some(b) = corner(1) else { return passed };
+            let Some(a) = corner(corners, 0) else { return passed };
+            let Some(b) = corner(corners, 1) else { return passed };
             (centre, first) = (a, b - a);
         }
         if is_new || !UNIFORM {
-            is_new = false;
             left_by_first = limit * rest_first - first.length_squared();
             if !(left_by_first > 0.0) {
                 return passed;
             }
         }
-        let Some(c) = corner(2) else { return passed };
+        let Some(c) = corner(corners, 2) else { return passed };
         let second = c - centre;
         let left_by_second = limit * rest_second - second.length_squared();
-        if !M::is_within(
-            left_by_first,
-            left_by_second,
-            limit * rest_between,
-            Edges { first, second },
-        ) {
+        let now = Edges { first, second };
+        if !M::is_within(left_by_first, left_by_second, limit * rest_between, now) {
             return passed;
         }
         (first, left_by_first) = (second, left_by_second);
     }
     if metrics.len() < triangles.len() { metrics.len() } else { triangles.len() }
+}
+
+/// Position of a triangle's corner, if it is below row `ready`.
+#[inline(always)]
+fn corner<I: Index, V: VertexTable + ?Sized, const CORNERS: usize>(
+    surface: &V,
+    corners: &[u8; CORNERS],
+    number: u32,
+    ready: u32,
+) -> Option<Vec3> {
+    let row = format::vertex_number::<I>(corners, number)?;
+    if row < ready { surface.position(row) } else { None }
 }
 
 /// A triangle's edges; `None` while a corner is not below row `ready`.
