@@ -46,22 +46,27 @@ pub fn unordered_queries(built: &BuiltTree) -> Box<dyn Method + '_> {
     }
 }
 
-/// The largest stretch of a frame (its positions in the mesh's order), or `None` beyond the limit.
+/// Gives the largest stretch of a frame (its positions in the mesh's order), or `None` beyond the limit.
+pub type StretchOf<'t> = Box<dyn Fn(&[Vec3]) -> Option<f32> + 't>;
+
+/// Measures frames on a built tree, whatever the width of its indices.
 ///
 /// # Panics
 /// If the bytes are not those of a tree with its rest shape.
 #[must_use]
-pub fn stretch(built: &BuiltTree, positions: &[Vec3]) -> Option<f32> {
-    let rows = built.to_rows(positions);
-    let measured = match built.index_bits() {
-        16 => measure_stretch(&built.tree::<u16>().expect("valid"), &rows[..]),
-        _ => measure_stretch(&built.tree::<u32>().expect("valid"), &rows[..]),
-    };
-    match measured {
+pub fn stretch(built: &BuiltTree) -> StretchOf<'_> {
+    match built.index_bits() {
+        16 => stretch_on(built, built.tree::<u16>().expect("valid")),
+        _ => stretch_on(built, built.tree::<u32>().expect("valid")),
+    }
+}
+
+fn stretch_on<'t, I: Index>(built: &'t BuiltTree, tree: Tree<'t, I>) -> StretchOf<'t> {
+    Box::new(move |positions| match measure_stretch(&tree, built.to_rows(positions).as_slice()) {
         Ok(stretch) => Some(stretch.sigma()),
         Err(StretchError::Exceeded { .. }) => None,
         Err(error) => panic!("{error}"),
-    }
+    })
 }
 
 struct Dibs<'t, I> {

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use dibs_build::{Builder, BuiltTree, Construction};
 use dibs_tests::baselines::{AabbTree, Exhaustive, Hybrid, Refit};
-use dibs_tests::dibs::{Knowledge, queries, stretch};
+use dibs_tests::dibs::{Knowledge, StretchOf, queries, stretch};
 use dibs_tests::method::Probe;
 use dibs_tests::streams::Stream;
 use glam::Vec3;
@@ -104,21 +104,21 @@ fn one(plan: &Plan, subject: &Subject, count: usize, records: &mut Records) -> R
 
 /// Frames that keep to the limit, and their stretches.
 pub struct Frames<'t> {
-    tree: &'t BuiltTree,
+    stretch: StretchOf<'t>,
     positions: Vec<Vec3>,
     pub stretches: Vec<f64>,
 }
 
 impl<'t> Frames<'t> {
     pub fn new(tree: &'t BuiltTree) -> Self {
-        Self { tree, positions: Vec::new(), stretches: Vec::new() }
+        Self { stretch: stretch(tree), positions: Vec::new(), stretches: Vec::new() }
     }
 
     /// The stream's next frame within the tree's limit, with its tools.
     pub fn next(&mut self, stream: &mut Stream<'_>) -> (&[Vec3], [Probe; 2]) {
         loop {
             stream.deform(&mut self.positions);
-            if let Some(largest) = stretch(self.tree, &self.positions) {
+            if let Some(largest) = (self.stretch)(&self.positions) {
                 self.stretches.push(f64::from(largest));
                 let tools = stream.tools(&self.positions);
                 return (&self.positions, tools);

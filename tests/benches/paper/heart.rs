@@ -67,12 +67,13 @@ fn one(plan: &Plan, heart: &Heart, records: &mut Records) -> Result<()> {
     }
     race.reset()?;
     let mut stretches = Vec::new();
+    let stretch_of = stretch(&ours);
     for repetition in 0..plan.repetitions {
         for tick in 0..plan.ticks {
             beat.deform(tick, &mut positions);
             race.step(&positions, &[beat.tool(tick)])?;
             if repetition == 0 {
-                stretches.extend(stretch(&ours, &positions).map(f64::from));
+                stretches.extend(stretch_of(&positions).map(f64::from));
             }
             progress.one();
         }
@@ -105,9 +106,10 @@ fn one(plan: &Plan, heart: &Heart, records: &mut Records) -> Result<()> {
 /// The limit that a recorded motion needs, with a margin.
 fn sufficient_stretch(heart: &Heart) -> Result<f32> {
     let tree: BuiltTree = Builder::new().stretch(ANY_STRETCH).build(&heart.mesh)?;
+    let stretch_of = stretch(&tree);
     let mut largest = 1.0_f32;
     for (number, frame) in heart.motion.frames.iter().enumerate() {
-        let found = stretch(&tree, frame)
+        let found = stretch_of(frame)
             .with_context(|| format!("frame {number} of the motion is torn apart"))?;
         largest = largest.max(found);
     }
