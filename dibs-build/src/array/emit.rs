@@ -274,12 +274,21 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
 
 /// Whether the stretch check can pass a triangle at rest; true where there is nothing to check with.
 fn is_measurable<I: Index>(tree: &Tree<'_, I>, row: u32) -> bool {
-    let Some(([first, ..], _)) = tree.metric(row) else { return true };
+    let Some((metric, _)) = tree.metric(row) else { return true };
     let corners = tree.triangle(row).and_then(|c| row_of(c, |v| tree.rest_position(v)));
-    let Some([a, b, _]) = corners else { return first > 0.0 };
+    let Some([a, b, c]) = corners else { return metric[0] > 0.0 };
+    let (e1, e2) = ((b - a).as_dvec3(), (c - a).as_dvec3());
     // The builder has made the metric smaller by what the check's rounding may amount to.
-    let allowed = f64::from(first) * f64::from(tree.stretch()).powi(2);
-    first > 0.0 && allowed >= (b - a).as_dvec3().length_squared()
+    let limit = f64::from(tree.stretch()).powi(2);
+    let left = |rest: f32, now: f64| limit * f64::from(rest) - now;
+    let [first, between, second] = metric;
+    let (x, z) = (left(first, e1.length_squared()), left(second, e2.length_squared()));
+    match tree.paths() {
+        PathKind::EdgePath => {
+            first > 0.0 && x >= 0.0 && z >= 0.0 && left(between, (e2 - e1).length_squared()) >= 0.0
+        }
+        _ => first > 0.0 && x > 0.0 && x * z >= left(between, e1.dot(e2)).powi(2),
+    }
 }
 
 /// Something of each corner, if all have it.

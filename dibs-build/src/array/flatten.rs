@@ -169,15 +169,23 @@ fn metrics(mesh: &Mesh, triangles: &[Placed], facts: Facts<'_>) -> Vec<u8> {
         if [a, c] != [first, second] || !is_measurable {
             continue;
         }
-        // The edge that both have: of two roundings the lower, which is right for both.
+        // The edge that both have: of two roundings the lower, which is right for both. One that is much lower
+        // is that of a flat triangle, and would spoil the other.
         if facts.shares.is_uniform() {
-            let shared = rows[at][0].min(rows[at - 1][2]);
+            let (own, before) = (rows[at][0], rows[at - 1][2]);
+            let shared = own.min(before);
+            if shared < own.max(before) * MUCH_LOWER {
+                continue;
+            }
             (rows[at][0], rows[at - 1][2]) = (shared, shared);
         }
         rows[at][0] = -rows[at][0];
     }
     rows.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect()
 }
+
+/// Two roundings of one edge's metric that are no farther apart make a fan.
+const MUCH_LOWER: f32 = 0.9999;
 
 /// The length of one radius code: the largest radius takes nearly the largest code.
 fn radius_unit<I: Index>(flat: &Flat) -> f32 {
