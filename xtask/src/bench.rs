@@ -15,6 +15,9 @@ pub struct Options {
     /// A few minutes instead of half an hour: fewer queries. Writes to target/bench, not to docs.
     #[arg(long)]
     quick: bool,
+    /// At most this many queries of each brain and tool, instead of the paper's 10,000.
+    #[arg(long)]
+    queries: Option<usize>,
     /// Where to write instead.
     #[arg(long)]
     out: Option<PathBuf>,
@@ -33,6 +36,9 @@ pub fn run(options: &Options) -> Result<()> {
     cargo.current_dir(workspace::root());
     if options.quick {
         cargo.arg("--quick");
+    }
+    if let Some(queries) = options.queries {
+        cargo.arg("--queries").arg(queries.to_string());
     }
     if let Some(out) = &options.out {
         cargo.arg("--out").arg(std::path::absolute(out)?);

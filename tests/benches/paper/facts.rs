@@ -18,6 +18,9 @@ pub fn run(plan: &Plan, arguments: &Arguments, records: &mut Records) {
     if arguments.quick {
         command += " --quick";
     }
+    if let Some(queries) = arguments.queries {
+        command += &format!(" --queries {queries}");
+    }
     let meshes = match subjects::real() {
         Some(_) => "real anatomy (human brains and a human heart, beside the repository)",
         None => "generated: the real ones are not on this machine",

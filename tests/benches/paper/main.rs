@@ -36,8 +36,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         return Ok(());
     } else {
         let start = Instant::now();
-        let plan = if arguments.quick { Plan::quick() } else { Plan::full() };
-        let records = paper::run(&plan, arguments)?;
+        let records = paper::run(&Plan::of(arguments), arguments)?;
         println!("measured in {:.0} s", start.elapsed().as_secs_f64());
         records
     };

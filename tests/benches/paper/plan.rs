@@ -12,6 +12,9 @@ pub struct Arguments {
     /// A few minutes instead of an hour: fewer queries. Written to target/bench, not to docs.
     #[arg(long)]
     pub quick: bool,
+    /// At most this many queries of each brain and tool.
+    #[arg(long)]
+    pub queries: Option<usize>,
     /// Where to write; by default docs for a full run, target/bench for a quick one.
     #[arg(long)]
     pub out: Option<PathBuf>,
@@ -56,6 +59,14 @@ impl Plan {
             ablation_brains: vec![5_000, 50_000],
             ablation_queries: 1_000,
         }
+    }
+
+    /// What the arguments ask for.
+    pub fn of(arguments: &Arguments) -> Self {
+        let mut plan = if arguments.quick { Self::quick() } else { Self::full() };
+        let most = arguments.queries.unwrap_or(usize::MAX);
+        plan.brains.iter_mut().for_each(|(_, queries)| *queries = most.min(*queries));
+        plan
     }
 
     /// Within ten minutes on two cores, compilation included.
