@@ -129,8 +129,8 @@ fn polygon_tests(page: &mut String, records: &Records) {
         }
     }
     page.push_str(
-        "\nWhere it differs: here a triangle is first tried against an elastic sphere, and one that is \
-         rejected by it counts as a node test, not as a polygon test. The count also depends on how \
+        "\nWhere it differs: here a triangle is first tried against planes, and one that is \
+         rejected by them counts as a node test, not as a polygon test. The count also depends on how \
          folded the brain is (a sphere pinned to one wall of a sulcus covers the other wall too), on \
          how far the random deformations go and on where the tools are, and none of these are the \
          paper's own. Where the default needs fewer, its sections, split by geodesic distance and \
