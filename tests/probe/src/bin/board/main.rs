@@ -4,13 +4,14 @@
 #![no_main]
 
 mod clock;
+mod exit;
 mod files;
 
 use core::cell::RefCell;
 
 use cortex_m::interrupt::{self, Mutex};
-use cortex_m_rt::{entry, exception};
-use cortex_m_semihosting::debug;
+use cortex_m_rt::entry;
+use exit::exit;
 use probe::{Fault, Machine, Memory, run};
 
 static MEMORY: Mutex<RefCell<Memory>> = Mutex::new(RefCell::new(Memory::new()));
@@ -45,21 +46,4 @@ fn main() -> ! {
         board.answers.flush()
     });
     exit(done.is_some())
-}
-
-fn exit(success: bool) -> ! {
-    debug::exit(if success { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
-    loop {
-        cortex_m::asm::wfi();
-    }
-}
-
-#[panic_handler]
-fn panic(_info: &core::panic::PanicInfo) -> ! {
-    exit(false)
-}
-
-#[exception]
-unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
-    exit(false)
 }

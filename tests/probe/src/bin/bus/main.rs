@@ -10,6 +10,8 @@
 #![no_std]
 #![no_main]
 
+#[path = "../board/exit.rs"]
+mod exit;
 // It writes no file.
 #[allow(dead_code)]
 #[path = "../board/files.rs"]
@@ -17,13 +19,13 @@ mod files;
 
 use core::ptr::{read_volatile, with_exposed_provenance_mut, write_volatile};
 
-use cortex_m_rt::{entry, exception};
-use cortex_m_semihosting::debug;
+use cortex_m_rt::entry;
 use dibs_nostd::format::CRC;
 use dibs_nostd::wire::{AesCmac, Deframer, Mac, NoMac, encode_status, enframe, framed_bytes};
 use dibs_nostd::{
     Advance, Assembler, FrameReader, FrameWriter, Frames, StretchMonitor, Tree, VertexTable,
 };
+use exit::exit;
 use probe::bus::{HEAD_BYTES, KEY, MTU, REPORT_MTU, VERTICES, WORK};
 
 static FRAMES: Frames<VERTICES> = Frames::new();
@@ -184,21 +186,4 @@ mod uart {
         while get(STATE) & TRANSMIT_FULL != 0 {}
         set(DATA, byte.into());
     }
-}
-
-fn exit(success: bool) -> ! {
-    debug::exit(if success { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
-    loop {
-        cortex_m::asm::wfi();
-    }
-}
-
-#[panic_handler]
-fn panic(_info: &core::panic::PanicInfo) -> ! {
-    exit(false)
-}
-
-#[exception]
-unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
-    exit(false)
 }

@@ -10,16 +10,18 @@
 
 #[path = "../board/clock.rs"]
 mod clock;
+#[path = "../board/exit.rs"]
+mod exit;
 #[path = "../board/files.rs"]
 mod files;
 
 use core::cell::RefCell;
 
 use cortex_m::interrupt::{self, Mutex};
-use cortex_m_rt::{entry, exception};
-use cortex_m_semihosting::debug;
+use cortex_m_rt::entry;
 use dibs_nostd::wire::{AesCmac, Mac, NoMac};
 use dibs_nostd::{Advance, Assembler, Frames, StretchMonitor, Tree};
+use exit::exit;
 use probe::receive::{ANSWER_WORDS, KEY, TAGGED, TREE_BYTES, UNTAGGED, VERTICES};
 
 /// Largest packet.
@@ -116,21 +118,4 @@ fn word(script: &mut files::Input) -> Option<u32> {
     let mut bytes = [0; 4];
     script.read(&mut bytes)?;
     Some(u32::from_le_bytes(bytes))
-}
-
-fn exit(success: bool) -> ! {
-    debug::exit(if success { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
-    loop {
-        cortex_m::asm::wfi();
-    }
-}
-
-#[panic_handler]
-fn panic(_info: &core::panic::PanicInfo) -> ! {
-    exit(false)
-}
-
-#[exception]
-unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
-    exit(false)
 }

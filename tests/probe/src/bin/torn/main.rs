@@ -7,6 +7,8 @@
 #![no_std]
 #![no_main]
 
+#[path = "../board/exit.rs"]
+mod exit;
 #[path = "../board/files.rs"]
 mod files;
 
@@ -17,10 +19,10 @@ use cortex_m::interrupt::{self, Mutex};
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{Peripherals, SYST};
 use cortex_m_rt::{entry, exception};
-use cortex_m_semihosting::debug;
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{FrameLabel, FrameWriter, Frames, Options, Query, Sphere, Tree, VertexTable};
+use exit::exit;
 
 /// Vertices of the surface: an octahedron's, split three times.
 const VERTICES: usize = 258;
@@ -208,21 +210,4 @@ fn run() -> Option<()> {
 fn wave(x: f32) -> f32 {
     let turns = x - (x as i32) as f32;
     4.0 * if turns < 0.5 { turns } else { 1.0 - turns } - 1.0
-}
-
-fn exit(success: bool) -> ! {
-    debug::exit(if success { debug::EXIT_SUCCESS } else { debug::EXIT_FAILURE });
-    loop {
-        cortex_m::asm::wfi();
-    }
-}
-
-#[panic_handler]
-fn panic(_info: &core::panic::PanicInfo) -> ! {
-    exit(false)
-}
-
-#[exception]
-unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
-    exit(false)
 }
