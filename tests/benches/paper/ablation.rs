@@ -96,7 +96,7 @@ fn one(plan: &Plan, name: &str, mesh: &Mesh, records: &mut Records) -> Result<()
         let mut frames = Frames::new(&variants[0].tree);
         let mut stream = Stream::new(&mesh.positions, SEED);
         for _ in 0..plan.ablation_queries {
-            let (positions, tools) = frames.next(&mut stream);
+            let (positions, tools) = frames.next(&mut stream)?;
             race.step(positions, &tools[tool..=tool])?;
             progress.one();
         }

@@ -1,6 +1,6 @@
 //! Tables 1 and 2: deforming brains of four sizes, a sphere and a capsule.
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use dibs_build::{Builder, BuiltTree, Construction};
 use dibs_tests::baselines::{AabbTree, Exhaustive, Hybrid, Refit};
 use dibs_tests::dibs::{Knowledge, StretchOf, queries, stretch};
@@ -69,7 +69,7 @@ fn one(plan: &Plan, subject: &Subject, count: usize, records: &mut Records) -> R
     let mut frames = Frames::new(&ours);
     let mut warm_up = Stream::new(&mesh.positions, TRAINING);
     for _ in 0..plan.warm_up(size) {
-        let (positions, tools) = frames.next(&mut warm_up);
+        let (positions, tools) = frames.next(&mut warm_up)?;
         race.step(positions, &tools)?;
     }
     race.reset()?;
@@ -78,7 +78,7 @@ fn one(plan: &Plan, subject: &Subject, count: usize, records: &mut Records) -> R
     for seed in 1..=SEEDS {
         let mut stream = Stream::new(&mesh.positions, seed);
         for _ in 0..count.div_ceil(SEEDS as usize) {
-            let (positions, tools) = frames.next(&mut stream);
+            let (positions, tools) = frames.next(&mut stream)?;
             race.step(positions, &tools)?;
             progress.one();
         }
@@ -102,6 +102,9 @@ fn one(plan: &Plan, subject: &Subject, count: usize, records: &mut Records) -> R
     Ok(())
 }
 
+/// Refused frames in a row after which the mesh, not the strength of its deformations, is to blame.
+const MOST_REFUSED: usize = 1_000;
+
 /// Frames that keep to the limit, and their stretches.
 pub struct Frames<'t> {
     stretch: StretchOf<'t>,
@@ -115,15 +118,19 @@ impl<'t> Frames<'t> {
     }
 
     /// The stream's next frame within the tree's limit, with its tools.
-    pub fn next(&mut self, stream: &mut Stream<'_>) -> (&[Vec3], [Probe; 2]) {
-        loop {
+    ///
+    /// # Errors
+    /// Where frame after frame is beyond the limit, which says that the tree refuses the mesh itself.
+    pub fn next(&mut self, stream: &mut Stream<'_>) -> Result<(&[Vec3], [Probe; 2])> {
+        for _ in 0..MOST_REFUSED {
             stream.deform(&mut self.positions);
             if let Some(largest) = (self.stretch)(&self.positions) {
                 self.stretches.push(f64::from(largest));
                 let tools = stream.tools(&self.positions);
-                return (&self.positions, tools);
+                return Ok((&self.positions, tools));
             }
         }
+        bail!("{MOST_REFUSED} frames in a row are beyond the tree's limit")
     }
 }
 
@@ -139,7 +146,7 @@ fn split_level(ours: &BuiltTree, mesh: &dibs_build::Mesh, boxes: &AabbTree) -> R
     let mut frames = Frames::new(ours);
     let mut stream = Stream::new(&mesh.positions, TRAINING + 1);
     for step in 0..30 {
-        let (positions, tools) = frames.next(&mut stream);
+        let (positions, tools) = frames.next(&mut stream)?;
         race.step(positions, &tools)?;
         if step == 9 {
             race.reset()?;
