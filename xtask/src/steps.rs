@@ -8,6 +8,9 @@ use anyhow::Result;
 use crate::process::run;
 use crate::workspace;
 
+/// Lines of an error that the list repeats: a list of broken promises starts with a heading.
+const REASON_LINES: usize = 4;
+
 /// What a step came to.
 pub enum Outcome {
     Passed,
@@ -48,8 +51,9 @@ impl Steps {
             Err(error) => {
                 self.failed += 1;
                 eprintln!("error: {error:#}");
-                let first = format!("{error:#}").lines().next().unwrap_or_default().to_owned();
-                format!("FAILED   {seconds:4} s  {name}: {first}")
+                let reason = format!("{error:#}");
+                let lines: Vec<_> = reason.lines().map(str::trim).take(REASON_LINES).collect();
+                format!("FAILED   {seconds:4} s  {name}: {}", lines.join(" "))
             }
         };
         self.lines.push(line);

@@ -49,9 +49,10 @@ impl Plan {
     /// Ticks for which the line is cut once: longer than the controller puts up with.
     pub const SILENCE: u32 = SILENCE_LIMIT + TICK_RATE / 2;
 
-    /// The tick after which that is done, as soon as a frame has come through.
+    /// The tick after which that is done, as soon as a frame has come through. Early: the emulated
+    /// line brings a frame in about a second, and what comes after the silence has to fit too.
     pub const fn silence_at(&self) -> u32 {
-        self.seconds * TICK_RATE / 3
+        self.seconds * TICK_RATE / 4
     }
 }
 

@@ -42,7 +42,7 @@ pub struct Options {
     /// Runs the controller as a program on this computer, without cross toolchain and QEMU.
     #[arg(long)]
     pub host: bool,
-    /// Puts faults of every kind on the bus, and silences it for a while halfway.
+    /// Puts faults of every kind on the bus, and silences it once for a while.
     #[arg(long)]
     pub faults: bool,
     /// What the faults are drawn from.

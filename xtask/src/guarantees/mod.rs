@@ -111,7 +111,7 @@ impl Effort {
         torn: 8_000,
         board_faults: 1,
         demo_seconds: 5,
-        fault_seconds: 8,
+        fault_seconds: 20,
         fuzz_seconds: 60,
     };
 }
