@@ -342,13 +342,14 @@ fn what_the_stretch_check_cannot_measure_is_warned_of() {
     };
     write("good.obj", "f 1 2 3\nf 1 3 4\n");
     write("flat.obj", "v 0.01 0.00001 0\nf 1 2 3\nf 1 3 4\nf 2 1 5\n");
-    for (mesh, unmeasurable) in [("good", 0), ("flat", 1)] {
+    write("tiny.obj", "v 1e-8 0 0\nv 0 1e-8 0\nf 1 2 3\nf 1 3 4\nf 1 5 6\n");
+    for (mesh, unmeasurable) in [("good", 0), ("flat", 0), ("tiny", 1)] {
         let output = dibs(folder, &format!("build {mesh}.obj -o {mesh}.dibs --json"));
         let errors = String::from_utf8(output.stderr).unwrap();
         assert!(output.status.success(), "{errors}");
         let built: Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!(built["tree"]["unmeasurable"], unmeasurable, "{built}");
-        let warned = built["warnings"].to_string().contains("4, 1 and 0) are too flat");
+        let warned = built["warnings"].to_string().contains("0, 4 and 5) are too small");
         assert_eq!(warned, unmeasurable > 0, "{built}");
         assert_eq!(errors.contains("weld or drop them"), unmeasurable > 0, "{errors}");
     }

@@ -69,7 +69,8 @@ pub enum PathKind {
     /// Along mesh edges: coverage holds while no edge is longer than `s` times its rest length.
     EdgePath,
     /// Across triangle interiors: coverage holds while no triangle's largest singular value
-    /// (deformation gradient against the rest shape) exceeds `s`.
+    /// (deformation gradient against the rest shape, which counts as higher where a triangle is flat:
+    /// see [`measure_stretch`](crate::measure_stretch)) exceeds `s`.
     Surface,
 }
 

@@ -27,11 +27,26 @@ pub fn of_triangle(mesh: &Mesh, now: &[Vec3], triangle: usize, paths: PathKind) 
 
 /// In the triangle's plane, `F = [now] [rest]^-1` for the 2x2 edge matrices of both shapes.
 fn largest_singular_value(rest: [DVec3; 3], now: [DVec3; 3]) -> f64 {
-    let gradient = flat(now) * flat(rest).inverse();
+    let gradient = flat(now) * higher(flat(rest)).inverse();
     let metric = gradient.transpose() * gradient;
     let (trace, determinant) = (metric.x_axis.x + metric.y_axis.y, metric.determinant());
     let root = (trace * trace / 4.0 - determinant).max(0.0).sqrt();
     (trace / 2.0 + root).sqrt()
+}
+
+/// The rest shape of a triangle lower than 1/64 of its longest edge counts as that high: stretched across that
+/// edge, `w` away from it, by what it takes.
+fn higher(edges: DMat2) -> DMat2 {
+    let (first, second) = (edges.x_axis, edges.y_axis);
+    let longest = [first, second, second - first]
+        .into_iter()
+        .max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))
+        .unwrap_or(first);
+    let height = edges.determinant().abs() / longest.length();
+    let factor = (longest.length() / 64.0 / height).max(1.0);
+    let across = longest.perp() / longest.length();
+    let stretched = |edge: DVec2| edge + across * across.dot(edge) * (factor - 1.0);
+    DMat2::from_cols(stretched(first), stretched(second))
 }
 
 /// The triangle's two edges in an orthonormal basis of its plane.

@@ -38,8 +38,8 @@ pub struct Summary {
     pub stretch: f32,
     /// The least stretch limit of any triangle.
     pub least_stretch_limit: f32,
-    /// Triangles that the controller's stretch check refuses even at rest, because they are too flat or too
-    /// small for its arithmetic: with them no frame is ever published.
+    /// Triangles that the controller's stretch check refuses even at rest, because they are too small for its
+    /// arithmetic: with them no frame is ever published.
     pub unmeasurable: u32,
     /// The vertices of the first of them, by the mesh's numbers.
     pub first_unmeasurable: Option<[u32; 3]>,

@@ -9,6 +9,7 @@
 use glam::DVec3;
 
 use crate::Mesh;
+use crate::stretch::fattened;
 
 /// A triangle of the mesh, and its corners in the order in which they are stored: rotated, so that the
 /// orientation stays.
@@ -132,7 +133,7 @@ fn start(choices: &[Choice], left: u32, placed: &[Placed]) -> Option<Choice> {
 fn rotations(mesh: &Mesh, triangle: u32, bit: u32) -> [Choice; 3] {
     let [a, b, c] = mesh.triangles[triangle as usize];
     let all = [[a, b, c], [b, c, a], [c, a, b]].map(|corners| {
-        let [a, b, c] = corners.map(|v| mesh.positions[v as usize].as_dvec3());
+        let [a, b, c] = fattened(corners.map(|v| mesh.positions[v as usize].as_dvec3()));
         let placed = Placed { triangle, corners };
         Choice { placed, openness: openness(b - a, c - a), is_fit: false, is_misfit: false, bit }
     });

@@ -169,12 +169,13 @@ fn metrics(mesh: &Mesh, triangles: &[Placed], facts: Facts<'_>) -> Vec<u8> {
         if [a, c] != [first, second] || !is_measurable {
             continue;
         }
-        // The edge that both have: of two roundings the lower, which is right for both. One that is much lower
-        // is that of a flat triangle, and would spoil the other.
+        // The edge that both have: of two roundings the lower, which is right for both unless one of them is so
+        // flat that it would be spoilt.
         if facts.shares.is_uniform() {
-            let (own, before) = (rows[at][0], rows[at - 1][2]);
-            let shared = own.min(before);
-            if shared < own.max(before) * MUCH_LOWER {
+            let shared = rows[at][0].min(rows[at - 1][2]);
+            let spoilt = |row: [f32; 3], edge: f32| (1.0 - shared / edge) / openness_of(row);
+            let most = spoilt(rows[at], rows[at][0]).max(spoilt(rows[at - 1], rows[at - 1][2]));
+            if most > MOST_SPOILT {
                 continue;
             }
             (rows[at][0], rows[at - 1][2]) = (shared, shared);
@@ -184,8 +185,13 @@ fn metrics(mesh: &Mesh, triangles: &[Placed], facts: Facts<'_>) -> Vec<u8> {
     rows.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect()
 }
 
-/// Two roundings of one edge's metric that are no farther apart make a fan.
-const MUCH_LOWER: f32 = 0.9999;
+/// By how much a squared stretch may be too large for the sake of a fan.
+const MOST_SPOILT: f32 = 5e-4;
+
+/// `1 - |cos|` of the corner that a metric is measured from.
+fn openness_of([first, between, second]: [f32; 3]) -> f32 {
+    1.0 - between.abs() / (first.abs() * second).sqrt()
+}
 
 /// The length of one radius code: the largest radius takes nearly the largest code.
 fn radius_unit<I: Index>(flat: &Flat) -> f32 {

@@ -5,6 +5,7 @@ use dibs_nostd::format::PathKind;
 use glam::{DVec3, Vec3};
 
 use super::fans::openness;
+use crate::stretch::fattened;
 
 /// Rounding of the controller's check in f32, in units of 2^-24: derived in `dibs_nostd`'s
 /// `stretch/kernel.rs`.
@@ -22,7 +23,11 @@ const LARGEST_SQUARED: f64 = 1e18;
 /// `share` is its stretch limit as a part of the tree's, which is `stretch`. Never too large: roundings
 /// are downwards. Zeros, which no triangle passes, where no f32 arithmetic could tell.
 pub(crate) fn metric(corners: [Vec3; 3], share: f64, stretch: f64, paths: PathKind) -> [f32; 3] {
-    let [a, b, c] = corners.map(Vec3::as_dvec3);
+    let corners = corners.map(Vec3::as_dvec3);
+    let [a, b, c] = match paths {
+        PathKind::EdgePath => corners,
+        _ => fattened(corners),
+    };
     let (e1, e2) = (b - a, c - a);
     let edges = [e1, c - b, e2].map(DVec3::length_squared);
     let possible = LEAST_SQUARED..=LARGEST_SQUARED / (stretch * stretch);

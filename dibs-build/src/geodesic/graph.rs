@@ -6,15 +6,16 @@
 //!
 //! Where triangles have stretch limits of their own, lengths are weighted by each limit's share of the
 //! largest: a path grows to at most the largest limit times its weighted length. An edge stretches no
-//! more than any of its triangles does, so the least of their limits is its; a chord is the sum of its
-//! parts in each triangle.
+//! more than any of its triangles does, so the least that it is in any of them is its; a chord is the sum of
+//! its parts in each triangle. Flat triangles, which are measured as if they were higher, have edges as long
+//! as that makes them, and no chord crosses them.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::Topology;
 use crate::Mesh;
-use crate::stretch::Shares;
+use crate::stretch::{Shares, fattened, is_flat};
 
 /// How far along-surface distances look beyond the mesh's edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,9 +125,17 @@ impl Unfolding<'_> {
         for &triangle in topology.triangles_at(self.source) {
             let [a, b] = topology.others(self.mesh, triangle, self.source);
             let (to_a, to_b) = (self.edge(self.source, a), self.edge(self.source, b));
-            self.found.push((a, to_a.length() * self.edge_share(triangle, a)));
-            self.found.push((b, to_b.length() * self.edge_share(triangle, b)));
-            let Paths::Surface { crossings } = self.paths else { continue };
+            let share = self.shares.share(triangle);
+            let Paths::Surface { crossings } = self.paths else {
+                self.found.extend([(a, to_a.length() * share), (b, to_b.length() * share)]);
+                continue;
+            };
+            if self.is_flat(triangle) {
+                let [at, at_a, at_b] = fattened(self.positions([self.source, a, b]));
+                self.found.extend([(a, at.distance(at_a) * share), (b, at.distance(at_b) * share)]);
+                continue;
+            }
+            self.found.extend([(a, to_a.length() * share), (b, to_b.length() * share)]);
             let axis = to_a.normalize();
             let across = to_a.cross(to_b).length() / to_a.length();
             let (at_a, at_b) = (DVec2::new(to_a.length(), 0.0), DVec2::new(to_b.dot(axis), across));
@@ -135,14 +144,12 @@ impl Unfolding<'_> {
         }
     }
 
-    /// The share of the edge from the source to `to`, one of a triangle's.
-    fn edge_share(&self, triangle: u32, to: u32) -> f64 {
-        let own = self.shares.share(triangle);
-        if self.shares.is_uniform() {
-            return own;
-        }
-        let others = self.topology.across(self.mesh, triangle, self.source, to);
-        others.map(|t| self.shares.share(t)).fold(own, f64::min)
+    fn is_flat(&self, triangle: u32) -> bool {
+        is_flat(self.positions(self.mesh.triangles[triangle as usize]))
+    }
+
+    fn positions(&self, corners: [u32; 3]) -> [DVec3; 3] {
+        corners.map(|v| self.mesh.positions[v as usize].as_dvec3())
     }
 
     /// The weighted length of the chord to `end`, a corner of `last`.
@@ -170,8 +177,8 @@ impl Unfolding<'_> {
     }
 
     fn edge(&self, from: u32, to: u32) -> DVec3 {
-        let at = |v: u32| self.mesh.positions[v as usize].as_dvec3();
-        at(to) - at(from)
+        let [from, to, _] = self.positions([from, to, to]);
+        to - from
     }
 
     /// Unfolds the triangles beyond a window's edge into the source's plane.
@@ -183,6 +190,9 @@ impl Unfolding<'_> {
         let topology = self.topology;
         self.crossed.push(([at_a, at_b], self.shares.share(window.triangle)));
         for next in topology.across(self.mesh, window.triangle, a, b) {
+            if self.is_flat(next) {
+                continue;
+            }
             let apex = topology.apex(self.mesh, next, a, b);
             let (along, to_apex) = (self.edge(a, b), self.edge(a, apex));
             let length = along.length();

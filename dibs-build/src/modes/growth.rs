@@ -4,6 +4,8 @@ use dibs_nostd::format::PathKind;
 use dibs_nostd::{Index, Tree};
 use glam::DVec3;
 
+use crate::stretch::fattened;
+
 /// The triangles of a tree, ready to tell what a displacement does to them.
 pub struct Triangles {
     corners: Vec<[u32; 3]>,
@@ -33,11 +35,15 @@ impl Triangles {
         let shape = |row: u32| {
             let [a, b, c] = corners[row as usize];
             let at = |vertex| Some(tree.rest_position(vertex)?.as_dvec3());
-            let [a, b, c] = [at(a)?, at(b)?, at(c)?];
-            let (e1, e2) = (b - a, c - a);
+            let corners = [at(a)?, at(b)?, at(c)?];
+            let edges = |[a, b, c]: [DVec3; 3]| (b - a, c - a);
             let measure = match tree.paths() {
-                PathKind::EdgePath => Measure::Edges([e1.length(), e2.length(), e1.distance(e2)]),
+                PathKind::EdgePath => {
+                    let (e1, e2) = edges(corners);
+                    Measure::Edges([e1.length(), e2.length(), e1.distance(e2)])
+                }
                 _ => {
+                    let (e1, e2) = edges(fattened(corners));
                     let x1 = e1.length();
                     Measure::Surface { x1, x2: e1.dot(e2) / x1, y2: e1.cross(e2).length() / x1 }
                 }

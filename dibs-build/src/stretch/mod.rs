@@ -1,11 +1,13 @@
 //! What a recorded motion asks of the stretch limits, and limits of single triangles.
 
+mod fatten;
 mod file;
 mod shares;
 
 use glam::{DMat2, DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
+pub(crate) use fatten::{fattened, is_flat};
 pub use file::{LimitsError, LimitsErrorKind, read_limits, write_limits};
 pub(crate) use shares::Shares;
 
@@ -14,8 +16,9 @@ use crate::{Mesh, Motion, Paths};
 
 /// How far a recorded motion stretches each triangle of its mesh.
 ///
-/// The measure is the one that the paths of the tree ask for: a triangle's largest singular value, or
-/// for [`Paths::Edges`] its longest edge over that edge's rest length. Between two frames, on straight
+/// The measure is the one that the paths of the tree ask for: a triangle's largest singular value (of one
+/// lower than 1/64 of its longest edge, as if it were that high), or for [`Paths::Edges`] its longest edge
+/// over that edge's rest length. Between two frames, on straight
 /// lines, neither is larger than in both: they are convex.
 ///
 /// ```
@@ -144,7 +147,7 @@ fn stretch(rest: [DVec3; 3], now: [DVec3; 3], paths: Paths) -> f64 {
         }
         Paths::Surface { .. } => {
             // The deformation gradient in the plane, and the root of its metric's larger eigenvalue.
-            let gradient = flat(now) * flat(rest).inverse();
+            let gradient = in_plane(now) * in_plane(fattened(rest)).inverse();
             let metric = gradient.transpose() * gradient;
             let (pp, pq, qq) = (metric.x_axis.x, metric.x_axis.y, metric.y_axis.y);
             ((pp + qq) / 2.0 + ((pp - qq) / 2.0).hypot(pq)).sqrt()
@@ -153,7 +156,7 @@ fn stretch(rest: [DVec3; 3], now: [DVec3; 3], paths: Paths) -> f64 {
 }
 
 /// Two edges of a triangle in a frame of its plane.
-fn flat([a, b, c]: [DVec3; 3]) -> DMat2 {
+fn in_plane([a, b, c]: [DVec3; 3]) -> DMat2 {
     let (along, other) = (b - a, c - a);
     let x = along.normalize_or(DVec3::X);
     let height = (other - x * other.dot(x)).length();

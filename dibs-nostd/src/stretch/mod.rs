@@ -32,7 +32,7 @@ pub enum StretchError {
         /// Row of the triangle.
         triangle: u32,
         /// Its stretch; not a number or infinite where a position is, or where the triangle is too
-        /// flat at rest to be measured.
+        /// small at rest to be measured.
         stretch: f32,
         /// Its limit.
         limit: f32,
@@ -67,7 +67,8 @@ impl core::error::Error for StretchError {}
 ///
 /// Never below the true stretch of any triangle; above the largest by a few parts in a million, more
 /// only where a triangle is nearly flat at rest (twice as much where its largest angle is 120
-/// degrees, a thousandth at 178).
+/// degrees, a thousandth at most). The rest shape of a triangle lower than 1/64 of its longest edge counts as
+/// that high, here and in the tree's radii.
 ///
 /// Cost: linear in the triangles, about 35 floating point operations each, without root or division
 /// but for those beyond all before them.

@@ -99,8 +99,8 @@ pub fn run(args: &Args) -> Result<()> {
     let summary = tree.summary();
     let unmeasurable = summary.first_unmeasurable.map(|[a, b, c]| {
         format!(
-            "{} triangles (the first has the vertices {a}, {b} and {c}) are too flat or too small for \
-             the controller's stretch check, which would refuse every frame: weld or drop them",
+            "{} triangles (the first has the vertices {a}, {b} and {c}) are too small for the \
+             controller's stretch check, which would refuse every frame: weld or drop them",
             summary.unmeasurable
         )
     });
