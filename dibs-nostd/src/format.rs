@@ -236,8 +236,8 @@ pub(crate) const fn triangle<I: Index>(triangles: &[u8], row: u32) -> Option<[u3
 pub(crate) const fn vertex_number<I: Index>(order: &[u8], row: u32) -> Option<u32> {
     let Some(tail) = rows_from(order, row, I::BYTES) else { return None };
     if I::BYTES == 2 {
-        let Some(r) = tail.first_chunk::<2>() else { return None };
-        Some(short(r[0], r[1]))
+        let Some(number) = tail.first_chunk::<2>() else { return None };
+        Some(u16::from_le_bytes(*number) as u32)
     } else {
         u32_at(tail, 0)
     }
@@ -258,38 +258,23 @@ pub(crate) const fn rest_position(rest: &[u8], row: u32) -> Option<glam::Vec3> {
 #[inline(always)]
 pub(crate) const fn metric(metric: &[u8], row: u32) -> Option<([f32; 3], bool)> {
     let Some(tail) = rows_from(metric, row, METRIC_BYTES) else { return None };
-    let Some(row) = tail.first_chunk::<METRIC_BYTES>() else { return None };
-    Some((metric_row(row), continues_fan(row)))
-}
-
-/// The metric in one row.
-#[inline(always)]
-pub(crate) const fn metric_row(row: &[u8; METRIC_BYTES]) -> [f32; 3] {
-    [metric_square(row, 0), metric_square(row, 1), metric_square(row, 2)]
-}
-
-/// One of the three numbers of a row of the metric section: 0, 1 or 2.
-#[inline(always)]
-pub(crate) const fn metric_square(row: &[u8; METRIC_BYTES], square: usize) -> f32 {
-    let number = f32::from_bits(metric_word(row, square));
-    if square == 0 { number.abs() } else { number }
-}
-
-#[inline(always)]
-const fn metric_word(row: &[u8; METRIC_BYTES], square: usize) -> u32 {
-    let &[a0, a1, a2, a3, h0, h1, h2, h3, d0, d1, d2, d3] = row;
-    match square {
-        0 => u32::from_le_bytes([a0, a1, a2, a3]),
-        1 => u32::from_le_bytes([h0, h1, h2, h3]),
-        _ => u32::from_le_bytes([d0, d1, d2, d3]),
+    match tail.first_chunk::<METRIC_BYTES>() {
+        Some(row) => Some(metric_row(row)),
+        None => None,
     }
 }
 
-/// Whether a row of the metric section continues the fan of the row before.
+/// The metric in one row. (Each number is read whole, so that it takes one load.)
 #[inline(always)]
-pub(crate) const fn continues_fan(row: &[u8; METRIC_BYTES]) -> bool {
-    metric_word(row, 0) >> 31 != 0
+pub(crate) const fn metric_row(row: &[u8; METRIC_BYTES]) -> ([f32; 3], bool) {
+    let ([first, between, second], _) = row.as_chunks() else { return ([0.0; 3], false) };
+    let first = u32::from_le_bytes(*first);
+    let (between, second) = (f32::from_le_bytes(*between), f32::from_le_bytes(*second));
+    ([f32::from_bits(first & !FAN_BIT), between, second], first & FAN_BIT != 0)
 }
+
+/// The sign of a row's first number: the row continues the fan of the one before.
+const FAN_BIT: u32 = 1 << 31;
 
 #[inline(always)]
 pub(crate) const fn limit_code(limits: &[u8], row: u32) -> Option<u32> {

@@ -197,6 +197,37 @@ fn each_region_is_measured_on_its_own() {
     }
 }
 
+/// A region may begin in the middle of a fan. The edge that its first triangle shares with the region before is
+/// one of its own edges, too.
+#[test]
+fn an_edge_between_two_regions_counts_for_both() {
+    let (mesh, _) = generate::heart(2_000).expect("a valid size");
+    for paths in [Paths::Edges, Paths::Surface { crossings: 2 }] {
+        let built = Builder::new().stretch(3.0).paths(paths).build(&mesh).expect("a valid mesh");
+        let tree = built.tree::<u16>().expect("valid");
+        let rest = built.to_rows(&mesh.positions);
+        let rows = tree.triangle_count().div_ceil(REGIONS as u32);
+        let mut checked = 0;
+        for region in 1..tree.triangle_count().div_ceil(rows) {
+            let first = region * rows;
+            let (_, continues) = tree.metric(first).expect("a row");
+            if !continues {
+                continue;
+            }
+            // All is small but that edge, with the third corner in its middle.
+            let [a, b, c] = tree.triangle(first).expect("a row").map(|row| row as usize);
+            let mut moved: Vec<Vec3> = rest.iter().map(|position| *position * 0.3).collect();
+            moved[b] = moved[a] + (rest[b] - rest[a]) * 0.6;
+            moved[c] = (moved[a] + moved[b]) * 0.5;
+            let measured = measure_stretch(&tree, moved.as_slice()).expect("within 3");
+            let found = measured.regions()[region as usize];
+            assert!(found >= 0.6, "{paths:?}, {region}: {found}");
+            checked += 1;
+        }
+        assert!(checked > 5, "{checked} regions begin in a fan");
+    }
+}
+
 /// Feeds a frame as a bus would: packets of rows in some order, and slices of work between them.
 fn feed<V: VertexTable + ?Sized>(
     gate: &mut impl Gate,

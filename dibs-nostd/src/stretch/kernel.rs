@@ -1,4 +1,4 @@
-//! The check of one triangle, and the run over rows of them.
+//! The check of one triangle.
 //!
 //! Let `f1` and `f2` lead from a triangle's first corner to its second and third, as they are now, and
 //! `G` be their Gram matrix, `[f1.f1, f1.f2; f1.f2, f2.f2]`; `M` is the same at rest, from the tree's
@@ -21,14 +21,9 @@
 //! The builder keeps products away from overflow and from underflow; where it cannot it stores a
 //! metric of zeros, which nothing passes.
 
-use core::ops::Range;
-
 use glam::Vec3;
 
-use super::StretchError;
-use crate::format::{METRIC_BYTES, PathKind};
 use crate::sqrt::sqrt;
-use crate::{Index, Tree, VertexTable, format};
 
 /// Half a unit in the last place of 1.
 pub(super) const U: f32 = 1.0 / 16_777_216.0;
@@ -51,17 +46,17 @@ impl Worst {
 }
 
 /// Squares that a triangle is judged by: now, or at rest.
-type Squares = [f32; 3];
+pub(super) type Squares = [f32; 3];
 
 /// A triangle as it is now: the edges from its first corner to the second and to the third.
 #[derive(Clone, Copy)]
-struct Edges {
-    first: Vec3,
-    second: Vec3,
+pub(super) struct Edges {
+    pub first: Vec3,
+    pub second: Vec3,
 }
 
 /// What a path kind measures.
-trait Measure {
+pub(super) trait Measure {
     /// The squares of a triangle as it is now.
     fn squares(now: Edges) -> Squares;
 
@@ -71,14 +66,14 @@ trait Measure {
     /// About the square of the stretch.
     fn estimate(rest: &Squares, now: &Squares) -> f32;
 
-    /// The same as [`within`](Self::within), of what is left of the limit: `first` by the first edge, known
-    /// to be positive, and `second` by the second one; `between` is the limit times the rest square.
-    /// Where it is true, `second` is positive.
+    /// The same as [`within`](Self::within), of what is left of the limit: `first` by the first edge, which is
+    /// known to be within it, and `second` by the second one; `between` is the limit times the rest square.
+    /// `first` is not negative; if it is 0, false is right, too. Where it is true, `second` is positive.
     fn is_within(first: f32, second: f32, between: f32, now: Edges) -> bool;
 }
 
 /// The largest singular value.
-struct SingularValue;
+pub(super) struct SingularValue;
 
 impl Measure for SingularValue {
     #[inline(always)]
@@ -113,7 +108,7 @@ impl Measure for SingularValue {
 }
 
 /// The longest of the three edges, each against its rest length.
-struct LongestEdge;
+pub(super) struct LongestEdge;
 
 impl Measure for LongestEdge {
     #[inline(always)]
@@ -144,191 +139,33 @@ impl Measure for LongestEdge {
     }
 }
 
-/// Checks the triangles of `rows`, as far as all their corners are below row `ready`, and raises `worst`
-/// where one is stretched more. Returns the row to go on with.
-pub(super) fn scan<I: Index, V: VertexTable + ?Sized>(
-    tree: &Tree<'_, I>,
-    surface: &V,
-    rows: Range<u32>,
-    ready: u32,
-    worst: &mut Worst,
-) -> Result<u32, StretchError> {
-    match (tree.paths(), I::BYTES) {
-        (PathKind::Surface, 2) => run::<I, V, SingularValue, 6>(tree, surface, rows, ready, worst),
-        (PathKind::Surface, _) => run::<I, V, SingularValue, 12>(tree, surface, rows, ready, worst),
-        (PathKind::EdgePath, 2) => run::<I, V, LongestEdge, 6>(tree, surface, rows, ready, worst),
-        (PathKind::EdgePath, _) => run::<I, V, LongestEdge, 12>(tree, surface, rows, ready, worst),
-    }
-}
-
-/// The run for one measure and `CORNERS` bytes a triangle: past what [`passing`] lets pass, with a closer
-/// look at what it does not.
-fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
-    tree: &Tree<'_, I>,
-    surface: &V,
-    rows: Range<u32>,
-    ready: u32,
-    worst: &mut Worst,
-) -> Result<u32, StretchError> {
-    let range = rows.start as usize..rows.end as usize;
-    let (metrics, _) = tree.sections().metric.as_chunks::<METRIC_BYTES>();
-    let (triangles, _) = tree.sections().triangles.as_chunks::<CORNERS>();
-    let (Some(mut metrics), Some(mut triangles)) =
-        (metrics.get(range.clone()), triangles.get(range))
-    else {
-        return Err(StretchError::Corrupt { row: rows.start });
-    };
-    let is_uniform = tree.sections().limits.is_empty();
-    let mut row = rows.start;
-    // Every turn takes a triangle.
-    for _ in rows {
-        let passed = if is_uniform {
-            passing::<I, V, M, CORNERS, true>(surface, metrics, triangles, ready, worst.squared)
-        } else {
-            passing::<I, V, M, CORNERS, false>(surface, metrics, triangles, ready, worst.squared)
-        };
-        row = row.saturating_add(passed as u32);
-        let (Some([metric, metrics_after @ ..]), Some([corners, triangles_after @ ..])) =
-            (metrics.get(passed..), triangles.get(passed..))
-        else {
-            break;
-        };
-        let Some(now) = edges::<I, V>(surface, corners, ready)? else { break };
-        let (rest, now) = (format::metric_row(metric), M::squares(now));
-        if !M::within(&rest, &now, worst.squared) {
-            match squared_stretch::<M>(&rest, &now, squared_limit(tree.stretch())) {
-                Ok(squared) if squared > worst.squared => *worst = Worst { squared, triangle: row },
-                Ok(_) => (),
-                Err(squared) => return Err(exceeded(tree, row, squared)),
-            }
-        }
-        row = row.saturating_add(1);
-        (metrics, triangles) = (metrics_after, triangles_after);
-    }
-    Ok(row)
-}
-
-/// How many of the first triangles have all their corners below row `ready` and certainly are not stretched
-/// beyond `sqrt(limit)`. The next one may be fine, too: this is where the time goes, and what is not likely is
-/// left to others.
-///
-/// What an edge leaves of the limit, `L r - g` for its squares at rest and now, is carried along a fan, where
-/// it is the edge of two triangles. In a tree that is not `UNIFORM`, whose triangles have limits of their
-/// own, `r` is not the same for both.
-#[inline(never)]
-fn passing<
-    I: Index,
-    V: VertexTable + ?Sized,
-    M: Measure,
-    const CORNERS: usize,
-    const UNIFORM: bool,
->(
-    surface: &V,
-    metrics: &[[u8; METRIC_BYTES]],
-    triangles: &[[u8; CORNERS]],
-    ready: u32,
-    limit: f32,
-) -> usize {
-    // One comparison does for both.
-    let vertices = surface.len() as u32;
-    let ready = if ready < vertices { ready } else { vertices };
-    let corner = |corners, number| corner::<I, V, CORNERS>(surface, corners, number, ready);
-    let (mut centre, mut first, mut left_by_first) = (Vec3::ZERO, Vec3::ZERO, 0.0);
-    for (passed, (metric, corners)) in metrics.iter().zip(triangles).enumerate() {
-        let [rest_first, rest_between, rest_second] = format::metric_row(metric);
-        // Of the triangle before the first nothing is known.
-        let is_new = passed == 0 || !format::continues_fan(metric);
-        if is_new {
-            let Some(a) = corner(corners, 0) else { return passed };
-            let Some(b) = corner(corners, 1) else { return passed };
-            (centre, first) = (a, b - a);
-        }
-        if is_new || !UNIFORM {
-            left_by_first = limit * rest_first - first.length_squared();
-            if !(left_by_first > 0.0) {
-                return passed;
-            }
-        }
-        let Some(c) = corner(corners, 2) else { return passed };
-        let second = c - centre;
-        let left_by_second = limit * rest_second - second.length_squared();
-        let now = Edges { first, second };
-        if !M::is_within(left_by_first, left_by_second, limit * rest_between, now) {
-            return passed;
-        }
-        (first, left_by_first) = (second, left_by_second);
-    }
-    if metrics.len() < triangles.len() { metrics.len() } else { triangles.len() }
-}
-
-/// Position of a triangle's corner, if it is below row `ready`.
-#[inline(always)]
-fn corner<I: Index, V: VertexTable + ?Sized, const CORNERS: usize>(
-    surface: &V,
-    corners: &[u8; CORNERS],
-    number: u32,
-    ready: u32,
-) -> Option<Vec3> {
-    let row = format::vertex_number::<I>(corners, number)?;
-    if row < ready { surface.position(row) } else { None }
-}
-
-/// A triangle's edges; `None` while a corner is not below row `ready`.
-fn edges<I: Index, V: VertexTable + ?Sized>(
-    surface: &V,
-    corners: &[u8],
-    ready: u32,
-) -> Result<Option<Edges>, StretchError> {
-    let mut positions = [Vec3::ZERO; 3];
-    for (number, position) in (0..).zip(&mut positions) {
-        let row = format::vertex_number::<I>(corners, number).unwrap_or(u32::MAX);
-        if row >= ready && (row as usize) < surface.len() {
-            return Ok(None);
-        }
-        *position = surface.position(row).ok_or(StretchError::Corrupt { row })?;
-    }
-    let [centre, first, second] = positions;
-    Ok(Some(Edges { first: first - centre, second: second - centre }))
-}
-
-/// The squared stretch of a triangle, rounded up; as an error if it is not certainly within the limit.
+/// The squared stretch of a triangle, rounded up, but not above the limit. If the triangle is not certainly
+/// within the limit, it is above that or not a number.
 #[cold]
-fn squared_stretch<M: Measure>(rest: &Squares, now: &Squares, limit: f32) -> Result<f32, f32> {
-    let estimate = M::estimate(rest, now);
+#[inline(never)]
+pub(super) fn squared_stretch<M: Measure>(rest: &Squares, now: Edges, limit: f32) -> f32 {
+    let now = M::squares(now);
+    let estimate = M::estimate(rest, &now);
     let mut squared = if estimate.is_nan() { estimate } else { f32::INFINITY };
     // The estimate may be too low by its rounding: a step more, and twice that, until it passes.
     let mut step = 4.0 * U;
     for _ in 0..24 {
         let candidate = estimate * (1.0 + step);
-        if M::within(rest, now, candidate) {
+        if M::within(rest, &now, candidate) {
             squared = candidate;
             break;
         }
         step *= 2.0;
     }
-    if squared <= limit {
-        Ok(squared)
-    } else if M::within(rest, now, limit) {
-        Ok(limit)
-    } else {
-        Err(squared)
-    }
+    if !(squared <= limit) && M::within(rest, &now, limit) { limit } else { squared }
 }
 
 /// The square of a stretch limit, rounded down.
-fn squared_limit(limit: f32) -> f32 {
+pub(super) fn squared_limit(limit: f32) -> f32 {
     limit * limit * (1.0 - 2.0 * U)
 }
 
 /// The root of a square, rounded up.
 pub(super) fn root_up(squared: f32) -> f32 {
     sqrt(squared) * (1.0 + 4.0 * U)
-}
-
-/// Names a triangle beyond its limit, both in terms of its rest shape.
-#[cold]
-fn exceeded<I: Index>(tree: &Tree<'_, I>, triangle: u32, squared: f32) -> StretchError {
-    let limit = tree.stretch_limit(triangle).unwrap_or(tree.stretch());
-    let stretch = root_up(squared) * (limit / tree.stretch());
-    StretchError::Exceeded { triangle, stretch, limit }
 }

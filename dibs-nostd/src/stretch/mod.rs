@@ -3,6 +3,7 @@
 mod kernel;
 mod measured;
 mod monitor;
+mod rows;
 
 use core::fmt;
 
@@ -87,7 +88,7 @@ pub fn measure_stretch<I: Index, V: VertexTable + ?Sized>(
     for worst in &mut regions {
         let end = triangles.min(first + rows);
         *worst = Worst::none(first);
-        kernel::scan(tree, vertices, first..end, tree.vertex_count(), worst)?;
+        rows::scan(tree, vertices, first..end, tree.vertex_count(), worst)?;
         first = end;
     }
     Ok(MeasuredStretch::of_regions(tree, &regions, vertices.epoch()))

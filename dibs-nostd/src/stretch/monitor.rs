@@ -2,9 +2,9 @@
 
 use core::ops::Range;
 
-use super::kernel::{self, Worst};
+use super::kernel::Worst;
 use super::measured::region_rows;
-use super::{MeasuredStretch, REGIONS, StretchError, check_tables};
+use super::{MeasuredStretch, REGIONS, StretchError, check_tables, rows};
 use crate::assembler::{Changed, Gate, Verdict};
 use crate::{Index, Tree, VertexTable};
 
@@ -173,7 +173,7 @@ impl<I: Index> Gate for StretchMonitor<'_, I> {
                 self.unpublished |= 1 << region;
             }
             let stop = if rows.end - next < work { rows.end } else { next + work };
-            let at = kernel::scan(self.tree, surface, next..stop, ready, slot)?;
+            let at = rows::scan(self.tree, surface, next..stop, ready, slot)?;
             work -= at - next;
             if at < rows.end {
                 self.next = Some(at);
