@@ -30,31 +30,46 @@ fn version() -> Result<String> {
     Ok(text.lines().next().unwrap_or_default().to_owned())
 }
 
-/// The command that boots a program which needs nothing but semihosting.
-pub fn alone(program: &Path) -> Command {
-    let mut command = Command::new(PROGRAM);
-    command.args(["-machine", "mps2-an500", "-cpu", "cortex-m7"]);
-    command.args(["-display", "none", "-monitor", "none", "-serial", "none"]);
-    command.args(["-icount", &format!("shift={SHIFT}")]);
-    command.args(["-semihosting-config", "enable=on,target=native", "-kernel"]).arg(program);
+/// How the emulated processor's time passes.
+#[derive(Clone, Copy)]
+pub enum Time {
+    /// As this computer's.
+    Real,
+    /// Every instruction takes 2 to this power nanoseconds.
+    Counted(u32),
+}
+
+/// That of a Cortex-M7 at about 480 MHz. While it sleeps, time jumps to the next interrupt: left to run with
+/// this computer's clock, it would overshoot by however late this computer wakes up.
+pub const BOARD: Time = Time::Counted(SHIFT);
+
+/// The command that boots a program which needs nothing but semihosting, with these arguments.
+pub fn alone(program: &Path, time: Time, arguments: &[&str]) -> Command {
+    let mut command = boot(program, time, arguments);
+    command.args(["-serial", "none"]);
     command
 }
 
 /// The command that boots `program` for `ticks` control ticks. Its bus is UART 0, connected to the
 /// socket `bus`; its telemetry UART 1, connected to the socket `telemetry`.
 pub fn command(program: &Path, bus: &Path, telemetry: &Path, ticks: u32) -> Command {
-    let mut command = Command::new(PROGRAM);
-    command.args(["-machine", "mps2-an500", "-cpu", "cortex-m7"]);
-    command.args(["-display", "none", "-monitor", "none"]);
+    // The firmware reads its run length where a program reads its arguments.
+    let mut command = boot(program, BOARD, &["board", &ticks.to_string()]);
     for socket in [bus, telemetry] {
         command.arg("-serial").arg(format!("unix:{}", socket.display()));
     }
-    // While the processor sleeps, time jumps to the next interrupt: left to run with this computer's
-    // clock, it would overshoot by however late this computer wakes up.
-    command.args(["-icount", &format!("shift={SHIFT}")]);
-    // The firmware reads its run length where a program reads its arguments.
     command
-        .args(["-semihosting-config", &format!("enable=on,target=native,arg=board,arg={ticks}")]);
+}
+
+fn boot(program: &Path, time: Time, arguments: &[&str]) -> Command {
+    let mut command = Command::new(PROGRAM);
+    command.args(["-machine", "mps2-an500", "-cpu", "cortex-m7"]);
+    command.args(["-display", "none", "-monitor", "none"]);
+    if let Time::Counted(shift) = time {
+        command.args(["-icount", &format!("shift={shift}")]);
+    }
+    let arguments: String = arguments.iter().map(|argument| format!(",arg={argument}")).collect();
+    command.args(["-semihosting-config", &format!("enable=on,target=native{arguments}")]);
     command.arg("-kernel").arg(program);
     command
 }

@@ -112,7 +112,7 @@ fn cycles(cross: &Cross) -> Result<Outcome> {
     cargo.args(["--quiet", "--package", "firmware-example", "--bin", "cycles"]);
     run(cargo.args(["--features", "cycles", "--profile", "firmware"]))?;
     let program = cross.program("firmware", "cycles");
-    let said = quiet(&mut qemu::alone(&program), Duration::from_mins(2))?;
+    let said = quiet(&mut qemu::alone(&program, qemu::BOARD, &[]), Duration::from_mins(2))?;
     print!("{said}");
     ensure!(said.contains("the cycle counter stands still"), "the emulator counts cycles");
     ensure!(!said.contains("base: 0,") && said.contains("Cost {"), "no cost was measured");

@@ -1,7 +1,7 @@
 //! The firmware's own promises: deadlines in the demo, and its stack.
 
 use std::fs;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -12,7 +12,7 @@ use super::figures::Figures;
 use super::stack::Binary;
 use crate::firmware::{self, Footprint, Surface};
 use crate::toolchain::Cross;
-use crate::{demo, workspace};
+use crate::{demo, qemu, workspace};
 
 /// Runs the demo on the emulated board, and takes over its report.
 pub fn check(seconds: u32, figures: &mut Figures) -> Result<()> {
@@ -132,11 +132,9 @@ pub fn stack(cross: &Cross, figures: &mut Figures) -> Result<()> {
 fn overflow_is_noticed(cross: &Cross) -> Result<bool> {
     let mut cargo = firmware::command(cross, &Surface::default());
     crate::process::run(cargo.args(["--features", "planted-overflow"]))?;
-    let mut qemu = Command::new("qemu-system-arm");
-    qemu.args(["-machine", "mps2-an500", "-cpu", "cortex-m7", "-display", "none"]);
-    qemu.args(["-monitor", "none", "-serial", "none"]);
-    qemu.args(["-semihosting-config", "enable=on,target=native,arg=board,arg=100", "-kernel"]);
-    qemu.arg(cross.program("firmware", "board")).stdin(Stdio::null()).stdout(Stdio::null());
+    let program = cross.program("firmware", "board");
+    let mut qemu = qemu::alone(&program, qemu::Time::Real, &["board", "100"]);
+    qemu.stdin(Stdio::null()).stdout(Stdio::null());
     let mut child = qemu.spawn()?;
     let start = Instant::now();
     let code = loop {

@@ -13,6 +13,7 @@ use probe::ANSWER_WORDS;
 use super::callgrind;
 use super::script::{Record, Script};
 use crate::process::run;
+use crate::qemu::Time;
 use crate::toolchain::Cross;
 use crate::{qemu, workspace};
 
@@ -90,27 +91,23 @@ pub fn build_for_board(cross: &Cross, name: &str) -> Result<PathBuf> {
 
 /// Answers on the emulated board; with `count`, its clock counts instructions.
 pub fn on_board(program: &Path, script: &Script, count: bool) -> Result<Answers> {
-    let shift = count.then_some(6);
-    run_on_board(program, &script.bytes(), shift, |file| Answers::read(file, script))
+    let time = if count { COUNTING } else { Time::Real };
+    run_on_board(program, &script.bytes(), time, |file| Answers::read(file, script))
 }
 
-/// Runs a program on the emulated board that reads a script, and reads its answers. With a shift,
-/// an instruction takes 2 to its power nanoseconds of the board's time.
+/// The board's clock counts 1.6 to each instruction.
+pub const COUNTING: Time = Time::Counted(6);
+
+/// Runs a program on the emulated board that reads a script, and reads its answers.
 pub fn run_on_board<T>(
     program: &Path,
     script: &[u8],
-    shift: Option<u32>,
+    time: Time,
     read: impl FnOnce(&Path) -> Result<T>,
 ) -> Result<T> {
     let folder = tempfile::tempdir()?;
     fs::write(folder.path().join("script.bin"), script)?;
-    let mut qemu = Command::new("qemu-system-arm");
-    qemu.args(["-machine", "mps2-an500", "-cpu", "cortex-m7", "-display", "none"]);
-    qemu.args(["-monitor", "none", "-serial", "none"]);
-    if let Some(shift) = shift {
-        qemu.args(["-icount", &format!("shift={shift}")]);
-    }
-    qemu.args(["-semihosting-config", "enable=on,target=native", "-kernel"]).arg(program);
+    let mut qemu = qemu::alone(program, time, &[]);
     run(qemu.current_dir(folder.path()).stdin(Stdio::null()))?;
     read(&folder.path().join("answers.bin"))
 }
@@ -128,9 +125,7 @@ pub fn executions(
         .iter()
         .map(|range| format!("0x{:x}..0x{:x}", range.start, range.end.saturating_sub(1)))
         .collect();
-    let mut qemu = Command::new("qemu-system-arm");
-    qemu.args(["-machine", "mps2-an500", "-cpu", "cortex-m7", "-display", "none"]);
-    qemu.args(["-monitor", "none", "-serial", "none"]);
+    let mut qemu = qemu::alone(program, Time::Real, &[]);
     // Since QEMU 8.1 the option has another name, and since 9 the old one is gone.
     if qemu_major()? >= 9 {
         qemu.args(["-accel", "tcg,one-insn-per-tb=on"]);
@@ -138,7 +133,6 @@ pub fn executions(
         qemu.arg("-singlestep");
     }
     qemu.args(["-d", "exec,nochain", "-dfilter", &filter.join(","), "-D", "log"]);
-    qemu.args(["-semihosting-config", "enable=on,target=native", "-kernel"]).arg(program);
     run(qemu.current_dir(folder.path()).stdin(Stdio::null()))?;
     let mut counts = BTreeMap::new();
     for line in BufReader::new(fs::File::open(folder.path().join("log"))?).lines() {

@@ -11,7 +11,7 @@ use glam::Vec3;
 use probe::receive::{ANSWER_WORDS, KEY, TAGGED, UNTAGGED, VERTICES};
 
 use super::figures::Figures;
-use super::probe::{build_for_board, run_on_board};
+use super::probe::{COUNTING, build_for_board, run_on_board};
 use crate::toolchain::Cross;
 
 /// Frames of each kind, from all over the beat.
@@ -45,7 +45,7 @@ pub fn check(cross: &Cross, figures: &mut Figures) -> Result<()> {
         script.frames(way, &built, &motion)?;
     }
     script.words.push(0);
-    let answers = run_on_board(&program, &script.finish(), Some(6), |answers: &Path| {
+    let answers = run_on_board(&program, &script.finish(), COUNTING, |answers: &Path| {
         let bytes = fs::read(answers)?;
         let words = bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
         Ok(words.collect::<Vec<_>>())

@@ -9,6 +9,7 @@ use dibs_tests::surfaces;
 
 use super::figures::Figures;
 use super::probe::{build_for_board, run_on_board};
+use crate::qemu;
 use crate::toolchain::Cross;
 
 /// Runs `queries` queries under interrupts that publish frames.
@@ -18,7 +19,7 @@ pub fn check(cross: &Cross, queries: u32, figures: &mut Figures) -> Result<()> {
     let mut script = queries.to_le_bytes().to_vec();
     script.extend((built.blob().len() as u32).to_le_bytes());
     script.extend(built.blob());
-    let counts = run_on_board(&program, &script, Some(1), |answers: &Path| {
+    let counts = run_on_board(&program, &script, qemu::BOARD, |answers: &Path| {
         let bytes = fs::read(answers)?;
         let words = bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
         Ok(words.collect::<Vec<_>>())
