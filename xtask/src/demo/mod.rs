@@ -68,11 +68,12 @@ pub fn run(options: &Options) -> Result<()> {
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let faults = options.faults.then(|| Plan::new(options.seed, options.seconds));
     let outcome = session::run(&scene, &machine, options.seconds, faults, &folder)?;
+    // Before anything is written: it names the commit, and whether it is clean.
+    let report = Report::new(&scene, &machine, &outcome)?;
     plot::draw(&outcome, &folder)?;
     if faults.is_some() {
         timeline::draw(&outcome, &folder)?;
     }
-    let report = Report::new(&scene, &machine, &outcome)?;
     report.write(&folder)?;
     report.print(&folder);
     report.verdict()
