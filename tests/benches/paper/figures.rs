@@ -96,7 +96,8 @@ fn total_against_size(area: &Area<'_>, records: &Records, tool: &str) -> Result<
     let lines: Vec<_> =
         methods.iter().map(|m| (*m, line(records, "brain", tool, m, "total"))).collect();
     let caption = format!("Refit and one query, {tool}");
-    chart(area, &caption, "median total, µs", &lines, &[], SeriesLabelPosition::UpperLeft)
+    let sizes = sizes(records, "brain");
+    chart(area, &caption, "median total, µs", &sizes, &lines, &[], SeriesLabelPosition::UpperLeft)
 }
 
 /// Figure 6: how often a surface may move before not refitting is faster.
@@ -107,7 +108,13 @@ fn crossovers(area: &Area<'_>, records: &Records, ours: &str, tool: &str) -> Res
         .collect();
     let caption = format!("Crossover of {}, {tool}", plain(ours));
     let marks = [(1.0, "a refit every query"), (0.03, "30 Hz imaging, 1 kHz control")];
-    chart(area, &caption, "refit ratio h_c", &lines, &marks, SeriesLabelPosition::LowerLeft)
+    let sizes = sizes(records, "crossover");
+    chart(area, &caption, "refit ratio h_c", &sizes, &lines, &marks, SeriesLabelPosition::LowerLeft)
+}
+
+/// The sizes of an experiment's meshes: panels that share them can be compared, whatever their lines leave out.
+fn sizes(records: &Records, experiment: &str) -> Vec<f64> {
+    records.meshes(experiment).iter().map(|&(_, triangles)| triangles as f64).collect()
 }
 
 /// Lines in logarithmic axes, each with its name.
@@ -115,17 +122,18 @@ fn chart(
     area: &Area<'_>,
     caption: &str,
     y_name: &str,
+    sizes: &[f64],
     lines: &[(&str, Vec<(f64, f64)>)],
     marks: &[(f64, &str)],
     legend: SeriesLabelPosition,
 ) -> Result<()> {
-    let points = || lines.iter().flat_map(|(_, points)| points.iter().copied());
+    let points = || lines.iter().flat_map(|(_, points)| points.iter().map(|p| p.1));
     let range = |values: &mut dyn Iterator<Item = f64>, room: f64| {
         let (low, high) = values.fold((f64::MAX, 0.0_f64), |(l, h), v| (l.min(v), h.max(v)));
         if low > high { 1.0..10.0 } else { low / room..high * room }
     };
-    let x = range(&mut points().map(|p| p.0), 1.4);
-    let y = range(&mut points().map(|p| p.1).chain(marks.iter().map(|m| m.0)), 1.6);
+    let x = range(&mut sizes.iter().copied(), 1.4);
+    let y = range(&mut points().chain(marks.iter().map(|m| m.0)), 1.6);
     let mut chart = ChartBuilder::on(area)
         .caption(caption, ("sans-serif", 19))
         .margin(12)
