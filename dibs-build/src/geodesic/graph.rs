@@ -52,12 +52,16 @@ pub(crate) struct Arc {
 
 impl Graph {
     pub fn new(mesh: &Mesh, topology: &Topology, paths: Paths, shares: &Shares) -> Self {
+        let flat: Vec<bool> =
+            mesh.triangles.par_iter().map(|&corners| is_flat(positions(mesh, corners))).collect();
+        let flat = &flat;
         let rows: Vec<Vec<Arc>> = (0..mesh.positions.len() as u32)
             .into_par_iter()
             .map_init(Vec::new, |found, vertex| {
                 found.clear();
                 let crossed = Vec::new();
-                Unfolding { mesh, topology, paths, shares, source: vertex, crossed, found }.run();
+                Unfolding { mesh, topology, paths, shares, flat, source: vertex, crossed, found }
+                    .run();
                 found.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
                 found.dedup_by_key(|&mut (to, _)| to);
                 found.iter().map(|&(to, length)| Arc { to, length: round_up(length) }).collect()
@@ -83,6 +87,10 @@ impl Graph {
     }
 }
 
+fn positions(mesh: &Mesh, corners: [u32; 3]) -> [DVec3; 3] {
+    corners.map(|v| mesh.positions[v as usize].as_dvec3())
+}
+
 /// The next f32 above, beyond the f64 rounding of a strip's unfolding.
 fn round_up(length: f64) -> f32 {
     let raised = length * (1.0 + 1e-12);
@@ -103,6 +111,8 @@ struct Unfolding<'a> {
     topology: &'a Topology,
     paths: Paths,
     shares: &'a Shares,
+    /// Which triangles are flat.
+    flat: &'a [bool],
     source: u32,
     /// The edges between the source and the triangle that was unfolded last, each with the share of the
     /// triangle before it.
@@ -130,8 +140,8 @@ impl Unfolding<'_> {
                 self.found.extend([(a, to_a.length() * share), (b, to_b.length() * share)]);
                 continue;
             };
-            if self.is_flat(triangle) {
-                let [at, at_a, at_b] = fattened(self.positions([self.source, a, b]));
+            if self.flat[triangle as usize] {
+                let [at, at_a, at_b] = fattened(positions(self.mesh, [self.source, a, b]));
                 self.found.extend([(a, at.distance(at_a) * share), (b, at.distance(at_b) * share)]);
                 continue;
             }
@@ -142,14 +152,6 @@ impl Unfolding<'_> {
             let edge = [(a, at_a), (b, at_b)];
             self.cross(&Window { edge, low: at_a, high: at_b, triangle, crossings });
         }
-    }
-
-    fn is_flat(&self, triangle: u32) -> bool {
-        is_flat(self.positions(self.mesh.triangles[triangle as usize]))
-    }
-
-    fn positions(&self, corners: [u32; 3]) -> [DVec3; 3] {
-        corners.map(|v| self.mesh.positions[v as usize].as_dvec3())
     }
 
     /// The weighted length of the chord to `end`, a corner of `last`.
@@ -177,8 +179,8 @@ impl Unfolding<'_> {
     }
 
     fn edge(&self, from: u32, to: u32) -> DVec3 {
-        let [from, to, _] = self.positions([from, to, to]);
-        to - from
+        let at = |v: u32| self.mesh.positions[v as usize].as_dvec3();
+        at(to) - at(from)
     }
 
     /// Unfolds the triangles beyond a window's edge into the source's plane.
@@ -190,7 +192,7 @@ impl Unfolding<'_> {
         let topology = self.topology;
         self.crossed.push(([at_a, at_b], self.shares.share(window.triangle)));
         for next in topology.across(self.mesh, window.triangle, a, b) {
-            if self.is_flat(next) {
+            if self.flat[next as usize] {
                 continue;
             }
             let apex = topology.apex(self.mesh, next, a, b);
