@@ -52,8 +52,10 @@ pub(crate) struct Arc {
 
 impl Graph {
     pub fn new(mesh: &Mesh, topology: &Topology, paths: Paths, shares: &Shares) -> Self {
-        let flat: Vec<bool> =
-            mesh.triangles.par_iter().map(|&corners| is_flat(positions(mesh, corners))).collect();
+        let counts_as_flat = |&corners: &[u32; 3]| {
+            matches!(paths, Paths::Surface { .. }) && is_flat(positions(mesh, corners))
+        };
+        let flat: Vec<bool> = mesh.triangles.par_iter().map(counts_as_flat).collect();
         let flat = &flat;
         let rows: Vec<Vec<Arc>> = (0..mesh.positions.len() as u32)
             .into_par_iter()
@@ -111,7 +113,7 @@ struct Unfolding<'a> {
     topology: &'a Topology,
     paths: Paths,
     shares: &'a Shares,
-    /// Which triangles are flat.
+    /// Which triangles are measured as if they were higher.
     flat: &'a [bool],
     source: u32,
     /// The edges between the source and the triangle that was unfolded last, each with the share of the
@@ -134,18 +136,15 @@ impl Unfolding<'_> {
         let topology = self.topology;
         for &triangle in topology.triangles_at(self.source) {
             let [a, b] = topology.others(self.mesh, triangle, self.source);
-            let (to_a, to_b) = (self.edge(self.source, a), self.edge(self.source, b));
-            let share = self.shares.share(triangle);
-            let Paths::Surface { crossings } = self.paths else {
-                self.found.extend([(a, to_a.length() * share), (b, to_b.length() * share)]);
-                continue;
-            };
-            if self.flat[triangle as usize] {
-                let [at, at_a, at_b] = fattened(positions(self.mesh, [self.source, a, b]));
-                self.found.extend([(a, at.distance(at_a) * share), (b, at.distance(at_b) * share)]);
+            let (share, is_flat) = (self.shares.share(triangle), self.flat[triangle as usize]);
+            let corners = positions(self.mesh, [self.source, a, b]);
+            let [source, at_a, at_b] = if is_flat { fattened(corners) } else { corners };
+            let (to_a, to_b) = (at_a - source, at_b - source);
+            self.found.extend([(a, to_a.length() * share), (b, to_b.length() * share)]);
+            let Paths::Surface { crossings } = self.paths else { continue };
+            if is_flat {
                 continue;
             }
-            self.found.extend([(a, to_a.length() * share), (b, to_b.length() * share)]);
             let axis = to_a.normalize();
             let across = to_a.cross(to_b).length() / to_a.length();
             let (at_a, at_b) = (DVec2::new(to_a.length(), 0.0), DVec2::new(to_b.dot(axis), across));
