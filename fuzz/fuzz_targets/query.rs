@@ -89,11 +89,13 @@ fn ask(
     budget: Budget,
 ) {
     let tree = *query.tree();
-    let Ok(answer) = query.closest(rows, tool, options) else { return };
-    let most = 3 * tree.node_count() + tree.triangle_count();
-    assert!(answer.node_tests <= budget.node_tests.min(most) + 1);
-    assert!(answer.triangle_tests <= budget.triangle_tests.min(tree.triangle_count() + 1));
-    assert!(answer.lower >= 0.0 && answer.lower <= answer.separation);
-    assert!(answer.separation.is_finite() && answer.accuracy > 0.0);
-    assert!(answer.corners.iter().all(|&corner| corner < tree.vertex_count()));
+    let both = [query.closest(rows, tool, options), query.closest_in_rounds(rows, tool, options)];
+    for answer in both.into_iter().flatten() {
+        let most = 3 * tree.node_count() + tree.triangle_count();
+        assert!(answer.node_tests <= budget.node_tests.min(most) + 1);
+        assert!(answer.triangle_tests <= budget.triangle_tests.min(tree.triangle_count() + 1));
+        assert!(answer.lower >= 0.0 && answer.lower <= answer.separation);
+        assert!(answer.separation.is_finite() && answer.accuracy > 0.0);
+        assert!(answer.corners.iter().all(|&corner| corner < tree.vertex_count()));
+    }
 }

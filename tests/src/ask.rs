@@ -18,10 +18,36 @@ pub fn closest<I: Index, const D: usize>(
     options: &Options,
 ) -> Result<Proximity, QueryError> {
     if tool.start == tool.end {
-        let sphere = Sphere::new(tool.start, tool.radius).expect("a valid sphere");
-        query.closest(vertices, &sphere, options)
+        query.closest(vertices, &sphere(tool), options)
     } else {
-        let capsule = Capsule::new(tool.start, tool.end, tool.radius).expect("a valid capsule");
-        query.closest(vertices, &capsule, options)
+        query.closest(vertices, &capsule(tool), options)
     }
+}
+
+/// The same in rounds.
+///
+/// # Errors
+/// The query's.
+///
+/// # Panics
+/// If the instrument is not a valid tool.
+pub fn closest_in_rounds<I: Index, const D: usize>(
+    query: &mut Query<'_, I, D>,
+    vertices: &(impl VertexTable + ?Sized),
+    tool: &Instrument,
+    options: &Options,
+) -> Result<Proximity, QueryError> {
+    if tool.start == tool.end {
+        query.closest_in_rounds(vertices, &sphere(tool), options)
+    } else {
+        query.closest_in_rounds(vertices, &capsule(tool), options)
+    }
+}
+
+fn sphere(tool: &Instrument) -> Sphere {
+    Sphere::new(tool.start, tool.radius).expect("a valid sphere")
+}
+
+fn capsule(tool: &Instrument) -> Capsule {
+    Capsule::new(tool.start, tool.end, tool.radius).expect("a valid capsule")
 }

@@ -62,30 +62,35 @@ fn run_with<I: Index>(case: &Case<'_>, tree: &Tree<'_, I>, seed: u64) -> Tally {
                     Options::new().warm_start(Some(rng.u32(..))),
                 ];
                 for options in &all[rng.usize(..2)..] {
-                    let found = ask::closest(&mut query, rows.as_slice(), &tool, options)
-                        .unwrap_or_else(|e| {
+                    let both = [
+                        ask::closest(&mut query, rows.as_slice(), &tool, options),
+                        ask::closest_in_rounds(&mut query, rows.as_slice(), &tool, options),
+                    ];
+                    for found in both {
+                        let found = found.unwrap_or_else(|e| {
                             panic!("{}: {deformation:?}: {tool:?} {options:?}: {e}", case.name)
                         });
-                    let error = check(&rows, &tool, &truth, &found);
-                    assert!(
-                        error <= 1.0 && found.lower == found.separation,
-                        "{}: {deformation:?}: {tool:?}\n  found {found:?}\n  truth {truth:?}",
-                        case.name
-                    );
-                    tally.worst = tally.worst.max(error);
-                    tally.queries += 1;
-                    last = found.triangle;
+                        let error = check(&rows, &tool, &truth, &found);
+                        assert!(
+                            error <= 1.0 && found.lower == found.separation,
+                            "{}: {deformation:?}: {tool:?}\n  found {found:?}\n  truth {truth:?}",
+                            case.name
+                        );
+                        tally.worst = tally.worst.max(error);
+                        tally.queries += 1;
+                        last = found.triangle;
+                    }
                 }
                 let budget = Budget { node_tests: rng.u32(..200), triangle_tests: rng.u32(..20) };
-                let cut = ask::closest(
-                    &mut query,
-                    rows.as_slice(),
-                    &tool,
-                    &Options::new().budget(budget),
-                )
-                .expect("a short budget is no error");
-                check_interval(&truth, &cut, budget);
-                tally.queries += 1;
+                let options = Options::new().budget(budget);
+                let both = [
+                    ask::closest(&mut query, rows.as_slice(), &tool, &options),
+                    ask::closest_in_rounds(&mut query, rows.as_slice(), &tool, &options),
+                ];
+                for cut in both {
+                    check_interval(&truth, &cut.expect("a short budget is no error"), budget);
+                    tally.queries += 1;
+                }
             }
         }
     }

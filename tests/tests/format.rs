@@ -221,13 +221,19 @@ fn a_query_on_rotten_bytes_ends() {
         let view = tree.moved_to(&rotten).expect("same layout");
         let mut query = Query::<u16, MAX_STACK>::new(&view).expect("deep enough");
         let tool = Sphere::new(rows[rng.usize(..rows.len())] * 1.3, 1.0).expect("valid");
-        match query.closest(rows.as_slice(), &tool, &Options::new()) {
-            Ok(found) => {
-                answers += 1;
-                assert!(found.node_tests <= 3 * tree.node_count() + tree.triangle_count() + 1);
+        let both = [
+            query.closest(rows.as_slice(), &tool, &Options::new()),
+            query.closest_in_rounds(rows.as_slice(), &tool, &Options::new()),
+        ];
+        for result in both {
+            match result {
+                Ok(found) => {
+                    answers += 1;
+                    assert!(found.node_tests <= 3 * tree.node_count() + tree.triangle_count() + 1);
+                }
+                Err(QueryError::Corrupt { .. } | QueryError::Uncovered { .. }) => errors += 1,
+                Err(other) => panic!("{other}"),
             }
-            Err(QueryError::Corrupt { .. } | QueryError::Uncovered { .. }) => errors += 1,
-            Err(other) => panic!("{other}"),
         }
     }
     println!("{answers} answers, {errors} errors");

@@ -1,6 +1,10 @@
 //! One search: the tests of nodes, leaves and triangles, and what is known so far.
 
+mod rounds;
+
 use glam::Vec3;
+
+pub(super) use rounds::Rounds;
 
 use super::plane::Plane;
 use super::{Budget, Options, QueryError};
@@ -179,15 +183,20 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
                 Link::Leaf { first, count } => self.leaf(first, count)?,
             };
             if matches!(step, Step::OutOfBudget) {
-                let waiting = self.stack.iter().take(self.waiting).map(|left| left.lower);
-                // A pin that is not a number bounds nothing.
-                let known = |lower: f32| if lower.is_nan() { 0.0 } else { lower };
-                let least = |least, lower| if known(lower) < least { known(lower) } else { least };
-                let lower = waiting.fold(known(lower), least);
-                return self.finish(lower);
+                return self.finish(self.least_waiting(lower));
             }
         }
         self.finish(f32::INFINITY)
+    }
+
+    /// The least lower bound of what waits and of a subtree that was not finished.
+    #[inline(always)]
+    fn least_waiting(&self, lower: f32) -> f32 {
+        let waiting = self.stack.iter().take(self.waiting).map(|left| left.lower);
+        // A pin that is not a number bounds nothing.
+        let known = |lower: f32| if lower.is_nan() { 0.0 } else { lower };
+        let least = |least, lower| if known(lower) < least { known(lower) } else { least };
+        waiting.fold(known(lower), least)
     }
 
     /// A pin at this distance is a point of the surface: nothing farther can win.

@@ -1,0 +1,116 @@
+//! Queries in rounds: as exact as those of one subtree after the other (`differential.rs` searches for a
+//! miss of either), on any stack, within any budget.
+
+use dibs_build::{Builder, BuiltTree, Mesh, generate};
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{Budget, Options, Query, Sphere, measure_stretch};
+use dibs_tests::deform::unit;
+use fastrand::Rng;
+use glam::Vec3;
+
+fn heart() -> (Mesh, BuiltTree) {
+    let (mesh, _) = generate::heart(2_000).expect("a valid size");
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
+    (mesh, built)
+}
+
+fn tool(mesh: &Mesh, rng: &mut Rng) -> Sphere {
+    let on_surface = mesh.positions[rng.usize(..mesh.positions.len())];
+    Sphere::new(on_surface + unit(rng) * 40.0 * rng.f32(), 2.0).expect("valid")
+}
+
+/// Counts are exact: a change of the tree or of the rounds shows here, and must be meant.
+#[test]
+fn counts_of_a_fixed_stream_are_what_they_were() {
+    let (mesh, built) = heart();
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let measured = measure_stretch(&tree, rows.as_slice()).expect("at rest");
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut rng = Rng::with_seed(1);
+    let mut counts = [(0, 0); 3];
+    let mut last = None;
+    for _ in 0..400 {
+        let tool = tool(&mesh, &mut rng);
+        let options = [
+            Options::new(),
+            Options::new().stretch(measured),
+            Options::new().stretch(measured).warm_start(last),
+        ];
+        for (count, options) in counts.iter_mut().zip(options) {
+            let found = query.closest_in_rounds(rows.as_slice(), &tool, &options);
+            let found = found.expect("an answer");
+            *count = (count.0 + found.node_tests, count.1 + found.triangle_tests);
+            last = found.triangle;
+        }
+    }
+    assert_eq!(counts, GOLDEN, "node and triangle tests: limit, measured, measured and warm");
+}
+
+/// Node and triangle tests of the stream above.
+const GOLDEN: [(u32, u32); 3] = [(84_717, 2_204), (49_835, 2_183), (49_792, 2_580)];
+
+/// Entries that the tree above needs.
+const NEEDED: usize = 30;
+
+#[test]
+fn any_stack_that_holds_the_tree_is_enough() {
+    let (mesh, built) = heart();
+    assert_eq!(built.tree::<u16>().expect("valid").stack() as usize, NEEDED);
+    let rows = built.to_rows(&mesh.positions);
+    let least = tests_with::<NEEDED>(&mesh, &built, &rows);
+    let more = tests_with::<{ NEEDED + 7 }>(&mesh, &built, &rows);
+    let most = tests_with::<{ NEEDED + 64 }>(&mesh, &built, &rows);
+    println!("{least}, {more} and {most} node tests on stacks that spare 0, 7 and 64 entries");
+    assert!(least != more && more != most, "what the stack has to spare is used");
+    assert_eq!(tests_with::<{ NEEDED + 65 }>(&mesh, &built, &rows), most, "64 are used");
+    assert_eq!(tests_with::<MAX_STACK>(&mesh, &built, &rows), most, "64 are used");
+}
+
+/// Node tests of a stream on a stack of `D` entries, whose separations are those of [`Query::closest`].
+fn tests_with<const D: usize>(mesh: &Mesh, built: &BuiltTree, rows: &[Vec3]) -> u32 {
+    let tree = built.tree::<u16>().expect("valid");
+    let mut query = Query::<u16, D>::new(&tree).expect("deep enough");
+    let mut rng = Rng::with_seed(2);
+    let mut tests = 0;
+    for _ in 0..400 {
+        let tool = tool(mesh, &mut rng);
+        let one_by_one = query.closest(rows, &tool, &Options::new()).expect("an answer");
+        let in_rounds = query.closest_in_rounds(rows, &tool, &Options::new()).expect("an answer");
+        let apart = (one_by_one.separation - in_rounds.separation).abs();
+        assert!(apart <= 2.0 * in_rounds.accuracy, "{one_by_one:?} {in_rounds:?}");
+        tests += in_rounds.node_tests;
+    }
+    tests
+}
+
+/// With more budget a query goes the same way further: its interval never grows.
+#[test]
+fn more_budget_tells_no_less() {
+    let (mesh, built) = heart();
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut rng = Rng::with_seed(3);
+    let mut cut_short = 0;
+    for _ in 0..400 {
+        let tool = tool(&mesh, &mut rng);
+        let truth = query.closest(rows.as_slice(), &tool, &Options::new()).expect("an answer");
+        let (mut lower, mut upper) = (0.0, f32::INFINITY);
+        for node_tests in (0..400).step_by(9) {
+            let budget = Budget { node_tests, triangle_tests: node_tests / 16 };
+            let options = Options::new().budget(budget);
+            let found = query.closest_in_rounds(rows.as_slice(), &tool, &options);
+            let found = found.expect("a short budget is no error");
+            assert!(found.node_tests <= node_tests + 1, "{budget:?} {found:?}");
+            assert!(found.triangle_tests <= budget.triangle_tests, "{budget:?} {found:?}");
+            assert!(found.lower <= truth.separation + found.accuracy, "{found:?} {truth:?}");
+            assert!(found.separation >= truth.separation - found.accuracy, "{found:?} {truth:?}");
+            assert!(found.lower >= lower && found.separation <= upper + found.accuracy);
+            (lower, upper) = (found.lower, found.separation);
+            cut_short += u32::from(found.lower < found.separation);
+        }
+    }
+    println!("{cut_short} of 18,000 queries were cut short");
+    assert!(cut_short > 1_000);
+}
