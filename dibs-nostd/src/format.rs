@@ -201,24 +201,23 @@ pub(crate) const fn split_node<I: Index>(rows: &[u8]) -> Option<(Node, &[u8])> {
 
 #[inline(always)]
 pub(crate) const fn node<I: Index>(nodes: &[u8], row: u32) -> Option<Node> {
-    // By whole records, so that one comparison finds out whether this one is there.
-    let record = if I::BYTES == 2 {
-        let Some((_, [record, ..])) = nodes.as_chunks::<8>().0.split_at_checked(row as usize)
-        else {
-            return None;
-        };
-        record.as_slice()
-    } else {
-        let Some((_, [record, ..])) = nodes.as_chunks::<12>().0.split_at_checked(row as usize)
-        else {
-            return None;
-        };
-        record.as_slice()
-    };
-    match split_node::<I>(record) {
+    let Some(rows) = rows_from(nodes, row, node_bytes::<I>()) else { return None };
+    match split_node::<I>(rows) {
         Some((node, _)) => Some(node),
         None => None,
     }
+}
+
+/// As [`node`], found among whole records: one comparison instead of one a field. (Compile-time validation
+/// would take longer with it.)
+#[inline(always)]
+pub(crate) fn whole_node<I: Index>(nodes: &[u8], row: u32) -> Option<Node> {
+    let record: &[u8] = if I::BYTES == 2 {
+        nodes.as_chunks::<8>().0.get(row as usize)?
+    } else {
+        nodes.as_chunks::<12>().0.get(row as usize)?
+    };
+    split_node::<I>(record).map(|(node, _)| node)
 }
 
 /// The corners at the start of these bytes, and the bytes after them.

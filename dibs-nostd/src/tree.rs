@@ -194,6 +194,12 @@ impl<'a, I: Index> Tree<'a, I> {
         format::node::<I>(self.sections.nodes, row)
     }
 
+    /// As [`Self::record`], for many of them at run time.
+    #[inline(always)]
+    pub(crate) fn whole_record(&self, row: u32) -> Option<Node> {
+        format::whole_node::<I>(self.sections.nodes, row)
+    }
+
     /// The nodes of a run of rows; `None` unless all of them are there.
     #[inline(always)]
     pub(crate) fn records(&self, first: u32, count: u32) -> Option<impl Iterator<Item = Node>> {

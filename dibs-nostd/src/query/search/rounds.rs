@@ -135,7 +135,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'s, 't, I, V, T>
         let places = rows.iter().zip(parents).zip(blocks);
         for (start, ((rows, parents), block)) in (0..children).step_by(4).zip(places) {
             let [a, b, c, d] = *rows;
-            let (a, b, c, d) = (tree.record(a)?, tree.record(b)?, tree.record(c)?, tree.record(d)?);
+            let node = |row| tree.whole_record(row);
+            let (a, b, c, d) = (node(a)?, node(b)?, node(c)?, node(d)?);
             let squared = |pin| Some(search.tool.axis_distance_squared(vertices.position(pin)?));
             let squared =
                 Vec4::new(squared(a.pin)?, squared(b.pin)?, squared(c.pin)?, squared(d.pin)?);
@@ -193,7 +194,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'s, 't, I, V, T>
             let link = block.links[lane];
             if let Link::Children { first, .. } = Link::decode(link) {
                 // Only to have it fetched: on a large mesh the memory takes longer than all the rest.
-                black_box(self.search.tree.record(first)?.pin);
+                black_box(self.search.tree.whole_record(first)?.pin);
             }
             self.search.push(base, Waiting { lower: block.lowers[lane], link })?;
         }
