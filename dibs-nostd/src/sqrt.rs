@@ -14,23 +14,12 @@ pub(crate) fn sqrt(x: f32) -> f32 {
 /// A hard-float ABI promises the FPU's single-precision square root.
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
 mod imp {
+    unsafe extern "C" {
+        safe fn sqrtf(x: f32) -> f32;
+    }
     #[inline(always)]
     pub(super) fn sqrt(x: f32) -> f32 {
-        let root: u32;
-        // SAFETY: arithmetic on two registers, both declared, present on every target with the
-        // hard-float ABI. It reads and writes no memory, stack or condition flag. (Operands in
-        // floating-point registers would save the moves; they need an unstable feature.)
-        unsafe {
-            core::arch::asm!(
-                "vmov s0, {x}",
-                "vsqrt.f32 s0, s0",
-                "vmov {x}, s0",
-                x = inlateout(reg) x.to_bits() => root,
-                out("s0") _,
-                options(pure, nomem, nostack, preserves_flags),
-            );
-        }
-        f32::from_bits(root)
+        sqrtf(x)
     }
 }
 
