@@ -1,8 +1,8 @@
 //! The square root, correctly rounded, by the hardware's own instruction where there is one.
 //!
 //! `core` has no stable square root, and the portable software one takes 59 instructions on a
-//! Cortex-M7 whose FPU needs a single one. All three ways below round correctly, so that host and
-//! target agree in every bit.
+//! Cortex-M7 whose FPU needs a single one. All ways below round correctly, so that host and target agree in
+//! every bit.
 #![allow(unsafe_code)]
 
 /// The square root of `x`, correctly rounded; NaN for a negative number or NaN.
@@ -12,11 +12,18 @@ pub(crate) fn sqrt(x: f32) -> f32 {
 }
 
 /// A hard-float ABI promises the FPU's single-precision square root.
+///
+/// The compiler knows what C's function by this name computes. Where it optimises, the instruction stands in
+/// place of a call, on the FPU's own registers, which inline assembly cannot name in stable Rust; the function
+/// is left for a negative number. Rust's own runtime brings it on targets without a C library: portable, and
+/// correctly rounded too.
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
 mod imp {
+    // SAFETY: this is the C standard's `float sqrtf(float)`. It touches no memory but, at most, `errno`.
     unsafe extern "C" {
         safe fn sqrtf(x: f32) -> f32;
     }
+
     #[inline(always)]
     pub(super) fn sqrt(x: f32) -> f32 {
         sqrtf(x)

@@ -48,10 +48,10 @@ fn counts_of_a_fixed_stream_are_what_they_were() {
 }
 
 /// Node and triangle tests of the stream above.
-const GOLDEN: [(u32, u32); 3] = [(84_717, 2_204), (49_835, 2_183), (49_792, 2_580)];
+const GOLDEN: [(u32, u32); 3] = [(79_061, 2_263), (49_564, 2_196), (49_467, 2_594)];
 
 /// Entries that the tree above needs.
-const NEEDED: usize = 30;
+const NEEDED: usize = 26;
 
 #[test]
 fn any_stack_that_holds_the_tree_is_enough() {
@@ -59,9 +59,9 @@ fn any_stack_that_holds_the_tree_is_enough() {
     assert_eq!(built.tree::<u16>().expect("valid").stack() as usize, NEEDED);
     let rows = built.to_rows(&mesh.positions);
     let least = tests_with::<NEEDED>(&mesh, &built, &rows);
-    let more = tests_with::<{ NEEDED + 7 }>(&mesh, &built, &rows);
+    let more = tests_with::<{ NEEDED + 16 }>(&mesh, &built, &rows);
     let most = tests_with::<{ NEEDED + 64 }>(&mesh, &built, &rows);
-    println!("{least}, {more} and {most} node tests on stacks that spare 0, 7 and 64 entries");
+    println!("{least}, {more} and {most} node tests on stacks that spare 0, 16 and 64 entries");
     assert!(least != more && more != most, "what the stack has to spare is used");
     assert_eq!(tests_with::<{ NEEDED + 65 }>(&mesh, &built, &rows), most, "64 are used");
     assert_eq!(tests_with::<MAX_STACK>(&mesh, &built, &rows), most, "64 are used");

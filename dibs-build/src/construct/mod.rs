@@ -78,21 +78,28 @@ impl<'a> Constructor<'a> {
         let all = (0..self.surface.mesh.triangles.len() as u32).collect();
         let section = Section::new(self.surface.mesh, all);
         let start = section.vertices[0];
-        self.cluster(section, start, 0)
+        self.cluster(&section, None, start, 0)
     }
 
-    fn cluster(&self, section: Section, start: u32, depth: u32) -> Result<Cluster, BuildError> {
+    /// The tree of a section, which is a part of the one `around` it.
+    fn cluster(
+        &self,
+        section: &Section,
+        around: Option<&Section>,
+        start: u32,
+        depth: u32,
+    ) -> Result<Cluster, BuildError> {
         let mut searches = self.take_searches();
-        searches.enter(&section);
-        let pin = self.pin(&section, &mut searches, start);
+        searches.enter(section, around);
+        let pin = self.pin(section, &mut searches, start);
         if !pin.radius.is_finite() {
             return Err(BuildError::NotConnected { vertex: pin.vertex });
         }
         if section.triangles.len() <= self.leaf_triangles {
             self.give_back(searches);
-            return self.leaves(&section, pin, depth);
+            return self.leaves(section, pin, depth);
         }
-        let sides = self.split(&section, &mut searches, depth);
+        let sides = self.split(section, &mut searches, depth);
         let [left, right] = sides.map(|triangles| Section::new(self.surface.mesh, triangles));
         // A child's search starts at its far border, seen from the seed that it belongs to.
         let borders = [(&left, 0), (&right, 1)].map(|(side, seed)| {
@@ -104,9 +111,8 @@ impl<'a> Constructor<'a> {
         });
         self.give_back(searches);
         let big = section.triangles.len() > PARALLEL_ABOVE;
-        drop(section);
-        let build_left = || self.cluster(left, borders[0], depth + 1);
-        let build_right = || self.cluster(right, borders[1], depth + 1);
+        let build_left = || self.cluster(&left, Some(section), borders[0], depth + 1);
+        let build_right = || self.cluster(&right, Some(section), borders[1], depth + 1);
         let (left, right) =
             if big { rayon::join(build_left, build_right) } else { (build_left(), build_right()) };
         let content = Content::Inner(vec![left?, right?]);
@@ -132,9 +138,8 @@ impl<'a> Constructor<'a> {
             Content::Leaf(parts.remove(0))
         } else {
             let leaves = parts.into_iter().map(|part| {
-                let section = Section::new(mesh, part);
-                let start = section.vertices[0];
-                self.cluster(section, start, depth + 1)
+                let part = Section::new(mesh, part);
+                self.cluster(&part, Some(section), part.vertices[0], depth + 1)
             });
             Content::Inner(leaves.collect::<Result<_, _>>()?)
         };

@@ -13,7 +13,7 @@ pub(crate) struct Pin {
 const TRY_ALL: usize = 12;
 
 /// Rounds of moving the centre away from what is farthest.
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 4;
 
 /// The geodesic centre, approximately: far seeds first (two sweeps), then the vertex that minimises
 /// the larger distance to them, then again with whatever is farthest from that vertex. Any vertex of
@@ -30,11 +30,11 @@ pub(crate) fn geodesic_centre(
     let second = searches.search_seed(0, surface, section, first).vertex;
     searches.search_seed(1, surface, section, second);
     if section.vertices.len() <= TRY_ALL {
-        return best_of(surface, section, searches, &section.vertices);
+        return best_of_all(surface, section, searches);
     }
     let mut candidates = between_seeds(searches);
     let Some(mut centre) = nearest(&candidates) else {
-        return best_of(surface, section, searches, &[first]);
+        return evaluate(surface, section, searches, first);
     };
     let mut best = evaluate(surface, section, searches, centre);
     for _ in 0..ROUNDS {
@@ -57,10 +57,10 @@ pub(crate) fn geodesic_centre(
 
 /// The vertices around the middle between the two seeds, each with its larger distance to them.
 fn between_seeds(searches: &Searches) -> Vec<(u32, f64)> {
-    let [first, second] = &searches.seeds;
-    let larger = |v: u32| first.get(v).max(second.get(v));
-    let least = first.settled().iter().map(|&v| larger(v)).fold(f64::INFINITY, f64::min);
-    let near = first.settled().iter().map(|&v| (v, larger(v)));
+    let settled = searches.seeds[0].settled();
+    let larger = |v: u32| (v, to_seeds(searches, v));
+    let least = settled.iter().map(|&v| larger(v).1).fold(f64::INFINITY, f64::min);
+    let near = settled.iter().map(|&v| larger(v));
     near.filter(|&(_, distance)| distance <= 1.5 * least).collect()
 }
 
@@ -70,15 +70,23 @@ fn nearest(candidates: &[(u32, f64)]) -> Option<u32> {
     candidates.iter().min_by(order).map(|&(vertex, _)| vertex)
 }
 
-fn best_of(
-    surface: &Surface<'_>,
-    section: &Section,
-    searches: &mut Searches,
-    candidates: &[u32],
-) -> Pin {
-    let mut best = Pin { vertex: candidates[0], radius: f64::INFINITY };
-    for &v in candidates {
-        let found = evaluate(surface, section, searches, v);
+/// The larger distance of a vertex to the seeds: no radius around it is smaller.
+fn to_seeds(searches: &Searches, vertex: u32) -> f64 {
+    let [first, second] = &searches.seeds;
+    first.get(vertex).max(second.get(vertex))
+}
+
+/// The best of the section's own vertices.
+fn best_of_all(surface: &Surface<'_>, section: &Section, searches: &mut Searches) -> Pin {
+    let least = |&v: &u32| (v, to_seeds(searches, v));
+    let mut candidates: Vec<(u32, f64)> = section.vertices.iter().map(least).collect();
+    candidates.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+    let mut best = Pin { vertex: section.vertices[0], radius: f64::INFINITY };
+    for (vertex, least) in candidates {
+        if least >= best.radius {
+            break;
+        }
+        let found = evaluate(surface, section, searches, vertex);
         if found.radius < best.radius {
             best = found;
         }

@@ -32,29 +32,43 @@ pub(crate) struct Surface<'a> {
 /// Memory of one thread's searches.
 #[derive(Debug)]
 pub(crate) struct Searches {
-    member: Vec<u32>,
-    stamp: u32,
+    members: Members,
     /// Distances from the two far seeds.
     pub seeds: [Distances; 2],
     /// Distances from whatever else is asked.
     pub other: Distances,
 }
 
+/// The section that searches are for, and what is around it.
+#[derive(Debug)]
+struct Members {
+    /// Of each vertex the latest section or surroundings that it was found in.
+    latest: Vec<u32>,
+    section: u32,
+    /// The number before the section's; zero if all of the mesh is around it.
+    around: u32,
+}
+
 impl Searches {
     pub fn new(vertices: usize) -> Self {
         Self {
-            member: vec![0; vertices],
-            stamp: 0,
+            members: Members { latest: vec![0; vertices], section: 0, around: 0 },
             seeds: [Distances::new(vertices), Distances::new(vertices)],
             other: Distances::new(vertices),
         }
     }
 
-    /// Makes `section` the one that searches are for.
-    pub fn enter(&mut self, section: &Section) {
-        self.stamp += 1;
+    /// Makes `section` the one that searches are for. Paths stay in the section `around` it, as long as that
+    /// hangs together: hardly one would be shorter outside, where more than half of a search would take place.
+    pub fn enter(&mut self, section: &Section, around: Option<&Section>) {
+        let members = &mut self.members;
+        members.section += 2;
+        members.around = if around.is_some() { members.section - 1 } else { 0 };
+        for &v in around.iter().flat_map(|around| &around.vertices) {
+            members.latest[v as usize] = members.around;
+        }
         for &v in &section.vertices {
-            self.member[v as usize] = self.stamp;
+            members.latest[v as usize] = members.section;
         }
     }
 
@@ -66,8 +80,7 @@ impl Searches {
         section: &Section,
         source: u32,
     ) -> Farthest {
-        let (member, stamp) = (&self.member, self.stamp);
-        search(&mut self.seeds[seed], surface, section, source, |v| member[v as usize] == stamp)
+        self.members.search(&mut self.seeds[seed], surface, section, source)
     }
 
     /// Distances from `source` to every vertex of the section that was entered, into `other`.
@@ -77,18 +90,28 @@ impl Searches {
         section: &Section,
         source: u32,
     ) -> Farthest {
-        let (member, stamp) = (&self.member, self.stamp);
-        search(&mut self.other, surface, section, source, |v| member[v as usize] == stamp)
+        self.members.search(&mut self.other, surface, section, source)
     }
 }
 
-fn search(
-    distances: &mut Distances,
-    surface: &Surface<'_>,
-    section: &Section,
-    source: u32,
-    is_member: impl Fn(u32) -> bool,
-) -> Farthest {
-    let allowed = |v| !surface.restricted || is_member(v);
-    distances.search(surface.graph, source, section.vertices.len(), &is_member, allowed)
+impl Members {
+    fn search(
+        &self,
+        distances: &mut Distances,
+        surface: &Surface<'_>,
+        section: &Section,
+        source: u32,
+    ) -> Farthest {
+        let latest = |v: u32| self.latest[v as usize];
+        let mut search = |least| {
+            let (graph, wanted) = (surface.graph, section.vertices.len());
+            let is_wanted = |v| latest(v) == self.section;
+            distances.search(graph, source, wanted, is_wanted, |v| latest(v) >= least)
+        };
+        if surface.restricted {
+            return search(self.section);
+        }
+        let farthest = search(self.around);
+        if farthest.reached == section.vertices.len() { farthest } else { search(0) }
+    }
 }

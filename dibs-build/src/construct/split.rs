@@ -4,7 +4,7 @@ use super::patch;
 use super::section::{Searches, Section, Surface};
 
 /// No side of a split gets less than this share of the triangles: it bounds the depth.
-const LEAST_SHARE: f64 = 0.1;
+const LEAST_SHARE: f64 = 0.05;
 
 /// Smaller sections are mended after their split. Larger ones would only cost time: what is wrong at
 /// their borders is mended further down.

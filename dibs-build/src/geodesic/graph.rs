@@ -33,7 +33,7 @@ pub enum Paths {
 impl Default for Paths {
     /// Those of the default construction.
     fn default() -> Self {
-        Self::Surface { crossings: 2 }
+        Self::Surface { crossings: 3 }
     }
 }
 

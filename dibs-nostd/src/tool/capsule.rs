@@ -1,6 +1,6 @@
 //! The capsule: a segment with a radius.
 
-use super::{AxisPair, Tool, ToolError, check_point, check_radius, clamp_bits, sealed, triangle};
+use super::{AxisPair, Tool, ToolError, check_point, check_radius, clamp_any, sealed, triangle};
 use crate::sqrt::sqrt;
 use glam::Vec3;
 
@@ -101,7 +101,7 @@ impl Tool for Capsule {
     fn axis_to(&self, point: Vec3) -> Vec3 {
         let Axis { start, direction, length, .. } = self.axis;
         let offset = point - start;
-        offset - clamp_bits(offset.dot(direction), length) * direction
+        offset - clamp_any(offset.dot(direction), length) * direction
     }
 
     #[inline(always)]

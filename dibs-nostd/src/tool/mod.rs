@@ -139,11 +139,17 @@ fn clamp(x: f32, high: f32) -> f32 {
     }
 }
 
-/// [`clamp`] by the bits, which costs less where nothing is known of `x`: positive numbers are ordered
-/// as their bits are. NaN may become a number.
+/// [`clamp`] without a branch, where nothing is known of `x`. NaN becomes a number, which one differs: what it
+/// was computed from is not a number either.
 #[inline(always)]
-fn clamp_bits(x: f32, high: f32) -> f32 {
-    let (bits, most) = (x.to_bits() as i32, high.to_bits() as i32);
-    let positive = bits & !(bits >> 31);
-    f32::from_bits(if positive < most { positive } else { most } as u32)
+fn clamp_any(x: f32, high: f32) -> f32 {
+    if cfg!(target_arch = "arm") {
+        // Positive numbers are ordered as their bits are, and integers are compared at less cost.
+        let (bits, most) = (x.to_bits() as i32, high.to_bits() as i32);
+        let positive = bits & !(bits >> 31);
+        f32::from_bits(if positive < most { positive } else { most } as u32)
+    } else {
+        let positive = if x > 0.0 { x } else { 0.0 };
+        if positive < high { positive } else { high }
+    }
 }
