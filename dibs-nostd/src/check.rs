@@ -4,8 +4,8 @@ use core::fmt;
 
 use crate::Index;
 use crate::format::{
-    CHECKSUM_AT, CRC, HEADER_BYTES, Link, MAGIC, MAX_LEAF_TRIANGLES, MAX_STACK, PathKind, VERSION,
-    limit_code, u32_at,
+    CHECKSUM_AT, CRC, HEADER_BYTES, Join, Link, MAGIC, MAX_LEAF_TRIANGLES, MAX_STACK, PathKind,
+    VERSION, limit_code, u32_at,
 };
 use crate::tree::{Header, Tree};
 
@@ -100,7 +100,7 @@ pub enum FormatError {
         /// Row of the vertex order.
         row: u32,
     },
-    /// A triangle's rest metric is not finite, is negative, or continues a fan that is not there.
+    /// A triangle's rest metric is not finite, is negative, or goes on from an edge that is not there.
     Metric {
         /// Row of the triangle.
         triangle: u32,
@@ -435,24 +435,30 @@ const fn tables<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatError> {
     Ok(())
 }
 
-/// Whether a triangle's metric is one, and the fan that it continues is there.
+/// Whether a triangle's metric is one, and the edge that it goes on from is there.
 const fn is_metric<I: Index>(tree: &Tree<'_, I>, row: u32) -> bool {
-    let Some(([first, second, third], continues)) = tree.metric(row) else { return false };
-    let is_fan = if continues {
-        match (row.checked_sub(1), tree.triangle(row)) {
-            (Some(before), Some([a, b, _])) => match tree.triangle(before) {
-                Some([first, _, third]) => first == a && third == b,
-                None => false,
-            },
+    let Some(metric) = tree.metric(row) else { return false };
+    let [first, second, third] = metric.squares;
+    let is_joined = match (metric.join, row.checked_sub(1)) {
+        (Join::Start, _) => !metric.is_reversed,
+        (join, Some(before)) => match (from_centre(tree, before), from_centre(tree, row)) {
+            (Some(before), Some(corners)) => join.is_between(before, corners),
             _ => false,
-        }
-    } else {
-        true
+        },
+        _ => false,
     };
     // A value that is not a number is in no range.
     first < f32::INFINITY
         && second.abs() < f32::INFINITY
         && third >= 0.0
         && third < f32::INFINITY
-        && is_fan
+        && is_joined
+}
+
+/// The corners of a triangle, its centre first.
+const fn from_centre<I: Index>(tree: &Tree<'_, I>, row: u32) -> Option<[u32; 3]> {
+    match (tree.metric(row), tree.triangle(row)) {
+        (Some(metric), Some(corners)) => Some(metric.from_centre(corners)),
+        _ => None,
+    }
 }

@@ -5,7 +5,7 @@ use core::marker::PhantomData;
 
 use glam::Vec3;
 
-use crate::format::{self, Link, Node, PathKind, section};
+use crate::format::{self, Link, Metric, Node, PathKind, section};
 use crate::sections::{self, Sections};
 use crate::{FormatError, Index, check};
 
@@ -155,11 +155,11 @@ impl<'a, I: Index> Tree<'a, I> {
         format::rest_position(self.sections.rest, row)
     }
 
-    /// Rest metric of a triangle, and whether it continues the fan of the row before (`docs/format.md`);
+    /// Rest metric of a triangle (`docs/format.md`);
     /// `None` outside the table or where the tree was emitted without its metric.
     #[inline(always)]
     #[must_use]
-    pub const fn metric(&self, row: u32) -> Option<([f32; 3], bool)> {
+    pub const fn metric(&self, row: u32) -> Option<Metric> {
         format::metric(self.sections.metric, row)
     }
 

@@ -53,7 +53,7 @@ fn every_field_and_section_stands_where_the_specification_says() {
         let (mesh, built) = heart(index);
         let bytes = built.blob();
         assert_eq!(&bytes[..4], b"DIBS");
-        assert_eq!(bytes[4..8], [2, 0, width as u8, 1]);
+        assert_eq!(bytes[4..8], [3, 0, width as u8, 1]);
         let (vertices, triangles, nodes) = (word(bytes, 12), word(bytes, 16), word(bytes, 20));
         assert_eq!(triangles as usize, mesh.triangles.len());
         assert_eq!(vertices as usize, mesh.positions.len());
@@ -106,8 +106,8 @@ fn a_wrong_value_with_a_right_checksum_is_named() {
     };
     assert!(matches!(Tree::<u32>::from_bytes(bytes), Err(FormatError::Width { found: 2, .. })));
     assert!(matches!(refuse(0, 0), FormatError::Magic { .. }));
-    assert!(matches!(refuse(4, 0x0102_0001), FormatError::Version { found: 1 }));
-    assert!(matches!(refuse(4, 0x0702_0002), FormatError::Field { offset: 7, value: 7 }));
+    assert!(matches!(refuse(4, 0x0102_0002), FormatError::Version { found: 2 }));
+    assert!(matches!(refuse(4, 0x0702_0003), FormatError::Field { offset: 7, value: 7 }));
     for (at, value) in
         [(12, 0), (12, 65_537), (16, 0), (20, 0), (24, 513), (36, 1), (40, 1), (44, 1), (56, 1)]
     {
@@ -258,7 +258,7 @@ fn metric_and_limits_stand_where_the_specification_says() {
             _ => word(bytes, at),
         };
         let rows = |row: usize| [0, 1, 2].map(|c| index(triangles + (3 * row + c) * width));
-        let mut fans = 0;
+        let (mut fans, mut flips, mut starts) = (0, 0, Vec::new());
         for row in 0..320 {
             let corners = rows(row).map(|r| built.vertex_order()[r as usize]);
             let is_same =
@@ -269,10 +269,16 @@ fn metric_and_limits_stand_where_the_specification_says() {
             let share = f64::from(code) / 65_535.0;
             let limit = f64::from(limits[triangle]);
             assert!(share * 2.0 >= limit && share * 2.0 < limit + 4e-5, "{share} for {limit}");
-            let [a, b, c] = corners.map(|v| mesh.positions[v as usize].as_dvec3());
+            let at = |i: usize| f32::from_bits(word(bytes, metric + 12 * row + 4 * i));
+            let from_centre = |row: usize| {
+                let [a, b, c] = rows(row);
+                let is_reversed = word(bytes, metric + 12 * row + 4) & 1 == 1;
+                if is_reversed { [b, a, c] } else { [a, b, c] }
+            };
+            let [a, b, c] = from_centre(row)
+                .map(|r| mesh.positions[built.vertex_order()[r as usize] as usize].as_dvec3());
             let (e1, e2) = (b - a, c - a);
             let expected = [e1.dot(e1), e1.dot(e2), e2.dot(e2)].map(|x| x * share * share);
-            let at = |i: usize| f32::from_bits(word(bytes, metric + 12 * row + 4 * i));
             for (i, expected) in expected.into_iter().enumerate() {
                 let found = f64::from(at(i).abs() * if i == 1 { at(i).signum() } else { 1.0 });
                 let scale = share * share * e1.length() * e2.length();
@@ -282,12 +288,21 @@ fn metric_and_limits_stand_where_the_specification_says() {
                 );
                 assert!(i == 1 || found < expected, "{found} must be below {expected}");
             }
+            let [centre, other, _] = from_centre(row);
             if at(0).is_sign_negative() {
-                assert_eq!([rows(row)[0], rows(row)[1]], [rows(row - 1)[0], rows(row - 1)[2]]);
+                let [before, _, third] = from_centre(row - 1);
+                assert_eq!([centre, other], [before, third]);
                 fans += 1;
+            } else if at(0).to_bits() & 1 == 1 {
+                let [before, _, third] = from_centre(row - 1);
+                assert_eq!([centre, other], [third, before]);
+                flips += 1;
+            } else {
+                assert_eq!(centre, rows(row)[0]);
+                starts.push(row);
             }
         }
-        assert!(fans > 100, "{fans} triangles continue a fan");
+        assert!(fans > 100 && flips > 20, "{fans} triangles continue a fan, {flips} flip");
 
         let refuse = |at: usize, value: u32| {
             let changed = with_word(bytes, at, value);
@@ -300,10 +315,14 @@ fn metric_and_limits_stand_where_the_specification_says() {
             let refused = refuse(metric + 24, wrong.to_bits());
             assert_eq!(refused, Err(FormatError::Metric { triangle: 2 }));
         }
-        let alone = (1..320).find(|&row| rows(row)[0] != rows(row - 1)[0]).expect("not one fan");
+        // What starts is neither the one nor the other, and measured from its first corner.
+        let touches = |row: usize| rows(row).iter().any(|v| rows(row - 1).contains(v));
+        let alone = starts.into_iter().skip(1).find(|&row| !touches(row)).expect("not one patch");
         let at = metric + 12 * alone;
-        let refused = refuse(at, word(bytes, at) | 1 << 31);
-        assert_eq!(refused, Err(FormatError::Metric { triangle: alone as u32 }));
+        for (number, mark) in [(0, 1 << 31), (0, 1), (4, 1)] {
+            let refused = refuse(at + number, word(bytes, at + number) ^ mark);
+            assert_eq!(refused, Err(FormatError::Metric { triangle: alone as u32 }));
+        }
         assert_eq!(refuse(codes + 8, 0), Err(FormatError::Limit { triangle: 4 }));
     }
 }

@@ -274,14 +274,15 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
 
 /// Whether the stretch check can pass a triangle at rest; true where there is nothing to check with.
 fn is_measurable<I: Index>(tree: &Tree<'_, I>, row: u32) -> bool {
-    let Some((metric, _)) = tree.metric(row) else { return true };
+    let Some(metric) = tree.metric(row) else { return true };
     let corners = tree.triangle(row).and_then(|c| row_of(c, |v| tree.rest_position(v)));
-    let Some([a, b, c]) = corners else { return metric[0] > 0.0 };
+    let [first, between, second] = metric.squares;
+    let Some(corners) = corners else { return first > 0.0 };
+    let [a, b, c] = metric.from_centre(corners);
     let (e1, e2) = ((b - a).as_dvec3(), (c - a).as_dvec3());
     // The builder has made the metric smaller by what the check's rounding may amount to.
     let limit = f64::from(tree.stretch()).powi(2);
     let left = |rest: f32, now: f64| limit * f64::from(rest) - now;
-    let [first, between, second] = metric;
     let (x, z) = (left(first, e1.length_squared()), left(second, e2.length_squared()));
     match tree.paths() {
         PathKind::EdgePath => {

@@ -1,11 +1,13 @@
-//! The order of a leaf's triangles and of their corners: fans, for the controller's stretch check.
+//! The order of a leaf's triangles and of their corners, for the controller's stretch check.
 //!
-//! A triangle whose first two corners are the first and the third of the one before shares an edge
-//! with it, and the controller has two of its corners and one of its edges at hand.
+//! A triangle is measured along two of its edges, from one of its first two corners, its centre. Where the first
+//! of these edges is the second one of the triangle before, whichever way round ([`Join`]), the controller has two
+//! of its corners and one of its edges at hand. So of all orders of a leaf that with the fewest starts is taken.
 //!
 //! The corners of the leaf's first triangle and the third ones of the others are all of its vertices:
 //! a query looks at no others to reject the leaf.
 
+use dibs_nostd::format::{Join, MAX_LEAF_TRIANGLES};
 use glam::DVec3;
 
 use crate::Mesh;
@@ -17,132 +19,229 @@ use crate::stretch::fattened;
 pub(crate) struct Placed {
     pub triangle: u32,
     pub corners: [u32; 3],
+    /// The centre is the second corner, not the first. Never so where it starts.
+    pub is_reversed: bool,
 }
 
-/// A way to store one of a leaf's triangles.
-#[derive(Clone, Copy)]
-struct Choice {
-    placed: Placed,
-    openness: f64,
-    /// Whether the first corner is neither too pointed nor too flat to measure the stretch from, or at
-    /// least the triangle's best.
-    is_fit: bool,
-    /// Whether it is so pointed that the stretch measured from it is off by a thousandth, and not the best.
-    is_misfit: bool,
-    /// The triangle's bit among the leaf's.
-    bit: u32,
+impl Placed {
+    /// How it goes on from the triangle before, if it can follow that at all.
+    pub fn join(self, before: Option<Self>) -> Option<Join> {
+        let joins = |join: &Join| {
+            before.is_some_and(|before| join.is_between(before.from_centre(), self.from_centre()))
+        };
+        let start = (!self.is_reversed).then_some(Join::Start);
+        [Join::Fan, Join::Flip].into_iter().find(joins).or(start)
+    }
+
+    /// Its corners, the centre first.
+    pub const fn from_centre(self) -> [u32; 3] {
+        let [a, b, c] = self.corners;
+        if self.is_reversed { [b, a, c] } else { [a, b, c] }
+    }
 }
 
-/// Orders a leaf's triangles by fans, the first of which may continue the last triangle before.
-///
-/// Where that leaves a triangle at a corner too pointed to measure from, the leaf starts at whichever
-/// triangle leaves the fewest.
-pub(crate) fn arrange(mesh: &Mesh, leaf: &[u32], before: Option<Placed>) -> Vec<Placed> {
-    best_order(mesh, leaf, before).0
+/// Orders the triangles of each leaf, the first of which may go on from the last one of the leaf before.
+pub(crate) fn arrange<'a>(mesh: &Mesh, leaves: impl IntoIterator<Item = &'a [u32]>) -> Vec<Placed> {
+    let mut leaves = leaves.into_iter().map(|leaf| choices(mesh, leaf));
+    let (mut placed, mut orders) = (Vec::new(), Orders::new());
+    let mut this = leaves.next();
+    while let Some(leaf) = this {
+        let next = leaves.next();
+        let before = placed.last().copied();
+        let order = orders.best(&leaf, before, next.as_deref().unwrap_or_default());
+        placed.extend(order.iter().map(|choice| choice.placed));
+        this = next;
+    }
+    placed
 }
 
 /// The triangles of a leaf that even its best order stores at far too pointed a corner, though they have a
 /// better one: alone in a leaf, they are stored at that.
 pub(crate) fn misfits(mesh: &Mesh, leaf: &[u32]) -> Vec<u32> {
-    let (_, unfit) = best_order(mesh, leaf, None);
-    unfit.iter().filter(|choice| choice.is_misfit).map(|choice| choice.placed.triangle).collect()
+    let choices = choices(mesh, leaf);
+    if !choices.iter().any(|choice| choice.is_misfit()) {
+        return Vec::new();
+    }
+    let order = Orders::new().best(&choices, None, &[]);
+    let misfits = order.iter().filter(|choice| choice.is_misfit());
+    misfits.map(|choice| choice.placed.triangle).collect()
 }
 
-/// The best order, and what it stores at a bad corner.
-fn best_order(mesh: &Mesh, leaf: &[u32], before: Option<Placed>) -> (Vec<Placed>, Vec<Choice>) {
-    let choices: Vec<Choice> =
-        leaf.iter().zip(0..).flat_map(|(&t, i)| rotations(mesh, t, 1 << i)).collect();
-    let all: u32 = (1 << leaf.len()) - 1;
-    let first = before.and_then(|last| continuation(&choices, all, last));
-    let Some(first) = first.or_else(|| start(&choices, all, &[])) else {
-        return Default::default();
+/// What an order costs: sums of these.
+type Cost = u32;
+
+/// A triangle that starts anew, and one that flips: about as the instructions that the check takes for it, beyond
+/// those for one in a fan.
+const START: Cost = 4 << 8;
+const FLIP: Cost = 1 << 8;
+/// A triangle measured from a corner without any openness. For a whole leaf that is less than a flip: it decides
+/// only between orders that are as good otherwise.
+const POINTED_MOST: f64 = 31.0;
+/// One at a corner too pointed or too flat to be measured from, though it has a better one: no order of a leaf is
+/// worth that.
+const UNFIT: Cost = 1 << 16;
+/// One at a corner so pointed that the stretch measured from it is off by a thousandth.
+const MISFIT: Cost = 1 << 24;
+
+/// A way to store one of a leaf's triangles.
+#[derive(Clone, Copy, Debug)]
+struct Choice {
+    placed: Placed,
+    /// What it costs for its centre.
+    cost: Cost,
+    /// The triangle's bit among the leaf's.
+    bit: usize,
+    /// Bits of the triangles that have its first corner, and of those that have its second.
+    with_first: usize,
+    with_second: usize,
+}
+
+impl Choice {
+    const fn is_misfit(&self) -> bool {
+        self.cost >= MISFIT
+    }
+
+    /// What it costs after that triangle, if it can follow it.
+    fn after(&self, before: Option<Placed>) -> Option<Cost> {
+        Some(match self.placed.join(before)? {
+            Join::Fan => self.cost,
+            Join::Flip => self.cost + FLIP,
+            Join::Start => self.cost + START,
+        })
+    }
+}
+
+/// The ways to store the triangles of a leaf.
+fn choices(mesh: &Mesh, leaf: &[u32]) -> Vec<Choice> {
+    let corners = |triangle: u32| mesh.triangles[triangle as usize];
+    let with = |vertex: u32| {
+        let bits =
+            leaf.iter().zip(0..).map(|(&t, i)| usize::from(corners(t).contains(&vertex)) << i);
+        bits.sum()
     };
-    let greedy = arrange_from(&choices, all, first);
-    if greedy.1.is_empty() {
-        return greedy;
-    }
-    let starts = choices.iter().filter(|choice| choice.is_fit);
-    let others = starts.map(|&first| arrange_from(&choices, all, first));
-    // Of equally good ones the first.
-    let orders = std::iter::once(greedy).chain(others);
-    let misfits = |unfit: &[Choice]| unfit.iter().filter(|choice| choice.is_misfit).count();
-    orders.min_by_key(|(_, unfit)| (misfits(unfit), unfit.len())).unwrap_or_default()
-}
-
-/// The order from this start, and which triangles it stores at a bad corner.
-fn arrange_from(choices: &[Choice], all: u32, first: Choice) -> (Vec<Placed>, Vec<Choice>) {
-    let mut left = all & !first.bit;
-    let mut placed = vec![first.placed];
-    let (mut last, mut unfit) = (first, Vec::new());
-    if !first.is_fit {
-        unfit.push(first);
-    }
-    while left != 0 {
-        let next = continuation(choices, left, last.placed);
-        let Some(next) = next.or_else(|| start(choices, left, &placed)) else { break };
-        left &= !next.bit;
-        placed.push(next.placed);
-        if !next.is_fit {
-            unfit.push(next);
+    let mut choices = Vec::with_capacity(6 * leaf.len());
+    for (&triangle, i) in leaf.iter().zip(0..) {
+        let [a, b, c] = corners(triangle);
+        let bits = [a, b, c].map(with);
+        let rotations = [[a, b, c], [b, c, a], [c, a, b]];
+        let openness = rotations.map(|corners| {
+            let [a, b, c] = fattened(corners.map(|v| mesh.positions[v as usize].as_dvec3()));
+            openness(b - a, c - a)
+        });
+        let best = openness.into_iter().fold(0.0, f64::max);
+        let costs = openness.map(|openness| match () {
+            () if openness < POINTED.min(best) => MISFIT,
+            () if openness < OPEN.min(best) => UNFIT,
+            () => (POINTED_MOST * (1.0 - openness)) as Cost,
+        });
+        for (first, corners) in rotations.into_iter().enumerate() {
+            let second = (first + 1) % 3;
+            for (is_reversed, centre) in [(false, first), (true, second)] {
+                // What goes on only on paper, since that would spoil its metric, is measured from its first corner.
+                if is_reversed && costs[first] >= UNFIT {
+                    continue;
+                }
+                choices.push(Choice {
+                    placed: Placed { triangle, corners, is_reversed },
+                    cost: costs[centre],
+                    bit: 1 << i,
+                    with_first: bits[first],
+                    with_second: bits[second],
+                });
+            }
         }
-        last = next;
     }
-    (placed, unfit)
+    choices
 }
 
-/// The triangle that continues the fan of `last`.
-fn continuation(choices: &[Choice], left: u32, last: Placed) -> Option<Choice> {
-    let [a, _, c] = last.corners;
-    let continues = |choice: &&Choice| {
-        let [first, second, _] = choice.placed.corners;
-        left & choice.bit != 0 && choice.is_fit && first == a && second == c
-    };
-    choices.iter().find(continues).copied()
+/// Ways to store a leaf's triangles, at most.
+const CHOICES: usize = 6 * MAX_LEAF_TRIANGLES as usize;
+
+/// Of all orders of a set of triangles that end with one choice: what the best of them costs, and the choice
+/// before the last.
+#[derive(Clone, Copy)]
+struct Best {
+    cost: Cost,
+    before: u32,
 }
 
-/// The triangle and corner from which the longest fan starts. Only its third corner may be new to the
-/// leaf, unless it is the first: since a leaf hangs together by edges, there is one.
-fn start(choices: &[Choice], left: u32, placed: &[Placed]) -> Option<Choice> {
-    let is_known = |v: u32| placed.is_empty() || placed.iter().any(|p| p.corners.contains(&v));
-    let possible = |choice: &&Choice| {
-        let [first, second, _] = choice.placed.corners;
-        left & choice.bit != 0 && is_known(first) && is_known(second)
-    };
-    let length = |first: &Choice| {
-        let (mut left, mut last, mut length) = (left & !first.bit, *first, 0);
-        while let Some(next) = continuation(choices, left, last.placed) {
-            (left, last, length) = (left & !next.bit, next, length + 1);
+/// There is no such order.
+const NONE: Best = Best { cost: Cost::MAX, before: 0 };
+
+/// The best orders of all sets of a leaf's triangles, by the bits of the set and the last choice: each made of one
+/// of a triangle less (Held and Karp's way to the shortest tour).
+struct Orders(Vec<[Best; CHOICES]>);
+
+impl Orders {
+    fn new() -> Self {
+        Self(vec![[NONE; CHOICES]; 1 << MAX_LEAF_TRIANGLES])
+    }
+
+    /// The cheapest order of a leaf, after that triangle and before a leaf of these choices.
+    fn best(&mut self, leaf: &[Choice], before: Option<Placed>, next: &[Choice]) -> Vec<Choice> {
+        let all = leaf.iter().fold(0, |bits, choice| bits | choice.bit);
+        self.0[..=all].fill([NONE; CHOICES]);
+        for (at, choice) in leaf.iter().enumerate() {
+            if let Some(cost) = choice.after(before) {
+                self.offer(choice.bit, at, cost, at);
+            }
         }
-        length
-    };
-    // Of equally long fans the one at the best corner, then the first.
-    let key = |choice: &Choice| (choice.is_fit, length(choice), choice.openness);
-    let mut possible = choices.iter().filter(possible);
-    let first = possible.next()?;
-    let mut best = (first, key(first));
-    for choice in possible {
-        let key = key(choice);
-        if key > best.1 {
-            best = (choice, key);
+        // Which choice may come right after which, and at what cost, but for starts.
+        let mut joins = Vec::new();
+        for (last, before) in leaf.iter().enumerate() {
+            for (at, choice) in leaf.iter().enumerate() {
+                match choice.after(Some(before.placed)) {
+                    Some(cost) if cost < choice.cost + START => joins.push((last, at, cost)),
+                    _ => (),
+                }
+            }
+        }
+        for set in 1..all {
+            let lasts = self.0[set];
+            let Some((last, cheapest)) = cheapest(&lasts, |_| 0) else { continue };
+            // Only the third corner of a leaf's triangle, but for its first, may be new to the leaf.
+            for (at, choice) in leaf.iter().enumerate() {
+                let is_known = set & choice.with_first != 0 && set & choice.with_second != 0;
+                if set & choice.bit == 0 && is_known && !choice.placed.is_reversed {
+                    self.offer(set | choice.bit, at, cheapest + choice.cost + START, last);
+                }
+            }
+            for &(last, at, cost) in &joins {
+                if lasts[last].cost != Cost::MAX && set & leaf[at].bit == 0 {
+                    self.offer(set | leaf[at].bit, at, lasts[last].cost + cost, last);
+                }
+            }
+        }
+        let way_out = |at: usize| {
+            let costs = next.iter().filter_map(|choice| choice.after(Some(leaf[at].placed)));
+            costs.min().unwrap_or_default()
+        };
+        let mut order = Vec::new();
+        let mut last = cheapest(&self.0[all], way_out).map(|(at, _)| at);
+        let mut set = all;
+        while let Some(at) = last {
+            order.push(leaf[at]);
+            let before = self.0[set][at].before as usize;
+            set &= !leaf[at].bit;
+            last = (set != 0).then_some(before);
+        }
+        order.reverse();
+        order
+    }
+
+    /// An order of this set that ends with the choice `at`, and comes to it from `before`.
+    fn offer(&mut self, set: usize, at: usize, cost: Cost, before: usize) {
+        let best = &mut self.0[set][at];
+        if cost < best.cost {
+            *best = Best { cost, before: before as u32 };
         }
     }
-    Some(*best.0)
 }
 
-/// The ways to store a triangle.
-fn rotations(mesh: &Mesh, triangle: u32, bit: u32) -> [Choice; 3] {
-    let [a, b, c] = mesh.triangles[triangle as usize];
-    let all = [[a, b, c], [b, c, a], [c, a, b]].map(|corners| {
-        let [a, b, c] = fattened(corners.map(|v| mesh.positions[v as usize].as_dvec3()));
-        let placed = Placed { triangle, corners };
-        Choice { placed, openness: openness(b - a, c - a), is_fit: false, is_misfit: false, bit }
-    });
-    let best = all.iter().map(|choice| choice.openness).fold(0.0, f64::max);
-    all.map(|choice| Choice {
-        is_fit: choice.openness >= OPEN.min(best),
-        is_misfit: choice.openness < POINTED.min(best),
-        ..choice
-    })
+/// The choice that an order ends with at the least cost, with what is to come.
+fn cheapest(lasts: &[Best], to_come: impl Fn(usize) -> Cost) -> Option<(usize, Cost)> {
+    let possible = lasts.iter().enumerate().filter(|(_, best)| best.cost != Cost::MAX);
+    possible.map(|(at, best)| (at, best.cost + to_come(at))).min_by_key(|&(_, cost)| cost)
 }
 
 /// Openness of a corner that is good enough: 18 degrees.

@@ -1,13 +1,13 @@
 //! From a tree of sections to the flat array: order, round up, write.
 
 use dibs_nostd::format::{
-    CHECKSUM_AT, CRC, HEADER_BYTES, Link, MAGIC, PathKind, SECTION_ALIGN, SECTION_BYTES, VERSION,
-    section,
+    CHECKSUM_AT, CRC, HEADER_BYTES, Join, Link, MAGIC, PathKind, SECTION_ALIGN, SECTION_BYTES,
+    VERSION, section,
 };
 use dibs_nostd::{Index, Tree};
 
 use super::fans::{Placed, arrange};
-use super::metric::metric;
+use super::metric::{metric, with_lowest_bit};
 use crate::Mesh;
 use crate::construct::{Cluster, Content};
 use crate::error::BuildError;
@@ -58,10 +58,7 @@ impl Flat {
             level = below;
         }
         leaves.sort_unstable_by_key(|&(first, _)| first);
-        for (_, leaf) in leaves {
-            let before = flat.triangles.last().copied();
-            flat.triangles.extend(arrange(mesh, leaf, before));
-        }
+        flat.triangles = arrange(mesh, leaves.into_iter().map(|(_, leaf)| &leaf[..]));
         flat
     }
 }
@@ -153,36 +150,55 @@ fn vertex_order(mesh: &Mesh, triangles: &[Placed]) -> Vec<u32> {
     corners.filter(|&v| !std::mem::replace(&mut seen[v as usize], true)).collect()
 }
 
-/// The metric of each triangle, marked where it continues the fan of the triangle before.
+/// The metric of each triangle, marked where it goes on from the triangle before.
 fn metrics(mesh: &Mesh, triangles: &[Placed], facts: Facts<'_>) -> Vec<u8> {
-    let mut rows: Vec<[f32; 3]> = triangles
-        .iter()
-        .map(|placed| {
-            let corners = placed.corners.map(|v| mesh.positions[v as usize]);
-            let share = facts.shares.share(placed.triangle);
-            metric(corners, share, f64::from(facts.stretch), facts.paths)
-        })
-        .collect();
-    for at in 1..rows.len() {
-        let ([a, _, c], [first, second, _]) = (triangles[at - 1].corners, triangles[at].corners);
-        let is_measurable = rows[at][0] > 0.0 && rows[at - 1][2] > 0.0;
-        if [a, c] != [first, second] || !is_measurable {
-            continue;
-        }
-        // The edge that both have: of two roundings the lower, which is right for both unless one of them is so
-        // flat that it would be spoilt.
-        if facts.shares.is_uniform() {
-            let shared = rows[at][0].min(rows[at - 1][2]);
-            let spoilt = |row: [f32; 3], edge: f32| (1.0 - shared / edge) / openness_of(row);
-            let most = spoilt(rows[at], rows[at][0]).max(spoilt(rows[at - 1], rows[at - 1][2]));
-            if most > MOST_SPOILT {
-                continue;
+    let of = |placed: Placed| {
+        let corners = placed.from_centre().map(|v| mesh.positions[v as usize]);
+        let share = facts.shares.share(placed.triangle);
+        metric(corners, placed.is_reversed, share, f64::from(facts.stretch), facts.paths)
+    };
+    let mut rows: Vec<[f32; 3]> = Vec::with_capacity(triangles.len());
+    let mut before: Option<Placed> = None;
+    for &placed in triangles {
+        let (mut placed, mut row) = (placed, of(placed));
+        let join = placed.join(before).filter(|&join| match rows.last_mut() {
+            Some(before) if join != Join::Start => share_edge(before, &mut row, join, facts.shares),
+            _ => false,
+        });
+        match join {
+            Some(Join::Fan) => row[0] = -row[0],
+            Some(Join::Flip) => (),
+            _ => {
+                placed.is_reversed = false;
+                row = of(placed);
+                row[0] = with_lowest_bit(row[0], false);
             }
-            (rows[at][0], rows[at - 1][2]) = (shared, shared);
         }
-        rows[at][0] = -rows[at][0];
+        rows.push(row);
+        before = Some(placed);
     }
     rows.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect()
+}
+
+/// Whether a triangle can go on from the one before like this. The edge that both have is of two roundings the
+/// lower, which is right for both unless one of them is so flat that it would be spoilt.
+fn share_edge(before: &mut [f32; 3], row: &mut [f32; 3], join: Join, shares: &Shares) -> bool {
+    if row[0] == 0.0 || before[2] == 0.0 {
+        return false;
+    }
+    let marked = |edge: f32| if join == Join::Flip { with_lowest_bit(edge, true) } else { edge };
+    if !shares.is_uniform() {
+        row[0] = marked(row[0]);
+        return true;
+    }
+    let shared = marked(row[0].min(before[2]));
+    let spoilt = |row: [f32; 3], edge: f32| (1.0 - shared / edge) / openness_of(row);
+    let most = spoilt(*row, row[0]).max(spoilt(*before, before[2]));
+    if most > MOST_SPOILT {
+        return false;
+    }
+    (row[0], before[2]) = (shared, shared);
+    true
 }
 
 /// By how much a squared stretch may be too large for the sake of a fan.

@@ -9,7 +9,7 @@ use crate::stretch::fattened;
 
 /// Rounding of the controller's check in f32, in units of 2^-24: derived in `dibs_nostd`'s
 /// `stretch/kernel.rs`.
-const SURFACE_ROUNDING: f64 = 20.0;
+const SURFACE_ROUNDING: f64 = 21.0;
 const EDGE_ROUNDING: f64 = 7.0;
 const U: f64 = 1.0 / 16_777_216.0;
 
@@ -18,11 +18,18 @@ const U: f64 = 1.0 / 16_777_216.0;
 const LEAST_SQUARED: f64 = 1e-14;
 const LARGEST_SQUARED: f64 = 1e18;
 
-/// The metric of one triangle with these corners at rest.
+/// The metric of one triangle with these corners at rest, the centre first. The lowest bit of its second number is
+/// `is_reversed`.
 ///
 /// `share` is its stretch limit as a part of the tree's, which is `stretch`. Never too large: roundings
 /// are downwards. Zeros, which no triangle passes, where no f32 arithmetic could tell.
-pub(crate) fn metric(corners: [Vec3; 3], share: f64, stretch: f64, paths: PathKind) -> [f32; 3] {
+pub(crate) fn metric(
+    corners: [Vec3; 3],
+    is_reversed: bool,
+    share: f64,
+    stretch: f64,
+    paths: PathKind,
+) -> [f32; 3] {
     let corners = corners.map(Vec3::as_dvec3);
     let [a, b, c] = match paths {
         PathKind::EdgePath => corners,
@@ -37,12 +44,14 @@ pub(crate) fn metric(corners: [Vec3; 3], share: f64, stretch: f64, paths: PathKi
     let share = share * share;
     match paths {
         PathKind::EdgePath => {
-            edges.map(|squared| round_down(squared * share / (1.0 + EDGE_ROUNDING * U)))
+            let [first, between, second] =
+                edges.map(|squared| round_down(squared * share / (1.0 + EDGE_ROUNDING * U)));
+            [first, with_lowest_bit(between, is_reversed), second]
         }
         _ => {
             let scale = share / (1.0 + SURFACE_ROUNDING * U / openness(e1, e2));
             let [first, _, second] = edges.map(|squared| round_down(squared * scale));
-            [first, (e1.dot(e2) * scale) as f32, second]
+            [first, near(e1.dot(e2) * scale, is_reversed), second]
         }
     }
 }
@@ -51,4 +60,25 @@ pub(crate) fn metric(corners: [Vec3; 3], share: f64, stretch: f64, paths: PathKi
 fn round_down(x: f64) -> f32 {
     let near = x as f32;
     if f64::from(near) > x { near.next_down() } else { near }
+}
+
+/// The largest number with this lowest bit that is not above `x`, which is positive; but 0 for 0.
+pub(crate) fn with_lowest_bit(x: f32, bit: bool) -> f32 {
+    if x == 0.0 || has_lowest_bit(x) == bit { x } else { x.next_down() }
+}
+
+/// The nearest f32 to `x` with this lowest bit: no farther than 2^-23 of it.
+fn near(x: f64, bit: bool) -> f32 {
+    let near = x as f32;
+    if has_lowest_bit(near) == bit {
+        near
+    } else if f64::from(near) < x {
+        near.next_up()
+    } else {
+        near.next_down()
+    }
+}
+
+fn has_lowest_bit(x: f32) -> bool {
+    x.to_bits() & 1 == 1
 }

@@ -1,6 +1,6 @@
 //! The check of one triangle.
 //!
-//! Let `f1` and `f2` lead from a triangle's first corner to its second and third, as they are now, and
+//! Let `f1` and `f2` lead from a triangle's centre to the other of its first two corners and to the third, as they are now, and
 //! `G` be their Gram matrix, `[f1.f1, f1.f2; f1.f2, f2.f2]`; `M` is the same at rest, from the tree's
 //! metric section. The triangle's largest singular value is at most `sigma` exactly if `L M - G` is
 //! positive semidefinite for `L = sigma^2`: if its diagonal and its determinant are not negative. So
@@ -13,10 +13,10 @@
 //! at most `5 u` of themselves, the other by `5 u |f1| |f2|`. A difference `x = L a - g` takes two more
 //! roundings, the comparison of the products two. If it holds, then, with `a` and `d` the diagonal of
 //! `M`, `G` is below `L (M + E)` with `|E11| <= 6.1 u a`, `|E22| <= 6.1 u d` and `|E12| <= 12.1 u sqrt(a d)`,
-//! so below `L (M + 18.2 u diag(a, d))`. Storing the off-diagonal entry of `M` takes `u sqrt(a d)`. And
-//! `diag(a, d)` is below `M / (1 - |cos|)`, `cos` that of the angle at the first corner. So the builder
-//! divides `M` by `1 + 20 u / (1 - |cos|)`, rounding down, and what passes is not stretched beyond
-//! `sqrt(L)`. It chooses the first corner so that this is little. For edges 6.1 u is all.
+//! so below `L (M + 18.2 u diag(a, d))`. Storing the off-diagonal entry of `M`, its lowest bit a mark, takes `2 u sqrt(a d)`. And
+//! `diag(a, d)` is below `M / (1 - |cos|)`, `cos` that of the angle at the centre. So the builder
+//! divides `M` by `1 + 21 u / (1 - |cos|)`, rounding down, and what passes is not stretched beyond
+//! `sqrt(L)`. It chooses the centre so that this is little. For edges 6.1 u is all.
 //!
 //! The builder keeps products away from overflow and from underflow; where it cannot it stores a
 //! metric of zeros, which nothing passes.
@@ -48,7 +48,7 @@ impl Worst {
 /// Squares that a triangle is judged by: now, or at rest.
 pub(super) type Squares = [f32; 3];
 
-/// A triangle as it is now: the edges from its first corner to the second and to the third.
+/// A triangle as it is now: the edges from its centre to the other of its first two corners, and to the third.
 #[derive(Clone, Copy)]
 pub(super) struct Edges {
     pub first: Vec3,

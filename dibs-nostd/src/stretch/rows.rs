@@ -1,7 +1,7 @@
 //! The check of many triangles, row by row: where the time of a measurement goes.
 //!
-//! What a fan's triangles share is carried from one to the next. What an edge leaves of the largest square so
-//! far, `L r - g` for its squares at rest and now, is the same number for both of its triangles, but in a tree
+//! What a triangle shares with the one before is carried over ([`Join`]). What an edge leaves of the largest
+//! square so far, `L r - g` for its squares at rest and now, is the same number for both of its triangles, but in a tree
 //! that is not `UNIFORM`: there triangles have limits of their own, and `r` is not the same for both.
 
 use core::ops::Range;
@@ -12,7 +12,7 @@ use super::StretchError;
 use super::kernel::{
     Edges, LongestEdge, Measure, SingularValue, Worst, root_up, squared_limit, squared_stretch,
 };
-use crate::format::{METRIC_BYTES, PathKind, metric_row};
+use crate::format::{Join, METRIC_BYTES, Metric, PathKind, metric_row};
 use crate::{Index, Tree, VertexTable, format};
 
 /// Checks the triangles of `rows`, as far as all their corners are below row `ready`, and raises `worst`
@@ -32,6 +32,32 @@ pub(super) fn scan<I: Index, V: VertexTable + ?Sized>(
     }
 }
 
+/// Raises `worst` where one triangle is stretched more, if all its corners are below row `ready`. Returns whether
+/// they are. What is beyond its limit is left to [`scan`].
+pub(super) fn look<I: Index, V: VertexTable + ?Sized>(
+    tree: &Tree<'_, I>,
+    surface: &V,
+    row: u32,
+    ready: u32,
+    worst: &mut Worst,
+) -> bool {
+    let Some(metric) = tree.metric(row) else { return true };
+    let now = match edges(tree, surface, row, &metric, ready) {
+        Ok(Some(now)) => now,
+        Ok(None) => return false,
+        Err(_) => return true,
+    };
+    let limit = squared_limit(tree.stretch());
+    let squared = match tree.paths() {
+        PathKind::Surface => squared_stretch::<SingularValue>(&metric.squares, now, limit),
+        PathKind::EdgePath => squared_stretch::<LongestEdge>(&metric.squares, now, limit),
+    };
+    if squared > worst.squared && squared <= limit {
+        *worst = Worst { squared, triangle: row };
+    }
+    true
+}
+
 /// The run for one measure and `CORNERS` bytes a triangle: as far as [`measure`] comes, and why it comes no
 /// farther.
 fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
@@ -41,37 +67,101 @@ fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
     ready: u32,
     worst: &mut Worst,
 ) -> Result<u32, StretchError> {
-    let range = rows.start as usize..rows.end as usize;
-    let (metrics, _) = tree.sections().metric.as_chunks::<METRIC_BYTES>();
     let (triangles, _) = tree.sections().triangles.as_chunks::<CORNERS>();
-    let (Some(metrics), Some(triangles)) = (metrics.get(range.clone()), triangles.get(range))
-    else {
-        return Err(StretchError::Corrupt { row: rows.start });
+    let bytes = tree.sections().metric;
+    // Words take fewer instructions than bytes, which may stand anywhere.
+    let row = match bytemuck::try_cast_slice::<u8, u32>(bytes) {
+        Ok(words) => {
+            let (metrics, _) = words.as_chunks();
+            run_on::<I, V, M, [u32; 3], CORNERS>(
+                tree,
+                surface,
+                metrics,
+                triangles,
+                rows.clone(),
+                ready,
+                worst,
+            )
+        }
+        Err(_) => {
+            let (metrics, _) = bytes.as_chunks();
+            run_on::<I, V, M, [u8; METRIC_BYTES], CORNERS>(
+                tree,
+                surface,
+                metrics,
+                triangles,
+                rows.clone(),
+                ready,
+                worst,
+            )
+        }
     };
+    let row = row.ok_or(StretchError::Corrupt { row: rows.start })?;
+    if row >= rows.end {
+        return Ok(row);
+    }
+    let metric = tree.metric(row).ok_or(StretchError::Corrupt { row })?;
+    let Some(now) = edges(tree, surface, row, &metric, ready)? else { return Ok(row) };
+    let limit = squared_limit(tree.stretch());
+    Err(exceeded(tree, row, squared_stretch::<M>(&metric.squares, now, limit)))
+}
+
+/// The same on rows of the metric section as they stand in memory; `None` where there are none.
+fn run_on<I: Index, V: VertexTable + ?Sized, M: Measure, R: MetricBits, const CORNERS: usize>(
+    tree: &Tree<'_, I>,
+    surface: &V,
+    metrics: &[R],
+    triangles: &[[u8; CORNERS]],
+    rows: Range<u32>,
+    ready: u32,
+    worst: &mut Worst,
+) -> Option<u32> {
+    let range = rows.start as usize..rows.end as usize;
+    let (metrics, triangles) = (metrics.get(range.clone())?, triangles.get(range)?);
     let limit = squared_limit(tree.stretch());
     let (first, largest) = (rows.start, *worst);
     let row;
     (row, *worst) = if tree.sections().limits.is_empty() {
-        measure::<I, V, M, CORNERS, true>(surface, metrics, triangles, ready, limit, first, largest)
+        measure::<I, V, M, R, CORNERS, true>(
+            surface, metrics, triangles, ready, limit, first, largest,
+        )
     } else {
-        measure::<I, V, M, CORNERS, false>(
+        measure::<I, V, M, R, CORNERS, false>(
             surface, metrics, triangles, ready, limit, first, largest,
         )
     };
-    let measured = row.saturating_sub(first) as usize;
-    let stopped_at = (metrics.get(measured), triangles.get(measured));
-    let (Some(metric), Some(corners)) = stopped_at else { return Ok(row) };
-    let Some(now) = edges::<I, V>(surface, corners, ready)? else { return Ok(row) };
-    let (rest, _) = metric_row(metric);
-    Err(exceeded(tree, row, squared_stretch::<M>(&rest, now, limit)))
+    Some(row)
 }
 
-/// What the next triangle of a fan has at hand.
+/// A row of the metric section as it stands in memory.
+trait MetricBits {
+    /// The bits of its numbers.
+    fn bits(&self) -> [u32; 3];
+}
+
+impl MetricBits for [u32; 3] {
+    #[inline(always)]
+    fn bits(&self) -> [u32; 3] {
+        let &[first, between, second] = self;
+        [u32::from_le(first), u32::from_le(between), u32::from_le(second)]
+    }
+}
+
+impl MetricBits for [u8; METRIC_BYTES] {
+    #[inline(always)]
+    fn bits(&self) -> [u32; 3] {
+        let [first, between, second] = metric_row(self);
+        [first.to_bits(), between.to_bits(), second.to_bits()]
+    }
+}
+
+/// What a triangle leaves to the next.
 #[derive(Clone, Copy)]
-struct Fan {
+struct Before {
     centre: Vec3,
-    /// The edge that it shares with the triangle before.
-    first: Vec3,
+    third: Vec3,
+    /// The edge from the centre to the third corner.
+    edge: Vec3,
     /// What that leaves of the largest square so far.
     left: f32,
 }
@@ -83,11 +173,12 @@ fn measure<
     I: Index,
     V: VertexTable + ?Sized,
     M: Measure,
+    R: MetricBits,
     const CORNERS: usize,
     const UNIFORM: bool,
 >(
     surface: &V,
-    metrics: &[[u8; METRIC_BYTES]],
+    metrics: &[R],
     triangles: &[[u8; CORNERS]],
     ready: u32,
     limit: f32,
@@ -99,34 +190,28 @@ fn measure<
     let ready = if ready < vertices { ready } else { vertices };
     let table = Table { surface, ready, limit };
     let mut row = first;
-    // Of the triangle before the first nothing is known.
     let (Some(metric), Some(corners)) = (metrics.first(), triangles.first()) else {
         return (row, worst);
     };
-    let ([rest, ..], _) = metric_row(metric);
-    let Some(mut fan) = table.start::<I, CORNERS>(rest, corners, worst.squared) else {
+    let Some(mut before) = table.before::<I, CORNERS>(metric, corners, worst.squared) else {
         return (row, worst);
     };
-    if !(fan.left > 0.0) {
-        // Not within the largest so far. What is not a number passes nothing: a closer look is taken.
-        fan.first = Vec3::NAN;
-    }
     // Two at a time, so that what one leaves to the next takes no moves.
     let (pairs, last_metric) = metrics.as_chunks::<2>();
     let (pairs_of_corners, last_corners) = triangles.as_chunks::<2>();
     for ([m0, m1], [t0, t1]) in pairs.iter().zip(pairs_of_corners) {
-        let next = table.next::<I, M, CORNERS, UNIFORM>(fan, m0, t0, row, &mut worst);
+        let next = table.next::<I, M, CORNERS, UNIFORM>(before, m0, t0, row, &mut worst);
         let Some(next) = next else { return (row, worst) };
         let next =
             table.next::<I, M, CORNERS, UNIFORM>(next, m1, t1, row.wrapping_add(1), &mut worst);
         let Some(next) = next else { return (row.wrapping_add(1), worst) };
-        fan = next;
+        before = next;
         row = row.wrapping_add(2);
     }
     for (metric, corners) in last_metric.iter().zip(last_corners) {
-        let next = table.next::<I, M, CORNERS, UNIFORM>(fan, metric, corners, row, &mut worst);
+        let next = table.next::<I, M, CORNERS, UNIFORM>(before, metric, corners, row, &mut worst);
         let Some(next) = next else { break };
-        fan = next;
+        before = next;
         row = row.wrapping_add(1);
     }
     (row, worst)
@@ -140,17 +225,37 @@ struct Table<'a, V: ?Sized> {
 }
 
 impl<V: VertexTable + ?Sized> Table<'_, V> {
+    /// What the first triangle of a run needs to know of the one before it: from its own first two corners.
+    #[inline(always)]
+    fn before<I: Index, const CORNERS: usize>(
+        &self,
+        metric: &impl MetricBits,
+        corners: &[u8; CORNERS],
+        largest: f32,
+    ) -> Option<Before> {
+        let metric = Metric::new(metric.bits().map(f32::from_bits));
+        let (a, b) =
+            (self.corner::<I, CORNERS>(corners, 0)?, self.corner::<I, CORNERS>(corners, 1)?);
+        let [centre, other, _] = metric.from_centre([a, b, b]);
+        let edge = if metric.join == Join::Flip { centre - other } else { other - centre };
+        let [rest, ..] = metric.squares;
+        let left = largest * rest - edge.length_squared();
+        // Not within the largest so far: what is not a number passes nothing, and a closer look is taken.
+        let edge = if left > 0.0 { edge } else { Vec3::NAN };
+        Some(Before { centre, third: centre, edge, left })
+    }
+
     /// Measures one triangle.
     #[inline(always)]
     fn next<I: Index, M: Measure, const CORNERS: usize, const UNIFORM: bool>(
         &self,
-        fan: Fan,
-        metric: &[u8; METRIC_BYTES],
+        before: Before,
+        metric: &impl MetricBits,
         corners: &[u8; CORNERS],
         row: u32,
         worst: &mut Worst,
-    ) -> Option<Fan> {
-        match self.pass::<I, M, CORNERS, UNIFORM>(fan, metric, corners, worst.squared) {
+    ) -> Option<Before> {
+        match self.pass::<I, M, CORNERS, UNIFORM>(before, metric, corners, worst.squared) {
             Some(next) => Some(next),
             None => {
                 let (next, raised) =
@@ -161,45 +266,48 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         }
     }
 
-    /// The first two corners.
-    #[inline(always)]
-    fn start<I: Index, const CORNERS: usize>(
-        &self,
-        rest: f32,
-        corners: &[u8; CORNERS],
-        largest: f32,
-    ) -> Option<Fan> {
-        let centre = self.corner::<I, CORNERS>(corners, 0)?;
-        let first = self.corner::<I, CORNERS>(corners, 1)? - centre;
-        Some(Fan { centre, first, left: largest * rest - first.length_squared() })
-    }
-
     /// Checks that a triangle is certainly not stretched beyond `sqrt(largest)`. What is not likely is left to
     /// others.
     #[inline(always)]
     fn pass<I: Index, M: Measure, const CORNERS: usize, const UNIFORM: bool>(
         &self,
-        mut fan: Fan,
-        metric: &[u8; METRIC_BYTES],
+        before: Before,
+        metric: &impl MetricBits,
         corners: &[u8; CORNERS],
         largest: f32,
-    ) -> Option<Fan> {
-        let ([rest_first, ..], continues) = metric_row(metric);
-        if !continues {
-            fan = self.start::<I, CORNERS>(rest_first, corners, largest)?;
-        } else if !UNIFORM {
-            fan.left = largest * rest_first - fan.first.length_squared();
+    ) -> Option<Before> {
+        let Before { mut centre, third, edge: mut first, mut left } = before;
+        let [mark, between, second] = metric.bits();
+        let (rest_between, rest_second) = (f32::from_bits(between), f32::from_bits(second));
+        // The marks of `Join`, the commonest first: written out, since a match would make an enum of them.
+        if mark as i32 >= 0 {
+            if mark & 1 == 0 {
+                let [a, b] = self.first_two::<I, CORNERS>(corners)?;
+                (centre, first) = (a, b - a);
+                left = largest * f32::from_bits(mark) - first.length_squared();
+                if !(left > 0.0) {
+                    return None;
+                }
+            } else {
+                // Both lines say that it is this way on which positions are moved, not that of a fan. (A zero may
+                // lose its sign, which no square shows.)
+                core::hint::cold_path();
+                centre = third + Vec3::ZERO;
+                first = -first;
+            }
         }
-        if (!continues || !UNIFORM) && !(fan.left > 0.0) {
-            return None;
+        if !UNIFORM {
+            left = largest * f32::from_bits(mark).abs() - first.length_squared();
+            if !(left > 0.0) {
+                return None;
+            }
         }
-        let second = self.corner::<I, CORNERS>(corners, 2)? - fan.centre;
-        // Read here, not above: so few registers are in use at a time that none has to be put aside.
-        let ([_, rest_between, rest_second], _) = metric_row(metric);
-        let left = largest * rest_second - second.length_squared();
-        let now = Edges { first: fan.first, second };
-        let is_within = M::is_within(fan.left, left, largest * rest_between, now);
-        is_within.then_some(Fan { centre: fan.centre, first: second, left })
+        let third = self.corner::<I, CORNERS>(corners, 2)?;
+        let edge = third - centre;
+        let left_second = largest * rest_second - edge.length_squared();
+        let now = Edges { first, second: edge };
+        let is_within = M::is_within(left, left_second, largest * rest_between, now);
+        is_within.then_some(Before { centre, third, edge, left: left_second })
     }
 
     /// Raises `worst` if a triangle is stretched more; `None` beyond the limit.
@@ -207,27 +315,45 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
     #[inline(never)]
     fn look_closer<I: Index, M: Measure, const CORNERS: usize>(
         &self,
-        metric: &[u8; METRIC_BYTES],
+        metric: &impl MetricBits,
         corners: &[u8; CORNERS],
         row: u32,
         mut worst: Worst,
-    ) -> Option<(Fan, Worst)> {
-        let centre = self.corner::<I, CORNERS>(corners, 0)?;
-        let first = self.corner::<I, CORNERS>(corners, 1)? - centre;
-        let second = self.corner::<I, CORNERS>(corners, 2)? - centre;
-        let (rest, _) = metric_row(metric);
-        let squared = squared_stretch::<M>(&rest, Edges { first, second }, self.limit);
+    ) -> Option<(Before, Worst)> {
+        let metric = Metric::new(metric.bits().map(f32::from_bits));
+        let a = self.corner::<I, CORNERS>(corners, 0)?;
+        let b = self.corner::<I, CORNERS>(corners, 1)?;
+        let third = self.corner::<I, CORNERS>(corners, 2)?;
+        let [centre, other, _] = metric.from_centre([a, b, third]);
+        let now = Edges { first: other - centre, second: third - centre };
+        let squared = squared_stretch::<M>(&metric.squares, now, self.limit);
         if !(squared <= self.limit) {
             return None;
         }
         if squared > worst.squared {
             worst = Worst { squared, triangle: row };
         }
-        let [.., rest_second] = rest;
-        let left = worst.squared * rest_second - second.length_squared();
+        let [.., rest_second] = metric.squares;
+        let left = worst.squared * rest_second - now.second.length_squared();
         // It is within the largest now: below 0 is rounding.
         let left = if left > 0.0 { left } else { 0.0 };
-        Some((Fan { centre, first: second, left }, worst))
+        Some((Before { centre, third, edge: now.second, left }, worst))
+    }
+
+    /// Positions of a triangle's first two corners, if they are there.
+    #[inline(always)]
+    fn first_two<I: Index, const CORNERS: usize>(
+        &self,
+        corners: &[u8; CORNERS],
+    ) -> Option<[Vec3; 2]> {
+        let a = format::vertex_number::<I>(corners, 0)?;
+        let b = format::vertex_number::<I>(corners, 1)?;
+        // One branch for both.
+        if (a < self.ready) & (b < self.ready) {
+            Some([self.surface.position(a)?, self.surface.position(b)?])
+        } else {
+            None
+        }
     }
 
     /// Position of a triangle's corner, if it is there.
@@ -244,19 +370,21 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
 
 /// A triangle's edges; `None` while a corner is not below row `ready`.
 fn edges<I: Index, V: VertexTable + ?Sized>(
+    tree: &Tree<'_, I>,
     surface: &V,
-    corners: &[u8],
+    row: u32,
+    metric: &Metric,
     ready: u32,
 ) -> Result<Option<Edges>, StretchError> {
+    let corners = tree.triangle(row).ok_or(StretchError::Corrupt { row })?;
     let mut positions = [Vec3::ZERO; 3];
-    for (number, position) in (0..).zip(&mut positions) {
-        let row = format::vertex_number::<I>(corners, number).unwrap_or(u32::MAX);
+    for (row, position) in corners.into_iter().zip(&mut positions) {
         if row >= ready && (row as usize) < surface.len() {
             return Ok(None);
         }
         *position = surface.position(row).ok_or(StretchError::Corrupt { row })?;
     }
-    let [centre, first, second] = positions;
+    let [centre, first, second] = metric.from_centre(positions);
     Ok(Some(Edges { first: first - centre, second: second - centre }))
 }
 
