@@ -139,6 +139,10 @@ impl Measure for LongestEdge {
     }
 }
 
+/// How far the squared stretch of a triangle is rounded up at least, as a part of itself. More than rounding asks
+/// for: triangles that are stretched all but as much then pass, and one that does not takes several times as long.
+const HEADROOM: f32 = 256.0 * U;
+
 /// The squared stretch of a triangle, rounded up, but not above the limit. If the triangle is not certainly
 /// within the limit, it is above that or not a number.
 #[cold]
@@ -147,8 +151,8 @@ pub(super) fn squared_stretch<M: Measure>(rest: &Squares, now: Edges, limit: f32
     let now = M::squares(now);
     let estimate = M::estimate(rest, &now);
     let mut squared = if estimate.is_nan() { estimate } else { f32::INFINITY };
-    // The estimate may be too low by its rounding: a step more, and twice that, until it passes.
-    let mut step = 4.0 * U;
+    // The estimate may be too low by its rounding: twice as much headroom then, until it passes.
+    let mut step = HEADROOM;
     for _ in 0..24 {
         let candidate = estimate * (1.0 + step);
         if M::within(rest, &now, candidate) {

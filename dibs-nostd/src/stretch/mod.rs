@@ -63,10 +63,10 @@ impl fmt::Display for StretchError {
 impl core::error::Error for StretchError {}
 
 /// Measures the stretch of a whole frame at once: of every triangle what the tree's
-/// [`PathKind`](crate::format::PathKind) asks for, rounded up by the error of the f32 arithmetic.
-/// [`StretchMonitor`] measures the same in slices.
+/// [`PathKind`](crate::format::PathKind) asks for, rounded up by the error of the f32 arithmetic
+/// and 2^-17 of itself. [`StretchMonitor`] measures the same in slices.
 ///
-/// Never below the true stretch of any triangle; above the largest by a few parts in a million, more
+/// Never below the true stretch of any triangle; above the largest by some ten parts in a million, more
 /// only where a triangle is nearly flat at rest (twice as much where its largest angle is 120
 /// degrees, a thousandth at most). The rest shape of a triangle lower than 1/64 of its longest edge counts as
 /// that high, here and in the tree's radii.
