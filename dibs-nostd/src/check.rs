@@ -441,7 +441,7 @@ const fn is_metric<I: Index>(tree: &Tree<'_, I>, row: u32) -> bool {
     let [first, second, third] = metric.squares;
     let is_joined = match (metric.join, row.checked_sub(1)) {
         (Join::Start, _) => !metric.is_reversed,
-        (join, Some(before)) => match (from_centre(tree, before), from_centre(tree, row)) {
+        (join, Some(before)) => match (centre_first(tree, before), centre_first(tree, row)) {
             (Some(before), Some(corners)) => join.is_between(before, corners),
             _ => false,
         },
@@ -456,9 +456,9 @@ const fn is_metric<I: Index>(tree: &Tree<'_, I>, row: u32) -> bool {
 }
 
 /// The corners of a triangle, its centre first.
-const fn from_centre<I: Index>(tree: &Tree<'_, I>, row: u32) -> Option<[u32; 3]> {
+const fn centre_first<I: Index>(tree: &Tree<'_, I>, row: u32) -> Option<[u32; 3]> {
     match (tree.metric(row), tree.triangle(row)) {
-        (Some(metric), Some(corners)) => Some(metric.from_centre(corners)),
+        (Some(metric), Some(corners)) => Some(metric.centre_first(corners)),
         _ => None,
     }
 }

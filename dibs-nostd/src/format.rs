@@ -291,7 +291,7 @@ impl Metric {
 
     /// The corners of a triangle, its centre first.
     #[must_use]
-    pub const fn from_centre<T: Copy>(&self, [a, b, c]: [T; 3]) -> [T; 3] {
+    pub const fn centre_first<T: Copy>(&self, [a, b, c]: [T; 3]) -> [T; 3] {
         if self.is_reversed { [b, a, c] } else { [a, b, c] }
     }
 }

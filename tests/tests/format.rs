@@ -270,12 +270,12 @@ fn metric_and_limits_stand_where_the_specification_says() {
             let limit = f64::from(limits[triangle]);
             assert!(share * 2.0 >= limit && share * 2.0 < limit + 4e-5, "{share} for {limit}");
             let at = |i: usize| f32::from_bits(word(bytes, metric + 12 * row + 4 * i));
-            let from_centre = |row: usize| {
+            let centre_first = |row: usize| {
                 let [a, b, c] = rows(row);
                 let is_reversed = word(bytes, metric + 12 * row + 4) & 1 == 1;
                 if is_reversed { [b, a, c] } else { [a, b, c] }
             };
-            let [a, b, c] = from_centre(row)
+            let [a, b, c] = centre_first(row)
                 .map(|r| mesh.positions[built.vertex_order()[r as usize] as usize].as_dvec3());
             let (e1, e2) = (b - a, c - a);
             let expected = [e1.dot(e1), e1.dot(e2), e2.dot(e2)].map(|x| x * share * share);
@@ -288,13 +288,13 @@ fn metric_and_limits_stand_where_the_specification_says() {
                 );
                 assert!(i == 1 || found < expected, "{found} must be below {expected}");
             }
-            let [centre, other, _] = from_centre(row);
+            let [centre, other, _] = centre_first(row);
             if at(0).is_sign_negative() {
-                let [before, _, third] = from_centre(row - 1);
+                let [before, _, third] = centre_first(row - 1);
                 assert_eq!([centre, other], [before, third]);
                 fans += 1;
             } else if at(0).to_bits() & 1 == 1 {
-                let [before, _, third] = from_centre(row - 1);
+                let [before, _, third] = centre_first(row - 1);
                 assert_eq!([centre, other], [third, before]);
                 flips += 1;
             } else {

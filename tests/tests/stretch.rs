@@ -59,7 +59,7 @@ fn a_flat_triangle_does_not_spoil_its_neighbours() {
         for row in 0..tree.triangle_count() {
             let at = |v| tree.rest_position(v).expect("a row").as_dvec3();
             let metric = tree.metric(row).expect("a row");
-            let [a, b, c] = metric.from_centre(tree.triangle(row).expect("a row").map(at));
+            let [a, b, c] = metric.centre_first(tree.triangle(row).expect("a row").map(at));
             let (e1, e2) = (b - a, c - a);
             let squares = [e1.length_squared(), e1.dot(e2), e2.length_squared()];
             if e1.angle_between(e2).sin() > 0.35 {

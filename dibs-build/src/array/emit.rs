@@ -278,7 +278,7 @@ fn is_measurable<I: Index>(tree: &Tree<'_, I>, row: u32) -> bool {
     let corners = tree.triangle(row).and_then(|c| row_of(c, |v| tree.rest_position(v)));
     let [first, between, second] = metric.squares;
     let Some(corners) = corners else { return first > 0.0 };
-    let [a, b, c] = metric.from_centre(corners);
+    let [a, b, c] = metric.centre_first(corners);
     let (e1, e2) = ((b - a).as_dvec3(), (c - a).as_dvec3());
     // The builder has made the metric smaller by what the check's rounding may amount to.
     let limit = f64::from(tree.stretch()).powi(2);

@@ -27,14 +27,14 @@ impl Placed {
     /// How it goes on from the triangle before, if it can follow that at all.
     pub fn join(self, before: Option<Self>) -> Option<Join> {
         let joins = |join: &Join| {
-            before.is_some_and(|before| join.is_between(before.from_centre(), self.from_centre()))
+            before.is_some_and(|before| join.is_between(before.centre_first(), self.centre_first()))
         };
         let start = (!self.is_reversed).then_some(Join::Start);
         [Join::Fan, Join::Flip].into_iter().find(joins).or(start)
     }
 
     /// Its corners, the centre first.
-    pub const fn from_centre(self) -> [u32; 3] {
+    pub const fn centre_first(self) -> [u32; 3] {
         let [a, b, c] = self.corners;
         if self.is_reversed { [b, a, c] } else { [a, b, c] }
     }
@@ -59,7 +59,7 @@ pub(crate) fn arrange<'a>(mesh: &Mesh, leaves: impl IntoIterator<Item = &'a [u32
 /// better one: alone in a leaf, they are stored at that.
 pub(crate) fn misfits(mesh: &Mesh, leaf: &[u32]) -> Vec<u32> {
     let choices = choices(mesh, leaf);
-    if !choices.iter().any(|choice| choice.is_misfit()) {
+    if !choices.iter().any(Choice::is_misfit) {
         return Vec::new();
     }
     let order = Orders::new().best(&choices, None, &[]);

@@ -153,7 +153,7 @@ fn vertex_order(mesh: &Mesh, triangles: &[Placed]) -> Vec<u32> {
 /// The metric of each triangle, marked where it goes on from the triangle before.
 fn metrics(mesh: &Mesh, triangles: &[Placed], facts: Facts<'_>) -> Vec<u8> {
     let of = |placed: Placed| {
-        let corners = placed.from_centre().map(|v| mesh.positions[v as usize]);
+        let corners = placed.centre_first().map(|v| mesh.positions[v as usize]);
         let share = facts.shares.share(placed.triangle);
         metric(corners, placed.is_reversed, share, f64::from(facts.stretch), facts.paths)
     };

@@ -236,7 +236,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let metric = Metric::new(metric.bits().map(f32::from_bits));
         let (a, b) =
             (self.corner::<I, CORNERS>(corners, 0)?, self.corner::<I, CORNERS>(corners, 1)?);
-        let [centre, other, _] = metric.from_centre([a, b, b]);
+        let [centre, other, _] = metric.centre_first([a, b, b]);
         let edge = if metric.join == Join::Flip { centre - other } else { other - centre };
         let [rest, ..] = metric.squares;
         let left = largest * rest - edge.length_squared();
@@ -324,7 +324,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let a = self.corner::<I, CORNERS>(corners, 0)?;
         let b = self.corner::<I, CORNERS>(corners, 1)?;
         let third = self.corner::<I, CORNERS>(corners, 2)?;
-        let [centre, other, _] = metric.from_centre([a, b, third]);
+        let [centre, other, _] = metric.centre_first([a, b, third]);
         let now = Edges { first: other - centre, second: third - centre };
         let squared = squared_stretch::<M>(&metric.squares, now, self.limit);
         if !(squared <= self.limit) {
@@ -384,7 +384,7 @@ fn edges<I: Index, V: VertexTable + ?Sized>(
         }
         *position = surface.position(row).ok_or(StretchError::Corrupt { row })?;
     }
-    let [centre, first, second] = metric.from_centre(positions);
+    let [centre, first, second] = metric.centre_first(positions);
     Ok(Some(Edges { first: first - centre, second: second - centre }))
 }
 
