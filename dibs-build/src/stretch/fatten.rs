@@ -25,7 +25,10 @@ pub(crate) fn fattened(mut corners: [DVec3; 3]) -> [DVec3; 3] {
         let [start, end] = [corners[(apex + 1) % 3], corners[(apex + 2) % 3]];
         let along = (end - start) / length;
         let across = (corners[apex] - start).reject_from_normalized(along);
-        let up = across.try_normalize().unwrap_or_else(|| along.any_orthonormal_vector());
+        // Twice, since of a very short vector rounding leaves a part along the edge, which would shorten another.
+        let up = across.try_normalize().map(|up| up.reject_from_normalized(along));
+        let up =
+            up.and_then(DVec3::try_normalize).unwrap_or_else(|| along.any_orthonormal_vector());
         corners[apex] += up * (FLAT * length - height);
     }
     corners
@@ -59,13 +62,15 @@ mod tests {
         fn only_flat_triangles_grow(a in point(), b in point(), at in -0.2..1.2, off in point(),
                                     power in -9.0..0.0, turn in 0..3_usize) {
             let length = a.distance(b);
-            prop_assume!(length > 0.1);
+            prop_assume!(length > 0.1 && off.length() > 0.1);
             let mut corners = [a, b, a + (b - a) * at + off.normalize() * length * 10f64.powf(power)];
             corners.rotate_left(turn);
             let fat = fattened(corners);
             prop_assert_eq!(is_flat(corners), fat != corners);
             let (length, height, _) = apex(fat);
-            prop_assert!(height >= FLAT * length * (1.0 - 1e-9), "{} of {}", height, length);
+            // An edge to the corner that moved may be the longest now.
+            let least = FLAT * length / (1.0 + FLAT * FLAT);
+            prop_assert!(height >= least * (1.0 - 1e-9), "{} of {}", height, length);
             // The Gram matrix has grown: no path across the triangle is shorter.
             let gram = |[a, b, c]: [DVec3; 3]| {
                 [(b - a).length_squared(), (b - a).dot(c - a), (c - a).length_squared()]
