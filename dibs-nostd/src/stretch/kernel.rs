@@ -1,7 +1,7 @@
 //! The check of one triangle.
 //!
-//! Let `f1` and `f2` lead from a triangle's centre to the other of its first two corners and to the third, as they are now, and
-//! `G` be their Gram matrix, `[f1.f1, f1.f2; f1.f2, f2.f2]`; `M` is the same at rest, from the tree's
+//! Let `f1` and `f2` lead from a triangle's centre to the other of its first two corners and to the third, as
+//! they are now, and `G` be their Gram matrix, `[f1.f1, f1.f2; f1.f2, f2.f2]`; `M` is the same at rest, from the tree's
 //! metric section. The triangle's largest singular value is at most `sigma` exactly if `L M - G` is
 //! positive semidefinite for `L = sigma^2`: if its diagonal and its determinant are not negative. So
 //! against the largest `L` so far a triangle takes neither a root nor a division. Only one that
@@ -13,8 +13,8 @@
 //! at most `5 u` of themselves, the other by `5 u |f1| |f2|`. A difference `x = L a - g` takes two more
 //! roundings, the comparison of the products two. If it holds, then, with `a` and `d` the diagonal of
 //! `M`, `G` is below `L (M + E)` with `|E11| <= 6.1 u a`, `|E22| <= 6.1 u d` and `|E12| <= 12.1 u sqrt(a d)`,
-//! so below `L (M + 18.2 u diag(a, d))`. Storing the off-diagonal entry of `M`, its lowest bit a mark, takes `2 u sqrt(a d)`. And
-//! `diag(a, d)` is below `M / (1 - |cos|)`, `cos` that of the angle at the centre. So the builder
+//! so below `L (M + 18.2 u diag(a, d))`. Storing the off-diagonal entry of `M`, its lowest bit a mark, takes
+//! `2 u sqrt(a d)`. And `diag(a, d)` is below `M / (1 - |cos|)`, `cos` that of the angle at the centre. So the builder
 //! divides `M` by `1 + 21 u / (1 - |cos|)`, rounding down, and what passes is not stretched beyond
 //! `sqrt(L)`. It chooses the centre so that this is little. For edges 6.1 u is all.
 //!

@@ -1,8 +1,8 @@
 //! The check of many triangles, row by row: where the time of a measurement goes.
 //!
 //! What a triangle shares with the one before is carried over ([`Join`]). What an edge leaves of the largest
-//! square so far, `L r - g` for its squares at rest and now, is the same number for both of its triangles, but in a tree
-//! that is not `UNIFORM`: there triangles have limits of their own, and `r` is not the same for both.
+//! square so far, `L r - g` for its squares at rest and now, is the same number for both of its triangles, but in
+//! a tree that is not `UNIFORM`: there triangles have limits of their own, and `r` is not the same for both.
 
 use core::ops::Range;
 
