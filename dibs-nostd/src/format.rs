@@ -4,6 +4,8 @@
 //! so that a generated `static` is validated while the firmware compiles, by the code that validates
 //! a blob when it boots.
 
+pub(crate) mod several;
+
 use crate::Index;
 
 /// First bytes of every tree.
@@ -142,7 +144,7 @@ impl Link {
 }
 
 /// A node as it is stored.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Node {
     pub pin: u32,
     pub radius_code: u32,

@@ -60,6 +60,7 @@ mod check;
 pub mod constraint;
 pub mod failsafe;
 pub mod format;
+mod four;
 mod frames;
 mod index;
 pub mod modes;

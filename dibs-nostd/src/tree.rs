@@ -5,7 +5,7 @@ use core::marker::PhantomData;
 
 use glam::Vec3;
 
-use crate::format::{self, Link, Metric, Node, PathKind, section};
+use crate::format::{self, Link, Metric, Node, PathKind, section, several};
 use crate::sections::{self, Sections};
 use crate::{FormatError, Index, check};
 
@@ -198,6 +198,24 @@ impl<'a, I: Index> Tree<'a, I> {
     #[inline(always)]
     pub(crate) fn whole_record(&self, row: u32) -> Option<Node> {
         format::whole_node::<I>(self.sections.nodes, row)
+    }
+
+    /// As [`several::copy_nodes`].
+    #[inline(always)]
+    pub(crate) fn copy_nodes(&self, first: u32, count: u32, to: &mut [u8]) -> Option<()> {
+        several::copy_nodes::<I>(self.sections.nodes, first, count, to)
+    }
+
+    /// As [`several::leaf_vertices`].
+    #[inline(always)]
+    pub(crate) fn leaf_vertices(&self, first: u32, count: u32) -> Option<[u32; 12]> {
+        several::leaf_vertices::<I>(self.sections.triangles, first, count)
+    }
+
+    /// As [`several::four_triangles`].
+    #[inline(always)]
+    pub(crate) fn four_triangles(&self, first: u32, count: u32) -> Option<[[u32; 4]; 3]> {
+        several::four_triangles::<I>(self.sections.triangles, first, count)
     }
 
     /// The nodes of a run of rows; `None` unless all of them are there.

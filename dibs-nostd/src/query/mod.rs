@@ -64,12 +64,12 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         Search::start(&self.tree, &mut self.stack, vertices, tool, options)?.run()
     }
 
-    /// As [`closest`](Self::closest), up to six subtrees at a time: for processors that work on several
+    /// As [`closest`](Self::closest), up to seven subtrees at a time: for processors that work on several
     /// instructions at once, and by several numbers each.
     ///
     /// The same promises, errors and answers (where several triangles are equally close, perhaps another of
-    /// them) and mostly fewer tests, but more memory: 1.5 KiB on the call stack, and it pays only if `STACK`
-    /// is 64 more than [`Tree::stack`]. With less, rounds are smaller. A microcontroller is better off with
+    /// them) and mostly fewer tests, but more memory: 2 KiB on the call stack, and it pays only if `STACK`
+    /// is 128 more than [`Tree::stack`]. With less, rounds are smaller. A microcontroller is better off with
     /// `closest`.
     ///
     /// # Errors

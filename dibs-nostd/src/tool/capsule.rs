@@ -1,8 +1,9 @@
 //! The capsule: a segment with a radius.
 
 use super::{AxisPair, Tool, ToolError, check_point, check_radius, clamp_any, sealed, triangle};
+use crate::four::Four;
 use crate::sqrt::sqrt;
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 /// Axes shorter than this are points: the squares of their components underflow.
 const SHORTEST: f32 = 1e-15;
@@ -78,7 +79,18 @@ impl Capsule {
     }
 }
 
-impl sealed::Sealed for Capsule {}
+impl sealed::Sealed for Capsule {
+    #[inline(always)]
+    fn axis_to_four(&self, points: &Four) -> Four {
+        let Axis { start, direction, length } = self.axis;
+        let (direction, length) = (Four::splat(direction), Vec4::splat(length));
+        let offset = points.minus(Four::splat(start));
+        let along = offset.dot(direction);
+        let positive = Vec4::select(along.cmpgt(Vec4::ZERO), along, Vec4::ZERO);
+        let along = Vec4::select(positive.cmplt(length), positive, length);
+        offset.minus(direction.times(along))
+    }
+}
 
 impl Tool for Capsule {
     #[inline]

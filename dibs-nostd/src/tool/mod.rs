@@ -109,7 +109,12 @@ impl fmt::Display for ToolError {
 impl core::error::Error for ToolError {}
 
 mod sealed {
-    pub trait Sealed {}
+    use crate::four::Four;
+
+    pub trait Sealed {
+        /// The shortest vectors from the axis to four points, bit by bit those of one after the other.
+        fn axis_to_four(&self, points: &Four) -> Four;
+    }
 }
 
 fn check_point(point: Vec3) -> Result<(), ToolError> {

@@ -1,6 +1,7 @@
 //! The sphere: a point with a radius.
 
 use super::{AxisPair, Tool, ToolError, check_point, check_radius, sealed, triangle};
+use crate::four::Four;
 use glam::Vec3;
 
 /// A spherical tool, or with radius zero a point.
@@ -38,7 +39,12 @@ impl Sphere {
     }
 }
 
-impl sealed::Sealed for Sphere {}
+impl sealed::Sealed for Sphere {
+    #[inline(always)]
+    fn axis_to_four(&self, points: &Four) -> Four {
+        points.minus(Four::splat(self.center))
+    }
+}
 
 impl Tool for Sphere {
     #[inline]

@@ -1,30 +1,34 @@
-//! The same search in rounds: up to six subtrees at once.
+//! The same search in rounds: up to seven subtrees at once.
 //!
 //! One subtree after the other is a chain: each takes its distances to say which is next, and a branch
 //! for each child that no processor can foretell. Half of a query's time on a large processor goes there.
-//! A round takes its subtrees together, so that the loads and roots of all their children overlap, and
-//! judges four children by one comparison.
+//! A round takes its subtrees together, so that the loads and roots of all their children overlap; judges four
+//! children by one comparison; and sorts what is left without a branch on what is nearer.
 //!
 //! Little of it is in vain: of what waits, 98 % is still within reach when its turn comes. And there is a
-//! gain in tests: the pins of six subtrees have pulled the reach in before a triangle is looked at.
+//! gain in tests: the pins of seven subtrees have pulled the reach in before a child is judged.
 
-use core::array;
-use core::hint::black_box;
+mod leaf;
+mod order;
 
 use glam::Vec4;
 
 use super::{Search, Step, Waiting};
-use crate::format::{Link, MAX_CHILDREN};
+use crate::format::several::four_nodes;
+use crate::format::{Link, MAX_CHILDREN, node_bytes};
+use crate::four::{Four, roots};
 use crate::query::QueryError;
 use crate::sqrt::sqrt;
 use crate::{Index, Proximity, Tool, VertexTable};
 
-/// Most subtrees in a round. More overlap, but see a looser reach.
-const SUBTREES: usize = 6;
+/// Most subtrees in a round. More overlap, but see a looser reach; and a set of their children must fit in a word.
+const SUBTREES: usize = 7;
 const MOST: usize = SUBTREES * MAX_CHILDREN as usize;
+const BLOCKS: usize = MOST / 4;
+const MOST_NODE_BYTES: usize = node_bytes::<u32>();
 /// Most entries that a round of several subtrees leaves waiting, so that counts do not depend on the
 /// stack as long as it is large.
-const MOST_WAITING: usize = 64;
+const MOST_WAITING: usize = 128;
 
 /// A search in rounds.
 pub(in crate::query) struct Rounds<'s, 't, I, V: ?Sized, T> {
@@ -32,20 +36,16 @@ pub(in crate::query) struct Rounds<'s, 't, I, V: ?Sized, T> {
     /// How many may wait after a round of several subtrees: what is left of the stack is enough for one
     /// subtree after the other.
     room: usize,
-    /// Rows of the round's children, and lower bounds of their parents. After the last child the root
-    /// fills its block up: known already, it changes nothing.
-    rows: [u32; MOST + 4],
-    parents: [f32; MOST + 4],
-    blocks: [Block; MOST / 4],
-}
-
-/// Four children.
-#[derive(Clone, Copy, Default)]
-struct Block {
-    pins: [u32; 4],
-    links: [u32; 4],
-    distances: [f32; 4],
-    lowers: [f32; 4],
+    /// Records of the round's children. What comes after them, up to the end of a block of four, is
+    /// other nodes: they may pull in the reach too, and are then left out.
+    records: [u8; (MOST + MAX_CHILDREN as usize) * MOST_NODE_BYTES],
+    /// Lower bounds of the children's parents.
+    parents: [f32; MOST + MAX_CHILDREN as usize],
+    /// Squares of the distances of their pins.
+    squares: [Vec4; BLOCKS],
+    lowers: [[f32; 4]; BLOCKS],
+    /// What the children in reach are sorted by.
+    keys: [[i32; 4]; BLOCKS + 2],
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'s, 't, I, V, T> {
@@ -54,9 +54,11 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'s, 't, I, V, T>
         Self {
             search,
             room: if spare < MOST_WAITING { spare } else { MOST_WAITING },
-            rows: [0; _],
+            records: [0; _],
             parents: [0.0; _],
-            blocks: [Block::default(); _],
+            squares: [Vec4::ZERO; _],
+            lowers: [[0.0; 4]; _],
+            keys: [[0; 4]; _],
         }
     }
 
@@ -73,7 +75,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'s, 't, I, V, T>
                 }
                 Link::Leaf { first, count } => {
                     self.search.waiting = top;
-                    self.search.leaf(first, count)
+                    self.search.leaf_at_once(first, count)
                 }
             };
             if matches!(step?, Step::OutOfBudget) {
@@ -94,16 +96,18 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'s, 't, I, V, T>
         };
         self.search.left.node_tests = left;
         self.search.waiting -= subtrees;
+        self.measure(children).ok_or(corrupt)?;
         let (near, leaves) = self.judge(children).ok_or(corrupt)?;
         let near = self.reject_leaves(near, leaves).ok_or(corrupt)?;
         self.push(near).ok_or(corrupt)?;
         Ok(Step::Done)
     }
 
-    /// Lists the children of the nearest subtrees, as many as the stack is enough for. Returns the number of
+    /// Copies the children of the nearest subtrees, as many as the stack is enough for. Returns the number of
     /// subtrees and that of children: those of a subtree that is out of reach by now do not count.
+    #[inline(always)]
     fn take(&mut self) -> Option<(usize, usize)> {
-        let Self { search, room, rows, parents, .. } = self;
+        let Self { search, room, records, parents, .. } = self;
         let (mut subtrees, mut children) = (0, 0);
         let from = search.waiting.saturating_sub(SUBTREES);
         for &Waiting { lower, link } in search.stack.get(from..search.waiting)?.iter().rev() {
@@ -112,114 +116,69 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'s, 't, I, V, T>
             if subtrees > 0 && search.waiting + all > *room + subtrees + 1 {
                 break;
             }
-            // As many as there may be, so that no loop ends sooner or later: the next are written over.
-            *rows.get_mut(children..)?.first_chunk_mut::<8>()? =
-                array::from_fn(|i| first + i as u32);
-            *parents.get_mut(children..)?.first_chunk_mut::<8>()? = [lower; 8];
+            let place = records.get_mut(children * node_bytes::<I>()..)?;
+            search.tree.copy_nodes(first, count, place)?;
+            *parents.get_mut(children..)?.first_chunk_mut()? = [lower; MAX_CHILDREN as usize];
             children = if lower > search.reach { children } else { all };
             subtrees += 1;
         }
-        *rows.get_mut(children..)?.first_chunk_mut::<4>()? = [0; 4];
         Some((subtrees, children))
     }
 
-    /// Tests the spheres of the children, in their order: each pin that is nearer than all before pulls in
-    /// the reach for the next. Returns the set of those within reach.
+    /// Measures how far the children's pins are. The nearest pulls in the reach.
     #[inline(always)]
-    fn judge(&mut self, children: usize) -> Option<(u64, u64)> {
-        let Self { search, rows, parents, blocks, .. } = self;
-        let (tree, vertices) = (search.tree, search.vertices);
-        let (rows, _) = rows.as_chunks::<4>();
-        let (parents, _) = parents.as_chunks::<4>();
-        let (mut near, mut leaves) = (0, 0);
-        let places = rows.iter().zip(parents).zip(blocks);
-        for (start, ((rows, parents), block)) in (0..children).step_by(4).zip(places) {
-            let [a, b, c, d] = *rows;
-            let node = |row| tree.whole_record(row);
-            let (a, b, c, d) = (node(a)?, node(b)?, node(c)?, node(d)?);
-            let squared = |pin| Some(search.tool.axis_distance_squared(vertices.position(pin)?));
-            let squared =
-                Vec4::new(squared(a.pin)?, squared(b.pin)?, squared(c.pin)?, squared(d.pin)?);
-            let codes = [a.radius_code, b.radius_code, c.radius_code, d.radius_code];
-            let radius = Vec4::from_array(codes.map(|code| code as f32)) * search.radius_scale;
-            let far = Vec4::splat(search.reach) + radius;
-            let distance = Vec4::from_array(squared.to_array().map(sqrt));
-            block.pins = [a.pin, b.pin, c.pin, d.pin];
-            block.links = [a.link, b.link, c.link, d.link];
-            block.distances = distance.to_array();
-            // What is not a number is not far: the leaves below find out what it is.
-            let mut within = !squared.cmpgt(far * far).bitmask() & 0xF;
-            if within & distance.cmplt(Vec4::splat(search.pin.1)).bitmask() != 0 {
-                within = search.one_by_one(block, squared, radius, children - start);
-            }
-            near |= u64::from(within) << start;
-            let marks =
-                (a.link >> 31) | (b.link >> 31 << 1) | (c.link >> 31 << 2) | (d.link >> 31 << 3);
-            leaves |= u64::from(marks) << start;
-            let (own, parents) = (distance - radius, Vec4::from_array(*parents));
-            block.lowers = Vec4::select(own.cmpgt(parents), own, parents).to_array();
+    fn measure(&mut self, children: usize) -> Option<()> {
+        let Self { search, records, squares, .. } = self;
+        let (vertices, tool) = (search.vertices, *search.tool);
+        let squares = squares.get_mut(..children.div_ceil(4))?;
+        let blocks = || records.chunks_exact(4 * node_bytes::<I>());
+        let mut least = Vec4::INFINITY;
+        for (nodes, squared) in blocks().zip(squares.iter_mut()) {
+            let pins = four_nodes::<I>(nodes)?.map(|node| node.pin);
+            let to = tool.axis_to_four(&Four::of(vertices, pins)?);
+            *squared = to.dot(to);
+            least = Vec4::select(squared.cmplt(least), *squared, least);
         }
-        let near = near & !(u64::MAX << children);
-        Some((near, near & leaves))
-    }
-
-    /// Tests the planes of those that are leaves. Returns the set of what is left.
-    #[inline(always)]
-    fn reject_leaves(&mut self, near: u64, mut leaves: u64) -> Option<u64> {
-        let mut left = near;
-        while let Some(at) = next(&mut leaves) {
-            let (block, lane) = (self.blocks.get(at / 4)?, at % 4);
-            if let Link::Leaf { first, count } = Link::decode(block.links[lane])
-                && let Some(tests) = self.search.left.node_tests.checked_sub(1)
-            {
-                self.search.left.node_tests = tests;
-                let (tree, vertices) = (self.search.tree, self.search.vertices);
-                let position = vertices.position(block.pins[lane])?;
-                let normal = self.search.tool.axis_to(position);
-                let plane = self.search.plane_across(normal, position, block.distances[lane]);
-                if plane.beyond(tree, vertices, first, count)? == count {
-                    left &= !(1 << at);
+        let least = least.min_element();
+        let distance = sqrt(least);
+        if distance < search.pin.1 {
+            for (nodes, squared) in blocks().zip(squares.iter()) {
+                let mut equal = u64::from(squared.cmpeq(Vec4::splat(least)).bitmask());
+                if let Some(lane) = next(&mut equal) {
+                    search.pull_in(four_nodes::<I>(nodes)?.get(lane)?.pin, distance);
+                    break;
                 }
             }
         }
-        Some(left)
-    }
-
-    /// Lets the children in a set wait, the nearest of all on top.
-    #[inline(always)]
-    fn push(&mut self, mut set: u64) -> Option<()> {
-        let base = self.search.waiting;
-        while let Some(at) = next(&mut set) {
-            let (block, lane) = (self.blocks.get(at / 4)?, at % 4);
-            let link = block.links[lane];
-            if let Link::Children { first, .. } = Link::decode(link) {
-                // Only to have it fetched: on a large mesh the memory takes longer than all the rest.
-                black_box(self.search.tree.whole_record(first)?.pin);
-            }
-            self.search.push(base, Waiting { lower: block.lowers[lane], link })?;
-        }
         Some(())
     }
-}
 
-impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// Tests the first `count` spheres of a block, of which one pulls in the reach. Returns the set of those
-    /// within it.
-    #[inline(never)]
-    fn one_by_one(&mut self, block: &Block, squared: Vec4, radius: Vec4, count: usize) -> u32 {
-        let spheres = squared.to_array().into_iter().zip(radius.to_array());
-        let pins = block.pins.into_iter().zip(block.distances);
-        let mut within = 0;
-        for (lane, ((squared, radius), (pin, distance))) in
-            spheres.zip(pins).take(count).enumerate()
-        {
-            let far = self.reach + radius;
-            if !(squared > far * far) {
-                within |= 1 << lane;
-                self.pull_in(pin, distance);
-            }
+    /// Compares the children's spheres with the reach. Returns the set of those within, and of the leaves
+    /// among them.
+    #[inline(always)]
+    fn judge(&mut self, children: usize) -> Option<(u64, u64)> {
+        let Self { search, records, parents, squares, lowers, .. } = self;
+        let (blocks, bytes) = (children.div_ceil(4), 4 * node_bytes::<I>());
+        let (reach, scale) = (Vec4::splat(search.reach), search.radius_scale);
+        let (mut near, mut leaves) = (0, 0);
+        let nodes = records.get(..blocks * bytes)?.chunks_exact(bytes);
+        let parents = parents.as_chunks::<4>().0.get(..blocks)?;
+        let bounds = squares.get(..blocks)?.iter().zip(lowers.get_mut(..blocks)?);
+        for ((nodes, parents), (squared, lowers)) in nodes.zip(parents).zip(bounds).rev() {
+            let nodes = four_nodes::<I>(nodes)?;
+            let codes = nodes.map(|node| node.radius_code as i32 as f32);
+            let radius = Vec4::from_array(codes) * scale;
+            let far = reach + radius;
+            // What is not a number is not far: the leaves below find out what it is.
+            let within = !squared.cmpgt(far * far).bitmask() & 0xF;
+            near = near << 4 | u64::from(within);
+            let links = Vec4::from_array(nodes.map(|node| f32::from_bits(node.link)));
+            leaves = leaves << 4 | u64::from(links.is_negative_bitmask());
+            let (own, parents) = (roots(*squared) - radius, Vec4::from_array(*parents));
+            *lowers = Vec4::select(own.cmpgt(parents), own, parents).to_array();
         }
-        within
+        let near = near & !u64::MAX.checked_shl(children as u32).unwrap_or(0);
+        Some((near, near & leaves))
     }
 }
 

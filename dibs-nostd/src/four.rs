@@ -1,0 +1,60 @@
+//! Four points at once, coordinate by coordinate: what a large processor does by one instruction.
+
+use glam::{Mat4, Vec3, Vec4};
+
+use crate::VertexTable;
+use crate::sqrt::sqrt;
+
+/// Four points or vectors. Each operation rounds as that of [`Vec3`] does.
+#[derive(Clone, Copy, Debug)]
+pub struct Four {
+    pub x: Vec4,
+    pub y: Vec4,
+    pub z: Vec4,
+}
+
+impl Four {
+    /// The positions in four rows; `None` if one is outside the table.
+    #[inline(always)]
+    pub fn of<V: VertexTable + ?Sized>(vertices: &V, [a, b, c, d]: [u32; 4]) -> Option<Self> {
+        let (a, b) = (vertices.position(a)?, vertices.position(b)?);
+        let (c, d) = (vertices.position(c)?, vertices.position(d)?);
+        // By fewer loads than coordinate by coordinate.
+        let columns = [a, b, c, d].map(|position| position.extend(0.0));
+        let [a, b, c, d] = columns;
+        let rows = Mat4::from_cols(a, b, c, d).transpose();
+        Some(Self { x: rows.x_axis, y: rows.y_axis, z: rows.z_axis })
+    }
+
+    /// The same four times.
+    #[inline(always)]
+    pub fn splat(point: Vec3) -> Self {
+        Self { x: Vec4::splat(point.x), y: Vec4::splat(point.y), z: Vec4::splat(point.z) }
+    }
+
+    #[inline(always)]
+    pub fn plus(self, other: Self) -> Self {
+        Self { x: self.x + other.x, y: self.y + other.y, z: self.z + other.z }
+    }
+
+    #[inline(always)]
+    pub fn minus(self, other: Self) -> Self {
+        Self { x: self.x - other.x, y: self.y - other.y, z: self.z - other.z }
+    }
+
+    #[inline(always)]
+    pub fn times(self, factors: Vec4) -> Self {
+        Self { x: self.x * factors, y: self.y * factors, z: self.z * factors }
+    }
+
+    #[inline(always)]
+    pub fn dot(self, other: Self) -> Vec4 {
+        self.x * other.x + self.y * other.y + self.z * other.z
+    }
+}
+
+/// Four square roots, correctly rounded.
+#[inline(always)]
+pub fn roots(squares: Vec4) -> Vec4 {
+    Vec4::from_array(squares.to_array().map(sqrt))
+}

@@ -1,0 +1,130 @@
+//! Leaves in a round, and triangles four at a time.
+
+use glam::Vec4;
+
+use super::{Rounds, next};
+use crate::format::{Link, Node, whole_node};
+use crate::four::{Four, roots};
+use crate::query::QueryError;
+use crate::query::plane::Plane;
+use crate::query::search::{Search, Step, THIRD};
+use crate::{Index, Tool, Tree, VertexTable};
+
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'_, '_, I, V, T> {
+    /// Tests the planes of those children that are leaves. Returns the set of what is left.
+    #[inline(always)]
+    pub(super) fn reject_leaves(&mut self, near: u64, mut leaves: u64) -> Option<u64> {
+        let (tree, vertices) = (self.search.tree, self.search.vertices);
+        let mut left = near;
+        while let Some(at) = next(&mut leaves) {
+            let Node { pin, link, .. } = whole_node::<I>(&self.records, at as u32)?;
+            if let Link::Leaf { first, count } = Link::decode(link)
+                && let Some(tests) = self.search.left.node_tests.checked_sub(1)
+            {
+                self.search.left.node_tests = tests;
+                let plane = self.search.plane_towards(vertices.position(pin)?);
+                let within = plane.vertices_within(tree, vertices, first, count)?;
+                left &= !(u64::from(within == 0) << at);
+            }
+        }
+        Some(left)
+    }
+}
+
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
+    /// As [`Search::leaf`], but from the first triangle on that the plane does not reject, four at a time, each
+    /// against its own plane only.
+    #[inline(always)]
+    pub(super) fn leaf_at_once(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
+        let Some(left) = self.left.node_tests.checked_sub(1) else {
+            return Ok(Step::OutOfBudget);
+        };
+        self.left.node_tests = left;
+        let corrupt = QueryError::Corrupt { row: first };
+        let (tree, vertices) = (self.tree, self.vertices);
+        let [corner, ..] = tree.triangle(first).ok_or(corrupt)?;
+        let plane = self.plane_towards(self.position(corner)?);
+        let within = plane.vertices_within(tree, vertices, first, count).ok_or(corrupt)?;
+        if within == 0 {
+            return Ok(Step::Done);
+        }
+        // From the third on, each vertex is the last of a triangle: those before it are beyond as a whole.
+        let beyond = within.trailing_zeros().saturating_sub(2);
+        let (mut first, mut count) = (first + beyond, count.saturating_sub(beyond));
+        let Some(left) = self.left.node_tests.checked_sub(count) else {
+            return Ok(Step::OutOfBudget);
+        };
+        self.left.node_tests = left;
+        while count > 0 {
+            let [a, b, c] = tree.four_triangles(first, count).ok_or(corrupt)?;
+            let corners = |rows| Four::of(vertices, rows).ok_or(corrupt);
+            let within = self.within_own_planes(corners(a)?, corners(b)?, corners(c)?);
+            let mut within = u64::from(within) & !(u64::MAX << count);
+            while let Some(at) = next(&mut within) {
+                if let Step::OutOfBudget = self.triangle(first + at as u32)? {
+                    return Ok(Step::OutOfBudget);
+                }
+            }
+            first += 4;
+            count = count.saturating_sub(4);
+        }
+        Ok(Step::Done)
+    }
+
+    /// Tests a triangle, if the budget is enough.
+    #[inline(always)]
+    fn triangle(&mut self, triangle: u32) -> Result<Step, QueryError> {
+        if triangle == self.best_triangle {
+            return Ok(Step::Done);
+        }
+        if self.left.triangle_tests == 0 {
+            return Ok(Step::OutOfBudget);
+        }
+        let corners = self.corners(triangle)?;
+        let [a, b, c] = corners;
+        // One corner that is not a number makes the sum none.
+        if (a + b + c).is_nan() {
+            return Err(QueryError::Position { vertex: self.not_a_number(triangle) });
+        }
+        self.test_triangle(triangle, &corners);
+        Ok(Step::Done)
+    }
+
+    /// Which of four triangles, by their corners, are not beyond the plane in the direction of their own corners'
+    /// mean.
+    #[inline(always)]
+    fn within_own_planes(&self, a: Four, b: Four, c: Four) -> u32 {
+        let mean = a.plus(b).plus(c).times(Vec4::splat(THIRD));
+        let normal = self.tool.axis_to_four(&mean);
+        let beyond = roots(normal.dot(normal)) * (self.reach + self.coordinate_slack);
+        let limit = normal.dot(mean.minus(normal)) + beyond + self.tilt_slack;
+        within(normal, limit, a) | within(normal, limit, b) | within(normal, limit, c)
+    }
+}
+
+impl Plane {
+    /// Which of a leaf's vertices are not beyond it, in the order in which its triangles bring them.
+    #[inline(always)]
+    fn vertices_within<I: Index, V: VertexTable + ?Sized>(
+        &self,
+        tree: &Tree<'_, I>,
+        vertices: &V,
+        first: u32,
+        count: u32,
+    ) -> Option<u32> {
+        let (normal, limit) = (Four::splat(self.normal), Vec4::splat(self.limit));
+        let [a, b, c, d, e, f, g, h, i, j, k, l] = tree.leaf_vertices(first, count)?;
+        let (one, two) = (Four::of(vertices, [a, b, c, d])?, Four::of(vertices, [e, f, g, h])?);
+        let mut set = within(normal, limit, one) | within(normal, limit, two) << 4;
+        if count > 6 {
+            set |= within(normal, limit, Four::of(vertices, [i, j, k, l])?) << 8;
+        }
+        Some(set & !(u32::MAX << (count + 2)))
+    }
+}
+
+/// Which of four points are not beyond a plane, or one each. What is not a number is not beyond.
+#[inline(always)]
+fn within(normal: Four, limit: Vec4, points: Four) -> u32 {
+    !normal.dot(points).cmpgt(limit).bitmask() & 0xF
+}
