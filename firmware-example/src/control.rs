@@ -153,7 +153,10 @@ impl Control {
             options = options.stretch(measured);
         }
         let start = clock();
+        #[cfg(not(feature = "in-rounds"))]
         let answer = self.query.closest(&frame, tool, &options);
+        #[cfg(feature = "in-rounds")]
+        let answer = self.query.closest_in_rounds(&frame, tool, &options);
         record.query_counts = clock().wrapping_sub(start);
         drop(frame);
 

@@ -86,6 +86,7 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T> {
+    #[inline(always)]
     pub fn start(
         tree: &'s Tree<'t, I>,
         stack: &'s mut [Waiting],

@@ -26,6 +26,8 @@ pub mod command {
     pub const FRAME: u32 = 2;
     /// A query: [`QUERY_WORDS`](super::QUERY_WORDS). Answered by [`ANSWER_WORDS`](super::ANSWER_WORDS).
     pub const QUERY: u32 = 3;
+    /// The same in rounds, of a frame of rows.
+    pub const QUERY_IN_ROUNDS: u32 = 5;
     /// A modal frame, of a tree with modes: 1 for queries that remember positions and 0 for others, the
     /// number of weights, then an `f32` each. Answered by what bounding its stretch took and the
     /// bound's bits; then by what computing every position took, and a hash of their bits.
@@ -52,6 +54,8 @@ const SLOTS: usize = 256;
 enum Table<'a> {
     /// From the rows of a frame.
     Rows,
+    /// From the rows of a frame, for a query in rounds.
+    InRounds,
     /// From weights.
     Modal(ModalSurface<'a, MAX_MODES>),
     /// From weights, and from memory.
@@ -144,6 +148,10 @@ fn queries(
                 let answer = ask(&mut query, &table, rows, measured, machine)?;
                 put(machine, &answer)?;
             }
+            command::QUERY_IN_ROUNDS => {
+                let answer = ask(&mut query, &Table::InRounds, rows, measured, machine)?;
+                put(machine, &answer)?;
+            }
             command::WEIGHTS => {
                 let remembers = word(machine)? != 0;
                 let (surface, bound) = modal(&Modes::of(tree).map_err(|_| Fault)?, machine)?;
@@ -224,6 +232,7 @@ fn timed(
     let rows = core::hint::black_box(rows);
     match table {
         Table::Rows => clocked(machine, || query.closest(rows, tool, options)),
+        Table::InRounds => clocked(machine, || query.closest_in_rounds(rows, tool, options)),
         Table::Modal(surface) => clocked(machine, || query.closest(surface, tool, options)),
         Table::Remembered(surface) => {
             clocked(machine, || query.closest(&Memo::<_, SLOTS>::new(surface), tool, options))

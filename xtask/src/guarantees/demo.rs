@@ -102,7 +102,10 @@ pub fn link(cross: &Cross, figures: &mut Figures) -> Result<()> {
     let said = String::from_utf8_lossy(&build.stderr);
     ensure!(!build.status.success(), "a planted panic path did not break the link");
     ensure!(said.contains("a_panic_path_survived"), "it broke something else:\n{said}");
-    Ok(())
+
+    let mut in_rounds = firmware::command(cross, &surface);
+    crate::process::run(in_rounds.args(["--features", "in-rounds"]))
+        .context("queries in rounds have a panic path")
 }
 
 /// Bounds the firmware's stack, and lets it overflow on purpose.

@@ -49,7 +49,7 @@ const FRAMES_OF_POSES: usize = 10;
 /// How the queries of a script are drawn.
 #[derive(Clone, Copy)]
 pub enum Draw {
-    /// Every option at random.
+    /// Every option at random, and half of the queries in rounds.
     Any,
     /// Without a budget: the whole search.
     Exhausting,
@@ -260,7 +260,12 @@ impl Script {
                 }
                 _ => Budget::UNLIMITED,
             };
-            self.query(&tool, is_capsule, measured, warm, budget, deadline);
+            if matches!(draw, Draw::Any) && rng.bool() {
+                self.words.push(command::QUERY_IN_ROUNDS);
+            } else {
+                self.words.push(command::QUERY);
+            }
+            self.asked(&tool, is_capsule, measured, warm, budget, deadline);
         }
     }
 
@@ -280,6 +285,18 @@ impl Script {
         deadline: Option<u32>,
     ) {
         self.words.push(command::QUERY);
+        self.asked(tool, is_capsule, measured, warm, budget, deadline);
+    }
+
+    fn asked(
+        &mut self,
+        tool: &Instrument,
+        is_capsule: bool,
+        measured: bool,
+        warm: u32,
+        budget: Budget,
+        deadline: Option<u32>,
+    ) {
         let points = [tool.start, tool.end].map(|p| p.to_array().map(f32::to_bits));
         self.words.extend(points.as_flattened());
         self.words.push(tool.radius.to_bits());
