@@ -9,7 +9,7 @@ use crate::toolchain::Cross;
 
 /// Answers one script everywhere, and compares all bits of all answers.
 pub fn check(cross: &Cross, queries: usize, figures: &mut Figures) -> Result<()> {
-    let script = Script::adversarial(queries, Draw::Any, 1);
+    let script = Script::adversarial(queries, Draw::EitherWay, 1);
     let release = Build::Release.answers(&script)?;
     figures.note("bits.queries", script.queries() as f64);
     figures.text("bits.hash", format!("{:016x}", hash(&release)));

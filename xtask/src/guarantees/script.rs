@@ -49,8 +49,10 @@ const FRAMES_OF_POSES: usize = 10;
 /// How the queries of a script are drawn.
 #[derive(Clone, Copy)]
 pub enum Draw {
-    /// Every option at random, and half of the queries in rounds.
+    /// Every option at random.
     Any,
+    /// The same, half of the queries in rounds.
+    EitherWay,
     /// Without a budget: the whole search.
     Exhausting,
     /// With a budget of a few tests, so that the dearest of them shows.
@@ -248,7 +250,7 @@ impl Script {
             let measured = rng.bool();
             let mut deadline = None;
             let budget = match draw {
-                Draw::Any if rng.bool() => {
+                Draw::Any | Draw::EitherWay if rng.bool() => {
                     Budget { node_tests: rng.u32(..300), triangle_tests: rng.u32(..60) }
                 }
                 Draw::Short => Budget { node_tests: rng.u32(..24), triangle_tests: rng.u32(..6) },
@@ -260,7 +262,7 @@ impl Script {
                 }
                 _ => Budget::UNLIMITED,
             };
-            if matches!(draw, Draw::Any) && rng.bool() {
+            if matches!(draw, Draw::EitherWay) && rng.bool() {
                 self.words.push(command::QUERY_IN_ROUNDS);
             } else {
                 self.words.push(command::QUERY);
