@@ -17,9 +17,12 @@ use gungraun::prelude::*;
 
 include!(concat!(env!("OUT_DIR"), "/heart.rs"));
 
+/// As queries in rounds want it.
+const STACK: usize = HEART_STACK + 128;
+
 /// A query on the heart at rest.
 struct Scene {
-    query: Query<'static, u16, HEART_STACK>,
+    query: Query<'static, u16, STACK>,
     rows: Vec<Vec3>,
     options: Options,
 }
@@ -73,6 +76,20 @@ fn sphere_closest(mut scene: Scene) -> Proximity {
 #[bench::nodes(setup = nodes_only)]
 fn capsule_closest(mut scene: Scene) -> Proximity {
     black_box(capsule_query(&mut scene))
+}
+
+#[library_benchmark]
+#[bench::whole(setup = cold)]
+fn sphere_closest_in_rounds(mut scene: Scene) -> Proximity {
+    let Scene { query, rows, options } = &mut scene;
+    black_box(query.closest_in_rounds(rows.as_slice(), &sphere(), options).expect("a sound tree"))
+}
+
+#[library_benchmark]
+#[bench::whole(setup = cold)]
+fn capsule_closest_in_rounds(mut scene: Scene) -> Proximity {
+    let Scene { query, rows, options } = &mut scene;
+    black_box(query.closest_in_rounds(rows.as_slice(), &capsule(), options).expect("a sound tree"))
 }
 
 fn beside() -> [Vec3; 3] {
@@ -154,6 +171,8 @@ library_benchmark_group!(
     benchmarks = [
         sphere_closest,
         capsule_closest,
+        sphere_closest_in_rounds,
+        capsule_closest_in_rounds,
         sphere_triangle,
         capsule_triangle,
         stretch_of_a_thousand_triangles,

@@ -7,8 +7,9 @@ use super::Budget;
 ///
 /// The constants are measured, on an emulated Cortex-M7 and on x86-64, as the plane above all of some
 /// thousand adversarial queries, and checked on others: `docs/guarantees.md` says on how many, how tight the
-/// bound is, and what a number of instructions says about a number of cycles. They hold for vertex
-/// tables that are slices of `Vec3`, and the firmware's profile or an optimised build.
+/// bound is, and what a number of instructions says about a number of cycles. They hold for
+/// [`Query::closest`](crate::Query::closest), vertex tables that are slices of `Vec3`, and the firmware's profile
+/// or an optimised build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Cost {

@@ -646,6 +646,8 @@ pub const PROMISES: &[Promise] = &[
     golden("host.capsule_closest.whole", 5.0),
     golden("host.capsule_closest.warm", 5.0),
     golden("host.capsule_closest.nodes", 5.0),
+    golden("host.sphere_closest_in_rounds.whole", 5.0),
+    golden("host.capsule_closest_in_rounds.whole", 5.0),
     golden("host.sphere_triangle.ordinary", 5.0),
     golden("host.sphere_triangle.sliver", 5.0),
     golden("host.capsule_triangle.ordinary", 5.0),
