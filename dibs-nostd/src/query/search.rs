@@ -311,9 +311,9 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             if plane.has_beyond(a) && plane.has_beyond(b) && plane.has_beyond(c) {
                 continue;
             }
-            // One corner that is not a number makes the mean none.
+            // One corner that is not finite makes the limit no number.
             if plane.limit.is_nan() {
-                return Err(QueryError::Position { vertex: self.not_a_number(triangle) });
+                return Err(QueryError::Position { vertex: self.not_finite(triangle) });
             }
             self.test_triangle(triangle, &[a, b, c]);
         }
@@ -359,12 +359,12 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         }
     }
 
-    /// Which corner of a triangle is not a number; the first where none is.
+    /// Which corner of a triangle is not finite; the first where all are.
     #[cold]
-    fn not_a_number(&self, triangle: u32) -> u32 {
+    fn not_finite(&self, triangle: u32) -> u32 {
         let rows = self.tree.triangle(triangle).unwrap_or_default();
-        let is_nan = |&row: &u32| self.vertices.position(row).is_none_or(Vec3::is_nan);
-        rows.into_iter().find(is_nan).unwrap_or_default()
+        let is_finite = |row| self.vertices.position(row).is_some_and(Vec3::is_finite);
+        rows.into_iter().find(|&row| !is_finite(row)).unwrap_or(rows[0])
     }
 
     /// The answer, where `lower` bounds what was left unexplored.

@@ -82,9 +82,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         }
         let corners = self.corners(triangle)?;
         let [a, b, c] = corners;
-        // One corner that is not a number makes the sum none.
-        if (a + b + c).is_nan() {
-            return Err(QueryError::Position { vertex: self.not_a_number(triangle) });
+        // Nor is the sum where one corner is not finite.
+        if !(a + b + c).is_finite() {
+            return Err(QueryError::Position { vertex: self.not_finite(triangle) });
         }
         self.test_triangle(triangle, &corners);
         Ok(Step::Done)
