@@ -93,26 +93,43 @@ fn line(
 fn total_against_size(area: &Area<'_>, records: &Records, tool: &str) -> Result<()> {
     let methods =
         [PAPER, DIBS, MEASURED, REFIT, HYBRID, OBVHS, PARRY_BVH, PARRY_TRIMESH, EXHAUSTIVE];
-    let lines: Vec<_> =
-        methods.iter().map(|m| (*m, line(records, "brain", tool, m, "total"))).collect();
+    let lines = |tool| methods.map(|m| (m, line(records, "brain", tool, m, "total")));
     let caption = format!("Refit and one query, {tool}");
-    let sizes = sizes(records, "brain");
-    chart(area, &caption, "median total, µs", &sizes, &lines, &[], SeriesLabelPosition::UpperLeft)
+    let axes = Axes::of(&TOOLS.map(lines).concat(), sizes(records, "brain"), "median total, µs");
+    chart(area, &caption, &axes, &lines(tool), &[], SeriesLabelPosition::UpperLeft)
 }
 
 /// Figure 6: how often a surface may move before not refitting is faster.
 fn crossovers(area: &Area<'_>, records: &Records, ours: &str, tool: &str) -> Result<()> {
-    let lines: Vec<_> = [REFIT, HYBRID, OBVHS, PARRY_BVH, PARRY_TRIMESH]
-        .iter()
-        .map(|m| (*m, line(records, "crossover", tool, ours, m)))
-        .collect();
+    let peers = [REFIT, HYBRID, OBVHS, PARRY_BVH, PARRY_TRIMESH];
+    let lines = |ours, tool| peers.map(|m| (m, line(records, "crossover", tool, ours, m)));
+    let of_both = |tool| [DIBS, MEASURED].map(|ours| lines(ours, tool)).concat();
     let caption = format!("Crossover of {}, {tool}", plain(ours));
     let marks = [(1.0, "a refit every query"), (0.03, "30 Hz imaging, 1 kHz control")];
     let sizes = sizes(records, "crossover");
-    chart(area, &caption, "refit ratio h_c", &sizes, &lines, &marks, SeriesLabelPosition::LowerLeft)
+    let axes = Axes::of(&TOOLS.map(of_both).concat(), sizes, "refit ratio h_c");
+    chart(area, &caption, &axes, &lines(ours, tool), &marks, SeriesLabelPosition::LowerLeft)
 }
 
-/// The sizes of an experiment's meshes: panels that share them can be compared, whatever their lines leave out.
+/// A method and its line.
+type Line = (&'static str, Vec<(f64, f64)>);
+
+/// What all panels of a sheet show, so that they can be compared, whatever the lines of one leave out.
+struct Axes {
+    sizes: Vec<f64>,
+    values: Vec<f64>,
+    name: &'static str,
+}
+
+impl Axes {
+    /// For the lines of all panels.
+    fn of(lines: &[Line], sizes: Vec<f64>, name: &'static str) -> Self {
+        let values = lines.iter().flat_map(|(_, points)| points.iter().map(|p| p.1)).collect();
+        Self { sizes, values, name }
+    }
+}
+
+/// The sizes of an experiment's meshes.
 fn sizes(records: &Records, experiment: &str) -> Vec<f64> {
     records.meshes(experiment).iter().map(|&(_, triangles)| triangles as f64).collect()
 }
@@ -121,19 +138,17 @@ fn sizes(records: &Records, experiment: &str) -> Vec<f64> {
 fn chart(
     area: &Area<'_>,
     caption: &str,
-    y_name: &str,
-    sizes: &[f64],
-    lines: &[(&str, Vec<(f64, f64)>)],
+    axes: &Axes,
+    lines: &[Line],
     marks: &[(f64, &str)],
     legend: SeriesLabelPosition,
 ) -> Result<()> {
-    let points = || lines.iter().flat_map(|(_, points)| points.iter().map(|p| p.1));
     let range = |values: &mut dyn Iterator<Item = f64>, room: f64| {
         let (low, high) = values.fold((f64::MAX, 0.0_f64), |(l, h), v| (l.min(v), h.max(v)));
         if low > high { 1.0..10.0 } else { low / room..high * room }
     };
-    let x = range(&mut sizes.iter().copied(), 1.4);
-    let y = range(&mut points().chain(marks.iter().map(|m| m.0)), 1.6);
+    let x = range(&mut axes.sizes.iter().copied(), 1.4);
+    let y = range(&mut axes.values.iter().copied().chain(marks.iter().map(|m| m.0)), 1.6);
     let mut chart = ChartBuilder::on(area)
         .caption(caption, ("sans-serif", 19))
         .margin(12)
@@ -144,7 +159,7 @@ fn chart(
     chart
         .configure_mesh()
         .x_desc("triangles")
-        .y_desc(y_name)
+        .y_desc(axes.name)
         .label_style(("sans-serif", 14))
         .x_label_formatter(&|v| {
             if *v >= 1_000.0 { format!("{}k", v / 1_000.0) } else { format!("{v}") }
