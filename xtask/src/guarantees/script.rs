@@ -43,7 +43,7 @@ pub enum Record {
 
 /// Ticks until the tool of table 3 repeats itself, roughly: 77 s.
 const PATH_TICKS: u32 = 77_000;
-/// Frames of the heart's motion that poses are tried on.
+/// Most frames of the heart's motion that poses are tried on.
 const FRAMES_OF_POSES: usize = 10;
 
 /// How the queries of a script are drawn.
@@ -157,10 +157,11 @@ impl Script {
         let mut script = Self::default();
         script.tree(&built);
         let frames = motion.frames.iter().step_by(motion.frames.len().div_ceil(FRAMES_OF_POSES));
+        let of_each = queries.div_ceil(frames.len());
         for positions in frames {
             let rows = built.to_rows(positions);
             script.rows(&rows, triangles.len() as u32);
-            for _ in 0..queries.div_ceil(FRAMES_OF_POSES) {
+            for _ in 0..of_each {
                 let tool = pose(&rows, &triangles, &mut rng);
                 script.query(&tool, true, true, u32::MAX, Budget::UNLIMITED, None);
             }
