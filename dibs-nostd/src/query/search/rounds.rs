@@ -5,8 +5,8 @@
 //! A round takes its subtrees together, so that the loads and roots of all their children overlap; judges four
 //! children by one comparison; and sorts what is left without a branch on what is nearer.
 //!
-//! Little of it is in vain: of what waits, 98 % is still within reach when its turn comes. And there is a
-//! gain in tests: the pins of seven subtrees have pulled the reach in before a child is judged.
+//! Little of it is in vain: what waits is nearly always within reach when its turn comes. And there is a gain
+//! in tests: the pins of seven subtrees have pulled the reach in before a child is judged.
 
 mod leaf;
 mod order;
