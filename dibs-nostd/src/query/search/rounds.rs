@@ -5,7 +5,7 @@
 //! A round takes its subtrees together, so that the loads and roots of all their children overlap; judges four
 //! children by one comparison; and sorts what is left without a branch on what is nearer.
 //!
-//! Little of it is in vain: what waits is nearly always within reach when its turn comes. And there is a gain
+//! Little of it is in vain: what waits is nearly always within reach when its turn comes. There is mostly a gain
 //! in tests: the pins of seven subtrees have pulled the reach in before a child is judged.
 
 mod leaf;
