@@ -144,7 +144,7 @@ impl Link {
 }
 
 /// A node as it is stored.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Node {
     pub pin: u32,
     pub radius_code: u32,
