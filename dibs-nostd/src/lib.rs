@@ -53,39 +53,26 @@
 
 pub use glam;
 
-mod answer;
-mod assembler;
-mod atomic;
-mod check;
-pub mod constraint;
-pub mod failsafe;
-pub mod format;
-mod four;
-mod frames;
-mod index;
+pub mod bus;
+pub mod control;
+mod math;
 pub mod modes;
 mod query;
-mod scrub;
-mod sections;
-mod sqrt;
 mod stretch;
+mod surface;
 mod tool;
 mod tree;
-mod vertices;
-pub mod wire;
 
-pub use answer::Proximity;
-pub use assembler::{
+pub use bus::wire;
+pub use bus::{
     Advance, Assembler, Changed, Gate, LastHeartbeat, Progress, Rejection, Unchecked, Verdict,
 };
-pub use check::FormatError;
-pub use frames::{
-    FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames, OutOfTable, PublishError,
-};
-pub use index::Index;
-pub use query::{Budget, Cost, Options, Query, QueryError};
-pub use scrub::{Rot, Scrub};
+pub use control::{constraint, failsafe};
+pub use query::{Budget, Cost, Options, Proximity, Query, QueryError};
 pub use stretch::{MeasuredStretch, REGIONS, StretchError, StretchMonitor, measure_stretch};
+pub use surface::{
+    FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames, OutOfTable, PublishError,
+    QuantisedVertices, VertexTable,
+};
 pub use tool::{ACCURACY, AxisPair, Capsule, MAX_COORDINATE, Sphere, Tool, ToolError};
-pub use tree::Tree;
-pub use vertices::{QuantisedVertices, VertexTable};
+pub use tree::{FormatError, Index, Rot, Scrub, Tree, format};

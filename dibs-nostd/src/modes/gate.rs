@@ -1,7 +1,7 @@
 //! The check of a modal frame before it is published.
 
 use super::{ModalSurface, Modes, WeightsError};
-use crate::assembler::{Changed, Gate, Verdict};
+use crate::bus::assembler::{Changed, Gate, Verdict};
 use crate::{StretchError, VertexTable};
 
 /// Admits weights within their ranges whose surface keeps to the stretch limit: the

@@ -1,7 +1,7 @@
 //! The modes' bytes: section 7 of `docs/format.md`, and its checker.
 
 use super::{MAX_GAIN, MAX_MODES, ModesError};
-use crate::format::{range, u32_at};
+use crate::tree::format::{range, u32_at};
 
 /// Bytes of the section's header.
 pub const HEADER_BYTES: usize = 32;

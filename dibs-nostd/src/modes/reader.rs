@@ -4,8 +4,8 @@ use glam::Vec3;
 
 use super::{ModalSurface, Modes, WeightsError};
 use crate::VertexTable;
-use crate::constraint::Unknown;
-use crate::frames::{FrameLabel, FrameReader};
+use crate::control::constraint::Unknown;
+use crate::surface::frames::{FrameLabel, FrameReader};
 
 /// Reads published weights as surfaces. The double buffer is [`Frames`](crate::Frames) of `K` rows, of
 /// which each holds one weight.

@@ -6,13 +6,15 @@ mod cost_x86_64;
 mod error;
 mod options;
 mod plane;
+mod proximity;
 mod search;
 
 pub use cost::Cost;
 pub use error::QueryError;
 pub use options::{Budget, Options};
+pub use proximity::Proximity;
 
-use crate::{Index, Proximity, Tool, Tree, VertexTable};
+use crate::{Index, Tool, Tree, VertexTable};
 use search::{Rounds, Search, Waiting};
 
 /// A query on one tree, with the fixed stack that its traversal needs: 8 bytes an entry.

@@ -8,9 +8,9 @@ pub(super) use rounds::Rounds;
 
 use super::plane::Plane;
 use super::{Budget, Options, QueryError};
-use crate::format::Link;
-use crate::sqrt::sqrt;
+use crate::math::sqrt::sqrt;
 use crate::tool::{AxisPair, Tool};
+use crate::tree::format::Link;
 use crate::{Index, Proximity, Tree, VertexTable};
 
 /// A subtree that waits for its turn.

@@ -23,7 +23,7 @@
 
 use glam::Vec3;
 
-use crate::sqrt::sqrt;
+use crate::math::sqrt::sqrt;
 
 /// Half a unit in the last place of 1.
 pub(super) const U: f32 = 1.0 / 16_777_216.0;

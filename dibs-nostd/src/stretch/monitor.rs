@@ -5,7 +5,7 @@ use core::ops::Range;
 use super::kernel::Worst;
 use super::measured::region_rows;
 use super::{MeasuredStretch, REGIONS, StretchError, check_tables, rows};
-use crate::assembler::{Changed, Gate, Verdict};
+use crate::bus::assembler::{Changed, Gate, Verdict};
 use crate::{Index, Tree, VertexTable};
 
 /// Blocks of vertex rows, at most: what a partial frame moved is remembered by them.

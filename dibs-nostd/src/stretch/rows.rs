@@ -12,7 +12,7 @@ use super::StretchError;
 use super::kernel::{
     Edges, LongestEdge, Measure, SingularValue, Worst, root_up, squared_limit, squared_stretch,
 };
-use crate::format::{Join, METRIC_BYTES, Metric, PathKind, metric_row};
+use crate::tree::format::{Join, METRIC_BYTES, Metric, PathKind, metric_row};
 use crate::{Index, Tree, VertexTable, format};
 
 /// Checks the triangles of `rows`, as far as all their corners are below row `ready`, and raises `worst`

@@ -1,8 +1,8 @@
 //! The capsule: a segment with a radius.
 
 use super::{AxisPair, Tool, ToolError, check_point, check_radius, clamp_any, sealed, triangle};
-use crate::four::Four;
-use crate::sqrt::sqrt;
+use crate::math::four::Four;
+use crate::math::sqrt::sqrt;
 use glam::{Vec3, Vec4};
 
 /// Axes shorter than this are points: the squares of their components underflow.

@@ -109,7 +109,7 @@ impl fmt::Display for ToolError {
 impl core::error::Error for ToolError {}
 
 mod sealed {
-    use crate::four::Four;
+    use crate::math::four::Four;
 
     pub trait Sealed {
         /// The shortest vectors from the axis to four points, bit by bit those of one after the other.

@@ -1,7 +1,7 @@
 //! The sphere: a point with a radius.
 
 use super::{AxisPair, Tool, ToolError, check_point, check_radius, sealed, triangle};
-use crate::four::Four;
+use crate::math::four::Four;
 use glam::Vec3;
 
 /// A spherical tool, or with radius zero a point.

@@ -14,11 +14,11 @@ mod order;
 use glam::Vec4;
 
 use super::{Search, Step, Waiting};
-use crate::format::several::four_nodes;
-use crate::format::{Link, MAX_CHILDREN, node_bytes};
-use crate::four::{Four, roots};
+use crate::math::four::{Four, roots};
+use crate::math::sqrt::sqrt;
 use crate::query::QueryError;
-use crate::sqrt::sqrt;
+use crate::tree::format::several::four_nodes;
+use crate::tree::format::{Link, MAX_CHILDREN, node_bytes};
 use crate::{Index, Proximity, Tool, VertexTable};
 
 /// Most subtrees in a round. More overlap, but see a looser reach; and a set of their children must fit in a word.

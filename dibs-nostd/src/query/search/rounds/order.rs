@@ -4,8 +4,8 @@ use core::array;
 use core::hint::black_box;
 
 use super::{Rounds, next};
-use crate::format::{Link, whole_node};
 use crate::query::search::Waiting;
+use crate::tree::format::{Link, whole_node};
 use crate::{Index, Tool, VertexTable};
 
 /// Trees with more nodes than this are larger than a processor's nearest cache.

@@ -10,11 +10,11 @@ use core::ops::Range;
 use glam::Vec3;
 
 use crate::MAX_COORDINATE;
-use crate::frames::{FrameLabel, FrameView, FrameWriter, PublishError};
-use crate::wire::{
+use crate::bus::wire::{
     Begin, Body, Content, Counters, Encoding, Event, FrameId, Mac, NoMac, Packet, Rows, Status,
     StreamError, Vertices, Weights, float_position, quantised_row,
 };
+use crate::surface::frames::{FrameLabel, FrameView, FrameWriter, PublishError};
 
 use collector::Collector;
 pub use collector::LastHeartbeat;

@@ -50,7 +50,7 @@ mod tests;
 use core::fmt;
 
 use crate::Proximity;
-use crate::constraint::Unknown;
+use crate::control::constraint::Unknown;
 
 pub use limits::{LimitError, Limits, Watch};
 pub use link::{Link, LinkStatus};

@@ -2,11 +2,11 @@
 //!
 //! To add one: its kind in [`section`], a row in [`rules`], a field of [`Sections`].
 
-use crate::format::{
+use crate::tree::Header;
+use crate::tree::format::{
     self, HEADER_BYTES, LIMIT_BYTES, METRIC_BYTES, SECTION_ALIGN, SECTION_BYTES, node_bytes,
     section, triangle_bytes,
 };
-use crate::tree::Header;
 use crate::{FormatError, Index};
 
 /// The parts of a tree's bytes; an optional one that is absent is empty.

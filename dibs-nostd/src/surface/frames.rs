@@ -35,8 +35,8 @@ use core::ops::Range;
 
 use glam::Vec3;
 
-use crate::atomic::{AtomicBool, AtomicU32, Ordering};
-use crate::constraint::Unknown;
+use crate::control::constraint::Unknown;
+use crate::surface::atomic::{AtomicBool, AtomicU32, Ordering};
 use crate::{MeasuredStretch, VertexTable};
 
 /// State word, bit 0: index of the front buffer.

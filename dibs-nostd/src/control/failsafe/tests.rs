@@ -7,7 +7,7 @@ use std::vec::Vec;
 use proptest::prelude::*;
 
 use super::{FailSafe, LimitError, Limits, Link, Observation, State, Verdict, Watch};
-use crate::constraint::Unknown;
+use crate::control::constraint::Unknown;
 
 const AGE: Watch = watch(50, 200);
 const SILENCE: Watch = watch(20, 100);

@@ -3,7 +3,7 @@
 use core::fmt;
 
 use crate::StretchError;
-use crate::wire::{Event, PacketError};
+use crate::bus::wire::{Event, PacketError};
 
 /// Why a packet, or the frame that it would have finished, was rejected. The frame published last
 /// stays.

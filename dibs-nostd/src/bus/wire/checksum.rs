@@ -47,7 +47,7 @@ pub(super) fn checksum(bytes: &[u8]) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::format::CRC;
+    use crate::tree::format::CRC;
     use proptest::prelude::*;
 
     proptest! {

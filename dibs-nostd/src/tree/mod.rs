@@ -1,13 +1,22 @@
 //! The tree: a validated view of bytes that stay where they are, in flash or in a file.
 
+pub mod format;
+mod index;
+mod scrub;
+pub(crate) mod sections;
+mod validate;
+
+pub use index::Index;
+pub use scrub::{Rot, Scrub};
+pub use validate::FormatError;
+
 use core::iter;
 use core::marker::PhantomData;
 
 use glam::Vec3;
 
-use crate::format::{self, Link, Metric, Node, PathKind, section, several};
-use crate::sections::{self, Sections};
-use crate::{FormatError, Index, check};
+use crate::tree::format::{Link, Metric, Node, PathKind, section, several};
+use sections::Sections;
 
 /// A deformation invariant bounding sphere tree with its triangles.
 ///
@@ -49,7 +58,7 @@ impl<'a, I: Index> Tree<'a, I> {
     /// # Errors
     /// [`FormatError`] names the first thing that is wrong and its value.
     pub const fn from_bytes(bytes: &'a [u8]) -> Result<Self, FormatError> {
-        let header = match check::header::<I>(bytes) {
+        let header = match validate::header::<I>(bytes) {
             Ok(header) => header,
             Err(error) => return Err(error),
         };
@@ -57,7 +66,7 @@ impl<'a, I: Index> Tree<'a, I> {
             Ok(sections) => Self { sections, header, width: PhantomData },
             Err(error) => return Err(error),
         };
-        match check::well_formed(&tree) {
+        match validate::well_formed(&tree) {
             Ok(()) => Ok(tree),
             Err(error) => Err(error),
         }

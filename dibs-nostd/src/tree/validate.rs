@@ -3,7 +3,7 @@
 use core::fmt;
 
 use crate::Index;
-use crate::format::{
+use crate::tree::format::{
     CHECKSUM_AT, CRC, HEADER_BYTES, Join, Link, MAGIC, MAX_LEAF_TRIANGLES, MAX_STACK, PathKind,
     VERSION, limit_code, u32_at,
 };

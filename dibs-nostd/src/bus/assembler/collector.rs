@@ -4,7 +4,7 @@
 
 use super::Rejection;
 use super::runs::{Misplaced, Place, Runs};
-use crate::wire::{
+use crate::bus::wire::{
     Begin, Commit, Content, Counters, Event, FrameId, Heartbeat, Mac, Packet, PublishedStatus,
     Status, is_newer,
 };

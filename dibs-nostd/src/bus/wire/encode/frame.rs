@@ -2,7 +2,7 @@
 
 use super::{PacketWriter, capacity};
 use crate::VertexTable;
-use crate::wire::{
+use crate::bus::wire::{
     Begin, Content, EncodeError, Encoding, FrameId, HEADER_BYTES, MAX_CONTENT_PACKETS, MAX_ROWS,
     Mac, NoMac, kind,
 };

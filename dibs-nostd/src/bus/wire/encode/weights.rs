@@ -1,7 +1,7 @@
 //! A modal frame as packets.
 
 use super::{PacketWriter, capacity};
-use crate::wire::{
+use crate::bus::wire::{
     Begin, Content, EncodeError, Encoding, FrameId, HEADER_BYTES, MAX_WEIGHTS, Mac, NoMac, kind,
 };
 

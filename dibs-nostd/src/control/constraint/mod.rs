@@ -50,7 +50,7 @@ use core::fmt;
 use glam::Vec3;
 
 use crate::Proximity;
-use crate::sqrt::sqrt;
+use crate::math::sqrt::sqrt;
 
 pub use forbidden::ForbiddenRegion;
 pub use guidance::Guidance;

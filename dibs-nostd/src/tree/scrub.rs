@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use crate::format::{CHECKSUM_AT, CRC, HEADER_BYTES, u32_at};
+use crate::tree::format::{CHECKSUM_AT, CRC, HEADER_BYTES, u32_at};
 
 /// An endless background check of a tree's bytes against their checksum.
 ///

@@ -4,7 +4,7 @@ use core::fmt;
 
 use glam::Vec3;
 
-use crate::sqrt::sqrt;
+use crate::math::sqrt::sqrt;
 
 /// The box that 16-bit positions live in: `position = origin + step * row`, each axis on its own.
 ///

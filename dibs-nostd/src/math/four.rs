@@ -3,7 +3,7 @@
 use glam::{Mat4, Vec3, Vec4};
 
 use crate::VertexTable;
-use crate::sqrt::sqrt;
+use crate::math::sqrt::sqrt;
 
 /// Four points or vectors. Each operation rounds as that of [`Vec3`] does.
 #[derive(Clone, Copy, Debug)]
