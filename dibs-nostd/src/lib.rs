@@ -62,17 +62,19 @@ mod stretch;
 mod surface;
 mod tool;
 mod tree;
+mod unavailable;
 
 pub use bus::wire;
-pub use bus::{
-    Advance, Assembler, Changed, Gate, LastHeartbeat, Progress, Rejection, Unchecked, Verdict,
-};
+pub use bus::{Advance, Assembler, LastHeartbeat, Progress, Rejection};
 pub use control::{constraint, failsafe};
-pub use query::{Budget, Cost, Options, Proximity, Query, QueryError};
-pub use stretch::{MeasuredStretch, REGIONS, StretchError, StretchMonitor, measure_stretch};
+pub use query::{Budget, Cost, Options, Proximity, Query};
+pub use stretch::{
+    Changed, Gate, StretchError, StretchMonitor, Unchecked, Verdict, measure_stretch,
+};
 pub use surface::{
-    FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames, OutOfTable, PublishError,
-    QuantisedVertices, VertexTable,
+    FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames, MeasuredStretch,
+    OutOfTable, PublishError, QuantisedVertices, REGIONS, VertexTable,
 };
 pub use tool::{ACCURACY, AxisPair, Capsule, MAX_COORDINATE, Sphere, Tool, ToolError};
 pub use tree::{FormatError, Index, Rot, Scrub, Tree, format};
+pub use unavailable::{QueryError, Unavailable};

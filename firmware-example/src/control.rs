@@ -3,10 +3,10 @@
 use core::fmt;
 
 use bytemuck::Zeroable;
-use dibs_nostd::constraint::{ForbiddenRegion, GainError, SpringDamper, Unknown};
+use dibs_nostd::constraint::{ForbiddenRegion, GainError, SpringDamper};
 use dibs_nostd::failsafe::{FailSafe, LimitError, Limits, Observation, Watch};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Capsule, Options, Proximity, QueryError, Tool};
+use dibs_nostd::{Capsule, Options, Proximity, QueryError, Tool, Unavailable};
 
 use crate::surface::{SURFACE, SurfaceQuery, SurfaceReader};
 use crate::telemetry::{Tick, cause_code};
@@ -100,14 +100,17 @@ impl Control {
         let (frame, answer) = match &tool {
             Some(tool) => self.ask(tool, clock, &mut record),
             // A pose that is not finite: nothing to ask with.
-            None => (None, Err(Unknown::NotFinite)),
+            None => (None, Err(Unavailable::NotFinite)),
         };
         let link = self.bus.link.read(self.tick);
         let verdict = self.failsafe.step(&Observation {
             now: self.tick,
             frame,
             link,
-            query_failed: answer == Err(Unknown::Query),
+            query_error: match answer {
+                Err(Unavailable::Query(error)) => Some(error),
+                _ => None,
+            },
             has_rotted: self.bus.has_rotted(),
         });
         self.bus.set_state(verdict.state);
@@ -138,11 +141,11 @@ impl Control {
         tool: &Capsule,
         clock: impl Fn() -> u32,
         record: &mut Tick,
-    ) -> (Option<(u32, u32)>, Result<Proximity, Unknown>) {
+    ) -> (Option<(u32, u32)>, Result<Proximity, Unavailable>) {
         record.tool_start = tool.start().to_array();
         record.tool_end = tool.end().to_array();
         record.tool_radius = tool.radius();
-        let Some(frame) = self.surface.read() else { return (None, Err(Unknown::NoSurface)) };
+        let Some(frame) = self.surface.read() else { return (None, Err(Unavailable::NoSurface)) };
         let label = frame.label();
         record.epoch = label.epoch;
         record.age = frame.age(self.tick);
@@ -161,7 +164,10 @@ impl Control {
         drop(frame);
 
         let frame = Some((label.epoch, label.received));
-        let Ok(closest) = answer else { return (frame, Err(Unknown::Query)) };
+        let closest = match answer {
+            Ok(closest) => closest,
+            Err(error) => return (frame, Err(Unavailable::Query(error))),
+        };
         self.warm_start = closest.triangle;
         write(&closest, record);
         (frame, Ok(closest.widened(label.position_error)))

@@ -4,7 +4,7 @@
 //! framed with COBS and a zero byte. The first field tells which record it is.
 
 use bytemuck::{NoUninit, Pod, Zeroable};
-use dibs_nostd::constraint::Unknown;
+use dibs_nostd::Unavailable;
 use dibs_nostd::wire::{Event, enframe, framed_bytes};
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
@@ -82,15 +82,15 @@ pub struct Tick {
 
 /// A cause as a number.
 #[must_use]
-pub const fn cause_code(cause: &Unknown) -> u32 {
+pub const fn cause_code(cause: &Unavailable) -> u32 {
     match cause {
-        Unknown::NoSurface => 1,
-        Unknown::Stale { .. } => 2,
-        Unknown::Query => 3,
-        Unknown::LinkLost { .. } => 4,
-        Unknown::HeartbeatLost { .. } => 5,
-        Unknown::Rejections { .. } => 6,
-        Unknown::Rot => 7,
+        Unavailable::NoSurface => 1,
+        Unavailable::Stale { .. } => 2,
+        Unavailable::Query(_) => 3,
+        Unavailable::LinkLost { .. } => 4,
+        Unavailable::HeartbeatLost { .. } => 5,
+        Unavailable::Rejections { .. } => 6,
+        Unavailable::Rot => 7,
         _ => 8,
     }
 }

@@ -9,7 +9,7 @@ use controller::{
     SURFACE_AGE_WARNING,
 };
 use dibs_build::{Builder, generate};
-use dibs_nostd::constraint::Unknown;
+use dibs_nostd::Unavailable;
 use dibs_nostd::failsafe::State;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
@@ -144,9 +144,9 @@ fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
         let expected = match silence {
             _ if silence <= SILENCE_WARNING => (State::Nominal, 0),
             _ if silence <= SILENCE_LIMIT => {
-                (State::Degraded, cause_code(&Unknown::LinkLost { silence }))
+                (State::Degraded, cause_code(&Unavailable::LinkLost { silence }))
             }
-            _ => (State::Safe, cause_code(&Unknown::LinkLost { silence })),
+            _ => (State::Safe, cause_code(&Unavailable::LinkLost { silence })),
         };
         assert_eq!((tick.state, tick.cause), (expected.0 as u32, expected.1), "after {silence}");
         sender.check(&tick);

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use dibs_nostd::constraint::Unknown;
+use dibs_nostd::Unavailable;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{FrameLabel, Frames, PublishError, VertexTable};
 
@@ -107,7 +107,7 @@ fn age_is_right_over_a_wrap_of_the_clock() {
     let frame = reader.read().unwrap();
     assert_eq!(frame.age(5), 10);
     assert_eq!(frame.check_age(5, 10), Ok(()));
-    assert_eq!(frame.check_age(5, 9), Err(Unknown::Stale { age: 10 }));
+    assert_eq!(frame.check_age(5, 9), Err(Unavailable::Stale { age: 10 }));
 }
 
 /// The clock may wrap any number of times: a frame that was found old stays old.

@@ -3,6 +3,4 @@
 pub(crate) mod assembler;
 pub mod wire;
 
-pub use assembler::{
-    Advance, Assembler, Changed, Gate, LastHeartbeat, Progress, Rejection, Unchecked, Verdict,
-};
+pub use assembler::{Advance, Assembler, LastHeartbeat, Progress, Rejection};

@@ -1,8 +1,8 @@
 //! The check of a modal frame before it is published.
 
 use super::{ModalSurface, Modes, WeightsError};
-use crate::bus::assembler::{Changed, Gate, Verdict};
-use crate::{StretchError, VertexTable};
+use crate::stretch::{Changed, Gate, StretchError, Verdict};
+use crate::surface::VertexTable;
 
 /// Admits weights within their ranges whose surface keeps to the stretch limit: the
 /// [`Gate`] of an [`Assembler`](crate::Assembler) of modal frames.

@@ -4,7 +4,7 @@ use core::cell::Cell;
 
 use glam::Vec3;
 
-use crate::VertexTable;
+use crate::surface::VertexTable;
 
 /// A vertex table that remembers some positions of another one: for a
 /// [`ModalSurface`](super::ModalSurface), of which a query asks for the same vertices a few times, as

@@ -32,7 +32,7 @@ pub use surface::ModalSurface;
 
 use glam::Vec3;
 
-use crate::{Index, Tree, format};
+use crate::tree::{Index, Tree, format};
 
 /// Most modes of a surface.
 pub const MAX_MODES: usize = 64;

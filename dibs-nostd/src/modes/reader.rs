@@ -3,9 +3,8 @@
 use glam::Vec3;
 
 use super::{ModalSurface, Modes, WeightsError};
-use crate::VertexTable;
-use crate::control::constraint::Unknown;
-use crate::surface::frames::{FrameLabel, FrameReader};
+use crate::surface::{FrameLabel, FrameReader, VertexTable};
+use crate::unavailable::Unavailable;
 
 /// Reads published weights as surfaces. The double buffer is [`Frames`](crate::Frames) of `K` rows, of
 /// which each holds one weight.
@@ -65,10 +64,10 @@ impl<const K: usize> ModalFrame<'_, K> {
     /// What a constraint has to be told when the frame is older than `limit`.
     ///
     /// # Errors
-    /// [`Unknown::Stale`] with the age.
-    pub const fn check_age(&self, now: u32, limit: u32) -> Result<(), Unknown> {
+    /// [`Unavailable::Stale`] with the age.
+    pub const fn check_age(&self, now: u32, limit: u32) -> Result<(), Unavailable> {
         let age = self.age(now);
-        if age > limit { Err(Unknown::Stale { age }) } else { Ok(()) }
+        if age > limit { Err(Unavailable::Stale { age }) } else { Ok(()) }
     }
 }
 

@@ -3,7 +3,8 @@
 use glam::Vec3;
 
 use super::{FRACTION_BITS, Modes};
-use crate::{VertexTable, format};
+use crate::surface::VertexTable;
+use crate::tree::format;
 
 /// The surface at some weights: [`Modes::surface`] makes one.
 ///

@@ -3,17 +3,16 @@
 mod cost;
 mod cost_m7;
 mod cost_x86_64;
-mod error;
 mod options;
 mod plane;
 mod proximity;
 mod search;
 
 pub use cost::Cost;
-pub use error::QueryError;
 pub use options::{Budget, Options};
 pub use proximity::Proximity;
 
+use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
 use search::{Rounds, Search, Waiting};
 

@@ -7,10 +7,11 @@ use glam::Vec3;
 pub(super) use rounds::Rounds;
 
 use super::plane::Plane;
-use super::{Budget, Options, QueryError};
+use super::{Budget, Options};
 use crate::math::sqrt::sqrt;
 use crate::tool::{AxisPair, Tool};
 use crate::tree::format::Link;
+use crate::unavailable::QueryError;
 use crate::{Index, Proximity, Tree, VertexTable};
 
 /// A subtree that waits for its turn.

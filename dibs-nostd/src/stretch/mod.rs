@@ -1,18 +1,20 @@
 //! Measured stretch: how far the surface as it is now departs from its rest shape.
 
+mod gate;
 mod kernel;
-mod measured;
 mod monitor;
+mod regions;
 mod rows;
 
 use core::fmt;
 
-use crate::{Index, Tree, VertexTable};
+use crate::surface::{MeasuredStretch, REGIONS, VertexTable};
+use crate::tree::{Index, Tree};
 
+pub use gate::{Changed, Gate, Unchecked, Verdict};
 use kernel::Worst;
-use measured::region_rows;
-pub use measured::{MeasuredStretch, REGIONS};
 pub use monitor::StretchMonitor;
+use regions::{of_regions, region_rows};
 
 /// Why a stretch could not be measured, or what it is beyond.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,7 +93,7 @@ pub fn measure_stretch<I: Index, V: VertexTable + ?Sized>(
         rows::scan(tree, vertices, first..end, tree.vertex_count(), worst)?;
         first = end;
     }
-    Ok(MeasuredStretch::of_regions(tree, &regions, vertices.epoch()))
+    Ok(of_regions(tree, &regions, vertices.epoch()))
 }
 
 /// Whether the tree can be measured with, on a table of this size.

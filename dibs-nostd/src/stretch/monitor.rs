@@ -3,10 +3,10 @@
 use core::ops::Range;
 
 use super::kernel::Worst;
-use super::measured::region_rows;
-use super::{MeasuredStretch, REGIONS, StretchError, check_tables, rows};
-use crate::bus::assembler::{Changed, Gate, Verdict};
-use crate::{Index, Tree, VertexTable};
+use super::regions::{of_regions, region_rows};
+use super::{Changed, Gate, StretchError, Verdict, check_tables, rows};
+use crate::surface::{REGIONS, VertexTable};
+use crate::tree::{Index, Tree};
 
 /// Blocks of vertex rows, at most: what a partial frame moved is remembered by them.
 const BLOCKS: usize = 32;
@@ -198,7 +198,7 @@ impl<I: Index> Gate for StretchMonitor<'_, I> {
         if !is_complete {
             return Ok(Verdict::Pending);
         }
-        let measured = MeasuredStretch::of_regions(self.tree, &self.regions, surface.epoch());
+        let measured = of_regions(self.tree, &self.regions, surface.epoch());
         Ok(Verdict::Admitted(Some(measured)))
     }
 

@@ -12,8 +12,9 @@ use super::StretchError;
 use super::kernel::{
     Edges, LongestEdge, Measure, SingularValue, Worst, root_up, squared_limit, squared_stretch,
 };
+use crate::surface::VertexTable;
 use crate::tree::format::{Join, METRIC_BYTES, Metric, PathKind, metric_row};
-use crate::{Index, Tree, VertexTable, format};
+use crate::tree::{Index, Tree, format};
 
 /// Checks the triangles of `rows`, as far as all their corners are below row `ready`, and raises `worst`
 /// where one is stretched more. Returns the row to go on with.

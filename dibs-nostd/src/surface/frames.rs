@@ -35,9 +35,9 @@ use core::ops::Range;
 
 use glam::Vec3;
 
-use crate::control::constraint::Unknown;
-use crate::surface::atomic::{AtomicBool, AtomicU32, Ordering};
-use crate::{MeasuredStretch, VertexTable};
+use super::atomic::{AtomicBool, AtomicU32, Ordering};
+use super::{MeasuredStretch, VertexTable};
+use crate::unavailable::Unavailable;
 
 /// State word, bit 0: index of the front buffer.
 const FRONT: u32 = 1;
@@ -385,10 +385,10 @@ impl<const N: usize> FrameGuard<'_, N> {
     /// What a constraint has to be told when the frame is older than `limit`.
     ///
     /// # Errors
-    /// [`Unknown::Stale`] with the age.
-    pub fn check_age(&self, now: u32, limit: u32) -> Result<(), Unknown> {
+    /// [`Unavailable::Stale`] with the age.
+    pub fn check_age(&self, now: u32, limit: u32) -> Result<(), Unavailable> {
         let age = self.age(now);
-        if age > limit { Err(Unknown::Stale { age }) } else { Ok(()) }
+        if age > limit { Err(Unavailable::Stale { age }) } else { Ok(()) }
     }
 }
 

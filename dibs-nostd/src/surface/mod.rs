@@ -1,10 +1,13 @@
 //! The surface as it is now: vertex tables, and the double buffer that frames arrive in.
 
 mod atomic;
-pub(crate) mod frames;
+mod frames;
+mod measured;
 mod vertices;
 
 pub use frames::{
     FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames, OutOfTable, PublishError,
 };
+pub(crate) use measured::share;
+pub use measured::{MeasuredStretch, REGIONS};
 pub use vertices::{QuantisedVertices, VertexTable};

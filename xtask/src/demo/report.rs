@@ -8,9 +8,9 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail};
 use controller::telemetry::{Summary, Tick, cause_code, cause_name};
 use controller::{SILENCE_LIMIT, SURFACE_AGE_LIMIT, TICK_RATE};
-use dibs_nostd::constraint::Unknown;
 use dibs_nostd::failsafe::State;
 use dibs_nostd::wire::Event;
+use dibs_nostd::{QueryError, Unavailable};
 use serde::Serialize;
 
 use super::faults::{Faults, Silence};
@@ -108,11 +108,11 @@ impl Report {
         let last = outcome.ticks.last().context("the controller ran no tick")?;
         let answered: Vec<&Tick> = outcome.ticks.iter().filter(|t| t.is_answered()).collect();
         let count = |state: State| outcome.ticks.iter().filter(|t| t.state == state as u32).count();
-        let because = |cause: Unknown| {
+        let because = |cause: Unavailable| {
             let is_so = |t: &&Tick| t.state == State::Safe as u32 && t.cause == cause_code(&cause);
             outcome.ticks.iter().filter(is_so).count()
         };
-        let waiting = because(Unknown::NoSurface);
+        let waiting = because(Unavailable::NoSurface);
         let mean = |value: fn(&Tick) -> u32| {
             let sum: f64 = answered.iter().map(|tick| f64::from(value(tick))).sum();
             if answered.is_empty() { 0.0 } else { sum / answered.len() as f64 }
@@ -177,7 +177,11 @@ impl Report {
             controller_command: outcome.command.clone(),
             broken_promises: Vec::new(),
         };
-        report.broken_promises = report.broken(machine, outcome, because(Unknown::Query));
+        report.broken_promises = report.broken(
+            machine,
+            outcome,
+            because(Unavailable::Query(QueryError::Corrupt { row: 0 })),
+        );
         Ok(report)
     }
 

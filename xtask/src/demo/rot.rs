@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, bail, ensure};
 use controller::telemetry::{Tick, cause_code};
-use dibs_nostd::constraint::Unknown;
+use dibs_nostd::Unavailable;
 use dibs_nostd::failsafe::State;
 
 use super::machine::Machine;
@@ -36,7 +36,7 @@ pub fn run(seconds: u32) -> Result<Rotted> {
     let outcome = session::run(&scene, &machine, seconds, None, folder.path())?;
     let last = outcome.ticks.last().context("the controller ran no tick")?;
     ensure!(last.frames_published > 0, "no frame was published");
-    let is_found = |tick: &Tick| tick.cause == cause_code(&Unknown::Rot);
+    let is_found = |tick: &Tick| tick.cause == cause_code(&Unavailable::Rot);
     ensure!(is_found(last), "the flipped bit was not found");
     let acted = outcome.ticks.iter().filter(|tick| tick.state != State::Safe as u32).count();
     Ok(Rotted { ticks: outcome.ticks.len(), acted })

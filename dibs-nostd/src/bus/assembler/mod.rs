@@ -1,7 +1,6 @@
 //! From packets to published frames: the gate between the bus and what the controller acts on.
 
 mod collector;
-mod gate;
 mod rejection;
 mod runs;
 
@@ -14,11 +13,11 @@ use crate::bus::wire::{
     Begin, Body, Content, Counters, Encoding, Event, FrameId, Mac, NoMac, Packet, Rows, Status,
     StreamError, Vertices, Weights, float_position, quantised_row,
 };
-use crate::surface::frames::{FrameLabel, FrameView, FrameWriter, PublishError};
+use crate::stretch::{Changed, Gate, Verdict};
+use crate::surface::{FrameLabel, FrameView, FrameWriter, PublishError};
 
 use collector::Collector;
 pub use collector::LastHeartbeat;
-pub use gate::{Changed, Gate, Unchecked, Verdict};
 pub use rejection::Rejection;
 
 /// Assembles frames of `N` vertices from packets, and publishes those that are complete and right.

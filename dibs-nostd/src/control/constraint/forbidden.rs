@@ -2,8 +2,9 @@
 
 use glam::Vec3;
 
-use super::{Approach, ConstraintForce, GainError, SpringDamper, Unknown, positive};
-use crate::Proximity;
+use super::{Approach, ConstraintForce, GainError, SpringDamper, positive};
+use crate::query::Proximity;
+use crate::unavailable::Unavailable;
 
 /// Pushes the tool away from the surface within a margin, and only ever away.
 ///
@@ -17,15 +18,15 @@ use crate::Proximity;
 /// surface could be, and its direction that of the best pair found.
 ///
 /// ```
-/// use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper, Unknown};
-/// use dibs_nostd::glam::Vec3;
+/// use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
+/// use dibs_nostd::{Unavailable, glam::Vec3};
 ///
 /// let spring = SpringDamper::new(2.0, 0.01, 5.0)?; // N/mm, N s/mm, N
 /// let wall = ForbiddenRegion::new(spring, 3.0)?; // mm
 ///
 /// // No surface yet: the tool is damped, the state says why.
-/// let safe = wall.force(Err(Unknown::NoSurface), Vec3::new(100.0, 0.0, 0.0));
-/// assert_eq!(safe.state, ConstraintState::Safe(Unknown::NoSurface));
+/// let safe = wall.force(Err(Unavailable::NoSurface), Vec3::new(100.0, 0.0, 0.0));
+/// assert_eq!(safe.state, ConstraintState::Safe(Unavailable::NoSurface));
 /// assert_eq!(safe.force, Vec3::new(-1.0, 0.0, 0.0));
 /// # Ok::<(), dibs_nostd::constraint::GainError>(())
 /// ```
@@ -51,7 +52,11 @@ impl ForbiddenRegion {
     /// `velocity` (mm/s) is that of the tool's closest point against the surface; the tool's own
     /// velocity takes the surface as standing still.
     #[must_use]
-    pub fn force(&self, proximity: Result<&Proximity, Unknown>, velocity: Vec3) -> ConstraintForce {
+    pub fn force(
+        &self,
+        proximity: Result<&Proximity, Unavailable>,
+        velocity: Vec3,
+    ) -> ConstraintForce {
         match Approach::new(proximity, velocity) {
             Err(reason) => self.spring.hold(velocity, reason),
             Ok(approach) if approach.separation < self.margin => {

@@ -2,8 +2,9 @@
 
 use glam::Vec3;
 
-use super::{Approach, ConstraintForce, GainError, SpringDamper, Unknown, not_negative};
-use crate::Proximity;
+use super::{Approach, ConstraintForce, GainError, SpringDamper, not_negative};
+use crate::query::Proximity;
+use crate::unavailable::Unavailable;
 
 /// Draws the tool to a stand-off from the surface, from either side, with a dead band in which it is
 /// free.
@@ -17,13 +18,13 @@ use crate::Proximity;
 /// least, and pushes away from it most.
 ///
 /// ```
-/// use dibs_nostd::constraint::{ConstraintState, Guidance, SpringDamper, Unknown};
-/// use dibs_nostd::glam::Vec3;
+/// use dibs_nostd::constraint::{ConstraintState, Guidance, SpringDamper};
+/// use dibs_nostd::{Unavailable, glam::Vec3};
 ///
 /// let spring = SpringDamper::new(0.5, 0.002, 2.0)?;
 /// let guide = Guidance::new(spring, 10.0, 1.0)?; // 9 to 11 mm from the surface is free
-/// let safe = guide.force(Err(Unknown::Stale { age: 250 }), Vec3::ZERO);
-/// assert_eq!(safe.state, ConstraintState::Safe(Unknown::Stale { age: 250 }));
+/// let safe = guide.force(Err(Unavailable::Stale { age: 250 }), Vec3::ZERO);
+/// assert_eq!(safe.state, ConstraintState::Safe(Unavailable::Stale { age: 250 }));
 /// # Ok::<(), dibs_nostd::constraint::GainError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +53,11 @@ impl Guidance {
     /// The force on the tool at this tick; `velocity` as in
     /// [`ForbiddenRegion::force`](super::ForbiddenRegion::force).
     #[must_use]
-    pub fn force(&self, proximity: Result<&Proximity, Unknown>, velocity: Vec3) -> ConstraintForce {
+    pub fn force(
+        &self,
+        proximity: Result<&Proximity, Unavailable>,
+        velocity: Vec3,
+    ) -> ConstraintForce {
         let approach = match Approach::new(proximity, velocity) {
             Ok(approach) => approach,
             Err(reason) => return self.spring.hold(velocity, reason),

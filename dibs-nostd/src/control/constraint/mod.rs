@@ -49,8 +49,9 @@ use core::fmt;
 
 use glam::Vec3;
 
-use crate::Proximity;
 use crate::math::sqrt::sqrt;
+use crate::query::Proximity;
+use crate::unavailable::Unavailable;
 
 pub use forbidden::ForbiddenRegion;
 pub use guidance::Guidance;
@@ -88,65 +89,8 @@ pub enum ConstraintState {
     /// The constraint acts with its largest force.
     Saturated,
     /// The proximity cannot be used: the force is the hold.
-    Safe(Unknown),
+    Safe(Unavailable),
 }
-
-/// Why a proximity is unknown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum Unknown {
-    /// No surface was ever published.
-    NoSurface,
-    /// The surface is older than allowed.
-    Stale {
-        /// Its age, on the receiver's clock.
-        age: u32,
-    },
-    /// The query returned an error.
-    Query,
-    /// The tree's bytes changed since they were validated: [`Scrub`](crate::Scrub).
-    Rot,
-    /// No good packet came for longer than allowed.
-    LinkLost {
-        /// Time since the last one, on the receiver's clock.
-        silence: u32,
-    },
-    /// No heartbeat came for longer than allowed.
-    HeartbeatLost {
-        /// Time since the last one, on the receiver's clock.
-        silence: u32,
-    },
-    /// More was rejected than allowed since the last frame was published.
-    Rejections {
-        /// Packets and frames rejected.
-        streak: u32,
-    },
-    /// The tool's axis touches the surface: no direction leads out.
-    NoDirection,
-    /// A number is not finite, or the direction is not a unit vector.
-    NotFinite,
-}
-
-impl fmt::Display for Unknown {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NoSurface => write!(f, "no surface was published yet"),
-            Self::Stale { age } => write!(f, "the surface is {age} old"),
-            Self::Query => write!(f, "the query failed"),
-            Self::Rot => write!(f, "the tree's bytes changed"),
-            Self::LinkLost { silence } => write!(f, "no good packet came for {silence}"),
-            Self::HeartbeatLost { silence } => write!(f, "no heartbeat came for {silence}"),
-            Self::Rejections { streak } => {
-                write!(f, "{streak} packets or frames were rejected in a row")
-            }
-            Self::NoDirection => write!(f, "the tool's axis touches the surface"),
-            Self::NotFinite => write!(f, "a number is not finite"),
-        }
-    }
-}
-
-impl core::error::Error for Unknown {}
 
 /// A spring and a damper with a largest force: what the constraints are made of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -205,7 +149,7 @@ impl SpringDamper {
             (force, ConstraintState::Active)
         } else if force.is_nan() {
             // Two infinities that cancel.
-            return self.hold(approach.velocity, Unknown::NotFinite);
+            return self.hold(approach.velocity, Unavailable::NotFinite);
         } else if least < 0.0 {
             (least, ConstraintState::Saturated)
         } else {
@@ -215,7 +159,7 @@ impl SpringDamper {
     }
 
     /// The safe output: damping against the velocity, saturated.
-    fn hold(&self, velocity: Vec3, reason: Unknown) -> ConstraintForce {
+    fn hold(&self, velocity: Vec3, reason: Unavailable) -> ConstraintForce {
         // Scaled by the largest axis, so that no square overflows or vanishes.
         let mut largest = 0.0;
         for axis in velocity.to_array() {
@@ -248,11 +192,14 @@ struct Approach {
 }
 
 impl Approach {
-    fn new(proximity: Result<&Proximity, Unknown>, velocity: Vec3) -> Result<Self, Unknown> {
+    fn new(
+        proximity: Result<&Proximity, Unavailable>,
+        velocity: Vec3,
+    ) -> Result<Self, Unavailable> {
         let proximity = proximity?;
         let direction = proximity.direction;
         if direction == Vec3::ZERO {
-            return Err(Unknown::NoDirection);
+            return Err(Unavailable::NoDirection);
         }
         // Along the direction the two points are `axis_distance - radius` apart, which goes on
         // below zero where the separation stops.
@@ -270,7 +217,7 @@ impl Approach {
             && gap.is_finite()
             && approach.separation.is_finite()
             && approach.speed.is_finite();
-        if is_unit && is_finite { Ok(approach) } else { Err(Unknown::NotFinite) }
+        if is_unit && is_finite { Ok(approach) } else { Err(Unavailable::NotFinite) }
     }
 }
 

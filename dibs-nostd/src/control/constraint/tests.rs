@@ -5,6 +5,9 @@ extern crate std;
 use proptest::prelude::*;
 
 use super::*;
+use crate::unavailable::QueryError;
+
+const QUERY: QueryError = QueryError::Corrupt { row: 7 };
 
 const SPRING: Result<SpringDamper, GainError> = SpringDamper::new(2.0, 0.01, 5.0);
 const RADIUS: f32 = 2.5;
@@ -97,11 +100,11 @@ fn the_guide_pulls_and_pushes() {
 #[test]
 fn the_hold_damps_and_says_why() {
     let reasons = [
-        Unknown::NoSurface,
-        Unknown::Stale { age: 80 },
-        Unknown::Query,
-        Unknown::NoDirection,
-        Unknown::NotFinite,
+        Unavailable::NoSurface,
+        Unavailable::Stale { age: 80 },
+        Unavailable::Query(QUERY),
+        Unavailable::NoDirection,
+        Unavailable::NotFinite,
     ];
     for reason in reasons {
         let held = wall().force(Err(reason), Vec3::new(0.0, 100.0, 0.0));
@@ -119,7 +122,7 @@ fn the_hold_damps_and_says_why() {
     }
     // A query's answer that gives no direction.
     let touching = wall().force(Ok(&pair(-RADIUS, Vec3::ZERO)), Vec3::X);
-    assert_eq!(touching.state, ConstraintState::Safe(Unknown::NoDirection));
+    assert_eq!(touching.state, ConstraintState::Safe(Unavailable::NoDirection));
 }
 
 #[test]
@@ -136,12 +139,12 @@ fn what_is_not_finite_is_not_used() {
         for (which, spoil) in spoil.iter().enumerate() {
             let mut pair = pair(1.0, Vec3::X);
             spoil(&mut pair, bad);
-            let safe = ConstraintState::Safe(Unknown::NotFinite);
+            let safe = ConstraintState::Safe(Unavailable::NotFinite);
             assert_eq!(wall().force(Ok(&pair), Vec3::ONE).state, safe, "field {which}, {bad}");
             assert_eq!(guide().force(Ok(&pair), Vec3::ONE).state, safe, "field {which}, {bad}");
         }
         let moving = wall().force(Ok(&pair(1.0, Vec3::X)), Vec3::new(bad, 0.0, 0.0));
-        assert_eq!(moving.state, ConstraintState::Safe(Unknown::NotFinite));
+        assert_eq!(moving.state, ConstraintState::Safe(Unavailable::NotFinite));
         assert_eq!(moving.force, Vec3::ZERO);
     }
     let mut long = pair(1.0, Vec3::X);
@@ -216,7 +219,7 @@ proptest! {
         let forces = [
             ForbiddenRegion::new(spring, a).map(|wall| wall.force(Ok(&any), velocity)),
             Guidance::new(spring, a, b).map(|guide| guide.force(Ok(&any), velocity)),
-            ForbiddenRegion::new(spring, a).map(|wall| wall.force(Err(Unknown::Query), velocity)),
+            ForbiddenRegion::new(spring, a).map(|wall| wall.force(Err(Unavailable::Query(QUERY)), velocity)),
         ];
         for answer in forces.into_iter().flatten() {
             prop_assert!(answer.force.is_finite(), "{answer:?}");

@@ -10,7 +10,7 @@
 //! |---|---|---|
 //! | [`State::Nominal`] | the answer, widened by age x tissue speed | every input is within its limits |
 //! | [`State::Degraded`] | the same, and the margin grows with the age | an input is beyond its first limit, or was: tell the operator |
-//! | [`State::Safe`] | [`Unknown`]: the constraint's hold | an input is beyond its second limit, or was: the surface is not acted on |
+//! | [`State::Safe`] | [`Unavailable`]: the constraint's hold | an input is beyond its second limit, or was: the surface is not acted on |
 //!
 //! The answer is widened in the nominal state too, so that the force does not jump where the state
 //! changes: the margin is one continuous function of the age.
@@ -49,8 +49,8 @@ mod tests;
 
 use core::fmt;
 
-use crate::Proximity;
-use crate::control::constraint::Unknown;
+use crate::query::Proximity;
+use crate::unavailable::{QueryError, Unavailable};
 
 pub use limits::{LimitError, Limits, Watch};
 pub use link::{Link, LinkStatus};
@@ -65,8 +65,8 @@ pub struct Observation {
     pub frame: Option<(u32, u32)>,
     /// What is known of the bus.
     pub link: Link,
-    /// Whether the query on that frame returned an error.
-    pub query_failed: bool,
+    /// The error of the query on that frame, if it returned one.
+    pub query_error: Option<QueryError>,
     /// Whether the tree's bytes were found changed: [`Scrub`](crate::Scrub). Leave it set for the rest
     /// of the run, unless what is wrong with the memory is known and gone.
     pub has_rotted: bool,
@@ -92,7 +92,7 @@ pub struct Verdict {
     pub state: State,
     /// Why it is not nominal: the first input, in the order of [`Observation`], that asks for the
     /// state; where none does any more, the last one that did.
-    pub cause: Option<Unknown>,
+    pub cause: Option<Unavailable>,
     /// How far the tissue may have moved since the surface was received, in mm: age times speed.
     pub margin: f32,
     /// Whether only an acknowledgement is missing to leave the safe state.
@@ -104,10 +104,10 @@ impl Verdict {
     ///
     /// # Errors
     /// The cause in the safe state.
-    pub fn admit(&self, answer: Proximity) -> Result<Proximity, Unknown> {
+    pub fn admit(&self, answer: Proximity) -> Result<Proximity, Unavailable> {
         match (self.state, self.cause) {
             (State::Nominal | State::Degraded, _) => Ok(answer.widened(self.margin)),
-            (State::Safe, cause) => Err(cause.unwrap_or(Unknown::NoSurface)),
+            (State::Safe, cause) => Err(cause.unwrap_or(Unavailable::NoSurface)),
         }
     }
 }
@@ -123,7 +123,7 @@ impl Verdict {
 /// let link = Link { silence: 0, heartbeat: 0, rejections: 0 };
 /// let mut state = |now, epoch, received| {
 ///     let frame = Some((epoch, received));
-///     let seen = Observation { now, frame, link, query_failed: false, has_rotted: false };
+///     let seen = Observation { now, frame, link, query_error: None, has_rotted: false };
 ///     machine.step(&seen).state
 /// };
 /// assert_eq!(state(1000, 1, 1000), State::Safe); // it starts safe
@@ -136,7 +136,7 @@ impl Verdict {
 pub struct FailSafe {
     limits: Limits,
     state: State,
-    cause: Option<Unknown>,
+    cause: Option<Unavailable>,
     /// The frame of the last step.
     frame: Option<(u32, u32)>,
     /// Frames since the last step that was not clear; stops at the number needed.
@@ -151,7 +151,7 @@ impl FailSafe {
         Self {
             limits,
             state: State::Safe,
-            cause: Some(Unknown::NoSurface),
+            cause: Some(Unavailable::NoSurface),
             frame: None,
             run: 0,
             acknowledged: false,
@@ -230,17 +230,21 @@ impl FailSafe {
     }
 
     /// The level that the inputs of this step ask for, and the first cause of it.
-    fn worst(&self, seen: &Observation, age: u32) -> (State, Option<Unknown>) {
+    fn worst(&self, seen: &Observation, age: u32) -> (State, Option<Unavailable>) {
         let (link, limits) = (seen.link, &self.limits);
         let mut worst = (State::Nominal, None);
-        let stale = Unknown::Stale { age };
-        let silent = Unknown::LinkLost { silence: link.silence };
-        let heartbeat = Unknown::HeartbeatLost { silence: link.heartbeat };
-        let rejections = Unknown::Rejections { streak: link.rejections };
+        let stale = Unavailable::Stale { age };
+        let silent = Unavailable::LinkLost { silence: link.silence };
+        let heartbeat = Unavailable::HeartbeatLost { silence: link.heartbeat };
+        let rejections = Unavailable::Rejections { streak: link.rejections };
+        if let Some(error) = seen.query_error {
+            worst = (State::Safe, Some(Unavailable::Query(error)));
+        }
+        if seen.frame.is_none() {
+            worst = (State::Safe, Some(Unavailable::NoSurface));
+        }
         for (level, cause) in [
-            (safe_if(seen.frame.is_none()), Unknown::NoSurface),
-            (safe_if(seen.query_failed), Unknown::Query),
-            (safe_if(seen.has_rotted), Unknown::Rot),
+            (safe_if(seen.has_rotted), Unavailable::Rot),
             (limits.age.level(age), stale),
             (limits.silence.level(link.silence), silent),
             (limits.heartbeat.level(link.heartbeat), heartbeat),

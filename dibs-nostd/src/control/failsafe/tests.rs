@@ -7,7 +7,9 @@ use std::vec::Vec;
 use proptest::prelude::*;
 
 use super::{FailSafe, LimitError, Limits, Link, Observation, State, Verdict, Watch};
-use crate::control::constraint::Unknown;
+use crate::unavailable::{QueryError, Unavailable};
+
+const QUERY: QueryError = QueryError::Corrupt { row: 7 };
 
 const AGE: Watch = watch(50, 200);
 const SILENCE: Watch = watch(20, 100);
@@ -41,7 +43,7 @@ fn seen(now: u32, epoch: u32, age: u32) -> Observation {
         now,
         frame: Some((epoch, now.wrapping_sub(age))),
         link: GOOD,
-        query_failed: false,
+        query_error: None,
         has_rotted: false,
     }
 }
@@ -63,37 +65,41 @@ fn machine(state: State, limits: Limits) -> FailSafe {
 }
 
 /// Every way in which an input can ask for a level, with the cause that is named.
-fn requests() -> Vec<(State, Observation, Option<Unknown>)> {
+fn requests() -> Vec<(State, Observation, Option<Unavailable>)> {
     use State::{Degraded, Nominal, Safe};
     let with = |link: Link| Observation { link, ..seen(2000, 100, 0) };
     let mut all = Vec::new();
-    all.push((Safe, Observation { frame: None, ..seen(2000, 0, 0) }, Some(Unknown::NoSurface)));
+    all.push((Safe, Observation { frame: None, ..seen(2000, 0, 0) }, Some(Unavailable::NoSurface)));
     all.push((
         Safe,
-        Observation { query_failed: true, ..seen(2000, 100, 0) },
-        Some(Unknown::Query),
+        Observation { query_error: Some(QUERY), ..seen(2000, 100, 0) },
+        Some(Unavailable::Query(QUERY)),
     ));
-    all.push((Safe, Observation { has_rotted: true, ..seen(2000, 100, 0) }, Some(Unknown::Rot)));
+    all.push((
+        Safe,
+        Observation { has_rotted: true, ..seen(2000, 100, 0) },
+        Some(Unavailable::Rot),
+    ));
     for (level, age) in [(Nominal, 50), (Degraded, 51), (Degraded, 200), (Safe, 201)] {
-        let cause = (level != Nominal).then_some(Unknown::Stale { age });
+        let cause = (level != Nominal).then_some(Unavailable::Stale { age });
         all.push((level, seen(2000, 100, age), cause));
     }
     for (level, silence) in [(Nominal, 20), (Degraded, 21), (Degraded, 100), (Safe, 101)] {
-        let cause = (level != Nominal).then_some(Unknown::LinkLost { silence });
+        let cause = (level != Nominal).then_some(Unavailable::LinkLost { silence });
         all.push((level, with(Link { silence, ..GOOD }), cause));
     }
     for (level, silence) in [(Nominal, 30), (Degraded, 31), (Degraded, 150), (Safe, 151)] {
-        let cause = (level != Nominal).then_some(Unknown::HeartbeatLost { silence });
+        let cause = (level != Nominal).then_some(Unavailable::HeartbeatLost { silence });
         all.push((level, with(Link { heartbeat: silence, ..GOOD }), cause));
     }
     for (level, streak) in [(Nominal, 3), (Degraded, 4), (Degraded, 9), (Safe, 10)] {
-        let cause = (level != Nominal).then_some(Unknown::Rejections { streak });
+        let cause = (level != Nominal).then_some(Unavailable::Rejections { streak });
         all.push((level, with(Link { rejections: streak, ..GOOD }), cause));
     }
     all.push((
         Safe,
         with(Link { silence: u32::MAX, ..GOOD }),
-        Some(Unknown::LinkLost { silence: u32::MAX }),
+        Some(Unavailable::LinkLost { silence: u32::MAX }),
     ));
     all
 }
@@ -266,7 +272,8 @@ fn run(steps: &[Step], limits: Limits, start: u32) -> (Vec<Observation>, Vec<Ver
             frame = Some((epoch, now.wrapping_sub(step.delay)));
         }
         let Step { link, query_failed, has_rotted, .. } = *step;
-        let seen = Observation { now, frame, link, query_failed, has_rotted };
+        let query_error = query_failed.then_some(QUERY);
+        let seen = Observation { now, frame, link, query_error, has_rotted };
         verdicts.push(machine.step(&seen));
         acknowledged.push(step.acknowledge && machine.acknowledge().is_ok());
         observations.push(seen);
@@ -278,7 +285,7 @@ fn run(steps: &[Step], limits: Limits, start: u32) -> (Vec<Observation>, Vec<Ver
 fn is_beyond(seen: &Observation, second: bool) -> bool {
     let limit = |watch: Watch| if second { watch.safe() } else { watch.degraded() };
     let Some((_, received)) = seen.frame else { return true };
-    seen.query_failed
+    seen.query_error.is_some()
         || seen.has_rotted
         || seen.now.wrapping_sub(received) > limit(AGE)
         || seen.link.silence > limit(SILENCE)

@@ -16,9 +16,9 @@ use glam::Vec4;
 use super::{Search, Step, Waiting};
 use crate::math::four::{Four, roots};
 use crate::math::sqrt::sqrt;
-use crate::query::QueryError;
 use crate::tree::format::several::four_nodes;
 use crate::tree::format::{Link, MAX_CHILDREN, node_bytes};
+use crate::unavailable::QueryError;
 use crate::{Index, Proximity, Tool, VertexTable};
 
 /// Most subtrees in a round. More overlap, but see a looser reach; and a set of their children must fit in a word.

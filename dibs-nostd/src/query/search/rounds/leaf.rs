@@ -4,10 +4,10 @@ use glam::Vec4;
 
 use super::{Rounds, next};
 use crate::math::four::{Four, roots};
-use crate::query::QueryError;
 use crate::query::plane::Plane;
 use crate::query::search::{Search, Step, THIRD};
 use crate::tree::format::{Link, Node, whole_node};
+use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'_, '_, I, V, T> {

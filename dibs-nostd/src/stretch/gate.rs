@@ -2,7 +2,9 @@
 
 use core::ops::Range;
 
-use crate::{Index, MeasuredStretch, StretchError, Tree, VertexTable, measure_stretch};
+use super::{StretchError, measure_stretch};
+use crate::surface::{MeasuredStretch, VertexTable};
+use crate::tree::{Index, Tree};
 
 /// What a frame changes of the published surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

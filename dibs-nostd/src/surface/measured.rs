@@ -1,16 +1,8 @@
-//! What a measurement found.
-
-use super::kernel::{Worst, root_up};
-use crate::{Index, Tree};
+//! The measured stretch of one frame, as it travels with the frame.
 
 /// Regions that a surface is divided into for its measured stretch: equal runs of triangle rows, which
 /// are patches of the surface because rows stand leaf by leaf.
 pub const REGIONS: usize = 32;
-
-/// Triangle rows of each region (the last may have fewer).
-pub(crate) const fn region_rows<I: Index>(tree: &Tree<'_, I>) -> u32 {
-    tree.triangle_count().div_ceil(REGIONS as u32)
-}
 
 /// The stretch `sigma` of one frame, measured on every triangle: the largest, and that of each region.
 ///
@@ -32,36 +24,16 @@ pub struct MeasuredStretch {
 }
 
 impl MeasuredStretch {
-    pub(super) fn of_regions<I: Index>(
-        tree: &Tree<'_, I>,
-        regions: &[Worst; REGIONS],
+    /// A measurement of the frame `epoch` with the tree of this checksum: of each region the code of its
+    /// [`share`].
+    pub(crate) const fn new(
+        sigma: f32,
+        tree: u32,
+        triangle: u32,
         epoch: Option<u32>,
+        regions: [u8; REGIONS],
     ) -> Self {
-        let mut worst = Worst::none(0);
-        for region in regions {
-            if region.squared > worst.squared {
-                worst = *region;
-            }
-        }
-        // What passed at the limit is within it, whatever the root's rounding says.
-        let within = |squared: f32| {
-            let sigma = root_up(squared);
-            if sigma > tree.stretch() { tree.stretch() } else { sigma }
-        };
-        let sigma = within(worst.squared);
-        let mut codes = [0; REGIONS];
-        for (code, region) in codes.iter_mut().zip(regions) {
-            let own = within(region.squared);
-            // The least code that stands for enough, whichever way the division rounds.
-            let mut part = ((own / sigma * 256.0) as u8).saturating_sub(1);
-            for _ in 0..2 {
-                if share(sigma, part) < own {
-                    part = part.saturating_add(1);
-                }
-            }
-            *code = part;
-        }
-        Self { sigma, tree: tree.checksum(), triangle: worst.triangle, epoch, regions: codes }
+        Self { sigma, tree, triangle, epoch, regions }
     }
 
     /// One bound for the whole surface, by other means than measuring every triangle.
@@ -128,7 +100,7 @@ impl MeasuredStretch {
     pub(crate) const WORDS: usize = 3 + REGIONS / 4;
 }
 
-/// What a region's code stands for.
-fn share(sigma: f32, code: u8) -> f32 {
+/// Stretch that a region's code stands for.
+pub(crate) fn share(sigma: f32, code: u8) -> f32 {
     sigma * ((f32::from(code) + 1.0) * (1.0 / 256.0))
 }

@@ -1,0 +1,43 @@
+//! Regions: equal runs of triangle rows, each measured by itself.
+
+use super::kernel::{Worst, root_up};
+use crate::surface::{MeasuredStretch, REGIONS, share};
+use crate::tree::{Index, Tree};
+
+/// Triangle rows of each region (the last may have fewer).
+pub(super) const fn region_rows<I: Index>(tree: &Tree<'_, I>) -> u32 {
+    tree.triangle_count().div_ceil(REGIONS as u32)
+}
+
+/// The measurement of a whole frame from the worst triangle of each region.
+pub(super) fn of_regions<I: Index>(
+    tree: &Tree<'_, I>,
+    regions: &[Worst; REGIONS],
+    epoch: Option<u32>,
+) -> MeasuredStretch {
+    let mut worst = Worst::none(0);
+    for region in regions {
+        if region.squared > worst.squared {
+            worst = *region;
+        }
+    }
+    // What passed at the limit is within it, whatever the root's rounding says.
+    let within = |squared: f32| {
+        let sigma = root_up(squared);
+        if sigma > tree.stretch() { tree.stretch() } else { sigma }
+    };
+    let sigma = within(worst.squared);
+    let mut codes = [0; REGIONS];
+    for (code, region) in codes.iter_mut().zip(regions) {
+        let own = within(region.squared);
+        // The least code that stands for enough, whichever way the division rounds.
+        let mut part = ((own / sigma * 256.0) as u8).saturating_sub(1);
+        for _ in 0..2 {
+            if share(sigma, part) < own {
+                part = part.saturating_add(1);
+            }
+        }
+        *code = part;
+    }
+    MeasuredStretch::new(sigma, tree.checksum(), worst.triangle, epoch, codes)
+}

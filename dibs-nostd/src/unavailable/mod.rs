@@ -1,0 +1,70 @@
+//! Why there is no answer: the causes that surface, query and fail-safe machine share.
+
+mod query;
+
+use core::fmt;
+
+pub use query::QueryError;
+
+/// Why there is no proximity to act on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Unavailable {
+    /// No surface was ever published.
+    NoSurface,
+    /// The surface is older than allowed.
+    Stale {
+        /// Its age, on the receiver's clock.
+        age: u32,
+    },
+    /// The query failed.
+    Query(QueryError),
+    /// The tree's bytes changed since they were validated: [`Scrub`](crate::Scrub).
+    Rot,
+    /// No good packet came for longer than allowed.
+    LinkLost {
+        /// Time since the last one, on the receiver's clock.
+        silence: u32,
+    },
+    /// No heartbeat came for longer than allowed.
+    HeartbeatLost {
+        /// Time since the last one, on the receiver's clock.
+        silence: u32,
+    },
+    /// More was rejected than allowed since the last frame was published.
+    Rejections {
+        /// Packets and frames rejected.
+        streak: u32,
+    },
+    /// The tool's axis touches the surface: no direction leads out.
+    NoDirection,
+    /// A number is not finite, or the direction is not a unit vector.
+    NotFinite,
+}
+
+impl fmt::Display for Unavailable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoSurface => write!(f, "no surface was published yet"),
+            Self::Stale { age } => write!(f, "the surface is {age} old"),
+            Self::Query(error) => error.fmt(f),
+            Self::Rot => write!(f, "the tree's bytes changed"),
+            Self::LinkLost { silence } => write!(f, "no good packet came for {silence}"),
+            Self::HeartbeatLost { silence } => write!(f, "no heartbeat came for {silence}"),
+            Self::Rejections { streak } => {
+                write!(f, "{streak} packets or frames were rejected in a row")
+            }
+            Self::NoDirection => write!(f, "the tool's axis touches the surface"),
+            Self::NotFinite => write!(f, "a number is not finite"),
+        }
+    }
+}
+
+impl core::error::Error for Unavailable {}
+
+impl From<QueryError> for Unavailable {
+    fn from(error: QueryError) -> Self {
+        Self::Query(error)
+    }
+}
