@@ -20,7 +20,7 @@ use super::subjects::{self, Subject};
 pub const STRETCH: f32 = 2.0;
 pub const TOOLS: [&str; 2] = ["sphere", "capsule"];
 /// Independent seeds that a cell's queries come from.
-const SEEDS: u64 = 5;
+pub const SEEDS: u64 = 5;
 /// Seeds of what is not measured.
 const TRAINING: u64 = 1_000;
 

@@ -28,7 +28,7 @@ pub fn run(plan: &Plan, arguments: &Arguments, records: &mut Records) {
     for (metric, note) in [
         ("kind", plan.name.to_owned()),
         ("machine", format!("{}, {cores} cores, {}", processor(), std::env::consts::OS)),
-        ("commit", said("git", &["describe", "--always", "--dirty", "--abbrev=12"])),
+        ("commit", commit()),
         ("command", command),
         ("compiler", said("rustc", &["--version"])),
         ("meshes", meshes.to_owned()),
@@ -37,6 +37,11 @@ pub fn run(plan: &Plan, arguments: &Arguments, records: &mut Records) {
     }
     let cell = Cell { experiment: "run".to_owned(), ..Cell::default() };
     records.push(Record::number(&cell, "", "clock", clock(), "us"));
+}
+
+/// The commit that is run.
+pub fn commit() -> String {
+    said("git", &["describe", "--always", "--dirty", "--abbrev=12"])
 }
 
 fn processor() -> String {

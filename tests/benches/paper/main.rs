@@ -30,6 +30,10 @@ fn run(arguments: &Arguments) -> Result<()> {
     let folder = arguments.out.clone().unwrap_or(default);
     let records = if arguments.render {
         Records::read(&folder.join("benchmarks.json"))?
+    } else if arguments.paper_search {
+        let mut records = Records::read(&folder.join("benchmarks.json"))?;
+        paper::search::run(&Plan::of(arguments), &mut records)?;
+        records
     } else if !arguments.bench && arguments.out.is_none() {
         // `cargo test --benches` asks a benchmark whether it works.
         paper::run(&Plan::smoke(), arguments)?;

@@ -12,6 +12,7 @@ mod names;
 mod peers;
 pub mod plan;
 pub mod record;
+pub mod search;
 mod statistics;
 mod subjects;
 
@@ -27,6 +28,7 @@ pub fn run(plan: &Plan, arguments: &Arguments) -> Result<Records> {
     let mut records = Records::default();
     facts::run(plan, arguments, &mut records);
     brain::run(plan, &mut records)?;
+    search::run(plan, &mut records)?;
     heart::run(plan, &mut records)?;
     if let Some(report) = &arguments.m7 {
         facts::cortex_m7(report, &mut records)?;

@@ -1,6 +1,8 @@
 //! What the methods are called.
 
 pub const PAPER: &str = "dibs-paper";
+/// The paper's construction, searched as the paper does.
+pub const PAPER_SEARCH: &str = "dibs-paper-search";
 pub const DIBS: &str = "dibs";
 pub const MEASURED: &str = "dibs-measured";
 pub const WARM: &str = "dibs-warm";
@@ -19,6 +21,7 @@ pub const OTHERS: [&str; 6] = [REFIT, HYBRID, OBVHS, PARRY_BVH, PARRY_TRIMESH, E
 pub fn title(method: &str) -> &str {
     match method {
         PAPER => "DIBS, the paper's construction",
+        PAPER_SEARCH => "DIBS, the paper's construction and search",
         DIBS => "DIBS",
         MEASURED => "DIBS, measured stretch",
         WARM => "DIBS, warm start",

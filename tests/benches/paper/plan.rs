@@ -21,6 +21,9 @@ pub struct Arguments {
     /// Only writes the documents and figures anew, from the folder's benchmarks.json.
     #[arg(long)]
     pub render: bool,
+    /// Only counts the paper's own search anew, into the folder's benchmarks.json.
+    #[arg(long)]
+    pub paper_search: bool,
     /// Reports of the demo on the emulated Cortex-M7: its report.json, for table 3.
     #[arg(long)]
     pub m7: Option<PathBuf>,

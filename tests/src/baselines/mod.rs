@@ -5,9 +5,11 @@ mod aabb_tree;
 pub mod bounds;
 mod exhaustive;
 mod hybrid;
+mod paper;
 mod refit;
 
 pub use aabb_tree::AabbTree;
 pub use exhaustive::Exhaustive;
 pub use hybrid::Hybrid;
+pub use paper::Paper;
 pub use refit::Refit;
