@@ -4,12 +4,11 @@ use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 use anyhow::{Context, Result};
-use dibs_build::{Builder, Mesh, generate};
-use glam::Vec3;
+use dibs_build::generate;
 
 fn main() -> Result<()> {
     let out = PathBuf::from(env::var("OUT_DIR")?);
-    surface(&out)?;
+    surface()?;
     if env::var("CARGO_CFG_TARGET_OS")? == "none" {
         link(&out)?;
     }
@@ -18,47 +17,19 @@ fn main() -> Result<()> {
 
 /// The tree in flash: of the generated heart, or of the mesh file in `DIBS_MESH`; for a stretch of
 /// 1.5, or what `DIBS_STRETCH` says.
-fn surface(out: &Path) -> Result<()> {
-    println!("cargo:rerun-if-env-changed=DIBS_MESH");
-    println!("cargo:rerun-if-env-changed=DIBS_STRETCH");
-    let mesh = match env::var_os("DIBS_MESH") {
-        Some(path) => {
-            println!("cargo:rerun-if-changed={}", Path::new(&path).display());
-            dibs_build::read(Path::new(&path))?.mesh
-        }
-        None => generate::heart(10_272)?.0,
+fn surface() -> Result<()> {
+    println!("cargo::rerun-if-env-changed=DIBS_MESH");
+    println!("cargo::rerun-if-env-changed=DIBS_STRETCH");
+    let tree = match env::var_os("DIBS_MESH") {
+        Some(path) => dibs_build::tree(&path),
+        None => dibs_build::tree(generate::heart(10_272)?.0),
     };
     let stretch = match env::var("DIBS_STRETCH") {
         Ok(text) => text.parse().with_context(|| format!("DIBS_STRETCH=`{text}`"))?,
         Err(_) => 1.5,
     };
-    let tree = Builder::new().stretch(stretch).build(&mesh)?;
-    let bits = tree.index_bits();
-    let (center, reach) = extent(&mesh);
-    let [x, y, z] = center.to_array();
-    let rust = tree.rust("SURFACE")?;
-    fs::write(
-        out.join("surface.rs"),
-        format!(
-            "{rust}
-/// Width of the surface's indices.
-pub type SurfaceIndex = u{bits};
-
-/// Centre of the surface's bounding box at rest, in mm.
-pub const SURFACE_CENTER: Vec3 = Vec3::new({x:?}, {y:?}, {z:?});
-
-/// Half the longest side of that box, in mm.
-pub const SURFACE_REACH: f32 = {reach:?};
-"
-        ),
-    )?;
+    tree.stretch(stretch).emit("surface");
     Ok(())
-}
-
-fn extent(mesh: &Mesh) -> (Vec3, f32) {
-    let low = mesh.positions.iter().copied().fold(Vec3::INFINITY, Vec3::min);
-    let high = mesh.positions.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
-    ((low + high) / 2.0, (high - low).max_element() / 2.0)
 }
 
 /// The linker scripts of the binaries `board` and `cycles`: `memory.x` at the top of the repository is the board.

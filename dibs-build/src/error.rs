@@ -88,9 +88,10 @@ pub enum BuildError {
         /// Bytes of the tree.
         bytes: u64,
     },
-    /// A name that cannot name a Rust `static`.
+    /// A name that cannot name a Rust module.
     #[error(
-        "{name:?} is not a name for a Rust static: use capital letters, digits and underscores"
+        "{name:?} is not a name for a Rust module: use lower-case letters, digits and underscores, \
+         a letter first, and no keyword"
     )]
     Name {
         /// The name asked for.

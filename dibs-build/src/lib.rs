@@ -1,18 +1,14 @@
 //! From a mesh file to a static deformation invariant bounding sphere tree, for `dibs-nostd`.
 //!
-//! A `build.rs`:
+//! The `main` of a `build.rs`:
 //!
 //! ```no_run
-//! fn main() -> Result<(), Box<dyn std::error::Error>> {
-//!     let mesh = dibs_build::read("heart.ply")?.mesh;
-//!     let tree = dibs_build::Builder::new().stretch(1.5).build(&mesh)?;
-//!     tree.write_rust(format!("{}/heart.rs", std::env::var("OUT_DIR")?), "HEART")?;
-//!     Ok(())
-//! }
+//! dibs_build::tree("heart.ply").stretch(1.5).emit("heart");
 //! ```
 //!
-//! [`read`] imports and checks a mesh (OBJ, STL, PLY, OFF), [`Builder`] makes the tree, [`BuiltTree`]
-//! is written as Rust source or as a blob. [`Motion`] is a recorded deformation (PC2), [`modes`] make a
+//! The program then says `dibs_nostd::include_tree!("heart")`. [`tree`] is made of parts: [`read`]
+//! imports and checks a mesh (OBJ, STL, PLY, OFF), [`Builder`] makes the tree, [`BuiltTree`] is written as a
+//! Rust module or as a blob. [`Motion`] is a recorded deformation (PC2), [`modes`] make a
 //! few weights of it, and [`generate`] makes procedural hearts and brains. The library prints nothing; the program `dibs` (feature `cli`,
 //! on by default) does.
 
@@ -27,6 +23,7 @@ mod mesh;
 pub mod modes;
 mod pc2;
 mod read;
+mod script;
 #[cfg(feature = "stream")]
 pub mod stream;
 mod stretch;
@@ -39,5 +36,6 @@ pub use geodesic::Paths;
 pub use mesh::{Mesh, Motion};
 pub use pc2::MotionMismatch;
 pub use read::{Format, Import, ReadError, ReadErrorKind, ReadOptions, Report, read};
+pub use script::{MeshSource, TreeScript, tree};
 pub use stretch::{LimitsError, LimitsErrorKind, MotionStretch, Needed, read_limits, write_limits};
 pub use write::{WriteError, WriteErrorKind, write_atomically};

@@ -55,6 +55,7 @@ pub use glam;
 
 pub mod bus;
 pub mod control;
+mod include;
 mod math;
 pub mod modes;
 mod query;
@@ -76,5 +77,5 @@ pub use surface::{
     OutOfTable, PublishError, QuantisedVertices, REGIONS, VertexTable,
 };
 pub use tool::{ACCURACY, AxisPair, Capsule, MAX_COORDINATE, Sphere, Tool, ToolError};
-pub use tree::{FormatError, Index, Rot, Scrub, Tree, format};
+pub use tree::{FormatError, Index, Rot, Scrub, Tree, TreeBytes, format};
 pub use unavailable::{QueryError, Unavailable};

@@ -8,7 +8,7 @@ use dibs_nostd::failsafe::{FailSafe, LimitError, Limits, Observation, Watch};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{Capsule, Options, Proximity, QueryError, Tool, Unavailable};
 
-use crate::surface::{SURFACE, SurfaceQuery, SurfaceReader};
+use crate::surface;
 use crate::telemetry::{Tick, cause_code};
 use crate::{BusStatus, TICK_RATE, instrument};
 
@@ -49,8 +49,8 @@ const MARGIN: f32 = 5.0;
 
 /// The controller's state from tick to tick.
 pub struct Control {
-    query: SurfaceQuery,
-    surface: SurfaceReader,
+    query: surface::Query,
+    surface: surface::Reader,
     wall: ForbiddenRegion,
     failsafe: FailSafe,
     bus: &'static BusStatus,
@@ -62,14 +62,18 @@ pub struct Control {
 }
 
 impl Control {
-    /// A controller that reads the surface published through `surface`.
+    /// A controller that searches `tree` with the surface published through `surface`.
     ///
     /// # Errors
     /// [`SetupError`] when a constant above is out of range, or the query's stack too small.
-    pub fn new(surface: SurfaceReader, bus: &'static BusStatus) -> Result<Self, SetupError> {
+    pub fn new(
+        tree: &surface::Tree,
+        surface: surface::Reader,
+        bus: &'static BusStatus,
+    ) -> Result<Self, SetupError> {
         let spring = SpringDamper::new(STIFFNESS, DAMPING, MAX_FORCE).map_err(SetupError::Gain)?;
         Ok(Self {
-            query: SurfaceQuery::new(&SURFACE).map_err(SetupError::Query)?,
+            query: surface::Query::new(tree).map_err(SetupError::Query)?,
             surface,
             wall: ForbiddenRegion::new(spring, MARGIN).map_err(SetupError::Gain)?,
             failsafe: FailSafe::new(limits().map_err(SetupError::Limit)?),

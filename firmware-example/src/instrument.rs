@@ -5,7 +5,7 @@ use core::f32::consts::TAU;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{Capsule, ToolError};
 
-use crate::surface::{SURFACE_CENTER, SURFACE_REACH};
+use crate::surface::{CENTRE, REACH};
 
 /// Length of the instrument's last link, in mm.
 const LENGTH: f32 = 60.0;
@@ -25,12 +25,12 @@ pub fn instrument(tick: u32) -> Result<Capsule, ToolError> {
         libm::sinf(TAU * ((tick % period) as f32 / period as f32 + phase))
     };
     // From 1.5 times the surface's size down to its middle.
-    let distance = SURFACE_REACH * (0.75 + 0.75 * wave(7_000, 0.25));
+    let distance = REACH * (0.75 + 0.75 * wave(7_000, 0.25));
     let around = Vec3::new(wave(11_000, 0.25), wave(11_000, 0.0), 0.6 * wave(5_300, 0.1));
     let tremor = Vec3::new(wave(111, 0.0), wave(113, 0.3), wave(109, 0.7)) * 0.1;
-    let tip = SURFACE_CENTER + around * distance + tremor;
+    let tip = CENTRE + around * distance + tremor;
 
-    let port = SURFACE_CENTER + Vec3::new(0.3, -0.4, 2.0) * SURFACE_REACH;
+    let port = CENTRE + Vec3::new(0.3, -0.4, 2.0) * REACH;
     let shaft = port - tip;
     let length = libm::sqrtf(shaft.length_squared());
     Capsule::new(tip, tip + shaft * (LENGTH / length), RADIUS)

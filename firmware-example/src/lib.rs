@@ -20,7 +20,6 @@ mod fingerprint;
 mod instrument;
 mod receiver;
 mod status;
-pub mod surface;
 pub mod telemetry;
 mod upkeep;
 
@@ -32,6 +31,9 @@ pub use instrument::instrument;
 pub use receiver::{MTU, Receiver, STATUS_FRAMED};
 pub use status::BusStatus;
 pub use upkeep::Upkeep;
+
+// The surface: `build.rs` emitted its tree.
+dibs_nostd::include_tree!("surface");
 
 /// Control ticks a second.
 pub const TICK_RATE: u32 = 1_000;

@@ -1,10 +1,10 @@
 //! Bus reception: bytes in, published frames and statuses out.
 
 use dibs_nostd::wire::{Counters, Deframer, encode_status, enframe, framed_bytes};
-use dibs_nostd::{Advance, Assembler, FrameWriter, StretchError, StretchMonitor};
+use dibs_nostd::{Advance, StretchError, StretchMonitor};
 
 use crate::fingerprint::Fingerprint;
-use crate::surface::{SURFACE, SURFACE_CENTER, SURFACE_REACH, SURFACE_VERTICES, SurfaceAssembler};
+use crate::surface::{self, CENTRE, REACH};
 use crate::{BusStatus, TICK_RATE};
 
 /// Largest packet on the serial bus, in bytes: 167 quantised vertices.
@@ -36,7 +36,7 @@ const ROWS: u32 = 8;
 /// of it is below the control tick's priority.
 pub struct Receiver {
     deframer: Deframer<MTU>,
-    assembler: SurfaceAssembler,
+    assembler: surface::Receiver<'static>,
     fingerprint: Fingerprint,
     status: &'static BusStatus,
     /// Tick of the last status.
@@ -46,19 +46,20 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// A receiver that publishes through `writer`.
+    /// A receiver that publishes surfaces of `tree` through `writer`.
     ///
     /// # Errors
     /// [`StretchError`] when the tree lacks what the stretch is measured against.
     pub fn new(
-        writer: FrameWriter<'static, SURFACE_VERTICES>,
+        tree: &'static surface::Tree,
+        writer: surface::Writer,
         status: &'static BusStatus,
     ) -> Result<Self, StretchError> {
-        let limit = SURFACE_CENTER.abs().max_element() + ROOM * SURFACE_REACH;
-        let monitor = StretchMonitor::new(&SURFACE)?;
+        let limit = CENTRE.abs().max_element() + ROOM * REACH;
+        let monitor = StretchMonitor::new(tree)?;
         Ok(Self {
             deframer: Deframer::new(),
-            assembler: Assembler::new(writer, monitor, SURFACE.mesh_id(), limit),
+            assembler: surface::Receiver::new(writer, monitor, tree.mesh_id(), limit),
             fingerprint: Fingerprint::new(),
             status,
             reported: 0,
@@ -113,6 +114,10 @@ impl Receiver {
         self.assembler.counters()
     }
 
+    const fn mesh_id(&self) -> u32 {
+        self.assembler.gate().tree().mesh_id()
+    }
+
     /// What goes back to the sender now, framed for the line: `None` unless a status is due. `tick` is
     /// the present control tick, 1 ms.
     pub fn report<'b>(&mut self, tick: u32, line: &'b mut [u8; STATUS_FRAMED]) -> Option<&'b [u8]> {
@@ -123,6 +128,6 @@ impl Receiver {
         let status = self.assembler.status(tick, self.status.safety());
         let (counters, mac) = (self.assembler.counters(), self.assembler.mac());
         let mut packet = [0; STATUS_MTU];
-        enframe(encode_status(SURFACE.mesh_id(), &status, counters, mac, &mut packet), line)
+        enframe(encode_status(self.mesh_id(), &status, counters, mac, &mut packet), line)
     }
 }

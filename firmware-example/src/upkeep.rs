@@ -3,7 +3,7 @@
 use dibs_nostd::Scrub;
 
 use crate::BusStatus;
-use crate::surface::SURFACE_BYTES;
+use crate::surface;
 
 /// Bytes checked in one slice.
 const SLICE: usize = 256;
@@ -18,7 +18,7 @@ impl Upkeep {
     /// A check that begins at the tree's first byte.
     #[must_use]
     pub fn new(status: &'static BusStatus) -> Self {
-        Self { scrub: Scrub::new(SURFACE_BYTES), status }
+        Self { scrub: surface::TREE.scrub(), status }
     }
 
     /// One slice: some thousand instructions.

@@ -1,8 +1,9 @@
 //! The control logic on the host, against an in-process bus: what the board does, byte for byte.
 
 use std::collections::HashMap;
+use std::sync::OnceLock;
 
-use controller::surface::{SURFACE, SurfaceFrames};
+use controller::surface::{self, Surface};
 use controller::telemetry::{Tick, cause_code};
 use controller::{
     BusStatus, Control, MTU, Receiver, SILENCE_LIMIT, SILENCE_WARNING, SURFACE_AGE_LIMIT,
@@ -17,6 +18,12 @@ use dibs_nostd::wire::{
 };
 use dibs_tests::oracle::{Instrument, exhaustive};
 
+/// The firmware's tree.
+fn firmware_tree() -> &'static surface::Tree {
+    static TREE: OnceLock<surface::Tree> = OnceLock::new();
+    TREE.get_or_init(|| surface::TREE.validate().expect("valid"))
+}
+
 /// The sending side: the generated heart, in the tree's order.
 struct Sender {
     frames: Vec<Vec<Vec3>>,
@@ -29,7 +36,11 @@ impl Sender {
     fn new() -> Self {
         let (mesh, motion) = generate::heart(10_272).expect("a heart");
         let tree = Builder::new().stretch(1.5).build(&mesh).expect("a tree");
-        assert_eq!(tree.summary().mesh_id, SURFACE.mesh_id(), "the firmware has another surface");
+        assert_eq!(
+            tree.summary().mesh_id,
+            firmware_tree().mesh_id(),
+            "the firmware has another surface"
+        );
         let mut row = vec![0; mesh.positions.len()];
         for (place, &vertex) in (0..).zip(tree.vertex_order()) {
             row[vertex as usize] = place;
@@ -48,7 +59,7 @@ impl Sender {
         let decode = |&p: &Vec3| grid.position(grid.quantise(p).expect("inside its own box"));
         self.decoded.insert(epoch, exact.iter().map(decode).collect());
         let encoding = Encoding::Quantised(grid);
-        let id = FrameId { mesh_id: SURFACE.mesh_id(), session: 1, epoch };
+        let id = FrameId { mesh_id: firmware_tree().mesh_id(), session: 1, epoch };
         let mut encoder = FrameEncoder::<_, MTU>::new(id, encoding, &exact[..]).unwrap();
         let (mut packet, mut line, mut all) = ([0; MTU], [0; framed_bytes(MTU)], Vec::new());
         let mut beat = [0; 64];
@@ -77,11 +88,11 @@ fn force(tick: &Tick) -> f32 {
 
 #[test]
 fn every_answer_is_that_of_one_whole_frame() {
-    static FRAMES: SurfaceFrames = SurfaceFrames::new();
+    static FRAMES: Surface = Surface::new();
     static BUS: BusStatus = BusStatus::new();
     let (writer, reader) = FRAMES.split().unwrap();
-    let mut receiver = Receiver::new(writer, &BUS).unwrap();
-    let mut control = Control::new(reader, &BUS).unwrap();
+    let mut receiver = Receiver::new(firmware_tree(), writer, &BUS).unwrap();
+    let mut control = Control::new(firmware_tree(), reader, &BUS).unwrap();
     let mut sender = Sender::new();
 
     let first = control.tick(|| 0);
@@ -113,11 +124,11 @@ fn every_answer_is_that_of_one_whole_frame() {
 
 #[test]
 fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
-    static FRAMES: SurfaceFrames = SurfaceFrames::new();
+    static FRAMES: Surface = Surface::new();
     static BUS: BusStatus = BusStatus::new();
     let (writer, reader) = FRAMES.split().unwrap();
-    let mut receiver = Receiver::new(writer, &BUS).unwrap();
-    let mut control = Control::new(reader, &BUS).unwrap();
+    let mut receiver = Receiver::new(firmware_tree(), writer, &BUS).unwrap();
+    let mut control = Control::new(firmware_tree(), reader, &BUS).unwrap();
     let mut sender = Sender::new();
     let mut feed = |bytes: &[u8], now: u32| {
         for &byte in bytes {

@@ -15,10 +15,14 @@ use dibs_nostd::{
 use dibs_tests::bus::{MESH, N, frame};
 use gungraun::prelude::*;
 
-include!(concat!(env!("OUT_DIR"), "/heart.rs"));
+dibs_nostd::include_tree!("heart");
 
 /// As queries in rounds want it.
-const STACK: usize = HEART_STACK + 128;
+const STACK: usize = heart::STACK + 128;
+
+fn tree() -> heart::Tree {
+    heart::TREE.validate().expect("valid")
+}
 
 /// A query on the heart at rest.
 struct Scene {
@@ -28,9 +32,10 @@ struct Scene {
 }
 
 fn scene(options: Options) -> Scene {
-    let rows = (0..HEART.vertex_count()).map(|row| HEART.rest_position(row));
+    let tree = tree();
+    let rows = (0..tree.vertex_count()).map(|row| tree.rest_position(row));
     let rows = rows.collect::<Option<_>>().expect("the tree has its rest shape");
-    Scene { query: Query::new(&HEART).expect("deep enough"), rows, options }
+    Scene { query: Query::new(&tree).expect("deep enough"), rows, options }
 }
 
 fn cold() -> Scene {
@@ -118,7 +123,7 @@ fn capsule_triangle(corners: [Vec3; 3]) -> bool {
 #[library_benchmark]
 #[bench::heart(setup = cold)]
 fn stretch_of_a_thousand_triangles(scene: Scene) -> f32 {
-    black_box(measure_stretch(&HEART, scene.rows.as_slice()).expect("at rest").sigma())
+    black_box(measure_stretch(scene.query.tree(), scene.rows.as_slice()).expect("at rest").sigma())
 }
 
 /// A bus, and the packets of two frames.

@@ -276,9 +276,13 @@ fn what_cannot_be_built_is_named() {
     assert!(matches!(error, BuildError::TooManyVertices { vertices: 65_537, bits: 16, .. }));
     assert_eq!(new().build(&many).expect("32 bits").index_bits(), 32);
     let tree = new().build(&mesh).expect("a valid mesh");
-    for name in ["", "heart", "9HEART", "HEART MURMUR"] {
-        assert!(matches!(tree.rust(name), Err(BuildError::Name { .. })), "{name:?}");
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("heart.rs");
+    for name in ["", "HEART", "9heart", "heart murmur"] {
+        let refused = tree.write_rust(&file, name);
+        assert!(matches!(refused, Err(BuildError::Name { .. })), "{name:?}");
     }
+    assert_eq!(folder.path().read_dir().expect("is there").count(), 0, "nothing is written");
     let shallow = Query::<u16, 3>::new(&tree.tree().expect("valid"));
     assert!(shallow.is_err(), "a stack of 3 is too small");
 }

@@ -584,24 +584,26 @@ fn section(bytes: &[u8], kind: u32) -> (usize, usize) {
     (word(at + 4) as usize, word(at + 8) as usize)
 }
 
-include!(concat!(env!("OUT_DIR"), "/modal_heart.rs"));
+dibs_nostd::include_tree!("modal_heart");
 
-/// The generated statics, which the compiler validated, are what the builder built.
+/// The generated module is what the builder built.
 #[test]
-fn the_generated_static_holds_the_modes() {
+fn the_generated_module_holds_the_modes() {
     let (mesh, motion) = generate::heart(1_000).expect("a valid size");
     let fit = ModalFit::new(&mesh, &motion).expect("a motion");
     let tree = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
     let built = tree.with_modes(&fit, 2).expect("so many");
     let weights = &built.modal_motion().expect("has modes").weights[9];
-    let modes = [HEART_MODES, Modes::of(&built.tree::<u16>().expect("valid")).expect("valid")];
+    let tree_of_module = modal_heart::TREE.validate().expect("valid");
+    let of_module = Modes::of(&tree_of_module).expect("valid");
+    let modes = [of_module, Modes::of(&built.tree::<u16>().expect("valid")).expect("valid")];
     let [generated, built] = modes.map(|modes| {
-        let surface = modes.surface::<HEART_MODE_COUNT>(weights).expect("in range");
+        let surface = modes.surface::<{ modal_heart::MODES }>(weights).expect("in range");
         (positions(&surface), modes.stretch_bound(weights))
     });
     assert_eq!(generated, built);
-    assert_eq!(generated.0.len(), HEART_VERTICES);
-    assert_eq!(HEART_STACK, HEART.stack() as usize);
+    assert_eq!(generated.0.len(), modal_heart::VERTICES);
+    assert_eq!(modal_heart::STACK, tree_of_module.stack() as usize);
 }
 
 /// All 24 modes of the real heart's 25 frames: driven whole by as many numbers a tick.

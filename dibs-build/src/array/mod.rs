@@ -8,6 +8,7 @@ mod flatten;
 mod metric;
 #[cfg(feature = "modes")]
 mod modal;
+mod module;
 
 pub use emit::{BuiltTree, ModesSummary, Summary, summarise};
 pub(crate) use flatten::{Facts, flatten};

@@ -4,10 +4,12 @@ pub mod format;
 mod index;
 mod scrub;
 pub(crate) mod sections;
+mod stored;
 mod validate;
 
 pub use index::Index;
 pub use scrub::{Rot, Scrub};
+pub use stored::TreeBytes;
 pub use validate::FormatError;
 
 use core::iter;
@@ -48,8 +50,8 @@ pub(crate) struct Header {
 impl<'a, I: Index> Tree<'a, I> {
     /// Validates the bytes of a tree, and gives a view of them.
     ///
-    /// `const`: a generated `static` is validated by the compiler, a blob once at start-up. Checks the
-    /// layout, the CRC-32, and that the tree is well formed: children after parents, every index
+    /// Once, at start-up: a generated tree by [`TreeBytes::validate`], which calls this. (`const`, but slow
+    /// there: the compiler takes a second or two for every thousand triangles.) Checks the layout, the CRC-32, and that the tree is well formed: children after parents, every index
     /// inside its table, every triangle in exactly one leaf, depth as stated. What it cannot check is
     /// that the radii cover this mesh: that is the builder's promise, tied to the mesh id.
     ///

@@ -14,14 +14,14 @@
 #![no_std]
 #![no_main]
 
-use controller::surface::{SURFACE, SURFACE_CENTER, SURFACE_REACH, SurfaceFrames, SurfaceQuery};
+use controller::surface::{CENTRE, Query, REACH, Surface, TREE};
 use core::panic::PanicInfo;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{DCB, DWT, Peripherals, SYST};
 use cortex_m_rt::entry;
 use cortex_m_semihosting::{debug, hprintln};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Budget, Capsule, Cost, FrameLabel, Options, Proximity, Query};
+use dibs_nostd::{Budget, Capsule, Cost, FrameLabel, Options, Proximity};
 
 const POSES: u32 = 2_000;
 
@@ -29,7 +29,7 @@ const POSES: u32 = 2_000;
 const HALF_AXIS: f32 = 75.0;
 const RADIUS: f32 = 3.0;
 
-static FRAMES: SurfaceFrames = SurfaceFrames::new();
+static FRAMES: Surface = Surface::new();
 
 #[entry]
 fn main() -> ! {
@@ -48,20 +48,21 @@ fn measure() -> Result<(), &'static str> {
 
     let (mut writer, mut reader) = FRAMES.split().ok_or("the buffers are taken")?;
     writer.begin();
-    for row in 0..SURFACE.vertex_count() {
-        let position = SURFACE.rest_position(row).ok_or("the tree has no rest shape")?;
+    let tree = TREE.validate().map_err(|_| "the tree in flash is damaged")?;
+    for row in 0..tree.vertex_count() {
+        let position = tree.rest_position(row).ok_or("the tree has no rest shape")?;
         writer.push(position).map_err(|_| "more vertices than rows")?;
     }
     let label = FrameLabel { epoch: 1, received: 0, position_error: 0.0, stretch: None };
     writer.publish(label).map_err(|_| "the frame is not complete")?;
     let frame = reader.read().ok_or("nothing is published")?;
 
-    let mut query: SurfaceQuery = Query::new(&SURFACE).map_err(|_| "the stack is too small")?;
+    let mut query = Query::new(&tree).map_err(|_| "the stack is too small")?;
     let mut random = Random(1);
     let mut bound = Cost { base: 0, node_test: 0, triangle_test: 0 };
     let (mut sum, mut largest) = (0_u64, 0_u32);
     for pose in 0..POSES {
-        let centre = SURFACE_CENTER + random.within() * SURFACE_REACH;
+        let centre = CENTRE + random.within() * REACH;
         let half = random.within().normalize_or(Vec3::X) * HALF_AXIS;
         let Ok(tool) = Capsule::new(centre - half, centre + half, RADIUS) else { continue };
         let mut cycles = |node_tests, triangle_tests| {

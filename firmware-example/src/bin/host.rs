@@ -11,15 +11,14 @@ use std::time::{Duration, Instant};
 use std::{env, thread};
 
 use anyhow::{Context, Result, anyhow};
-use controller::surface::SurfaceFrames;
 use controller::telemetry::{MAX_FRAMED, Summary, frame};
-use controller::{BusStatus, Control, Receiver, STATUS_FRAMED, TICK_RATE, Upkeep};
+use controller::{BusStatus, Control, Receiver, STATUS_FRAMED, TICK_RATE, Upkeep, surface};
 use dibs_nostd::wire::{Counters, Event};
 
 /// Slices of background work between two looks at the bus.
 const SLICES: u32 = 1_000;
 
-static FRAMES: SurfaceFrames = SurfaceFrames::new();
+static FRAMES: surface::Surface = surface::Surface::new();
 static BUS: BusStatus = BusStatus::new();
 static TICKS: AtomicU32 = AtomicU32::new(0);
 static COUNTERS: Mutex<Counters> = Mutex::new(Counters::new());
@@ -32,7 +31,9 @@ fn main() -> Result<()> {
     let ticks: u32 = argument("TICKS")?.to_str().and_then(|t| t.parse().ok()).context("TICKS")?;
 
     let (writer, reader) = FRAMES.split().context("the buffers are split once")?;
-    let mut receiver = Receiver::new(writer, &BUS).map_err(|error| anyhow!("{error}"))?;
+    let tree = surface::TREE.validate().context("the tree")?;
+    let tree: &'static surface::Tree = Box::leak(Box::new(tree));
+    let mut receiver = Receiver::new(tree, writer, &BUS).map_err(|error| anyhow!("{error}"))?;
     bus.set_read_timeout(Some(Duration::from_millis(1)))?;
     thread::spawn(move || {
         let (mut buffer, mut line) = ([0; 1024], [0; STATUS_FRAMED]);
@@ -63,7 +64,7 @@ fn main() -> Result<()> {
         }
     });
 
-    let mut control = Control::new(reader, &BUS).map_err(|error| anyhow!("{error}"))?;
+    let mut control = Control::new(tree, reader, &BUS).map_err(|error| anyhow!("{error}"))?;
     let mut out = BufWriter::new(telemetry);
     let mut line = [0; MAX_FRAMED];
     let period = Duration::from_secs(1) / TICK_RATE;

@@ -13,14 +13,14 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 Examples:
   dibs build heart.ply -o heart.dibs --stretch 1.5
-  dibs build heart.stl -o heart.rs --name HEART --weld 0.001
+  dibs build heart.stl -o heart.rs --name heart --weld 0.001
   dibs build scan.obj -o scan.dibs --largest-component --json
   dibs build heart.ply -o heart.dibs --limits heart.limits --motion heart.pc2
   dibs build heart.ply -o heart.dibs --motion heart.pc2 --modes 16")]
 pub struct Args {
     /// The rest shape: OBJ, STL, PLY or OFF, told apart by content
     mesh: PathBuf,
-    /// What to write: NAME.dibs, a blob, or NAME.rs, Rust source to be included
+    /// What to write: NAME.dibs, a blob, or NAME.rs, a Rust module that includes NAME.dibs beside it
     #[arg(short, long)]
     output: PathBuf,
     /// The largest stretch that the tree must cover: a factor of at least 1
@@ -35,7 +35,7 @@ pub struct Args {
     /// Bits of an index; by default 16 up to 65,536 vertices, else 32
     #[arg(long, value_enum)]
     index: Option<Bits>,
-    /// Name of the Rust static; by default the output file's name in capitals
+    /// Name of the Rust module; by default the output file's
     #[arg(long)]
     name: Option<String>,
     #[command(flatten)]
@@ -92,23 +92,16 @@ pub fn run(args: &Args) -> Result<()> {
         tree = fit.add(&tree, count)?;
     }
     if is_source {
-        tree.write_rust(&args.output, &static_name(args))?;
+        tree.write_rust(&args.output, &module_name(args))?;
     } else {
         tree.write_blob(&args.output)?;
     }
     let summary = tree.summary();
-    let unmeasurable = summary.first_unmeasurable.map(|[a, b, c]| {
-        format!(
-            "{} triangles (the first has the vertices {a}, {b} and {c}) are too small for the \
-             controller's stretch check, which would refuse every frame: weld or drop them",
-            summary.unmeasurable
-        )
-    });
-    if let Some(warning) = &unmeasurable {
+    for warning in summary.warnings() {
         eprintln!("warning: {name}: {warning}");
     }
     if args.json {
-        let warnings: Vec<String> = report.warnings().chain(unmeasurable).collect();
+        let warnings: Vec<String> = report.warnings().chain(summary.warnings()).collect();
         let output = args.output.display().to_string();
         println!(
             "{:#}",
@@ -179,15 +172,15 @@ fn build(
     tree
 }
 
-/// The name asked for, or the output file's, made fit for a Rust static.
-fn static_name(args: &Args) -> String {
+/// The name asked for, or the output file's, made fit for a Rust module.
+fn module_name(args: &Args) -> String {
     args.name.clone().unwrap_or_else(|| {
         let stem = args.output.file_stem().unwrap_or_else(|| Path::new("tree").as_os_str());
         let name: String = stem
             .to_string_lossy()
             .chars()
-            .map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_uppercase() } else { '_' })
+            .map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' })
             .collect();
-        if name.starts_with(|c: char| c.is_ascii_uppercase()) { name } else { format!("T{name}") }
+        if name.starts_with(|c: char| c.is_ascii_lowercase()) { name } else { format!("t{name}") }
     })
 }

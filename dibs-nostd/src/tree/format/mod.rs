@@ -1,8 +1,7 @@
 //! The tree's bytes: little-endian records at fixed places, read from flash without a parsing pass.
 //!
 //! `docs/format.md` is the specification; this module is its only reader. Everything here is `const`
-//! so that a generated `static` is validated while the firmware compiles, by the code that validates
-//! a blob when it boots.
+//! so that a tree may be validated in a constant too; a generated one is validated when it boots.
 
 pub(crate) mod several;
 
@@ -18,6 +17,10 @@ pub const HEADER_BYTES: usize = 64;
 pub const SECTION_BYTES: usize = 12;
 /// Where the checksum stands in the header. It covers every other byte.
 pub const CHECKSUM_AT: usize = 60;
+/// Where the header states the number of vertices.
+pub(crate) const VERTICES_AT: usize = 12;
+/// Where the header states the entries that a traversal's stack needs.
+pub(crate) const STACK_AT: usize = 24;
 /// Every section starts at a multiple of this.
 pub const SECTION_ALIGN: usize = 16;
 /// Most entries that a traversal's stack may need, whatever the tree.

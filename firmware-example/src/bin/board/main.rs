@@ -18,36 +18,44 @@ mod stack;
 mod uart;
 mod vectors;
 
-use controller::surface::{SURFACE, SurfaceFrames};
 use controller::telemetry::{MAX_FRAMED, Tick, frame};
-use controller::{BusStatus, Control, Receiver, STATUS_FRAMED, Upkeep};
+use controller::{BusStatus, Control, Receiver, STATUS_FRAMED, Upkeep, surface};
 use cortex_m_rt::entry;
 use heapless::spsc::{Consumer, Queue};
 
 /// Records that wait for the line.
 const QUEUE: usize = 64;
 
-static FRAMES: SurfaceFrames = SurfaceFrames::new();
+static FRAMES: surface::Surface = surface::Surface::new();
 static BUS: BusStatus = BusStatus::new();
 
 #[entry]
 fn main() -> ! {
     static mut RECORDS: Queue<Tick, QUEUE> = Queue::new();
+    static mut TREE: Option<surface::Tree> = None;
     let (producer, consumer) = RECORDS.split();
 
+    // Once, before anything runs on it; from then on `Upkeep` watches it.
+    let tree = match surface::TREE.validate() {
+        Ok(tree) => TREE.insert(tree),
+        Err(error) => {
+            defmt::error!("the tree in flash is damaged: {}", error);
+            semihosting::exit(false)
+        }
+    };
     defmt::info!(
         "{} triangles, {} vertices, mesh {=u32:08x}, stretch limit {}",
-        SURFACE.triangle_count(),
-        SURFACE.vertex_count(),
-        SURFACE.mesh_id(),
-        SURFACE.stretch()
+        tree.triangle_count(),
+        tree.vertex_count(),
+        tree.mesh_id(),
+        tree.stretch()
     );
     let Some((writer, reader)) = FRAMES.split() else { semihosting::exit(false) };
-    let Ok(control) = Control::new(reader, &BUS) else {
+    let Ok(control) = Control::new(tree, reader, &BUS) else {
         defmt::error!("the controller's constants are out of range");
         semihosting::exit(false)
     };
-    let Ok(receiver) = Receiver::new(writer, &BUS) else {
+    let Ok(receiver) = Receiver::new(tree, writer, &BUS) else {
         defmt::error!("the tree has nothing to measure stretch against");
         semihosting::exit(false)
     };

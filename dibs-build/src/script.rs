@@ -1,0 +1,176 @@
+//! A build script in one line.
+
+use std::env;
+use std::path::{Path, PathBuf};
+
+use crate::{Builder, BuiltTree, Mesh, ReadOptions, read_limits};
+
+/// Begins the tree of a build script, from a mesh file or a [`Mesh`]: [`TreeScript::emit`] ends it.
+///
+/// The `main` of a `build.rs`:
+///
+/// ```no_run
+/// dibs_build::tree("heart.ply").stretch(1.5).emit("heart");
+/// ```
+///
+/// Paths are relative to the package, as everywhere in build scripts.
+#[must_use = "nothing is built before `emit`"]
+pub fn tree(mesh: impl Into<MeshSource>) -> TreeScript {
+    TreeScript {
+        mesh: mesh.into(),
+        reading: ReadOptions::default(),
+        limits: None,
+        #[cfg(feature = "modes")]
+        modes: None,
+        builder: Builder::new(),
+    }
+}
+
+/// Where a build script's mesh comes from.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum MeshSource {
+    /// A file: OBJ, STL, PLY or OFF.
+    File(PathBuf),
+    /// A mesh that the script has made.
+    Mesh(Mesh),
+}
+
+impl<P: AsRef<Path> + ?Sized> From<&P> for MeshSource {
+    fn from(path: &P) -> Self {
+        Self::File(path.as_ref().to_path_buf())
+    }
+}
+
+impl From<PathBuf> for MeshSource {
+    fn from(path: PathBuf) -> Self {
+        Self::File(path)
+    }
+}
+
+impl From<Mesh> for MeshSource {
+    fn from(mesh: Mesh) -> Self {
+        Self::Mesh(mesh)
+    }
+}
+
+/// The tree of a build script, as [`tree`] begins it.
+#[derive(Clone, Debug)]
+#[must_use = "nothing is built before `emit`"]
+pub struct TreeScript {
+    mesh: MeshSource,
+    reading: ReadOptions,
+    limits: Option<PathBuf>,
+    #[cfg(feature = "modes")]
+    modes: Option<(PathBuf, usize)>,
+    builder: Builder<'static>,
+}
+
+impl TreeScript {
+    /// The largest stretch that the tree must cover: a factor of at least 1, 1.5 unless it is said.
+    pub fn stretch(mut self, limit: f32) -> Self {
+        self.builder = self.builder.stretch(limit);
+        self
+    }
+
+    /// A limit for each triangle instead, from a file that `dibs stretch --limits` has written.
+    pub fn limits(mut self, file: impl Into<PathBuf>) -> Self {
+        self.limits = Some(file.into());
+        self
+    }
+
+    /// Adds displacement modes fitted to a recorded motion, a PC2 file.
+    #[cfg(feature = "modes")]
+    pub fn modes(mut self, motion: impl Into<PathBuf>, count: usize) -> Self {
+        self.modes = Some((motion.into(), count));
+        self
+    }
+
+    /// How the mesh file is read.
+    pub fn reading(mut self, options: ReadOptions) -> Self {
+        self.reading = options;
+        self
+    }
+
+    /// What else the builder can do: `with(|builder| builder.with_rest_shape(false))`.
+    pub fn with(mut self, change: impl FnOnce(Builder<'static>) -> Builder<'static>) -> Self {
+        self.builder = change(self.builder);
+        self
+    }
+
+    /// Builds the tree and writes it where `dibs_nostd::include_tree!(name)` finds it.
+    ///
+    /// Tells cargo to run the script again when a file that was read, or the script, has changed, and only
+    /// then; shows as cargo's warnings what is unusual about the mesh. If anything fails, the script ends
+    /// with one sentence as cargo's error: the file, the element, the remedy.
+    pub fn emit(self, name: &str) {
+        if let Err(error) = self.try_emit(name) {
+            println!("cargo::error={error}");
+            std::process::exit(1);
+        }
+    }
+
+    /// The same for a script that goes on after an error.
+    ///
+    /// # Errors
+    /// Whatever reading, building or writing returns.
+    pub fn try_emit(self, name: &str) -> Result<BuiltTree, Box<dyn std::error::Error>> {
+        println!("cargo::rerun-if-changed=build.rs");
+        for file in self.files() {
+            println!("cargo::rerun-if-changed={}", file.display());
+        }
+        let out =
+            env::var_os("OUT_DIR").ok_or("OUT_DIR is not set: call this from a build script")?;
+        let label = match &self.mesh {
+            MeshSource::File(path) => path.display().to_string(),
+            MeshSource::Mesh(_) => name.to_owned(),
+        };
+        let built = self.build(&label)?;
+        built.write_rust(Path::new(&out).join(name).with_extension("rs"), name)?;
+        Ok(built)
+    }
+
+    /// Every file that is read.
+    fn files(&self) -> impl Iterator<Item = &Path> {
+        let mesh = match &self.mesh {
+            MeshSource::File(path) => Some(path.as_path()),
+            MeshSource::Mesh(_) => None,
+        };
+        #[cfg(feature = "modes")]
+        let motion = self.modes.as_ref().map(|(path, _)| path.as_path());
+        #[cfg(not(feature = "modes"))]
+        let motion = None;
+        [mesh, self.limits.as_deref(), motion].into_iter().flatten()
+    }
+
+    fn build(self, label: &str) -> Result<BuiltTree, Box<dyn std::error::Error>> {
+        let mesh = match self.mesh {
+            MeshSource::File(path) => {
+                let import = self.reading.read(path)?;
+                warn(label, import.report.warnings());
+                import.mesh
+            }
+            MeshSource::Mesh(mesh) => mesh,
+        };
+        let builder = match &self.limits {
+            Some(path) => self.builder.limits(read_limits(path, &mesh)?),
+            None => self.builder,
+        };
+        let built = builder.build(&mesh).map_err(|error| format!("{label}: {error}"))?;
+        warn(label, built.summary().warnings());
+        #[cfg(feature = "modes")]
+        if let Some((path, count)) = self.modes {
+            let motion = crate::Motion::read_pc2(&path)?;
+            let failed = |error| format!("{}: {error}", path.display());
+            let fit = crate::modes::ModalFit::new(&mesh, &motion).map_err(failed)?;
+            return built.with_modes(&fit, count).map_err(|error| failed(error).into());
+        }
+        Ok(built)
+    }
+}
+
+fn warn(label: &str, warnings: impl Iterator<Item = String>) {
+    for warning in warnings {
+        println!("cargo::warning={label}: {warning}");
+    }
+}

@@ -1,0 +1,25 @@
+//! Including the module that `dibs-build` generates for a tree.
+
+/// Includes the module of a tree that a build script emitted: `include_tree!("heart")` gives `mod heart`.
+///
+/// The module has all that follows from the tree, so that a program states none of it:
+///
+/// | item | is |
+/// |---|---|
+/// | `TREE` | the bytes in flash, a [`TreeBytes`](crate::TreeBytes): `TREE.validate()` gives the `Tree` |
+/// | `Surface` | the double buffer for its vertices, a [`Frames`](crate::Frames) |
+/// | `Receiver` | the bus's end of it, an [`Assembler`](crate::Assembler) that measures stretch in slices |
+/// | `Reader` | the control loop's end of it |
+/// | `Query` | a [`Query`](crate::Query) with the stack that the tree needs; `WideQuery` for large processors |
+/// | `VERTICES`, `STACK`, `Index` | the sizes, for types of your own |
+/// | `CENTRE`, `REACH` | the rest shape's bounding box, where the tree carries its rest shape |
+///
+/// A tree with modes brings `MODES` and a module `modal` with the types for surfaces of so many weights.
+///
+/// The build script is `fn main() { dibs_build::tree("heart.ply").stretch(1.5).emit("heart") }`.
+#[macro_export]
+macro_rules! include_tree {
+    ($name:literal) => {
+        ::core::include!(::core::concat!(::core::env!("OUT_DIR"), "/", $name, ".rs"));
+    };
+}

@@ -1,0 +1,80 @@
+//! A tree in flash, before its validation.
+
+use core::marker::PhantomData;
+
+use crate::tree::format::{STACK_AT, VERTICES_AT, u32_at};
+use crate::{FormatError, Index, Scrub, Tree};
+
+/// The bytes of a tree in flash, which nobody has validated yet.
+///
+/// No query takes these bytes: [`validate`](Self::validate) is the only way from them to a [`Tree`].
+/// Call it once, at start-up. The sizes of buffers and stacks are constants all the same, so that a
+/// `static` can be declared with them.
+///
+/// `dibs_build` generates one for each tree, as `TREE` of the module that
+/// [`include_tree!`](crate::include_tree) includes.
+///
+/// ```
+/// use dibs_nostd::{Query, TreeBytes};
+///
+/// # let (mesh, _) = dibs_build::generate::heart(320).unwrap();
+/// # let built = dibs_build::Builder::new().build(&mesh).unwrap();
+/// let stored = TreeBytes::<u16>::new(built.blob());
+/// let tree = stored.validate()?;
+/// let query = Query::<_, 32>::new(&tree)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct TreeBytes<'a, I> {
+    bytes: &'a [u8],
+    width: PhantomData<I>,
+}
+
+impl<'a, I: Index> TreeBytes<'a, I> {
+    /// Bytes that are to be a tree with indices of type `I`.
+    #[must_use]
+    pub const fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, width: PhantomData }
+    }
+
+    /// Validates the bytes, as [`Tree::from_bytes`] does.
+    ///
+    /// Cost: linear in the bytes, some ten instructions each on a Cortex-M7.
+    ///
+    /// # Errors
+    /// [`FormatError`] names the first thing that is wrong and its value.
+    pub const fn validate(&self) -> Result<Tree<'a, I>, FormatError> {
+        Tree::from_bytes(self.bytes)
+    }
+
+    /// A background check of these bytes, for as long as the program runs.
+    #[must_use]
+    pub fn scrub(&self) -> Scrub<'a> {
+        Scrub::new(self.bytes)
+    }
+
+    /// The bytes.
+    #[must_use]
+    pub const fn bytes(&self) -> &'a [u8] {
+        self.bytes
+    }
+
+    /// Vertices that the header states: rows of a vertex table. 0 where there is no header.
+    #[must_use]
+    pub const fn vertex_count(&self) -> usize {
+        self.word(VERTICES_AT)
+    }
+
+    /// Entries that the header states for a query's stack. 0 where there is no header.
+    #[must_use]
+    pub const fn stack(&self) -> usize {
+        self.word(STACK_AT)
+    }
+
+    const fn word(&self, at: usize) -> usize {
+        match u32_at(self.bytes, at) {
+            Some(word) => word as usize,
+            None => 0,
+        }
+    }
+}
