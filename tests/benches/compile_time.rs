@@ -71,8 +71,10 @@ impl Crate {
         fs::write(root.join("Cargo.toml"), manifest)?;
         fs::copy(core.join("../Cargo.lock"), root.join("Cargo.lock"))?;
         let source = match tree {
-            None => "pub fn mesh_id(bytes: &[u8]) -> Option<u32> {\n    \
-                     dibs_nostd::Tree::<u32>::from_bytes(bytes).ok().map(|tree| tree.mesh_id())\n}\n",
+            None => {
+                "pub fn mesh_id(bytes: &[u8]) -> Option<u32> {\n    \
+                     dibs_nostd::Tree::<u32>::from_bytes(bytes).ok().map(|tree| tree.mesh_id())\n}\n"
+            }
             Some(tree) => {
                 tree.write_rust(root.join("src/heart.rs"), "heart")?;
                 "include!(\"heart.rs\");\npub fn mesh_id() -> Option<u32> {\n    \
