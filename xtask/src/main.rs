@@ -1,21 +1,13 @@
 //! `cargo xtask`: what needs more than cargo.
 
-mod apt;
-mod bench;
-mod demo;
-mod firmware;
-mod guarantees;
-mod nightly;
-mod process;
-mod qemu;
-mod steps;
+mod prove;
 mod test;
-mod toolchain;
-mod workspace;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use prove::Passed;
+use xtask::nightly;
 
 /// Finds or installs the cross toolchain and the emulator where a task needs them.
 /// `DIBS_CROSS=rustup|debian|none` forces one way to build for the board.
@@ -28,12 +20,19 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
-    Demo(demo::Options),
+    /// Streams a beating heart to the firmware, and checks every answer.
+    #[command(disable_help_flag = true)]
+    Demo(Passed),
     Test(test::Options),
-    Bench(bench::Options),
-    Guarantees(guarantees::Options),
+    /// Runs the paper's experiments.
+    #[command(disable_help_flag = true)]
+    Bench(Passed),
+    /// Measures every promise, and writes docs/guarantees.json and docs/guarantees.md.
+    #[command(disable_help_flag = true)]
+    Guarantees(Passed),
     /// Writes docs/performance.md: where a query's instructions go on the emulated board.
-    Profile,
+    #[command(disable_help_flag = true)]
+    Profile(Passed),
     Fuzz(nightly::FuzzOptions),
     /// Runs the tests of frames, bus and format under the address and the thread sanitizer.
     Sanitize,
@@ -43,11 +42,11 @@ enum Task {
 
 fn main() -> ExitCode {
     let result = match Arguments::parse().task {
-        Task::Demo(options) => demo::run(&options),
+        Task::Demo(passed) => prove::demo(&passed),
         Task::Test(options) => test::test(&options),
-        Task::Bench(options) => bench::run(&options),
-        Task::Guarantees(options) => guarantees::run(&options),
-        Task::Profile => guarantees::profile::run(),
+        Task::Bench(passed) => prove::run("bench", &passed),
+        Task::Guarantees(passed) => prove::run("guarantees", &passed),
+        Task::Profile(passed) => prove::run("profile", &passed),
         Task::Fuzz(options) => or_say(nightly::missing(), || nightly::fuzz_by_hand(&options)),
         Task::Sanitize => or_say(nightly::missing(), nightly::sanitize_by_hand),
         Task::Miri => or_say(nightly::miri_missing(), nightly::miri),

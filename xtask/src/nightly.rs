@@ -30,6 +30,7 @@ pub struct FuzzOptions {
 
 /// What came of a fuzz target.
 pub struct Fuzzed {
+    /// Its name.
     pub target: &'static str,
     /// Inputs that it ran.
     pub inputs: u64,

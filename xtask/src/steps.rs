@@ -1,9 +1,11 @@
 //! Steps that are run one after the other, whatever fails, and listed at the end.
 
+use std::fs;
+use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 
 use crate::process::run;
 use crate::workspace;
@@ -11,8 +13,12 @@ use crate::workspace;
 /// Lines of an error that the list repeats: a list of broken promises starts with a heading.
 const REASON_LINES: usize = 4;
 
+const PASSED: &str = "passed";
+const FAILED: &str = "FAILED";
+
 /// What a step came to.
 pub enum Outcome {
+    /// It did what it should.
     Passed,
     /// It could not run here; the reason.
     Skipped(String),
@@ -22,8 +28,6 @@ pub enum Outcome {
 #[derive(Default)]
 pub struct Steps {
     lines: Vec<String>,
-    passed: usize,
-    failed: usize,
 }
 
 impl Steps {
@@ -43,28 +47,45 @@ impl Steps {
         let result = step();
         let seconds = start.elapsed().as_secs();
         let line = match result {
-            Ok(Outcome::Passed) => {
-                self.passed += 1;
-                format!("passed   {seconds:4} s  {name}")
-            }
+            Ok(Outcome::Passed) => format!("{PASSED}   {seconds:4} s  {name}"),
             Ok(Outcome::Skipped(reason)) => format!("skipped  {seconds:4} s  {name}: {reason}"),
             Err(error) => {
-                self.failed += 1;
                 eprintln!("error: {error:#}");
                 let reason = format!("{error:#}");
                 let lines: Vec<_> = reason.lines().map(str::trim).take(REASON_LINES).collect();
-                format!("FAILED   {seconds:4} s  {name}: {}", lines.join(" "))
+                format!("{FAILED}   {seconds:4} s  {name}: {}", lines.join(" "))
             }
         };
         self.lines.push(line);
     }
 
+    /// Lists the steps in a file, for the program that has started this one.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn write(&self, file: &Path) -> Result<()> {
+        fs::write(file, self.lines.join("\n"))
+            .with_context(|| format!("cannot write {}", file.display()))
+    }
+
+    /// Takes over the steps that another program has listed.
+    ///
+    /// # Errors
+    /// Where there is no such list.
+    pub fn read(&mut self, file: &Path) -> Result<()> {
+        let list = fs::read_to_string(file)
+            .with_context(|| format!("no list of steps in {}", file.display()))?;
+        self.lines.extend(list.lines().map(str::to_owned));
+        Ok(())
+    }
+
     /// Lists the steps; ends the program where one failed.
     pub fn finish(self) {
+        let count = |word| self.lines.iter().filter(|line| line.starts_with(word)).count();
         println!("\n{}", self.lines.join("\n"));
-        println!("{} passed, {} failed", self.passed, self.failed);
+        println!("{} passed, {} failed", count(PASSED), count(FAILED));
         // The list above says what; a message of its own would no longer be its last line.
-        if self.failed > 0 {
+        if count(FAILED) > 0 {
             std::process::exit(1);
         }
     }

@@ -4,14 +4,13 @@ use std::process::Command;
 use std::time::Duration;
 
 use anyhow::{Result, ensure};
+use xtask::process::{quiet, run};
+use xtask::qemu;
+use xtask::steps::{Outcome, Steps};
+use xtask::toolchain::Cross;
+use xtask::workspace;
 
-use crate::demo;
-use crate::guarantees::{self, Effort};
-use crate::process::{quiet, run};
-use crate::qemu;
-use crate::steps::{Outcome, Steps};
-use crate::toolchain::Cross;
-use crate::workspace;
+use crate::prove;
 
 /// Runs every check: format, lints, documentation, tests, oldest compiler, the board's build, and a
 /// short demo on the emulated board.
@@ -48,10 +47,22 @@ pub fn test(options: &Options) -> Result<()> {
         }
         Err(error) => steps.run("toolchain for the board", || Err(error)),
     }
-    guarantees::test(Effort { demo_seconds: options.demo_seconds, ..Effort::TEST }, &mut steps);
-    steps.run("demo on this computer", || demo_on_host(options.demo_seconds));
+    if let Err(error) = checks(options.demo_seconds, &mut steps) {
+        steps.run("checks of tests/prove", || Err(error));
+    }
     steps.finish();
     Ok(())
+}
+
+/// The checks of `tests/prove`, whose steps join those here.
+fn checks(demo_seconds: u32, steps: &mut Steps) -> Result<()> {
+    let list = workspace::target().join("steps.txt");
+    // So that the list of an earlier run is not taken for this one's.
+    std::fs::write(&list, "")?;
+    let mut prove = prove::command(&[]);
+    prove.args(["test", "--demo-seconds", &demo_seconds.to_string(), "--steps"]).arg(&list);
+    run(&mut prove)?;
+    steps.read(&list)
 }
 
 /// `cargo check` with the compiler that `rust-version` names.
@@ -117,9 +128,4 @@ fn cycles(cross: &Cross) -> Result<Outcome> {
     ensure!(said.contains("the cycle counter stands still"), "the emulator counts cycles");
     ensure!(!said.contains("base: 0,") && said.contains("Cost {"), "no cost was measured");
     Ok(Outcome::Passed)
-}
-
-fn demo_on_host(seconds: u32) -> Result<Outcome> {
-    demo::run(&demo::Options { seconds, host: true, ..demo::Options::default() })
-        .map(|()| Outcome::Passed)
 }

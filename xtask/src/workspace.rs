@@ -13,8 +13,3 @@ pub fn root() -> PathBuf {
 pub fn target() -> PathBuf {
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |dir| root().join(dir))
 }
-
-/// What the demo leaves: `target/demo` at the top of the repository, wherever cargo builds.
-pub fn demo() -> PathBuf {
-    root().join("target").join("demo")
-}

@@ -1,0 +1,132 @@
+//! The demo on the emulated board: deadlines, answers, and every published frame read back.
+
+use std::fs;
+
+use anyhow::{Context, Result};
+use serde_json::Value;
+use xtask::steps::Outcome;
+use xtask::workspace;
+
+use crate::demo;
+use crate::harness::figures::Figures;
+use crate::harness::promise::{
+    Bound, Promise,
+    criteria::{FLOW, MEMORY, TIMING},
+    note,
+};
+use crate::harness::{Check, Effort};
+
+pub const CHECK: Check = Check {
+    name: "demo on the emulated board",
+    run: check,
+    promises: &[
+        Promise {
+            id: "stack.measured",
+            says: "Stack used in the demo, by the paint that is gone",
+            criterion: MEMORY,
+            bound: Bound::NotAbove("stack.bound"),
+            unit: "bytes",
+            limits: "One run's depth.",
+        },
+        note("demo.ticks"),
+        Promise {
+            id: "demo.misses",
+            says: "No control tick at 1 kHz is missed or late while the bus is busy throughout",
+            criterion: TIMING,
+            bound: Bound::Is(0.0),
+            unit: "of {demo.ticks} ticks on the emulated board",
+            limits: "500 million instructions a second, one a cycle.",
+        },
+        Promise {
+            id: "demo.mismatches",
+            says: "Every answer of the demo agrees with exhaustive search in f64",
+            criterion: FLOW,
+            bound: Bound::Is(0.0),
+            unit: "of {demo.ticks} ticks",
+            limits: "",
+        },
+        Promise {
+            id: "demo.latency",
+            says: "A control tick begins at once: the longest section with interrupts disabled is shorter than",
+            criterion: TIMING,
+            bound: Bound::AtMost(2.0),
+            unit: "µs",
+            limits: "From the moment that it is due to its first instruction, exception entry included.",
+        },
+        Promise {
+            id: "demo.tick",
+            says: "Longest control tick, from the moment that it is due to its end",
+            criterion: TIMING,
+            bound: Bound::AtMost(1_000.0),
+            unit: "µs",
+            limits: "At 500 million instructions a second.",
+        },
+        note("demo.compared"),
+        Promise {
+            id: "demo.wrong",
+            says: "Every frame that the board published is, to the bit, one that was sent",
+            criterion: FLOW,
+            bound: Bound::Is(0.0),
+            unit: "of {demo.compared} frames, read back by a checksum of all positions in the board's memory",
+            limits: "CRC-32.",
+        },
+        Promise {
+            id: "interrupts.masked",
+            says: "Longest section with all interrupts disabled, by the clock around it: start-up takes the peripherals",
+            criterion: TIMING,
+            bound: Bound::AtMost(1.0),
+            unit: "µs at most, before the first tick; after that there is none",
+            limits: "The clock counts in 0.04 µs, 20 instructions. The one function of the row below.",
+        },
+        Promise {
+            id: "interrupts.bus-masked",
+            says: "Longest section with the bus interrupt disabled: a slice of the checks in the background",
+            criterion: TIMING,
+            bound: Bound::AtMost(20.0),
+            unit: "µs",
+            limits: "Control ticks in its midst, which keep the bus waiting anyway, taken off. A UART with a buffer, \
+         or DMA, bridges both.",
+        },
+    ],
+};
+
+/// Takes over the demo's report.
+fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
+    let report = report_of(effort.demo_seconds, false)?;
+    for (name, field) in [
+        ("demo.ticks", "ticks"),
+        ("demo.misses", "deadline_misses"),
+        ("demo.latency", "latency_max_us"),
+        ("demo.tick", "tick_max_us"),
+        ("demo.mismatches", "mismatches"),
+        ("demo.compared", "frames_compared"),
+        ("demo.wrong", "frames_published_wrong"),
+        ("interrupts.masked", "masked_max_us"),
+        ("interrupts.bus-masked", "bus_masked_max_us"),
+        ("stack.measured", "stack_bytes"),
+    ] {
+        figures.note(name, number(&report[field], field)?);
+    }
+    Ok(Outcome::Passed)
+}
+
+/// The report of a demo, with faults on the bus or without.
+pub fn report_of(seconds: u32, faults: bool) -> Result<Value> {
+    let name = if faults { "demo-faults" } else { "demo" };
+    let output = workspace::target().join("guarantees").join(name);
+    demo::run(&demo::Options {
+        seconds,
+        faults,
+        seed: 1,
+        board_only: true,
+        output: Some(output.clone()),
+        ..demo::Options::default()
+    })?;
+    let text = fs::read_to_string(output.join("report.json"))?;
+    Ok(serde_json::from_str(&text)?)
+}
+
+/// A number of the report.
+pub fn number(value: &Value, field: &str) -> Result<f64> {
+    value.as_f64().with_context(|| format!("no {field} in the report"))
+}

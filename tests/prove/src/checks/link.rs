@@ -1,0 +1,58 @@
+//! The firmware links, and so has no panic path; and it has no allocator.
+
+use anyhow::{Context, Result, ensure};
+use xtask::firmware::{self, Surface};
+use xtask::steps::Outcome;
+
+use crate::footprint::Footprint;
+use crate::harness::figures::Figures;
+use crate::harness::promise::{
+    Bound, Promise,
+    criteria::{FAULTS, RESOURCES},
+};
+use crate::harness::{Check, Effort};
+use crate::probe::board;
+
+pub const CHECK: Check = Check {
+    name: "firmware without panic and allocator",
+    run: check,
+    promises: &[
+        Promise {
+            id: "panics",
+            says: "The firmware links, and so has no panic path; one put in on purpose breaks the link",
+            criterion: FAULTS,
+            bound: Bound::Is(0.0),
+            unit: "panic paths",
+            limits: "The release build. Debug builds stop instead.",
+        },
+        Promise {
+            id: "allocators",
+            says: "No allocator in the firmware",
+            criterion: RESOURCES,
+            bound: Bound::Is(0.0),
+            unit: "allocator symbols",
+            limits: "",
+        },
+    ],
+};
+
+/// A panic path put in on purpose must break the link, so that a link is known to show something.
+fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
+    let (cross, surface) = (board()?, Surface::default());
+    let footprint = Footprint::read(&firmware::build(&cross, &surface)?)?;
+    figures.note("allocators", footprint.allocators.len() as f64);
+    figures.note("panics", footprint.panics.len() as f64);
+    let found = [&footprint.allocators[..], &footprint.panics].concat().join(", ");
+    ensure!(found.is_empty(), "the firmware has {found}");
+
+    let mut planted = firmware::command(&cross, &surface);
+    let build = planted.args(["--features", "planted-panic"]).output()?;
+    let said = String::from_utf8_lossy(&build.stderr);
+    ensure!(!build.status.success(), "a planted panic path did not break the link");
+    ensure!(said.contains("a_panic_path_survived"), "it broke something else:\n{said}");
+
+    let mut in_rounds = firmware::command(&cross, &surface);
+    xtask::process::run(in_rounds.args(["--features", "in-rounds"]))
+        .context("queries in rounds have a panic path")?;
+    Ok(Outcome::Passed)
+}

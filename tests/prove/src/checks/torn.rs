@@ -1,0 +1,57 @@
+//! Frames published in the middle of queries, on the emulated board.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Result, ensure};
+use dibs_build::{Builder, IndexWidth};
+use dibs_tests::surfaces;
+use xtask::qemu;
+use xtask::steps::Outcome;
+
+use crate::harness::figures::Figures;
+use crate::harness::promise::{Bound, Promise, criteria::FLOW, note};
+use crate::harness::{Check, Effort};
+use crate::probe::{board, build_for_board, run_on_board};
+
+pub const CHECK: Check = Check {
+    name: "torn reads on the board",
+    run: check,
+    promises: &[
+        note("torn.queries"),
+        note("torn.published"),
+        note("torn.put-off"),
+        note("torn.mixed-without"),
+        Promise {
+            id: "torn.mixed",
+            says: "No query sees vertices of two frames, published in its midst",
+            criterion: FLOW,
+            bound: Bound::Is(0.0),
+            unit: "of {torn.queries} queries on the emulated board while {torn.published} frames were published and \
+         {torn.put-off} put off; without the protocol {torn.mixed-without} queries do",
+            limits: "",
+        },
+    ],
+};
+
+/// Runs queries under interrupts that publish frames.
+fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
+    let program = build_for_board(&board()?, "torn")?;
+    let built = Builder::new().index(IndexWidth::Bits16).build(&surfaces::ball(3))?;
+    let mut script = effort.torn.to_le_bytes().to_vec();
+    script.extend((built.blob().len() as u32).to_le_bytes());
+    script.extend(built.blob());
+    let counts = run_on_board(&program, &script, qemu::BOARD, |answers: &Path| {
+        let bytes = fs::read(answers)?;
+        let words = bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        Ok(words.collect::<Vec<_>>())
+    })?;
+    ensure!(counts.len() == 5, "{} counts, not 5", counts.len());
+    let names = ["queries", "mixed", "published", "put-off", "mixed-without"];
+    for (name, count) in names.into_iter().zip(&counts) {
+        figures.note(&format!("torn.{name}"), f64::from(*count));
+    }
+    // So that the check is known to see it.
+    ensure!(counts[4] > 0, "no query saw two epochs even without the protocol");
+    Ok(Outcome::Passed)
+}

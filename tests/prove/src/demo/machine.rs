@@ -1,0 +1,102 @@
+//! Where the controller runs: on the emulated board, or as a program on this computer.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result};
+use xtask::firmware;
+use xtask::process::run;
+use xtask::toolchain::Cross;
+use xtask::{qemu, workspace};
+
+use super::Options;
+use super::scene::Scene;
+use crate::footprint::Footprint;
+
+/// A controller that is built and ready to run.
+pub enum Machine {
+    /// The firmware on QEMU's Cortex-M7.
+    Board {
+        /// The firmware.
+        program: PathBuf,
+        /// What it needs of the board.
+        footprint: Footprint,
+        /// The toolchain that built it.
+        toolchain: String,
+        /// The emulator's version.
+        emulator: String,
+    },
+    /// The same control logic as a program.
+    Host {
+        /// The program.
+        program: PathBuf,
+        /// Why it is not the board.
+        reason: String,
+    },
+}
+
+impl Machine {
+    /// Builds the controller: for the board where that is possible and wanted.
+    pub fn prepare(options: &Options, scene: &Scene) -> Result<Self> {
+        if options.host {
+            return Self::host(scene, "as asked by --host".to_owned());
+        }
+        match Cross::find().and_then(|cross| Ok((cross, qemu::find()?))) {
+            Ok((cross, emulator)) => {
+                let program = firmware::build(&cross, &scene.surface)?;
+                let footprint = Footprint::read(&program)?;
+                Ok(Self::Board { program, footprint, toolchain: cross.describe(), emulator })
+            }
+            Err(error) if options.board_only => Err(error),
+            Err(error) => {
+                let line = "!".repeat(78);
+                eprintln!("{line}\n{error:#}\n");
+                eprintln!("NO BOARD: running the control logic on this computer instead.");
+                eprintln!("Instructions, deadlines, flash, RAM and stack will be missing.\n{line}");
+                Self::host(scene, format!("no board: {error:#}"))
+            }
+        }
+    }
+
+    fn host(scene: &Scene, reason: String) -> Result<Self> {
+        // This program contains the controller's library too. A folder of its own for another surface, and
+        // the same selection of packages for this one, keep cargo from building anything twice.
+        let folder = if scene.surface.is_default() {
+            workspace::target()
+        } else {
+            workspace::target().join("host-controller")
+        };
+        let mut cargo = Command::new("cargo");
+        cargo.args(["build", "--quiet", "--release", "--package", "dibs-prove"]);
+        cargo.args(["--package", "firmware-example", "--bin", "host", "--target-dir"]).arg(&folder);
+        cargo.current_dir(workspace::root());
+        scene.surface.describe_to(&mut cargo);
+        run(&mut cargo).context("the host's controller does not build")?;
+        Ok(Self::Host { program: folder.join("release").join("host"), reason })
+    }
+
+    /// The command that runs the controller for `ticks` ticks, with its bus and its telemetry on two
+    /// sockets that it connects to.
+    pub fn command(&self, bus: &Path, telemetry: &Path, ticks: u32) -> Command {
+        let mut command = match self {
+            Self::Board { program, .. } => qemu::command(program, bus, telemetry, ticks),
+            Self::Host { program, .. } => {
+                let mut command = Command::new(program);
+                command.arg(bus).arg(telemetry).arg(ticks.to_string());
+                command
+            }
+        };
+        command.stdin(Stdio::null());
+        command
+    }
+
+    /// One line for the user.
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Board { toolchain, emulator, .. } => {
+                format!("Cortex-M7 (mps2-an500) in {emulator}; built by {toolchain}")
+            }
+            Self::Host { reason, .. } => format!("program on this computer, {reason}"),
+        }
+    }
+}

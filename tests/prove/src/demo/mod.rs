@@ -1,0 +1,84 @@
+//! `cargo xtask demo`: a beating heart streamed to the controller, every answer checked.
+
+mod check;
+mod faults;
+pub mod machine;
+mod plot;
+mod report;
+pub mod scene;
+mod sender;
+pub mod session;
+mod timeline;
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use faults::Plan;
+use machine::Machine;
+use report::Report;
+use scene::Scene;
+use xtask::steps::Outcome;
+use xtask::workspace;
+
+/// Streams a beating heart to the firmware while its instrument moves around and through it, and
+/// checks every answer against exhaustive search.
+#[derive(clap::Args, Default)]
+pub struct Options {
+    /// Mesh of the surface at rest (OBJ, STL, PLY or OFF); the generated heart of 10,272 triangles
+    /// if absent.
+    #[arg(long, requires = "motion")]
+    pub mesh: Option<PathBuf>,
+    /// Its motion: a PC2 file with a position for each of the mesh's vertices in every frame.
+    #[arg(long, requires = "mesh")]
+    pub motion: Option<PathBuf>,
+    /// Limit on stretch that the tree is built for; by default 1.5 for the generated heart, and
+    /// what the motion needs (with 2 % to spare) for a mesh of your own.
+    #[arg(long)]
+    pub stretch: Option<f32>,
+    /// Seconds of the controller's time to run.
+    #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..=3600))]
+    pub seconds: u32,
+    /// Runs the controller as a program on this computer, without cross toolchain and QEMU.
+    #[arg(long)]
+    pub host: bool,
+    /// Puts faults of every kind on the bus, and silences it once for a while.
+    #[arg(long)]
+    pub faults: bool,
+    /// What the faults are drawn from.
+    #[arg(long, default_value_t = 1, requires = "faults")]
+    pub seed: u64,
+    /// Folder for the report and the pictures; `demo` in Cargo's target folder if absent.
+    #[arg(long)]
+    pub output: Option<PathBuf>,
+    /// Whether the board may be replaced by this computer where it cannot be had.
+    #[arg(skip)]
+    pub board_only: bool,
+}
+
+/// Runs the demo and writes its report and pictures; an error names each promise that was broken.
+pub fn run(options: &Options) -> Result<()> {
+    let scene = Scene::load(options)?;
+    println!("surface: {}", scene.describe());
+    let machine = Machine::prepare(options, &scene)?;
+    println!("controller: {}", machine.describe());
+
+    let folder = options.output.clone().unwrap_or_else(|| workspace::target().join("demo"));
+    std::fs::create_dir_all(&folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let faults = options.faults.then(|| Plan::new(options.seed, options.seconds));
+    let outcome = session::run(&scene, &machine, options.seconds, faults, &folder)?;
+    // Before anything is written: it names the commit, and whether it is clean.
+    let report = Report::new(&scene, &machine, &outcome)?;
+    plot::draw(&outcome, &folder)?;
+    if faults.is_some() {
+        timeline::draw(&outcome, &folder)?;
+    }
+    report.write(&folder)?;
+    report.print(&folder);
+    report.verdict()
+}
+
+/// The demo of `cargo xtask test`, on this computer.
+pub fn on_host(seconds: u32) -> Result<Outcome> {
+    run(&Options { seconds, host: true, ..Options::default() }).map(|()| Outcome::Passed)
+}

@@ -1,0 +1,146 @@
+//! The pictures of a run.
+
+use std::ops::Range;
+use std::path::Path;
+
+use anyhow::{Result, anyhow};
+use controller::TICK_RATE;
+use controller::telemetry::Tick;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use xtask::qemu;
+
+use super::report::force;
+use super::session::Outcome;
+
+/// Points of a curve: more cannot be seen.
+const POINTS: usize = 1_500;
+
+/// Bars of a histogram.
+const BINS: usize = 80;
+
+const BLUE_INK: RGBColor = RGBColor(31, 90, 160);
+const RED_INK: RGBColor = RGBColor(190, 50, 40);
+
+/// Draws `separation.svg` (with the force below it) and, where instructions were counted,
+/// `instructions.svg`.
+pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
+    let answered: Vec<&Tick> = outcome.ticks.iter().filter(|tick| tick.is_answered()).collect();
+    if answered.is_empty() {
+        return Ok(());
+    }
+    let picture = folder.join("separation.svg");
+    let root = SVGBackend::new(&picture, (900, 560)).into_drawing_area();
+    root.fill(&WHITE).map_err(failed)?;
+    let (upper, lower) = root.split_vertically(280);
+    curve(
+        &upper,
+        "separation (mm)",
+        BLUE_INK,
+        &extremes(&answered, |tick| tick.separation.into()),
+    )?;
+    curve(&lower, "force (N)", RED_INK, &extremes(&answered, |tick| force(tick).into()))?;
+    root.present().map_err(failed)?;
+
+    let instructions = |tick: &Tick| f64::from(tick.query_counts * qemu::INSTRUCTIONS_A_COUNT);
+    if answered.iter().any(|tick| tick.query_counts > 0) {
+        let picture = folder.join("instructions.svg");
+        let root = SVGBackend::new(&picture, (900, 560)).into_drawing_area();
+        root.fill(&WHITE).map_err(failed)?;
+        let (upper, lower) = root.split_vertically(280);
+        curve(&upper, "instructions a query", BLUE_INK, &extremes(&answered, instructions))?;
+        let values: Vec<f64> = answered.iter().map(|tick| instructions(tick)).collect();
+        histogram(&lower, "instructions a query", &values)?;
+        root.present().map_err(failed)?;
+    }
+    Ok(())
+}
+
+/// A value over time, thinned out so that every stretch of time keeps its least and largest.
+fn extremes(ticks: &[&Tick], value: impl Fn(&Tick) -> f64) -> Vec<(f64, f64)> {
+    let point = |tick: &&Tick| (f64::from(tick.tick) / f64::from(TICK_RATE), value(tick));
+    let of_chunk = |chunk: &[&Tick]| {
+        let by_value = |a: &(f64, f64), b: &(f64, f64)| a.1.total_cmp(&b.1);
+        let least = chunk.iter().map(point).min_by(by_value);
+        let most = chunk.iter().map(point).max_by(by_value);
+        let mut both: Vec<_> = least.into_iter().chain(most).collect();
+        both.sort_by(|a, b| a.0.total_cmp(&b.0));
+        both
+    };
+    ticks.chunks((2 * ticks.len()).div_ceil(POINTS)).flat_map(of_chunk).collect()
+}
+
+fn curve(
+    area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    name: &str,
+    ink: RGBColor,
+    points: &[(f64, f64)],
+) -> Result<()> {
+    let time = range(points.iter().map(|point| point.0));
+    let top = range(points.iter().map(|point| point.1)).end;
+    let mut chart = ChartBuilder::on(area)
+        .margin(12)
+        .x_label_area_size(36)
+        .y_label_area_size(70)
+        .build_cartesian_2d(time, 0.0..if top > 0.0 { top * 1.05 } else { 1.0 })
+        .map_err(failed)?;
+    chart
+        .configure_mesh()
+        .x_desc("time (s)")
+        .y_desc(name)
+        .light_line_style(TRANSPARENT)
+        .draw()
+        .map_err(failed)?;
+    chart.draw_series(LineSeries::new(points.iter().copied(), ink)).map_err(failed)?;
+    Ok(())
+}
+
+/// How often each value occurs, with the worst one marked.
+fn histogram(
+    area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    name: &str,
+    values: &[f64],
+) -> Result<()> {
+    let worst = values.iter().copied().fold(1.0, f64::max);
+    let width = worst / BINS as f64;
+    let mut bins = [0u32; BINS];
+    for value in values {
+        bins[((value / width) as usize).min(BINS - 1)] += 1;
+    }
+    let most = f64::from(bins.iter().copied().max().unwrap_or(1));
+    let mut chart = ChartBuilder::on(area)
+        .margin(12)
+        .x_label_area_size(36)
+        .y_label_area_size(70)
+        .build_cartesian_2d(0.0..worst * 1.05, 0.0..most * 1.1)
+        .map_err(failed)?;
+    chart
+        .configure_mesh()
+        .x_desc(name)
+        .y_desc("queries")
+        .light_line_style(TRANSPARENT)
+        .draw()
+        .map_err(failed)?;
+    let bar = |(bin, &count): (usize, &u32)| {
+        let left = bin as f64 * width;
+        Rectangle::new([(left, 0.0), (left + width, f64::from(count))], BLUE_INK.filled())
+    };
+    chart.draw_series(bins.iter().enumerate().map(bar)).map_err(failed)?;
+    let mark = [(worst, 0.0), (worst, most)];
+    chart.draw_series(LineSeries::new(mark, RED_INK.stroke_width(2))).map_err(failed)?;
+    let right = Pos::new(HPos::Right, VPos::Bottom);
+    let font = ("sans-serif", 13).into_font().color(&RED_INK).pos(right);
+    let text = Text::new(format!("worst {worst:.0}"), (worst, most * 1.01), font);
+    chart.draw_series([text]).map_err(failed)?;
+    Ok(())
+}
+
+fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
+    let (low, high) =
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+    low..high
+}
+
+fn failed(error: impl std::fmt::Display) -> anyhow::Error {
+    anyhow!("cannot draw: {error}")
+}

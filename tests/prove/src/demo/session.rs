@@ -1,0 +1,194 @@
+//! One run: the controller as a child process, a sender, a listener and a checker.
+
+use std::fs::File;
+use std::io::Read;
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::Path;
+use std::process::Child;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, mpsc};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail, ensure};
+use controller::TICK_RATE;
+use controller::telemetry::{MAX_FRAMED, Record, Summary, Tick};
+use dibs_nostd::wire::Deframer;
+use indicatif::{ProgressBar, ProgressStyle};
+use xtask::process::shown;
+use xtask::{qemu, workspace};
+
+use super::check::{Checked, Compared, check, compare};
+use super::faults::{Faults, Plan};
+use super::machine::Machine;
+use super::scene::Scene;
+use super::sender::{Link, send};
+
+/// Real time that a connected controller may stay silent.
+const SILENCE: Duration = Duration::from_secs(30);
+
+/// Everything that a run showed.
+pub struct Outcome {
+    /// The record of every tick.
+    pub ticks: Vec<Tick>,
+    /// The controller's own summary.
+    pub summary: Summary,
+    /// The check of every answer.
+    pub checked: Vec<Checked>,
+    /// The comparison of every published frame.
+    pub compared: Vec<Compared>,
+    /// What was done to the bus, if anything.
+    pub faults: Option<Faults>,
+    /// Ticks that were asked for.
+    pub ticks_asked: u32,
+    /// Frames sent to the last byte.
+    pub frames_sent: u32,
+    /// Whether the controller itself ended well.
+    pub exited_well: bool,
+    /// How the controller was started.
+    pub command: String,
+    /// Real time that the run took.
+    pub took: Duration,
+}
+
+/// Runs the controller for `seconds` of its own time.
+pub fn run(
+    scene: &Scene,
+    machine: &Machine,
+    seconds: u32,
+    faults: Option<Plan>,
+    folder: &Path,
+) -> Result<Outcome> {
+    let ticks_asked = seconds * TICK_RATE;
+    let sockets = tempfile::tempdir()?;
+    let (bus_path, telemetry_path) = (sockets.path().join("bus"), sockets.path().join("telemetry"));
+    let bus_socket = UnixListener::bind(&bus_path)?;
+    let telemetry_socket = UnixListener::bind(&telemetry_path)?;
+
+    let mut command = machine.command(&bus_path, &telemetry_path, ticks_asked);
+    // As one would type it at the top of the repository.
+    let shown = shown(&command)
+        .replace(&format!("{}/", workspace::root().display()), "")
+        .replace(&format!("{}/", sockets.path().display()), "");
+    // The firmware's log, in defmt's encoding: `defmt-print -e FIRMWARE < log.defmt`.
+    command.stdout(File::create(folder.join("log.defmt"))?);
+    let start = Instant::now();
+    let mut child = Guard(command.spawn().with_context(|| format!("cannot start `{shown}`"))?);
+    let bus = accept(&bus_socket, &mut child.0)?;
+    let telemetry = accept(&telemetry_socket, &mut child.0)?;
+
+    let link = Arc::new(Link::default());
+    let (to_check, answers) = mpsc::channel::<Tick>();
+    let (listened, sent, checked) = thread::scope(|scope| {
+        let sender = scope.spawn(|| send(scene, &link, bus, faults.as_ref()));
+        let checker = scope.spawn(|| {
+            answers.into_iter().map(|tick| check(scene, &link, &tick)).collect::<Result<Vec<_>>>()
+        });
+        let listened = listen(telemetry, &link, &to_check, ticks_asked);
+        link.over.store(true, Ordering::Relaxed);
+        drop(to_check);
+        (listened, joined(sender.join()), joined(checker.join()))
+    });
+    let (ticks, summary) = listened?;
+    let injected = sent?;
+    let mut compared = Vec::new();
+    for tick in &ticks {
+        compare(&link, tick, &mut compared);
+    }
+    let status = child.0.wait()?;
+    Ok(Outcome {
+        ticks,
+        summary,
+        checked: checked?,
+        compared,
+        faults: faults.map(|plan| Faults::new(&plan, injected)),
+        ticks_asked,
+        frames_sent: link.frames_sent.load(Ordering::Relaxed),
+        exited_well: status.success(),
+        command: shown,
+        took: start.elapsed(),
+    })
+}
+
+/// Ends the controller when the run fails halfway.
+struct Guard(Child);
+
+impl Drop for Guard {
+    fn drop(&mut self) {
+        // Both fail only where the controller has ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn joined<T>(result: thread::Result<Result<T>>) -> Result<T> {
+    result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+}
+
+/// Waits until the controller connects.
+fn accept(socket: &UnixListener, child: &mut Child) -> Result<UnixStream> {
+    socket.set_nonblocking(true)?;
+    let start = Instant::now();
+    loop {
+        match socket.accept() {
+            Ok((stream, _)) => {
+                stream.set_nonblocking(false)?;
+                return Ok(stream);
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => {
+                if let Some(status) = child.try_wait()? {
+                    bail!("the controller ended before it connected: {status}");
+                }
+                ensure!(start.elapsed() < SILENCE, "the controller does not connect");
+                thread::sleep(Duration::from_millis(5));
+            }
+            Err(error) => return Err(error.into()),
+        }
+    }
+}
+
+/// Reads telemetry until the summary, and hands every answer to the checker.
+fn listen(
+    mut telemetry: UnixStream,
+    link: &Link,
+    to_check: &mpsc::Sender<Tick>,
+    ticks_asked: u32,
+) -> Result<(Vec<Tick>, Summary)> {
+    telemetry.set_read_timeout(Some(SILENCE))?;
+    let style = "{bar:24} {pos}/{len} ticks  {msg}";
+    let bar = ProgressBar::new(ticks_asked.into()).with_style(ProgressStyle::with_template(style)?);
+    let mut deframer = Deframer::<MAX_FRAMED>::new();
+    let mut ticks = Vec::new();
+    let mut buffer = [0; 4096];
+    loop {
+        let bytes = telemetry.read(&mut buffer).context("the controller fell silent")?;
+        ensure!(bytes > 0, "the controller ended without a summary");
+        for &byte in &buffer[..bytes] {
+            let Some(packet) = deframer.push(byte) else { continue };
+            let record = packet.ok().and_then(Record::decode).context("damaged telemetry")?;
+            match record {
+                Record::Summary(summary) => {
+                    bar.finish_and_clear();
+                    return Ok((ticks, summary));
+                }
+                Record::Tick(tick) => {
+                    link.bytes.store(tick.bytes, Ordering::Relaxed);
+                    link.tick.store(tick.tick, Ordering::Relaxed);
+                    if tick.is_answered() {
+                        to_check.send(tick)?;
+                    }
+                    ticks.push(tick);
+                    bar.set_position(tick.tick.into());
+                    bar.set_message(line(&tick));
+                }
+            }
+        }
+    }
+}
+
+/// What the progress line says of a tick.
+fn line(tick: &Tick) -> String {
+    let instructions = u64::from(tick.query_counts) * u64::from(qemu::INSTRUCTIONS_A_COUNT);
+    let epoch = tick.epoch;
+    format!("frame {epoch}  separation {:6.2} mm  {instructions:6} instructions", tick.separation)
+}

@@ -1,0 +1,30 @@
+//! The measured figures, by name.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+/// Figures by name: numbers, and a few texts.
+#[derive(Default)]
+pub struct Figures {
+    measured: BTreeMap<String, Value>,
+}
+
+impl Figures {
+    /// A number.
+    pub fn note(&mut self, name: &str, value: f64) {
+        println!("{name}: {value}");
+        self.measured.insert(name.to_owned(), Value::from(value));
+    }
+
+    /// A text.
+    pub fn text(&mut self, name: &str, value: String) {
+        println!("{name}: {value}");
+        self.measured.insert(name.to_owned(), Value::from(value));
+    }
+
+    /// A figure, if it was measured.
+    pub fn get(&self, name: &str) -> Option<&Value> {
+        self.measured.get(name)
+    }
+}

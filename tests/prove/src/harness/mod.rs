@@ -1,0 +1,131 @@
+//! One harness for every promise. A check, one file in `checks/`, measures figures and says what each of them
+//! promises; the records join both in docs/guarantees.json, and docs/guarantees.md is made from the records.
+//! `cargo xtask test` runs the same checks on fewer cases, and compares their figures with the records.
+
+mod effort;
+mod faults;
+pub mod figures;
+mod markdown;
+pub mod promise;
+pub mod record;
+pub mod run;
+
+use anyhow::{Result, ensure};
+use xtask::steps::{Outcome, Steps};
+
+use crate::checks::CHECKS;
+pub use effort::Effort;
+use figures::Figures;
+use promise::Promise;
+use record::Raise;
+use run::Run;
+
+/// A check, and the promises that its figures are about.
+pub struct Check {
+    /// The step's name; `--only` selects by it.
+    pub name: &'static str,
+    /// One for every figure that the check measures.
+    pub promises: &'static [Promise],
+    /// Measures.
+    pub run: fn(&Effort, &mut Figures) -> Result<Outcome>,
+}
+
+/// Measures every promise, and writes docs/guarantees.json and docs/guarantees.md.
+#[derive(clap::Args)]
+pub struct Options {
+    /// Fits the constants of the cost model anew (`--only board`, `--only host`: of one machine), and ends; the
+    /// checks are another run, of a program that has them.
+    #[arg(long)]
+    fit: bool,
+    /// Seconds of each fuzz target.
+    #[arg(long, default_value_t = 60)]
+    fuzz_seconds: u32,
+    /// Makes docs/guarantees.md anew from docs/guarantees.json, and measures nothing.
+    #[arg(long)]
+    render: bool,
+    /// As few cases as `cargo xtask test` takes, for a quick look.
+    #[arg(long)]
+    quick: bool,
+    /// Only checks whose names contain this; the other records stay as they are.
+    #[arg(long)]
+    only: Option<String>,
+    /// Golden figures whose names begin so may be recorded above the lowest that was ever recorded.
+    #[arg(long, value_delimiter = ',', requires = "because")]
+    raise: Vec<String>,
+    /// The defect that was mended, or the feature that is worth it.
+    #[arg(long, default_value = "")]
+    because: String,
+}
+
+/// Measures, and writes the documents.
+pub fn guarantees(options: &Options) -> Result<()> {
+    let only = options.only.as_deref();
+    if options.fit {
+        return crate::checks::cost::fit(only);
+    }
+    if options.render {
+        return record::render();
+    }
+    let effort = if options.quick { Effort::TEST } else { Effort::FULL };
+    let effort = Effort { fuzz_seconds: options.fuzz_seconds, ..effort };
+    let raise = Raise { names: &options.raise, because: &options.because };
+    let mut steps = Steps::default();
+    let measured = run(&effort, only, &mut steps);
+    steps.run("documents", || record::write(&measured, raise).map(|()| Outcome::Passed));
+    steps.finish();
+    Ok(())
+}
+
+/// Runs the checks as steps of `cargo xtask test`, and compares their figures with the committed ones.
+pub fn test(effort: &Effort, steps: &mut Steps) {
+    let measured = run(effort, None, steps);
+    steps.run("figures within their bounds", || {
+        record::compare(&measured).map(|()| Outcome::Passed)
+    });
+}
+
+/// The figures of a run, and the checks that could not run here.
+pub struct Measured {
+    pub figures: Figures,
+    pub skipped: Vec<&'static str>,
+    pub run: Run,
+}
+
+/// Runs the checks, each as a step.
+fn run(effort: &Effort, only: Option<&str>, steps: &mut Steps) -> Measured {
+    let run = Run::now(effort.is_record);
+    let mut measured = Measured { figures: Figures::default(), skipped: Vec::new(), run };
+    for check in CHECKS.iter().filter(|check| only.is_none_or(|only| check.name.contains(only))) {
+        steps.run(check.name, || {
+            let outcome = (check.run)(effort, &mut measured.figures)?;
+            if matches!(outcome, Outcome::Skipped(_)) {
+                measured.skipped.push(check.name);
+            }
+            let broken = check.broken(&measured.figures);
+            ensure!(broken.is_empty(), "{}", broken.join("\n"));
+            Ok(outcome)
+        });
+    }
+    measured
+}
+
+impl Check {
+    /// The promises that the figures break, as far as they do not hang on the records.
+    fn broken(&self, figures: &Figures) -> Vec<String> {
+        self.promises.iter().filter_map(|promise| promise.broken(figures)).collect()
+    }
+}
+
+impl Promise {
+    /// The figure's fault, if it was measured and has one.
+    pub fn broken(&self, figures: &Figures) -> Option<String> {
+        let figure = figures.get(self.id)?;
+        let other = |name: &str| figures.get(name)?.as_f64();
+        // A text, or JSON's substitute for a number that is none, keeps no bound.
+        let is_kept = match figure.as_f64() {
+            Some(number) => self.bound.holds(number, other),
+            None => matches!(self.bound, promise::Bound::Informs),
+        };
+        (!is_kept).then(|| format!("{} is {figure}, and must be {}", self.id, self.bound))
+    }
+}

@@ -1,0 +1,73 @@
+//! When, where and of which commit something was measured.
+
+use std::process::Command;
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use xtask::process::quiet;
+use xtask::workspace;
+
+/// A run of this program.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Run {
+    /// UTC, to the minute.
+    pub date: String,
+    /// `-dirty` where anything but `docs`, which a run writes itself, differs from it.
+    pub commit: String,
+    pub compiler: String,
+    pub machine: String,
+    pub emulator: String,
+    /// `full`, or `test` for as few cases as a run of the tests takes.
+    pub size: String,
+}
+
+impl Run {
+    /// The one that has just begun.
+    pub fn now(is_full: bool) -> Self {
+        let dirty = said("git", &["status", "--porcelain", "--", ".", ":!docs"]);
+        let dirty = if dirty.is_empty() { "" } else { "-dirty" };
+        Self {
+            date: said("date", &["-u", "+%Y-%m-%dT%H:%MZ"]),
+            commit: said("git", &["rev-parse", "--short=12", "HEAD"]) + dirty,
+            compiler: said("rustc", &["--version"]),
+            machine: machine(),
+            emulator: said("qemu-system-arm", &["--version"]).lines().next().unwrap_or("").into(),
+            size: if is_full { "full" } else { "test" }.to_owned(),
+        }
+    }
+
+    /// Whether figures of both may stand side by side as those of one recording: all but the date is the same.
+    pub fn is_of_the_same(&self, other: &Self) -> bool {
+        Self { date: other.date.clone(), ..self.clone() } == *other
+    }
+
+    /// Whether it tried everything, on a commit that can be had again.
+    pub fn is_whole(&self) -> bool {
+        self.size == "full" && !self.commit.ends_with("-dirty") && self.commit != UNKNOWN
+    }
+
+    /// The day.
+    pub fn day(&self) -> &str {
+        self.date.split('T').next().unwrap_or_default()
+    }
+}
+
+/// What stands for a fact that cannot be had.
+pub const UNKNOWN: &str = "unknown";
+
+/// The processor, its cores, and the operating system.
+pub fn machine() -> String {
+    let known = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = known.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+    let model = model.map_or(std::env::consts::ARCH, |(_, name)| name);
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    format!("{model}, {cores} cores, {}", std::env::consts::OS)
+}
+
+/// Standard output of a command at the top of the repository.
+pub fn said(program: &str, arguments: &[&str]) -> String {
+    let mut command = Command::new(program);
+    command.args(arguments).current_dir(workspace::root());
+    quiet(&mut command, Duration::from_secs(10))
+        .map_or_else(|_| UNKNOWN.to_owned(), |text| text.trim().to_owned())
+}

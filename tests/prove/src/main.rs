@@ -1,0 +1,72 @@
+//! Measures and proves: `cargo xtask demo | guarantees | profile | bench` run this, and `test` its checks.
+//! docs/proofs.md says which file shows which promise.
+
+mod binary;
+mod checks;
+mod data;
+mod demo;
+mod faults;
+mod footprint;
+mod harness;
+#[cfg(feature = "peers")]
+mod paper;
+mod probe;
+mod profile;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use harness::Effort;
+use xtask::steps::Steps;
+
+/// `cargo xtask` passes its arguments on to this.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    Demo(demo::Options),
+    Guarantees(harness::Options),
+    /// Writes docs/performance.md: where a query's instructions go on the emulated board.
+    Profile,
+    #[cfg(feature = "peers")]
+    Bench(paper::Options),
+    /// Runs the checks of `cargo xtask test`.
+    #[command(hide = true)]
+    Test {
+        /// Seconds of the controller's time in the demo.
+        #[arg(long)]
+        demo_seconds: u32,
+        /// Where to list the steps.
+        #[arg(long)]
+        steps: PathBuf,
+    },
+}
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse().task {
+        Task::Demo(options) => demo::run(&options),
+        Task::Guarantees(options) => harness::guarantees(&options),
+        Task::Profile => profile::run(),
+        #[cfg(feature = "peers")]
+        Task::Bench(options) => paper::bench(&options),
+        Task::Test { demo_seconds, steps: file } => {
+            let mut steps = Steps::default();
+            harness::test(&Effort { demo_seconds, ..Effort::TEST }, &mut steps);
+            steps.run("demo on this computer", || demo::on_host(demo_seconds));
+            steps.write(&file)
+        }
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! What the run ran on, and how.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use serde::Deserialize;
+
+use super::measure::clock;
+use super::names::DIBS;
+use super::plan::{Options, Plan};
+use super::record::{Cell, Record, Records};
+use crate::data::real;
+use crate::harness::run::Run;
+
+pub fn run(plan: &Plan, options: &Options, records: &mut Records) {
+    let Run { date, commit, compiler, machine, .. } = Run::now(true);
+    let mut command = "cargo xtask bench".to_owned();
+    if options.quick {
+        command += " --quick";
+    }
+    if let Some(queries) = options.queries {
+        command += &format!(" --queries {queries}");
+    }
+    let meshes = match real() {
+        Some(_) => "real anatomy (human brains and a human heart, beside the repository)",
+        None => "generated: the real ones are not on this machine",
+    };
+    for (metric, note) in [
+        ("kind", plan.name.to_owned()),
+        ("machine", machine),
+        ("commit", commit),
+        ("date", date),
+        ("command", command),
+        ("compiler", compiler),
+        ("meshes", meshes.to_owned()),
+    ] {
+        records.push(Record::fact(metric, note));
+    }
+    let cell = Cell { experiment: "run".to_owned(), ..Cell::default() };
+    records.push(Record::number(&cell, "", "clock", clock(), "us"));
+}
+
+/// What `cargo xtask demo` reports, as far as it is needed here.
+#[derive(Deserialize)]
+struct Demo {
+    ticks: u64,
+    instructions_mean: Option<f64>,
+    instructions_max: Option<f64>,
+    node_tests_mean: f64,
+    triangle_tests_mean: f64,
+    surface: String,
+    stretch_limit: f64,
+}
+
+/// The board's clock, in Hz.
+const CLOCK_RATE: f64 = 480e6;
+
+/// Adds what the demo showed on the emulated Cortex-M7.
+pub fn cortex_m7(path: &Path, records: &mut Records) -> Result<()> {
+    let name = path.display();
+    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {name}"))?;
+    let demo: Demo =
+        serde_json::from_str(&text).with_context(|| format!("{name} is not the demo's report"))?;
+    let (Some(mean), Some(max)) = (demo.instructions_mean, demo.instructions_max) else {
+        return Ok(());
+    };
+    let cell = Cell::new("cortex-m7", &demo.surface, 0, "capsule");
+    let mut instructions = Record::number(&cell, DIBS, "instructions", mean, "instructions");
+    (instructions.max, instructions.n) = (max, demo.ticks);
+    records.push(instructions);
+    for (metric, value, unit) in [
+        ("frequency_mean", CLOCK_RATE / mean, "Hz at one cycle an instruction"),
+        ("frequency_worst", CLOCK_RATE / max, "Hz at one cycle an instruction"),
+        ("node_tests", demo.node_tests_mean, "tests"),
+        ("triangle_tests", demo.triangle_tests_mean, "tests"),
+        ("stretch_limit", demo.stretch_limit, ""),
+    ] {
+        records.push(Record::number(&cell, DIBS, metric, value, unit));
+    }
+    Ok(())
+}

@@ -1,0 +1,104 @@
+//! `cargo xtask bench`: the paper's experiments, run and reported.
+
+mod ablation;
+mod brain;
+mod claims;
+mod facts;
+mod figures;
+mod heart;
+mod markdown;
+mod measure;
+mod names;
+#[cfg(test)]
+mod path_tests;
+mod peers;
+mod plan;
+mod record;
+mod search;
+mod statistics;
+#[cfg(test)]
+mod statistics_tests;
+mod subjects;
+#[cfg(test)]
+mod tests;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+
+pub use plan::Options;
+use plan::Plan;
+use record::Records;
+use xtask::workspace;
+
+use crate::demo;
+
+/// Runs the benchmark, or makes its documents anew.
+pub fn bench(options: &Options) -> Result<()> {
+    let quick = || workspace::target().join("bench");
+    let default = if options.quick { quick() } else { workspace::root().join("docs") };
+    let folder = options.out.clone().unwrap_or(default);
+    let records = if options.render {
+        Records::read(&folder.join("benchmarks.json"))?
+    } else if options.paper_search {
+        let mut records = Records::read(&folder.join("benchmarks.json"))?;
+        search::run(&Plan::of(options), &mut records)?;
+        records
+    } else {
+        let start = Instant::now();
+        let mut records = run(&Plan::of(options), options)?;
+        if !options.no_board {
+            match board(options.quick) {
+                Ok(report) => facts::cortex_m7(&report, &mut records)?,
+                Err(error) => eprintln!("the Cortex-M7's part is left out: {error:#}"),
+            }
+        }
+        println!("measured in {:.0} s", start.elapsed().as_secs_f64());
+        records
+    };
+    write(&records, &folder)?;
+    println!("written to {}", folder.display());
+    Ok(())
+}
+
+/// Table 3 on the emulated board: the demo's path and heart. Returns the demo's report.
+fn board(quick: bool) -> Result<PathBuf> {
+    let seconds = if quick { 7 } else { 14 };
+    demo::run(&demo::Options { seconds, ..demo::Options::default() })?;
+    Ok(workspace::target().join("demo").join("report.json"))
+}
+
+/// Runs all experiments of a plan.
+fn run(plan: &Plan, options: &Options) -> Result<Records> {
+    let mut records = Records::default();
+    facts::run(plan, options, &mut records);
+    brain::run(plan, &mut records)?;
+    heart::run(plan, &mut records)?;
+    ablation::run(plan, &mut records)?;
+    search::run(plan, &mut records)?;
+    Ok(records)
+}
+
+/// Everything that is made from the records: file names, below the folder of the records, and contents.
+fn documents(records: &Records) -> Result<Vec<(String, String)>> {
+    let mut documents = vec![
+        ("benchmarks.md".to_owned(), markdown::benchmarks(records)),
+        ("paper.md".to_owned(), claims::paper(records)),
+    ];
+    documents.extend(figures::all(records)?);
+    Ok(documents)
+}
+
+/// Writes the records and all that is made from them.
+fn write(records: &Records, folder: &Path) -> Result<()> {
+    let json = ("benchmarks.json".to_owned(), records.json()?);
+    std::fs::create_dir_all(folder.join("figures"))
+        .with_context(|| format!("cannot make {}", folder.display()))?;
+    for (name, text) in [json].into_iter().chain(documents(records)?) {
+        let path = folder.join(name);
+        dibs_build::write_atomically(&path, |out| out.write_all(text.as_bytes()))
+            .with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,139 @@
+//! How much is run, and how far it is.
+
+use std::path::PathBuf;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Runs the paper's experiments: DIBS, the paper's baselines and today's peers, on the same surfaces and
+/// tools. Writes docs/benchmarks.json and everything that is made from it.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub struct Options {
+    /// A few minutes instead of half an hour: fewer queries. Writes to target/bench, not to docs.
+    #[arg(long)]
+    pub quick: bool,
+    /// At most this many queries of each brain and tool, instead of the paper's 10,000.
+    #[arg(long)]
+    pub queries: Option<usize>,
+    /// Where to write instead.
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Measures nothing: makes the documents and figures anew from benchmarks.json.
+    #[arg(long)]
+    pub render: bool,
+    /// Only counts the paper's own search anew, into the folder's benchmarks.json.
+    #[arg(long)]
+    pub paper_search: bool,
+    /// Leaves out the emulated Cortex-M7.
+    #[arg(long)]
+    pub no_board: bool,
+}
+
+/// How much is run.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    pub name: &'static str,
+    /// Triangles of each brain, and queries of each of its cells.
+    pub brains: Vec<(u32, usize)>,
+    /// Queries of exhaustive search on the largest brain.
+    exhaustive_most: usize,
+    pub heart_triangles: u32,
+    /// Ticks of the heart's experiment, and how often they are repeated.
+    pub ticks: u32,
+    pub repetitions: usize,
+    /// Brains of the ablation, and queries of each of its cells.
+    pub ablation_brains: Vec<u32>,
+    pub ablation_queries: usize,
+}
+
+impl Plan {
+    /// 10,000 queries a cell, as in the paper.
+    pub fn full() -> Self {
+        Self {
+            name: "full",
+            brains: [500, 5_000, 50_000, 500_000].map(|t| (t, 10_000)).to_vec(),
+            exhaustive_most: 500,
+            heart_triangles: 10_272,
+            ticks: 14_000,
+            repetitions: 3,
+            ablation_brains: vec![5_000, 50_000],
+            ablation_queries: 1_000,
+        }
+    }
+
+    /// What the arguments ask for.
+    pub fn of(options: &Options) -> Self {
+        let mut plan = if options.quick { Self::quick() } else { Self::full() };
+        let most = options.queries.unwrap_or(usize::MAX);
+        plan.brains.iter_mut().for_each(|(_, queries)| *queries = most.min(*queries));
+        plan
+    }
+
+    /// Within ten minutes on two cores, compilation included.
+    pub fn quick() -> Self {
+        Self {
+            name: "quick",
+            brains: vec![(500, 2_000), (5_000, 2_000), (50_000, 500), (500_000, 100)],
+            exhaustive_most: 20,
+            ticks: 3_500,
+            repetitions: 3,
+            ablation_brains: vec![5_000],
+            ablation_queries: 200,
+            ..Self::full()
+        }
+    }
+
+    /// Seconds: everything runs, nothing is worth quoting.
+    #[cfg(test)]
+    pub fn smoke() -> Self {
+        Self {
+            name: "smoke",
+            brains: vec![(500, 25), (1_000, 10)],
+            exhaustive_most: 5,
+            heart_triangles: 1_000,
+            ticks: 30,
+            repetitions: 2,
+            ablation_brains: vec![500],
+            ablation_queries: 5,
+        }
+    }
+
+    /// Exhaustive search takes part in each of this many steps.
+    pub fn exhaustive_every(&self, triangles: usize) -> usize {
+        let (_, queries) = self.brains.iter().max().copied().unwrap_or_default();
+        match triangles {
+            400_000.. => queries.div_ceil(self.exhaustive_most).max(1),
+            _ => 1,
+        }
+    }
+
+    /// Steps before anything is measured.
+    pub fn warm_up(&self, triangles: usize) -> usize {
+        if self.name == "smoke" { 1 } else { (100_000 / triangles).clamp(5, 100) }
+    }
+}
+
+/// A progress bar on standard error, where that is a terminal.
+pub struct Progress(ProgressBar);
+
+impl Progress {
+    /// A bar of `length` steps, or without a length something that turns.
+    pub fn start(what: &str, length: u64) -> Self {
+        let bar = if length == 0 {
+            ProgressBar::new_spinner()
+        } else {
+            let style = ProgressStyle::with_template("{bar:24} {pos}/{len} {eta:>5}  {msg}");
+            ProgressBar::new(length).with_style(style.unwrap_or(ProgressStyle::default_bar()))
+        };
+        bar.set_message(what.to_owned());
+        bar.tick();
+        Self(bar)
+    }
+
+    pub fn one(&self) {
+        self.0.inc(1);
+    }
+
+    pub fn finish(self) {
+        self.0.finish_and_clear();
+    }
+}

@@ -1,0 +1,248 @@
+//! The probe: a program that answers a script, on the emulated board and on this computer.
+
+pub mod script;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, ensure};
+use probe::ANSWER_WORDS;
+use xtask::process::run;
+use xtask::qemu::Time;
+use xtask::toolchain::Cross;
+use xtask::{qemu, valgrind, workspace};
+
+use self::script::{Record, Script};
+
+/// One answer: its words, of which the first is what it took on the clock.
+pub struct Answer<'a> {
+    /// What was asked.
+    pub record: Record,
+    /// What came back.
+    pub words: &'a [u32],
+    /// Instructions that it took, where they were counted.
+    pub instructions: u32,
+}
+
+impl Answer<'_> {
+    /// Node tests that the budget counts, and triangle tests.
+    pub fn tests(&self) -> [u32; 2] {
+        [self.words[1].saturating_sub(1), self.words[2]]
+    }
+
+    /// Everything that must be the same wherever it was answered.
+    pub fn bits(&self) -> &[u32] {
+        &self.words[1..]
+    }
+}
+
+/// The answers to a script.
+pub struct Answers {
+    words: Vec<u32>,
+    records: Vec<Record>,
+    /// Instructions of each query, where callgrind counted them.
+    counts: Option<Vec<u32>>,
+}
+
+impl Answers {
+    fn read(file: &Path, script: &Script) -> Result<Self> {
+        let bytes = fs::read(file).with_context(|| format!("no answers in {}", file.display()))?;
+        let words = bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        let words: Vec<u32> = words.collect();
+        let expected: usize = script.records.iter().map(|&record| length(record)).sum();
+        ensure!(words.len() == expected, "{} words answered, not {expected}", words.len());
+        Ok(Self { words, records: script.records.clone(), counts: None })
+    }
+
+    /// All answers, in order.
+    pub fn iter(&self) -> impl Iterator<Item = Answer<'_>> {
+        let mut rest = self.words.as_slice();
+        let mut counts = self.counts.as_ref().map(|counts| counts.iter());
+        self.records.iter().map(move |&record| {
+            let (words, after) = rest.split_at(length(record));
+            rest = after;
+            let instructions = match (&mut counts, record) {
+                (Some(counts), Record::Query { .. }) => counts.next().copied().unwrap_or_default(),
+                // The board's clock counts 1.6 to each instruction.
+                _ => (u64::from(words[0]) * 5 / 8) as u32,
+            };
+            Answer { record, words, instructions }
+        })
+    }
+}
+
+fn length(record: Record) -> usize {
+    match record {
+        Record::Stretch(_) | Record::Bound | Record::Positions(_) => 2,
+        Record::Query { .. } => ANSWER_WORDS,
+    }
+}
+
+/// The toolchain of the board, where there is an emulator too.
+pub fn board() -> Result<Cross> {
+    let cross = Cross::find()?;
+    qemu::find()?;
+    Ok(cross)
+}
+
+/// The probe for the board.
+pub fn build_for_board(cross: &Cross, name: &str) -> Result<PathBuf> {
+    let mut cargo = cross.cargo("build");
+    cargo.args(["--quiet", "--package", "dibs-probe", "--features", "board"]);
+    run(cargo.args(["--profile", "firmware", "--bin", name]))?;
+    Ok(cross.program("firmware", name))
+}
+
+/// Answers on the emulated board; with `count`, its clock counts instructions.
+pub fn on_board(program: &Path, script: &Script, count: bool) -> Result<Answers> {
+    let time = if count { COUNTING } else { Time::Real };
+    run_on_board(program, &script.bytes(), time, |file| Answers::read(file, script))
+}
+
+/// The board's clock counts 1.6 to each instruction.
+pub const COUNTING: Time = Time::Counted(6);
+
+/// Runs a program on the emulated board that reads a script, and reads its answers.
+pub fn run_on_board<T>(
+    program: &Path,
+    script: &[u8],
+    time: Time,
+    read: impl FnOnce(&Path) -> Result<T>,
+) -> Result<T> {
+    let folder = tempfile::tempdir()?;
+    fs::write(folder.path().join("script.bin"), script)?;
+    let mut qemu = qemu::alone(program, time, &[]);
+    run(qemu.current_dir(folder.path()).stdin(Stdio::null()))?;
+    read(&folder.path().join("answers.bin"))
+}
+
+/// How often each instruction of the functions between these addresses is executed while a script is
+/// answered: QEMU is told to execute one at a time, and to log them.
+pub fn executions(
+    program: &Path,
+    script: &Script,
+    ranges: &[Range<u64>],
+) -> Result<BTreeMap<u64, u64>> {
+    let folder = tempfile::tempdir()?;
+    fs::write(folder.path().join("script.bin"), script.bytes())?;
+    let filter: Vec<String> = ranges
+        .iter()
+        .map(|range| format!("0x{:x}..0x{:x}", range.start, range.end.saturating_sub(1)))
+        .collect();
+    let mut qemu = qemu::alone(program, Time::Real, &[]);
+    // Since QEMU 8.1 the option has another name, and since 9 the old one is gone.
+    if qemu_major()? >= 9 {
+        qemu.args(["-accel", "tcg,one-insn-per-tb=on"]);
+    } else {
+        qemu.arg("-singlestep");
+    }
+    qemu.args(["-d", "exec,nochain", "-dfilter", &filter.join(","), "-D", "log"]);
+    run(qemu.current_dir(folder.path()).stdin(Stdio::null()))?;
+    let mut counts = BTreeMap::new();
+    for line in BufReader::new(fs::File::open(folder.path().join("log"))?).lines() {
+        // `Trace 0: HOST [flags/ADDRESS/...] name`
+        let line = line?;
+        let address = line.split('/').nth(1).and_then(|a| u64::from_str_radix(a, 16).ok());
+        if let Some(address) = address {
+            *counts.entry(address).or_insert(0) += 1;
+        }
+    }
+    ensure!(!counts.is_empty(), "QEMU logged no instruction");
+    Ok(counts)
+}
+
+/// The first number of `QEMU emulator version 7.2.22 (...)`.
+fn qemu_major() -> Result<u32> {
+    let version = qemu::find()?;
+    let number = version.split_whitespace().find_map(|word| word.split('.').next()?.parse().ok());
+    number.with_context(|| format!("no version in `{version}`"))
+}
+
+/// One way to build the probe for this computer.
+#[derive(Clone, Copy)]
+pub enum Build {
+    Debug,
+    Release,
+    /// For the very processor of this computer, with all of its instructions.
+    Native,
+}
+
+impl Build {
+    /// For people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Debug => "debug",
+            Self::Release => "release",
+            Self::Native => "target-cpu=native",
+        }
+    }
+
+    /// Answers on this computer.
+    pub fn answers(self, script: &Script) -> Result<Answers> {
+        let program = self.program()?;
+        let files = tempfile::tempdir()?;
+        answer(&mut Command::new(program), files.path(), script)
+    }
+
+    /// Answers on this computer, under callgrind, which counts the instructions of each query.
+    pub fn counted(self, script: &Script) -> Result<Answers> {
+        valgrind::find()?;
+        let program = self.program()?;
+        let files = tempfile::tempdir()?;
+        let profile = files.path().join("profile");
+        let mut valgrind = Command::new("valgrind");
+        valgrind.args(["--quiet", "--tool=callgrind", "--dump-line=no", "--combine-dumps=yes"]);
+        // Counted is what is below the function that asks; each time that it begins, so does a part of the
+        // profile.
+        valgrind.args(["--collect-atstart=no", "--toggle-collect=probe::clocked"]);
+        valgrind.arg("--dump-before=probe::clocked");
+        valgrind.arg(format!("--callgrind-out-file={}", profile.display()));
+        let mut answers = answer(valgrind.arg(program), files.path(), script)?;
+        let mut counts = Vec::new();
+        for line in BufReader::new(fs::File::open(&profile)?).lines() {
+            if let Some(count) = line?.strip_prefix("totals: ") {
+                counts.push(count.trim().parse()?);
+            }
+        }
+        let queries = script.queries();
+        ensure!(counts.len() == queries + 1, "{} counts of {queries} queries", counts.len());
+        // The first part is what comes before the first query.
+        answers.counts = Some(counts.split_off(1));
+        Ok(answers)
+    }
+
+    /// Builds the program.
+    fn program(self) -> Result<PathBuf> {
+        let target = match self {
+            Self::Native => workspace::target().join("native"),
+            Self::Debug | Self::Release => workspace::target(),
+        };
+        let mut cargo = Command::new("cargo");
+        cargo.args(["build", "--quiet", "--package", "dibs-probe", "--bin", "answer"]);
+        cargo.arg("--target-dir").arg(&target).current_dir(workspace::root());
+        let folder = match self {
+            Self::Debug => "debug",
+            Self::Release | Self::Native => {
+                cargo.arg("--release");
+                "release"
+            }
+        };
+        if matches!(self, Self::Native) {
+            cargo.env("RUSTFLAGS", "-C target-cpu=native");
+        }
+        run(&mut cargo)?;
+        Ok(target.join(folder).join("answer"))
+    }
+}
+
+/// Has a program of this computer answer a script.
+fn answer(program: &mut Command, folder: &Path, script: &Script) -> Result<Answers> {
+    let (script_file, answers) = (folder.join("script"), folder.join("answers"));
+    fs::write(&script_file, script.bytes())?;
+    run(program.arg(&script_file).arg(&answers))?;
+    Answers::read(&answers, script)
+}

@@ -1,0 +1,12 @@
+//! Builds, runs and installs: the toolchain of the board, the emulator, the programs of the nightly compiler.
+//! `cargo xtask` is made of it; so is `tests/prove`, which measures with it.
+
+pub mod apt;
+pub mod firmware;
+pub mod nightly;
+pub mod process;
+pub mod qemu;
+pub mod steps;
+pub mod toolchain;
+pub mod valgrind;
+pub mod workspace;

@@ -1,0 +1,40 @@
+//! Runs `tests/prove`, the program that measures and proves.
+
+use std::process::Command;
+
+use anyhow::Result;
+use xtask::workspace;
+
+/// Arguments that are passed on as they are.
+#[derive(clap::Args)]
+pub struct Passed {
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<String>,
+}
+
+/// `cargo run` of the program, to which arguments are added. Paths among them are the user's, so it runs in
+/// the user's folder.
+pub fn command(features: &[&str]) -> Command {
+    let mut cargo = Command::new("cargo");
+    cargo.args(["run", "--quiet", "--release", "--package", "dibs-prove", "--manifest-path"]);
+    cargo.arg(workspace::root().join("Cargo.toml")).args(features).arg("--");
+    cargo
+}
+
+/// Runs a task of the program.
+pub fn run(task: &str, passed: &Passed) -> Result<()> {
+    end(command(&[]).arg(task).args(&passed.arguments))
+}
+
+/// Runs the demo, which needs none of the peers of the benchmark.
+pub fn demo(passed: &Passed) -> Result<()> {
+    end(command(&["--no-default-features"]).arg("demo").args(&passed.arguments))
+}
+
+/// Runs a program that tells its own error, and ends as it does.
+fn end(command: &mut Command) -> Result<()> {
+    match command.status()?.code() {
+        Some(0) => Ok(()),
+        code => std::process::exit(code.unwrap_or(1)),
+    }
+}
