@@ -43,9 +43,10 @@ pub enum WriteErrorKind {
     },
 }
 
-/// Writes a file through `contents` into a temporary file beside it, which is renamed once it is
-/// complete: no half-written output is left behind, whatever fails. A path that is no regular
-/// file (`/dev/stdout`) is written directly.
+/// Writes a file through `contents` into a temporary file beside it, which is renamed once it is complete and
+/// the disk has it: no half-written output is left behind where the program fails, and none under the file's
+/// name where the power does, as far as disk and file system keep `fsync`'s word. A path that is no regular file
+/// (`/dev/stdout`) is written directly.
 ///
 /// # Errors
 /// [`WriteErrorKind::Io`], also for whatever `contents` returns.
@@ -76,7 +77,11 @@ fn write(path: &Path, contents: impl FnOnce(&mut dyn Write) -> io::Result<()>) -
     }
     let temporary = builder.prefix(".dibs-").tempfile_in(folder)?;
     fill(temporary.as_file(), contents)?;
+    temporary.as_file().sync_all()?;
     temporary.persist(&target)?;
+    // The name is the folder's: without this the old file may come back. Not every system opens a folder.
+    #[cfg(unix)]
+    File::open(folder)?.sync_all()?;
     Ok(())
 }
 
