@@ -31,6 +31,7 @@ pub const CHECK: Check = Check {
     promises: &[
         note("anytime.cases"),
         note("anytime.cut-short"),
+        note("anytime.held"),
         Promise {
             id: "anytime.outside",
             says: "A query cut short by any budget, none included, gives an interval that holds the true separation",
@@ -49,7 +50,7 @@ pub const CHECK: Check = Check {
         },
         Promise {
             id: "anytime.grown",
-            says: "The interval never grows with the budget, nor from tick to tick under warm start",
+            says: "The interval never grows with the budget, nor its upper end from tick to tick under warm start",
             criterion: FLOW,
             bound: Bound::Is(0.0),
             unit: "of {anytime.cases} budgets",
@@ -65,11 +66,12 @@ pub const CHECK: Check = Check {
         },
         Promise {
             id: "anytime.too-weak",
-            says: "The force of a query cut short is at least that of the true separation",
+            says: "The force of a query cut short is at least that of the true separation, where it is no hold",
             criterion: FAULTS,
             bound: Bound::Is(0.0),
             unit: "of {anytime.cases} budgets",
-            limits: "The size; the direction is that of the best pair found.",
+            limits: "The size; the direction is that of the best pair found. Left out are {anytime.held} answers without a \
+                     direction, to which the wall answers with its hold: damping, no spring.",
         },
     ],
 };
@@ -94,6 +96,8 @@ struct Tally {
     grown: u64,
     unfinished: u64,
     too_weak: u64,
+    /// The wall could only hold.
+    held: u64,
     /// Largest error of an end of an interval, in units of the stated accuracy.
     worst: f64,
 }
@@ -106,6 +110,7 @@ impl AddAssign for Tally {
         self.grown += other.grown;
         self.unfinished += other.unfinished;
         self.too_weak += other.too_weak;
+        self.held += other.held;
         self.worst = self.worst.max(other.worst);
     }
 }
@@ -126,6 +131,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     tallies.into_iter().for_each(|tally| sum += tally);
     figures.note("anytime.cases", sum.cases as f64);
     figures.note("anytime.cut-short", sum.cut_short as f64);
+    figures.note("anytime.held", sum.held as f64);
     figures.note("anytime.worst-error", sum.worst);
     figures.note("anytime.outside", sum.outside as f64);
     figures.note("anytime.grown", sum.grown as f64);
@@ -217,6 +223,7 @@ fn judge(answer: &Proximity, truth: &OraclePair, tally: &mut Tally) {
     let needed = (f64::from(STIFFNESS) * (f64::from(MARGIN) - truth.separation))
         .clamp(0.0, f64::from(MAX_FORCE));
     let held = matches!(force.state, ConstraintState::Safe(_));
+    tally.held += u64::from(held);
     let strong = f64::from(force.force.length()) >= needed * (1.0 - 1e-6) - 1e-6;
     tally.too_weak += u64::from(!held && !strong);
 }

@@ -18,6 +18,7 @@ pub const CHECK: Check = Check {
     run: check,
     promises: &[
         note("demo.faults.ticks"),
+        note("demo.faults.answers"),
         note("demo.faults.injected"),
         note("demo.faults.compared"),
         note("demo.faults.rejected"),
@@ -42,7 +43,7 @@ pub const CHECK: Check = Check {
             says: "Every answer then agrees with exhaustive search in f64",
             criterion: FLOW,
             bound: Bound::Is(0.0),
-            unit: "of {demo.faults.ticks} ticks",
+            unit: "of {demo.faults.answers} answers in {demo.faults.ticks} ticks",
             limits: "",
         },
         note("demo.faults.safe-after-frame"),
@@ -64,6 +65,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let report = report_of(effort.fault_seconds, true)?;
     for (name, field) in [
         ("demo.faults.ticks", "ticks"),
+        ("demo.faults.answers", "queries"),
         ("demo.faults.misses", "deadline_misses"),
         ("demo.faults.mismatches", "mismatches"),
         ("demo.faults.compared", "frames_compared"),

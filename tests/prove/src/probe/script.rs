@@ -70,26 +70,56 @@ pub enum Knows {
     Everything,
 }
 
+/// A surface to ask about, and the most triangles of a leaf of its tree.
+pub struct Subject {
+    pub name: &'static str,
+    mesh: Mesh,
+    leaf: usize,
+}
+
+impl Subject {
+    pub fn new(name: &'static str, mesh: Mesh, leaf: usize) -> Self {
+        Self { name, mesh, leaf }
+    }
+}
+
 impl Script {
     /// Small surfaces of every kind in every deformation, with tools where it hurts: near, on and inside,
     /// at centres and middle planes, where all distances are equal.
     pub fn adversarial(queries: usize, draw: Draw, seed: u64) -> Self {
+        let subjects = [
+            Subject::new("heart", generate::heart(1_280).expect("a valid size").0, 8),
+            Subject::new("brain", generate::brain(1_200).expect("a valid size"), 4),
+            Subject::new("ball", surfaces::ball(3), 8),
+            Subject::new("slivers", surfaces::slivers(60), 1),
+        ];
+        Self::about_all(&subjects, false, queries, draw, seed)
+    }
+
+    /// The same about these surfaces; `wandering`: with half of the tools wandering about the surface.
+    pub fn about_all(
+        subjects: &[Subject],
+        wandering: bool,
+        queries: usize,
+        draw: Draw,
+        seed: u64,
+    ) -> Self {
         let mut rng = Rng::with_seed(seed);
-        let heart = generate::heart(1_280).expect("a valid size").0;
-        let brain = generate::brain(1_200).expect("a valid size");
-        let meshes = [(heart, 8), (brain, 4), (surfaces::ball(3), 8), (surfaces::slivers(60), 1)];
         let mut script = Self::default();
-        let of_each = queries.div_ceil(meshes.len());
+        let of_each = queries.div_ceil(subjects.len());
         // Few enough of a frame that every mesh has every deformation, twice.
         let of_frame = (of_each / (2 * Deformation::ALL.len())).clamp(1, 100);
-        for (mesh, leaf) in meshes {
-            let built = build(&mesh, leaf);
+        for Subject { mesh, leaf, .. } in subjects {
+            let built = build(mesh, *leaf);
+            let tree = built.tree::<u16>().expect("16-bit indices");
             script.tree(&built);
             let end = script.queries() + of_each;
             while script.queries() < end {
                 for deformation in Deformation::ALL {
-                    let left = end.saturating_sub(script.queries());
-                    script.frame(&built, &mesh, deformation, left.min(of_frame), draw, &mut rng);
+                    let left = end.saturating_sub(script.queries()).min(of_frame);
+                    let (paths, limit) = (tree.paths(), tree.stretch());
+                    let moved = deformation.apply(mesh, paths, limit, &mut rng);
+                    script.frame(&built, &moved, wandering, left, draw, &mut rng);
                 }
             }
         }
@@ -232,19 +262,22 @@ impl Script {
     fn frame(
         &mut self,
         built: &BuiltTree,
-        mesh: &Mesh,
-        deformation: Deformation,
+        moved: &[Vec3],
+        wandering: bool,
         queries: usize,
         draw: Draw,
         rng: &mut Rng,
     ) {
         let tree = built.tree::<u16>().expect("16-bit indices");
         let triangles = surfaces::triangles(&tree);
-        let moved = deformation.apply(mesh, tree.paths(), tree.stretch(), rng);
-        let rows = built.to_rows(&moved);
+        let rows = built.to_rows(moved);
         self.rows(&rows, tree.triangle_count());
-        for _ in 0..queries {
-            let tool = pose(&rows, &triangles, rng);
+        for number in 0..queries {
+            let tool = if wandering && rng.bool() {
+                about(&rows, &triangles, number, rng)
+            } else {
+                pose(&rows, &triangles, rng)
+            };
             // A capsule of length zero is one too.
             let is_capsule = tool.start != tool.end || rng.u32(..8) == 0;
             let warm = if rng.bool() { u32::MAX } else { rng.u32(..tree.triangle_count() + 2) };
