@@ -1,14 +1,14 @@
 //! The builder: what a `build.rs` or the `dibs` program calls.
 
 use dibs_nostd::Index;
-use dibs_nostd::format::{MAX_CHILDREN, MAX_LEAF_TRIANGLES, PathKind};
+use dibs_nostd::format::{MAX_CHILDREN, MAX_LEAF_TRIANGLES};
 
 use crate::Mesh;
 use crate::array::{BuiltTree, Facts, flatten};
 use crate::construct::{Cluster, Constructor, Surface, widen};
 use crate::error::BuildError;
-use crate::geodesic::{Graph, Paths, Topology};
-use crate::stretch::Shares;
+use crate::geodesic::{Graph, Topology};
+use crate::rest::{Paths, Shares, has_area};
 
 /// How sections are pinned, measured and split.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -207,12 +207,8 @@ impl<'p> Builder<'p> {
             None => (self.stretch, Shares::default()),
         };
         let root = self.construct(mesh, paths, &shares)?;
-        let kind = match paths {
-            Paths::Edges => PathKind::EdgePath,
-            Paths::Surface { .. } => PathKind::Surface,
-        };
         let facts = Facts {
-            paths: kind,
+            paths: paths.kind(),
             stretch,
             shares: &shares,
             with_order: self.with_order,
@@ -273,9 +269,12 @@ impl<'p> Builder<'p> {
             return Err(BuildError::Coordinate { vertex });
         }
         let vertices = mesh.positions.len();
-        for (triangle, corners) in mesh.triangles.iter().enumerate() {
-            if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices) {
+        for (triangle, &corners) in mesh.triangles.iter().enumerate() {
+            if let Some(vertex) = corners.into_iter().find(|&v| v as usize >= vertices) {
                 return Err(BuildError::Corner { triangle, vertex, vertices });
+            }
+            if !has_area(mesh.corners(corners)) {
+                return Err(BuildError::NoArea { triangle, corners });
             }
         }
         Ok(())

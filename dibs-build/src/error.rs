@@ -17,6 +17,17 @@ pub enum BuildError {
         /// Vertices of the mesh.
         vertices: usize,
     },
+    /// A triangle without area: its corners lie in a line or in one place.
+    #[error(
+        "triangle {triangle}, with the vertices {corners:?}, has no area: remove it, or weld its \
+         corners (`dibs_build::read` drops such triangles)"
+    )]
+    NoArea {
+        /// The triangle.
+        triangle: usize,
+        /// Its vertices.
+        corners: [u32; 3],
+    },
     /// A vertex has a coordinate that is not finite.
     #[error("vertex {vertex} has a coordinate that is not a finite number")]
     Coordinate {

@@ -14,6 +14,13 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
+impl Mesh {
+    /// Positions of a triangle's corners.
+    pub(crate) fn corners(&self, vertices: [u32; 3]) -> [Vec3; 3] {
+        vertices.map(|vertex| self.positions[vertex as usize])
+    }
+}
+
 /// A recorded or generated deformation of a mesh: every frame holds one position a vertex.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Motion {

@@ -265,6 +265,19 @@ fn what_cannot_be_built_is_named() {
     broken.triangles[5][1] = 9_999;
     let error = built(&broken, new());
     assert!(matches!(error, BuildError::Corner { triangle: 5, vertex: 9_999, .. }), "{error}");
+    for corners in [[0, 1, 1], [4, 4, 4]] {
+        let mut broken = mesh.clone();
+        broken.triangles[5] = corners;
+        let error = built(&broken, new());
+        assert!(matches!(error, BuildError::NoArea { triangle: 5, .. }), "{error}");
+    }
+    let mut broken = mesh.clone();
+    let [a, b, c] = broken.triangles[6].map(|vertex| vertex as usize);
+    broken.positions[a] = Vec3::ZERO;
+    broken.positions[b] = Vec3::new(1.0, 2.0, 3.0);
+    broken.positions[c] = Vec3::new(2.0, 4.0, 6.0);
+    let error = built(&broken, new());
+    assert!(matches!(error, BuildError::NoArea { triangle: 6, .. }), "{error}");
     let mut two = mesh.clone();
     let first = two.positions.len() as u32;
     two.positions.extend([Vec3::X, Vec3::Y, Vec3::Z].map(|p| p * 500.0));
@@ -285,6 +298,16 @@ fn what_cannot_be_built_is_named() {
     assert_eq!(folder.path().read_dir().expect("is there").count(), 0, "nothing is written");
     let shallow = Query::<u16, 3>::new(&tree.tree().expect("valid"));
     assert!(shallow.is_err(), "a stack of 3 is too small");
+}
+
+/// Triangles that repeat each other unfold to chords without length, which cross their edges nowhere.
+#[test]
+fn limits_on_triangles_that_repeat_each_other_build() {
+    let positions = [[3.0, 2.0, 1.0], [2.0, 2.0, 1.0], [2.0, 3.0, 0.0], [3.0, 1.0, 0.0]];
+    let positions = positions.map(Vec3::from_array).to_vec();
+    let triangles = vec![[1, 2, 0], [3, 1, 0], [3, 0, 1], [2, 0, 3], [1, 2, 0]];
+    let mesh = Mesh { positions, triangles };
+    Builder::new().limits(vec![1.85, 1.5, 1.65, 1.01, 1.0]).build(&mesh).expect("a valid mesh");
 }
 
 /// Counts are exact: a change of the tree or of the traversal shows here, and must be meant.

@@ -7,11 +7,11 @@
 //! The corners of the leaf's first triangle and the third ones of the others are all of its vertices:
 //! a query looks at no others to reject the leaf.
 
-use dibs_nostd::format::{Join, MAX_LEAF_TRIANGLES};
+use dibs_nostd::format::{Join, MAX_LEAF_TRIANGLES, PathKind};
 use glam::DVec3;
 
 use crate::Mesh;
-use crate::stretch::fattened;
+use crate::rest::RestShape;
 
 /// A triangle of the mesh, and its corners in the order in which they are stored: rotated, so that the
 /// orientation stays.
@@ -125,7 +125,8 @@ fn choices(mesh: &Mesh, leaf: &[u32]) -> Vec<Choice> {
         let bits = [a, b, c].map(with);
         let rotations = [[a, b, c], [b, c, a], [c, a, b]];
         let openness = rotations.map(|corners| {
-            let [a, b, c] = fattened(corners.map(|v| mesh.positions[v as usize].as_dvec3()));
+            let shape = RestShape::new(mesh.corners(corners), PathKind::Surface);
+            let [a, b, c] = shape.corners;
             openness(b - a, c - a)
         });
         let best = openness.into_iter().fold(0.0, f64::max);

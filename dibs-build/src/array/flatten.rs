@@ -11,7 +11,7 @@ use super::metric::{metric, with_lowest_bit};
 use crate::Mesh;
 use crate::construct::{Cluster, Content};
 use crate::error::BuildError;
-use crate::stretch::Shares;
+use crate::rest::Shares;
 
 /// A tree in the order of its array.
 #[derive(Debug)]
@@ -153,7 +153,7 @@ fn vertex_order(mesh: &Mesh, triangles: &[Placed]) -> Vec<u32> {
 /// The metric of each triangle, marked where it goes on from the triangle before.
 fn metrics(mesh: &Mesh, triangles: &[Placed], facts: Facts<'_>) -> Vec<u8> {
     let of = |placed: Placed| {
-        let corners = placed.centre_first().map(|v| mesh.positions[v as usize]);
+        let corners = mesh.corners(placed.centre_first());
         let share = facts.shares.share(placed.triangle);
         metric(corners, placed.is_reversed, share, f64::from(facts.stretch), facts.paths)
     };

@@ -5,7 +5,7 @@ use dibs_nostd::format::PathKind;
 use glam::{DVec3, Vec3};
 
 use super::fans::openness;
-use crate::stretch::fattened;
+use crate::rest::RestShape;
 
 /// Rounding of the controller's check in f32, in units of 2^-24: derived in `dibs_nostd`'s
 /// `stretch/kernel.rs`.
@@ -30,11 +30,7 @@ pub(crate) fn metric(
     stretch: f64,
     paths: PathKind,
 ) -> [f32; 3] {
-    let corners = corners.map(Vec3::as_dvec3);
-    let [a, b, c] = match paths {
-        PathKind::EdgePath => corners,
-        _ => fattened(corners),
-    };
+    let [a, b, c] = RestShape::new(corners, paths).corners;
     let (e1, e2) = (b - a, c - a);
     let edges = [e1, c - b, e2].map(DVec3::length_squared);
     let possible = LEAST_SQUARED..=LARGEST_SQUARED / (stretch * stretch);

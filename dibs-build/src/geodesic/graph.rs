@@ -7,35 +7,15 @@
 //! Where triangles have stretch limits of their own, lengths are weighted by each limit's share of the
 //! largest: a path grows to at most the largest limit times its weighted length. An edge stretches no
 //! more than any of its triangles does, so the least that it is in any of them is its; a chord is the sum of
-//! its parts in each triangle. Flat triangles, which are measured as if they were higher, have edges as long
-//! as that makes them, and no chord crosses them.
+//! its parts in each triangle. Lengths are those of the triangles' [rest shapes](RestShape), so that the stretch
+//! check is about the same lengths; no chord crosses a flat triangle, whose shape does not fit its neighbours'.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::Topology;
 use crate::Mesh;
-use crate::stretch::{Shares, fattened, is_flat};
-
-/// How far along-surface distances look beyond the mesh's edges.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Paths {
-    /// Mesh edges only, as in the paper. The stretch of each edge is what limits the tree.
-    Edges,
-    /// Mesh edges and chords across up to this many edges (1: pairs of triangles). The largest
-    /// singular value of each triangle is what limits the tree.
-    Surface {
-        /// Most edges that a chord crosses.
-        crossings: u32,
-    },
-}
-
-impl Default for Paths {
-    /// Those of the default construction.
-    fn default() -> Self {
-        Self::Surface { crossings: 3 }
-    }
-}
+use crate::rest::{Paths, RestShape, Shares};
 
 /// Arcs from each vertex, in compressed rows. Lengths are weighted ones at rest, rounded up.
 #[derive(Debug)]
@@ -52,10 +32,9 @@ pub(crate) struct Arc {
 
 impl Graph {
     pub fn new(mesh: &Mesh, topology: &Topology, paths: Paths, shares: &Shares) -> Self {
-        let counts_as_flat = |&corners: &[u32; 3]| {
-            matches!(paths, Paths::Surface { .. }) && is_flat(positions(mesh, corners))
-        };
-        let flat: Vec<bool> = mesh.triangles.par_iter().map(counts_as_flat).collect();
+        let is_flat =
+            |&corners: &[u32; 3]| RestShape::new(mesh.corners(corners), paths.kind()).is_flat;
+        let flat: Vec<bool> = mesh.triangles.par_iter().map(is_flat).collect();
         let flat = &flat;
         let rows: Vec<Vec<Arc>> = (0..mesh.positions.len() as u32)
             .into_par_iter()
@@ -89,10 +68,6 @@ impl Graph {
     }
 }
 
-fn positions(mesh: &Mesh, corners: [u32; 3]) -> [DVec3; 3] {
-    corners.map(|v| mesh.positions[v as usize].as_dvec3())
-}
-
 /// The next f32 above, beyond the f64 rounding of a strip's unfolding.
 fn round_up(length: f64) -> f32 {
     let raised = length * (1.0 + 1e-12);
@@ -113,7 +88,7 @@ struct Unfolding<'a> {
     topology: &'a Topology,
     paths: Paths,
     shares: &'a Shares,
-    /// Which triangles are measured as if they were higher.
+    /// Which triangles have a rest shape that does not fit their neighbours.
     flat: &'a [bool],
     source: u32,
     /// The edges between the source and the triangle that was unfolded last, each with the share of the
@@ -136,13 +111,14 @@ impl Unfolding<'_> {
         let topology = self.topology;
         for &triangle in topology.triangles_at(self.source) {
             let [a, b] = topology.others(self.mesh, triangle, self.source);
-            let (share, is_flat) = (self.shares.share(triangle), self.flat[triangle as usize]);
-            let corners = positions(self.mesh, [self.source, a, b]);
-            let [source, at_a, at_b] = if is_flat { fattened(corners) } else { corners };
+            let share = self.shares.share(triangle);
+            let corners = self.mesh.corners([self.source, a, b]);
+            let shape = RestShape::new(corners, self.paths.kind());
+            let [source, at_a, at_b] = shape.corners;
             let (to_a, to_b) = (at_a - source, at_b - source);
             self.found.extend([(a, to_a.length() * share), (b, to_b.length() * share)]);
             let Paths::Surface { crossings } = self.paths else { continue };
-            if is_flat {
+            if shape.is_flat {
                 continue;
             }
             let axis = to_a.normalize();
@@ -159,22 +135,21 @@ impl Unfolding<'_> {
         if self.shares.is_uniform() {
             return length;
         }
-        let mut share = self.shares.share(last);
-        let mut largest = share;
+        let last = self.shares.share(last);
+        let mut share = last;
         // From the end to the source, as parts of the chord.
         let (mut weighted, mut from) = (0.0, 1.0);
-        let mut is_certain = true;
         for &([a, b], before) in self.crossed.iter().rev() {
             let across = end.perp_dot(b - a);
+            if across.abs() <= GRAZING * length * (b - a).length() {
+                // Rounding decides where it crosses: every part may lie in the triangle of the largest share.
+                return length * self.crossed.iter().map(|&(_, share)| share).fold(last, f64::max);
+            }
             let at = (a.perp_dot(b - a) / across).clamp(0.0, from);
-            is_certain &= across.abs() > GRAZING * length * (b - a).length();
             weighted += share * (from - at);
             (share, from) = (before, at);
-            largest = largest.max(before);
         }
-        weighted += share * from;
-        // Where a chord only grazes an edge, rounding decides where it crosses.
-        length * if is_certain { weighted + CROSSING } else { largest }
+        length * (weighted + share * from + CROSSING)
     }
 
     fn edge(&self, from: u32, to: u32) -> DVec3 {

@@ -5,6 +5,5 @@ mod search;
 mod topology;
 
 pub(crate) use graph::Graph;
-pub use graph::Paths;
 pub(crate) use search::{Distances, Farthest};
 pub(crate) use topology::Topology;

@@ -4,7 +4,7 @@ use dibs_nostd::format::PathKind;
 use dibs_nostd::{Index, Tree};
 use glam::DVec3;
 
-use crate::stretch::fattened;
+use crate::rest::RestShape;
 
 /// The triangles of a tree, ready to tell what a displacement does to them.
 pub struct Triangles {
@@ -34,19 +34,13 @@ impl Triangles {
             rows.clone().map(|row| tree.triangle(row)).collect::<Option<_>>()?;
         let shape = |row: u32| {
             let [a, b, c] = corners[row as usize];
-            let at = |vertex| Some(tree.rest_position(vertex)?.as_dvec3());
-            let corners = [at(a)?, at(b)?, at(c)?];
-            let edges = |[a, b, c]: [DVec3; 3]| (b - a, c - a);
+            let at = |vertex| tree.rest_position(vertex);
+            let [a, b, c] = RestShape::new([at(a)?, at(b)?, at(c)?], tree.paths()).corners;
+            let (e1, e2) = (b - a, c - a);
+            let x1 = e1.length();
             let measure = match tree.paths() {
-                PathKind::EdgePath => {
-                    let (e1, e2) = edges(corners);
-                    Measure::Edges([e1.length(), e2.length(), e1.distance(e2)])
-                }
-                _ => {
-                    let (e1, e2) = edges(fattened(corners));
-                    let x1 = e1.length();
-                    Measure::Surface { x1, x2: e1.dot(e2) / x1, y2: e1.cross(e2).length() / x1 }
-                }
+                PathKind::EdgePath => Measure::Edges([x1, e2.length(), e1.distance(e2)]),
+                _ => Measure::Surface { x1, x2: e1.dot(e2) / x1, y2: e1.cross(e2).length() / x1 },
             };
             let limit = f64::from(tree.stretch_limit(row)?);
             Some(Shape { strictness: f64::from(tree.stretch()) / limit, measure })

@@ -1,17 +1,14 @@
 //! What a recorded motion asks of the stretch limits, and limits of single triangles.
 
-mod fatten;
 mod file;
-mod shares;
 
 use glam::{DMat2, DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
-pub(crate) use fatten::{fattened, is_flat};
 pub use file::{LimitsError, LimitsErrorKind, read_limits, write_limits};
-pub(crate) use shares::Shares;
 
 use crate::pc2::MotionMismatch;
+use crate::rest::RestShape;
 use crate::{Mesh, Motion, Paths};
 
 /// How far a recorded motion stretches each triangle of its mesh.
@@ -65,7 +62,7 @@ impl MotionStretch {
         let needed = |triangle: usize| {
             let corners = mesh.triangles[triangle];
             let at = |positions: &[Vec3]| corners.map(|v| positions[v as usize].as_dvec3());
-            let rest = at(&mesh.positions);
+            let rest = RestShape::new(mesh.corners(corners), paths.kind()).corners;
             let mut worst = Needed { triangle, stretch: 0.0, frame: 0 };
             for (frame, positions) in motion.frames.iter().enumerate() {
                 let stretch = stretch(rest, at(positions), paths);
@@ -135,7 +132,7 @@ impl MotionStretch {
 /// What limits have besides their margin.
 const ROUNDING: f64 = 1.0001;
 
-/// A triangle's stretch.
+/// The stretch of a triangle against its rest shape.
 fn stretch(rest: [DVec3; 3], now: [DVec3; 3], paths: Paths) -> f64 {
     match paths {
         Paths::Edges => {
@@ -147,7 +144,7 @@ fn stretch(rest: [DVec3; 3], now: [DVec3; 3], paths: Paths) -> f64 {
         }
         Paths::Surface { .. } => {
             // The deformation gradient in the plane, and the root of its metric's larger eigenvalue.
-            let gradient = in_plane(now) * in_plane(fattened(rest)).inverse();
+            let gradient = in_plane(now) * in_plane(rest).inverse();
             let metric = gradient.transpose() * gradient;
             let (pp, pq, qq) = (metric.x_axis.x, metric.x_axis.y, metric.y_axis.y);
             ((pp + qq) / 2.0 + ((pp - qq) / 2.0).hypot(pq)).sqrt()

@@ -1,0 +1,10 @@
+//! The rest shape of each triangle, and its stretch limit: along-surface distances, stretch, the stored metric and
+//! the growth of modes all take both from here.
+
+mod paths;
+mod shape;
+mod shares;
+
+pub use paths::Paths;
+pub(crate) use shape::{RestShape, has_area};
+pub(crate) use shares::Shares;

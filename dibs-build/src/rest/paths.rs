@@ -1,0 +1,33 @@
+//! Which lines on the surface count as paths.
+
+use dibs_nostd::format::PathKind;
+
+/// How far along-surface distances look beyond the mesh's edges.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Paths {
+    /// Mesh edges only, as in the paper. The stretch of each edge is what limits the tree.
+    Edges,
+    /// Mesh edges and chords across up to this many edges (1: pairs of triangles). The largest
+    /// singular value of each triangle is what limits the tree.
+    Surface {
+        /// Most edges that a chord crosses.
+        crossings: u32,
+    },
+}
+
+impl Paths {
+    /// The kind that the tree records.
+    pub(crate) const fn kind(self) -> PathKind {
+        match self {
+            Self::Edges => PathKind::EdgePath,
+            Self::Surface { .. } => PathKind::Surface,
+        }
+    }
+}
+
+impl Default for Paths {
+    /// Those of the default construction.
+    fn default() -> Self {
+        Self::Surface { crossings: 3 }
+    }
+}
