@@ -8,7 +8,7 @@ use dibs_build::stream::faults::{Fault, Injector};
 use dibs_build::stream::{SendError, Sender, Settings, SurfaceOrder};
 use dibs_build::{Builder, Motion, generate};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::wire::{Body, Content, Encoding, Packet, PacketError, Rows};
+use dibs_nostd::wire::{Body, Content, Encoding, NoMac, Packet, PacketError, Rows};
 
 /// The order of a small heart's rows, the vertex of each, and the heart's motion.
 fn heart() -> (SurfaceOrder, Vec<u32>, Motion) {
@@ -66,7 +66,7 @@ fn receive(packets: &[Vec<u8>], held: &mut [Vec3]) -> (u32, Content, usize) {
             Body::Commit(commit) => assert_eq!(commit.digest, digest),
             _ => panic!("not of a frame"),
         }
-        digest = digest.wrapping_add(packet.checksum);
+        digest = digest.wrapping_add(packet.verify(&NoMac, 5).unwrap());
     }
     let (epoch, content) = what.expect("a begin");
     (epoch, content, rows_sent)

@@ -293,13 +293,24 @@ fn the_rate_is_kept() {
 
 const KEY: [u8; 16] = *b"\x00\x11\x22\x33\x44\x55\x66\x77\x88\x99\xaa\xbb\xcc\xdd\xee\xff";
 
+/// What a key file needs.
+fn share_with_nobody(path: &Path) {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o600)).unwrap();
+    }
+}
+
 #[test]
 fn with_a_key_the_receiver_believes_and_without_it_nothing() {
     let folder = heart();
     let folder = folder.path();
     std::fs::write(folder.join("heart.key"), "00112233445566778899aabbCCDDEEFF\n").unwrap();
     std::fs::write(folder.join("other.key"), "00112233445566778899aabbccddeefe").unwrap();
-    let mac = || AesCmac::new(&KEY, 0xC0FFEE);
+    share_with_nobody(&folder.join("heart.key"));
+    share_with_nobody(&folder.join("other.key"));
+    let mac = || AesCmac::new(&KEY, 0, 0xC0FFEE);
     for line in ["--key heart.key --quantise", "--key heart.key --quantise --mtu 64"] {
         let (seen, output) = over_tcp(folder, &format!("--rate 200 {line}"), mac());
         assert_all(&seen, &totals(&output));
@@ -327,11 +338,17 @@ fn what_cannot_be_streamed_is_one_sentence() {
     let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
     write("short.key", "00112233");
     write("text.key", "this is no hexadecimal, is it?!!");
+    for key in ["short.key", "text.key"] {
+        share_with_nobody(&folder.join(key));
+    }
+    write("open.key", "00112233445566778899aabbccddeeff");
     let to = "--to udp:127.0.0.1:9";
     let cases = [
         (format!("{to} --key absent.key"), "absent.key: cannot be read"),
         (format!("{to} --key short.key"), "short.key: a key file holds 32 hexadecimal digits"),
         (format!("{to} --key text.key"), "text.key: a key file holds 32 hexadecimal digits"),
+        #[cfg(unix)]
+        (format!("{to} --key open.key"), "open.key: other users can read"),
         (format!("{to} --rate 0"), "--rate 0: a rate is above 0"),
         (format!("{to} --partial=-1"), "--partial: a tolerance"),
         (format!("{to} --modes"), "--motion and --modes"),
@@ -345,4 +362,108 @@ fn what_cannot_be_streamed_is_one_sentence() {
         assert_eq!(error.lines().count(), 1, "{line}: {error}");
         assert!(!error.contains("hexadecimal, is"), "a key is not repeated");
     }
+}
+
+/// A receiver on UDP knows nobody until something comes, and a sender with a key says nothing until it has
+/// heard: a hello has to start it. From a given port, where the receiver answers to one.
+#[test]
+fn datagrams_with_a_key() {
+    let folder = heart();
+    let folder = folder.path();
+    std::fs::write(folder.join("heart.key"), "00112233445566778899aabbccddeeff").unwrap();
+    share_with_nobody(&folder.join("heart.key"));
+    for is_fixed in [false, true] {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket.set_read_timeout(Some(Duration::from_millis(100))).unwrap();
+        let mut to = format!("udp:{}", socket.local_addr().unwrap());
+        let free = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+        if is_fixed {
+            to += &format!("@{}", free.port());
+            socket.connect(free).unwrap();
+        }
+        let line = format!("--to {to} --rate 100 --quantise --key heart.key --receiver 3");
+        let child = stream(folder, &line);
+        let mac = AesCmac::new(&KEY, 3, 0xC0FFEE);
+        let (seen, output) = receive(folder, &mut Datagrams(socket), mac, child);
+        assert_all(&seen, &totals(&output));
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_prints_the_totals() {
+    let folder = heart();
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let line = format!("--to tcp:{} --rate 100 --loop", listener.local_addr().unwrap());
+    let child = stream(folder.path(), &line);
+    let (mut socket, _) = listener.accept().unwrap();
+    let mut some = [0; 20_000];
+    socket.read_exact(&mut some).unwrap();
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    // It ends by itself, although nobody reads any more.
+    let totals = totals(&child.wait_with_output().unwrap());
+    assert_eq!(totals["interrupted"], true);
+    assert!(totals["frames"].as_u64().unwrap() >= 2, "{totals}");
+}
+
+#[test]
+fn a_broken_connection_is_made_again() {
+    let folder = heart();
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let to = format!("--to tcp:{}", listener.local_addr().unwrap());
+    let child = stream(folder.path(), &format!("{to} --rate 50 --loop --frames 75"));
+    let (mut first, _) = listener.accept().unwrap();
+    first.read_exact(&mut [0; 20_000]).unwrap();
+    drop(first);
+    let (second, _) = listener.accept().unwrap();
+    second.set_read_timeout(Some(Duration::from_millis(5))).unwrap();
+    let (seen, output) = receive(folder.path(), &mut Bytes::new(second), NoMac, child);
+    let totals = totals(&output);
+    assert_eq!(totals["reconnections"], 1);
+    assert!(seen.published > 30 && totals["acknowledged"] == 75, "{totals}");
+
+    // Nobody comes back.
+    let child = stream(folder.path(), &format!("{to} --rate 50 --loop --retry 1"));
+    drop(listener.accept().unwrap());
+    drop(listener);
+    let output = child.wait_with_output().unwrap();
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    assert!(error.contains("did not come back within 1 s"), "{error}");
+}
+
+/// A receiver that reports and publishes nothing: the program says so, and goes on.
+#[test]
+fn a_receiver_that_acknowledges_nothing_is_named() {
+    let folder = heart();
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let line = format!("--to tcp:{} --rate 100 --frames 3", listener.local_addr().unwrap());
+    let child = stream(folder.path(), &line);
+    let (socket, _) = listener.accept().unwrap();
+    socket.set_read_timeout(Some(Duration::from_millis(5))).unwrap();
+    // Another mesh's statuses are nobody's; this receiver has the mesh, and none of the frames' packets.
+    let blob = std::fs::read(folder.path().join("heart.dibs")).unwrap();
+    let mesh = Tree::<u16>::from_bytes(&blob).unwrap().mesh_id();
+    let mut link = Bytes::new(socket);
+    let frames = Frames::<N>::new();
+    let (writer, _reader) = frames.split().unwrap();
+    let mut deaf = Assembler::new(writer, dibs_nostd::Unchecked, mesh, 1e4);
+    let mut child = child;
+    let start = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        assert!(start.elapsed() < PATIENCE, "the program waits for ever");
+        let _ = link.receive();
+        let status = deaf.status(start.elapsed().as_millis() as u32, 1);
+        let mut buffer = [0; 256];
+        link.reply(encode_status(mesh, &status, deaf.counters(), &NoMac, &mut buffer));
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(totals(&output)["frames"], 3);
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        error.contains("2 frames are not acknowledged; the receiver has published none"),
+        "{error}"
+    );
 }

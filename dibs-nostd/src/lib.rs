@@ -66,7 +66,7 @@ mod tree;
 mod unavailable;
 
 pub use bus::wire;
-pub use bus::{Advance, Assembler, LastHeartbeat, Progress, Rejection};
+pub use bus::{Advance, Assembler, BusHealth, LastHeartbeat, Progress, Rejection};
 pub use control::{constraint, failsafe};
 pub use query::{Budget, Cost, Options, Proximity, Query};
 pub use stretch::{

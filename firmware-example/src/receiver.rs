@@ -1,7 +1,7 @@
 //! Bus reception: bytes in, published frames and statuses out.
 
 use dibs_nostd::wire::{Counters, Deframer, encode_status, enframe, framed_bytes};
-use dibs_nostd::{Advance, StretchError, StretchMonitor};
+use dibs_nostd::{Advance, Progress, StretchError, StretchMonitor};
 
 use crate::fingerprint::Fingerprint;
 use crate::surface::{self, CENTRE, REACH};
@@ -74,13 +74,12 @@ impl Receiver {
             None => return,
             // Rejections are counted by cause in the assembler.
             Some(Ok(packet)) => {
-                self.status.link.note(&self.assembler.accept(packet, tick), tick);
+                let outcome = self.assembler.accept(packet, tick);
+                self.has_news |= outcome == Ok(Progress::Hello);
             }
-            Some(Err(error)) => {
-                self.assembler.count_framing(&error);
-                self.status.link.damaged();
-            }
+            Some(Err(error)) => self.assembler.count_framing(&error),
         }
+        self.status.link.set(&self.assembler.health());
         self.status.set(self.assembler.counters());
     }
 
@@ -90,7 +89,7 @@ impl Receiver {
     #[inline(never)]
     pub fn work(&mut self) -> bool {
         let outcome = self.assembler.advance(WORK);
-        self.status.link.note_check(&outcome);
+        self.status.link.set(&self.assembler.health());
         match outcome {
             Ok(Advance::Pending) => return true,
             Ok(Advance::Published { epoch }) => self.fingerprint.begin(epoch),

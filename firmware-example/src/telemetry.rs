@@ -91,6 +91,9 @@ pub const fn cause_code(cause: &Unavailable) -> u32 {
         Unavailable::HeartbeatLost { .. } => 5,
         Unavailable::Rejections { .. } => 6,
         Unavailable::Rot => 7,
+        Unavailable::Delayed { .. } => 9,
+        Unavailable::SourceStale { .. } => 10,
+        Unavailable::Forgeries { .. } => 11,
         _ => 8,
     }
 }
@@ -107,6 +110,9 @@ pub const fn cause_name(code: u32) -> &'static str {
         5 => "heartbeat lost",
         6 => "rejections in a row",
         7 => "tree changed",
+        9 => "delayed on its way",
+        10 => "source stands still",
+        11 => "forgeries",
         _ => "number not finite",
     }
 }

@@ -94,7 +94,19 @@ pub fn give<G: Gate, M: Mac, const N: usize>(
     assembler: &mut Assembler<'_, G, N, M>,
     packet: &[u8],
 ) -> Result<Option<u32>, Rejection> {
-    assembler.accept(packet, 0)?;
+    give_at(assembler, packet, 0)
+}
+
+/// The same, at a time on the receiver's clock.
+///
+/// # Errors
+/// What the assembler rejected.
+pub fn give_at<G: Gate, M: Mac, const N: usize>(
+    assembler: &mut Assembler<'_, G, N, M>,
+    packet: &[u8],
+    now: u32,
+) -> Result<Option<u32>, Rejection> {
+    assembler.accept(packet, now)?;
     for _ in 0..1000 {
         match assembler.advance(7)? {
             Advance::Published { epoch } => return Ok(Some(epoch)),
@@ -121,7 +133,7 @@ pub fn raw(
     first: u32,
     body: &[u8],
 ) -> Vec<u8> {
-    let mut packet = vec![2, kind];
+    let mut packet = vec![3, kind];
     packet.extend((session as u16).to_le_bytes());
     packet.extend(MESH.to_le_bytes());
     packet.extend(epoch.to_le_bytes());
@@ -138,8 +150,8 @@ pub fn raw(
 /// A begin packet of a float frame, by the specification alone.
 pub fn raw_begin(session: u32, epoch: u32, content: u8, rows: u32, base: u32) -> Vec<u8> {
     let mut body = ((session >> 16) as u16).to_le_bytes().to_vec();
-    body.extend([content, 0]);
-    body.extend(rows.to_le_bytes());
+    body.extend([0, 0, content]);
+    body.extend(&rows.to_le_bytes()[..3]);
     body.extend(base.to_le_bytes());
     body.extend([0; 24]);
     raw(1, session, epoch, [0, 0], 0, &body)
@@ -161,6 +173,15 @@ pub fn published(reader: &mut FrameReader<'_, N>) -> Option<(u32, Vec<[u32; 3]>)
     let frame = reader.read()?;
     let positions = (0..N as u32).map(|v| frame.position(v).unwrap().to_array().map(f32::to_bits));
     Some((frame.label().epoch, positions.collect()))
+}
+
+/// A packet's share of its frame's digest, by the specification alone.
+pub fn share(packet: &[u8]) -> u32 {
+    let mut share = checksum(packet);
+    for (shift, factor) in [(16, 0x85EB_CA6B_u32), (13, 0xC2B2_AE35)] {
+        share = (share ^ (share >> shift)).wrapping_mul(factor);
+    }
+    share ^ (share >> 16)
 }
 
 /// CRC-32 by the definition, one bit at a time: the packets' checksum is computed another way.

@@ -47,7 +47,7 @@ fn what_is_no_packet() {
         damaged
     });
     assert!(matches!(flipped, Rejection::Packet(PacketError::Checksum { .. })));
-    for version in [0, 1, 3, 255] {
+    for version in [0, 1, 2, 255] {
         let fault = edit(vertices, 0, &[version]);
         assert_eq!(rejection_of(&fault), packet(PacketError::Version { version }));
     }
@@ -55,6 +55,8 @@ fn what_is_no_packet() {
         (edit(vertices, 1, &[9]), PacketError::Kind { kind: 9 }),
         (edit(vertices, 1, &[0]), PacketError::Kind { kind: 0 }),
         (edit(vertices, 1, &[0x89]), PacketError::Kind { kind: 0x89 }),
+        // A hello has no tag.
+        (edit(vertices, 1, &[0x88]), PacketError::Kind { kind: 0x88 }),
         // Length, count and padding.
         (edit(vertices, 14, &[2]), PacketError::Length { bytes: 64, expected: 48 }),
         (edit(vertices, 14, &[4]), PacketError::Length { bytes: 64, expected: 70 }),
@@ -68,36 +70,38 @@ fn what_is_no_packet() {
         ),
         (edit(vertices, 59, &[1]), PacketError::Reserved { offset: 54 }),
         (edit(commit, 27, &[1]), PacketError::Reserved { offset: 22 }),
-        (edit(&raw(2, 1, 1, [1, 0], 0, &[]), 0, &[2]), PacketError::Empty),
+        (edit(&raw(2, 1, 1, [1, 0], 0, &[]), 0, &[3]), PacketError::Empty),
         // Sequence.
         (edit(vertices, 12, &[0, 0]), PacketError::Sequence { sequence: 0 }),
         (edit(commit, 12, &[0, 0]), PacketError::Sequence { sequence: 0 }),
         (edit(begin, 12, &[1, 0]), PacketError::Sequence { sequence: 1 }),
         // The begin's fields.
         (edit(begin, 14, &[1]), PacketError::Reserved { offset: 14 }),
-        (edit(begin, 15, &[1]), PacketError::Reserved { offset: 15 }),
-        (edit(begin, 20, &[7]), PacketError::Content { content: 7 }),
-        (edit(begin, 21, &[7]), PacketError::Encoding { encoding: 7 }),
-        (edit(begin, 22, &[0; 4]), PacketError::Rows { rows: 0 }),
-        (edit(begin, 22, &[1, 0, 0, 1]), PacketError::Rows { rows: 0x0100_0001 }),
+        (edit(begin, 15, &[1]), PacketError::Reserved { offset: 14 }),
+        (edit(begin, 22, &[7]), PacketError::Content { content: 7 }),
+        (edit(begin, 22, &[7 << 3]), PacketError::Encoding { encoding: 7 }),
+        (edit(begin, 22, &[0x40]), PacketError::Reserved { offset: 22 }),
+        (edit(begin, 23, &[0; 3]), PacketError::Rows { rows: 0 }),
         (edit(begin, 26, &[1]), PacketError::Reserved { offset: 26 }),
         (edit(begin, 30, &[1]), PacketError::Reserved { offset: 30 }),
         (edit(begin, 53, &[1]), PacketError::Reserved { offset: 30 }),
-        (edit(begin, 21, &[1]), PacketError::Box),
+        (edit(begin, 22, &[1 << 3]), PacketError::Box),
         (raw_begin(1, 1, 2, 65, 0), PacketError::Rows { rows: 65 }),
-        (edit(&raw_begin(1, 1, 2, 6, 0), 21, &[1]), PacketError::Encoding { encoding: 1 }),
+        (edit(&raw_begin(1, 1, 2, 6, 0), 22, &[2 | 1 << 3]), PacketError::Encoding { encoding: 1 }),
         // A heartbeat's and a status's.
         (raw(6, 1, 1, [0, 0], 0, &[0, 0, 1, 0, 0, 0, 0, 0]), PacketError::Reserved { offset: 20 }),
+        (raw(8, 1, 1, [0, 0], 0, &[0, 0, 1, 0, 0, 0, 0, 0]), PacketError::Reserved { offset: 20 }),
+        (raw(8, 1, 1, [0, 0], 1, &[0; 8]), PacketError::Reserved { offset: 15 }),
         (
             raw(7, 1, 1, [0, 0], 0, &{
-                let mut body = [0; 20];
+                let mut body = [0; 28];
                 body[2] = 4;
                 body
             }),
             PacketError::Reserved { offset: 20 },
         ),
-        (raw(7, 0, 1, [0, 0], 0, &[0; 20]), PacketError::Reserved { offset: 18 }),
-        (raw(7, 0, 0, [0, 0], 256, &[0; 20]), PacketError::Reserved { offset: 16 }),
+        (raw(7, 0, 1, [0, 0], 0, &[0; 28]), PacketError::Reserved { offset: 18 }),
+        (raw(7, 0, 0, [0, 0], 256, &[0; 28]), PacketError::Reserved { offset: 16 }),
     ] {
         assert_eq!(rejection_of(&fault), packet(expected), "{fault:02x?}");
         assert_eq!(packet(expected).event(), Event::Malformed);
@@ -115,11 +119,19 @@ fn what_is_a_packet_and_not_right() {
     rejected(&edit(vertices, 4, &[0xFF]), Rejection::WrongMesh { mesh_id: MESH | 0xFF });
     rejected(&edit(vertices, 8, &[2]), Rejection::Unexpected { epoch: 2 });
     rejected(&edit(vertices, 2, &[2]), Rejection::Unexpected { epoch: 1 });
-    let status = Status { published: None, wants_whole: false, safety: 0, number: 0, challenge: 0 };
+    let status = Status {
+        published: None,
+        wants_whole: false,
+        safety: 0,
+        number: 0,
+        clock: 0,
+        answer: 0,
+        challenge: 0,
+    };
     let mut buffer = [0; 64];
     let status = encode_status(MESH, &status, &Counters::new(), &NoMac, &mut buffer);
     rejected(status, Rejection::Unexpected { epoch: 0 });
-    rejected(&edit(begin, 22, &41_u32.to_le_bytes()), Rejection::RowCount { rows: 41 });
+    rejected(&edit(begin, 23, &[41, 0, 0]), Rejection::RowCount { rows: 41 });
     rejected(&frame(1, true)[1], Rejection::Encoding);
     let weights = WeightsEncoder::<64>::new(id(2), &[0.5; N])
         .unwrap()
@@ -211,7 +223,7 @@ fn a_frame_without_its_last_rows_is_not_published() {
     let mut digest = 0_u32;
     for packet in short {
         give(&mut assembler, packet).unwrap();
-        digest = digest.wrapping_add(checksum(packet));
+        digest = digest.wrapping_add(share(packet));
     }
     let mut commit = edit(commit, 12, &(short.len() as u16).to_le_bytes());
     commit = edit(&commit, 18, &digest.to_le_bytes());

@@ -25,7 +25,7 @@ use std::io;
 
 use dibs_nostd::format::CRC;
 use dibs_nostd::wire::{
-    Body, CHECKSUM_BYTES, Content, Encoding, HEADER_BYTES, Packet, Rows, TAG_BYTES, enframe,
+    Body, CHECKSUM_BYTES, Content, Encoding, HEADER_BYTES, NoMac, Packet, Rows, TAG_BYTES, enframe,
     framed_bytes,
 };
 use fastrand::Rng;
@@ -363,7 +363,7 @@ impl Injector {
         }
         seal(&mut altered);
         if fault == Fault::Stretch {
-            let change = checksum(&altered).wrapping_sub(checksum(packet));
+            let change = share(&altered).wrapping_sub(share(packet));
             self.digest = self.digest.wrapping_add(change);
         }
         Some(altered)
@@ -390,8 +390,9 @@ fn seal(packet: &mut [u8]) {
     }
 }
 
-fn checksum(packet: &[u8]) -> u32 {
-    packet.last_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes))
+/// What a packet without a tag adds to its frame's digest.
+fn share(packet: &[u8]) -> u32 {
+    Packet::decode(packet).ok().and_then(|packet| packet.verify(&NoMac, 0)).unwrap_or(0)
 }
 
 /// A line on which faults happen.

@@ -38,8 +38,14 @@ pub enum Target {
     },
     /// A TCP server, `tcp:HOST:PORT`.
     Tcp(String),
-    /// A UDP receiver, `udp:HOST:PORT`.
-    Udp(String),
+    /// A UDP receiver, `udp:HOST:PORT`, or `udp:HOST:PORT@LOCAL_PORT` for one that answers to a fixed port;
+    /// any free port where none is given.
+    Udp {
+        /// Host and port.
+        address: String,
+        /// The port on this side.
+        local: u16,
+    },
     /// A listening Unix socket, `unix:PATH`.
     Unix(PathBuf),
 }
@@ -49,7 +55,9 @@ pub enum Target {
 #[non_exhaustive]
 pub enum TargetError {
     /// None of the four kinds.
-    #[error("`{text}` is no target: serial:PORT[@BAUD], tcp:HOST:PORT, udp:HOST:PORT or unix:PATH")]
+    #[error(
+        "`{text}` is no target: serial:PORT[@BAUD], tcp:HOST:PORT, udp:HOST:PORT[@LOCAL_PORT] or unix:PATH"
+    )]
     Kind {
         /// What was given.
         text: String,
@@ -80,7 +88,7 @@ impl FromStr for Target {
     fn from_str(text: &str) -> Result<Self, TargetError> {
         let kind = || TargetError::Kind { text: text.to_owned() };
         let (scheme, rest) = text.split_once(':').ok_or_else(kind)?;
-        let address = || {
+        let address = |rest: &str| {
             let (host, port) = rest.rsplit_once(':').ok_or_else(kind)?;
             let is_address = !host.is_empty() && port.parse::<u16>().is_ok();
             if is_address { Ok(rest.to_owned()) } else { Err(kind()) }
@@ -101,8 +109,12 @@ impl FromStr for Target {
                 };
                 Ok(Self::Serial { port: port.to_owned(), baud })
             }
-            "tcp" => Ok(Self::Tcp(address()?)),
-            "udp" => Ok(Self::Udp(address()?)),
+            "tcp" => Ok(Self::Tcp(address(rest)?)),
+            "udp" => {
+                let (rest, local) = rest.rsplit_once('@').unwrap_or((rest, "0"));
+                let local = local.parse().map_err(|_| kind())?;
+                Ok(Self::Udp { address: address(rest)?, local })
+            }
             "unix" => Ok(Self::Unix(PathBuf::from(rest))),
             _ => Err(kind()),
         }
@@ -114,7 +126,8 @@ impl fmt::Display for Target {
         match self {
             Self::Serial { port, baud } => write!(f, "serial:{port}@{baud}"),
             Self::Tcp(address) => write!(f, "tcp:{address}"),
-            Self::Udp(address) => write!(f, "udp:{address}"),
+            Self::Udp { address, local: 0 } => write!(f, "udp:{address}"),
+            Self::Udp { address, local } => write!(f, "udp:{address}@{local}"),
             Self::Unix(path) => write!(f, "unix:{}", path.display()),
         }
     }
@@ -135,10 +148,13 @@ impl Target {
             Self::Tcp(address) => {
                 Line::tcp(TcpStream::connect_timeout(&resolve(address)?, CONNECT)?)
             }
-            Self::Udp(address) => {
-                let peer = resolve(address)?;
-                let any: SocketAddr =
-                    if peer.is_ipv4() { ([0, 0, 0, 0], 0).into() } else { ([0_u16; 8], 0).into() };
+            Self::Udp { address, local } => {
+                let (peer, local) = (resolve(address)?, *local);
+                let any: SocketAddr = if peer.is_ipv4() {
+                    ([0, 0, 0, 0], local).into()
+                } else {
+                    ([0_u16; 8], local).into()
+                };
                 let socket = UdpSocket::bind(any)?;
                 socket.connect(peer)?;
                 Line::udp(socket)

@@ -54,6 +54,9 @@ impl<T: Transport + ?Sized> Transport for Box<T> {
     }
 }
 
+/// A line that takes nothing for this long is stuck: a packet is a fraction of a second even on a slow one.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(10);
+
 /// How long the reading thread waits before it looks whether it is still wanted.
 const PATIENCE: Duration = Duration::from_millis(50);
 
@@ -75,9 +78,7 @@ impl Line {
     /// When the port cannot be shared with the reading thread.
     pub fn serial(mut port: SerialPort) -> io::Result<Self> {
         port.set_read_timeout(PATIENCE)?;
-        // A packet is a fraction of a second even on a slow line; a line that takes nothing for this
-        // long is stuck.
-        port.set_write_timeout(Duration::from_secs(10))?;
+        port.set_write_timeout(WRITE_TIMEOUT)?;
         let reader = port.try_clone()?;
         Ok(Self::stream(port, reader, || ()))
     }
@@ -89,6 +90,7 @@ impl Line {
     pub fn tcp(socket: TcpStream) -> io::Result<Self> {
         socket.set_nodelay(true)?;
         socket.set_read_timeout(Some(PATIENCE))?;
+        socket.set_write_timeout(Some(WRITE_TIMEOUT))?;
         let (reader, handle) = (socket.try_clone()?, socket.try_clone()?);
         Ok(Self::stream(socket, reader, move || drop(handle.shutdown(Shutdown::Both))))
     }
@@ -100,6 +102,7 @@ impl Line {
     #[cfg(unix)]
     pub fn unix(socket: UnixStream) -> io::Result<Self> {
         socket.set_read_timeout(Some(PATIENCE))?;
+        socket.set_write_timeout(Some(WRITE_TIMEOUT))?;
         let (reader, handle) = (socket.try_clone()?, socket.try_clone()?);
         Ok(Self::stream(socket, reader, move || drop(handle.shutdown(Shutdown::Both))))
     }

@@ -52,7 +52,8 @@ const PUBLISHED: u32 = 4;
 pub struct FrameLabel {
     /// Number of the frame, given by the sender; wraps.
     pub epoch: u32,
-    /// When the first packet of the frame arrived, on the receiver's clock (any unit; wraps).
+    /// When the first packet of the frame arrived, less the age that the surface then had, on the
+    /// receiver's clock (wraps).
     pub received: u32,
     /// No vertex is farther than this from the position that the sender had, in mm: the
     /// quantisation on the wire. A separation is off by at most as much.

@@ -34,8 +34,23 @@ pub enum Unavailable {
     },
     /// More was rejected than allowed since the last frame was published.
     Rejections {
-        /// Packets and frames rejected.
+        /// Frames refused or damaged.
         streak: u32,
+    },
+    /// The surface was longer on its way than allowed, or nobody knows how long.
+    Delayed {
+        /// From the status that it echoes to its arrival, on the receiver's clock.
+        transit: u32,
+    },
+    /// The surface was older than allowed when it was sent: its source stands still.
+    SourceStale {
+        /// Its age then.
+        age: u32,
+    },
+    /// More packets were forged than allowed since the last frame was published.
+    Forgeries {
+        /// Packets without a genuine tag.
+        count: u32,
     },
     /// The tool's axis touches the surface: no direction leads out.
     NoDirection,
@@ -53,8 +68,13 @@ impl fmt::Display for Unavailable {
             Self::LinkLost { silence } => write!(f, "no good packet came for {silence}"),
             Self::HeartbeatLost { silence } => write!(f, "no heartbeat came for {silence}"),
             Self::Rejections { streak } => {
-                write!(f, "{streak} packets or frames were rejected in a row")
+                write!(f, "{streak} frames were refused or damaged in a row")
             }
+            Self::Delayed { transit } => {
+                write!(f, "the surface may have been {transit} on its way")
+            }
+            Self::SourceStale { age } => write!(f, "the surface was {age} old when it was sent"),
+            Self::Forgeries { count } => write!(f, "{count} packets were forged"),
             Self::NoDirection => write!(f, "the tool's axis touches the surface"),
             Self::NotFinite => write!(f, "a number is not finite"),
         }

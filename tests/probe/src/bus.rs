@@ -12,3 +12,5 @@ pub const REPORT_MTU: usize = 200;
 pub const HEAD_BYTES: usize = 16;
 /// The key of both sides.
 pub const KEY: [u8; 16] = *b"sixteen bytes...";
+/// The receiver's id.
+pub const RECEIVER: u32 = 7;

@@ -24,6 +24,15 @@ pub enum SendError {
     /// Packets are to carry tags, and the receiver's challenge is not known: no status has come.
     #[error("no genuine status came from the receiver: is it on, and has it the same key?")]
     NoChallenge,
+    /// Another sender has taken over the receiver: there is one sender a surface.
+    #[error(
+        "another sender has taken over with session {session}: there can be only one; stop it, and start \
+         this one again"
+    )]
+    Superseded {
+        /// The other sender's session.
+        session: u32,
+    },
     /// The connection is gone.
     #[error("the connection broke: {0}")]
     Line(std::io::Error),

@@ -1,8 +1,11 @@
 //! From positions to packets, and what comes back.
 
+mod clock;
 mod error;
 mod frame;
+mod greeting;
 mod order;
+mod reply;
 mod settings;
 
 pub use error::SendError;
@@ -10,16 +13,18 @@ pub use frame::{Prepared, Sent};
 pub use order::SurfaceOrder;
 pub use settings::Settings;
 
-use std::time::Instant;
+use std::time::Duration;
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
-    Body, Content, Counters, Encoding, FrameEncoder, FrameId, Mac, NoMac, Packet, QuantisedBox,
+    Content, Counters, Encoding, FrameEncoder, FrameId, Freshness, Mac, NoMac, QuantisedBox,
     Status, WeightsEncoder, encode_heartbeat, is_newer,
 };
 
 use super::Transport;
+use clock::Clock;
 use frame::{apply, coarsened, packets_of};
+use greeting::Greeting;
 
 /// What was sent since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -57,28 +62,36 @@ pub struct Totals {
 /// ```
 pub struct Sender<T, const MTU: usize, M = NoMac> {
     transport: T,
-    /// What makes the tags; `None` until the receiver's challenge is known.
+    /// `None` until the receiver's challenge is known.
     mac: Option<M>,
-    /// What makes tags under a challenge.
-    mac_of: Box<dyn Fn(u32) -> M + Send>,
+    /// The MAC under a challenge.
+    keyed_mac: Box<dyn Fn(u32) -> M + Send>,
+    clock: Clock,
+    /// The hello that waits for its answer.
+    greeting: Option<Greeting>,
     surface: SurfaceOrder,
     settings: Settings,
     epoch: u32,
+    /// The epoch before the session's first.
+    before: u32,
+    /// A frame of this session was acknowledged.
+    is_established: bool,
+    /// The session of a sender that has taken over.
+    superseded: Option<u32>,
     beat: u32,
-    last_beat: Option<Instant>,
+    last_beat: Option<Duration>,
+    /// The positions, or weights, that came last, and when they came first.
+    capture: Option<(Vec<f32>, Duration)>,
     /// The last frame of positions, as the receiver has it if it came through.
     held: Option<(u32, Vec<Vec3>)>,
     since_whole: u32,
     whole_wanted: bool,
     /// The last whole frame: until it is acknowledged, requests for one are about the time before it.
-    whole: Option<(u32, Instant)>,
+    whole: Option<(u32, Duration)>,
     status: Option<Status>,
     counters: Counters,
     totals: Totals,
 }
-
-/// Statuses that may be overtaken on their way.
-const OVERTAKEN: u32 = 8;
 
 impl<T: Transport, const MTU: usize> Sender<T, MTU> {
     /// A sender that has sent nothing yet.
@@ -90,9 +103,9 @@ impl<T: Transport, const MTU: usize> Sender<T, MTU> {
 }
 
 impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
-    /// A sender of packets with tags. `mac_of` makes what makes the tags under a challenge: the
-    /// receiver's, which it draws when it starts and reports in its status. Until a status has come
-    /// nothing can be sent.
+    /// A sender of packets with tags. `keyed_mac(challenge)` returns the MAC under the receiver's
+    /// challenge, which that draws when it starts and reports in its status. Until a status has come,
+    /// [`poll`](Self::poll) says hello to the receiver, and nothing else can be sent.
     ///
     /// For a receiver without a way back, which uses the challenge 0: [`challenge`](Self::challenge).
     #[must_use]
@@ -100,17 +113,23 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         transport: T,
         surface: SurfaceOrder,
         settings: Settings,
-        mac_of: impl Fn(u32) -> M + Send + 'static,
+        keyed_mac: impl Fn(u32) -> M + Send + 'static,
     ) -> Self {
         Self {
             transport,
             mac: None,
-            mac_of: Box::new(mac_of),
+            keyed_mac: Box::new(keyed_mac),
+            clock: Clock::system(),
+            greeting: None,
             surface,
             settings,
             epoch: 0,
+            before: 0,
+            is_established: false,
+            superseded: None,
             beat: 0,
             last_beat: None,
+            capture: None,
             held: None,
             since_whole: 0,
             whole_wanted: true,
@@ -123,7 +142,23 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
 
     /// Takes a challenge as the receiver's.
     pub fn challenge(&mut self, challenge: u32) {
-        self.mac = Some((self.mac_of)(challenge));
+        self.mac = Some((self.keyed_mac)(challenge));
+    }
+
+    /// Takes the time from `now`, in place of the system's clock: for tests and simulations. Any start;
+    /// it never goes back.
+    #[must_use]
+    pub fn with_clock(mut self, now: impl Fn() -> Duration + Send + 'static) -> Self {
+        self.clock = Clock::of(now);
+        self
+    }
+
+    /// Goes on through another transport, after the one before broke: with a whole frame, as soon as the
+    /// receiver has answered. The transport that broke.
+    pub fn reconnect(&mut self, transport: T) -> T {
+        self.whole_wanted = true;
+        self.greeting = Some(Greeting::new());
+        std::mem::replace(&mut self.transport, transport)
     }
 
     /// Whether frames can be sent: without tags always, with tags once the challenge is known.
@@ -135,10 +170,23 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     /// Sends a frame: positions (mm) in the mesh's order. Whole, or only what moved, as the settings
     /// and the receiver ask for; with heartbeats in between, where they are due.
     ///
+    /// The frame counts as captured now, unless its positions are those of the last one to the bit: then it
+    /// is as old as that one. So a source that stands still grows old, although its sender lives. Where the
+    /// time of the capture is known, [`send_captured`](Self::send_captured).
+    ///
     /// # Errors
     /// [`SendError`] names the vertex that cannot be sent, or what the line said.
     pub fn send(&mut self, positions: &[Vec3]) -> Result<Sent, SendError> {
         let frame = self.prepare(positions)?;
+        self.transmit(frame)
+    }
+
+    /// Sends a frame that was captured some time ago.
+    ///
+    /// # Errors
+    /// As [`send`](Self::send).
+    pub fn send_captured(&mut self, positions: &[Vec3], ago: Duration) -> Result<Sent, SendError> {
+        let frame = self.prepare_captured(positions, ago)?;
         self.transmit(frame)
     }
 
@@ -148,9 +196,21 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     /// # Errors
     /// [`SendError`] names the vertex that cannot be sent.
     pub fn prepare(&mut self, positions: &[Vec3]) -> Result<Prepared, SendError> {
-        if !self.is_ready() {
-            return Err(SendError::NoChallenge);
-        }
+        let ago = self.since_change(positions.iter().flat_map(Vec3::to_array));
+        self.prepare_captured(positions, ago)
+    }
+
+    /// The first half of [`send_captured`](Self::send_captured).
+    ///
+    /// # Errors
+    /// [`SendError`] names the vertex that cannot be sent.
+    pub fn prepare_captured(
+        &mut self,
+        positions: &[Vec3],
+        ago: Duration,
+    ) -> Result<Prepared, SendError> {
+        self.check()?;
+        let freshness = self.freshness(ago);
         let rows = self.surface.to_rows(positions)?;
         let encoding = self.encoding(&rows)?;
         let is_partial = self.is_partial_wanted();
@@ -163,7 +223,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
             None => FrameEncoder::new(id, encoding, &rows[..]),
         };
         let mac = self.mac.as_ref().ok_or(SendError::NoChallenge)?;
-        let frame = frame.and_then(|frame| frame.with_mac(mac));
+        let frame = frame.and_then(|frame| frame.with_freshness(freshness).with_mac(mac));
         let packets = packets_of::<_, MTU>(frame.map_err(SendError::Frame)?);
 
         let content = match base {
@@ -187,10 +247,25 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     /// # Errors
     /// [`SendError`] names the weight that cannot be sent.
     pub fn prepare_weights(&mut self, weights: &[f32]) -> Result<Prepared, SendError> {
+        let ago = self.since_change(weights.iter().copied());
+        self.prepare_weights_captured(weights, ago)
+    }
+
+    /// The same of weights that were captured some time ago.
+    ///
+    /// # Errors
+    /// [`SendError`] names the weight that cannot be sent.
+    pub fn prepare_weights_captured(
+        &mut self,
+        weights: &[f32],
+        ago: Duration,
+    ) -> Result<Prepared, SendError> {
+        self.check()?;
+        let freshness = self.freshness(ago);
         let id = self.next_id();
         let mac = self.mac.as_ref().ok_or(SendError::NoChallenge)?;
         let frame = WeightsEncoder::<MTU>::new(id, weights).map_err(SendError::Frame)?;
-        let mut frame = frame.with_mac(mac);
+        let mut frame = frame.with_freshness(freshness).with_mac(mac);
         let (mut buffer, mut packets) = ([0; MTU], Vec::new());
         while let Some(packet) = frame.next_packet(&mut buffer) {
             packets.push(packet.to_vec());
@@ -209,37 +284,48 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
             self.put(packet)?;
         }
         if sent.content == Content::Whole {
-            self.whole = Some((sent.epoch, Instant::now()));
+            self.whole = Some((sent.epoch, self.clock.now()));
         }
         self.totals.partial += u64::from(matches!(sent.content, Content::Partial { .. }));
         self.totals.frames += 1;
         Ok(sent)
     }
 
-    /// Sends a heartbeat if one is due, and takes in the statuses that have come. Does not block;
-    /// to be called some times between two heartbeats.
+    /// Sends a heartbeat or a hello if one is due, and takes in the statuses that have come. Does not
+    /// block; to be called some times between two heartbeats.
     ///
     /// # Errors
-    /// [`SendError::Line`] when the connection is gone.
+    /// [`SendError::Line`] when the connection is gone, [`SendError::Superseded`] when another sender has
+    /// taken over.
     pub fn poll(&mut self) -> Result<(), SendError> {
+        self.greet()?;
         self.heartbeat()?;
         while let Some(packet) = self.transport.receive().map_err(SendError::Line)? {
             self.take(&packet);
         }
-        Ok(())
+        self.superseded.map_or(Ok(()), |session| Err(SendError::Superseded { session }))
     }
 
     /// The frame that the receiver has published, if it has said so in this session.
     #[must_use]
     pub fn acknowledged(&self) -> Option<u32> {
         let published = self.status?.published?;
-        (published.session == self.settings.session).then_some(published.epoch)
+        let is_own = published.session == self.settings.session
+            && !is_newer(published.epoch, self.epoch)
+            && is_newer(published.epoch, self.before);
+        is_own.then_some(published.epoch)
     }
 
-    /// Frames that were sent and not acknowledged yet, nor a later one.
+    /// Frames of this session that were sent and not acknowledged yet, nor a later one.
     #[must_use]
     pub fn in_flight(&self) -> u32 {
-        self.epoch.wrapping_sub(self.acknowledged().unwrap_or(0))
+        self.epoch.wrapping_sub(self.acknowledged().unwrap_or(self.before))
+    }
+
+    /// Number of this run: that of the settings, or a later one that was free.
+    #[must_use]
+    pub const fn session(&self) -> u32 {
+        self.settings.session
     }
 
     /// What the receiver reported last.
@@ -303,14 +389,41 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         Ok(Encoding::Quantised(coarsened(grid, tolerance)))
     }
 
+    /// An error unless a frame can be sent.
+    fn check(&self) -> Result<(), SendError> {
+        match self.superseded {
+            Some(session) => Err(SendError::Superseded { session }),
+            None if self.is_ready() => Ok(()),
+            None => Err(SendError::NoChallenge),
+        }
+    }
+
+    /// How long these numbers have been the same.
+    fn since_change(&mut self, numbers: impl Iterator<Item = f32> + Clone) -> Duration {
+        let now = self.clock.now();
+        match &self.capture {
+            Some((last, at)) if numbers.clone().eq(last.iter().copied()) => now.saturating_sub(*at),
+            _ => {
+                self.capture = Some((numbers.collect(), now));
+                Duration::ZERO
+            }
+        }
+    }
+
+    fn freshness(&self, age: Duration) -> Freshness {
+        let age_ms = u16::try_from(age.as_millis()).unwrap_or(u16::MAX);
+        Freshness { age_ms, echo: self.status.map(|status| status.clock) }
+    }
+
     fn heartbeat(&mut self) -> Result<(), SendError> {
         let Some(interval) = self.settings.heartbeat.filter(|_| self.is_ready()) else {
             return Ok(());
         };
-        if self.last_beat.is_some_and(|last| last.elapsed() < interval) {
+        let now = self.clock.now();
+        if self.last_beat.is_some_and(|last| now.saturating_sub(last) < interval) {
             return Ok(());
         }
-        self.last_beat = Some(Instant::now());
+        self.last_beat = Some(now);
         self.beat = self.beat.wrapping_add(1);
         let mut buffer = [0; 64];
         let Some(mac) = &self.mac else { return Ok(()) };
@@ -323,53 +436,5 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.totals.packets += 1;
         self.totals.bytes += packet.len() as u64;
         Ok(())
-    }
-
-    /// Takes in a packet that came back. What is no status of this mesh is not for this sender.
-    fn take(&mut self, packet: &[u8]) {
-        let Ok(packet) = Packet::decode(packet) else { return };
-        let Body::Status(report) = packet.body else { return };
-        if packet.mesh_id != self.surface.mesh_id {
-            return;
-        }
-        let challenge = report.status.challenge;
-        let is_new = self.mac.as_ref().is_none_or(|mac| mac.challenge() != challenge);
-        let mac = (self.mac_of)(challenge);
-        let session = report.status.published.map_or(0, |published| published.session);
-        if !packet.is_genuine(&mac, session) {
-            return;
-        }
-        if is_new {
-            // A receiver that has started anew: it has nothing.
-            self.mac = Some(mac);
-            self.whole_wanted = true;
-        }
-        // Datagrams may overtake each other; farther back, or with nothing published, is a receiver
-        // that has started anew.
-        let is_late = report.status.published.is_some()
-            && self
-                .status
-                .is_some_and(|last| last.number.wrapping_sub(report.status.number) < OVERTAKEN);
-        if is_late {
-            return;
-        }
-        self.counters.update(&report);
-        self.status = Some(report.status);
-        self.totals.statuses += 1;
-        // Somebody has sent under a later session: this one would be refused for ever.
-        if let Some(published) = report.status.published
-            && is_newer(published.session, self.settings.session)
-        {
-            self.settings.session = published.session.wrapping_add(1);
-            self.held = None;
-            self.whole_wanted = true;
-        }
-        let is_answered = self.whole.is_some_and(|(epoch, at)| {
-            let has_come = self.acknowledged().is_some_and(|newest| !is_newer(epoch, newest));
-            has_come || at.elapsed() >= self.settings.patience
-        });
-        if is_answered && (report.status.wants_whole || self.acknowledged().is_none()) {
-            self.whole_wanted = true;
-        }
     }
 }

@@ -22,7 +22,8 @@ pub struct Settings {
     /// heeded.
     pub patience: Duration,
     /// Number of this run: later than that of every run before, which the receiver remembers. By
-    /// default the time in tenths of a second, which wraps after 13 years.
+    /// default the time in tenths of a second, which wraps after 13 years. A sender that finds the number
+    /// taken when it starts takes one more.
     pub session: u32,
 }
 

@@ -3,10 +3,11 @@
 //! Nothing here knows what a frame holds: vertices or weights, and where they are stored.
 
 use super::Rejection;
+use super::health::{BusHealth, FrameName, Trouble};
 use super::runs::{Misplaced, Place, Runs};
 use crate::bus::wire::{
     Begin, Commit, Content, Counters, Event, FrameId, Heartbeat, Mac, Packet, PublishedStatus,
-    Status, is_newer,
+    Status, StreamError, is_newer,
 };
 
 /// The frame in work.
@@ -15,16 +16,16 @@ pub(super) struct Frame {
     pub id: FrameId,
     pub begin: Begin,
     /// The receiver's clock at the begin.
-    pub received: u32,
+    received: u32,
+    /// The receiver's clock at the last packet that was taken.
+    touched: u32,
     /// Checksum of the begin packet: tells a repeated begin from a restarted sender's.
     begin_checksum: u32,
-    /// Sum of the checksums so far.
+    /// Sum of the packets' shares so far.
     sum: u32,
     pub runs: Runs,
     /// The commit's sequence number and digest, once it has come.
     commit: Option<(u16, u32)>,
-    /// An earlier frame began, and nothing came of this one since.
-    is_doubted: bool,
     /// All packets have come, and the digest is right.
     pub is_complete: bool,
 }
@@ -33,7 +34,9 @@ pub(super) struct Frame {
 #[derive(Clone, Copy, Debug)]
 struct Published {
     id: FrameId,
-    received: u32,
+    captured: u32,
+    source_age: u32,
+    transit: u32,
     stretch: Option<f32>,
     /// The greatest age that was reported: a wrap of the clock does not make it young again.
     oldest: u32,
@@ -62,8 +65,18 @@ pub(super) struct Collector {
     wants_whole: bool,
     /// Statuses made so far.
     statuses: u32,
+    /// The nonce of the last hello.
+    answer: u32,
+    /// The receiver's clock at the packet in work, and at the last packet and heartbeat that were taken.
+    now: u32,
+    packet: Option<u32>,
+    heartbeat_at: Option<u32>,
+    trouble: Trouble,
     pub counters: Counters,
 }
+
+/// How long (ms) a frame must have stood still before an earlier one may take its place.
+const PATIENCE: u32 = 100;
 
 impl Collector {
     pub const fn new(mesh_id: u32) -> Self {
@@ -74,7 +87,58 @@ impl Collector {
             heartbeat: None,
             wants_whole: false,
             statuses: 0,
+            answer: 0,
+            now: 0,
+            packet: None,
+            heartbeat_at: None,
+            trouble: Trouble::new(),
             counters: Counters::new(),
+        }
+    }
+
+    /// Sets the clock.
+    pub const fn set_now(&mut self, now: u32) {
+        self.now = now;
+    }
+
+    /// A packet was taken.
+    pub const fn note_packet(&mut self) {
+        self.packet = Some(self.now);
+    }
+
+    /// Counts a rejection, of a packet or frame with this name, where it has one.
+    #[cold]
+    pub fn refuse(&mut self, name: Option<FrameName>, rejection: &Rejection) {
+        self.counters.count(rejection.event());
+        let in_work = self.frame.as_ref().map(|frame| FrameName::of(&frame.id));
+        self.trouble.note(name, in_work, rejection);
+    }
+
+    /// Counts bytes that were no packet.
+    pub fn refuse_bytes(&mut self, _: &StreamError) {
+        self.counters.count(Event::Framing);
+        self.trouble.note_damage();
+    }
+
+    /// Takes a hello's nonce.
+    pub const fn hello(&mut self, nonce: u32) {
+        self.answer = nonce;
+    }
+
+    /// What a fail-safe machine watches.
+    pub fn health(&self) -> BusHealth {
+        let (transit, source_age) = match &self.published {
+            Some(published) => (published.transit, published.source_age),
+            None => (u32::MAX, u32::MAX),
+        };
+        let (rejections, forgeries) = self.trouble.counts();
+        BusHealth {
+            packet: self.packet,
+            heartbeat: self.heartbeat_at,
+            rejections,
+            forgeries,
+            transit,
+            source_age,
         }
     }
 
@@ -85,21 +149,17 @@ impl Collector {
         Err(Rejection::WrongMesh { mesh_id: packet.mesh_id })
     }
 
-    /// Whether a begin may start a frame: `None` for one that is repeated. Checks what only this
+    /// Whether a genuine begin may start a frame: `None` for one that is repeated. Checks what only this
     /// receiver can with `is_acceptable`.
-    pub fn begin<M: Mac>(
+    pub fn begin(
         &mut self,
         packet: &Packet<'_>,
         begin: Begin,
-        mac: &M,
-        now: u32,
+        share: u32,
         is_acceptable: impl FnOnce(&Begin) -> Result<(), Rejection>,
     ) -> Result<Option<Frame>, Rejection> {
         let epoch = packet.epoch;
         let id = FrameId { mesh_id: self.mesh_id, session: begin.session, epoch };
-        if !packet.is_genuine(mac, begin.session) {
-            return Err(Rejection::Forged { epoch });
-        }
         if self.published.is_some_and(|published| !id.is_after(&published.id)) {
             return Err(Rejection::Stale { epoch });
         }
@@ -111,15 +171,14 @@ impl Collector {
                 return Err(Rejection::Base { epoch: base_epoch });
             }
         }
-        if let Some(frame) = &mut self.frame {
+        if let Some(frame) = &self.frame {
             if frame.id == id && frame.begin_checksum == packet.checksum {
                 return Ok(None);
             }
             if frame.is_complete {
                 return Err(Rejection::Busy { epoch });
             }
-            if frame.id.is_after(&id) && !frame.is_doubted {
-                frame.is_doubted = true;
+            if frame.id.is_after(&id) && self.now.wrapping_sub(frame.touched) < PATIENCE {
                 return Err(Rejection::Stale { epoch });
             }
             self.counters.count(Event::Abandoned);
@@ -127,31 +186,33 @@ impl Collector {
         let frame = Frame {
             id,
             begin,
-            received: now,
+            received: self.now,
+            touched: self.now,
             begin_checksum: packet.checksum,
-            sum: packet.checksum,
+            sum: share,
             runs: Runs::new(!matches!(begin.content, Content::Partial { .. })),
             commit: None,
-            is_doubted: false,
             is_complete: false,
         };
         self.frame = Some(frame);
+        self.trouble.note_begin();
         Ok(Some(frame))
     }
 
-    /// The frame in work, if the packet belongs to it.
+    /// The frame in work and the packet's share of its digest, if the packet belongs to it.
     #[inline]
-    pub fn frame_of<M: Mac>(&self, packet: &Packet<'_>, mac: &M) -> Result<&Frame, Rejection> {
+    pub fn frame_of<M: Mac>(
+        &self,
+        packet: &Packet<'_>,
+        mac: &M,
+    ) -> Result<(&Frame, u32), Rejection> {
         let epoch = packet.epoch;
         match &self.frame {
             Some(frame)
                 if frame.id.epoch == epoch && frame.id.session as u16 == packet.session_low =>
             {
-                if packet.is_genuine(mac, frame.id.session) {
-                    Ok(frame)
-                } else {
-                    Err(Rejection::Forged { epoch })
-                }
+                let share = packet.verify(mac, frame.id.session);
+                share.map(|share| (frame, share)).ok_or(Rejection::Forged { epoch })
             }
             _ => {
                 let is_stale = self.published.is_some_and(|published| {
@@ -169,11 +230,11 @@ impl Collector {
 
     /// Notes rows that were stored where `place` says. `Ok(true)` once the frame is complete.
     #[inline]
-    pub fn take_rows(&mut self, packet: &Packet<'_>, place: Place) -> Result<bool, Rejection> {
+    pub fn take_rows(&mut self, share: u32, place: Place) -> Result<bool, Rejection> {
         let Some(frame) = &mut self.frame else { return Ok(false) };
         frame.runs.insert(place);
-        frame.sum = frame.sum.wrapping_add(packet.checksum);
-        frame.is_doubted = false;
+        frame.sum = frame.sum.wrapping_add(share);
+        frame.touched = self.now;
         self.finish()
     }
 
@@ -193,7 +254,7 @@ impl Collector {
             None if frame.runs.reaches(sequence) => return Err(Rejection::Order { sequence }),
             None => frame.commit = Some((sequence, commit.digest)),
         }
-        frame.is_doubted = false;
+        frame.touched = self.now;
         self.finish().map(Some)
     }
 
@@ -225,7 +286,6 @@ impl Collector {
         packet: &Packet<'_>,
         heartbeat: Heartbeat,
         mac: &M,
-        now: u32,
     ) -> Result<(), Rejection> {
         let Heartbeat { session, beat } = heartbeat;
         let epoch = packet.epoch;
@@ -244,7 +304,8 @@ impl Collector {
         if before_published || before_last {
             return Err(Rejection::Stale { epoch });
         }
-        self.heartbeat = Some(LastHeartbeat { session, beat, epoch, received: now });
+        self.heartbeat = Some(LastHeartbeat { session, beat, epoch, received: self.now });
+        self.heartbeat_at = Some(self.now);
         Ok(())
     }
 
@@ -252,10 +313,20 @@ impl Collector {
     pub fn published(&mut self, frame: &Frame, stretch: Option<f32>) {
         self.frame = None;
         self.wants_whole = false;
-        let Frame { id, received, .. } = *frame;
-        self.published = Some(Published { id, received, stretch, oldest: 0 });
+        let freshness = frame.begin.freshness;
+        let transit = freshness.echo.map(|echo| frame.received.wrapping_sub(echo));
+        self.published = Some(Published {
+            id: frame.id,
+            captured: frame.captured(),
+            source_age: u32::from(freshness.age_ms),
+            // An echo from the future is of another run of this receiver.
+            transit: transit.filter(|&transit| transit <= i32::MAX as u32).unwrap_or(u32::MAX),
+            stretch,
+            oldest: 0,
+        });
+        self.trouble = Trouble::new();
         // A session that published is the sender's, whatever a stray heartbeat said.
-        self.heartbeat = self.heartbeat.filter(|last| last.session == id.session);
+        self.heartbeat = self.heartbeat.filter(|last| last.session == frame.id.session);
         self.counters.count(Event::Published);
     }
 
@@ -275,7 +346,7 @@ impl Collector {
         let number = self.statuses;
         self.statuses = number.wrapping_add(1);
         let published = self.published.as_mut().map(|published| {
-            let age = now.wrapping_sub(published.received);
+            let age = now.wrapping_sub(published.captured);
             published.oldest = if age < published.oldest { u32::MAX } else { age };
             PublishedStatus {
                 session: published.id.session,
@@ -284,7 +355,8 @@ impl Collector {
                 stretch: published.stretch,
             }
         });
-        Status { published, wants_whole: self.wants_whole, safety, number, challenge }
+        let Self { wants_whole, answer, .. } = *self;
+        Status { published, wants_whole, safety, number, clock: now, answer, challenge }
     }
 }
 
@@ -299,6 +371,11 @@ impl Misplaced {
 }
 
 impl Frame {
+    /// The receiver's clock when the surface was captured, had the begin taken no time.
+    pub fn captured(&self) -> u32 {
+        self.received.wrapping_sub(u32::from(self.begin.freshness.age_ms))
+    }
+
     /// Where rows belong; `None` for a packet that came before.
     #[inline]
     pub fn locate(

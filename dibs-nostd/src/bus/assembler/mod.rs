@@ -1,23 +1,22 @@
 //! From packets to published frames: the gate between the bus and what the controller acts on.
 
 mod collector;
+mod health;
+mod packets;
 mod rejection;
 mod runs;
 
-use core::ops::Range;
-
-use glam::Vec3;
-
 use crate::MAX_COORDINATE;
 use crate::bus::wire::{
-    Begin, Body, Content, Counters, Encoding, Event, FrameId, Mac, NoMac, Packet, Rows, Status,
-    StreamError, Vertices, Weights, float_position, quantised_row,
+    Content, Counters, Event, FrameId, Mac, NoMac, Packet, Status, StreamError,
 };
-use crate::stretch::{Changed, Gate, Verdict};
+use crate::stretch::{Gate, Verdict};
 use crate::surface::{FrameLabel, FrameView, FrameWriter, PublishError};
 
 use collector::Collector;
 pub use collector::LastHeartbeat;
+pub use health::BusHealth;
+use health::FrameName;
 pub use rejection::Rejection;
 
 /// Assembles frames of `N` vertices from packets, and publishes those that are complete and right.
@@ -97,6 +96,8 @@ pub enum Progress {
     },
     /// The sender lives: [`Assembler::last_heartbeat`].
     Heartbeat,
+    /// The sender asks for a status: it is due now.
+    Hello,
 }
 
 /// What a slice of work led to.
@@ -158,9 +159,9 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
         }
     }
 
-    /// Takes one packet, whole. `now` is the receiver's clock (any unit, ms for
-    /// [`status`](Self::status); wraps): the frame's label keeps its value at the begin packet, because
-    /// the surface is at least that old.
+    /// Takes one packet, whole. `now` is the receiver's clock in ms (wraps). The frame's label keeps its
+    /// value at the begin packet, less the age that the frame had when it was sent: the surface is at
+    /// least that old.
     ///
     /// Cost: O(bytes).
     ///
@@ -168,12 +169,28 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
     /// [`Rejection`] says why the packet or its frame was not taken; it has been counted.
     #[inline]
     pub fn accept(&mut self, packet: &[u8], now: u32) -> Result<Progress, Rejection> {
-        let outcome = self.take(packet, now);
+        self.collector.set_now(now);
+        let packet = match Packet::decode(packet) {
+            Ok(packet) => packet,
+            Err(error) => {
+                let rejection = Rejection::Packet(error);
+                self.collector.refuse(None, &rejection);
+                return Err(rejection);
+            }
+        };
+        let outcome = self.take(&packet);
         match &outcome {
             Ok(Progress::Duplicate) => self.collector.counters.count(Event::Duplicate),
-            Ok(Progress::Heartbeat) => self.collector.counters.count(Event::Heartbeat),
-            Ok(_) => (),
-            Err(rejection) => self.collector.counters.count(rejection.event()),
+            Ok(Progress::Hello) => (),
+            Ok(progress) => {
+                self.collector.note_packet();
+                if *progress == Progress::Heartbeat {
+                    self.collector.counters.count(Event::Heartbeat);
+                }
+            }
+            Err(rejection) => {
+                self.collector.refuse(Some(FrameName::of_packet(&packet)), rejection);
+            }
         }
         outcome
     }
@@ -237,8 +254,14 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
     }
 
     /// Counts bytes of a stream that were no packet: what a [`Deframer`](crate::wire::Deframer) reports.
-    pub fn count_framing(&mut self, _: &StreamError) {
-        self.collector.counters.count(Event::Framing);
+    pub fn count_framing(&mut self, error: &StreamError) {
+        self.collector.refuse_bytes(error);
+    }
+
+    /// The health of the bus, for a fail-safe machine. O(1).
+    #[must_use]
+    pub fn health(&self) -> BusHealth {
+        self.collector.health()
     }
 
     /// The frame published last.
@@ -257,159 +280,6 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
     #[must_use]
     pub const fn mac(&self) -> &M {
         &self.mac
-    }
-
-    #[inline]
-    fn take(&mut self, bytes: &[u8], now: u32) -> Result<Progress, Rejection> {
-        let packet = Packet::decode(bytes)?;
-        self.collector.check_mesh(&packet)?;
-        let epoch = packet.epoch;
-        match packet.body {
-            Body::Vertices(vertices) => self.vertices(&packet, vertices),
-            Body::Weights(weights) => self.weights(&packet, weights),
-            Body::Begin(begin) => self.begin(&packet, begin, now),
-            Body::Commit(commit) => {
-                Ok(match self.collector.commit(&packet, commit, &self.mac)? {
-                    None => Progress::Duplicate,
-                    Some(is_complete) => stored(is_complete, epoch),
-                })
-            }
-            Body::Heartbeat(heartbeat) => {
-                self.collector.heartbeat(&packet, heartbeat, &self.mac, now)?;
-                Ok(Progress::Heartbeat)
-            }
-            Body::Status(_) => Err(Rejection::Unexpected { epoch }),
-        }
-    }
-
-    fn begin(
-        &mut self,
-        packet: &Packet<'_>,
-        begin: Begin,
-        now: u32,
-    ) -> Result<Progress, Rejection> {
-        // A frame that only waits for a reader is better published than in the way.
-        if let Some(label) = self.admitted {
-            self.publish(label);
-        }
-        let takes_weights = self.gate.weight_range(0).is_some();
-        let is_acceptable = |begin: &Begin| {
-            if begin.rows as usize != N {
-                Err(Rejection::RowCount { rows: begin.rows })
-            } else if (begin.content == Content::Modal) != takes_weights {
-                Err(Rejection::Encoding)
-            } else {
-                Ok(())
-            }
-        };
-        let is_partial = matches!(begin.content, Content::Partial { .. });
-        // Whatever comes of this one: the next is to find the published rows copied.
-        self.takes_partial |= is_partial && packet.is_genuine(&self.mac, begin.session);
-        let begun = self.collector.begin(packet, begin, &self.mac, now, is_acceptable)?;
-        let Some(frame) = begun else { return Ok(Progress::Duplicate) };
-        self.admitted = None;
-        self.clean();
-        self.is_box_inside = match begin.encoding {
-            Encoding::Float => false,
-            Encoding::Quantised(grid) => {
-                let corners = [grid.origin(), grid.upper_corner()];
-                corners.into_iter().all(|corner| is_within(corner, self.max_coordinate))
-            }
-        };
-        self.gate.begin(if is_partial { Changed::Partial } else { Changed::Whole });
-        Ok(Progress::Begun { epoch: frame.id.epoch })
-    }
-
-    #[inline]
-    fn vertices(
-        &mut self,
-        packet: &Packet<'_>,
-        Vertices { first, rows }: Vertices<'_>,
-    ) -> Result<Progress, Rejection> {
-        let frame = self.collector.frame_of(packet, &self.mac)?;
-        let count = rows.len() as u32;
-        let out_of_range = Rejection::OutOfRange { first, count };
-        let range = first..first.checked_add(count).ok_or(out_of_range)?;
-        let limit = self.max_coordinate;
-        let grid = match (&rows, frame.begin.encoding, frame.begin.content) {
-            (_, _, Content::Modal) => return Err(Rejection::Encoding),
-            (Rows::Float(_), Encoding::Float, _) => None,
-            (Rows::Quantised(_), Encoding::Quantised(grid), _) => Some(grid),
-            _ => return Err(Rejection::Encoding),
-        };
-        let places = self.writer.rows(range.clone()).ok_or(out_of_range)?;
-        let Some(place) = frame.locate(packet.sequence, range.clone())? else {
-            return Ok(Progress::Duplicate);
-        };
-        let is_partial = matches!(frame.begin.content, Content::Partial { .. });
-        if is_partial && range.end > self.copied {
-            self.collector.want_whole();
-            return Err(Rejection::NotReady { first });
-        }
-        match (rows, grid) {
-            (Rows::Quantised(rows), Some(grid)) => {
-                let decode = |row| grid.position(quantised_row(row));
-                if !self.is_box_inside {
-                    check(rows.iter().map(decode), first, limit)?;
-                }
-                for (place, row) in places.iter().zip(rows) {
-                    place.set(decode(row));
-                }
-            }
-            (Rows::Float(rows), _) => {
-                check(rows.iter().map(float_position), first, limit)?;
-                for (place, row) in places.iter().zip(rows) {
-                    place.set(float_position(row));
-                }
-            }
-            _ => return Err(Rejection::Encoding),
-        }
-        self.stored(packet, place, range)
-    }
-
-    fn weights(
-        &mut self,
-        packet: &Packet<'_>,
-        Weights { first, values }: Weights<'_>,
-    ) -> Result<Progress, Rejection> {
-        let frame = self.collector.frame_of(packet, &self.mac)?;
-        let count = values.len() as u32;
-        let out_of_range = Rejection::OutOfRange { first, count };
-        let range = first..first.checked_add(count).ok_or(out_of_range)?;
-        if frame.begin.content != Content::Modal {
-            return Err(Rejection::Encoding);
-        }
-        let places = self.writer.rows(range.clone()).ok_or(out_of_range)?;
-        let Some(place) = frame.locate(packet.sequence, range.clone())? else {
-            return Ok(Progress::Duplicate);
-        };
-        for (row, value) in range.clone().zip(values) {
-            let value = f32::from_le_bytes(*value);
-            let [low, high] = self.gate.weight_range(row).ok_or(out_of_range)?;
-            if !value.is_finite() {
-                return Err(Rejection::NotFinite { row });
-            }
-            if !(low <= value && value <= high) {
-                return Err(Rejection::TooFar { row });
-            }
-        }
-        for (place, value) in places.iter().zip(values) {
-            place.set(Vec3::new(f32::from_le_bytes(*value), 0.0, 0.0));
-        }
-        self.stored(packet, place, range)
-    }
-
-    /// Notes rows that have been stored.
-    #[inline]
-    fn stored(
-        &mut self,
-        packet: &Packet<'_>,
-        place: runs::Place,
-        rows: Range<u32>,
-    ) -> Result<Progress, Rejection> {
-        self.is_dirty = true;
-        self.gate.moved(rows);
-        Ok(stored(self.collector.take_rows(packet, place)?, packet.epoch))
     }
 
     /// Forgets what was copied, if rows of a frame that was not published have been stored over it.
@@ -435,8 +305,9 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
         match verdict {
             Err(error) => {
                 let rejection = Rejection::Stretch(error);
+                let name = FrameName::of(&frame.id);
                 self.collector.frame = None;
-                self.collector.counters.count(rejection.event());
+                self.collector.refuse(Some(name), &rejection);
                 Err(rejection)
             }
             Ok(_) if !frame.is_complete => Ok(Advance::Idle),
@@ -444,7 +315,7 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
             Ok(Verdict::Admitted(stretch)) => {
                 let label = FrameLabel {
                     epoch: frame.id.epoch,
-                    received: frame.received,
+                    received: frame.captured(),
                     position_error: frame.begin.encoding.error() + self.gate.position_error(),
                     stretch,
                 };
@@ -469,38 +340,4 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
             _ => Advance::Idle,
         }
     }
-}
-
-const fn stored(is_complete: bool, epoch: u32) -> Progress {
-    if is_complete { Progress::Complete { epoch } } else { Progress::Stored }
-}
-
-/// Whether every coordinate is within the limit; false for one that is not a number.
-#[inline(always)]
-fn is_within(position: Vec3, limit: f32) -> bool {
-    let Vec3 { x, y, z } = position.abs();
-    // No short cut: three comparisons cost less than branches.
-    (x <= limit) & (y <= limit) & (z <= limit)
-}
-
-/// An error unless every position is finite and within the limit. It names the first that is not.
-#[inline]
-fn check(
-    positions: impl Iterator<Item = Vec3> + Clone,
-    first: u32,
-    limit: f32,
-) -> Result<(), Rejection> {
-    let all = positions.clone().fold(true, |all, position| all & is_within(position, limit));
-    if all {
-        return Ok(());
-    }
-    for (row, position) in (first..).zip(positions) {
-        if !position.is_finite() {
-            return Err(Rejection::NotFinite { row });
-        }
-        if !is_within(position, limit) {
-            return Err(Rejection::TooFar { row });
-        }
-    }
-    Ok(())
 }

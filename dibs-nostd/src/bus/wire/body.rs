@@ -20,6 +20,8 @@ pub enum Body<'a> {
     Heartbeat(Heartbeat),
     /// What the receiver has: the only packet on the way back.
     Status(StatusReport<'a>),
+    /// The sender asks for a status.
+    Hello(Hello),
 }
 
 /// The first packet of a frame.
@@ -33,6 +35,20 @@ pub struct Begin {
     pub encoding: Encoding,
     /// Vertices of the surface; in a modal frame, weights.
     pub rows: u32,
+    /// How fresh the frame was when this packet was made.
+    pub freshness: Freshness,
+}
+
+/// How fresh a frame was when its sender made the begin packet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Freshness {
+    /// Time since the surface was captured, in ms; 65,535 stands for that or more.
+    pub age_ms: u16,
+    /// [`Status::clock`](super::Status::clock) of the newest status that the sender had taken; `None`
+    /// before the first. The packet was made after that status, so the receiver knows how long both were
+    /// on their way, at most, by its own clock alone.
+    pub echo: Option<u32>,
 }
 
 /// What a frame holds.
@@ -139,8 +155,9 @@ pub struct Weights<'a> {
 /// of content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Commit {
-    /// Wrapping sum of the checksums of the frame's begin packet and all its packets of content.
-    /// Packets of two frames that happen to share session and epoch do not add up.
+    /// Wrapping sum over the frame's begin packet and all its packets of content: with tags of their
+    /// [`Code::share`](super::Code::share), else of their checksums, scrambled. Packets of two frames that
+    /// happen to share session and epoch do not add up.
     pub digest: u32,
 }
 
@@ -152,4 +169,15 @@ pub struct Heartbeat {
     pub session: u32,
     /// One more in each heartbeat of the session; wraps.
     pub beat: u32,
+}
+
+/// The sender asks who is there: the receiver's next status answers. Never tagged, because a sender that
+/// does not know the challenge yet must be able to ask; it changes nothing but the answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Hello {
+    /// The sender's session, all of it.
+    pub session: u32,
+    /// A random number, not 0, that the answer repeats: a recorded status does not know it.
+    pub nonce: u32,
 }

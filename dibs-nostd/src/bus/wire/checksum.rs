@@ -44,6 +44,15 @@ pub(super) fn checksum(bytes: &[u8]) -> u32 {
     !remainder
 }
 
+/// A packet's share of its frame's digest where there are no tags: its checksum through a bijection whose
+/// sums have nothing to do with the checksum's linearity (the last step of `MurmurHash3`).
+#[inline]
+pub(super) const fn scrambled(checksum: u32) -> u32 {
+    let mixed = (checksum ^ (checksum >> 16)).wrapping_mul(0x85EB_CA6B);
+    let mixed = (mixed ^ (mixed >> 13)).wrapping_mul(0xC2B2_AE35);
+    mixed ^ (mixed >> 16)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

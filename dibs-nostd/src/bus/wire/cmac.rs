@@ -5,32 +5,37 @@ use core::fmt;
 use aes::Aes128;
 use cmac::{Cmac, KeyInit, Mac as _};
 
-use super::{Mac, TAG_BYTES};
+use super::{Code, Direction, Mac};
 
 /// Tags by AES-128-CMAC (RFC 4493, NIST SP 800-38B), cut to 48 bits.
 ///
-/// The cipher is that of the crate `aes`, in constant time, without tables. A board with a hardware cipher
+/// Each direction has a key of its own, derived from the shared key and the receiver's id (NIST SP
+/// 800-108, counter mode): a packet for one receiver is a forgery to another, and so is one that comes
+/// back the wrong way.
+///
+/// The cipher is the crate `aes`'s, in constant time, without tables. A board with a hardware cipher
 /// implements [`Mac`] with that.
 ///
-/// RAM: the expanded key, some 700 bytes while a tag is made. The key is not erased when this is
-/// dropped.
+/// RAM: two expanded keys, some 800 bytes, and half of that again while a code is made. The keys are not
+/// erased when this is dropped.
 ///
 /// ```
 /// use dibs_nostd::wire::{AesCmac, Encoding, FrameEncoder, FrameId};
 /// use dibs_nostd::{Assembler, Frames, Rejection, Unchecked, glam::Vec3};
 ///
 /// let key = *b"a secret of ours";
+/// let receiver = 7; // this controller's number
 /// let challenge = 0x5EED; // drawn at start-up; the sender reads it from the status
 /// let frames = Frames::<2>::new();
 /// let (writer, mut reader) = frames.split().unwrap();
-/// let mac = AesCmac::new(&key, challenge);
+/// let mac = AesCmac::new(&key, receiver, challenge);
 /// let mut assembler = Assembler::with_mac(writer, Unchecked, 0xB0D1, 1e3, mac);
 ///
 /// let mut send = |key: &[u8; 16], epoch| {
 ///     let id = FrameId { mesh_id: 0xB0D1, session: 1, epoch };
 ///     let positions = [Vec3::X, Vec3::Y];
 ///     let mut frame = FrameEncoder::<_, 64>::new(id, Encoding::Float, &positions[..])
-///         .and_then(|frame| frame.with_mac(AesCmac::new(key, challenge)))
+///         .and_then(|frame| frame.with_mac(AesCmac::new(key, receiver, challenge)))
 ///         .unwrap();
 ///     let mut buffer = [0; 64];
 ///     while let Some(packet) = frame.next_packet(&mut buffer) {
@@ -44,18 +49,24 @@ use super::{Mac, TAG_BYTES};
 /// ```
 #[derive(Clone)]
 pub struct AesCmac {
-    mac: Cmac<Aes128>,
+    to_receiver: Cmac<Aes128>,
+    to_sender: Cmac<Aes128>,
     challenge: u32,
 }
 
 impl AesCmac {
-    /// Tags under a key that both sides have, bound to the receiver's challenge.
+    /// Codes under a key that both sides have, for the receiver of this id, bound to its challenge.
     ///
-    /// The receiver draws the challenge when it starts: a random number, or a counter that survives a
-    /// restart; with 0, recordings of an earlier run are believed until a later session has published.
+    /// The id is any number that no other receiver under the same key has. The receiver draws the
+    /// challenge when it starts: a random number, or a counter that survives a restart; with 0, recordings
+    /// of an earlier run are believed until a later session has published.
     #[must_use]
-    pub fn new(key: &[u8; 16], challenge: u32) -> Self {
-        Self { mac: Cmac::new(key.into()), challenge }
+    pub fn new(key: &[u8; 16], receiver: u32, challenge: u32) -> Self {
+        Self {
+            to_receiver: derived(key, b"dibs to receiver", receiver),
+            to_sender: derived(key, b"dibs to sender", receiver),
+            challenge,
+        }
     }
 
     /// The same key, bound to another challenge: for a sender that has read it from a status.
@@ -66,18 +77,36 @@ impl AesCmac {
     }
 }
 
+/// A key of its own for a purpose: SP 800-108 in counter mode with CMAC, one block.
+fn derived(key: &[u8; 16], label: &[u8], receiver: u32) -> Cmac<Aes128> {
+    let (counter, end, bits) = ([1], [0], 128_u32.to_be_bytes());
+    let key =
+        code(&Cmac::new(key.into()), &[&counter, label, &end, &receiver.to_le_bytes(), &bits]);
+    Cmac::new(&key.into())
+}
+
+/// The code of a message in parts.
+fn code(mac: &Cmac<Aes128>, parts: &[&[u8]]) -> [u8; 16] {
+    let mut mac = mac.clone();
+    for part in parts {
+        mac.update(part);
+    }
+    mac.finalize().into_bytes().into()
+}
+
 impl Mac for AesCmac {
     const TAGGED: bool = true;
 
-    fn tag(&self, session: u32, packet: &[u8]) -> [u8; TAG_BYTES] {
-        let mut mac = self.mac.clone();
+    fn code(&self, direction: Direction, session: u32, packet: &[u8]) -> Code {
+        let mac = match direction {
+            Direction::ToReceiver => &self.to_receiver,
+            Direction::ToSender => &self.to_sender,
+        };
         let [c0, c1, c2, c3] = self.challenge.to_le_bytes();
         let [s0, s1, s2, s3] = session.to_le_bytes();
-        mac.update(&[c0, c1, c2, c3, s0, s1, s2, s3]);
-        mac.update(packet);
-        let code: [u8; 16] = mac.finalize().into_bytes().into();
-        let [t0, t1, t2, t3, t4, t5, ..] = code;
-        [t0, t1, t2, t3, t4, t5]
+        let code = code(mac, &[&[c0, c1, c2, c3, s0, s1, s2, s3], packet]);
+        let [t0, t1, t2, t3, t4, t5, h0, h1, h2, h3, ..] = code;
+        Code { tag: [t0, t1, t2, t3, t4, t5], share: u32::from_le_bytes([h0, h1, h2, h3]) }
     }
 
     fn challenge(&self) -> u32 {
@@ -85,9 +114,39 @@ impl Mac for AesCmac {
     }
 }
 
-/// Without the key.
+/// Without the keys.
 impl fmt::Debug for AesCmac {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("AesCmac").field("challenge", &self.challenge).finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The vectors of RFC 4493, in one part and in two.
+    #[test]
+    fn the_code_is_that_of_rfc_4493() {
+        let key = 0x2b7e_1516_28ae_d2a6_abf7_1588_09cf_4f3c_u128.to_be_bytes();
+        let message = [
+            0x6bc1_bee2_2e40_9f96_e93d_7e11_7393_172a_u128,
+            0xae2d_8a57_1e03_ac9c_9eb7_6fac_45af_8e51,
+            0x30c8_1c46_a35c_e411_e5fb_c119_1a0a_52ef,
+            0xf69f_2445_df4f_9b17_ad2b_417b_e66c_3710,
+        ]
+        .map(u128::to_be_bytes);
+        let message = message.as_flattened();
+        for (length, expected) in [
+            (0, 0xbb1d_6929_e959_3728_7fa3_7d12_9b75_6746_u128),
+            (16, 0x070a_16b4_6b4d_4144_f79b_dd9d_d04a_287c),
+            (40, 0xdfa6_6747_de9a_e630_30ca_3261_1497_c827),
+            (64, 0x51f0_bebf_7e3b_9d92_fc49_7417_7936_3cfe),
+        ] {
+            let mac = Cmac::new(&key.into());
+            let (start, end) = message[..length].split_at(length / 3);
+            assert_eq!(code(&mac, &[start, end]), expected.to_be_bytes());
+            assert_eq!(code(&mac, &[&message[..length]]), expected.to_be_bytes());
+        }
     }
 }

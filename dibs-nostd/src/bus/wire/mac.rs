@@ -1,4 +1,4 @@
-//! Message authentication: what a packet's tag is made by.
+//! Message authentication: how the tag of a packet is made.
 
 /// Bytes of a tag: the first 48 bits of a message authentication code.
 ///
@@ -6,22 +6,42 @@
 /// right once in 2^48. AUTOSAR's `SecOC` takes 24 to 64 bits.
 pub const TAG_BYTES: usize = 6;
 
-/// Makes the tags of packets, and so decides what is genuine.
+/// Makes the codes of packets, and so decides which are genuine.
 ///
-/// Sender and receiver hold the same key and the same *challenge*: a number that the receiver draws
-/// when it starts and reports in its status, so that recordings from before are worth nothing.
+/// Sender and receiver hold the same key, the same receiver id and the same *challenge*: a number that
+/// the receiver draws when it starts and reports in its status, so that recordings from before are worth
+/// nothing.
 pub trait Mac {
     /// Whether packets carry a tag. A receiver takes only packets with, or only packets without.
     const TAGGED: bool;
 
-    /// The tag over challenge, session and packet (all bytes before the tag). Cost: linear in the
-    /// packet.
-    fn tag(&self, session: u32, packet: &[u8]) -> [u8; TAG_BYTES];
+    /// The code over challenge, session and packet (all bytes before the tag), under the key of this
+    /// direction. Cost: linear in the packet.
+    fn code(&self, direction: Direction, session: u32, packet: &[u8]) -> Code;
 
     /// The challenge in use; 0 where there is none.
     fn challenge(&self) -> u32 {
         0
     }
+}
+
+/// The way a packet goes. Each has a key of its own, so that nothing can be sent back as an answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// Frames and heartbeats.
+    ToReceiver,
+    /// Statuses.
+    ToSender,
+}
+
+/// A packet's message authentication code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Code {
+    /// The part that travels with the packet.
+    pub tag: [u8; TAG_BYTES],
+    /// A part that never travels: [`Commit::digest`](super::Commit::digest) sums it over the frame, so
+    /// that nobody without the key can tell which packets of two frames add up.
+    pub share: u32,
 }
 
 /// No authentication: whoever can write to the bus is believed.
@@ -31,16 +51,16 @@ pub struct NoMac;
 impl Mac for NoMac {
     const TAGGED: bool = false;
 
-    fn tag(&self, _: u32, _: &[u8]) -> [u8; TAG_BYTES] {
-        [0; TAG_BYTES]
+    fn code(&self, _: Direction, _: u32, _: &[u8]) -> Code {
+        Code { tag: [0; TAG_BYTES], share: 0 }
     }
 }
 
 impl<M: Mac> Mac for &M {
     const TAGGED: bool = M::TAGGED;
 
-    fn tag(&self, session: u32, packet: &[u8]) -> [u8; TAG_BYTES] {
-        (**self).tag(session, packet)
+    fn code(&self, direction: Direction, session: u32, packet: &[u8]) -> Code {
+        (**self).code(direction, session, packet)
     }
 
     fn challenge(&self) -> u32 {

@@ -4,7 +4,7 @@
 //! [`Vertices`] or [`Weights`], and one [`Commit`]. [`FrameEncoder`] and [`WeightsEncoder`] make the
 //! packets on the sender's side, [`Packet::decode`] reads one in place on the receiver's, and the
 //! [`Assembler`](crate::Assembler) makes frames of them. A [`Heartbeat`] tells the receiver that the
-//! sender lives, a [`Status`] tells the sender what came of its frames.
+//! sender lives, a [`Status`] tells the sender what came of its frames, a [`Hello`] asks for one.
 //!
 //! On a byte stream each packet is framed with COBS: [`enframe`] and [`Deframer`]. On UDP a packet is
 //! one datagram, on CAN-FD one message: [`canfd`].
@@ -29,20 +29,24 @@ mod stream;
 
 #[cfg(feature = "authenticity")]
 pub use self::cmac::AesCmac;
-pub use body::{Begin, Body, Commit, Content, Encoding, Heartbeat, Rows, Vertices, Weights};
+pub use body::{
+    Begin, Body, Commit, Content, Encoding, Freshness, Heartbeat, Hello, Rows, Vertices, Weights,
+};
 pub(crate) use body::{float_position, quantised_row};
 pub use counters::{Counters, Event};
-pub use encode::{EncodeError, FrameEncoder, WeightsEncoder, encode_heartbeat, encode_status};
+pub use encode::{
+    EncodeError, FrameEncoder, WeightsEncoder, encode_heartbeat, encode_hello, encode_status,
+};
 pub use error::PacketError;
 pub use id::{FrameId, is_newer};
-pub use mac::{Mac, NoMac, TAG_BYTES};
+pub use mac::{Code, Direction, Mac, NoMac, TAG_BYTES};
 pub use packet::Packet;
 pub use quantised::{BoxError, QuantisedBox};
 pub use status::{PublishedStatus, Status, StatusReport};
 pub use stream::{Deframer, StreamError, enframe, framed_bytes};
 
 /// The protocol's version: the first byte of every packet.
-pub const VERSION: u8 = 2;
+pub const VERSION: u8 = 3;
 
 /// Bytes of the header that every packet starts with.
 pub const HEADER_BYTES: usize = 18;
@@ -57,7 +61,7 @@ pub const MIN_MTU: usize = 64;
 pub const MAX_PACKET: usize = HEADER_BYTES + 255 * 12 + TAG_BYTES + CHECKSUM_BYTES;
 
 /// Most rows that a frame can have.
-pub const MAX_ROWS: u32 = 1 << 24;
+pub const MAX_ROWS: u32 = (1 << 24) - 1;
 
 /// Most packets between a frame's begin and its commit.
 pub const MAX_CONTENT_PACKETS: u32 = 65_534;
@@ -74,6 +78,7 @@ mod kind {
     pub const WEIGHTS: u8 = 5;
     pub const HEARTBEAT: u8 = 6;
     pub const STATUS: u8 = 7;
+    pub const HELLO: u8 = 8;
     /// Set in the kind of a packet that carries a tag.
     pub const TAGGED: u8 = 0x80;
 }

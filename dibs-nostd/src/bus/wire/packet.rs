@@ -1,11 +1,12 @@
 //! One packet, decoded in place.
 
-use super::checksum::checksum;
+use super::checksum::{checksum, scrambled};
 use super::fields::Fields;
 use super::{
-    Begin, Body, BoxError, CHECKSUM_BYTES, Commit, Content, Encoding, HEADER_BYTES, Heartbeat,
-    MAX_ROWS, MAX_WEIGHTS, Mac, PacketError, PublishedStatus, QuantisedBox, Rows, Status,
-    StatusReport, TAG_BYTES, VERSION, Vertices, Weights, float_position, kind, padded,
+    Begin, Body, BoxError, CHECKSUM_BYTES, Commit, Content, Direction, Encoding, Freshness,
+    HEADER_BYTES, Heartbeat, Hello, MAX_ROWS, MAX_WEIGHTS, Mac, PacketError, PublishedStatus,
+    QuantisedBox, Rows, Status, StatusReport, TAG_BYTES, VERSION, Vertices, Weights,
+    float_position, kind, padded,
 };
 
 /// A packet whose checksum and form are right. It borrows the bytes that it was decoded from.
@@ -13,13 +14,13 @@ use super::{
 pub struct Packet<'a> {
     /// Identity of the mesh whose surface this is about: `Tree::mesh_id`.
     pub mesh_id: u32,
-    /// The lower half of the session; [`Begin`], [`Heartbeat`] and [`Status`] have all of it.
+    /// The lower half of the session; [`Begin`], [`Heartbeat`], [`Status`] and [`Hello`] have all of it.
     pub session_low: u16,
     /// Number of the frame; wraps.
     pub epoch: u32,
     /// Place of the packet in its frame: 0 for a begin, from 1 for what follows.
     pub sequence: u16,
-    /// The packet's CRC-32: [`Commit::digest`] sums them.
+    /// The packet's CRC-32.
     pub checksum: u32,
     /// What the packet says.
     pub body: Body<'a>,
@@ -33,7 +34,7 @@ impl<'a> Packet<'a> {
     ///
     /// ```
     /// use dibs_nostd::wire::{Packet, PacketError};
-    /// assert_eq!(Packet::decode(&[2, 1, 0]), Err(PacketError::TooShort { bytes: 3 }));
+    /// assert_eq!(Packet::decode(&[3, 1, 0]), Err(PacketError::TooShort { bytes: 3 }));
     /// ```
     ///
     /// # Errors
@@ -68,7 +69,8 @@ impl<'a> Packet<'a> {
             kind::COMMIT => 4,
             kind::WEIGHTS => usize::from(count) * 4,
             kind::HEARTBEAT => 8,
-            kind::STATUS => 20 + usize::from(count) * 4,
+            kind::STATUS => 28 + usize::from(count) * 4,
+            kind::HELLO if !is_tagged => 8,
             _ => return Err(PacketError::Kind { kind: tagged_kind }),
         };
         let tag_bytes = if is_tagged { TAG_BYTES } else { 0 };
@@ -86,19 +88,28 @@ impl<'a> Packet<'a> {
             (padding, None)
         };
         zero(padding, HEADER_BYTES + size)?;
-        if !matches!(kind, kind::FLOAT_VERTICES | kind::QUANTISED_VERTICES | kind::WEIGHTS) {
-            zero(&[if kind == kind::STATUS { 0 } else { count }], 14)?;
-            zero(&[if kind == kind::STATUS { 0 } else { u8::from(first != 0) }], 15)?;
-        } else if count == 0 {
-            return Err(PacketError::Empty);
+        match kind {
+            kind::FLOAT_VERTICES | kind::QUANTISED_VERTICES | kind::WEIGHTS => {
+                if count == 0 {
+                    return Err(PacketError::Empty);
+                }
+            }
+            kind::BEGIN | kind::STATUS => (),
+            _ => {
+                zero(&[count], 14)?;
+                zero(&[u8::from(first != 0)], 15)?;
+            }
         }
         // Only what comes after a frame's begin has a place in it.
-        let is_placed = !matches!(kind, kind::BEGIN | kind::HEARTBEAT | kind::STATUS);
+        let is_placed = !matches!(kind, kind::BEGIN | kind::HEARTBEAT | kind::STATUS | kind::HELLO);
         if is_placed != (sequence != 0) {
             return Err(PacketError::Sequence { sequence });
         }
         let body = match kind {
-            kind::BEGIN => Body::Begin(begin(Fields(body), session_low)?),
+            kind::BEGIN => {
+                let echo = first << 8 | u32::from(count);
+                Body::Begin(begin(Fields(body), session_low, echo)?)
+            }
             kind::FLOAT_VERTICES => {
                 Body::Vertices(Vertices { first, rows: Rows::Float(body.as_chunks().0) })
             }
@@ -107,36 +118,63 @@ impl<'a> Packet<'a> {
             }
             kind::COMMIT => Body::Commit(Commit { digest: Fields(body).u32() }),
             kind::WEIGHTS => Body::Weights(Weights { first, values: body.as_chunks().0 }),
-            kind::HEARTBEAT => Body::Heartbeat(heartbeat(Fields(body), session_low)?),
+            kind::HEARTBEAT => {
+                let [session, beat] = words(Fields(body), session_low)?;
+                Body::Heartbeat(Heartbeat { session, beat })
+            }
+            kind::HELLO => {
+                let [session, nonce] = words(Fields(body), session_low)?;
+                Body::Hello(Hello { session, nonce })
+            }
             _ => Body::Status(status(Fields(body), session_low, epoch, first)?),
         };
         Ok(Self { mesh_id, session_low, epoch, sequence, checksum: stated, body, tag })
     }
 
-    /// Whether the packet is genuine, as one of this session: its tag is the one that `mac` makes, or
-    /// it carries none and `mac` asks for none. Compares in constant time.
+    /// The packet's share of its frame's digest, if the packet is genuine as one of this session: its tag
+    /// is the one that `mac` makes, or it carries none and `mac` asks for none. Compares in constant time.
     #[must_use]
-    pub fn is_genuine<M: Mac>(&self, mac: &M, session: u32) -> bool {
+    #[inline]
+    pub fn verify<M: Mac>(&self, mac: &M, session: u32) -> Option<u32> {
         match self.tag {
             Some((signed, tag)) if M::TAGGED => {
-                let made = mac.tag(session, signed);
-                made.iter().zip(tag).fold(0, |difference, (a, b)| difference | (a ^ b)) == 0
+                let direction = match self.body {
+                    Body::Status(_) => Direction::ToSender,
+                    _ => Direction::ToReceiver,
+                };
+                let code = mac.code(direction, session, signed);
+                let difference =
+                    code.tag.iter().zip(tag).fold(0, |difference, (a, b)| difference | (a ^ b));
+                (difference == 0).then_some(code.share)
             }
-            None => !M::TAGGED,
-            Some(_) => false,
+            None if !M::TAGGED => Some(scrambled(self.checksum)),
+            _ => None,
         }
     }
+
+    /// Whether [`verify`](Self::verify) finds the packet genuine.
+    #[must_use]
+    pub fn is_genuine<M: Mac>(&self, mac: &M, session: u32) -> bool {
+        self.verify(mac, session).is_some()
+    }
 }
+
+/// Bit of a begin's form: the word before the body is an echo.
+pub(super) const HAS_ECHO: u8 = 0x80;
 
 /// A session of which the header has the lower half.
 fn session_of(high: u16, low: u16) -> u32 {
     u32::from(high) << 16 | u32::from(low)
 }
 
-fn begin(mut fields: Fields<'_>, session_low: u16) -> Result<Begin, PacketError> {
+fn begin(mut fields: Fields<'_>, session_low: u16, echo: u32) -> Result<Begin, PacketError> {
     let session = session_of(fields.u16(), session_low);
-    let (content, encoding) = (fields.u8(), fields.u8());
-    let (rows, base_epoch) = (fields.u32(), fields.u32());
+    let (age_ms, form) = (fields.u16(), fields.u8());
+    let (rows, base_epoch) = (fields.u24(), fields.u32());
+    let (content, encoding, has_echo) = (form & 7, form >> 3 & 7, form & HAS_ECHO != 0);
+    zero(&[form & 0x40], HEADER_BYTES + 4)?;
+    zero(&[u8::from(!has_echo && echo != 0)], 14)?;
+    let freshness = Freshness { age_ms, echo: has_echo.then_some(echo) };
     let grid = fields.0;
     let (origin, step) = (fields.take(), fields.take());
     let (content, limit) = match content {
@@ -162,13 +200,14 @@ fn begin(mut fields: Fields<'_>, session_low: u16) -> Result<Begin, PacketError>
         ),
         encoding => return Err(PacketError::Encoding { encoding }),
     };
-    Ok(Begin { session, content, encoding, rows })
+    Ok(Begin { session, content, encoding, rows, freshness })
 }
 
-fn heartbeat(mut fields: Fields<'_>, session_low: u16) -> Result<Heartbeat, PacketError> {
+/// The bodies of heartbeat and hello: session and one number.
+fn words(mut fields: Fields<'_>, session_low: u16) -> Result<[u32; 2], PacketError> {
     let session = session_of(fields.u16(), session_low);
     zero(&fields.take::<2>(), HEADER_BYTES + 2)?;
-    Ok(Heartbeat { session, beat: fields.u32() })
+    Ok([session, fields.u32()])
 }
 
 fn status(
@@ -181,7 +220,7 @@ fn status(
     let (flags, safety) = (fields.u8(), fields.u8());
     let number = fields.u32();
     let (age_ms, stretch) = (fields.u32(), f32::from_bits(fields.u32()));
-    let challenge = fields.u32();
+    let (challenge, clock, answer) = (fields.u32(), fields.u32(), fields.u32());
     zero(&[flags & !3], HEADER_BYTES + 2)?;
     let published = if flags & 1 == 0 {
         zero(&[u8::from(session != 0 || epoch != 0 || age_ms != 0)], HEADER_BYTES)?;
@@ -191,7 +230,8 @@ fn status(
         let stretch = if stretch > 0.0 { Some(stretch) } else { None };
         Some(PublishedStatus { session, epoch, age_ms, stretch })
     };
-    let status = Status { published, wants_whole: flags & 2 != 0, safety, number, challenge };
+    let wants_whole = flags & 2 != 0;
+    let status = Status { published, wants_whole, safety, number, clock, answer, challenge };
     let first_counter = u8::try_from(first).map_err(|_| PacketError::Reserved { offset: 16 })?;
     Ok(StatusReport { status, first_counter, counters: fields.0.as_chunks().0 })
 }

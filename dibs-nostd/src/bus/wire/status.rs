@@ -12,6 +12,10 @@ pub struct Status {
     pub safety: u8,
     /// One more in each status of a receiver's run; wraps.
     pub number: u32,
+    /// The receiver's clock when it made this status, in ms: the sender's next frames echo it.
+    pub clock: u32,
+    /// The nonce of the last [`Hello`](super::Hello) that came; 0 before the first.
+    pub answer: u32,
     /// What the receiver's tags are bound to: [`Mac::challenge`](super::Mac::challenge).
     pub challenge: u32,
 }
@@ -24,7 +28,7 @@ pub struct PublishedStatus {
     pub session: u32,
     /// Its number.
     pub epoch: u32,
-    /// Time since its first packet arrived, in ms.
+    /// Time since its first packet arrived and the age that it then had, in ms.
     pub age_ms: u32,
     /// Its measured stretch, `None` where the receiver does not measure.
     pub stretch: Option<f32>,

@@ -3,6 +3,7 @@
 use core::fmt;
 
 use super::State;
+use super::freshness::Freshness;
 
 /// Two limits on one input: beyond the first the state is degraded, beyond the second safe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,7 +60,7 @@ impl Watch {
 
 /// What the machine tolerates, and what it takes to recover.
 ///
-/// Only the age must be watched; silence, heartbeat and rejections are off until they are given. One
+/// Only the age must be watched; every other input is off until its limits are given. One
 /// good frame and an acknowledgement recover, until more frames are asked for, or no acknowledgement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -68,6 +69,7 @@ pub struct Limits {
     pub(super) silence: Watch,
     pub(super) heartbeat: Watch,
     pub(super) rejections: Watch,
+    pub(super) freshness: Freshness,
     tissue_speed: f32,
     recovery_frames: u16,
     automatic: bool,
@@ -91,6 +93,7 @@ impl Limits {
             silence: Watch::OFF,
             heartbeat: Watch::OFF,
             rejections: Watch::OFF,
+            freshness: Freshness::OFF,
             tissue_speed,
             recovery_frames: 1,
             automatic: false,
@@ -109,7 +112,7 @@ impl Limits {
         Self { heartbeat: watch, ..self }
     }
 
-    /// Limits on the packets and frames rejected since the last frame was published.
+    /// Limits on the frames refused or damaged since the last one was published, each counted once.
     #[must_use]
     pub const fn rejections(self, watch: Watch) -> Self {
         Self { rejections: watch, ..self }

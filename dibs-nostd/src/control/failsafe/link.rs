@@ -3,7 +3,7 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use super::elapsed;
-use crate::{Advance, Progress, Rejection};
+use crate::bus::BusHealth;
 
 /// The health of the bus at one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,8 +13,20 @@ pub struct Link {
     pub silence: u32,
     /// Time since the last heartbeat; `u32::MAX` before the first.
     pub heartbeat: u32,
-    /// Packets and frames rejected since the last frame was published.
+    /// Frames refused or damaged since the last one was published: [`BusHealth::rejections`].
     pub rejections: u32,
+    /// Forged packets since then.
+    pub forgeries: u32,
+    /// Time that the published frame was on its way, at most; `u32::MAX` where nobody knows.
+    pub transit: u32,
+    /// Age of the published frame when it was sent; `u32::MAX` before the first.
+    pub source_age: u32,
+}
+
+impl Link {
+    /// Nothing is wrong.
+    pub const CLEAR: Self =
+        Self { silence: 0, heartbeat: 0, rejections: 0, forgeries: 0, transit: 0, source_age: 0 };
 }
 
 /// Where the bus interrupt notes what came, and the control tick reads it. Meant for a `static`.
@@ -22,18 +34,32 @@ pub struct Link {
 /// Neither waits for the other; each number is exact, together they may be of two moments.
 ///
 /// ```
-/// use dibs_nostd::{Progress, failsafe::LinkStatus};
+/// use dibs_nostd::wire::{FrameId, NoMac, encode_heartbeat};
+/// use dibs_nostd::{Assembler, Frames, Unchecked, failsafe::LinkStatus};
 ///
+/// static FRAMES: Frames<3> = Frames::new();
 /// static LINK: LinkStatus = LinkStatus::new();
 /// assert_eq!(LINK.read(5).silence, u32::MAX, "nothing came yet");
-/// LINK.note(&Ok(Progress::Complete { epoch: 7 }), 10); // what `Assembler::accept` returned, when
+///
+/// // Bus interrupt: after each call of `accept` or `advance`.
+/// let (writer, _reader) = FRAMES.split().unwrap();
+/// let mut assembler = Assembler::new(writer, Unchecked, 0xB0D1, 1000.0);
+/// let mut buffer = [0; 64];
+/// let id = FrameId { mesh_id: 0xB0D1, session: 1, epoch: 0 };
+/// assembler.accept(encode_heartbeat(&id, 1, &NoMac, &mut buffer), 10).unwrap();
+/// LINK.set(&assembler.health());
+///
+/// // Control interrupt.
 /// assert_eq!(LINK.read(12).silence, 2);
 /// ```
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct LinkStatus {
     packet: AtomicU32,
     heartbeat: AtomicU32,
     rejections: AtomicU32,
+    forgeries: AtomicU32,
+    transit: AtomicU32,
+    source_age: AtomicU32,
     /// Bit 0: a packet came. Bit 1: a heartbeat came.
     seen: AtomicU32,
 }
@@ -49,45 +75,29 @@ impl LinkStatus {
             packet: AtomicU32::new(0),
             heartbeat: AtomicU32::new(0),
             rejections: AtomicU32::new(0),
+            forgeries: AtomicU32::new(0),
+            transit: AtomicU32::new(u32::MAX),
+            source_age: AtomicU32::new(u32::MAX),
             seen: AtomicU32::new(0),
         }
     }
 
-    /// Notes what a packet came to, at the receiver's clock `now`. One writer.
-    pub fn note(&self, outcome: &Result<Progress, Rejection>, now: u32) {
-        match outcome {
-            Err(_) => self.damaged(),
-            Ok(progress) => {
-                self.packet.store(now, Ordering::Relaxed);
-                let seen = self.seen.load(Ordering::Relaxed);
-                self.seen.store(seen | PACKET, Ordering::Release);
-                if *progress == Progress::Heartbeat {
-                    self.heartbeat(now);
-                }
-            }
+    /// Notes the health of the bus: after each packet and each slice of checking. One writer.
+    pub fn set(&self, health: &BusHealth) {
+        let mut seen = 0;
+        if let Some(packet) = health.packet {
+            self.packet.store(packet, Ordering::Relaxed);
+            seen |= PACKET;
         }
-    }
-
-    /// Notes what a slice of checking came to: `Assembler::advance`.
-    pub fn note_check(&self, outcome: &Result<Advance, Rejection>) {
-        match outcome {
-            Err(_) => self.damaged(),
-            Ok(Advance::Published { .. }) => self.rejections.store(0, Ordering::Relaxed),
-            Ok(_) => (),
+        if let Some(heartbeat) = health.heartbeat {
+            self.heartbeat.store(heartbeat, Ordering::Relaxed);
+            seen |= HEARTBEAT;
         }
-    }
-
-    /// Notes a heartbeat, at the receiver's clock `now`.
-    pub fn heartbeat(&self, now: u32) {
-        self.heartbeat.store(now, Ordering::Relaxed);
-        let seen = self.seen.load(Ordering::Relaxed);
-        self.seen.store(seen | HEARTBEAT, Ordering::Release);
-    }
-
-    /// Notes damage that never became a packet: a frame of the byte stream that was cut or too long.
-    pub fn damaged(&self) {
-        let streak = self.rejections.load(Ordering::Relaxed).saturating_add(1);
-        self.rejections.store(streak, Ordering::Relaxed);
+        self.rejections.store(health.rejections, Ordering::Relaxed);
+        self.forgeries.store(health.forgeries, Ordering::Relaxed);
+        self.transit.store(health.transit, Ordering::Relaxed);
+        self.source_age.store(health.source_age, Ordering::Relaxed);
+        self.seen.store(seen, Ordering::Release);
     }
 
     /// The health of the bus at `now`.
@@ -101,6 +111,15 @@ impl LinkStatus {
             silence: since(PACKET, &self.packet),
             heartbeat: since(HEARTBEAT, &self.heartbeat),
             rejections: self.rejections.load(Ordering::Relaxed),
+            forgeries: self.forgeries.load(Ordering::Relaxed),
+            transit: self.transit.load(Ordering::Relaxed),
+            source_age: self.source_age.load(Ordering::Relaxed),
         }
+    }
+}
+
+impl Default for LinkStatus {
+    fn default() -> Self {
+        Self::new()
     }
 }

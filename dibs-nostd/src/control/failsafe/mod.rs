@@ -42,6 +42,7 @@
 //! compared over half the clock's range: 24 days at 1 kHz, after which the machine is long safe and
 //! stays so.
 
+mod freshness;
 mod limits;
 mod link;
 #[cfg(test)]
@@ -120,7 +121,7 @@ impl Verdict {
 /// // Ticks of 1 ms: degraded after 50, safe after 200; tissue at up to 0.1 mm a tick.
 /// let limits = Limits::new(Watch::new(50, 200)?, 0.1)?.recovery(2)?.automatic();
 /// let mut machine = FailSafe::new(limits);
-/// let link = Link { silence: 0, heartbeat: 0, rejections: 0 };
+/// let link = Link::CLEAR;
 /// let mut state = |now, epoch, received| {
 ///     let frame = Some((epoch, received));
 ///     let seen = Observation { now, frame, link, query_error: None, has_rotted: false };
@@ -170,7 +171,7 @@ impl FailSafe {
         self.state
     }
 
-    /// One control tick. O(1): seven comparisons of two limits.
+    /// One control tick. O(1): ten comparisons of two limits.
     pub fn step(&mut self, seen: &Observation) -> Verdict {
         let age = seen.frame.map_or(u32::MAX, |(_, received)| elapsed(seen.now, received));
         let (level, cause) = self.worst(seen, age);
@@ -243,13 +244,14 @@ impl FailSafe {
         if seen.frame.is_none() {
             worst = (State::Safe, Some(Unavailable::NoSurface));
         }
-        for (level, cause) in [
+        let inputs = [
             (safe_if(seen.has_rotted), Unavailable::Rot),
             (limits.age.level(age), stale),
             (limits.silence.level(link.silence), silent),
             (limits.heartbeat.level(link.heartbeat), heartbeat),
             (limits.rejections.level(link.rejections), rejections),
-        ] {
+        ];
+        for (level, cause) in inputs.into_iter().chain(limits.freshness.levels(&link)) {
             if level > worst.0 {
                 worst = (level, Some(cause));
             }

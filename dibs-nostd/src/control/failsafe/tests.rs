@@ -15,6 +15,9 @@ const AGE: Watch = watch(50, 200);
 const SILENCE: Watch = watch(20, 100);
 const HEARTBEAT: Watch = watch(30, 150);
 const REJECTIONS: Watch = watch(3, 9);
+const TRANSIT: Watch = watch(300, 900);
+const SOURCE_AGE: Watch = watch(40, 80);
+const FORGERIES: Watch = watch(5, 50);
 const SPEED: f32 = 0.125;
 
 const fn watch(degraded: u32, safe: u32) -> Watch {
@@ -30,12 +33,15 @@ fn limits(frames: u16, automatic: bool) -> Limits {
         .silence(SILENCE)
         .heartbeat(HEARTBEAT)
         .rejections(REJECTIONS)
+        .transit(TRANSIT)
+        .source_age(SOURCE_AGE)
+        .forgeries(FORGERIES)
         .recovery(frames)
         .unwrap();
     if automatic { limits.automatic() } else { limits }
 }
 
-const GOOD: Link = Link { silence: 0, heartbeat: 0, rejections: 0 };
+const GOOD: Link = Link::CLEAR;
 
 /// A step at `now` with a surface of this epoch and age.
 fn seen(now: u32, epoch: u32, age: u32) -> Observation {
@@ -95,6 +101,18 @@ fn requests() -> Vec<(State, Observation, Option<Unavailable>)> {
     for (level, streak) in [(Nominal, 3), (Degraded, 4), (Degraded, 9), (Safe, 10)] {
         let cause = (level != Nominal).then_some(Unavailable::Rejections { streak });
         all.push((level, with(Link { rejections: streak, ..GOOD }), cause));
+    }
+    for (level, transit) in [(Nominal, 300), (Degraded, 301), (Degraded, 900), (Safe, 901)] {
+        let cause = (level != Nominal).then_some(Unavailable::Delayed { transit });
+        all.push((level, with(Link { transit, ..GOOD }), cause));
+    }
+    for (level, age) in [(Nominal, 40), (Degraded, 41), (Degraded, 80), (Safe, 81)] {
+        let cause = (level != Nominal).then_some(Unavailable::SourceStale { age });
+        all.push((level, with(Link { source_age: age, ..GOOD }), cause));
+    }
+    for (level, count) in [(Nominal, 5), (Degraded, 6), (Degraded, 50), (Safe, 51)] {
+        let cause = (level != Nominal).then_some(Unavailable::Forgeries { count });
+        all.push((level, with(Link { forgeries: count, ..GOOD }), cause));
     }
     all.push((
         Safe,
@@ -245,7 +263,12 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     let link = prop_oneof![
         8 => Just(GOOD),
         1 => (0_u32..120, 0_u32..170, 0_u32..12)
-            .prop_map(|(silence, heartbeat, rejections)| Link { silence, heartbeat, rejections }),
+            .prop_map(|(silence, heartbeat, rejections)| Link {
+                silence,
+                heartbeat,
+                rejections,
+                ..GOOD
+            }),
     ];
     let step = (1_u32..80, any::<bool>(), 0_u32..70, link, 0_u32..40, any::<bool>()).prop_map(
         |(wait, new_frame, delay, link, fault, acknowledge)| Step {

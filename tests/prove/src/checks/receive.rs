@@ -139,7 +139,7 @@ impl Script {
             let packets = match (way.mtu, way.is_tagged) {
                 (64, false) => packets::<_, 64>(way, built, positions, session, |_| NoMac)?,
                 (64, true) => {
-                    packets::<_, 64>(way, built, positions, session, |c| AesCmac::new(&KEY, c))?
+                    packets::<_, 64>(way, built, positions, session, |c| AesCmac::new(&KEY, 0, c))?
                 }
                 _ => packets::<_, 1024>(way, built, positions, session, |_| NoMac)?,
             };
@@ -162,12 +162,12 @@ fn packets<M: Mac, const MTU: usize>(
     built: &BuiltTree,
     positions: &[Vec3],
     session: u32,
-    mac_of: impl Fn(u32) -> M + Send + 'static,
+    keyed_mac: impl Fn(u32) -> M + Send + 'static,
 ) -> Result<Vec<Vec<u8>>> {
     let order = SurfaceOrder::of(&built.tree::<u16>()?);
     let settings =
         Settings { quantised: way.quantised, heartbeat: None, session, ..Settings::default() };
-    let mut sender = Sender::<_, MTU, M>::with_mac(Vec::new(), order, settings, mac_of);
+    let mut sender = Sender::<_, MTU, M>::with_mac(Vec::new(), order, settings, keyed_mac);
     sender.challenge(0);
     sender.send(positions)?;
     Ok(std::mem::take(sender.transport()))

@@ -152,7 +152,7 @@ fn life(fault: Fault, count: u64, chunk: u64, seed: u64, place: Place<'_>) -> Ro
 struct Life<'p, M> {
     place: Place<'p>,
     source: Source<M>,
-    mac_of: fn(u32) -> M,
+    keyed_mac: fn(u32) -> M,
     log: Log,
     injector: Injector,
     rng: Rng,
@@ -169,7 +169,7 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
         count: u64,
         case: Case,
         seed: u64,
-        mac_of: fn(u32) -> M,
+        keyed_mac: fn(u32) -> M,
         place: Place<'p>,
     ) -> Row {
         let mut rng = Rng::with_seed(seed);
@@ -177,8 +177,8 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
         let session = u32::MAX - rng.u32(..20);
         let mut life = Self {
             place,
-            source: source(case, session, mac_of),
-            mac_of,
+            source: source(case, session, keyed_mac),
+            keyed_mac,
             log: Log::default(),
             injector: Injector::new(seed),
             is_stream: rng.bool() || matches!(place, Place::Board(_)),
@@ -210,13 +210,23 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
 
     /// What a receiver draws when it starts.
     fn any_mac(&mut self) -> M {
-        (self.mac_of)(if M::TAGGED { self.rng.u32(..) } else { 0 })
+        (self.keyed_mac)(if M::TAGGED { self.rng.u32(..) } else { 0 })
     }
 
     /// The next frame's packets.
     fn next_frame(&mut self, controller: &mut dyn Receiver) -> Vec<Vec<u8>> {
-        self.source.transport().inbox.push_back(controller.status());
-        self.source.poll().expect("a mailbox does not fail");
+        // A hello is answered at once.
+        for _ in 0..3 {
+            self.source.transport().inbox.push_back(controller.status());
+            self.source.poll().expect("a mailbox does not fail");
+            let hellos = take(&mut self.source.transport().sent);
+            if hellos.is_empty() {
+                break;
+            }
+            for packet in hellos {
+                self.deliver(&packet, controller);
+            }
+        }
         self.moment += 1;
         let frame = self.source.prepare(&surface(self.moment)).expect("a finite surface");
         self.log.note(&self.source);
@@ -286,7 +296,7 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
         }
         self.log.forget_last();
         self.session = self.session.wrapping_add(1);
-        self.source = source(self.case, self.session, self.mac_of);
+        self.source = source(self.case, self.session, self.keyed_mac);
         let (published, packets) = (controller.published(), self.next_frame(controller));
         for packet in &packets {
             self.deliver(packet, controller);

@@ -3,7 +3,9 @@
 use std::collections::VecDeque;
 use std::f32::consts::{PI, TAU};
 use std::io;
+use std::sync::Arc;
 use std::sync::LazyLock;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use dibs_build::stream::{Sender, Settings, SurfaceOrder, Transport};
@@ -15,7 +17,7 @@ use dibs_nostd::wire::{
 };
 use dibs_nostd::{Advance, Assembler, FrameReader, Frames, StretchMonitor, Tree, VertexTable};
 pub use probe::bus::MTU;
-use probe::bus::{KEY, VERTICES, WORK};
+use probe::bus::{KEY, RECEIVER, VERTICES, WORK};
 
 /// Rings of vertices between the poles, and vertices of a ring.
 const RINGS: usize = 8;
@@ -66,6 +68,9 @@ pub fn surface(moment: u32) -> Vec<Vec3> {
     rest.iter().map(|&p| p + push * near(p)).collect()
 }
 
+/// From frame to frame, in ms.
+pub const FRAME_MS: u32 = 40;
+
 /// How a run sends.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
@@ -94,10 +99,11 @@ impl Transport for Mailbox {
 /// A sender whose packets are collected.
 pub type Source<M> = Sender<Mailbox, MTU, M>;
 
+/// A sender on a clock that goes on by [`FRAME_MS`] whenever it is asked.
 pub fn source<M: Mac>(
     case: Case,
     session: u32,
-    mac_of: impl Fn(u32) -> M + Send + 'static,
+    keyed_mac: impl Fn(u32) -> M + Send + 'static,
 ) -> Source<M> {
     let tree = TREE.tree::<u16>().expect("16-bit indices");
     let settings = Settings {
@@ -108,7 +114,10 @@ pub fn source<M: Mac>(
         session,
         ..Settings::default()
     };
-    Sender::with_mac(Mailbox::default(), SurfaceOrder::of(&tree), settings, mac_of)
+    let time = Arc::new(AtomicU64::new(0));
+    let now = move || Duration::from_millis(time.fetch_add(u64::from(FRAME_MS), Ordering::Relaxed));
+    Sender::with_mac(Mailbox::default(), SurfaceOrder::of(&tree), settings, keyed_mac)
+        .with_clock(now)
 }
 
 /// The frames that were sent to the last packet, each as the receiver must have it.
@@ -185,6 +194,8 @@ pub struct Controller<'f, M> {
     reader: FrameReader<'f, N>,
     published: u32,
     wrong: u64,
+    /// In ms: some pass with each status.
+    now: u32,
 }
 
 impl<'f, M: Mac> Controller<'f, M> {
@@ -192,7 +203,7 @@ impl<'f, M: Mac> Controller<'f, M> {
         let (writer, reader) = frames.split().expect("new frames");
         let monitor = StretchMonitor::new(tree).expect("a tree with a metric");
         let assembler = Assembler::with_mac(writer, monitor, tree.mesh_id(), LIMIT, mac);
-        Self { deframer: Deframer::new(), assembler, reader, published: 0, wrong: 0 }
+        Self { deframer: Deframer::new(), assembler, reader, published: 0, wrong: 0, now: 0 }
     }
 
     /// Checks and publishes, in slices, and compares what is published with what was sent.
@@ -222,13 +233,14 @@ impl<M: Mac> Receiver for Controller<'_, M> {
 
     fn status(&mut self) -> Vec<u8> {
         let mesh_id = TREE.summary().mesh_id;
-        let status = self.assembler.status(0, 0);
+        self.now = self.now.wrapping_add(FRAME_MS);
+        let status = self.assembler.status(self.now, 0);
         let (counters, mac) = (*self.assembler.counters(), self.assembler.mac());
         encode_status(mesh_id, &status, &counters, mac, &mut [0; MTU]).to_vec()
     }
 
     fn message(&mut self, packet: &[u8], log: &Log) {
-        let _ = self.assembler.accept(packet, 0);
+        let _ = self.assembler.accept(packet, self.now);
         self.work(log);
     }
 
@@ -236,7 +248,7 @@ impl<M: Mac> Receiver for Controller<'_, M> {
         for &byte in bytes {
             match self.deframer.push(byte) {
                 None => continue,
-                Some(Ok(packet)) => drop(self.assembler.accept(packet, 0)),
+                Some(Ok(packet)) => drop(self.assembler.accept(packet, self.now)),
                 Some(Err(error)) => self.assembler.count_framing(&error),
             }
             self.work(log);
@@ -252,9 +264,9 @@ impl<M: Mac> Receiver for Controller<'_, M> {
     }
 }
 
-/// What makes tags under a challenge.
+/// The MAC under a challenge.
 pub fn mac_under(challenge: u32) -> AesCmac {
-    AesCmac::new(&KEY, challenge)
+    AesCmac::new(&KEY, RECEIVER, challenge)
 }
 
 /// A packet as it goes over a byte stream.

@@ -14,6 +14,7 @@ pub fn read(path: &Path) -> Result<[u8; 16]> {
         "{name}: a key file holds {DIGITS} hexadecimal digits and nothing else, as \
          `openssl rand -hex 16` prints"
     );
+    refuse_if_shared(path)?;
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
         Err(error) => anyhow::bail!("{name}: cannot be read: {error}"),
@@ -27,4 +28,25 @@ pub fn read(path: &Path) -> Result<[u8; 16]> {
         *byte = (high << 4 | low) as u8;
     }
     Ok(key)
+}
+
+/// A key that others on this computer may read is none.
+#[cfg(unix)]
+fn refuse_if_shared(path: &Path) -> Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    // A file that is not there is the reader's to report.
+    let Ok(metadata) = std::fs::metadata(path) else { return Ok(()) };
+    let mode = metadata.permissions().mode() & 0o777;
+    let name = path.display();
+    ensure!(
+        mode & 0o077 == 0,
+        "{name}: other users can read or write this key (mode {mode:03o}); `chmod 600 {name}`, and \
+         take a new key if others had access"
+    );
+    Ok(())
+}
+
+#[cfg(not(unix))]
+fn refuse_if_shared(_: &Path) -> Result<()> {
+    Ok(())
 }

@@ -1,21 +1,20 @@
 //! `dibs stream`: a recorded motion, sent to a controller.
 
+mod interrupt;
 mod key;
+mod player;
 mod report;
 
 use crate::modes;
 use crate::tree_file::{self, AnyTree};
 use anyhow::{Context, Result, anyhow, bail};
-use dibs_build::stream::{Line, Sender, Settings, SurfaceOrder, Target};
+use dibs_build::stream::{Sender, Settings, SurfaceOrder, Target};
 use dibs_build::{Builder, Motion};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::wire::{AesCmac, Mac};
-use report::Display;
+use dibs_nostd::wire::AesCmac;
+use interrupt::Interrupt;
+use player::Player;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
-
-/// A receiver that reports at all reports this often.
-const SILENT: Duration = Duration::from_secs(2);
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -25,6 +24,7 @@ Examples:
   dibs stream heart.dibs heart.pc2 --to udp:192.168.1.20:5000 --rate 1000 --modes
   dibs stream heart.ply heart.pc2 --to unix:/tmp/uart --frames 100 --json
   dibs stream heart.dibs heart.pc2 --to serial:/dev/ttyUSB0 --key heart.key
+  dibs stream heart.dibs heart.pc2 --to udp:192.168.1.20:5000@5001 --key heart.key --receiver 3
 
 An emulated serial line is a server for this: qemu-system-arm -serial unix:/tmp/uart,server=on,wait=off")]
 pub struct Args {
@@ -33,7 +33,8 @@ pub struct Args {
     surface: PathBuf,
     /// The motion: a PC2 file with a position for each of the mesh's vertices in every frame
     motion: PathBuf,
-    /// Where to: serial:PORT or serial:PORT@BAUD, tcp:HOST:PORT, udp:HOST:PORT or unix:PATH
+    /// Where to: `serial:PORT` or `serial:PORT@BAUD`, `tcp:HOST:PORT`, `udp:HOST:PORT` or
+    /// `udp:HOST:PORT@LOCAL_PORT`, `unix:PATH`
     #[arg(long)]
     to: Target,
     /// Frames a second; by default the motion's own rate
@@ -55,18 +56,24 @@ pub struct Args {
     /// The receiver's challenge, where it has no way to report one: 0, if it was made with none
     #[arg(long, value_name = "NUMBER", requires = "key")]
     challenge: Option<u32>,
+    /// The receiver's id under the tags: a key may be shared by several receivers, each with its own
+    #[arg(long, value_name = "NUMBER", default_value_t = 0, requires = "key")]
+    receiver: u32,
     /// Largest packet, in bytes: no more than the receiver takes. 64 is a CAN-FD message
     #[arg(long, value_name = "BYTES", default_value = "1024", value_parser = ["64", "1024"])]
     mtu: String,
     /// Start over at the end of the motion
     #[arg(long = "loop")]
     repeat: bool,
-    /// Stop after this many frames
+    /// Stop after this many frames. Ctrl-C stops too, and prints the totals
     #[arg(long)]
     frames: Option<u64>,
     /// Frames that may be on their way before the next one waits, where the receiver reports
     #[arg(long, default_value_t = 2)]
     window: u32,
+    /// How long to try to connect again after the connection broke; 0 gives up at once
+    #[arg(long, value_name = "SECONDS", default_value_t = 10)]
+    retry: u64,
     /// Print the totals as a JSON object
     #[arg(long)]
     json: bool,
@@ -120,80 +127,19 @@ fn connect<const MTU: usize>(
 ) -> Result<()> {
     let settings =
         Settings { quantised: args.quantise, partial: args.partial, ..Settings::default() };
+    let interrupt = Interrupt::new()?;
     let line = args.to.open()?;
     let Some(key) = key else {
-        return play(args, recording, Sender::<_, MTU>::new(line, order, settings));
+        let sender = Sender::<_, MTU>::new(line, order, settings);
+        return Player::new(args, recording, sender, interrupt).run();
     };
-    let mac_of = move |challenge| AesCmac::new(&key, challenge);
-    let mut sender = Sender::<_, MTU, _>::with_mac(line, order, settings, mac_of);
-    match args.challenge {
-        Some(challenge) => sender.challenge(challenge),
-        None => await_challenge(&mut sender, &args.to)?,
+    let receiver = args.receiver;
+    let keyed_mac = move |challenge| AesCmac::new(&key, receiver, challenge);
+    let mut sender = Sender::<_, MTU, _>::with_mac(line, order, settings, keyed_mac);
+    if let Some(challenge) = args.challenge {
+        sender.challenge(challenge);
     }
-    play(args, recording, sender)
-}
-
-/// Until the receiver has reported its challenge.
-fn await_challenge<M: Mac, const MTU: usize>(
-    sender: &mut Sender<Line, MTU, M>,
-    to: &Target,
-) -> Result<()> {
-    let start = Instant::now();
-    while !sender.is_ready() {
-        if start.elapsed() > SILENT {
-            bail!(
-                "{to}: no genuine status came within {} s: is the receiver on, and has it the same \
-                 key? One that cannot report needs --challenge",
-                SILENT.as_secs()
-            );
-        }
-        sender.poll()?;
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    Ok(())
-}
-
-/// Sends the frames, each when it is due.
-fn play<M: Mac, const MTU: usize>(
-    args: &Args,
-    recording: &Recording,
-    mut sender: Sender<Line, MTU, M>,
-) -> Result<()> {
-    let name = args.motion.display();
-    let mut display = Display::new();
-    let interval = Duration::from_secs_f64(1.0 / recording.rate);
-    let mut due = Instant::now();
-    let mut late = 0_u64;
-    let recorded = recording.frames.len() as u64;
-    let end = args.frames.unwrap_or(if args.repeat { u64::MAX } else { recorded });
-    for number in 0..end {
-        wait(&mut sender, due, args.window)?;
-        let now = Instant::now();
-        if now > due + interval {
-            // The line is slower than the motion: go on from here, do not pile up.
-            late += 1;
-            due = now;
-        }
-        due += interval;
-        let frame = (number % recorded) as usize;
-        let sent = match &recording.weights {
-            Some(weights) => {
-                sender.prepare_weights(&weights[frame]).and_then(|frame| sender.transmit(frame))
-            }
-            None => sender.send(&recording.frames[frame]),
-        };
-        let sent = sent.map_err(|error| anyhow!("{name}: {error}"))?;
-        display.show(&sender, &sent);
-    }
-    // What is on its way is to be acknowledged, where anybody does.
-    let end = Instant::now();
-    while sender.in_flight() > 0 && sender.status().is_some() && end.elapsed() < SILENT {
-        sender.poll()?;
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    display.finish();
-    report::print(&sender, late, args.json);
-    Ok(())
+    Player::new(args, recording, sender, interrupt).run()
 }
 
 /// The order of the vertices: the tree's, or that of the tree that the mesh gives.
@@ -214,30 +160,4 @@ fn order(path: &Path) -> Result<SurfaceOrder> {
         16 => SurfaceOrder::of(&built.tree::<u16>().context("the tree just built")?),
         _ => SurfaceOrder::of(&built.tree::<u32>().context("the tree just built")?),
     })
-}
-
-/// Heartbeats and statuses until the next frame is due, and has room.
-fn wait<M: Mac, const MTU: usize>(
-    sender: &mut Sender<Line, MTU, M>,
-    due: Instant,
-    window: u32,
-) -> Result<()> {
-    let mut heard = (sender.totals().statuses, Instant::now());
-    loop {
-        sender.poll()?;
-        let statuses = sender.totals().statuses;
-        if statuses != heard.0 {
-            heard = (statuses, Instant::now());
-        }
-        let now = Instant::now();
-        let reports = statuses > 0 && now < heard.1 + SILENT;
-        if now >= due && !(reports && sender.in_flight() >= window) {
-            return Ok(());
-        }
-        std::thread::sleep(
-            Duration::from_millis(1)
-                .min(due.saturating_duration_since(now))
-                .max(Duration::from_micros(100)),
-        );
-    }
 }

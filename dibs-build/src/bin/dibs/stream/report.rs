@@ -13,6 +13,17 @@ pub struct Display {
     last: Instant,
 }
 
+/// How a stream went, besides what the sender knows.
+#[derive(Default)]
+pub struct Outcome {
+    /// Frames that were sent later than they were due.
+    pub late: u64,
+    /// How often the connection was made again.
+    pub reconnections: u64,
+    /// The user ended it.
+    pub is_interrupted: bool,
+}
+
 impl Display {
     pub fn new() -> Self {
         let bar = ProgressBar::new_spinner();
@@ -35,6 +46,20 @@ impl Display {
         } else {
             eprintln!("{text}");
         }
+    }
+
+    /// Says that frames wait although the receiver reports.
+    pub fn warn<M: Mac, const MTU: usize>(&self, sender: &Sender<Line, MTU, M>) {
+        let mut text = format!("{} frames are not acknowledged", sender.in_flight());
+        text += match sender.status().and_then(|status| status.published) {
+            Some(_) => "; the receiver has published others",
+            None => "; the receiver has published none",
+        };
+        let causes = causes(sender.counters());
+        if !causes.is_empty() {
+            let _ = write!(text, "; it rejected {}", causes.join(", "));
+        }
+        self.bar.suspend(|| eprintln!("{text}"));
     }
 
     pub fn finish(&self) {
@@ -86,7 +111,12 @@ fn causes(counters: &Counters) -> Vec<String> {
 }
 
 /// The totals.
-pub fn print<M: Mac, const MTU: usize>(sender: &Sender<Line, MTU, M>, late: u64, json: bool) {
+pub fn print<M: Mac, const MTU: usize>(
+    sender: &Sender<Line, MTU, M>,
+    outcome: &Outcome,
+    json: bool,
+) {
+    let Outcome { late, reconnections, is_interrupted } = *outcome;
     let totals = sender.totals();
     let per_frame = totals.bytes as f64 / totals.frames.max(1) as f64;
     let (published, rejected) =
@@ -106,6 +136,8 @@ pub fn print<M: Mac, const MTU: usize>(sender: &Sender<Line, MTU, M>, late: u64,
                 "bytes": totals.bytes,
                 "bytes_per_frame": per_frame,
                 "late": late,
+                "reconnections": reconnections,
+                "interrupted": is_interrupted,
                 "statuses": totals.statuses,
                 "acknowledged": sender.acknowledged(),
                 "published": published,
@@ -120,6 +152,12 @@ pub fn print<M: Mac, const MTU: usize>(sender: &Sender<Line, MTU, M>, late: u64,
     );
     if late > 0 {
         println!("late      {late} frames: the line is slower than the motion");
+    }
+    if reconnections > 0 {
+        println!("line      broke and came back {reconnections} times");
+    }
+    if is_interrupted {
+        println!("stopped   by a signal");
     }
     if totals.statuses == 0 {
         println!("receiver  no status came back");

@@ -1,10 +1,10 @@
 //! A frame of vertices as packets.
 
-use super::{PacketWriter, capacity};
+use super::{PacketWriter, begin_packet, capacity};
 use crate::VertexTable;
 use crate::bus::wire::{
-    Begin, Content, EncodeError, Encoding, FrameId, HEADER_BYTES, MAX_CONTENT_PACKETS, MAX_ROWS,
-    Mac, NoMac, kind,
+    Begin, Content, EncodeError, Encoding, FrameId, Freshness, HEADER_BYTES, MAX_CONTENT_PACKETS,
+    MAX_ROWS, Mac, NoMac, kind,
 };
 
 /// Cuts one frame into packets of at most `MTU` bytes: begin, vertices, commit.
@@ -75,7 +75,8 @@ impl<'a, T: VertexTable + ?Sized, const MTU: usize> FrameEncoder<'a, T, MTU> {
                 return Err(EncodeError::OutOfBox { row });
             }
         }
-        let begin = Begin { session: id.session, content: Content::Whole, encoding, rows };
+        let (session, freshness) = (id.session, Freshness::default());
+        let begin = Begin { session, content: Content::Whole, encoding, rows, freshness };
         let next = Next::Begin;
         let frame =
             Self { id, begin, positions, held: None, mac: NoMac, next, sequence: 0, digest: 0 };
@@ -104,6 +105,13 @@ impl<'a, T: VertexTable + ?Sized, const MTU: usize> FrameEncoder<'a, T, MTU> {
         frame.begin.content = Content::Partial { base_epoch };
         frame.held = Some(held);
         Ok(frame)
+    }
+
+    /// The same frame, as fresh as this.
+    #[must_use]
+    pub fn with_freshness(mut self, freshness: Freshness) -> Self {
+        self.begin.freshness = freshness;
+        self
     }
 
     /// The same frame, with a tag on every packet.
@@ -141,10 +149,9 @@ impl<T: VertexTable + ?Sized, M: Mac, const MTU: usize> FrameEncoder<'_, T, MTU,
     pub fn next_packet<'b>(&mut self, buffer: &'b mut [u8; MTU]) -> Option<&'b [u8]> {
         let first = match self.next {
             Next::Begin => {
-                let mut packet = self.packet(buffer, kind::BEGIN, 0, 0);
-                packet.begin(&self.begin);
-                let (packet, checksum) = packet.finish(&self.mac, self.id.session);
-                self.digest = checksum;
+                let packet = begin_packet::<M>(buffer, &self.id, &self.begin);
+                let (packet, share) = packet.finish(&self.mac, self.id.session);
+                self.digest = share;
                 self.next = self.vertices_from(0);
                 return Some(packet);
             }
@@ -181,8 +188,8 @@ impl<T: VertexTable + ?Sized, M: Mac, const MTU: usize> FrameEncoder<'_, T, MTU,
                 }
             }
         }
-        let (packet, checksum) = packet.finish(&self.mac, self.id.session);
-        self.digest = self.digest.wrapping_add(checksum);
+        let (packet, share) = packet.finish(&self.mac, self.id.session);
+        self.digest = self.digest.wrapping_add(share);
         self.next = self.vertices_from(end);
         Some(packet)
     }

@@ -8,12 +8,13 @@ pub use weights::WeightsEncoder;
 
 use core::fmt;
 
-use super::checksum::checksum;
+use super::checksum::{checksum, scrambled};
 use super::fields::Bytes;
+use super::packet::HAS_ECHO;
 use super::{
-    Begin, CHECKSUM_BYTES, Content, Counters, Encoding, FrameId, HEADER_BYTES, Heartbeat,
-    MAX_CONTENT_PACKETS, MAX_ROWS, MAX_WEIGHTS, MIN_MTU, Mac, Status, TAG_BYTES, VERSION, kind,
-    padded,
+    Begin, CHECKSUM_BYTES, Content, Counters, Direction, Encoding, FrameId, HEADER_BYTES,
+    MAX_CONTENT_PACKETS, MAX_ROWS, MAX_WEIGHTS, MIN_MTU, Mac, NoMac, Status, TAG_BYTES, VERSION,
+    kind, padded,
 };
 
 /// Writes a heartbeat to the buffer. `id` has the newest epoch that the sender has begun; before the
@@ -24,13 +25,28 @@ pub fn encode_heartbeat<'b, M: Mac>(
     mac: &M,
     buffer: &'b mut [u8; MIN_MTU],
 ) -> &'b [u8] {
-    let mut packet = PacketWriter::<M>::new(buffer, kind::HEARTBEAT, id, 0, 0, 0);
-    let Heartbeat { session, beat } = Heartbeat { session: id.session, beat };
-    let [_, _, high @ ..] = session.to_le_bytes();
+    words(kind::HEARTBEAT, id, beat, mac, buffer)
+}
+
+/// Writes a hello to the buffer: `id` as in a heartbeat, and a nonce that is not 0. Never tagged.
+pub fn encode_hello<'b>(id: &FrameId, nonce: u32, buffer: &'b mut [u8; MIN_MTU]) -> &'b [u8] {
+    words(kind::HELLO, id, nonce, &NoMac, buffer)
+}
+
+/// A packet of session and one number.
+fn words<'b, M: Mac>(
+    kind: u8,
+    id: &FrameId,
+    number: u32,
+    mac: &M,
+    buffer: &'b mut [u8; MIN_MTU],
+) -> &'b [u8] {
+    let mut packet = PacketWriter::<M>::new(buffer, kind, id, 0, 0, 0);
+    let [_, _, high @ ..] = id.session.to_le_bytes();
     packet.put(&high);
     packet.put(&[0; 2]);
-    packet.put(&beat.to_le_bytes());
-    packet.finish(mac, session).0
+    packet.put(&number.to_le_bytes());
+    packet.finish(mac, id.session).0
 }
 
 /// Writes a status to the buffer, with as many counters as fit: which ones follows from the status's
@@ -42,7 +58,7 @@ pub fn encode_status<'b, M: Mac, const MTU: usize>(
     mac: &M,
     buffer: &'b mut [u8; MTU],
 ) -> &'b [u8] {
-    let room = const { capacity::<M>(MTU, 20 + HEADER_BYTES, 4) };
+    let room = const { capacity::<M>(MTU, 28 + HEADER_BYTES, 4) };
     let all = counters.from(0).len();
     let pages = all.div_ceil(room as usize);
     let first = (status.number as usize).checked_rem(pages).unwrap_or(0) * room as usize;
@@ -63,11 +79,28 @@ pub fn encode_status<'b, M: Mac, const MTU: usize>(
     packet.put(&status.number.to_le_bytes());
     packet.put(&age_ms.to_le_bytes());
     packet.put(&stretch.to_le_bytes());
-    packet.put(&status.challenge.to_le_bytes());
+    for word in [status.challenge, status.clock, status.answer] {
+        packet.put(&word.to_le_bytes());
+    }
     for counter in page {
         packet.put(&counter.to_le_bytes());
     }
     packet.finish(mac, session).0
+}
+
+/// A begin packet, complete but for its end.
+fn begin_packet<'b, M: Mac>(
+    buffer: &'b mut [u8],
+    id: &FrameId,
+    begin: &Begin,
+) -> PacketWriter<'b, M> {
+    // The echo stands where packets of rows have their count and first row.
+    let [count, first @ ..] = begin.freshness.echo.unwrap_or(0).to_le_bytes();
+    let [f0, f1, f2] = first;
+    let first = u32::from_le_bytes([f0, f1, f2, 0]);
+    let mut packet = PacketWriter::new(buffer, kind::BEGIN, id, 0, count, first);
+    packet.begin(begin);
+    packet
 }
 
 /// Rows of this size that fit one packet behind `fixed` bytes.
@@ -81,6 +114,7 @@ const fn capacity<M: Mac>(mtu: usize, fixed: usize, row: usize) -> u32 {
 /// One packet being written. The buffer is known to be large enough: `MTU` and the counts see to it.
 struct PacketWriter<'b, M> {
     bytes: Bytes<'b>,
+    direction: Direction,
     mac: core::marker::PhantomData<M>,
 }
 
@@ -101,7 +135,9 @@ impl<'b, M: Mac> PacketWriter<'b, M> {
         bytes.put(&sequence.to_le_bytes());
         let [f0, f1, f2, _] = first.to_le_bytes();
         bytes.put(&[count, f0, f1, f2]);
-        Self { bytes, mac: core::marker::PhantomData }
+        let direction =
+            if kind == kind::STATUS { Direction::ToSender } else { Direction::ToReceiver };
+        Self { bytes, direction, mac: core::marker::PhantomData }
     }
 
     fn put(&mut self, bytes: &[u8]) {
@@ -117,8 +153,12 @@ impl<'b, M: Mac> PacketWriter<'b, M> {
             Content::Partial { base_epoch } => (1, base_epoch),
             Content::Modal => (2, 0),
         };
-        self.put(&[content, u8::from(begin.encoding != Encoding::Float)]);
-        self.put(&begin.rows.to_le_bytes());
+        let encoding = u8::from(begin.encoding != Encoding::Float);
+        let has_echo = if begin.freshness.echo.is_some() { HAS_ECHO } else { 0 };
+        self.put(&begin.freshness.age_ms.to_le_bytes());
+        self.put(&[content | encoding << 3 | has_echo]);
+        let [r0, r1, r2, _] = begin.rows.to_le_bytes();
+        self.put(&[r0, r1, r2]);
         self.put(&base_epoch.to_le_bytes());
         match begin.encoding {
             Encoding::Float => self.put(&[0; 24]),
@@ -130,20 +170,21 @@ impl<'b, M: Mac> PacketWriter<'b, M> {
         }
     }
 
-    /// Adds padding, tag and checksum; the packet and its checksum.
+    /// Adds padding, tag and checksum; the packet, and its share of the frame's digest.
     fn finish(mut self, mac: &M, session: u32) -> (&'b [u8], u32) {
         let tag_bytes = if M::TAGGED { TAG_BYTES } else { 0 };
         let end = padded(self.bytes.used + tag_bytes + CHECKSUM_BYTES) - tag_bytes - CHECKSUM_BYTES;
         for _ in self.bytes.used..end {
             self.put(&[0]);
         }
-        if M::TAGGED {
-            let tag = mac.tag(session, self.bytes.written());
-            self.put(&tag);
+        let code = M::TAGGED.then(|| mac.code(self.direction, session, self.bytes.written()));
+        if let Some(code) = &code {
+            self.put(&code.tag);
         }
         let checksum = checksum(self.bytes.written());
         self.put(&checksum.to_le_bytes());
-        (self.bytes.into_written().unwrap_or_default(), checksum)
+        let share = code.map_or(scrambled(checksum), |code| code.share);
+        (self.bytes.into_written().unwrap_or_default(), share)
     }
 }
 

@@ -1,8 +1,9 @@
 //! A modal frame as packets.
 
-use super::{PacketWriter, capacity};
+use super::{PacketWriter, begin_packet, capacity};
 use crate::bus::wire::{
-    Begin, Content, EncodeError, Encoding, FrameId, HEADER_BYTES, MAX_WEIGHTS, Mac, NoMac, kind,
+    Begin, Content, EncodeError, Encoding, FrameId, Freshness, HEADER_BYTES, MAX_WEIGHTS, Mac,
+    NoMac, kind,
 };
 
 /// Cuts the weights of one modal frame into packets of at most `MTU` bytes: begin, weights, commit.
@@ -22,6 +23,7 @@ use crate::bus::wire::{
 pub struct WeightsEncoder<'a, const MTU: usize, M = NoMac> {
     id: FrameId,
     weights: &'a [f32],
+    freshness: Freshness,
     mac: M,
     /// Weights that were sent; `None` before the begin.
     sent: Option<u32>,
@@ -44,6 +46,7 @@ impl<'a, const MTU: usize> WeightsEncoder<'a, MTU> {
             None => Ok(Self {
                 id,
                 weights,
+                freshness: Freshness::default(),
                 mac: NoMac,
                 sent: None,
                 is_done: false,
@@ -56,13 +59,19 @@ impl<'a, const MTU: usize> WeightsEncoder<'a, MTU> {
     /// The same frame, with a tag on every packet.
     #[must_use]
     pub fn with_mac<M: Mac>(self, mac: M) -> WeightsEncoder<'a, MTU, M> {
-        let Self { id, weights, sent, is_done, sequence, digest, .. } = self;
-        WeightsEncoder { id, weights, mac, sent, is_done, sequence, digest }
+        let Self { id, weights, freshness, sent, is_done, sequence, digest, .. } = self;
+        WeightsEncoder { id, weights, freshness, mac, sent, is_done, sequence, digest }
     }
 }
 
 impl<M: Mac, const MTU: usize> WeightsEncoder<'_, MTU, M> {
     const CAPACITY: u32 = capacity::<M>(MTU, HEADER_BYTES, 4);
+
+    /// The same frame, as fresh as this.
+    #[must_use]
+    pub fn with_freshness(self, freshness: Freshness) -> Self {
+        Self { freshness, ..self }
+    }
 
     /// Writes the next packet to the buffer; `None` after the commit.
     pub fn next_packet<'b>(&mut self, buffer: &'b mut [u8; MTU]) -> Option<&'b [u8]> {
@@ -70,15 +79,16 @@ impl<M: Mac, const MTU: usize> WeightsEncoder<'_, MTU, M> {
             return None;
         }
         let Some(first) = self.sent else {
-            let mut packet = PacketWriter::<M>::new(buffer, kind::BEGIN, &self.id, 0, 0, 0);
-            packet.begin(&Begin {
+            let begin = Begin {
                 session: self.id.session,
                 content: Content::Modal,
                 encoding: Encoding::Float,
                 rows: self.weights.len() as u32,
-            });
-            let (packet, checksum) = packet.finish(&self.mac, self.id.session);
-            self.digest = checksum;
+                freshness: self.freshness,
+            };
+            let packet = begin_packet::<M>(buffer, &self.id, &begin);
+            let (packet, share) = packet.finish(&self.mac, self.id.session);
+            self.digest = share;
             self.sent = Some(0);
             return Some(packet);
         };
@@ -98,8 +108,8 @@ impl<M: Mac, const MTU: usize> WeightsEncoder<'_, MTU, M> {
         for weight in run {
             packet.put(&weight.to_le_bytes());
         }
-        let (packet, checksum) = packet.finish(&self.mac, self.id.session);
-        self.digest = self.digest.wrapping_add(checksum);
+        let (packet, share) = packet.finish(&self.mac, self.id.session);
+        self.digest = self.digest.wrapping_add(share);
         self.sent = Some(first + u32::from(count));
         Some(packet)
     }

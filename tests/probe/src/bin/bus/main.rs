@@ -26,7 +26,7 @@ use dibs_nostd::{
     Advance, Assembler, FrameReader, FrameWriter, Frames, StretchMonitor, Tree, VertexTable,
 };
 use exit::exit;
-use probe::bus::{HEAD_BYTES, KEY, MTU, REPORT_MTU, VERTICES, WORK};
+use probe::bus::{HEAD_BYTES, KEY, MTU, RECEIVER, REPORT_MTU, VERTICES, WORK};
 
 static FRAMES: Frames<VERTICES> = Frames::new();
 
@@ -50,7 +50,8 @@ fn run(bytes: &mut [u8]) -> Option<()> {
     if is_tagged == 0 {
         Receiver::new(&tree, writer, reader, limit, NoMac)?.receive()
     } else {
-        Receiver::new(&tree, writer, reader, limit, AesCmac::new(&KEY, challenge))?.receive()
+        Receiver::new(&tree, writer, reader, limit, AesCmac::new(&KEY, RECEIVER, challenge))?
+            .receive()
     }
 }
 
@@ -90,7 +91,7 @@ impl<'t, M: Mac> Receiver<'t, M> {
                 self.received = self.received.wrapping_add(1);
                 match self.deframer.push(byte) {
                     None => continue,
-                    Some(Ok(packet)) => drop(self.assembler.accept(packet, 0)),
+                    Some(Ok(packet)) => drop(self.assembler.accept(packet, self.now())),
                     Some(Err(error)) => self.assembler.count_framing(&error),
                 }
                 has_work = true;
@@ -101,6 +102,11 @@ impl<'t, M: Mac> Receiver<'t, M> {
                 reported = Some(self.received);
             }
         }
+    }
+
+    /// A clock that goes by the bytes of the line, 16 to a millisecond.
+    const fn now(&self) -> u32 {
+        self.received / 16
     }
 
     /// A slice of checking; whether more is to be done at once.
@@ -133,7 +139,7 @@ impl<'t, M: Mac> Receiver<'t, M> {
         for (place, word) in head.as_chunks_mut().0.iter_mut().zip(words) {
             *place = word.to_le_bytes();
         }
-        let status = self.assembler.status(0, 0);
+        let status = self.assembler.status(self.now(), 0);
         let mut packet = [0; REPORT_MTU];
         let counters = self.assembler.counters();
         let packet =

@@ -51,7 +51,7 @@ fn run() -> Option<()> {
         let [untagged, tagged] = &FRAMES;
         let monitor = StretchMonitor::new(&tree).ok()?;
         let mut plain = Assembler::new(untagged.split()?.0, monitor.clone(), tree.mesh_id(), 1e3);
-        let mac = AesCmac::new(&KEY, 0);
+        let mac = AesCmac::new(&KEY, 0, 0);
         let mut guarded = Assembler::with_mac(tagged.split()?.0, monitor, tree.mesh_id(), 1e3, mac);
         loop {
             let counts = match word(&mut script)? {

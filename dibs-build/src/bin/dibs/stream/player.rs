@@ -1,0 +1,170 @@
+//! Plays a recording to a receiver, at its own speed.
+
+use super::interrupt::Interrupt;
+use super::report::{self, Display, Outcome};
+use super::{Args, Recording};
+use anyhow::{Result, anyhow, bail};
+use dibs_build::stream::{Line, SendError, Sender};
+use dibs_nostd::wire::Mac;
+use std::time::{Duration, Instant};
+
+/// A receiver that reports at all reports this often.
+const SILENT: Duration = Duration::from_secs(2);
+
+/// Between two attempts to connect.
+const ATTEMPT: Duration = Duration::from_millis(200);
+
+/// Between two looks at what came back.
+const GLANCE: Duration = Duration::from_millis(2);
+
+pub struct Player<'a, const MTU: usize, M> {
+    args: &'a Args,
+    recording: &'a Recording,
+    sender: Sender<Line, MTU, M>,
+    interrupt: Interrupt,
+    display: Display,
+    outcome: Outcome,
+}
+
+impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
+    pub fn new(
+        args: &'a Args,
+        recording: &'a Recording,
+        sender: Sender<Line, MTU, M>,
+        interrupt: Interrupt,
+    ) -> Self {
+        let (display, outcome) = (Display::new(), Outcome::default());
+        Self { args, recording, sender, interrupt, display, outcome }
+    }
+
+    /// Sends the frames, and prints the totals: of all of them, or of those before an interrupt.
+    pub fn run(mut self) -> Result<()> {
+        self.await_challenge()?;
+        let played = self.play();
+        self.display.finish();
+        report::print(&self.sender, &self.outcome, self.args.json);
+        played
+    }
+
+    /// Until the receiver has reported its challenge, where tags need one.
+    fn await_challenge(&mut self) -> Result<()> {
+        let (start, to) = (Instant::now(), &self.args.to);
+        while !self.sender.is_ready() {
+            if start.elapsed() > SILENT {
+                bail!(
+                    "{to}: no genuine status came within {} s: is the receiver on, and has it the same \
+                     key? One that cannot report needs --challenge",
+                    SILENT.as_secs()
+                );
+            }
+            self.sender.poll()?;
+            std::thread::sleep(GLANCE);
+        }
+        Ok(())
+    }
+
+    /// Sends each frame when it is due.
+    fn play(&mut self) -> Result<()> {
+        let interval = Duration::from_secs_f64(1.0 / self.recording.rate);
+        let mut due = Instant::now();
+        let recorded = self.recording.frames.len() as u64;
+        let end = if self.args.repeat { u64::MAX } else { recorded };
+        for number in 0..self.args.frames.unwrap_or(end) {
+            self.wait(due)?;
+            if self.interrupt.is_raised() {
+                self.outcome.is_interrupted = true;
+                break;
+            }
+            let now = Instant::now();
+            if now > due + interval {
+                // The line is slower than the motion: go on from here, do not pile up.
+                self.outcome.late += 1;
+                due = now;
+            }
+            due += interval;
+            self.send((number % recorded) as usize)?;
+        }
+        // What is on its way is to be acknowledged, where anybody does.
+        let end = Instant::now();
+        while self.sender.in_flight() > 0
+            && self.sender.status().is_some()
+            && end.elapsed() < SILENT
+        {
+            self.poll()?;
+            std::thread::sleep(GLANCE);
+        }
+        Ok(())
+    }
+
+    fn send(&mut self, frame: usize) -> Result<()> {
+        let (sender, recording) = (&mut self.sender, self.recording);
+        // A recording is as fresh as the moment at which its frame is due, whether anything moves or not.
+        let sent = match &recording.weights {
+            Some(weights) => sender
+                .prepare_weights_captured(&weights[frame], Duration::ZERO)
+                .and_then(|frame| sender.transmit(frame)),
+            None => sender.send_captured(&recording.frames[frame], Duration::ZERO),
+        };
+        match sent {
+            Ok(sent) => self.display.show(&self.sender, &sent),
+            Err(SendError::Line(error)) => self.reconnect(&error)?,
+            Err(error) => return Err(anyhow!("{}: {error}", self.args.motion.display())),
+        }
+        Ok(())
+    }
+
+    fn poll(&mut self) -> Result<()> {
+        match self.sender.poll() {
+            Err(SendError::Line(error)) => self.reconnect(&error),
+            polled => Ok(polled?),
+        }
+    }
+
+    /// Connects again, for as long as the user is ready to wait.
+    fn reconnect(&mut self, error: &std::io::Error) -> Result<()> {
+        let (start, to) = (Instant::now(), &self.args.to);
+        let patience = Duration::from_secs(self.args.retry);
+        eprintln!("{to}: the connection broke ({error})");
+        while start.elapsed() < patience && !self.interrupt.is_raised() {
+            if let Ok(line) = to.open() {
+                drop(self.sender.reconnect(line));
+                self.outcome.reconnections += 1;
+                eprintln!("{to}: connected again");
+                return Ok(());
+            }
+            std::thread::sleep(ATTEMPT);
+        }
+        bail!(
+            "{to}: the connection broke ({error}), and did not come back within {} s",
+            self.args.retry
+        )
+    }
+
+    /// Heartbeats and statuses until the next frame is due, and has room.
+    fn wait(&mut self, due: Instant) -> Result<()> {
+        let mut heard = (self.sender.totals().statuses, Instant::now());
+        loop {
+            self.poll()?;
+            let statuses = self.sender.totals().statuses;
+            if statuses != heard.0 {
+                heard = (statuses, Instant::now());
+            }
+            let now = Instant::now();
+            let reports = statuses > 0 && now < heard.1 + SILENT;
+            let is_full = reports && self.sender.in_flight() >= self.args.window;
+            if self.interrupt.is_raised() || now >= due && !is_full {
+                return Ok(());
+            }
+            if now >= due + SILENT {
+                // The receiver reports, and acknowledges nothing: say so, and try another frame.
+                self.display.warn(&self.sender);
+                return Ok(());
+            }
+            std::thread::sleep(
+                Duration::from_millis(1)
+                    .min(due.saturating_duration_since(now))
+                    .max(Duration::from_micros(100)),
+            );
+        }
+    }
+}

@@ -1,0 +1,22 @@
+//! The sender's clock.
+
+use std::time::{Duration, Instant};
+
+/// Where a sender takes the time from: the system's clock, or in tests another.
+pub(super) struct Clock(Box<dyn Fn() -> Duration + Send>);
+
+impl Clock {
+    /// Time since now.
+    pub fn system() -> Self {
+        let start = Instant::now();
+        Self(Box::new(move || start.elapsed()))
+    }
+
+    pub fn of(now: impl Fn() -> Duration + Send + 'static) -> Self {
+        Self(Box::new(now))
+    }
+
+    pub fn now(&self) -> Duration {
+        (self.0)()
+    }
+}

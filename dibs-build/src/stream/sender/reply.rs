@@ -1,0 +1,91 @@
+//! What the sender makes of the receiver's statuses.
+
+use dibs_nostd::wire::{Body, Mac, Packet, StatusReport, encode_hello, is_newer};
+
+use super::greeting::Greeting;
+use super::{SendError, Sender};
+use crate::stream::Transport;
+
+impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
+    /// Says hello until the receiver answers, where its challenge is not known, or it is not sure that it
+    /// is still the same receiver.
+    pub(super) fn greet(&mut self) -> Result<(), SendError> {
+        if !self.is_ready() {
+            self.greeting.get_or_insert_with(Greeting::new);
+        }
+        let now = self.clock.now();
+        let Some(nonce) = self.greeting.as_mut().and_then(|greeting| greeting.due(now)) else {
+            return Ok(());
+        };
+        let mut buffer = [0; 64];
+        let hello = encode_hello(&self.id(), nonce, &mut buffer).to_vec();
+        self.put(&hello)
+    }
+
+    /// Takes in a packet that came back. What is no status of this mesh is not for this sender.
+    pub(super) fn take(&mut self, packet: &[u8]) {
+        let Ok(packet) = Packet::decode(packet) else { return };
+        let Body::Status(report) = packet.body else { return };
+        let mac = (self.keyed_mac)(report.status.challenge);
+        let session = report.status.published.map_or(0, |published| published.session);
+        if packet.mesh_id == self.surface.mesh_id && packet.is_genuine(&mac, session) {
+            self.take_status(&report, mac);
+        }
+    }
+
+    /// Takes in a genuine status, if it is new: the next one of the receiver's run, or the answer to a
+    /// hello. Anything else is a recording, was overtaken, or comes from a receiver that has started
+    /// anew: a hello will tell.
+    fn take_status(&mut self, report: &StatusReport<'_>, mac: M) {
+        let status = report.status;
+        let is_answer =
+            self.greeting.is_some_and(|greeting| greeting.is_answered_by(status.answer));
+        let is_same = self.mac.as_ref().is_some_and(|known| known.challenge() == mac.challenge());
+        let is_later = self.status.is_none_or(|last| is_newer(status.number, last.number));
+        let is_next = is_same && is_later;
+        if !(is_answer || is_next) {
+            self.greeting.get_or_insert_with(Greeting::new);
+            return;
+        }
+        if is_answer {
+            self.greeting = None;
+        }
+        if !is_next {
+            // A receiver that has started anew: it has nothing.
+            self.mac = Some(mac);
+            self.whole_wanted = true;
+        }
+        self.counters.update(report);
+        self.status = Some(status);
+        self.totals.statuses += 1;
+        self.yield_or_take_over();
+        let now = self.clock.now();
+        let is_answered = self.whole.is_some_and(|(epoch, at)| {
+            let has_come = self.acknowledged().is_some_and(|newest| !is_newer(epoch, newest));
+            has_come || now.saturating_sub(at) >= self.settings.patience
+        });
+        if is_answered && (status.wants_whole || self.acknowledged().is_none()) {
+            self.whole_wanted = true;
+        }
+    }
+
+    /// What to do where the receiver has published a frame that this sender has not sent. Its own would be
+    /// refused for ever.
+    fn yield_or_take_over(&mut self) {
+        let Some(published) = self.status.and_then(|status| status.published) else { return };
+        let own = self.settings.session;
+        if self.acknowledged().is_some() {
+            self.is_established = true;
+        } else if self.is_established && is_newer(published.session, own) {
+            self.superseded = Some(published.session);
+        } else if !is_newer(own, published.session) {
+            // From before this sender's start, or under its own number by mistake.
+            self.settings.session = published.session.wrapping_add(1);
+            self.before = self.epoch;
+            self.is_established = false;
+            self.held = None;
+            self.whole = None;
+            self.whole_wanted = true;
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! What is wrong with the bus, in numbers that a fail-safe machine watches.
+
+use super::Rejection;
+use crate::bus::wire::{FrameId, Packet, is_newer};
+
+/// The health of the bus, as the receiver sees it: what
+/// [`LinkStatus::set`](crate::failsafe::LinkStatus::set) takes. Times are on the receiver's clock, in ms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub struct BusHealth {
+    /// When the last packet was taken: a repeated packet or a hello is none.
+    pub packet: Option<u32>,
+    /// When the last heartbeat was taken.
+    pub heartbeat: Option<u32>,
+    /// Frames that were refused or damaged since the last one was published, each counted once, however
+    /// many of its packets were rejected. Packets of other meshes, forged ones, and those of frames that
+    /// are over do not count.
+    pub rejections: u32,
+    /// Packets without a genuine tag since the last frame was published.
+    pub forgeries: u32,
+    /// Of the published frame: from the status that it echoes to its begin packet's arrival. Neither the
+    /// frame nor that status was longer on its way. `u32::MAX` where it echoes none.
+    pub transit: u32,
+    /// Of the published frame: its age when it was sent, as the sender stated it.
+    pub source_age: u32,
+}
+
+/// As much of a frame's name as each of its packets has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct FrameName {
+    session_low: u16,
+    epoch: u32,
+}
+
+impl FrameName {
+    pub const fn of(id: &FrameId) -> Self {
+        Self { session_low: id.session as u16, epoch: id.epoch }
+    }
+
+    pub const fn of_packet(packet: &Packet<'_>) -> Self {
+        Self { session_low: packet.session_low, epoch: packet.epoch }
+    }
+
+    const fn is_after(self, other: Self) -> bool {
+        if self.session_low == other.session_low {
+            is_newer(self.epoch, other.epoch)
+        } else {
+            self.session_low.wrapping_sub(other.session_low) as i16 > 0
+        }
+    }
+}
+
+/// The frames that went wrong since the last publication.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Trouble {
+    rejections: u32,
+    forgeries: u32,
+    last: Last,
+}
+
+/// The frame that was counted last.
+#[derive(Clone, Copy, Debug)]
+enum Last {
+    /// None since the last begin.
+    None,
+    /// One of which only damage is known.
+    Unnamed,
+    Named(FrameName),
+}
+
+impl Trouble {
+    pub const fn new() -> Self {
+        Self { rejections: 0, forgeries: 0, last: Last::None }
+    }
+
+    /// Rejections and forgeries.
+    pub const fn counts(&self) -> (u32, u32) {
+        (self.rejections, self.forgeries)
+    }
+
+    /// A frame began.
+    pub const fn note_begin(&mut self) {
+        self.last = Last::None;
+    }
+
+    /// Bytes or a packet without a name were rejected.
+    pub const fn note_damage(&mut self) {
+        if let Last::None = self.last {
+            self.rejections = self.rejections.saturating_add(1);
+            self.last = Last::Unnamed;
+        }
+    }
+
+    /// A packet or frame was rejected while another was in work.
+    pub fn note(
+        &mut self,
+        name: Option<FrameName>,
+        in_work: Option<FrameName>,
+        rejection: &Rejection,
+    ) {
+        let name = match (rejection, name) {
+            (Rejection::Forged { .. }, _) => {
+                self.forgeries = self.forgeries.saturating_add(1);
+                return;
+            }
+            (Rejection::WrongMesh { .. } | Rejection::Stale { .. }, _) => return,
+            (_, None) => return self.note_damage(),
+            (_, Some(name)) => name,
+        };
+        // Packets of a frame that was given up.
+        if in_work.is_some_and(|in_work| in_work.is_after(name)) {
+            return;
+        }
+        match self.last {
+            Last::Named(last) if !name.is_after(last) => return,
+            // The damage is likely to have been this frame's.
+            Last::Unnamed => (),
+            _ => self.rejections = self.rejections.saturating_add(1),
+        }
+        self.last = Last::Named(name);
+    }
+}

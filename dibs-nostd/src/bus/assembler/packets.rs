@@ -1,0 +1,200 @@
+//! What each packet does to the frame in work.
+
+use core::ops::Range;
+
+use glam::Vec3;
+
+use super::{Assembler, Progress, Rejection, runs};
+use crate::bus::wire::{
+    Begin, Body, Content, Encoding, Mac, Packet, Rows, Vertices, Weights, float_position,
+    quantised_row,
+};
+use crate::stretch::{Changed, Gate};
+
+impl<G: Gate, M: Mac, const N: usize> Assembler<'_, G, N, M> {
+    #[inline]
+    pub(super) fn take(&mut self, packet: &Packet<'_>) -> Result<Progress, Rejection> {
+        self.collector.check_mesh(packet)?;
+        let epoch = packet.epoch;
+        match packet.body {
+            Body::Vertices(vertices) => self.vertices(packet, vertices),
+            Body::Weights(weights) => self.weights(packet, weights),
+            Body::Begin(begin) => self.begin(packet, begin),
+            Body::Commit(commit) => Ok(match self.collector.commit(packet, commit, &self.mac)? {
+                None => Progress::Duplicate,
+                Some(is_complete) => stored(is_complete, epoch),
+            }),
+            Body::Heartbeat(heartbeat) => {
+                self.collector.heartbeat(packet, heartbeat, &self.mac)?;
+                Ok(Progress::Heartbeat)
+            }
+            Body::Hello(hello) => {
+                self.collector.hello(hello.nonce);
+                Ok(Progress::Hello)
+            }
+            Body::Status(_) => Err(Rejection::Unexpected { epoch }),
+        }
+    }
+
+    fn begin(&mut self, packet: &Packet<'_>, begin: Begin) -> Result<Progress, Rejection> {
+        // A frame that only waits for a reader is better published than in the way.
+        if let Some(label) = self.admitted {
+            self.publish(label);
+        }
+        let takes_weights = self.gate.weight_range(0).is_some();
+        let is_acceptable = |begin: &Begin| {
+            if begin.rows as usize != N {
+                Err(Rejection::RowCount { rows: begin.rows })
+            } else if (begin.content == Content::Modal) != takes_weights {
+                Err(Rejection::Encoding)
+            } else {
+                Ok(())
+            }
+        };
+        let is_partial = matches!(begin.content, Content::Partial { .. });
+        let share = packet.verify(&self.mac, begin.session);
+        let share = share.ok_or(Rejection::Forged { epoch: packet.epoch })?;
+        // Whatever comes of this one: the next is to find the published rows copied.
+        self.takes_partial |= is_partial;
+        let begun = self.collector.begin(packet, begin, share, is_acceptable)?;
+        let Some(frame) = begun else { return Ok(Progress::Duplicate) };
+        self.admitted = None;
+        self.clean();
+        self.is_box_inside = match begin.encoding {
+            Encoding::Float => false,
+            Encoding::Quantised(grid) => {
+                let corners = [grid.origin(), grid.upper_corner()];
+                corners.into_iter().all(|corner| is_within(corner, self.max_coordinate))
+            }
+        };
+        self.gate.begin(if is_partial { Changed::Partial } else { Changed::Whole });
+        Ok(Progress::Begun { epoch: frame.id.epoch })
+    }
+
+    #[inline]
+    fn vertices(
+        &mut self,
+        packet: &Packet<'_>,
+        Vertices { first, rows }: Vertices<'_>,
+    ) -> Result<Progress, Rejection> {
+        let (frame, share) = self.collector.frame_of(packet, &self.mac)?;
+        let count = rows.len() as u32;
+        let out_of_range = Rejection::OutOfRange { first, count };
+        let range = first..first.checked_add(count).ok_or(out_of_range)?;
+        let limit = self.max_coordinate;
+        let grid = match (&rows, frame.begin.encoding, frame.begin.content) {
+            (_, _, Content::Modal) => return Err(Rejection::Encoding),
+            (Rows::Float(_), Encoding::Float, _) => None,
+            (Rows::Quantised(_), Encoding::Quantised(grid), _) => Some(grid),
+            _ => return Err(Rejection::Encoding),
+        };
+        let places = self.writer.rows(range.clone()).ok_or(out_of_range)?;
+        let Some(place) = frame.locate(packet.sequence, range.clone())? else {
+            return Ok(Progress::Duplicate);
+        };
+        let is_partial = matches!(frame.begin.content, Content::Partial { .. });
+        if is_partial && range.end > self.copied {
+            self.collector.want_whole();
+            return Err(Rejection::NotReady { first });
+        }
+        match (rows, grid) {
+            (Rows::Quantised(rows), Some(grid)) => {
+                let decode = |row| grid.position(quantised_row(row));
+                if !self.is_box_inside {
+                    check(rows.iter().map(decode), first, limit)?;
+                }
+                for (place, row) in places.iter().zip(rows) {
+                    place.set(decode(row));
+                }
+            }
+            (Rows::Float(rows), _) => {
+                check(rows.iter().map(float_position), first, limit)?;
+                for (place, row) in places.iter().zip(rows) {
+                    place.set(float_position(row));
+                }
+            }
+            _ => return Err(Rejection::Encoding),
+        }
+        self.stored(packet.epoch, share, place, range)
+    }
+
+    fn weights(
+        &mut self,
+        packet: &Packet<'_>,
+        Weights { first, values }: Weights<'_>,
+    ) -> Result<Progress, Rejection> {
+        let (frame, share) = self.collector.frame_of(packet, &self.mac)?;
+        let count = values.len() as u32;
+        let out_of_range = Rejection::OutOfRange { first, count };
+        let range = first..first.checked_add(count).ok_or(out_of_range)?;
+        if frame.begin.content != Content::Modal {
+            return Err(Rejection::Encoding);
+        }
+        let places = self.writer.rows(range.clone()).ok_or(out_of_range)?;
+        let Some(place) = frame.locate(packet.sequence, range.clone())? else {
+            return Ok(Progress::Duplicate);
+        };
+        for (row, value) in range.clone().zip(values) {
+            let value = f32::from_le_bytes(*value);
+            let [low, high] = self.gate.weight_range(row).ok_or(out_of_range)?;
+            if !value.is_finite() {
+                return Err(Rejection::NotFinite { row });
+            }
+            if !(low <= value && value <= high) {
+                return Err(Rejection::TooFar { row });
+            }
+        }
+        for (place, value) in places.iter().zip(values) {
+            place.set(Vec3::new(f32::from_le_bytes(*value), 0.0, 0.0));
+        }
+        self.stored(packet.epoch, share, place, range)
+    }
+
+    /// Notes rows that have been stored.
+    #[inline]
+    fn stored(
+        &mut self,
+        epoch: u32,
+        share: u32,
+        place: runs::Place,
+        rows: Range<u32>,
+    ) -> Result<Progress, Rejection> {
+        self.is_dirty = true;
+        self.gate.moved(rows);
+        Ok(stored(self.collector.take_rows(share, place)?, epoch))
+    }
+}
+
+const fn stored(is_complete: bool, epoch: u32) -> Progress {
+    if is_complete { Progress::Complete { epoch } } else { Progress::Stored }
+}
+
+/// Whether every coordinate is within the limit; false for one that is not a number.
+#[inline(always)]
+fn is_within(position: Vec3, limit: f32) -> bool {
+    let Vec3 { x, y, z } = position.abs();
+    // No short cut: three comparisons cost less than branches.
+    (x <= limit) & (y <= limit) & (z <= limit)
+}
+
+/// An error unless every position is finite and within the limit. It names the first that is not.
+#[inline]
+fn check(
+    positions: impl Iterator<Item = Vec3> + Clone,
+    first: u32,
+    limit: f32,
+) -> Result<(), Rejection> {
+    let all = positions.clone().fold(true, |all, position| all & is_within(position, limit));
+    if all {
+        return Ok(());
+    }
+    for (row, position) in (first..).zip(positions) {
+        if !position.is_finite() {
+            return Err(Rejection::NotFinite { row });
+        }
+        if !is_within(position, limit) {
+            return Err(Rejection::TooFar { row });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,462 @@
+//! What an attacker without the key, or an accident without malice, tries on bus and sender: each of these
+//! once worked.
+
+use std::cell::Cell;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use dibs_build::stream::{SendError, Sender, Settings, SurfaceOrder, Transport};
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::wire::{
+    AesCmac, Code, Content, Direction, Encoding, FrameEncoder, FrameId, Freshness, Mac, NoMac,
+    encode_heartbeat, encode_status,
+};
+use dibs_nostd::{Advance, Assembler, FrameReader, Frames, Rejection, Unchecked};
+use dibs_tests::bus::*;
+
+const KEY: [u8; 16] = *b"a secret of ours";
+const RECEIVER: u32 = 7;
+
+fn mac() -> AesCmac {
+    AesCmac::new(&KEY, RECEIVER, 77)
+}
+
+type Guarded<M = AesCmac> = Assembler<'static, Unchecked, N, M>;
+
+fn guarded<M: Mac>(mac: M) -> (Guarded<M>, FrameReader<'static, N>) {
+    let frames: &'static Frames<N> = Box::leak(Box::new(Frames::new()));
+    let (writer, reader) = frames.split().unwrap();
+    (Assembler::with_mac(writer, Unchecked, MESH, 100.0, mac), reader)
+}
+
+fn tagged(id: FrameId, positions: &[Vec3], freshness: Freshness) -> Vec<Vec<u8>> {
+    let encoder = FrameEncoder::<_, 64>::new(id, Encoding::Float, positions).unwrap();
+    collect(encoder.with_freshness(freshness).with_mac(mac()).unwrap())
+}
+
+fn work<M: Mac>(assembler: &mut Guarded<M>) -> Option<u32> {
+    (0..10).find_map(|_| match assembler.advance(1000) {
+        Ok(Advance::Published { epoch }) => Some(epoch),
+        _ => None,
+    })
+}
+
+fn status<M: Mac>(assembler: &mut Guarded<M>, now: u32, safety: u8) -> Vec<u8> {
+    let status = assembler.status(now, safety);
+    encode_status(MESH, &status, assembler.counters(), assembler.mac(), &mut [0; 256]).to_vec()
+}
+
+/// Packets there, packets back.
+#[derive(Clone, Default)]
+struct Pipe(Arc<Mutex<[Vec<Vec<u8>>; 2]>>);
+
+impl Pipe {
+    fn sent(&self) -> Vec<Vec<u8>> {
+        std::mem::take(&mut self.0.lock().unwrap()[0])
+    }
+
+    fn answer(&self, packet: &[u8]) {
+        self.0.lock().unwrap()[1].push(packet.to_vec());
+    }
+}
+
+impl Transport for Pipe {
+    fn send(&mut self, packet: &[u8]) -> std::io::Result<()> {
+        self.0.lock().unwrap()[0].push(packet.to_vec());
+        Ok(())
+    }
+
+    fn receive(&mut self) -> std::io::Result<Option<Vec<u8>>> {
+        let back = &mut self.0.lock().unwrap()[1];
+        Ok((!back.is_empty()).then(|| back.remove(0)))
+    }
+}
+
+/// A sender with a clock of its own.
+struct Source<M> {
+    sender: Sender<Pipe, 256, M>,
+    pipe: Pipe,
+    clock: Arc<AtomicU64>,
+}
+
+impl<M: Mac + 'static> Source<M> {
+    fn new(session: u32, keyed_mac: fn(u32) -> M) -> Self {
+        let (pipe, clock) = (Pipe::default(), Arc::new(AtomicU64::new(0)));
+        let order = SurfaceOrder::new(MESH, (0..N as u32).collect());
+        let settings =
+            Settings { session, partial: Some(0.01), heartbeat: None, ..Settings::default() };
+        let time = Arc::clone(&clock);
+        let sender = Sender::with_mac(pipe.clone(), order, settings, keyed_mac)
+            .with_clock(move || Duration::from_millis(time.load(Ordering::Relaxed)));
+        Self { sender, pipe, clock }
+    }
+
+    fn set_clock(&self, now: u32) {
+        self.clock.store(u64::from(now), Ordering::Relaxed);
+    }
+
+    /// A status, and what the sender says to it.
+    fn hear(&mut self, assembler: &mut Guarded<M>, now: u32, safety: u8) -> Result<(), SendError> {
+        self.set_clock(now);
+        self.pipe.answer(&status(assembler, now, safety));
+        let heard = self.sender.poll();
+        for packet in self.pipe.sent() {
+            let _ = assembler.accept(&packet, now);
+        }
+        heard
+    }
+
+    /// Until the sender knows the receiver.
+    fn meet(&mut self, assembler: &mut Guarded<M>, now: u32) {
+        for _ in 0..4 {
+            self.hear(assembler, now, 1).unwrap();
+        }
+        assert!(self.sender.is_ready());
+    }
+
+    /// A frame and all that comes of it: the epoch that was published.
+    fn frame(&mut self, assembler: &mut Guarded<M>, moment: u32, now: u32) -> Option<u32> {
+        self.set_clock(now);
+        self.sender.send(&surface(moment)).unwrap();
+        deliver(assembler, &self.pipe.sent(), now)
+    }
+}
+
+/// Packets, and the checking in between: the epoch that was published.
+fn deliver<M: Mac>(assembler: &mut Guarded<M>, packets: &[Vec<u8>], now: u32) -> Option<u32> {
+    let mut published = None;
+    for packet in packets {
+        let _ = assembler.accept(packet, now);
+        published = published.or(work(assembler));
+    }
+    published
+}
+
+fn keyed(challenge: u32) -> AesCmac {
+    AesCmac::new(&KEY, RECEIVER, challenge)
+}
+
+/// Whoever has recorded the begin of one unfinished frame replays it behind every later begin.
+#[test]
+fn a_replayed_begin_displaces_nothing() {
+    let (mut assembler, _reader) = guarded(mac());
+    let (mut recorded, mut published) = (Vec::new(), 0);
+    for epoch in 1..=1000 {
+        let now = 20 * epoch;
+        let packets = tagged(id(epoch), &surface(epoch), Freshness::default());
+        if epoch == 20 {
+            recorded.clone_from(&packets[0]);
+        }
+        for (place, packet) in packets.iter().enumerate() {
+            if epoch == 20 && place == 5 {
+                continue; // lost by itself
+            }
+            let _ = assembler.accept(packet, now);
+            if epoch > 20 && place == 0 {
+                for _ in 0..2 {
+                    let replayed = assembler.accept(&recorded, now);
+                    assert_eq!(replayed, Err(Rejection::Stale { epoch: 20 }));
+                }
+            }
+        }
+        published += u32::from(work(&mut assembler).is_some());
+    }
+    assert_eq!(published, 999);
+    assert_eq!(assembler.health().rejections, 0, "replays are no trouble of the line");
+}
+
+/// The receiver has frames of the sender's own session that the sender has not sent: of an earlier run of
+/// it, or one that somebody made up, 2^31 - 1 ahead.
+#[test]
+fn a_sender_is_not_locked_out_of_its_session() {
+    for ahead in [5000, i32::MAX as u32] {
+        let (mut assembler, _reader) = guarded(mac());
+        for packet in tagged(FrameId { session: 9, ..id(ahead) }, &surface(1), Freshness::default())
+        {
+            assembler.accept(&packet, 0).unwrap();
+        }
+        assert_eq!(work(&mut assembler), Some(ahead));
+        let mut source = Source::new(9, keyed);
+        source.meet(&mut assembler, 1);
+        assert_eq!((source.sender.acknowledged(), source.sender.in_flight()), (None, 0));
+        for n in 0..100 {
+            let published = source.frame(&mut assembler, n, 20 * n + 20);
+            source.hear(&mut assembler, 20 * n + 25, 1).unwrap();
+            assert_eq!(published, Some(n + 1));
+            assert_eq!(source.sender.acknowledged(), published);
+        }
+        assert_eq!(source.sender.session(), 10);
+    }
+}
+
+/// The later sender wins, and the other one is told: they never alternate.
+#[test]
+fn of_two_senders_one_is_told_to_stop() {
+    let (mut assembler, _reader) = guarded(mac());
+    let (mut first, mut second) = (Source::new(100, keyed), Source::new(50, keyed));
+    first.meet(&mut assembler, 0);
+    for n in 1..5 {
+        assert!(first.frame(&mut assembler, n, 40 * n).is_some());
+        first.hear(&mut assembler, 40 * n + 1, 1).unwrap();
+    }
+    second.meet(&mut assembler, 200);
+    assert!(second.frame(&mut assembler, 3, 201).is_some());
+    let told = first.hear(&mut assembler, 202, 1);
+    assert!(matches!(told, Err(SendError::Superseded { session: 101 })), "{told:?}");
+    let refused = first.sender.send(&surface(9));
+    assert!(matches!(refused, Err(SendError::Superseded { .. })), "{refused:?}");
+    for n in 6..50 {
+        second.hear(&mut assembler, 40 * n, 1).unwrap();
+        assert!(second.frame(&mut assembler, n, 40 * n).is_some());
+        assert!(first.sender.poll().is_err());
+    }
+    assert_eq!(assembler.published().map(|id| id.session), Some(101));
+}
+
+/// Recorded statuses of this run and of an earlier one show the sender nothing.
+#[test]
+fn recorded_statuses_are_not_believed() {
+    let (mut assembler, _reader) = guarded(mac());
+    let mut source = Source::new(9, keyed);
+    source.meet(&mut assembler, 0);
+    let mut recorded = Vec::new();
+    for n in 1..60 {
+        recorded.push(status(&mut assembler, 20 * n, 1));
+        source.pipe.answer(recorded.last().unwrap());
+        source.sender.poll().unwrap();
+        assert!(source.frame(&mut assembler, n, 20 * n).is_some());
+    }
+    source.hear(&mut assembler, 1200, 3).unwrap(); // the controller is safe now
+    let (acknowledged, in_flight) = (source.sender.acknowledged(), source.sender.in_flight());
+    let earlier = status(&mut guarded(keyed(5)).0, 0, 1);
+    for (n, replayed) in (60..).zip(recorded.iter().chain([&earlier])) {
+        source.pipe.answer(replayed);
+        source.sender.poll().unwrap();
+        assert_eq!(source.sender.status().unwrap().safety, 3);
+        assert_eq!(source.sender.acknowledged(), acknowledged);
+        assert_eq!(source.sender.in_flight(), in_flight + n - 60);
+        source.set_clock(20 * n);
+        let sent = source.sender.send(&surface(n)).unwrap();
+        assert!(matches!(sent.content, Content::Partial { .. }), "no whole frame is asked for");
+        let published = deliver(&mut assembler, &source.pipe.sent(), 20 * n);
+        assert!(published.is_some(), "the challenge is still the receiver's");
+    }
+    // A receiver that has really started anew is believed, once it answers.
+    let (mut anew, _reader) = guarded(keyed(78));
+    source.set_clock(9999);
+    source.meet(&mut anew, 9999);
+    assert!(source.frame(&mut anew, 3, 10_000).is_some());
+}
+
+/// Somebody holds every packet back for ten minutes, or only the statuses.
+#[test]
+fn delay_shows_whoever_is_delayed() {
+    for (frames_late, statuses_late) in [(0, 0), (600_000, 0), (0, 600_000)] {
+        let (mut assembler, _reader) = guarded(mac());
+        let mut source = Source::new(9, keyed);
+        source.meet(&mut assembler, 0);
+        let start = 1_000_000;
+        // The sender has heard the status of `heard`, and sends at `start`.
+        let heard = start - 30 - statuses_late;
+        source.hear(&mut assembler, heard, 1).unwrap();
+        source.set_clock(start);
+        source.sender.send_captured(&surface(1), Duration::from_millis(12)).unwrap();
+        for packet in source.pipe.sent() {
+            assembler.accept(&packet, start + 2 + frames_late).unwrap();
+        }
+        assert!(work(&mut assembler).is_some());
+        let health = assembler.health();
+        assert_eq!(health.transit, 32 + frames_late + statuses_late);
+        assert_eq!(health.source_age, 12);
+        let age = assembler.status(start + 2 + frames_late + 5, 1).published.unwrap().age_ms;
+        assert_eq!(age, 12 + 5, "the age counts from the capture");
+    }
+    // A sender that heard nothing, and one that echoes what this receiver has not said yet.
+    for echo in [None, Some(1001), Some(1 << 31)] {
+        let (mut assembler, _reader) = guarded(mac());
+        for packet in tagged(id(1), &surface(1), Freshness { age_ms: 3, echo }) {
+            assembler.accept(&packet, 1000).unwrap();
+        }
+        assert!(work(&mut assembler).is_some());
+        assert_eq!(assembler.health().transit, u32::MAX);
+    }
+}
+
+/// The source stands still while its sender lives.
+#[test]
+fn a_frozen_source_grows_old() {
+    let (mut assembler, mut reader) = guarded(NoMac);
+    let mut source = Source::new(9, |_| NoMac);
+    source.meet(&mut assembler, 0);
+    for n in 0..10 {
+        let moment = if n < 5 { n } else { 5 };
+        assert!(source.frame(&mut assembler, moment, 1000 * n).is_some());
+        let age = 1000 * n.saturating_sub(5);
+        assert_eq!(assembler.health().source_age, age);
+        assert_eq!(reader.read().unwrap().age(1000 * n + 7), age + 7);
+    }
+    assert!(source.frame(&mut assembler, 5, 200_000).is_some());
+    assert_eq!(assembler.health().source_age, 65_535, "or more");
+    assert!(source.frame(&mut assembler, 6, 200_001).is_some());
+    assert_eq!(assembler.health().source_age, 0);
+}
+
+/// Two frames of one name, both with genuine tags, mixed so that their public digests agree: the sums
+/// that the receiver compares are not those.
+#[test]
+fn two_frames_of_one_name_are_not_spliced() {
+    let rows: [Vec<Vec3>; 2] = [surface(1), surface(500)];
+    let [a, b] = rows.map(|rows| tagged(id(1), &rows, Freshness::default()));
+    assert_eq!(a[0], b[0], "the begins are the same");
+    let last = a.len() - 1;
+    // Checksums, and their scrambled form: what anybody can compute. Every mixture of twelve packets.
+    for public in [checksum, share] {
+        let mixtures = 1_u32..1 << 12;
+        let closest = mixtures.min_by_key(|mixture| {
+            let picked = (1..=12).filter(|i| mixture >> (i - 1) & 1 == 1);
+            let change = |i: usize| public(&b[i]).wrapping_sub(public(&a[i]));
+            picked.fold(0_u32, |sum, i| sum.wrapping_add(change(i))) as i32
+        });
+        let closest = closest.unwrap();
+        let (mut assembler, mut reader) = guarded(mac());
+        let mut outcome = Ok(None);
+        for i in 0..=last {
+            let is_other = (1..=12).contains(&i) && closest >> (i - 1) & 1 == 1;
+            outcome = give(&mut assembler, if is_other { &b[i] } else { &a[i] });
+        }
+        assert!(matches!(outcome, Err(Rejection::Digest { .. })), "{outcome:?}");
+        assert!(published(&mut reader).is_none());
+    }
+    // The share that travels nowhere is what the digest sums.
+    let code = |i: usize| mac().code(Direction::ToReceiver, 1, &a[i][..a[i].len() - 10]);
+    let sum = (0..last).fold(0_u32, |sum, i| sum.wrapping_add(code(i).share));
+    assert_eq!(a[last][18..22], sum.to_le_bytes());
+    for (i, packet) in a.iter().enumerate() {
+        assert_eq!(packet[packet.len() - 10..packet.len() - 4], code(i).tag);
+        assert!(!packet.windows(4).any(|four| four == code(i).share.to_le_bytes()));
+    }
+}
+
+/// A packet for one receiver is a forgery to another, and one direction's to the other.
+#[test]
+fn keys_differ_by_receiver_and_direction() {
+    let packet = [7; 40];
+    let codes: Vec<Code> = [RECEIVER, RECEIVER + 1]
+        .iter()
+        .flat_map(|&receiver| {
+            let mac = AesCmac::new(&KEY, receiver, 77);
+            [Direction::ToReceiver, Direction::ToSender].map(|way| mac.code(way, 1, &packet))
+        })
+        .collect();
+    for (i, one) in codes.iter().enumerate() {
+        assert!(codes[..i].iter().all(|other| other.tag != one.tag && other.share != one.share));
+    }
+}
+
+/// One fault is one rejection to the fail-safe machine, however many packets it takes with it.
+#[test]
+fn a_frame_counts_once() {
+    let (mut assembler, _reader) = bus();
+    let rejections = |assembler: &Assembler<'static, Unchecked, N>| assembler.health().rejections;
+    for packet in frame(1, true) {
+        give(&mut assembler, &packet).unwrap();
+    }
+    // The begin is lost, and everything behind it is unexpected.
+    for packet in &frame(2, true)[1..] {
+        give(&mut assembler, packet).unwrap_err();
+    }
+    assert_eq!(rejections(&assembler), 1);
+    assert!(assembler.counters().rejected() > 5);
+    // So is the next, whose begin is damaged rather than lost, and its packets come twice.
+    let mut third = frame(3, true);
+    third[0][30] ^= 1;
+    for packet in third.iter().chain(&third) {
+        give(&mut assembler, packet).unwrap_err();
+    }
+    assert_eq!(rejections(&assembler), 2);
+    // Other meshes and what is over do not count, nor does one packet that is replayed for ever.
+    let other = FrameId { mesh_id: MESH ^ 1, ..id(9) };
+    let rows = surface(9);
+    let foreign = collect(FrameEncoder::<_, 64>::new(other, Encoding::Float, &rows[..]).unwrap());
+    for packet in foreign.iter().chain(&frame(1, true)).chain(&frame(2, true)[1..]) {
+        for _ in 0..3 {
+            give(&mut assembler, packet).unwrap_err();
+        }
+    }
+    assert_eq!(rejections(&assembler), 2);
+    // A damaged line without a single good packet: once.
+    for _ in 0..9 {
+        give(&mut assembler, &[0; 64]).unwrap_err();
+    }
+    assert_eq!(rejections(&assembler), 2, "the frames counted last may be those");
+    for packet in frame(5, true) {
+        give(&mut assembler, &packet).unwrap();
+    }
+    assert_eq!(rejections(&assembler), 0);
+    for _ in 0..9 {
+        give(&mut assembler, &[0; 64]).unwrap_err();
+    }
+    assert_eq!(rejections(&assembler), 1);
+    assert_eq!(assembler.health().forgeries, 0);
+}
+
+/// A MAC that counts its work.
+struct Counting(AesCmac, Cell<u32>);
+
+impl Mac for &Counting {
+    const TAGGED: bool = true;
+
+    fn code(&self, direction: Direction, session: u32, packet: &[u8]) -> Code {
+        self.1.set(self.1.get() + 1);
+        self.0.code(direction, session, packet)
+    }
+
+    fn challenge(&self) -> u32 {
+        self.0.challenge()
+    }
+}
+
+/// Forgeries have a count of their own, and cost one code each.
+#[test]
+fn a_forgery_is_verified_once_and_counted_apart() {
+    let counting = Box::leak(Box::new(Counting(mac(), Cell::new(0))));
+    let (mut assembler, _reader) = guarded(&*counting);
+    let rows = surface(1);
+    let wrong = AesCmac::new(b"another's guess.", RECEIVER, 77);
+    let encoder =
+        FrameEncoder::<_, 64>::partial(id(2), Encoding::Float, &rows[..], 1, &rows[..]).unwrap();
+    let partial = collect(encoder.with_mac(wrong).unwrap());
+    for n in 1..=10 {
+        assert_eq!(assembler.accept(&partial[0], n), Err(Rejection::Forged { epoch: 2 }));
+        assert_eq!(counting.1.get(), n);
+        let health = assembler.health();
+        assert_eq!((health.forgeries, health.rejections, health.packet), (n, 0, None));
+    }
+    let genuine = tagged(id(1), &rows, Freshness::default());
+    for (n, packet) in (11..).zip(&genuine) {
+        assembler.accept(packet, n).unwrap();
+        assert_eq!(counting.1.get(), n);
+    }
+    assert!(work(&mut assembler).is_some());
+    assert_eq!(assembler.health().forgeries, 0);
+}
+
+/// A sender that died, of which somebody repeats a packet or says hello.
+#[test]
+fn repetitions_are_no_sign_of_life() {
+    let (mut assembler, _reader) = bus();
+    let packets = frame(1, true);
+    assembler.accept(&packets[0], 5).unwrap();
+    let beat = encode_heartbeat(&id(1), 1, &NoMac, &mut [0; 64]).to_vec();
+    assembler.accept(&beat, 6).unwrap();
+    let hello = dibs_nostd::wire::encode_hello(&id(1), 3, &mut [0; 64]).to_vec();
+    for now in 7..100 {
+        for packet in [&packets[0], &beat, &hello] {
+            let _ = assembler.accept(packet, now);
+        }
+    }
+    let health = assembler.health();
+    assert_eq!((health.packet, health.heartbeat), (Some(6), Some(6)));
+    assert_eq!(assembler.status(100, 1).answer, 3);
+}
