@@ -26,3 +26,8 @@ pub mod surfaces;
 #[cfg(doctest)]
 #[doc = include_str!("../../README.md")]
 pub struct Readme;
+
+/// The guide's code for the host: it compiles and runs. `tests/new_user.rs` does the rest.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/guide.md")]
+pub struct Guide;

@@ -36,6 +36,7 @@ pub fn test(options: &Options) -> Result<()> {
         &["doc", "--release", "--workspace", "--no-deps"],
         &[("RUSTDOCFLAGS", "-D warnings")],
     );
+    steps.cargo("packages", &["package", "--workspace", "--no-verify", "--allow-dirty"], &[]);
     steps.run("oldest compiler", oldest_compiler);
 
     match Cross::find() {
@@ -43,6 +44,7 @@ pub fn test(options: &Options) -> Result<()> {
             println!("\nboard: {}", cross.describe());
             steps.run("core crate for the board", || core_crate(&cross));
             steps.run("lints of the firmware", || firmware_lints(&cross));
+            steps.run("a new user", || new_user(&cross));
             steps.run("cycles, as far as an emulator has them", || cycles(&cross));
         }
         Err(error) => steps.run("toolchain for the board", || Err(error)),
@@ -114,6 +116,16 @@ fn firmware_lints(cross: &Cross) -> Result<Outcome> {
         run(&mut command)?;
     }
     Ok(Outcome::Passed)
+}
+
+/// The guide, followed from an empty crate outside the repository to an answer on the board.
+fn new_user(cross: &Cross) -> Result<Outcome> {
+    if !matches!(cross, Cross::Rustup) {
+        return Ok(Outcome::Skipped("the guide takes rustup's target".to_owned()));
+    }
+    let mut command = Command::new("cargo");
+    command.args(["test", "--release", "--package", "dibs-tests", "--test", "new_user"]);
+    run(command.args(["--", "--ignored"])).map(|()| Outcome::Passed)
 }
 
 /// Runs the program that measures cycles on silicon. The emulator's counter stands still, so that it counts

@@ -1,0 +1,159 @@
+//! Dependencies between the folders of a crate point one way.
+//!
+//! `DIBS_CHECKOUT=FOLDER cargo test -p dibs-tests --test layers -- --nocapture` prints those of another checkout.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::{env, fs};
+
+/// Which folder imports from which others.
+type Imports = BTreeMap<String, BTreeSet<String>>;
+
+#[test]
+fn the_core_has_no_mutual_imports() {
+    let imports = imports("dibs-nostd");
+    assert!(imports["query"].contains("tree"), "nothing was read: {imports:?}");
+    assert_eq!(cycle(&imports), None);
+}
+
+/// The builder's mutual imports that are left. One that is gone must go from this list.
+const LEFT: [(&str, &str); 3] =
+    [("array", "construct"), ("builder", "construct"), ("geodesic", "stretch")];
+
+#[test]
+fn the_builder_has_no_new_mutual_imports() {
+    let mut imports = imports("dibs-build");
+    let mutual = |a: &str, b: &str| imports[a].contains(b) && imports[b].contains(a);
+    if env::var_os("DIBS_CHECKOUT").is_none() {
+        for (a, b) in LEFT {
+            assert!(
+                mutual(a, b),
+                "{a} and {b} no longer import each other: take them off the list"
+            );
+        }
+    }
+    for (a, b) in LEFT {
+        imports.get_mut(b).expect("a folder").remove(a);
+    }
+    assert_eq!(cycle(&imports), None);
+}
+
+#[test]
+fn a_cycle_is_found() {
+    let imports = |rows: &[(&str, &[&str])]| -> Imports {
+        let set = |to: &[&str]| to.iter().map(|&to| to.to_owned()).collect();
+        rows.iter().map(|&(from, to)| (from.to_owned(), set(to))).collect()
+    };
+    assert_eq!(cycle(&imports(&[("a", &["b", "c"]), ("b", &["c"]), ("c", &[])])), None);
+    assert!(cycle(&imports(&[("a", &["b"]), ("b", &["c"]), ("c", &["a"])])).is_some());
+}
+
+/// Folders that import each other, directly or not.
+fn cycle(imports: &Imports) -> Option<BTreeSet<&str>> {
+    let mut left: BTreeSet<&str> = imports.keys().map(String::as_str).collect();
+    // Take away what imports from nothing that is left, until nothing is.
+    loop {
+        let is_free = |from: &&str| !imports[*from].iter().any(|to| left.contains(to.as_str()));
+        let free: Vec<&str> = left.iter().copied().filter(is_free).collect();
+        if free.is_empty() {
+            break;
+        }
+        free.iter().for_each(|from| drop(left.remove(from)));
+    }
+    (!left.is_empty()).then_some(left)
+}
+
+/// The imports between the top folders of a crate, and the table of them.
+fn imports(package: &str) -> Imports {
+    let checkout = env::var("DIBS_CHECKOUT").unwrap_or_else(|_| "..".to_owned());
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join(checkout).join(package).join("src");
+    let lib = code(&source.join("lib.rs"));
+    let home = homes(&lib);
+    let mut imports = Imports::new();
+    for file in files(&source) {
+        let inner = file.strip_prefix(&source).expect("inside").with_extension("");
+        let from = inner.iter().next().expect("a name").to_string_lossy().into_owned();
+        if ["bin", "lib"].contains(&from.as_str()) {
+            continue;
+        }
+        let to = imports.entry(from.clone()).or_default();
+        to.extend(names(&code(&file)).filter_map(|name| home.get(&name).cloned()));
+        to.remove(&from);
+    }
+    // A module that is a name for another one, as `wire`, has no row.
+    let rows: BTreeSet<String> = imports.keys().cloned().collect();
+    imports.values_mut().for_each(|to| to.retain(|to| rows.contains(to)));
+    println!("| {package} | imports from |\n|---|---|");
+    for (from, to) in &imports {
+        let mark = |to: &String| {
+            let is_mutual = imports[to].contains(from);
+            if is_mutual { format!("**{to}**") } else { to.clone() }
+        };
+        println!("| {from} | {} |", to.iter().map(mark).collect::<Vec<_>>().join(", "));
+    }
+    println!();
+    imports
+}
+
+/// The folder of each name that `lib.rs` has, modules among them.
+fn homes(lib: &str) -> BTreeMap<String, String> {
+    let mut home = BTreeMap::new();
+    for statement in lib.split(';').map(str::trim) {
+        if let Some((_, name)) = statement.rsplit_once("mod ") {
+            home.insert(name.to_owned(), name.to_owned());
+        } else if let Some((_, path)) = statement.rsplit_once("use ") {
+            let path = path.trim_start_matches("crate::");
+            let folder = words(path).next().unwrap_or_default();
+            words(path).skip(1).for_each(|name| drop(home.insert(name, folder.clone())));
+        }
+    }
+    home
+}
+
+/// The first name of every path that begins at the crate's root.
+fn names(code: &str) -> impl Iterator<Item = String> {
+    code.split("crate::").skip(1).flat_map(|path| {
+        let Some(group) = path.strip_prefix('{') else {
+            return words(path).take(1).collect::<Vec<_>>();
+        };
+        let (mut depth, mut found, mut is_first) = (0, Vec::new(), true);
+        for (at, character) in group.char_indices() {
+            match character {
+                '{' => depth += 1,
+                '}' if depth == 0 => break,
+                '}' => depth -= 1,
+                ',' if depth == 0 => is_first = true,
+                c if is_first && c.is_alphabetic() => {
+                    found.extend(words(&group[at..]).next());
+                    is_first = false;
+                }
+                _ => (),
+            }
+        }
+        found
+    })
+}
+
+fn words(text: &str) -> impl Iterator<Item = String> {
+    let is_other = |c: char| !c.is_alphanumeric() && c != '_';
+    text.split(is_other).filter(|word| !word.is_empty()).map(str::to_owned)
+}
+
+/// A file without its comments and its unit tests.
+fn code(file: &Path) -> String {
+    let text = fs::read_to_string(file).expect("a source file");
+    let code = text.split("#[cfg(test)]\nmod ").next().unwrap_or_default();
+    let lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries =
+        fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
+    let inner = entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] });
+    let is_source = |path: &PathBuf| {
+        path.extension().is_some_and(|e| e == "rs")
+            && path.file_stem().is_some_and(|s| s != "tests")
+    };
+    inner.filter(is_source).collect()
+}

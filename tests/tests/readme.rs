@@ -1,0 +1,110 @@
+//! The README's figures are those of the records. `DIBS_WRITE=1` writes them anew.
+
+use std::{env, fs};
+
+use serde_json::Value;
+
+const README: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../README.md");
+const BEGIN: &str =
+    "<!-- figures: written by `DIBS_WRITE=1 cargo test -p dibs-tests --test readme` -->\n";
+const END: &str = "<!-- end of figures -->\n";
+
+#[test]
+fn the_figures_are_those_of_the_records() {
+    let readme = fs::read_to_string(README).expect("the README");
+    let (before, rest) = readme.split_once(BEGIN).expect("the marker before the figures");
+    let (block, after) = rest.split_once(END).expect("the marker after the figures");
+    let expected = figures();
+    if env::var_os("DIBS_WRITE").is_some() {
+        fs::write(README, format!("{before}{BEGIN}{expected}{END}{after}")).expect("writable");
+    } else {
+        assert_eq!(block, expected, "write the figures anew: DIBS_WRITE=1");
+    }
+}
+
+/// Methods and metrics of the columns.
+const COLUMNS: [(&str, &str); 6] = [
+    ("dibs", "total"),
+    ("dibs-measured", "total_with_measuring"),
+    ("aabb-hybrid", "total"),
+    ("aabb-refit", "total"),
+    ("obvhs", "total"),
+    ("parry-bvh", "total"),
+];
+
+fn figures() -> String {
+    let benchmarks = records("benchmarks.json");
+    let mut block = "
+| mean µs a query, refitting included | dibs | dibs, every triangle's stretch measured before each query | hybrid AABB | refitted AABB | obvhs | parry3d |
+|---|---|---|---|---|---|---|
+"
+    .to_owned();
+    for (experiment, mesh, triangles, tool) in [
+        ("heart", "human heart", 10_272, "capsule"),
+        ("brain", "human brain", 5_000, "sphere"),
+        ("brain", "human brain", 50_000, "sphere"),
+        ("brain", "human brain", 500_000, "sphere"),
+    ] {
+        let cells = COLUMNS.map(|(method, metric)| {
+            let is_row = |row: &&Value| {
+                row["experiment"] == experiment
+                    && row["mesh"] == mesh
+                    && row["triangles"] == triangles
+                    && row["tool"] == tool
+                    && row["method"] == method
+                    && row["metric"] == metric
+            };
+            let row = benchmarks.iter().find(is_row);
+            let row = row.unwrap_or_else(|| panic!("{mesh} {triangles} {method} {metric}"));
+            short(row["mean"].as_f64().expect("a number"))
+        });
+        let triangles = thousands(triangles);
+        block += &format!("| {mesh}, {triangles} triangles, {tool} | {} |\n", cells.join(" | "));
+    }
+    let guarantees = records("guarantees.json");
+    let figure = |id: &str| {
+        let row = guarantees.iter().find(|row| row["id"] == id);
+        let figure = &row.unwrap_or_else(|| panic!("{id}"))["figure"];
+        let figure = figure.as_f64().or_else(|| figure.as_str()?.parse().ok());
+        thousands(figure.expect("a number").round() as u32)
+    };
+    block += &format!(
+        "
+One measurement of the stretch serves every query until the next frame.
+On an emulated Cortex-M7, generated heart of 10,272 triangles, warm start: **{} instructions** a query on average, {} at
+most, in {} ticks. From [docs/benchmarks.md](docs/benchmarks.md), which also says where refitted trees win, and
+[docs/guarantees.md](docs/guarantees.md).
+",
+        figure("m7.warm.mean"),
+        figure("m7.warm.largest"),
+        figure("m7.warm.queries"),
+    );
+    block
+}
+
+/// The rows of a record under `docs`.
+fn records(name: &str) -> Vec<Value> {
+    let path = format!("{}/../docs/{name}", env!("CARGO_MANIFEST_DIR"));
+    let text = fs::read_to_string(path).expect("a record");
+    serde_json::from_str(&text).expect("rows")
+}
+
+/// Two digits below 10, none above.
+fn short(value: f64) -> String {
+    match value {
+        _ if value < 10.0 => format!("{value:.1}"),
+        _ => thousands(value.round() as u32),
+    }
+}
+
+fn thousands(value: u32) -> String {
+    let digits = value.to_string();
+    let mut out = String::new();
+    for (at, digit) in digits.chars().enumerate() {
+        if at > 0 && (digits.len() - at).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out
+}
