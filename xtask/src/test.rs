@@ -36,7 +36,8 @@ pub fn test(options: &Options) -> Result<()> {
         &["doc", "--release", "--workspace", "--no-deps"],
         &[("RUSTDOCFLAGS", "-D warnings")],
     );
-    steps.cargo("packages", &["package", "--workspace", "--no-verify", "--allow-dirty"], &[]);
+    let packages = ["-p", "dibs-nostd", "-p", "dibs-build", "--no-verify", "--allow-dirty"];
+    steps.cargo("packages", &[&["package"], &packages[..]].concat(), &[]);
     steps.run("oldest compiler", oldest_compiler);
 
     match Cross::find() {

@@ -107,7 +107,7 @@ impl BuiltTree {
         }
     }
 
-    /// The tree's bytes, as a `.dibs` file holds them (`docs/format.md`).
+    /// The tree's bytes, as a `.dibs` file holds them (`dibs-nostd`'s `docs/format.md`).
     #[must_use]
     pub fn blob(&self) -> &[u8] {
         &self.bytes

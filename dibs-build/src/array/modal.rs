@@ -9,7 +9,7 @@ use crate::error::BuildError;
 use crate::modes::{self, ModalFit, ModalMotion, ModesError};
 
 impl BuiltTree {
-    /// The same tree with the first `count` modes of a fitted motion: `docs/format.md`, section 7.
+    /// The same tree with the first `count` modes of a fitted motion: `dibs-nostd`'s `docs/format.md`, section 7.
     ///
     /// Errors and stretch are those of the surface as the controller will compute it, at every
     /// recorded frame. A weight may go a quarter of its recorded range beyond it

@@ -1,4 +1,4 @@
-//! The modes of a tree as bytes: section 7 of `docs/format.md`.
+//! The modes of a tree as bytes: section 7 of `dibs-nostd`'s `docs/format.md`.
 
 use dibs_nostd::modes::{MAX_ANCHORS, MAX_MODES, ModalSurface, Modes};
 use dibs_nostd::{Index, StretchError, Tree, VertexTable, measure_stretch};

@@ -17,7 +17,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The bytes are specified in `docs/wire.md`. [`faults`] damages what is sent, for tests.
+//! The bytes are specified in `dibs-nostd`'s `docs/wire.md`. [`faults`] damages what is sent, for tests.
 
 pub mod faults;
 mod sender;

@@ -51,7 +51,7 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     /// upper bounds from the first node on. Near children first; squares are compared, and a root is
     /// taken only where an order is needed. A leaf is rejected by one plane, a triangle by another.
     ///
-    /// Cost: the budget at most; typical counts are in `docs/benchmarks.md`.
+    /// Cost: the budget at most; typical counts are in the repository's `docs/benchmarks.md`.
     ///
     /// # Errors
     /// [`QueryError`]: a table of the wrong size, a root pin that is not finite, a measurement of

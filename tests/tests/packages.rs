@@ -1,0 +1,41 @@
+//! The published crates point at no file that is not in their package.
+
+use std::path::{Path, PathBuf};
+use std::{env, fs};
+
+#[test]
+fn the_packages_are_whole() {
+    for package in ["dibs-nostd", "dibs-build"] {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(package);
+        for file in ["README.md", "LICENSE-MIT", "LICENSE-APACHE"] {
+            assert!(root.join(file).is_file(), "{package} has no {file}");
+        }
+        let mut references = 0;
+        for source in files(&root.join("src")) {
+            let text = fs::read_to_string(&source).expect("a source file");
+            for (at, _) in text.match_indices("docs/") {
+                let is_elsewhere = text[..at].ends_with("the repository's `")
+                    || text[..at].ends_with("`dibs-nostd`'s `");
+                let path: String = text[at..].chars().take_while(|c| is_of_path(*c)).collect();
+                let path = path.trim_end_matches('.');
+                references += 1;
+                assert!(
+                    is_elsewhere || root.join(path).is_file(),
+                    "{}: {path} is not in the package",
+                    source.display()
+                );
+            }
+        }
+        println!("{package}: {references} references to docs");
+    }
+}
+
+fn is_of_path(c: char) -> bool {
+    c.is_ascii_alphanumeric() || ['/', '-', '.'].contains(&c)
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let paths =
+        fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
+    paths.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
+}
