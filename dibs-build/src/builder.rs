@@ -5,26 +5,10 @@ use dibs_nostd::format::{MAX_CHILDREN, MAX_LEAF_TRIANGLES};
 
 use crate::Mesh;
 use crate::array::{BuiltTree, Facts, flatten};
-use crate::construct::{Cluster, Constructor, Surface, widen};
+use crate::construct::{Cluster, Construction, Constructor, Surface, widen};
 use crate::error::BuildError;
 use crate::geodesic::{Graph, Topology};
 use crate::rest::{Paths, Shares, has_area};
-
-/// How sections are pinned, measured and split.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub enum Construction {
-    /// Geodesic centre, whole-mesh paths over edges and chords, split by two far seeds.
-    #[default]
-    Geodesic,
-    /// The paper's: mid-range pin, edge paths inside the section, split by a plane, orphans swapped,
-    /// one triangle a leaf.
-    Paper,
-    /// The default, but with the paper's pin: for comparison.
-    MidRangePin,
-    /// The default, but split by the paper's plane: for comparison.
-    PlaneSplit,
-}
 
 /// Width of the vertex indices in the tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]

@@ -16,6 +16,7 @@ mod array;
 mod builder;
 mod construct;
 mod error;
+mod fans;
 pub mod generate;
 mod geodesic;
 mod mesh;
@@ -31,7 +32,8 @@ mod stretch;
 mod write;
 
 pub use array::{BuiltTree, ModesSummary, Summary, summarise};
-pub use builder::{Builder, Construction, IndexWidth};
+pub use builder::{Builder, IndexWidth};
+pub use construct::Construction;
 pub use error::BuildError;
 pub use mesh::{Mesh, Motion};
 pub use pc2::MotionMismatch;

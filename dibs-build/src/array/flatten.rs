@@ -6,11 +6,11 @@ use dibs_nostd::format::{
 };
 use dibs_nostd::{Index, Tree};
 
-use super::fans::{Placed, arrange};
 use super::metric::{metric, with_lowest_bit};
 use crate::Mesh;
 use crate::construct::{Cluster, Content};
 use crate::error::BuildError;
+use crate::fans::{Placed, arrange};
 use crate::rest::Shares;
 
 /// A tree in the order of its array.

@@ -4,7 +4,7 @@
 use dibs_nostd::format::PathKind;
 use glam::{DVec3, Vec3};
 
-use super::fans::openness;
+use crate::fans::openness;
 use crate::rest::RestShape;
 
 /// Rounding of the controller's check in f32, in units of 2^-24: derived in `dibs_nostd`'s

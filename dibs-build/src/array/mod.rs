@@ -3,7 +3,6 @@
 #[cfg(feature = "modes")]
 mod append;
 mod emit;
-pub(crate) mod fans;
 mod flatten;
 mod metric;
 #[cfg(feature = "modes")]

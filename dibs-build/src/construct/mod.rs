@@ -10,13 +10,28 @@ mod widen;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::Construction;
-use crate::array::fans;
 use crate::error::BuildError;
+use crate::fans;
 use pin::Pin;
 pub(crate) use section::Surface;
 use section::{Searches, Section};
 pub(crate) use widen::widen;
+
+/// How sections are pinned, measured and split.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Construction {
+    /// Geodesic centre, whole-mesh paths over edges and chords, split by two far seeds.
+    #[default]
+    Geodesic,
+    /// The paper's: mid-range pin, edge paths inside the section, split by a plane, orphans swapped,
+    /// one triangle a leaf.
+    Paper,
+    /// The default, but with the paper's pin: for comparison.
+    MidRangePin,
+    /// The default, but split by the paper's plane: for comparison.
+    PlaneSplit,
+}
 
 /// A node before it is flattened.
 #[derive(Debug)]
