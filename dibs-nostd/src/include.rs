@@ -8,7 +8,7 @@
 /// |---|---|
 /// | `TREE` | the bytes in flash, a [`TreeBytes`](crate::TreeBytes): `TREE.validate()` gives the `Tree` |
 /// | `Surface` | the double buffer for its vertices, a [`Frames`](crate::Frames) |
-/// | `Receiver` | the bus's end of it, an [`Assembler`](crate::Assembler) that measures stretch in slices |
+/// | `Receiver` | the bus's end of it, an [`Assembler`](crate::Assembler) that measures stretch in slices; `receiver` makes one |
 /// | `Reader` | the control loop's end of it |
 /// | `Query` | a [`Query`](crate::Query) with the stack that the tree needs; `WideQuery` for large processors |
 /// | `VERTICES`, `STACK`, `Index` | the sizes, for types of your own |

@@ -1,7 +1,7 @@
 //! Bus reception: bytes in, published frames and statuses out.
 
 use dibs_nostd::wire::{Counters, Deframer, encode_status, enframe, framed_bytes};
-use dibs_nostd::{Advance, Progress, StretchError, StretchMonitor};
+use dibs_nostd::{Advance, Progress, StretchError};
 
 use crate::fingerprint::Fingerprint;
 use crate::surface::{self, CENTRE, REACH};
@@ -56,10 +56,9 @@ impl Receiver {
         status: &'static BusStatus,
     ) -> Result<Self, StretchError> {
         let limit = CENTRE.abs().max_element() + ROOM * REACH;
-        let monitor = StretchMonitor::new(tree)?;
         Ok(Self {
             deframer: Deframer::new(),
-            assembler: surface::Receiver::new(writer, monitor, tree.mesh_id(), limit),
+            assembler: surface::receiver(tree, writer, limit)?,
             fingerprint: Fingerprint::new(),
             status,
             reported: 0,

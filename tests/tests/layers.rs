@@ -43,7 +43,7 @@ fn cycle(imports: &Imports) -> Option<BTreeSet<&str>> {
         if free.is_empty() {
             break;
         }
-        free.iter().for_each(|from| drop(left.remove(from)));
+        left.retain(|from| !free.contains(from));
     }
     (!left.is_empty()).then_some(left)
 }
@@ -89,7 +89,7 @@ fn homes(lib: &str) -> BTreeMap<String, String> {
         } else if let Some((_, path)) = statement.rsplit_once("use ") {
             let path = path.trim_start_matches("crate::");
             let folder = words(path).next().unwrap_or_default();
-            words(path).skip(1).for_each(|name| drop(home.insert(name, folder.clone())));
+            home.extend(words(path).skip(1).map(|name| (name, folder.clone())));
         }
     }
     home
