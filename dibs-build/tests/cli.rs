@@ -355,3 +355,45 @@ fn what_the_stretch_check_cannot_measure_is_warned_of() {
         assert_eq!(errors.contains("weld or drop them"), unmeasurable > 0, "{errors}");
     }
 }
+
+#[test]
+fn a_tracked_path_is_answered_as_whole_queries_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeeds(folder, "generate heart --triangles 1000 -o heart.ply --motion heart.pc2");
+    succeeds(folder, "build heart.ply -o heart.dibs --stretch 1.5");
+    let tool = |tick: u32| {
+        let x = 60.0 + 0.1 * f64::from(tick);
+        format!("capsule:{x},0,20,{x},10,80,2.5\n")
+    };
+    std::fs::write(folder.join("tools.csv"), (0..120).map(tool).collect::<String>()).unwrap();
+    let lines = |options: &str| -> Vec<Value> {
+        let line = format!("track heart.dibs --motion heart.pc2 --path tools.csv --json {options}");
+        let text = succeeds(folder, &line);
+        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    };
+    for surface in ["held", "interpolated", "extrapolated"] {
+        let tracked = lines(&format!("--surface {surface}"));
+        let whole = lines(&format!("--surface {surface} --full"));
+        assert_eq!((tracked.len(), whole.len()), (120, 120));
+        let tests = |lines: &[Value]| -> u64 {
+            lines.iter().map(|line| line["node_tests"].as_u64().unwrap()).sum()
+        };
+        assert!(tests(&tracked) * 4 < tests(&whole), "{surface}");
+        for (tick, (tracked, whole)) in tracked.iter().zip(&whole).enumerate() {
+            assert_eq!(tracked["tick"], tick);
+            let apart =
+                |key| tracked[key].as_f64().unwrap() - whole["separation"].as_f64().unwrap();
+            assert!(apart("separation").abs() < 1e-3 && apart("lower").abs() < 1e-3, "{tracked}");
+            assert_eq!(tracked["fallback"].is_null(), tick > 0, "{tracked}");
+            assert!(whole["fallback"].is_null());
+        }
+    }
+    // Interpolated is the default, and not held.
+    assert_eq!(lines(""), lines("--surface interpolated"));
+    assert_ne!(lines("--full"), lines("--full --surface held"));
+
+    std::fs::write(folder.join("bad.csv"), "sphere:1,2,3,4\nsphere:1,2\n").unwrap();
+    let error = fails(folder, "track heart.dibs --motion heart.pc2 --path bad.csv");
+    assert!(error.starts_with("bad.csv, line 2: "), "{error}");
+}

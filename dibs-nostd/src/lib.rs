@@ -68,13 +68,14 @@ mod unavailable;
 pub use bus::wire;
 pub use bus::{Advance, Assembler, BusHealth, LastHeartbeat, Progress, Rejection};
 pub use control::{constraint, failsafe};
-pub use query::{Budget, Cost, Options, Proximity, Query};
+pub use query::{Budget, Cost, Fallback, Options, Proximity, Query, Tracked, Tracker};
 pub use stretch::{
     Changed, Gate, StretchError, StretchMonitor, Unchecked, Verdict, measure_stretch,
 };
 pub use surface::{
-    FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames, MeasuredStretch,
-    OutOfTable, PublishError, QuantisedVertices, REGIONS, VertexTable,
+    Between, FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames, MeasuredStretch,
+    Moved, MovingSurface, Odometer, OutOfTable, PublishError, QuantisedVertices, REGIONS, Step,
+    Travel, VertexTable,
 };
 pub use tool::{ACCURACY, AxisPair, Capsule, MAX_COORDINATE, Sphere, Tool, ToolError};
 pub use tree::{FormatError, Index, Rot, Scrub, Tree, TreeBytes, format};

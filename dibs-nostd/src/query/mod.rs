@@ -7,10 +7,12 @@ mod options;
 mod plane;
 mod proximity;
 mod search;
+mod tracker;
 
 pub use cost::Cost;
 pub use options::{Budget, Options};
 pub use proximity::Proximity;
+pub use tracker::{Fallback, Tracked, Tracker};
 
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};

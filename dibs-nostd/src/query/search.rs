@@ -1,10 +1,12 @@
 //! One search: the tests of nodes, leaves and triangles, and what is known so far.
 
 mod rounds;
+mod tick;
 
 use glam::Vec3;
 
 pub(super) use rounds::Rounds;
+pub(super) use tick::{Outcome, Tick};
 
 use super::plane::Plane;
 use super::{Budget, Options};

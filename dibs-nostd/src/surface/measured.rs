@@ -41,6 +41,15 @@ impl MeasuredStretch {
         Self { sigma, tree, triangle, epoch: None, regions: [u8::MAX; REGIONS] }
     }
 
+    /// A bound for two frames of one surface and all between them: gradients are linear in the positions, and
+    /// the largest singular value (or edge) is convex. `None` if they were measured with different trees.
+    #[must_use]
+    pub fn or_larger(self, other: Self) -> Option<Self> {
+        let larger = if other.sigma > self.sigma { other } else { self };
+        let regions = [u8::MAX; REGIONS];
+        (self.tree == other.tree).then_some(Self { epoch: None, regions, ..larger })
+    }
+
     /// The largest stretch, rounded up: at least 1 where anything kept its length, and never below a
     /// half.
     #[must_use]

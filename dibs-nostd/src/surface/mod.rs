@@ -3,6 +3,8 @@
 mod atomic;
 mod frames;
 mod measured;
+pub(crate) mod motion;
+mod moving;
 mod vertices;
 
 pub use frames::{
@@ -10,4 +12,6 @@ pub use frames::{
 };
 pub(crate) use measured::share;
 pub use measured::{MeasuredStretch, REGIONS};
+pub use motion::{Moved, MovingSurface, Odometer, Travel};
+pub use moving::{Between, Step};
 pub use vertices::{QuantisedVertices, VertexTable};

@@ -90,6 +90,11 @@ impl sealed::Sealed for Capsule {
         let along = Vec4::select(positive.cmplt(length), positive, length);
         offset.minus(direction.times(along))
     }
+
+    #[inline(always)]
+    fn axis_span(&self) -> Vec3 {
+        self.axis.length * self.axis.direction
+    }
 }
 
 impl Tool for Capsule {

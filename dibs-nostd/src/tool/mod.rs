@@ -109,11 +109,16 @@ impl fmt::Display for ToolError {
 impl core::error::Error for ToolError {}
 
 mod sealed {
+    use glam::Vec3;
+
     use crate::math::four::Four;
 
     pub trait Sealed {
         /// The shortest vectors from the axis to four points, bit by bit those of one after the other.
         fn axis_to_four(&self, points: &Four) -> Four;
+
+        /// From the axis' start to its end, each component within 2^-23 of the axis' length.
+        fn axis_span(&self) -> Vec3;
     }
 }
 

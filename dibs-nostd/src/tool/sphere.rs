@@ -44,6 +44,11 @@ impl sealed::Sealed for Sphere {
     fn axis_to_four(&self, points: &Four) -> Four {
         points.minus(Four::splat(self.center))
     }
+
+    #[inline(always)]
+    fn axis_span(&self) -> Vec3 {
+        Vec3::ZERO
+    }
 }
 
 impl Tool for Sphere {

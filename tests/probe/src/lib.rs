@@ -7,6 +7,7 @@
 
 pub mod bus;
 pub mod receive;
+pub mod track;
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::modes::{MAX_MODES, Memo, ModalSurface, Modes};

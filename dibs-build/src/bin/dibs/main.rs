@@ -8,6 +8,7 @@ mod modes;
 mod query;
 mod stream;
 mod stretch;
+mod track;
 mod tree_file;
 
 use clap::{Parser, Subcommand};
@@ -31,6 +32,8 @@ enum Command {
     Inspect(inspect::Args),
     /// Find the surface point closest to a tool
     Query(query::Args),
+    /// Follow a tool about a moving surface, tick by tick
+    Track(track::Args),
     /// Send a recorded motion to a controller, over a serial line or a socket
     Stream(stream::Args),
     /// Generate a procedural heart or brain
@@ -55,6 +58,7 @@ fn main() -> ExitCode {
         Command::Stretch(args) => stretch::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Query(args) => query::run(&args),
+        Command::Track(args) => track::run(&args),
         Command::Stream(args) => stream::run(&args),
         Command::Generate(args) => generate::run(&args),
     };

@@ -11,7 +11,7 @@ use dibs_nostd::{
 use std::path::{Path, PathBuf};
 
 /// As much as any tree needs.
-const STACK: usize = dibs_nostd::format::MAX_STACK;
+pub const STACK: usize = dibs_nostd::format::MAX_STACK;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -41,12 +41,12 @@ pub struct Args {
 }
 
 #[derive(Clone, Copy)]
-enum ToolSpec {
+pub enum ToolSpec {
     Sphere(Sphere),
     Capsule(Capsule),
 }
 
-fn parse_tool(text: &str) -> Result<ToolSpec> {
+pub fn parse_tool(text: &str) -> Result<ToolSpec> {
     let (shape, numbers) = text.split_once(':').ok_or_else(|| anyhow!("no ':' after the shape"))?;
     let numbers: Vec<f32> = numbers
         .split(',')
@@ -152,7 +152,7 @@ fn current(path: &Path, frame: Option<usize>) -> Result<Vec<Vec3>> {
 }
 
 /// Puts positions into the order of the tree's rows.
-fn rows<I: Index>(tree: &Tree<'_, I>, path: &Path, of_mesh: &[Vec3]) -> Result<Vec<Vec3>> {
+pub fn rows<I: Index>(tree: &Tree<'_, I>, path: &Path, of_mesh: &[Vec3]) -> Result<Vec<Vec3>> {
     (0..tree.vertex_count())
         .map(|row| {
             let vertex = tree.vertex_number(row).unwrap_or(row);

@@ -1,0 +1,236 @@
+//! `dibs track`: a tool on its path about a moving surface, tick by tick.
+
+use crate::query::{STACK, ToolSpec, parse_tool, rows};
+use crate::tree_file::{self, AnyTree};
+use anyhow::{Context, Result, anyhow, bail};
+use dibs_build::Motion;
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::{
+    Fallback, Index, MeasuredStretch, MovingSurface, Odometer, Options, Proximity, Query, Step,
+    Tool, Tracker, Tree, measure_stretch,
+};
+use std::io::{BufWriter, Write, stdout};
+use std::path::{Path, PathBuf};
+
+/// Opened nodes that are remembered: more than any tool needs.
+const OPENED: usize = 4_096;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  dibs track heart.dibs --motion heart.pc2 --path tools.csv --json
+  dibs track heart.dibs --motion heart.pc2 --path tools.csv --surface extrapolated --full
+
+A frame arrives when its time has come; the motion is played over and over. Between frames the surface is that
+of the last frame (held), on its way there from the one before (interpolated: late by a frame), or beyond it as
+it moved before (extrapolated). One line a tick on standard output, and what it took on standard error.")]
+pub struct Args {
+    /// A tree file that `dibs build` wrote
+    tree: PathBuf,
+    /// The surface's motion, a .pc2 file of the built mesh
+    #[arg(long)]
+    motion: PathBuf,
+    /// Ticks a second
+    #[arg(long, default_value_t = 1_000.0)]
+    rate: f64,
+    /// The tool at each tick: a line is what `dibs query --tool` takes
+    #[arg(long)]
+    path: PathBuf,
+    /// The surface between frames
+    #[arg(long, value_enum, default_value_t = Surface::Interpolated)]
+    surface: Surface,
+    /// Ask every tick anew, remembering nothing
+    #[arg(long)]
+    full: bool,
+    /// Print a JSON object a line
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Surface {
+    Held,
+    Interpolated,
+    Extrapolated,
+}
+
+pub fn run(args: &Args) -> Result<()> {
+    let bytes = tree_file::load(&args.tree)?;
+    match tree_file::validate(&bytes, &args.tree)? {
+        AnyTree::Narrow(tree) => track(args, &tree),
+        AnyTree::Wide(tree) => track(args, &tree),
+    }
+}
+
+/// The tool at each tick.
+fn tools(path: &Path) -> Result<Vec<ToolSpec>> {
+    let name = path.display();
+    let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot be read"))?;
+    let tools: Vec<ToolSpec> = (1..)
+        .zip(text.lines())
+        .filter(|(_, line)| !line.trim().is_empty())
+        .map(|(number, line)| {
+            parse_tool(line.trim()).map_err(|error| anyhow!("{name}, line {number}: {error}"))
+        })
+        .collect::<Result<_>>()?;
+    if tools.is_empty() {
+        bail!("{name}: no line, and so no tick; give a tool for each tick");
+    }
+    Ok(tools)
+}
+
+fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
+    let tools = tools(&args.path)?;
+    let motion = Motion::read_pc2(&args.motion)?;
+    let name = args.motion.display();
+    if !(args.rate > 0.0 && args.rate.is_finite()) {
+        bail!("--rate is {}: give the ticks of a second", args.rate);
+    }
+    if !(motion.rate > 0.0) || motion.frames.is_empty() {
+        bail!("{name}: has {} frames at {} a second", motion.frames.len(), motion.rate);
+    }
+    let frames: Vec<Vec<Vec3>> =
+        motion.frames.iter().map(|frame| rows(tree, &args.motion, frame)).collect::<Result<_>>()?;
+    let stretches: Vec<MeasuredStretch> = (0..)
+        .zip(&frames)
+        .map(|(number, frame)| {
+            measure_stretch(tree, frame.as_slice()).map_err(|error| {
+                anyhow!(
+                    "{name}, frame {number}: {error}; build the tree with a larger --stretch, or with \
+                     --limits that allow it"
+                )
+            })
+        })
+        .collect::<Result<_>>()?;
+    let mut session = Session {
+        tree,
+        query: Query::new(tree)?,
+        tracker: (!args.full).then(|| Tracker::new(tree)).transpose()?,
+        out: BufWriter::new(stdout().lock()),
+        json: args.json,
+        sums: [0; 2],
+        fallbacks: 0,
+    };
+    let mut odometer = Odometer::new(tree);
+    let frame_at = |tick: usize| tick as f64 / args.rate * f64::from(motion.rate);
+    let mut ticks = (0..).zip(&tools).peekable();
+    let mut last = 0;
+    while let Some(&(first, _)) = ticks.peek() {
+        // The ticks from one frame to the next.
+        let number = frame_at(first) as usize;
+        let current = number % frames.len();
+        let step = odometer.step(frames[last].as_slice(), frames[current].as_slice());
+        let both =
+            stretches[last].or_larger(stretches[current]).context("measured with one tree")?;
+        while let Some((tick, tool)) = ticks.next_if(|&(tick, _)| frame_at(tick) as usize == number)
+        {
+            let share = (frame_at(tick) - number as f64) as f32;
+            let stretch =
+                if args.surface == Surface::Interpolated { both } else { stretches[current] };
+            session.tick(tick, &step, args.surface, share, stretch, tool)?;
+        }
+        last = current;
+    }
+    session.finish(tools.len())
+}
+
+struct Session<'t, I> {
+    tree: &'t Tree<'t, I>,
+    query: Query<'t, I, STACK>,
+    /// `None` where every tick is asked anew.
+    tracker: Option<Tracker<'t, I, STACK, OPENED>>,
+    out: BufWriter<std::io::StdoutLock<'static>>,
+    json: bool,
+    /// Node and triangle tests.
+    sums: [u64; 2],
+    fallbacks: usize,
+}
+
+impl<I: Index> Session<'_, I> {
+    fn tick(
+        &mut self,
+        tick: usize,
+        step: &Step<'_, [Vec3], [Vec3]>,
+        surface: Surface,
+        share: f32,
+        stretch: MeasuredStretch,
+        tool: &ToolSpec,
+    ) -> Result<()> {
+        let (proximity, fallback) = match surface {
+            Surface::Held => self.ask(&step.after(), stretch, tool)?,
+            Surface::Interpolated => self.ask(&step.at(share), stretch, tool)?,
+            // Beyond the stretch that the tree allows a guess is worth nothing: the last frame is held.
+            Surface::Extrapolated => match measure_stretch(self.tree, &step.beyond(share)) {
+                Ok(stretch) => self.ask(&step.beyond(share), stretch, tool)?,
+                Err(_) => self.ask(&step.after(), stretch, tool)?,
+            },
+        };
+        self.sums[0] += u64::from(proximity.node_tests);
+        self.sums[1] += u64::from(proximity.triangle_tests);
+        self.fallbacks += usize::from(fallback.is_some());
+        let (separation, lower) = (proximity.separation, proximity.lower);
+        let (nodes, triangles) = (proximity.node_tests, proximity.triangle_tests);
+        if self.json {
+            let line = serde_json::json!({
+                "tick": tick,
+                "separation": separation,
+                "lower": lower,
+                "node_tests": nodes,
+                "triangle_tests": triangles,
+                "fallback": fallback.map(word),
+            });
+            writeln!(self.out, "{line}")?;
+        } else {
+            let fallback = fallback.map_or("", word);
+            writeln!(self.out, "{tick:6} {separation:12.5} {nodes:6} {triangles:5} {fallback}")?;
+        }
+        Ok(())
+    }
+
+    fn ask(
+        &mut self,
+        surface: &impl MovingSurface,
+        stretch: MeasuredStretch,
+        tool: &ToolSpec,
+    ) -> Result<(Proximity, Option<Fallback>)> {
+        match tool {
+            ToolSpec::Sphere(sphere) => self.closest(surface, sphere, stretch),
+            ToolSpec::Capsule(capsule) => self.closest(surface, capsule, stretch),
+        }
+    }
+
+    fn closest(
+        &mut self,
+        surface: &impl MovingSurface,
+        tool: &impl Tool,
+        stretch: MeasuredStretch,
+    ) -> Result<(Proximity, Option<Fallback>)> {
+        let options = Options::new().stretch(stretch);
+        Ok(match &mut self.tracker {
+            Some(tracker) => {
+                let found = tracker.closest(surface, tool, &options)?;
+                (found.closest, found.fallback)
+            }
+            None => (self.query.closest(surface, tool, &options)?, None),
+        })
+    }
+
+    fn finish(mut self, ticks: usize) -> Result<()> {
+        self.out.flush()?;
+        let [nodes, triangles] = self.sums.map(|sum| sum as f64 / ticks as f64);
+        eprintln!(
+            "{ticks} ticks: {nodes:.1} node tests and {triangles:.1} triangle tests each, {} fallbacks",
+            self.fallbacks
+        );
+        Ok(())
+    }
+}
+
+fn word(fallback: Fallback) -> &'static str {
+    match fallback {
+        Fallback::Start => "start",
+        Fallback::Surface => "surface",
+        Fallback::Jump => "jump",
+        _ => "full",
+    }
+}

@@ -1,0 +1,461 @@
+//! A search that begins with the front of the one before: it tests the bounds that have run out, and no others.
+//!
+//! The odometer counts how far tool and surface have moved, rounded up. A bound that is found at reading `now`
+//! is kept as the reading `now + bound` at which nothing is left of it. It still holds if less than that
+//! has gone by: what is left of it is the difference. So a child has to be tested again once its reading is not beyond
+//! `now` plus the cutoff: a number that never falls while answers are exact, since a distance shrinks by no
+//! more than the odometer counts.
+//!
+//! Rounding. A bound is stored less the slack of its own search, and compared with the cutoff, which has the
+//! slack of this one: so the errors of both are covered, whatever their scales. Positions may be rounded
+//! anew in each frame, by at most 16 * 2^-24 of their coordinates: both sides spare that.
+
+use glam::Vec3;
+
+use super::{ACCURACY, Search, Step, THIRD, Waiting};
+use crate::math::sqrt::sqrt;
+use crate::query::Budget;
+use crate::query::plane::Plane;
+use crate::query::tracker::front::{FrontMut, NOWHERE, Place, UNUSED, is_before};
+use crate::surface::motion::{FAR, Unit};
+use crate::tree::format::{Link, Node};
+use crate::unavailable::QueryError;
+use crate::{Index, Proximity, Tool, Tree, VertexTable};
+
+/// A motion of this many units, a 64th of the root sphere's radius, may be too much for the front.
+const LARGE_STEP: u32 = 1 << 18;
+
+/// How a tick ended.
+pub(in crate::query) enum Outcome {
+    /// With an answer; whether everything due was looked at; whether the front had to start anew.
+    Answer { closest: Proximity, is_complete: bool, restarted: bool },
+    /// The front has no free place; how many tests it took to find out.
+    Full { tests: Budget },
+}
+
+/// One tick.
+pub(in crate::query) struct Tick<'s, 't, 'f, I, V: ?Sized, T> {
+    search: Search<'s, 't, I, V, T>,
+    front: FrontMut<'f>,
+    unit: Unit,
+    /// The odometer.
+    now: u32,
+    /// Taken off a bound before it is stored.
+    margin: f32,
+    facing: Facing,
+}
+
+/// The plane across the closest pair, which most triangles about it are beyond, and those that share the closest
+/// point are not nearer than: so that they need no exact test.
+struct Facing {
+    start: Vec3,
+    /// From the axis to the closest triangle, of length 1; zero where there is none, or they touch.
+    normal: Vec3,
+    /// The farthest that the axis reaches along the normal, from its start.
+    foremost: f32,
+    /// Triangles farther than this along the normal cannot be closer than the closest by more than the accuracy.
+    within: f32,
+}
+
+impl Facing {
+    /// The plane of the closest pair so far.
+    #[inline(always)]
+    fn new<I: Index, V: VertexTable + ?Sized, T: Tool>(search: &Search<'_, '_, I, V, T>) -> Self {
+        let start = search.tool.axis_start();
+        let none = Self { start, normal: Vec3::ZERO, foremost: 0.0, within: f32::INFINITY };
+        let Some(pair) = search.best else { return none };
+        let across = pair.on_surface - pair.on_axis;
+        let length = sqrt(across.dot(across));
+        if !(length > search.slack) {
+            return none;
+        }
+        let normal = across / length;
+        let end = normal.dot(search.tool.axis_span());
+        let foremost = if end > 0.0 { end } else { 0.0 };
+        let within = sqrt(pair.distance_squared) - ACCURACY * search.scale;
+        Self { start, normal, foremost, within }
+    }
+
+    /// No point of a triangle is closer to the axis than this.
+    #[inline(always)]
+    fn lowest(&self, corners: &[Vec3; 3]) -> f32 {
+        least(corners.map(|corner| self.normal.dot(corner - self.start))) - self.foremost
+    }
+}
+
+impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I, V, T> {
+    #[inline(always)]
+    pub fn new(
+        mut search: Search<'s, 't, I, V, T>,
+        front: FrontMut<'f>,
+        unit: Unit,
+        now: u32,
+        budget: Budget,
+    ) -> Self {
+        // A tick tests each node's sphere, each leaf's plane and each triangle's plane twice at most.
+        let header = search.tree.header();
+        let most = header.nodes.saturating_add(header.triangles).saturating_mul(4);
+        search.budget.node_tests = if budget.node_tests < most { budget.node_tests } else { most };
+        search.left.node_tests = search.budget.node_tests;
+        let margin = search.slack + search.coordinate_slack;
+        let facing = Facing::new(&search);
+        Self { search, front, unit, now, margin, facing }
+    }
+
+    /// Tests what has run out after a motion of `moved` units. Returns the closest triangle too, where one was tested.
+    pub fn run(mut self, moved: u32) -> Result<(Outcome, Option<u32>), QueryError> {
+        let outcome = self.test_what_is_due(moved)?;
+        Ok((outcome, self.search.best.map(|_| self.search.best_triangle)))
+    }
+
+    #[inline(always)]
+    fn test_what_is_due(&mut self, moved: u32) -> Result<Outcome, QueryError> {
+        let corrupt = QueryError::Corrupt { row: 0 };
+        self.search.waiting = 0;
+        if self.search.best.is_none()
+            && let Some(place) = self.front.best.take()
+        {
+            self.front.put_back(place).ok_or(corrupt)?;
+        }
+        let restarted =
+            moved > LARGE_STEP && 2 * self.front.count_due(self.threshold()) > self.front.used();
+        if restarted {
+            self.front.clear();
+        }
+        if self.front.is_empty() {
+            let root = self.search.tree.record(0).ok_or(corrupt)?;
+            let nowhere = Place { node: NOWHERE, slot: 0 };
+            self.front.open(root.link, nowhere, self.now).ok_or(corrupt)?;
+        }
+        // What is opened from now on is tested at once.
+        let (mut from, end) = (0, self.front.used());
+        while let Some(at) = self.front.next_due(from..end, self.threshold()) {
+            match self.visit(at as u16)? {
+                Visit::Done => from = at + 1,
+                Visit::OutOfBudget => {
+                    self.put_back_waiting().ok_or(corrupt)?;
+                    let least = self.unit.length(self.front.least(self.now));
+                    let closest = self.finish(if least > 0.0 { least } else { 0.0 })?;
+                    return Ok(Outcome::Answer { closest, is_complete: false, restarted });
+                }
+                Visit::Full => {
+                    self.put_back_waiting().ok_or(corrupt)?;
+                    self.close_some(8)?;
+                    let (all, left) = (self.search.budget, self.search.left);
+                    let tests = Budget {
+                        node_tests: all.node_tests.saturating_sub(left.node_tests),
+                        triangle_tests: all.triangle_tests.saturating_sub(left.triangle_tests),
+                    };
+                    return Ok(Outcome::Full { tests });
+                }
+            }
+        }
+        self.close_some(1)?;
+        let closest = self.finish(f32::INFINITY)?;
+        Ok(Outcome::Answer { closest, is_complete: true, restarted })
+    }
+
+    /// A bound whose key is not beyond this has to be tested.
+    #[inline(always)]
+    fn threshold(&self) -> u32 {
+        self.now.wrapping_add(self.unit.up(self.search.reach + self.search.coordinate_slack))
+    }
+
+    #[inline(always)]
+    fn key(&self, bound: f32) -> u32 {
+        self.now.wrapping_add(self.unit.down(bound - self.margin))
+    }
+
+    fn finish(&mut self, lower: f32) -> Result<Proximity, QueryError> {
+        if let Some(place) = *self.front.best {
+            let key = self.key(sqrt(self.search.best_squared));
+            *self.key_of(place).ok_or(QueryError::Corrupt { row: 0 })? = key;
+        }
+        let mut closest = self.search.finish(lower)?;
+        // A triangle that is closer by less than the accuracy may have been passed over.
+        closest.accuracy *= 2.0;
+        Ok(closest)
+    }
+
+    #[inline(always)]
+    fn key_of(&mut self, place: Place) -> Option<&mut u32> {
+        self.front.node(place.node)?.keys.get_mut(usize::from(place.slot))
+    }
+
+    /// Tests what is due below an opened node, and opens what is within reach.
+    fn visit(&mut self, at: u16) -> Result<Visit, QueryError> {
+        if let Step::OutOfBudget = self.test_due(at)? {
+            return Ok(Visit::OutOfBudget);
+        }
+        while let Some(top) = self.search.waiting.checked_sub(1) {
+            let corrupt = QueryError::Corrupt { row: top as u32 };
+            let &Waiting { lower, link: word } = self.search.stack.get(top).ok_or(corrupt)?;
+            let place = Place::from_word(word);
+            if lower > self.search.reach {
+                self.search.waiting = top;
+                self.front.put_back(place).ok_or(corrupt)?;
+                continue;
+            }
+            let key = *self.key_of(place).ok_or(corrupt)?;
+            let link = self.record(place).ok_or(corrupt)?.link;
+            let Some(opened) = self.front.open(link, place, key) else {
+                return Ok(Visit::Full);
+            };
+            self.search.waiting = top;
+            *self.key_of(place).ok_or(corrupt)? = u32::from(opened);
+            if let Step::OutOfBudget = self.test_due(opened)? {
+                return Ok(Visit::OutOfBudget);
+            }
+        }
+        Ok(Visit::Done)
+    }
+
+    /// The node in a place.
+    #[inline(always)]
+    fn record(&mut self, place: Place) -> Option<Node> {
+        match Link::decode(self.front.node(place.node)?.link) {
+            Link::Children { first, count } if u32::from(place.slot) < count => {
+                self.search.tree.whole_record(first + u32::from(place.slot))
+            }
+            _ => None,
+        }
+    }
+
+    fn put_back_waiting(&mut self) -> Option<()> {
+        while let Some(top) = self.search.waiting.checked_sub(1) {
+            self.search.waiting = top;
+            self.front.put_back(Place::from_word(self.search.stack.get(top)?.link))?;
+        }
+        Some(())
+    }
+
+    /// Tests the children of an opened node that are due.
+    fn test_due(&mut self, at: u16) -> Result<Step, QueryError> {
+        let corrupt = QueryError::Corrupt { row: u32::from(at) };
+        let threshold = self.threshold();
+        let opened = self.front.node(at).ok_or(corrupt)?;
+        let (step, count) = match Link::decode(opened.link) {
+            // Its time has come, as long as the odometer can count: it starts again.
+            _ if opened.link == UNUSED => (Step::Done, 0),
+            Link::Children { first, count } => {
+                let due = opened.due(count, threshold);
+                (self.test_children(at, first, due)?, count)
+            }
+            Link::Leaf { first, count } => {
+                let due = opened.due(count, threshold);
+                (self.test_triangles(at, first, due)?, count)
+            }
+        };
+        self.front.schedule(usize::from(at), count, self.now).ok_or(corrupt)?;
+        Ok(step)
+    }
+
+    #[inline(always)]
+    fn test_children(&mut self, at: u16, first: u32, mut due: u32) -> Result<Step, QueryError> {
+        let corrupt = QueryError::Corrupt { row: first };
+        let base = self.search.waiting;
+        let (now, unit, margin) = (self.now, self.unit, self.margin);
+        let later = |key: u32, bound: f32| {
+            let own = now.wrapping_add(unit.down(bound - margin));
+            if is_before(key, own) { own } else { key }
+        };
+        let search = &mut self.search;
+        let tree = search.tree;
+        let opened = self.front.node(at).ok_or(corrupt)?;
+        while let Some(slot) = next(&mut due) {
+            let node = tree.whole_record(first + u32::from(slot)).ok_or(corrupt)?;
+            let key = opened.keys.get_mut(usize::from(slot)).ok_or(corrupt)?;
+            let Some(left) = search.left.node_tests.checked_sub(1) else {
+                return Ok(Step::OutOfBudget);
+            };
+            search.left.node_tests = left;
+            let position = search.position(node.pin)?;
+            let normal = search.tool.axis_to(position);
+            let distance = sqrt(normal.dot(normal));
+            search.pull_in(node.pin, distance);
+            let own = distance - node.radius_code as f32 * search.radius_scale;
+            *key = later(*key, own);
+            if own > search.reach {
+                continue;
+            }
+            if let Link::Leaf { first, count } = Link::decode(node.link)
+                && let Some(left) = search.left.node_tests.checked_sub(1)
+            {
+                search.left.node_tests = left;
+                let plane = search.plane_across(normal, position, distance);
+                let excess = plane.excess(tree, search.vertices, first, count).ok_or(corrupt)?;
+                if excess > 0.0 {
+                    *key = later(*key, search.reach + excess / distance);
+                    continue;
+                }
+            }
+            opened.apart |= 1 << slot;
+            let link = Place { node: at, slot }.to_word();
+            search.push(base, Waiting { lower: own, link }).ok_or(corrupt)?;
+        }
+        Ok(Step::Done)
+    }
+
+    #[inline(always)]
+    fn test_triangles(&mut self, at: u16, first: u32, mut due: u32) -> Result<Step, QueryError> {
+        let corrupt = QueryError::Corrupt { row: first };
+        while let Some(slot) = next(&mut due) {
+            let (triangle, place) = (first + u32::from(slot), Place { node: at, slot });
+            if triangle == self.search.best_triangle {
+                self.front.node(at).ok_or(corrupt)?.apart |= 1 << slot;
+                *self.front.best = Some(place);
+                continue;
+            }
+            let search = &mut self.search;
+            let (Some(left), 1..) =
+                (search.left.node_tests.checked_sub(1), search.left.triangle_tests)
+            else {
+                return Ok(Step::OutOfBudget);
+            };
+            search.left.node_tests = left;
+            let corners = search.corners(triangle)?;
+            let facing = self.facing.lowest(&corners);
+            let bound = if facing > self.facing.within {
+                facing
+            } else {
+                match self.test_closely(triangle, &corners, place)? {
+                    Some(bound) => bound,
+                    None => continue,
+                }
+            };
+            let key = self.key(bound);
+            *self.key_of(place).ok_or(corrupt)? = key;
+        }
+        Ok(Step::Done)
+    }
+
+    /// Tests a triangle against its own plane, then exactly. Returns a bound, unless it is the closest so far.
+    fn test_closely(
+        &mut self,
+        triangle: u32,
+        corners: &[Vec3; 3],
+        place: Place,
+    ) -> Result<Option<f32>, QueryError> {
+        let search = &self.search;
+        let &[a, b, c] = corners;
+        let middle = (a + b + c) * THIRD;
+        let normal = search.tool.axis_to(middle);
+        let distance = sqrt(normal.dot(normal));
+        let plane = search.plane_across(normal, middle, distance);
+        if plane.limit.is_nan() {
+            return Err(QueryError::Position { vertex: search.not_finite(triangle) });
+        }
+        let excess = least([a, b, c].map(|corner| plane.normal.dot(corner))) - plane.limit;
+        if excess > 0.0 {
+            return Ok(Some(search.reach + excess / distance));
+        }
+        self.test_exactly(triangle, corners, place)
+    }
+
+    /// Tests a triangle. Returns its distance, unless it is the closest so far, which is then apart.
+    #[inline(always)]
+    fn test_exactly(
+        &mut self,
+        triangle: u32,
+        corners: &[Vec3; 3],
+        place: Place,
+    ) -> Result<Option<f32>, QueryError> {
+        let search = &mut self.search;
+        search.left.triangle_tests = search.left.triangle_tests.saturating_sub(1);
+        let Some(pair) = search.tool.closest_on_triangle(corners, f32::INFINITY) else {
+            return Err(QueryError::Position { vertex: search.not_finite(triangle) });
+        };
+        let distance = sqrt(pair.distance_squared);
+        if !(pair.distance_squared < search.best_squared) {
+            return Ok(Some(distance));
+        }
+        search.best_squared = pair.distance_squared;
+        search.best_triangle = triangle;
+        search.best = Some(pair);
+        search.tighten(distance);
+        self.facing = Facing::new(&self.search);
+        let corrupt = QueryError::Corrupt { row: triangle };
+        if let Some(place) = self.front.best.replace(place) {
+            self.front.put_back(place).ok_or(corrupt)?;
+        }
+        self.front.node(place.node).ok_or(corrupt)?.apart |= 1 << place.slot;
+        Ok(None)
+    }
+
+    /// Looks at some opened nodes, one after the other from tick to tick, and closes those that are as well
+    /// bounded by their own spheres.
+    #[inline(always)]
+    fn close_some(&mut self, number: u32) -> Result<(), QueryError> {
+        let corrupt = QueryError::Corrupt { row: 0 };
+        for _ in 0..number {
+            let Some((at, due)) = self.front.next_closable() else { continue };
+            let left = due.wrapping_sub(self.threshold()) as i32;
+            if left <= 0 {
+                continue;
+            }
+            let Some(tests) = self.search.left.node_tests.checked_sub(1) else { return Ok(()) };
+            self.search.left.node_tests = tests;
+            let opened = self.front.node(at).ok_or(corrupt)?;
+            let place = Place { node: opened.parent, slot: opened.slot };
+            let node = self.record(place).ok_or(corrupt)?;
+            let distance =
+                sqrt(self.search.tool.axis_distance_squared(self.search.position(node.pin)?));
+            let own = self.key(distance - node.radius_code as f32 * self.search.radius_scale);
+            if (own.wrapping_sub(self.threshold()) as i32).saturating_mul(2) >= left {
+                let key = if is_before(own, due) { due } else { own };
+                self.front.close(at, key, self.now).ok_or(corrupt)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// How looking at an opened node ended.
+enum Visit {
+    Done,
+    OutOfBudget,
+    Full,
+}
+
+impl Plane {
+    /// How far all vertices of a leaf are beyond it, in units of the normal's length; not above zero if one is
+    /// not. `None` if the leaf's bytes are bad.
+    #[inline(never)]
+    fn excess<I: Index, V: VertexTable + ?Sized>(
+        &self,
+        tree: &Tree<'_, I>,
+        vertices: &V,
+        first: u32,
+        count: u32,
+    ) -> Option<f32> {
+        let along = |row| vertices.position(row).map(|position| self.normal.dot(position));
+        let mut triangles = tree.triangles(first, count)?;
+        let [a, b, c] = triangles.next()?;
+        let mut lowest = least([along(a)?, along(b)?, along(c)?]);
+        for [_, _, corner] in triangles {
+            if !(lowest > self.limit) {
+                break;
+            }
+            lowest = least([along(corner)?, lowest, lowest]);
+        }
+        Some(lowest - self.limit)
+    }
+}
+
+/// Takes the first element out of a set.
+#[inline(always)]
+fn next(set: &mut u32) -> Option<u8> {
+    let rest = *set & set.checked_sub(1)?;
+    let at = set.trailing_zeros() as u8;
+    *set = rest;
+    Some(at)
+}
+
+/// The least of three; not a number if one is not.
+#[inline(always)]
+fn least([a, b, c]: [f32; 3]) -> f32 {
+    let lower = if a > b { b } else { a };
+    if lower > c { c } else { lower }
+}
+
+const _: () = assert!(FAR > LARGE_STEP as i32);

@@ -1,0 +1,235 @@
+//! The front: the top of the tree as far as it has been opened, and when each bound runs out.
+
+use core::ops::Range;
+
+use crate::surface::motion::FAR;
+use crate::tree::format::MAX_CHILDREN;
+
+/// Whether reading `a` of the odometer comes before `b`: readings wrap, and are less than half of a turn apart.
+#[inline(always)]
+pub(in crate::query) fn is_before(a: u32, b: u32) -> bool {
+    (a.wrapping_sub(b) as i32) < 0
+}
+
+/// A node whose children (or, of a leaf, whose triangles) have bounds of their own.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::query) struct Opened {
+    /// What is below the node, as a link; [`UNUSED`] where this place is free.
+    pub link: u32,
+    /// Place of the node above; of a free place, the next free one.
+    pub parent: u16,
+    /// Which of the parent's children this is.
+    pub slot: u8,
+    /// The children that are not waiting for their bounds to run out, one bit each: they are opened, on the
+    /// search's stack, or the closest triangle.
+    pub apart: u8,
+    /// The odometer's reading at which each child's bound has come down to zero. Of an opened child, its place.
+    pub keys: [u32; MAX_CHILDREN as usize],
+}
+
+/// No node has this link: it is that of eight children in rows that no tree has.
+pub(in crate::query) const UNUSED: u32 = u32::MAX >> 1;
+/// No place: one more than the largest.
+pub(in crate::query) const NOWHERE: u16 = u16::MAX;
+
+impl Opened {
+    const FREE: Self =
+        Self { link: UNUSED, parent: NOWHERE, slot: 0, apart: 0, keys: [0; MAX_CHILDREN as usize] };
+
+    /// The children whose bounds have run out, one bit each.
+    #[inline(always)]
+    pub fn due(&self, count: u32, threshold: u32) -> u32 {
+        let mut due = 0;
+        for &key in self.keys.iter().rev() {
+            due = due << 1 | u32::from(!is_before(threshold, key));
+        }
+        due & !u32::from(self.apart) & !(u32::MAX << count)
+    }
+}
+
+/// A child of an opened node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::query) struct Place {
+    pub node: u16,
+    pub slot: u8,
+}
+
+impl Place {
+    /// As a word for the search's stack.
+    #[inline(always)]
+    pub fn to_word(self) -> u32 {
+        u32::from(self.node) << 3 | u32::from(self.slot)
+    }
+
+    #[inline(always)]
+    pub fn from_word(word: u32) -> Self {
+        Self { node: (word >> 3) as u16, slot: (word & 7) as u8 }
+    }
+}
+
+/// The opened nodes, each in a place of its own. A node's children are tested together, so that a tick looks at
+/// one number for each opened node, not for each child.
+#[derive(Clone, Debug)]
+pub(in crate::query) struct Front<const OPENED: usize> {
+    /// When the first of each node's bounds runs out. (A table of its own, since all of it is read at each tick.)
+    due: [u32; OPENED],
+    nodes: [Opened; OPENED],
+    /// Places from here on were never used.
+    end: usize,
+    /// The first free place below.
+    free: u16,
+    /// Where the closest triangle stands.
+    pub best: Option<Place>,
+    /// The place to look at next for a node to close.
+    hand: usize,
+}
+
+impl<const OPENED: usize> Front<OPENED> {
+    #[inline(always)]
+    pub const fn new() -> Self {
+        const { assert!(OPENED > 0 && OPENED < NOWHERE as usize) };
+        Self {
+            due: [0; OPENED],
+            nodes: [Opened::FREE; OPENED],
+            end: 0,
+            free: NOWHERE,
+            best: None,
+            hand: 0,
+        }
+    }
+}
+
+/// The front without its size, so that a search is compiled once whatever the size.
+#[derive(Debug)]
+pub(in crate::query) struct FrontMut<'f> {
+    due: &'f mut [u32],
+    nodes: &'f mut [Opened],
+    end: &'f mut usize,
+    free: &'f mut u16,
+    pub best: &'f mut Option<Place>,
+    hand: &'f mut usize,
+}
+
+impl<const OPENED: usize> Front<OPENED> {
+    #[inline(always)]
+    pub fn borrow(&mut self) -> FrontMut<'_> {
+        let Self { due, nodes, end, free, best, hand } = self;
+        FrontMut { due, nodes, end, free, best, hand }
+    }
+}
+
+impl FrontMut<'_> {
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        (*self.end, *self.free, *self.best, *self.hand) = (0, NOWHERE, None, 0);
+    }
+
+    pub fn is_empty(&self) -> bool {
+        *self.end == 0
+    }
+
+    /// How many places were ever used.
+    pub fn used(&self) -> usize {
+        *self.end
+    }
+
+    #[inline(always)]
+    pub fn node(&mut self, at: u16) -> Option<&mut Opened> {
+        self.nodes.get_mut(usize::from(at))
+    }
+
+    /// The first of these places whose node is due.
+    #[inline(always)]
+    pub fn next_due(&self, places: Range<usize>, threshold: u32) -> Option<usize> {
+        let from = places.start;
+        let due = self.due.get(places)?;
+        // Eight at a time: as a rule none is.
+        let (eights, _) = due.as_chunks::<8>();
+        let waits = |eight: &&[u32; 8]| {
+            let before = eight.map(|due| threshold.wrapping_sub(due));
+            before.iter().fold(u32::MAX, |all, before| all & before) >> 31 == 1
+        };
+        let passed = 8 * eights.iter().take_while(waits).count();
+        let at = due.get(passed..)?.iter().position(|&due| !is_before(threshold, due))?;
+        Some(from + passed + at)
+    }
+
+    /// How many nodes are due.
+    pub fn count_due(&self, threshold: u32) -> usize {
+        let due = self.due.get(..*self.end).unwrap_or_default();
+        due.iter().filter(|&&due| !is_before(threshold, due)).count()
+    }
+
+    /// The least that is left of any bound, in units.
+    pub fn least(&self, now: u32) -> i32 {
+        let due = self.due.get(..*self.end).unwrap_or_default();
+        let left = due.iter().map(|due| due.wrapping_sub(now) as i32);
+        left.fold(FAR, |least, left| if left < least { left } else { least })
+    }
+
+    /// Opens a node in a free place, with one bound for all below; `None` if there is no place.
+    #[inline(always)]
+    pub fn open(&mut self, link: u32, parent: Place, key: u32) -> Option<u16> {
+        let at = if *self.free == NOWHERE { *self.end } else { usize::from(*self.free) };
+        let node = self.nodes.get_mut(at)?;
+        if at == *self.end {
+            *self.end = at + 1;
+        } else {
+            *self.free = node.parent;
+        }
+        *self.due.get_mut(at)? = key;
+        let keys = [key; MAX_CHILDREN as usize];
+        *node = Opened { link, parent: parent.node, slot: parent.slot, apart: 0, keys };
+        Some(at as u16)
+    }
+
+    /// Frees a place, and lets its parent wait in its stead.
+    pub fn close(&mut self, at: u16, key: u32, now: u32) -> Option<()> {
+        let free = *self.free;
+        let node = self.node(at)?;
+        let place = Place { node: node.parent, slot: node.slot };
+        *node = Opened { parent: free, ..Opened::FREE };
+        *self.free = at;
+        *self.due.get_mut(usize::from(at))? = now.wrapping_add(FAR as u32);
+        *self.node(place.node)?.keys.get_mut(usize::from(place.slot))? = key;
+        self.put_back(place)
+    }
+
+    /// Lets a child wait for its bound to run out.
+    #[inline(always)]
+    pub fn put_back(&mut self, Place { node, slot }: Place) -> Option<()> {
+        let due = self.due.get_mut(usize::from(node))?;
+        let node = self.nodes.get_mut(usize::from(node))?;
+        node.apart &= !(1 << slot);
+        let &key = node.keys.get(usize::from(slot))?;
+        if is_before(key, *due) {
+            *due = key;
+        }
+        Some(())
+    }
+
+    /// Finds when the first of a node's bounds runs out.
+    #[inline(always)]
+    pub fn schedule(&mut self, at: usize, count: u32, now: u32) -> Option<()> {
+        let node = self.nodes.get(at)?;
+        let mut apart = node.apart;
+        let mut least = now.wrapping_add(FAR as u32);
+        for &key in node.keys.get(..count as usize)? {
+            if apart & 1 == 0 && is_before(key, least) {
+                least = key;
+            }
+            apart >>= 1;
+        }
+        *self.due.get_mut(at)? = least;
+        Some(())
+    }
+
+    /// The next place, in turn, of a node below the root that none of its own children are apart from.
+    pub fn next_closable(&mut self) -> Option<(u16, u32)> {
+        *self.hand = if *self.hand + 1 < *self.end { *self.hand + 1 } else { 0 };
+        let node = self.nodes.get(*self.hand)?;
+        let &due = self.due.get(*self.hand)?;
+        (node.apart == 0 && node.link != UNUSED && node.parent != NOWHERE)
+            .then_some((*self.hand as u16, due))
+    }
+}

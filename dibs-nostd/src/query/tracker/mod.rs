@@ -1,0 +1,251 @@
+//! The closest pair from tick to tick: a tick costs what has changed.
+
+pub(super) mod front;
+#[cfg(test)]
+mod tests;
+
+use glam::Vec3;
+
+use super::search::{Outcome, Search, Tick, Waiting};
+use super::{Budget, Options, Proximity};
+use crate::math::sqrt::sqrt;
+use crate::surface::motion::Unit;
+use crate::unavailable::QueryError;
+use crate::{Index, MovingSurface, Tool, Travel, Tree};
+use front::Front;
+
+/// Units that the odometer may count between two looks at a bound: half of what it can tell apart.
+const FARTHEST: u32 = 1 << 29;
+
+/// A query that remembers its last answer's proof.
+///
+/// A search leaves a *front*: subtrees that were rejected by a lower bound, triangles that were tested. When
+/// the tool moves by at most `a` (the larger of its ends' steps) and the surface by at most `b`, each of these
+/// bounds still holds, less `a + b`. So a tracker keeps the front from tick to tick, and tests what has run
+/// out: as a rule some ten of a thousand bounds. The answers are those of [`Query::closest`](crate::Query::closest),
+/// within their accuracy. (Fronts of bounding volume trees: Klosowski et al. 1998, Tang et al. 2010. Bounds that
+/// expire: kinetic data structures; Barbič & James 2010.)
+///
+/// How far the surface moved comes with it, as [`MovingSurface::travel`]; where nobody measured it the tick is a
+/// whole query. Another tool is a step to where it is. The stretch in the options may change from tick to tick:
+/// what is remembered is true whatever it becomes.
+///
+/// `STACK` must be at least [`Tree::stack`]. `OPENED` nodes of the tree are remembered with their children; 256
+/// are enough for a heart of 10,272 triangles. With fewer than it takes, ticks are whole queries.
+///
+/// RAM: 8 bytes an entry of the stack, 44 an opened node, which are about 8 for each of its children.
+///
+/// ```
+/// use dibs_build::{Builder, generate};
+/// use dibs_nostd::{Odometer, Options, Sphere, Tracker, Tree, glam::Vec3};
+///
+/// let (heart, motion) = generate::heart(1_000)?;
+/// let built = Builder::new().stretch(1.5).build(&heart)?;
+/// let tree = Tree::<u16>::from_bytes(built.blob())?;
+/// let mut tracker = Tracker::<_, 64, 128>::new(&tree)?;
+/// let mut odometer = Odometer::new(&tree);
+///
+/// let (first, second) = (built.to_rows(&motion.frames[0]), built.to_rows(&motion.frames[1]));
+/// let surface = odometer.start(first.as_slice());
+/// let tool = Sphere::new(Vec3::new(70.0, 0.0, 20.0), 2.5)?;
+/// let cold = tracker.closest(&surface, &tool, &Options::new())?;
+///
+/// let surface = odometer.step(first.as_slice(), second.as_slice());
+/// let tool = Sphere::new(Vec3::new(70.1, 0.0, 20.0), 2.5)?;
+/// let warm = tracker.closest(&surface, &tool, &Options::new())?;
+/// assert!(warm.fallback.is_none() && warm.closest.node_tests < cold.closest.node_tests / 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Tracker<'t, I, const STACK: usize, const OPENED: usize> {
+    tree: Tree<'t, I>,
+    unit: Unit,
+    stack: [Waiting; STACK],
+    front: Front<OPENED>,
+    last: Option<Last>,
+    /// Units that tool and surface have moved; wraps.
+    now: u32,
+    /// Units since everything due was looked at.
+    behind: u32,
+    triangle: Option<u32>,
+}
+
+/// Where tool and surface were.
+#[derive(Clone, Copy, Debug)]
+struct Last {
+    start: Vec3,
+    span: Vec3,
+    length: f32,
+    travel: Travel,
+}
+
+/// What a tick found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub struct Tracked {
+    /// The closest pair; its counts of tests are this tick's.
+    pub closest: Proximity,
+    /// Why this tick was a whole query, if it was.
+    pub fallback: Option<Fallback>,
+    /// Places of opened nodes that have been needed so far, of the tracker's `OPENED`.
+    pub opened: u32,
+}
+
+/// Why a tick was a whole query.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Fallback {
+    /// Nothing is remembered: the first tick, or the one after an error.
+    Start,
+    /// The surface's motion since the last tick was not measured all the way.
+    Surface,
+    /// Tool or surface moved so far that more than half of the front ran out.
+    Jump,
+    /// More nodes had to be opened than there are places.
+    Full,
+}
+
+impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK, OPENED> {
+    /// A tracker on `tree` that has seen nothing yet.
+    ///
+    /// # Errors
+    /// [`QueryError::Stack`] if `STACK` is less than the tree needs.
+    #[inline(always)]
+    pub const fn new(tree: &Tree<'t, I>) -> Result<Self, QueryError> {
+        if tree.stack() as usize > STACK {
+            return Err(QueryError::Stack { needed: tree.stack(), available: STACK as u32 });
+        }
+        Ok(Self {
+            tree: *tree,
+            unit: Unit::of(tree),
+            stack: [Waiting { lower: 0.0, link: 0 }; STACK],
+            front: Front::new(),
+            last: None,
+            now: 0,
+            behind: 0,
+            triangle: None,
+        })
+    }
+
+    /// The tree that is searched.
+    #[must_use]
+    pub const fn tree(&self) -> &Tree<'t, I> {
+        &self.tree
+    }
+
+    /// Forgets the last tick: the next one is a whole query.
+    pub fn forget(&mut self) {
+        self.last = None;
+    }
+
+    /// The closest pair between `tool` and the surface as it is now.
+    ///
+    /// As [`Query::closest`](crate::Query::closest), warm start included. Under a budget the interval is as
+    /// certain as there, and the next tick goes on where this one ended.
+    ///
+    /// Cost: the budget at most, and one number for each opened node.
+    ///
+    /// # Errors
+    /// Those of [`Query::closest`](crate::Query::closest).
+    pub fn closest<S: MovingSurface + ?Sized, T: Tool>(
+        &mut self,
+        surface: &S,
+        tool: &T,
+        options: &Options,
+    ) -> Result<Tracked, QueryError> {
+        let travel = surface.travel();
+        let moved = self.moved(tool, travel);
+        self.last = None;
+        let (moved, mut fallback) = match moved {
+            Ok(moved) => (moved, None),
+            Err(fallback) => {
+                self.front.borrow().clear();
+                self.behind = 0;
+                (0, Some(fallback))
+            }
+        };
+        self.now = self.now.wrapping_add(moved);
+        let mut options = *options;
+        if self.triangle.is_some() {
+            options = options.warm_start(self.triangle);
+        }
+        let search = Search::start(&self.tree, &mut self.stack, surface, tool, &options)?;
+        let tick = Tick::new(search, self.front.borrow(), self.unit, self.now, options.budget);
+        let (outcome, best) = tick.run(moved)?;
+        self.triangle = best.or(self.triangle);
+        let (closest, is_complete) = match outcome {
+            Outcome::Answer { closest, is_complete, restarted } => {
+                if restarted {
+                    fallback = Some(Fallback::Jump);
+                }
+                (closest, is_complete)
+            }
+            Outcome::Full { tests } => {
+                fallback = Some(Fallback::Full);
+                (self.whole(surface, tool, &options.warm_start(best), tests)?, false)
+            }
+        };
+        self.behind = if is_complete { 0 } else { self.behind.saturating_add(moved) };
+        self.last = travel.map(|travel| Last::new(tool, travel));
+        Ok(Tracked { closest, fallback, opened: self.front.borrow().used() as u32 })
+    }
+
+    /// A whole query, with what so many tests have left of the budget.
+    #[cold]
+    fn whole<S: MovingSurface + ?Sized, T: Tool>(
+        &mut self,
+        surface: &S,
+        tool: &T,
+        options: &Options,
+        tests: Budget,
+    ) -> Result<Proximity, QueryError> {
+        let budget = Budget {
+            node_tests: options.budget.node_tests.saturating_sub(tests.node_tests),
+            triangle_tests: options.budget.triangle_tests.saturating_sub(tests.triangle_tests),
+        };
+        let options = options.budget(budget);
+        let search = Search::start(&self.tree, &mut self.stack, surface, tool, &options)?;
+        let mut closest = search.run()?;
+        closest.node_tests = closest.node_tests.saturating_add(tests.node_tests);
+        closest.triangle_tests = closest.triangle_tests.saturating_add(tests.triangle_tests);
+        Ok(closest)
+    }
+
+    /// How far tool and surface moved since the last tick, in units.
+    #[inline(always)]
+    fn moved(&self, tool: &impl Tool, travel: Option<Travel>) -> Result<u32, Fallback> {
+        let last = self.last.ok_or(Fallback::Start)?;
+        let surface = travel.and_then(|travel| travel.since(&last.travel));
+        let surface = surface.ok_or(Fallback::Surface)?;
+        let moved = surface.saturating_add(u64::from(last.step(tool, self.unit)));
+        if moved.saturating_add(u64::from(self.behind)) > u64::from(FARTHEST) {
+            return Err(Fallback::Jump);
+        }
+        Ok(moved as u32)
+    }
+}
+
+impl Last {
+    fn new(tool: &impl Tool, travel: Travel) -> Self {
+        let (start, span) = (tool.axis_start(), tool.axis_span());
+        Self { start, span, length: tool.axis_length(), travel }
+    }
+
+    /// The farthest that a point of the axis is from where it was, or a point of another tool's axis from this
+    /// one's, in units: the larger of the ends' steps.
+    #[inline(always)]
+    fn step(&self, tool: &impl Tool, unit: Unit) -> u32 {
+        const U: f32 = 1.0 / 16_777_216.0;
+        let (start, end) = (tool.axis_start() - self.start, tool.axis_span() - self.span);
+        if start == Vec3::ZERO && end == Vec3::ZERO {
+            return 0;
+        }
+        let (start, end) = (start.length_squared(), (start + end).length_squared());
+        let larger = if start > end { start } else { end };
+        // A span is within 2^-23 of the length, each difference within 2^-24 of itself.
+        let rounding = 8.0 * U * (tool.axis_length() + self.length);
+        unit.up(sqrt(larger) * (1.0 + 16.0 * U) + rounding)
+    }
+}

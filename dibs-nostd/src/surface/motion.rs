@@ -1,0 +1,277 @@
+//! How far a surface has moved: the odometer by which a tracker's bounds run out.
+//!
+//! A bound of a distance holds for as long as nothing has moved by more than it has to spare. So all that
+//! has to be known of a moving surface is a number that grows, from frame to frame, by at least the
+//! distance that any vertex moved. Two readings of it, however many frames apart, bound the motion between
+//! them: frames that nobody looked at add up by themselves.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use glam::Vec3;
+
+use super::moving::Step;
+use crate::math::sqrt::sqrt;
+use crate::{Index, Tree, VertexTable};
+
+/// A surface whose motion is known: a table of positions, and the reading of its odometer.
+///
+/// Sealed: only what measures a motion may state one.
+pub trait MovingSurface: VertexTable + sealed::Sealed {
+    /// The odometer's reading at this frame; `None` where nobody measures the motion.
+    fn travel(&self) -> Option<Travel>;
+}
+
+mod sealed {
+    pub trait Sealed {}
+    impl<V: super::VertexTable + ?Sized> Sealed for super::Moved<'_, V> {}
+    impl<S: super::MovingSurface + ?Sized> Sealed for &S {}
+    impl<W, V> Sealed for crate::surface::moving::Between<'_, W, V>
+    where
+        W: super::VertexTable + ?Sized,
+        V: super::VertexTable + ?Sized,
+    {
+    }
+}
+
+impl<S: MovingSurface + ?Sized> MovingSurface for &S {
+    fn travel(&self) -> Option<Travel> {
+        (**self).travel()
+    }
+}
+
+/// The reading of a surface's odometer.
+///
+/// Between two readings of one odometer no vertex moved farther than
+/// [`since`](Self::since) says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Travel {
+    tree: u32,
+    /// An unbroken run of measurements: no two have the same number.
+    chain: u32,
+    /// In the tree's units: how far along the path that leads through all frames.
+    reading: u64,
+    /// How far from that path: an extrapolated surface is on a way of its own, which goes no farther.
+    aside: i64,
+}
+
+impl Travel {
+    /// The farthest that a vertex can have moved between two readings, in the tree's [`Unit`]; `None` if the
+    /// motion was not measured all the way.
+    #[inline]
+    pub(crate) fn since(&self, before: &Self) -> Option<u64> {
+        if self.tree != before.tree || self.chain != before.chain {
+            return None;
+        }
+        let along = self.reading.abs_diff(before.reading);
+        if along == 0 {
+            return Some(self.aside.abs_diff(before.aside));
+        }
+        let aside = self.aside.unsigned_abs().saturating_add(before.aside.unsigned_abs());
+        Some(along.saturating_add(aside))
+    }
+
+    /// This reading, so many units farther along the path, or on a way of its own.
+    pub(super) fn beyond(self, along: u64, aside: i64) -> Self {
+        let reading = self.reading.saturating_add(along);
+        Self { reading, aside: self.aside.saturating_add(aside), ..self }
+    }
+}
+
+/// What lengths are counted in where they are added up: a power of two, 2^-24 of the tree's root sphere or less.
+///
+/// Integers add without rounding, and wrap without a seam.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Unit {
+    length: f32,
+    inverse: f32,
+}
+
+impl Unit {
+    pub(crate) const fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
+        const EXPONENT: u32 = 0xFF << 23;
+        let radius = match tree.node(0) {
+            Some((_, radius, _)) => radius,
+            None => 0.0,
+        };
+        // Far from where a product underflows or overflows. Written so that NaN becomes a number.
+        let radius = if radius > 1e-20 { radius } else { 1e-20 };
+        let radius = if radius < 1e20 { radius } else { 1e20 };
+        let power = f32::from_bits(radius.to_bits() & EXPONENT);
+        Self { length: power / 16_777_216.0, inverse: 16_777_216.0 / power }
+    }
+
+    /// A length in units, rounded down: 0 for what is not a number or negative, at most [`FAR`].
+    #[inline(always)]
+    pub(crate) fn down(self, length: f32) -> u32 {
+        let units = (length * self.inverse) as i32;
+        let units = if units < FAR { units } else { FAR };
+        if units > 0 { units as u32 } else { 0 }
+    }
+
+    /// A length in units, rounded up, at most about [`FAR`].
+    #[inline(always)]
+    pub(crate) fn up(self, length: f32) -> u32 {
+        self.down(length).wrapping_add(1)
+    }
+
+    /// The length of so many units, to the nearest f32.
+    #[inline(always)]
+    pub(crate) fn length(self, units: i32) -> f32 {
+        units as f32 * self.length
+    }
+}
+
+/// The largest number of units that a length is counted as: 64 times the root sphere's radius or more.
+pub(crate) const FAR: i32 = 1 << 30;
+
+/// A table of positions, with the reading of its surface's [`Odometer`].
+///
+/// It borrows the table: what was measured cannot change while it lives.
+#[derive(Debug)]
+pub struct Moved<'v, V: ?Sized> {
+    pub(super) table: &'v V,
+    pub(super) travel: Travel,
+}
+
+impl<V: ?Sized> Clone for Moved<'_, V> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<V: ?Sized> Copy for Moved<'_, V> {}
+
+impl<V: VertexTable + ?Sized> VertexTable for Moved<'_, V> {
+    fn len(&self) -> usize {
+        self.table.len()
+    }
+
+    #[inline(always)]
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.table.position(vertex)
+    }
+
+    fn epoch(&self) -> Option<u32> {
+        self.table.epoch()
+    }
+}
+
+impl<V: VertexTable + ?Sized> MovingSurface for Moved<'_, V> {
+    fn travel(&self) -> Option<Travel> {
+        Some(self.travel)
+    }
+}
+
+/// Measures how far a surface moves from one frame to the next.
+///
+/// Only a measurement makes a [`Travel`], and only of frames that follow one another: a frame that is not
+/// the one measured last, by a digest of all its positions, starts anew, and so does whatever was tracked
+/// on it.
+///
+/// ```
+/// use dibs_build::{Builder, generate};
+/// use dibs_nostd::{MovingSurface, Odometer, Tree};
+///
+/// let (heart, motion) = generate::heart(320)?;
+/// let built = Builder::new().stretch(1.5).build(&heart)?;
+/// let tree = Tree::<u16>::from_bytes(built.blob())?;
+/// let [first, second] = [0, 1].map(|frame: usize| built.to_rows(&motion.frames[frame]));
+///
+/// let mut odometer = Odometer::new(&tree);
+/// let before = odometer.start(first.as_slice());
+/// let step = odometer.step(first.as_slice(), second.as_slice());
+/// assert!(step.length() > 0.0 && step.after().travel() != before.travel());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Odometer {
+    unit: Unit,
+    tree: u32,
+    vertices: usize,
+    travel: Option<Travel>,
+    /// Of the frame measured last.
+    digest: u32,
+}
+
+impl Odometer {
+    /// An odometer for surfaces of this tree.
+    #[must_use]
+    pub const fn new<I: Index>(tree: &Tree<'_, I>) -> Self {
+        Self {
+            unit: Unit::of(tree),
+            tree: tree.checksum(),
+            vertices: tree.vertex_count() as usize,
+            travel: None,
+            digest: 0,
+        }
+    }
+
+    /// A frame of whose past nothing is known.
+    ///
+    /// Cost: one pass over the vertices.
+    pub fn start<'v, V: VertexTable + ?Sized>(&mut self, surface: &'v V) -> Moved<'v, V> {
+        self.travel = None;
+        self.step(surface, surface).after()
+    }
+
+    /// The frame `after` that follows `before`, which must be the one measured last: else whatever is tracked
+    /// starts anew.
+    ///
+    /// Cost: one pass over the vertices of both, some 15 floating point operations each.
+    pub fn step<'v, V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
+        &mut self,
+        before: &'v W,
+        after: &'v V,
+    ) -> Step<'v, W, V> {
+        let (mut from, mut to) = (Digest::new(), Digest::new());
+        let mut largest = 0.0_f32;
+        let mut is_measured = before.len() == self.vertices && after.len() == self.vertices;
+        for vertex in 0..self.vertices as u32 {
+            let (Some(old), Some(new)) = (before.position(vertex), after.position(vertex)) else {
+                is_measured = false;
+                break;
+            };
+            from.add(old);
+            to.add(new);
+            let squared = new.distance_squared(old);
+            if squared > largest {
+                largest = squared;
+            }
+            // What is not a number is not below infinity either.
+            is_measured &= squared < f32::INFINITY;
+        }
+        // Differences and squares are rounded by a few parts in 2^24, and underflow below 1e-22.
+        let length = sqrt(largest) * (1.0 + 4.0 * f32::EPSILON) + 1e-20;
+        let units = ((length * self.unit.inverse) as u64).saturating_add(1);
+        let start = || Travel { tree: self.tree, chain: next_chain(), reading: 0, aside: 0 };
+        let from_last = self.travel.filter(|_| self.digest == from.0).unwrap_or_else(start);
+        let (from, units) = if is_measured { (from_last, units) } else { (start(), 0) };
+        let travel = from.beyond(units, 0);
+        self.digest = to.0;
+        self.travel = Some(travel);
+        Step { before, after, from, travel, units, is_measured, length }
+    }
+}
+
+/// A number that no other run of measurements has.
+fn next_chain() -> u32 {
+    static NEXT: AtomicU32 = AtomicU32::new(0);
+    NEXT.fetch_add(1, Ordering::Relaxed)
+}
+
+/// Tells one frame from another: FNV-1a of the positions' bits, word by word.
+struct Digest(u32);
+
+impl Digest {
+    const fn new() -> Self {
+        Self(0x811C_9DC5)
+    }
+
+    #[inline(always)]
+    fn add(&mut self, position: Vec3) {
+        for axis in position.to_array() {
+            self.0 = (self.0 ^ axis.to_bits()).wrapping_mul(0x0100_0193);
+        }
+    }
+}
