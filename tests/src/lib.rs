@@ -21,6 +21,7 @@ pub mod streams;
 pub mod stretch;
 #[cfg(feature = "builder")]
 pub mod surfaces;
+pub mod tree_bytes;
 
 /// The README's code: it compiles, and its control loop runs.
 #[cfg(doctest)]

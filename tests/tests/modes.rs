@@ -6,8 +6,7 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use dibs_build::modes::{MARGIN, ModalFit, ModesError, Projector};
-use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, Motion, MotionStretch, Paths, generate};
-use dibs_nostd::format::CRC;
+use dibs_build::{Builder, BuiltTree, IndexWidth, Motion, MotionStretch, Paths, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::modes::{
     self, MAX_MODES, Memo, ModalGate, ModalReader, ModalSurface, Modes, WeightsError,
@@ -17,11 +16,12 @@ use dibs_nostd::{
     Advance, Assembler, Changed, Frames, Gate, Index, Options, Query, Rejection, Sphere,
     StretchError, Tree, Verdict, VertexTable, measure_stretch,
 };
+use dibs_tests::ask;
 use dibs_tests::bus::reseal;
 use dibs_tests::motions::trembling;
 use dibs_tests::oracle::exhaustive;
 use dibs_tests::poses::pose;
-use dibs_tests::{ask, stretch};
+use dibs_tests::tree_bytes::{reseal as reseal_tree, section};
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -148,60 +148,6 @@ fn lazy_is_eager<I: Index>(tree: &Tree<'_, I>) {
     }
     let share = computed as f64 / f64::from(queries * tree.vertex_count());
     assert!(share < 0.5, "{share} of the vertices were computed");
-}
-
-/// The bound is never below the true stretch, whatever the weights, and at a recorded frame hardly
-/// above it.
-#[test]
-fn the_stretch_bound_is_sound_and_tight() {
-    let (mesh, motion) = trembling(1_000, 5, 4);
-    let fit = ModalFit::new(&mesh, &motion).expect("a motion");
-    let mut rng = Rng::with_seed(12);
-    let limits: Vec<f32> = mesh.triangles.iter().map(|_| 1.6 + 1.4 * rng.f32()).collect();
-    let surface = Paths::Surface { crossings: 2 };
-    for (paths, limited) in [(Paths::Edges, false), (surface, false), (surface, true)] {
-        let builder = Builder::new().stretch(3.0).paths(paths);
-        let builder = if limited { builder.limits(limits.clone()) } else { builder };
-        let built =
-            builder.build(&mesh).expect("a valid mesh").with_modes(&fit, 10).expect("so many");
-        let tree = built.tree::<u16>().expect("valid");
-        let modes = Modes::of(&tree).expect("valid");
-        let rows =
-            Mesh { positions: built.to_rows(&mesh.positions), triangles: triangle_rows(&tree) };
-        let recorded = &built.modal_motion().expect("has modes").weights;
-        let mut rng = Rng::with_seed(5);
-        let check = |weights: &[f32], most: f64| {
-            let surface = modes.surface::<10>(weights).expect("in range");
-            let now = positions(&surface);
-            // Counted as the part of its limit that it takes.
-            let share = |triangle: u32| {
-                let limit = tree.stretch_limit(triangle).expect("in the table");
-                let own = stretch::of_triangle(&rows, &now, triangle as usize, tree.paths());
-                own * f64::from(tree.stretch()) / f64::from(limit)
-            };
-            let truth = (0..tree.triangle_count()).map(share).fold(0.0, f64::max);
-            let bound = modes.stretch_bound(weights).expect("in range");
-            let sigma = f64::from(bound.sigma());
-            assert!(sigma >= truth, "{sigma} is below {truth}");
-            assert!(sigma <= truth * most + 1e-6, "{sigma} for {truth}");
-        };
-        for (frame, weights) in recorded.iter().enumerate() {
-            check(weights, 1.0002);
-            let next = &recorded[(frame + 1) % recorded.len()];
-            for _ in 0..20 {
-                let t = rng.f32();
-                let blend = |noise: f32, rng: &mut Rng| -> Vec<f32> {
-                    let of_mode =
-                        |(a, b): (&f32, &f32)| a + t * (b - a) + noise * (rng.f32() - 0.5);
-                    weights.iter().zip(next).map(of_mode).collect()
-                };
-                check(&blend(0.0, &mut rng), 1.1);
-                check(&blend(0.05, &mut rng), 1.3);
-                check(&anywhere(&modes, &mut rng), 4.0);
-            }
-        }
-        check(&[0.0; 10], 1.0002);
-    }
 }
 
 #[test]
@@ -508,10 +454,7 @@ fn damaged_modes_do_not_validate() {
     let damaged = |at: usize, bytes: &[u8]| {
         let mut blob = blob.to_vec();
         blob[start + at..][..bytes.len()].copy_from_slice(bytes);
-        let mut digest = CRC.digest();
-        digest.update(&blob[..60]);
-        digest.update(&blob[64..]);
-        blob[60..64].copy_from_slice(&digest.finalize().to_le_bytes());
+        reseal_tree(&mut blob);
         let tree = Tree::<u16>::from_bytes(&blob).expect("the tree itself is sound");
         Modes::of(&tree).map(|modes| {
             let weights = vec![0.0; modes.count()];
@@ -576,14 +519,6 @@ fn damaged_modes_do_not_validate() {
     }
 }
 
-/// Offset and length of a section, read by the specification alone.
-fn section(bytes: &[u8], kind: u32) -> (usize, usize) {
-    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
-    let row = (0..word(48) as usize).map(|r| 64 + 12 * r).find(|&at| word(at) == kind);
-    let at = row.expect("the section is there");
-    (word(at + 4) as usize, word(at + 8) as usize)
-}
-
 dibs_nostd::include_tree!("modal_heart");
 
 /// The generated module is what the builder built.
@@ -608,14 +543,10 @@ fn the_generated_module_holds_the_modes() {
 
 /// All 24 modes of the real heart's 25 frames: driven whole by as many numbers a tick.
 #[test]
+#[cfg_attr(not(real_meshes), ignore = "../shared/data is absent")]
 fn the_real_heart_is_driven_by_its_modes() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let path = folder.join("heart_10272.ply");
-    if !path.exists() {
-        println!("skipped: {} is not there", path.display());
-        return;
-    }
-    let mesh = dibs_build::read(path).expect("a mesh").mesh;
+    let mesh = dibs_build::read(folder.join("heart_10272.ply")).expect("a mesh").mesh;
     let motion = Motion::read_pc2(folder.join("heart_10272.pc2")).expect("a motion");
     let fit = ModalFit::new(&mesh, &motion).expect("fits");
     assert_eq!(fit.available(), 24);

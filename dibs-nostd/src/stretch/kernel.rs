@@ -173,3 +173,26 @@ pub(super) fn squared_limit(limit: f32) -> f32 {
 pub(super) fn root_up(squared: f32) -> f32 {
     sqrt(squared) * (1.0 + 4.0 * U)
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// What is compared with the limit's square is never above it, and hardly below.
+        #[test]
+        fn a_limit_is_squared_downwards(limit in 1.0_f32..1e6) {
+            let (exact, squared) = (f64::from(limit).powi(2), f64::from(squared_limit(limit)));
+            prop_assert!(squared <= exact && squared >= exact * (1.0 - 5.0 * f64::from(U)));
+        }
+
+        /// A root is never below the true one, and hardly above.
+        #[test]
+        fn a_root_is_taken_upwards(squared in LEAST..1e12) {
+            let (exact, root) = (f64::from(squared).sqrt(), f64::from(root_up(squared)));
+            prop_assert!(root >= exact && root <= exact * (1.0 + 7.0 * f64::from(U)));
+        }
+    }
+}
