@@ -1,13 +1,28 @@
 //! The README's `build.rs`, with a generated mesh instead of a file: the README's control loop is a
-//! documentation example of this package. And the same with modes, for their tests.
+//! documentation example of this package. And the same with modes, for their tests. Tests on real meshes are
+//! ignored where these are absent.
+
+/// Real meshes, beside the repository.
+const DATA: &str = "../../shared/data";
+
+/// `cfg(real_meshes)` where they are there.
+fn look_for_real_meshes() {
+    println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rustc-check-cfg=cfg(real_meshes)");
+    if std::path::Path::new(DATA).is_dir() {
+        println!("cargo:rerun-if-changed={DATA}");
+        println!("cargo:rustc-cfg=real_meshes");
+    }
+}
 
 #[cfg(not(feature = "builder"))]
 fn main() {
-    println!("cargo:rerun-if-changed=build.rs");
+    look_for_real_meshes();
 }
 
 #[cfg(feature = "builder")]
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    look_for_real_meshes();
     let (mesh, motion) = dibs_build::generate::heart(1_000)?;
     let tree = dibs_build::tree(mesh.clone()).stretch(1.5).try_emit("heart")?;
     let fit = dibs_build::modes::ModalFit::new(&mesh, &motion)?;

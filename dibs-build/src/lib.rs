@@ -16,6 +16,7 @@ mod array;
 mod builder;
 mod construct;
 mod error;
+mod export;
 mod fans;
 pub mod generate;
 mod geodesic;

@@ -1,6 +1,5 @@
 //! Output files appear complete or not at all.
 
-use crate::Mesh;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -33,6 +32,9 @@ pub enum WriteErrorKind {
         /// Vertices of this one.
         found: usize,
     },
+    /// A name whose end is no format that can be written.
+    #[error("a mesh is written as what its name ends in: .ply, .stl, .obj or .off")]
+    UnknownFormat,
     /// More elements than the format can count.
     #[error("{count} {element} are more than the format can count")]
     TooMany {
@@ -91,40 +93,10 @@ fn fill(file: &File, contents: impl FnOnce(&mut dyn Write) -> io::Result<()>) ->
     buffered.flush()
 }
 
-impl Mesh {
-    /// Writes a binary little-endian PLY file: f32 positions, 32-bit vertex numbers.
-    ///
-    /// # Errors
-    /// [`WriteError`]; the file is complete or untouched.
-    pub fn write_ply(&self, path: impl AsRef<Path>) -> Result<(), WriteError> {
-        write_atomically(path, |out| {
-            write!(
-                out,
-                "ply\nformat binary_little_endian 1.0\n\
-                 element vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
-                 element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
-                self.positions.len(),
-                self.triangles.len()
-            )?;
-            for position in &self.positions {
-                for coordinate in position.to_array() {
-                    out.write_all(&coordinate.to_le_bytes())?;
-                }
-            }
-            for triangle in &self.triangles {
-                out.write_all(&[3])?;
-                for corner in triangle {
-                    out.write_all(&corner.to_le_bytes())?;
-                }
-            }
-            Ok(())
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Mesh;
 
     #[test]
     fn failure_leaves_the_old_file_and_nothing_else() {

@@ -1,5 +1,6 @@
 //! The `dibs` program, as a script would run it.
 
+use dibs_build::Format;
 use dibs_nostd::modes::{ModalGate, ModalReader, Modes};
 use dibs_nostd::{Advance, Assembler, Frames, Tree, VertexTable};
 use serde_json::Value;
@@ -232,21 +233,27 @@ fn weights_are_streamed() {
     assert!(error.contains("heart.ply"), "{error}");
 }
 
-/// The program and the library agree on every malformed file; what the library must say about
-/// each is asserted in the tests package. The files are not part of the project.
+/// The program and the library agree on what is wrong with a file, and on what they make of it; what the library
+/// must say about each is asserted in the tests package.
 #[test]
 fn malformed_files_end_as_the_library_says() {
-    let nasty = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/nasty");
-    if !nasty.is_dir() {
-        println!("skipped: {} is absent", nasty.display());
-        return;
-    }
+    const FILES: [(&str, &str); 8] = [
+        ("empty.stl", ""),
+        ("prose.txt", "very few triangles here"),
+        ("cut.stl", "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n"),
+        ("nan.obj", "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n"),
+        ("beyond.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"),
+        ("two.off", "OFF\n6 2 0\n0 0 0\n1 0 0\n0 1 0\n5 0 0\n6 0 0\n5 1 0\n3 0 1 2\n3 3 4 5\n"),
+        ("quad.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"),
+        ("thin.off", "OFF\n5 2 0\n0 0 0\n1 0 0\n0 1 0\n2 0 0\n3 0 0\n3 0 1 2\n3 1 3 4\n"),
+    ];
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("tree.dibs");
-    for entry in std::fs::read_dir(nasty).unwrap() {
-        let path = entry.unwrap().path();
-        let line = format!("build {} -o tree.dibs --stretch 1.3 --json", path.display());
-        match dibs_build::read(&path) {
+    let (mut meshes, mut errors) = (0, 0);
+    for (name, text) in FILES {
+        std::fs::write(folder.path().join(name), text).unwrap();
+        let line = format!("build {name} -o tree.dibs --stretch 1.3 --json");
+        match dibs_build::read(folder.path().join(name)) {
             Ok(import) => {
                 let built = json(folder.path(), &line);
                 let report = serde_json::to_value(&import.report).unwrap();
@@ -254,13 +261,111 @@ fn malformed_files_end_as_the_library_says() {
                 assert_eq!(built["tree"]["triangles"], report["triangles"], "{line}");
                 json(folder.path(), "inspect tree.dibs --json");
                 std::fs::remove_file(&output).unwrap();
+                meshes += 1;
             }
             Err(error) => {
-                assert_eq!(fails(folder.path(), &line), error.to_string());
+                let message = format!("{name}: {}", error.kind);
+                assert_eq!(fails(folder.path(), &line), message);
                 assert!(!output.exists(), "{line}");
+                errors += 1;
             }
         }
     }
+    assert_eq!((meshes, errors), (2, 6));
+}
+
+/// Nobody need read the results to the end, and where they cannot be printed that is an error, not a panic.
+#[cfg(target_os = "linux")]
+#[test]
+fn results_that_nobody_reads_or_no_disk_holds() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeeds(folder, "generate heart --triangles 320 -o heart.ply --motion heart.pc2");
+    succeeds(folder, "build heart.ply -o heart.dibs --stretch 3");
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let to = format!("--to udp:{}", socket.local_addr().unwrap());
+    for line in [
+        "generate heart --triangles 320 -o other.ply --motion other.pc2",
+        "build heart.ply -o other.dibs --json",
+        "build heart.ply -o other.dibs",
+        "stretch heart.ply heart.pc2 --limits other.limits",
+        "inspect heart.dibs",
+        "inspect heart.dibs --json",
+        "query heart.dibs --tool sphere:0,0,150,5 --json",
+        &format!("stream heart.dibs heart.pc2 {to} --frames 3 --json"),
+    ] {
+        let run = |stdout: std::process::Stdio| {
+            let words = line.split_whitespace();
+            let mut dibs = Command::new(env!("CARGO_BIN_EXE_dibs"));
+            dibs.current_dir(folder).args(words).stdout(stdout).output().unwrap()
+        };
+        let full = run(std::fs::File::options().write(true).open("/dev/full").unwrap().into());
+        let error = String::from_utf8(full.stderr).unwrap();
+        assert_eq!(full.status.code(), Some(1), "{line}: {error}");
+        assert!(error.contains("error: the results cannot be printed"), "{line}: {error}");
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let closed = run(writer.into());
+        let error = String::from_utf8(closed.stderr).unwrap();
+        assert!(closed.status.success() && !error.contains("error"), "{line}: {error}");
+    }
+    // What was to be written was.
+    for file in ["other.ply", "other.pc2", "other.dibs", "other.limits"] {
+        assert!(folder.join(file).metadata().unwrap().len() > 100, "{file}");
+    }
+}
+
+/// A mesh is written as what its name says, and reads back as the same surface.
+#[test]
+fn a_mesh_is_what_its_name_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let (mesh, _) = dibs_build::generate::heart(320).unwrap();
+    for (name, format) in [
+        ("h.ply", Format::Ply),
+        ("h.STL", Format::StlBinary),
+        ("h.obj", Format::Obj),
+        ("h.off", Format::Off),
+    ] {
+        succeeds(folder, &format!("generate heart --triangles 320 -o {name}"));
+        let import = dibs_build::read(folder.join(name)).unwrap();
+        assert_eq!(import.report.format, format, "{name}");
+        assert_eq!(import.report.warnings().collect::<Vec<_>>(), [""; 0], "{name}");
+        let corners = |mesh: &dibs_build::Mesh| -> Vec<_> {
+            mesh.triangles
+                .iter()
+                .map(|corners| corners.map(|v| mesh.positions[v as usize]))
+                .collect()
+        };
+        assert_eq!(corners(&import.mesh), corners(&mesh), "{name}");
+    }
+    let error = fails(folder, "generate heart --triangles 320 -o h.txt --motion h.pc2");
+    assert_eq!(
+        error,
+        "h.txt: a mesh is written as what its name ends in: .ply, .stl, .obj or .off"
+    );
+    assert!(!folder.join("h.txt").exists() && !folder.join("h.pc2").exists());
+}
+
+/// The program's own name, and sentences in which one triangle is one triangle.
+#[test]
+fn it_says_its_name_and_counts_in_english() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    assert!(succeeds(folder, "--version").starts_with("dibs 0."));
+    // Two triangles that share no vertex but two positions: welded, and nothing more to be said about them.
+    let soup = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 4 5 6\n";
+    std::fs::write(folder.join("soup.obj"), soup).unwrap();
+    std::fs::write(folder.join("one.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let of = |name: &str| {
+        let output = dibs(folder, &format!("build {name}.obj -o {name}.dibs"));
+        (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap())
+    };
+    let (read, warnings) = of("soup");
+    assert!(read.contains("4 vertices, 2 triangles, 2 vertices welded to others"), "{read}");
+    assert_eq!(warnings, "warning: soup.obj: 4 open border edges\n");
+    let (read, _) = of("one");
+    assert!(read.contains("3 vertices, 1 triangle\n") && !read.contains("1 triangles"), "{read}");
 }
 
 #[test]

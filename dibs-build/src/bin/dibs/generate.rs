@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use clap::Subcommand;
-use dibs_build::generate;
+use dibs_build::{Format, generate};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -22,7 +22,7 @@ enum Surface {
         /// Triangles: an even number
         #[arg(long, default_value_t = 10_272)]
         triangles: u32,
-        /// The mesh to write, PLY
+        /// The mesh to write: .ply, .stl, .obj or .off
         #[arg(short, long)]
         output: PathBuf,
         /// The motion to write, PC2: one cycle
@@ -34,25 +34,28 @@ enum Surface {
         /// Triangles: an even number
         #[arg(long, default_value_t = 50_000)]
         triangles: u32,
-        /// The mesh to write, PLY
+        /// The mesh to write: .ply, .stl, .obj or .off
         #[arg(short, long)]
         output: PathBuf,
     },
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    let (mesh, output) = match &args.surface {
-        Surface::Heart { triangles, output, motion } => {
+    let (Surface::Heart { output, .. } | Surface::Brain { output, .. }) = &args.surface;
+    // Before the work, not after it.
+    let format = Format::from_name(output)?;
+    let mesh = match &args.surface {
+        Surface::Heart { triangles, motion, .. } => {
             let (mesh, beat) = generate::heart(*triangles)?;
             if let Some(path) = motion {
                 beat.write_pc2(path)?;
                 println!("written  {}: {} frames", path.display(), beat.frames.len());
             }
-            (mesh, output)
+            mesh
         }
-        Surface::Brain { triangles, output } => (generate::brain(*triangles)?, output),
+        Surface::Brain { triangles, .. } => generate::brain(*triangles)?,
     };
-    mesh.write_ply(output)?;
+    mesh.write(output, format)?;
     let (vertices, triangles) = (mesh.positions.len(), mesh.triangles.len());
     println!("written  {}: {vertices} vertices, {triangles} triangles", output.display());
     Ok(())

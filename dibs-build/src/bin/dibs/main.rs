@@ -1,5 +1,8 @@
 //! `dibs`: from a mesh file to a tree, and queries on it, on the command line.
 
+#[macro_use]
+mod output;
+
 mod build;
 mod generate;
 mod inspect;
@@ -16,7 +19,7 @@ use std::process::ExitCode;
 
 /// Closest points on a deforming surface, by trees that never need refitting.
 #[derive(Parser)]
-#[command(version, after_help = EXAMPLES)]
+#[command(name = "dibs", version, after_help = EXAMPLES)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -62,7 +65,7 @@ fn main() -> ExitCode {
         Command::Stream(args) => stream::run(&args),
         Command::Generate(args) => generate::run(&args),
     };
-    match outcome {
+    match outcome.and_then(|()| output::finish()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");

@@ -26,7 +26,7 @@ pub fn validate<'a>(bytes: &'a [u8], path: &Path) -> Result<AnyTree<'a>> {
 pub fn print(summary: &Summary) {
     let s = summary;
     println!(
-        "tree     {} triangles, {} vertices, {} nodes, stack {}, {}-bit indices",
+        "tree     triangles {}, vertices {}, nodes {}, stack {}, {}-bit indices",
         s.triangles, s.vertices, s.nodes, s.stack, s.index_bits
     );
     let paths = if s.surface_paths { "of triangles" } else { "of edges" };

@@ -1,0 +1,47 @@
+//! Standard output and standard error, which may be a full disk or a pipe that nobody reads any more.
+//!
+//! The `println!` and `eprintln!` of this program: unlike the standard ones they do not panic.
+
+use std::fmt;
+use std::io::{self, ErrorKind, Write};
+use std::sync::OnceLock;
+
+/// As the standard one, but a failure is kept for [`finish`].
+macro_rules! println {
+    ($($text:tt)*) => { $crate::output::print(format_args!($($text)*)) };
+}
+
+/// As the standard one, but a failure is ignored: there is nowhere to say it.
+macro_rules! eprintln {
+    ($($text:tt)*) => { $crate::output::warn(format_args!($($text)*)) };
+}
+
+/// Why the first line that could not be printed was not.
+static FAILURE: OnceLock<io::Error> = OnceLock::new();
+
+/// Prints a line of results. After a failure nothing more is printed, but the work goes on: files are still written.
+pub fn print(line: fmt::Arguments<'_>) {
+    if FAILURE.get().is_none()
+        && let Err(error) = writeln!(io::stdout(), "{line}")
+    {
+        // Set by another thread: that one came first.
+        let _ = FAILURE.set(error);
+    }
+}
+
+/// Prints a line on standard error.
+pub fn warn(line: fmt::Arguments<'_>) {
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
+/// Whether all results were printed. A reader that has seen enough (`dibs inspect --json | head -1`) is no error.
+pub fn finish() -> anyhow::Result<()> {
+    let flushed = io::stdout().flush();
+    let failure = FAILURE.get().or(flushed.as_ref().err());
+    match failure {
+        Some(error) if error.kind() != ErrorKind::BrokenPipe => {
+            anyhow::bail!("the results cannot be printed ({error})")
+        }
+        _ => Ok(()),
+    }
+}
