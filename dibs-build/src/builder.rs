@@ -3,11 +3,11 @@
 use dibs_nostd::Index;
 use dibs_nostd::format::{MAX_CHILDREN, MAX_LEAF_TRIANGLES};
 
-use crate::Mesh;
 use crate::array::{BuiltTree, Facts, flatten};
 use crate::construct::{Cluster, Construction, Constructor, Surface, widen};
 use crate::error::BuildError;
 use crate::geodesic::{Graph, Topology};
+use crate::mesh::{Mesh, RestSurface};
 use crate::rest::{Paths, Shares, has_area};
 
 /// Width of the vertex indices in the tree.
@@ -158,25 +158,31 @@ impl<'p> Builder<'p> {
         Builder { progress: report, ..self }
     }
 
-    /// Builds the tree. The same mesh and options give the same bytes, whatever the threads.
+    /// Builds the tree of a [`Mesh`], or of an [`Import`](crate::Import) whose rounding to f32 then counts in the
+    /// accuracy of every answer. The same mesh and options give the same bytes, whatever the threads.
     ///
     /// Cost: `O(n log^2 n)` for `n` triangles, on all cores.
     ///
     /// # Errors
     /// [`BuildError`] names what is wrong with the mesh or the options.
-    pub fn build(&self, mesh: &Mesh) -> Result<BuiltTree, BuildError> {
+    pub fn build(&self, surface: &(impl RestSurface + ?Sized)) -> Result<BuiltTree, BuildError> {
+        let (mesh, error) = (surface.mesh(), surface.position_error());
         self.check(mesh)?;
         match self.index {
-            IndexWidth::Bits16 => self.build_with::<u16>(mesh),
-            IndexWidth::Bits32 => self.build_with::<u32>(mesh),
+            IndexWidth::Bits16 => self.build_with::<u16>(mesh, error),
+            IndexWidth::Bits32 => self.build_with::<u32>(mesh, error),
             IndexWidth::Fitting if mesh.positions.len() <= u16::MAX_VERTICES as usize => {
-                self.build_with::<u16>(mesh)
+                self.build_with::<u16>(mesh, error)
             }
-            IndexWidth::Fitting => self.build_with::<u32>(mesh),
+            IndexWidth::Fitting => self.build_with::<u32>(mesh, error),
         }
     }
 
-    fn build_with<I: Index>(&self, mesh: &Mesh) -> Result<BuiltTree, BuildError> {
+    fn build_with<I: Index>(
+        &self,
+        mesh: &Mesh,
+        position_error: f32,
+    ) -> Result<BuiltTree, BuildError> {
         let vertices = mesh.positions.len();
         if vertices > I::MAX_VERTICES as usize {
             let (most, bits) = (I::MAX_VERTICES, 8 * I::BYTES);
@@ -195,6 +201,7 @@ impl<'p> Builder<'p> {
             paths: paths.kind(),
             stretch,
             shares: &shares,
+            position_error,
             with_order: self.with_order,
             with_rest: self.with_rest,
             with_metric: self.with_metric,

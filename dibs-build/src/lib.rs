@@ -26,6 +26,7 @@ pub mod modes;
 mod pc2;
 mod read;
 mod rest;
+mod rounding;
 mod script;
 #[cfg(feature = "stream")]
 pub mod stream;
@@ -36,7 +37,7 @@ pub use array::{BuiltTree, ModesSummary, Summary, summarise};
 pub use builder::{Builder, IndexWidth};
 pub use construct::Construction;
 pub use error::BuildError;
-pub use mesh::{Mesh, Motion};
+pub use mesh::{Mesh, Motion, RestSurface};
 pub use pc2::MotionMismatch;
 pub use read::{Format, Import, ReadError, ReadErrorKind, ReadOptions, Report, read};
 pub use rest::Paths;

@@ -21,6 +21,35 @@ impl Mesh {
     }
 }
 
+/// Anything that a tree is built on: a [`Mesh`], or an [`Import`](crate::Import).
+pub trait RestSurface {
+    /// Its positions and triangles.
+    fn mesh(&self) -> &Mesh;
+
+    /// How far a vertex may be from where it should be (in the mesh's unit, not negative).
+    fn position_error(&self) -> f32;
+}
+
+impl RestSurface for Mesh {
+    fn mesh(&self) -> &Mesh {
+        self
+    }
+
+    fn position_error(&self) -> f32 {
+        0.0
+    }
+}
+
+impl<S: RestSurface> RestSurface for &S {
+    fn mesh(&self) -> &Mesh {
+        (**self).mesh()
+    }
+
+    fn position_error(&self) -> f32 {
+        (**self).position_error()
+    }
+}
+
 /// A recorded or generated deformation of a mesh: every frame holds one position a vertex.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Motion {

@@ -3,7 +3,7 @@
 use std::env;
 use std::path::{Path, PathBuf};
 
-use crate::{Builder, BuiltTree, Mesh, ReadOptions, read_limits};
+use crate::{Builder, BuiltTree, Mesh, ReadOptions, RestSurface, read_limits};
 
 /// Begins the tree of a build script, from a mesh file or a [`Mesh`]: [`TreeScript::emit`] ends it.
 ///
@@ -144,25 +144,25 @@ impl TreeScript {
     }
 
     fn build(self, label: &str) -> Result<BuiltTree, Box<dyn std::error::Error>> {
-        let mesh = match self.mesh {
+        let surface: Box<dyn RestSurface> = match self.mesh {
             MeshSource::File(path) => {
                 let import = self.reading.read(path)?;
                 warn(label, import.report.warnings());
-                import.mesh
+                Box::new(import)
             }
-            MeshSource::Mesh(mesh) => mesh,
+            MeshSource::Mesh(mesh) => Box::new(mesh),
         };
         let builder = match &self.limits {
-            Some(path) => self.builder.limits(read_limits(path, &mesh)?),
+            Some(path) => self.builder.limits(read_limits(path, surface.mesh())?),
             None => self.builder,
         };
-        let built = builder.build(&mesh).map_err(|error| format!("{label}: {error}"))?;
+        let built = builder.build(&*surface).map_err(|error| format!("{label}: {error}"))?;
         warn(label, built.summary().warnings());
         #[cfg(feature = "modes")]
         if let Some((path, count)) = self.modes {
             let motion = crate::Motion::read_pc2(&path)?;
             let failed = |error| format!("{}: {error}", path.display());
-            let fit = crate::modes::ModalFit::new(&mesh, &motion).map_err(failed)?;
+            let fit = crate::modes::ModalFit::new(surface.mesh(), &motion).map_err(failed)?;
             return built.with_modes(&fit, count).map_err(|error| failed(error).into());
         }
         Ok(built)

@@ -53,7 +53,7 @@ fn every_field_and_section_stands_where_the_specification_says() {
         let (mesh, built) = heart(index);
         let bytes = built.blob();
         assert_eq!(&bytes[..4], b"DIBS");
-        assert_eq!(bytes[4..8], [3, 0, width as u8, 1]);
+        assert_eq!(bytes[4..8], [4, 0, width as u8, 1]);
         let (vertices, triangles, nodes) = (word(bytes, 12), word(bytes, 16), word(bytes, 20));
         assert_eq!(triangles as usize, mesh.triangles.len());
         assert_eq!(vertices as usize, mesh.positions.len());
@@ -107,9 +107,9 @@ fn a_wrong_value_with_a_right_checksum_is_named() {
     assert!(matches!(Tree::<u32>::from_bytes(bytes), Err(FormatError::Width { found: 2, .. })));
     assert!(matches!(refuse(0, 0), FormatError::Magic { .. }));
     assert!(matches!(refuse(4, 0x0102_0002), FormatError::Version { found: 2 }));
-    assert!(matches!(refuse(4, 0x0702_0003), FormatError::Field { offset: 7, value: 7 }));
+    assert!(matches!(refuse(4, 0x0702_0004), FormatError::Field { offset: 7, value: 7 }));
     for (at, value) in
-        [(12, 0), (12, 65_537), (16, 0), (20, 0), (24, 513), (36, 1), (40, 1), (44, 1), (56, 1)]
+        [(12, 0), (12, 65_537), (16, 0), (20, 0), (24, 513), (40, 1), (44, 1), (56, 1)]
     {
         let expected = FormatError::Field { offset: at as u8, value };
         assert_eq!(refuse(at, value), expected, "field at {at}");
@@ -117,6 +117,9 @@ fn a_wrong_value_with_a_right_checksum_is_named() {
     for wrong in [0.5f32, f32::NAN, f32::INFINITY] {
         assert!(matches!(refuse(28, wrong.to_bits()), FormatError::Field { offset: 28, .. }));
         assert!(wrong == 0.5 || matches!(refuse(32, wrong.to_bits()), FormatError::Field { .. }));
+    }
+    for wrong in [-0.5f32, f32::NAN, f32::INFINITY] {
+        assert!(matches!(refuse(36, wrong.to_bits()), FormatError::Field { offset: 36, .. }));
     }
     assert!(matches!(refuse(20, word(bytes, 20) - 1), FormatError::Section { kind: 1 }));
     assert!(matches!(refuse(64, 99), FormatError::Section { kind: 1 }));

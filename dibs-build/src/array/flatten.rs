@@ -69,6 +69,7 @@ pub(crate) struct Facts<'a> {
     pub paths: PathKind,
     pub stretch: f32,
     pub shares: &'a Shares,
+    pub position_error: f32,
     pub with_order: bool,
     pub with_rest: bool,
     pub with_metric: bool,
@@ -133,7 +134,7 @@ pub(crate) fn flatten<I: Index>(
         flat.stack,
         facts.stretch.to_bits(),
         unit.to_bits(),
-        0,
+        facts.position_error.to_bits(),
         0,
         0,
     ];

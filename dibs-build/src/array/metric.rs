@@ -6,6 +6,7 @@ use glam::{DVec3, Vec3};
 
 use crate::fans::openness;
 use crate::rest::RestShape;
+use crate::rounding::round_down;
 
 /// Rounding of the controller's check in f32, in units of 2^-24: derived in `dibs_nostd`'s
 /// `stretch/kernel.rs`.
@@ -50,12 +51,6 @@ pub(crate) fn metric(
             [first, near(e1.dot(e2) * scale, is_reversed), second]
         }
     }
-}
-
-/// The nearest f32 that is not above `x`.
-fn round_down(x: f64) -> f32 {
-    let near = x as f32;
-    if f64::from(near) > x { near.next_down() } else { near }
 }
 
 /// The largest number with this lowest bit that is not above `x`, which is positive; but 0 for 0.

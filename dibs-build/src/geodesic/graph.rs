@@ -16,6 +16,7 @@ use rayon::prelude::*;
 use super::Topology;
 use crate::Mesh;
 use crate::rest::{Paths, RestShape, Shares};
+use crate::rounding::round_up;
 
 /// Arcs from each vertex, in compressed rows. Lengths are weighted ones at rest, rounded up.
 #[derive(Debug)]
@@ -45,7 +46,10 @@ impl Graph {
                     .run();
                 found.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
                 found.dedup_by_key(|&mut (to, _)| to);
-                found.iter().map(|&(to, length)| Arc { to, length: round_up(length) }).collect()
+                found
+                    .iter()
+                    .map(|&(to, length)| Arc { to, length: round_up(length * (1.0 + UNFOLDING)) })
+                    .collect()
             })
             .collect();
         let mut start = Vec::with_capacity(rows.len() + 1);
@@ -68,12 +72,8 @@ impl Graph {
     }
 }
 
-/// The next f32 above, beyond the f64 rounding of a strip's unfolding.
-fn round_up(length: f64) -> f32 {
-    let raised = length * (1.0 + 1e-12);
-    let near = raised as f32;
-    if f64::from(near) < raised { near.next_up() } else { near }
-}
+/// What covers the f64 rounding of a strip's unfolding, as a part of a length.
+const UNFOLDING: f64 = 1e-12;
 
 /// Sine of the angle between a chord and an edge below which it is not certain where they cross.
 const GRAZING: f64 = 1e-5;

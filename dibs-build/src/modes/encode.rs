@@ -8,6 +8,7 @@ use super::growth::Triangles;
 use super::quantise::{QuantisedMode, gain, quantise, unit};
 use super::{MARGIN, ModalFit, ModalMotion, ModesError, Projector};
 use crate::BuildError;
+use crate::rounding::round_up;
 
 /// Adds the first `count` modes of a fit to a tree, whose rows hold the mesh vertices `order`.
 ///
@@ -88,7 +89,7 @@ impl<'a, I: Index> Shapes<'a, I> {
                 (largest, sum, points) = (largest.max(squared), sum + squared, points + 1);
             }
         }
-        Ok((up(largest.sqrt()), up((sum / points as f64).sqrt())))
+        Ok((round_up(largest.sqrt()), round_up((sum / points as f64).sqrt())))
     }
 
     /// The rest shape and recorded frames with their stretch, evenly spaced where they are too many;
@@ -160,7 +161,7 @@ impl Section {
             self.unit as f32,
             self.position_error,
             self.rms_error,
-            up(self.slack),
+            round_up(self.slack),
             MARGIN,
             0.0,
             0.0,
@@ -168,7 +169,7 @@ impl Section {
         put(&mut bytes, &header);
         for ((mode, [low, high]), growth) in self.modes.iter().zip(&self.ranges).zip(&self.growths)
         {
-            put(&mut bytes, &[*low, *high, gain(mode, self.unit), up(*growth)]);
+            put(&mut bytes, &[*low, *high, gain(mode, self.unit), round_up(*growth)]);
         }
         for anchor in &self.anchors {
             put(&mut bytes, &anchor.weights);
@@ -218,10 +219,4 @@ fn evaluation_error(
     }
     let farthest = rest.iter().map(|p| f64::from(p.abs().max_element())).fold(0.0, f64::max);
     units * unit + reach * U + (farthest + reach) * U
-}
-
-/// The nearest f32 that is not below `x`.
-fn up(x: f64) -> f32 {
-    let near = x as f32;
-    if f64::from(near) < x { near.next_up() } else { near }
 }

@@ -16,6 +16,10 @@ const LEAST_EXTENT: f64 = 1e-6;
 /// Above, fourth powers of distances overflow f32.
 const MOST_COORDINATE: f64 = dibs_nostd::MAX_COORDINATE as f64;
 
+/// The distance between neighbouring f32 numbers of the largest coordinate's size, as a part of the mesh's
+/// extent: a mesh of 100 mm may lie 80 m from the origin.
+const MOST_RESOLUTION: f64 = 1e-4;
+
 /// Ear clipping takes quadratic time at worst: below this, a second for one face.
 const MOST_CORNERS: usize = 10_000;
 
@@ -40,10 +44,13 @@ pub(crate) fn import(raw: &Raw, format: Format, options: &ReadOptions) -> Result
         border_edges: 0,
         non_manifold_edges: 0,
         inconsistent_edges: 0,
+        extent: 0.0,
+        position_error: position_error(raw),
     };
     let (faces, short) = triangles(raw, &mut report)?;
     let mut surface = Surface { positions, faces, short };
     check_scale(raw, format)?;
+    report.extent = check_distance(raw)?;
     surface.weld(is_stl, options.weld_tolerance, &mut report);
     surface.drop_degenerate(options.strict, &mut report)?;
     surface.drop_duplicates(options.strict, &mut report)?;
@@ -104,6 +111,31 @@ fn check_scale(raw: &Raw, format: Format) -> Result<()> {
         return Err(ReadErrorKind::TooSmall { extent, least: LEAST_EXTENT });
     }
     Ok(())
+}
+
+/// How far f32 coordinates are from those of the file, at most.
+fn position_error(raw: &Raw) -> f64 {
+    let rounding = |value: f64| value - f64::from(value as f32);
+    let errors = raw.positions.iter().map(|position| position.map(rounding));
+    errors.map(|[x, y, z]| x.hypot(y).hypot(z)).fold(0.0, f64::max)
+}
+
+/// Neighbouring f32 numbers must be much closer than the mesh is large, or its shape is lost, now or when the
+/// controller gets its positions. Returns the largest extent along an axis.
+fn check_distance(raw: &Raw) -> Result<f64> {
+    let corners = || raw.corners.iter().filter_map(|&corner| raw.positions.get(corner as usize));
+    let largest = corners().flatten().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+    let size = |axis: usize| {
+        let values = || corners().map(|position| position[axis]);
+        values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+    };
+    let extent = (0..3).map(size).fold(0.0, f64::max);
+    let resolution = largest * f64::from(f32::EPSILON);
+    // Where all vertices are one point, the triangles are found degenerate, which says more.
+    if extent > 0.0 && resolution > MOST_RESOLUTION * extent {
+        return Err(ReadErrorKind::TooFar { largest, resolution, extent });
+    }
+    Ok(extent)
 }
 
 /// A triangle, and the face (counted from 1) that it comes from.

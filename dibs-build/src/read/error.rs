@@ -138,6 +138,18 @@ pub enum ReadErrorKind {
         /// The largest magnitude that is accepted.
         most: f64,
     },
+    /// The mesh lies so far from the origin that f32 coordinates do not hold its shape.
+    #[error(
+        "the mesh is {extent:e} across and has coordinates up to {largest:e}, where f32 numbers are {resolution:e} apart; move it to the origin"
+    )]
+    TooFar {
+        /// The largest magnitude of a coordinate.
+        largest: f64,
+        /// Distance between f32 numbers of that size.
+        resolution: f64,
+        /// The mesh's largest extent along an axis.
+        extent: f64,
+    },
     /// Triangles without area, under `strict`.
     #[error(
         "{count} degenerate triangles, the first in face {face}; repair the mesh, or read it without --strict to drop them"

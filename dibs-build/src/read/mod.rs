@@ -15,7 +15,8 @@ mod weld;
 pub use error::{ReadError, ReadErrorKind};
 pub use report::{Format, Report};
 
-use crate::Mesh;
+use crate::mesh::{Mesh, RestSurface};
+use crate::rounding::round_up;
 use std::path::Path;
 
 /// A mesh that passed every check, and what was found and done on the way.
@@ -42,6 +43,16 @@ pub struct ReadOptions {
     pub strict: bool,
     /// Keep the component with the most triangles, instead of failing when there are several.
     pub largest_component: bool,
+}
+
+impl RestSurface for Import {
+    fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
+    fn position_error(&self) -> f32 {
+        round_up(self.report.position_error)
+    }
 }
 
 impl Import {

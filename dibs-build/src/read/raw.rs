@@ -5,8 +5,8 @@ use std::borrow::Cow;
 
 /// What a file contains, before any check that needs the whole of it.
 pub(crate) struct Raw {
-    /// f64, so that a coordinate too large for f32 can be told from an infinite one. Text is
-    /// rounded to f32 first: rounding twice could give another f32.
+    /// f64, so that what is lost by rounding to f32 is known, and a coordinate too large for f32 can be told from
+    /// an infinite one.
     pub positions: Vec<[f64; 3]>,
     /// The corners of all polygons, one after the other.
     pub corners: Vec<u32>,
@@ -57,13 +57,17 @@ pub(crate) fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, str>)>
         .map(|(i, line)| (i + 1, line))
 }
 
-/// A coordinate in a text: rounded to f32 where f32 can hold it.
+/// A coordinate in a text. Rounded to f32 it is the f32 that is nearest to what the text says.
 pub(crate) fn coordinate(token: &str) -> Option<f64> {
-    let narrow = token.parse::<f32>().ok()?;
+    let (narrow, wide) = (token.parse::<f32>().ok()?, token.parse::<f64>().ok()?);
     if narrow.is_finite() {
-        return Some(f64::from(narrow));
+        // Rounding twice could give another f32, where the first time ends in the middle of two.
+        return Some(match f64::from(narrow) {
+            _ if wide as f32 == narrow => wide,
+            nearest if nearest > wide => wide.next_up(),
+            _ => wide.next_down(),
+        });
     }
-    let wide = token.parse::<f64>().ok()?;
     // "1e400" is a number too large even for f64: keep it apart from "inf".
     let overflow = wide.is_infinite() && token.contains(|c: char| c.is_ascii_digit());
     Some(if overflow { f64::MAX.copysign(wide) } else { wide })

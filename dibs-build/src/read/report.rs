@@ -46,7 +46,7 @@ impl fmt::Display for Format {
 }
 
 /// Counts of what was read, welded, dropped and found.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// The format that the content has.
     pub format: Format,
@@ -79,75 +79,104 @@ pub struct Report {
     pub non_manifold_edges: usize,
     /// Edges whose two triangles run the same way along them, so that their normals disagree.
     pub inconsistent_edges: usize,
+    /// The surface's largest extent along an axis, in the mesh's unit.
+    pub extent: f64,
+    /// Largest distance of a vertex from where the file has it: coordinates are rounded to f32. In the mesh's unit;
+    /// 0 for files that hold f32. The tree adds it to the accuracy of every answer.
+    pub position_error: f64,
 }
+
+/// Rounding that is no more than this part of the extent needs no mention: that of a mesh around the origin is a
+/// fourth of it.
+const MOST_SILENT: f64 = 1.0 / 4_194_304.0;
 
 impl Report {
     /// What a user should know: one sentence for each thing that was changed or is unusual.
     pub fn warnings(&self) -> impl Iterator<Item = String> + use<> {
-        let dropped_components = self.components.get(1..).unwrap_or_default();
-        [
-            (
-                self.extension_disagrees,
-                format!("read as {}, not as its extension says", self.format),
-            ),
-            (
-                self.polygons_not_simple > 0,
-                format!(
-                    "{} polygons touch or cross themselves or have no area; cut as fans",
-                    self.polygons_not_simple
-                ),
-            ),
-            (
-                self.coincident > 0,
-                format!("{} vertices coincide with another and were left apart", self.coincident),
-            ),
-            (
-                self.dropped_degenerate > 0,
-                format!("{} degenerate triangles dropped", self.dropped_degenerate),
-            ),
-            (
-                self.dropped_duplicates > 0,
-                format!("{} duplicate triangles dropped", self.dropped_duplicates),
-            ),
-            (
-                !dropped_components.is_empty(),
-                format!(
-                    "{} smaller surfaces dropped, {} triangles",
-                    dropped_components.len(),
-                    dropped_components.iter().sum::<usize>()
-                ),
-            ),
-            (
-                self.unreferenced_vertices > 0,
-                format!("{} vertices belong to no triangle", self.unreferenced_vertices),
-            ),
-            (self.border_edges > 0, format!("{} open border edges", self.border_edges)),
-            (
-                self.non_manifold_edges > 0,
-                format!("{} edges of more than two triangles", self.non_manifold_edges),
-            ),
-            (
-                self.inconsistent_edges > 0,
-                format!(
-                    "{} edges between triangles of opposite orientation",
-                    self.inconsistent_edges
-                ),
-            ),
-        ]
-        .into_iter()
-        .filter_map(|(applies, sentence)| applies.then_some(sentence))
+        let mut warnings = Vec::new();
+        let mut warn = |count: usize, one: &str, several: &str| match count {
+            0 => (),
+            1 => warnings.push(format!("1 {one}")),
+            count => warnings.push(format!("{count} {several}")),
+        };
+        warn(
+            self.polygons_not_simple,
+            "polygon touches or crosses itself or has no area; cut as a fan",
+            "polygons touch or cross themselves or have no area; cut as fans",
+        );
+        warn(
+            self.coincident,
+            "vertex coincides with another and was left apart",
+            "vertices coincide with another and were left apart",
+        );
+        warn(
+            self.dropped_degenerate,
+            "degenerate triangle dropped",
+            "degenerate triangles dropped",
+        );
+        warn(self.dropped_duplicates, "duplicate triangle dropped", "duplicate triangles dropped");
+        let dropped = self.components.get(1..).unwrap_or_default();
+        let triangles: usize = dropped.iter().sum();
+        warn(
+            dropped.len(),
+            &format!("smaller surface dropped, {}", counted(triangles, "triangle")),
+            &format!("smaller surfaces dropped, {}", counted(triangles, "triangle")),
+        );
+        warn(
+            self.unreferenced_vertices - self.welded_rows(),
+            "vertex belongs to no triangle",
+            "vertices belong to no triangle",
+        );
+        warn(self.border_edges, "open border edge", "open border edges");
+        warn(
+            self.non_manifold_edges,
+            "edge of more than two triangles",
+            "edges of more than two triangles",
+        );
+        warn(
+            self.inconsistent_edges,
+            "edge between triangles of opposite orientation",
+            "edges between triangles of opposite orientation",
+        );
+        if self.position_error > MOST_SILENT * self.extent {
+            warnings.push(format!(
+                "rounding to f32 moves vertices by up to {:.1e}, so far are they from the origin; answers count it \
+                 in their accuracy, frames from the bus may do the same again: better move the mesh to the origin",
+                self.position_error
+            ));
+        }
+        if self.extension_disagrees {
+            warnings.insert(0, format!("read as {}, not as its extension says", self.format));
+        }
+        warnings.into_iter()
     }
+
+    /// Rows of the vertex table that belong to no triangle because their vertex was welded to another.
+    fn welded_rows(&self) -> usize {
+        match self.format {
+            // Their rows are gone.
+            Format::StlAscii | Format::StlBinary => 0,
+            Format::Obj | Format::Ply | Format::Off => self.welded.min(self.unreferenced_vertices),
+        }
+    }
+}
+
+/// A number of things whose plural ends in "s".
+fn counted(count: usize, thing: &str) -> String {
+    format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let surface_vertices = self.vertices - self.unreferenced_vertices;
-        write!(f, "{}: {surface_vertices} vertices, {} triangles", self.format, self.triangles)?;
+        let triangles = counted(self.triangles, "triangle");
+        write!(f, "{}: {surface_vertices} vertices, {triangles}", self.format)?;
         if self.polygons_triangulated > 0 {
-            write!(f, ", {} polygons triangulated", self.polygons_triangulated)?;
+            write!(f, ", {} triangulated", counted(self.polygons_triangulated, "polygon"))?;
         }
         if self.welded > 0 {
-            write!(f, ", {} vertices welded", self.welded)?;
+            let vertices = if self.welded == 1 { "vertex" } else { "vertices" };
+            write!(f, ", {} {vertices} welded to others", self.welded)?;
         }
         Ok(())
     }

@@ -401,7 +401,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         Ok(Proximity {
             separation,
             lower: if left < separation { left } else { separation },
-            accuracy: ACCURACY * self.scale + FLOOR,
+            accuracy: ACCURACY * self.scale + FLOOR + self.tree.position_error(),
             axis_distance,
             point_on_surface: pair.on_surface,
             point_on_tool: pair.on_axis - direction * radius,

@@ -42,6 +42,7 @@ pub(crate) struct Header {
     pub stack: u32,
     pub stretch: f32,
     pub radius_unit: f32,
+    pub position_error: f32,
     /// Rows of the section table.
     pub sections: u32,
     pub checksum: u32,
@@ -125,6 +126,13 @@ impl<'a, I: Index> Tree<'a, I> {
     #[must_use]
     pub const fn stack(&self) -> u32 {
         self.header.stack
+    }
+
+    /// How far a vertex may be from where the file of the mesh has it, because positions are f32: 0 where the file
+    /// holds f32, too. Part of the accuracy of every answer.
+    #[must_use]
+    pub const fn position_error(&self) -> f32 {
+        self.header.position_error
     }
 
     /// The stretch limit `s` that the tree was built for (1 = no stretch).

@@ -216,10 +216,11 @@ pub(crate) const fn header<I: Index>(bytes: &[u8]) -> Result<Header, FormatError
         stack: tri!(field(bytes, 24)),
         stretch: f32::from_bits(tri!(field(bytes, 28))),
         radius_unit: f32::from_bits(tri!(field(bytes, 32))),
+        position_error: f32::from_bits(tri!(field(bytes, 36))),
         sections: tri!(field(bytes, 48)),
         checksum: tri!(field(bytes, CHECKSUM_AT)),
     };
-    let mut reserved = 36;
+    let mut reserved = 40;
     while reserved < 48 {
         let value = tri!(field(bytes, reserved));
         if value != 0 {
@@ -238,6 +239,8 @@ pub(crate) const fn header<I: Index>(bytes: &[u8]) -> Result<Header, FormatError
         Some((24, header.stack))
     } else if !(header.stretch >= 1.0 && header.stretch <= 1e6) {
         Some((28, header.stretch.to_bits()))
+    } else if !(header.position_error >= 0.0 && header.position_error <= 1e18) {
+        Some((36, header.position_error.to_bits()))
     } else if !(header.radius_unit >= 0.0 && header.radius_unit <= 1e18) {
         Some((32, header.radius_unit.to_bits()))
     } else if last != 0 {

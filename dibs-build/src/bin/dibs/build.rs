@@ -74,19 +74,20 @@ pub fn run(args: &Args) -> Result<()> {
         Some("dibs") => false,
         _ => bail!("{}: the output's name must end in .dibs or .rs", args.output.display()),
     };
-    let Import { mesh, report } = mesh_file::read(&args.mesh, &args.reading)?;
+    let import = mesh_file::read(&args.mesh, &args.reading)?;
+    let Import { mesh, report } = &import;
     let name = args.mesh.display();
-    let limits = args.limits.as_ref().map(|path| read_limits(path, &mesh)).transpose()?;
+    let limits = args.limits.as_ref().map(|path| read_limits(path, mesh)).transpose()?;
     if let Some(path) = &args.motion {
         let uniform = || vec![args.stretch; mesh.triangles.len()];
-        check_covered(args, &mesh, path, &limits.clone().unwrap_or_else(uniform))?;
+        check_covered(args, mesh, path, &limits.clone().unwrap_or_else(uniform))?;
     }
     // A motion that does not fit is found before the work, too.
     let fit = match (&args.motion, args.modes) {
-        (Some(path), Some(_)) => Some(modes::fit(&mesh, path)?),
+        (Some(path), Some(_)) => Some(modes::fit(mesh, path)?),
         _ => None,
     };
-    let mut tree = build(args, &mesh, limits)
+    let mut tree = build(args, &import, limits)
         .map_err(|error| anyhow!("{name}: no tree can be built: {error}"))?;
     if let (Some(fit), Some(count)) = (&fit, args.modes) {
         tree = fit.add(&tree, count)?;
@@ -147,10 +148,10 @@ fn check_covered(args: &Args, mesh: &Mesh, path: &Path, limits: &[f32]) -> Resul
 
 fn build(
     args: &Args,
-    mesh: &Mesh,
+    import: &Import,
     limits: Option<Vec<f32>>,
 ) -> Result<BuiltTree, dibs_build::BuildError> {
-    let bar = mesh_file::progress_bar("building", mesh.triangles.len());
+    let bar = mesh_file::progress_bar("building", import.mesh.triangles.len());
     let progress = |done: usize| bar.set_position(done as u64);
     let builder = match limits {
         Some(limits) => Builder::new().limits(limits),
@@ -167,7 +168,7 @@ fn build(
             Some(Bits::Bits32) => IndexWidth::Bits32,
         })
         .progress(&progress)
-        .build(mesh);
+        .build(import);
     bar.finish_and_clear();
     tree
 }

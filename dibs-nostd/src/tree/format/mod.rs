@@ -10,7 +10,7 @@ use crate::Index;
 /// First bytes of every tree.
 pub const MAGIC: [u8; 4] = *b"DIBS";
 /// Version of the layout that this crate reads.
-pub const VERSION: u16 = 3;
+pub const VERSION: u16 = 4;
 /// Bytes of the fixed header; the section table follows it.
 pub const HEADER_BYTES: usize = 64;
 /// Bytes of one row of the section table: kind, offset, length.

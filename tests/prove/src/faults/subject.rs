@@ -56,7 +56,7 @@ static MESH: LazyLock<Mesh> = LazyLock::new(|| {
 
 /// The surface's tree.
 pub static TREE: LazyLock<BuiltTree> =
-    LazyLock::new(|| Builder::new().stretch(STRETCH).build(&MESH).expect("a tree"));
+    LazyLock::new(|| Builder::new().stretch(STRETCH).build(&*MESH).expect("a tree"));
 
 /// The surface at a moment: a bump that wanders, so that from moment to moment some vertices move and
 /// some do not.
