@@ -14,12 +14,13 @@
 
 mod array;
 mod builder;
+mod components;
 mod construct;
 mod error;
 mod export;
-mod fans;
 pub mod generate;
 mod geodesic;
+mod leaf;
 mod mesh;
 #[cfg(feature = "modes")]
 pub mod modes;
@@ -42,5 +43,10 @@ pub use pc2::MotionMismatch;
 pub use read::{Format, Import, ReadError, ReadErrorKind, ReadOptions, Report, read};
 pub use rest::Paths;
 pub use script::{MeshSource, TreeScript, tree};
-pub use stretch::{LimitsError, LimitsErrorKind, MotionStretch, Needed, read_limits, write_limits};
+pub use stretch::{
+    Beyond, LimitsError, LimitsErrorKind, MotionStretch, Needed, read_limits, write_limits,
+};
 pub use write::{WriteError, WriteErrorKind, write_atomically};
+
+/// The vectors of this interface.
+pub use glam;

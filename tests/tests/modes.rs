@@ -550,7 +550,7 @@ fn the_real_heart_is_driven_by_its_modes() {
     let motion = Motion::read_pc2(folder.join("heart_10272.pc2")).expect("a motion");
     let fit = ModalFit::new(&mesh, &motion).expect("fits");
     assert_eq!(fit.available(), 24);
-    let needed = MotionStretch::of(&mesh, &motion, Paths::default(), &|_| ()).expect("fits");
+    let needed = MotionStretch::new(&mesh, &motion, Paths::default(), &|_| ()).expect("fits");
     let builder = Builder::new().limits(needed.limits(0.1));
     let tree = builder.build(&mesh).expect("a valid mesh");
     let mut rng = Rng::with_seed(9);

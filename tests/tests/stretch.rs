@@ -485,7 +485,7 @@ fn limits_of_single_triangles_spare_tests_on_a_real_heart() {
     let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/heart_10272");
     let mesh = dibs_build::read(format!("{data}.ply")).expect("a mesh").mesh;
     let motion = Motion::read_pc2(format!("{data}.pc2")).expect("its motion");
-    let needed = MotionStretch::of(&mesh, &motion, Paths::default(), &|_| ()).expect("fits");
+    let needed = MotionStretch::new(&mesh, &motion, Paths::default(), &|_| ()).expect("fits");
     let uniform = Builder::new().stretch(2.5).build(&mesh).expect("a valid mesh");
     let limits = needed.limits(0.02);
     let learned = Builder::new().limits(limits).build(&mesh).expect("a valid mesh");

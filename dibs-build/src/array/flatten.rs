@@ -10,7 +10,7 @@ use super::metric::{metric, with_lowest_bit};
 use crate::Mesh;
 use crate::construct::{Cluster, Content};
 use crate::error::BuildError;
-use crate::fans::{Placed, arrange};
+use crate::leaf::{self, StoredTriangle};
 use crate::rest::Shares;
 
 /// A tree in the order of its array.
@@ -19,7 +19,7 @@ struct Flat {
     /// Pin, radius and link of each node.
     nodes: Vec<(u32, f64, Link)>,
     /// Triangles, leaf by leaf.
-    triangles: Vec<Placed>,
+    triangles: Vec<StoredTriangle>,
     /// Entries that a traversal's stack needs.
     stack: u32,
 }
@@ -58,7 +58,7 @@ impl Flat {
             level = below;
         }
         leaves.sort_unstable_by_key(|&(first, _)| first);
-        flat.triangles = arrange(mesh, leaves.into_iter().map(|(_, leaf)| &leaf[..]));
+        flat.triangles = leaf::order(mesh, leaves.into_iter().map(|(_, leaf)| &leaf[..]));
         flat
     }
 }
@@ -145,21 +145,21 @@ pub(crate) fn flatten<I: Index>(
 
 /// Mesh vertices in the order in which the leaves come to them, so that what is near on the surface
 /// is near in memory.
-fn vertex_order(mesh: &Mesh, triangles: &[Placed]) -> Vec<u32> {
+fn vertex_order(mesh: &Mesh, triangles: &[StoredTriangle]) -> Vec<u32> {
     let mut seen = vec![false; mesh.positions.len()];
     let corners = triangles.iter().flat_map(|t| t.corners);
     corners.filter(|&v| !std::mem::replace(&mut seen[v as usize], true)).collect()
 }
 
-/// The metric of each triangle, marked where it goes on from the triangle before.
-fn metrics(mesh: &Mesh, triangles: &[Placed], facts: Facts<'_>) -> Vec<u8> {
-    let of = |placed: Placed| {
+/// The metric of each triangle, marked where it continues the previous one.
+fn metrics(mesh: &Mesh, triangles: &[StoredTriangle], facts: Facts<'_>) -> Vec<u8> {
+    let of = |placed: StoredTriangle| {
         let corners = mesh.corners(placed.centre_first());
         let share = facts.shares.share(placed.triangle);
         metric(corners, placed.is_reversed, share, f64::from(facts.stretch), facts.paths)
     };
     let mut rows: Vec<[f32; 3]> = Vec::with_capacity(triangles.len());
-    let mut before: Option<Placed> = None;
+    let mut before: Option<StoredTriangle> = None;
     for &placed in triangles {
         let (mut placed, mut row) = (placed, of(placed));
         let join = placed.join(before).filter(|&join| match rows.last_mut() {
@@ -181,8 +181,8 @@ fn metrics(mesh: &Mesh, triangles: &[Placed], facts: Facts<'_>) -> Vec<u8> {
     rows.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect()
 }
 
-/// Whether a triangle can go on from the one before like this. The edge that both have is of two roundings the
-/// lower, which is right for both unless one of them is so flat that it would be spoilt.
+/// Whether a triangle can join the previous one. The shared edge takes the lower of its two roundings, which is safe
+/// for both, but makes the stretch of a nearly flat triangle too large: then the join is refused.
 fn share_edge(before: &mut [f32; 3], row: &mut [f32; 3], join: Join, shares: &Shares) -> bool {
     if row[0] == 0.0 || before[2] == 0.0 {
         return false;
@@ -202,7 +202,7 @@ fn share_edge(before: &mut [f32; 3], row: &mut [f32; 3], join: Join, shares: &Sh
     true
 }
 
-/// By how much a squared stretch may be too large for the sake of a fan.
+/// By how much a join may make a squared stretch too large, as a part of it.
 const MOST_SPOILT: f32 = 5e-4;
 
 /// `1 - |cos|` of the corner that a metric is measured from.

@@ -4,7 +4,7 @@
 use dibs_nostd::format::PathKind;
 use glam::{DVec3, Vec3};
 
-use crate::fans::openness;
+use crate::leaf::openness;
 use crate::rest::RestShape;
 use crate::rounding::round_down;
 

@@ -1,7 +1,6 @@
 //! Top-down construction: from one section of all triangles to the tree of sections.
 
 mod paper;
-mod patch;
 mod pin;
 mod section;
 mod split;
@@ -11,7 +10,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::error::BuildError;
-use crate::fans;
+use crate::leaf;
 use pin::Pin;
 pub(crate) use section::Surface;
 use section::{Searches, Section};
@@ -21,7 +20,7 @@ pub(crate) use widen::widen;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Construction {
-    /// Geodesic centre, whole-mesh paths over edges and chords, split by two far seeds.
+    /// Geodesic centre, paths over edges and chords in the section around the measured one, split by two far seeds.
     #[default]
     Geodesic,
     /// The paper's: mid-range pin, edge paths inside the section, split by a plane, orphans swapped,
@@ -55,7 +54,7 @@ impl Cluster {
 pub(crate) enum Content {
     /// Mostly two after construction, more once it is widened.
     Inner(Vec<Cluster>),
-    /// Triangles that hang together by edges.
+    /// Triangles that are connected by edges.
     Leaf(Vec<u32>),
 }
 
@@ -71,7 +70,7 @@ pub(crate) struct Constructor<'a> {
     idle: Mutex<Vec<Searches>>,
 }
 
-/// Deeper sections than this are halved, whatever the cost.
+/// Sections at this depth are halved, so that depth is bounded.
 const MAX_DEPTH: u32 = 64;
 
 /// Sections of fewer triangles are built by the thread that has them.
@@ -116,7 +115,7 @@ impl<'a> Constructor<'a> {
         }
         let sides = self.split(section, &mut searches, depth);
         let [left, right] = sides.map(|triangles| Section::new(self.surface.mesh, triangles));
-        // A child's search starts at its far border, seen from the seed that it belongs to.
+        // A child's search starts at its border, at the vertex farthest from the child's seed.
         let borders = [(&left, 0), (&right, 1)].map(|(side, seed)| {
             let seen_from = &searches.seeds[seed];
             let by_distance = |a: &&u32, b: &&u32| {
@@ -134,16 +133,16 @@ impl<'a> Constructor<'a> {
         Ok(Cluster { pin: pin.vertex, radius: pin.radius, content })
     }
 
-    /// A leaf, or one for each part of the section where it does not hang together by edges, or where its
-    /// stretch could not be measured in one.
+    /// One leaf; or one for each part that is connected by edges, and one for each triangle whose stretch would be
+    /// measured badly among the others.
     fn leaves(&self, section: &Section, pin: Pin, depth: u32) -> Result<Cluster, BuildError> {
         let mesh = self.surface.mesh;
-        let mut parts = patch::parts(&mesh.triangles, &section.triangles);
+        let mut parts = leaf::connected_by_edges(&mesh.triangles, &section.triangles);
         if let [whole] = &mut parts[..] {
-            let misfits = fans::misfits(mesh, whole);
-            if whole.len() > 1 && !misfits.is_empty() {
-                whole.retain(|triangle| !misfits.contains(triangle));
-                parts.extend(misfits.into_iter().map(|triangle| vec![triangle]));
+            let apart = leaf::ill_conditioned(mesh, whole);
+            if whole.len() > 1 && !apart.is_empty() {
+                whole.retain(|triangle| !apart.contains(triangle));
+                parts.extend(apart.into_iter().map(|triangle| vec![triangle]));
                 parts.retain(|part| !part.is_empty());
             }
         }

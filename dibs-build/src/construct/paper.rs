@@ -5,14 +5,12 @@
 //! vertices' covariance with the largest eigenvalue, through the middle of their projections; a part
 //! that is not contiguous with the rest of its side is an orphan and goes to the sibling.
 
-use std::collections::HashMap;
-
 use glam::{DMat3, DVec3};
-use petgraph::unionfind::UnionFind;
 
 use super::pin::{self, Pin};
 use super::section::{Searches, Section, Surface};
 use super::split;
+use crate::components::connected_by_vertices;
 
 /// The vertex nearest to the mid-range of the section, and its geodesic radius.
 pub(crate) fn mid_range_pin(
@@ -94,20 +92,10 @@ fn main_axis(points: impl Iterator<Item = DVec3> + Clone) -> DVec3 {
     longest.map_or(DVec3::X, |axis| axis.normalize_or(DVec3::X))
 }
 
-/// The parts of a set of triangles that hang together by shared vertices, largest first.
+/// The parts of a set of triangles that are connected by shared vertices, largest first.
 fn contiguous_parts(surface: &Surface<'_>, triangles: &[u32]) -> Vec<Vec<u32>> {
-    let mut parts = UnionFind::<usize>::new(triangles.len());
-    let mut owner = HashMap::new();
-    for (i, &t) in triangles.iter().enumerate() {
-        for v in surface.mesh.triangles[t as usize] {
-            parts.union(*owner.entry(v).or_insert(i), i);
-        }
-    }
-    let mut groups: HashMap<usize, Vec<u32>> = HashMap::new();
-    for (part, &t) in parts.into_labeling().into_iter().zip(triangles) {
-        groups.entry(part).or_default().push(t);
-    }
-    let mut groups: Vec<Vec<u32>> = groups.into_values().collect();
-    groups.sort_by(|a, b| b.len().cmp(&a.len()).then(a[0].cmp(&b[0])));
-    groups
+    let corners: Vec<[u32; 3]> =
+        triangles.iter().map(|&triangle| surface.mesh.triangles[triangle as usize]).collect();
+    let parts = connected_by_vertices(&corners).into_iter();
+    parts.map(|part| part.into_iter().map(|at| triangles[at]).collect()).collect()
 }

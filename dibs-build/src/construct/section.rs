@@ -25,7 +25,7 @@ impl Section {
 pub(crate) struct Surface<'a> {
     pub mesh: &'a Mesh,
     pub graph: &'a Graph,
-    /// Whether paths must stay inside the section (the paper) or may use the whole mesh.
+    /// Whether paths must stay inside the section (the paper) or may leave it.
     pub restricted: bool,
 }
 
@@ -58,8 +58,8 @@ impl Searches {
         }
     }
 
-    /// Makes `section` the one that searches are for. Paths stay in the section `around` it, as long as that
-    /// hangs together: hardly one would be shorter outside, where more than half of a search would take place.
+    /// Makes `section` the one that searches are for. Paths stay in the section `around` it if that is connected:
+    /// paths outside are hardly ever shorter, and take more than half of a search's time.
     pub fn enter(&mut self, section: &Section, around: Option<&Section>) {
         let members = &mut self.members;
         members.section += 2;

@@ -1,13 +1,13 @@
 //! Dividing a section in two by distance along the surface.
 
-use super::patch;
 use super::section::{Searches, Section, Surface};
+use crate::leaf::connected_by_edges;
 
 /// No side of a split gets less than this share of the triangles: it bounds the depth.
 const LEAST_SHARE: f64 = 0.05;
 
-/// Smaller sections are mended after their split. Larger ones would only cost time: what is wrong at
-/// their borders is mended further down.
+/// Sections up to this size are mended after their split. The borders of larger ones are mended further down the
+/// tree, in less time.
 const MEND_BELOW: usize = 64;
 
 /// Each triangle goes to the nearer of the two far seeds that the pin's search left in `searches`.
@@ -39,10 +39,10 @@ pub(crate) fn by_geodesic(
     }
 }
 
-/// The largest part that hangs together by edges, and the rest: triangles at the border of a split that
-/// only touch their side at a corner are better off on the other, or they become leaves of their own.
+/// The largest part that is connected by edges, and the rest: border triangles that touch their side only at a
+/// corner. They go to the other side, or each would become a leaf of its own.
 fn mainland(mesh: &[[u32; 3]], side: &[u32]) -> (Vec<u32>, Vec<u32>) {
-    let mut parts = patch::parts(mesh, side);
+    let mut parts = connected_by_edges(mesh, side);
     let sizes = parts.iter().map(Vec::len).enumerate();
     let largest = sizes.max_by_key(|&(at, size)| (size, std::cmp::Reverse(at)));
     let mainland = parts.swap_remove(largest.map_or(0, |(at, _)| at));

@@ -1,7 +1,7 @@
-//! From two children a node to as many as pay.
+//! From two children a node to up to eight.
 //!
-//! A query that looks at a node tests all of its children. A child that mostly passes its test is not
-//! worth one: its own children had better be tested at once. How often it passes goes with its radius
+//! A query that expands a node tests all of its children. The test of a child that mostly passes is wasted: its own
+//! children should be tested at once. How often it passes goes with its radius
 //! as a share of its parent's (about 0.4 of the time at a share of 0.5, 0.6 at 0.7, 0.85 at 0.9 on
 //! brains and hearts). With two children the break-even is one half, and less as looking at a node costs
 //! as much again as testing one child: fewest tests take a share of 0.7, fewest instructions one of 0.6.

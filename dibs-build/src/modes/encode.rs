@@ -38,8 +38,10 @@ pub(crate) fn encode<I: Index>(
     let modes = fit.modes[..count].iter().map(quantised).collect::<Result<Vec<_>, _>>()?;
     let displacements: Vec<Vec<DVec3>> = modes.iter().map(QuantisedMode::displacements).collect();
 
-    let projector =
-        Projector::of(displacements.clone(), rest.iter().map(|p| p.as_dvec3()).collect())?;
+    let projector = Projector::from_displacements(
+        displacements.clone(),
+        rest.iter().map(|p| p.as_dvec3()).collect(),
+    )?;
     let weights: Vec<Vec<f32>> = frames.iter().map(|frame| projector.weights(frame)).collect();
     let triangles = Triangles::new(tree).ok_or(ModesError::NoRestShape)?;
     let growths = displacements.iter().map(|d| triangles.growth(d)).collect();

@@ -44,10 +44,16 @@ impl Projector {
             rows.clone().map(|row| DVec3::from(of_row(row)) * step).collect()
         };
         let rest = |row| modes.rest_position(row).unwrap_or_default().as_dvec3();
-        Self::of((0..modes.count()).map(displacements).collect(), rows.clone().map(rest).collect())
+        Self::from_displacements(
+            (0..modes.count()).map(displacements).collect(),
+            rows.clone().map(rest).collect(),
+        )
     }
 
-    pub(super) fn of(modes: Vec<Vec<DVec3>>, rest: Vec<DVec3>) -> Result<Self, ModesError> {
+    pub(super) fn from_displacements(
+        modes: Vec<Vec<DVec3>>,
+        rest: Vec<DVec3>,
+    ) -> Result<Self, ModesError> {
         let products = DMatrix::from_fn(modes.len(), modes.len(), |i, j| dot(&modes[i], &modes[j]));
         let normal = Cholesky::new(products).ok_or(ModesError::Degenerate)?;
         Ok(Self { modes, rest, normal })

@@ -5,8 +5,8 @@ use super::raw::Raw;
 use super::weld::first_coincident;
 use super::{Format, Import, ReadErrorKind, ReadOptions, Report};
 use crate::Mesh;
+use crate::components::connected_by_vertices;
 use glam::{DVec3, Vec3};
-use petgraph::unionfind::UnionFind;
 use std::collections::HashSet;
 
 /// The exact tests multiply two squared lengths. Across a mesh of this size, with edges down to a
@@ -273,26 +273,19 @@ impl Surface {
 
     /// Triangles that share a vertex are connected.
     fn keep_one_component(&mut self, largest: bool, report: &mut Report) -> Result<()> {
-        let mut sets = UnionFind::<u32>::new(self.positions.len());
-        for [a, b, c] in self.faces.iter().map(|triangle| triangle.corners) {
-            sets.union(a, b);
-            sets.union(b, c);
-        }
-        let set = sets.into_labeling();
-        let set_of = |triangle: &Triangle| set[triangle.corners[0] as usize];
-        let mut size = vec![0_usize; set.len()];
-        for triangle in &self.faces {
-            size[set_of(triangle) as usize] += 1;
-        }
-        let mut sizes: Vec<usize> = size.iter().copied().filter(|&s| s > 0).collect();
-        sizes.sort_unstable_by(|a, b| b.cmp(a));
-        if sizes.len() > 1 {
+        let corners: Vec<[u32; 3]> = self.faces.iter().map(|face| face.corners).collect();
+        let components = connected_by_vertices(&corners);
+        let sizes: Vec<usize> = components.iter().map(Vec::len).collect();
+        if let [kept, _, ..] = &components[..] {
             if !largest {
                 return Err(ReadErrorKind::Components { sizes, coincident: report.coincident });
             }
-            // Of equally large ones the first in the file.
-            let kept = self.faces.iter().map(set_of).find(|&set| size[set as usize] == sizes[0]);
-            self.faces.retain(|triangle| Some(set_of(triangle)) == kept);
+            let (mut at, mut kept) = (0, kept.iter().peekable());
+            self.faces.retain(|_| {
+                let is_kept = kept.next_if_eq(&&at).is_some();
+                at += 1;
+                is_kept
+            });
         }
         report.components = sizes;
         Ok(())

@@ -21,7 +21,7 @@ use crate::{Mesh, Motion, Paths};
 /// ```
 /// use dibs_build::{Builder, MotionStretch, Paths, generate};
 /// let (mesh, motion) = generate::heart(1_000)?;
-/// let needed = MotionStretch::of(&mesh, &motion, Paths::default(), &|_| ())?;
+/// let needed = MotionStretch::new(&mesh, &motion, Paths::default(), &|_| ())?;
 /// let tree = Builder::new().limits(needed.limits(0.1)).build(&mesh)?;
 /// assert!(f64::from(tree.summary().stretch) >= needed.worst().stretch * 1.09);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -42,6 +42,23 @@ pub struct Needed {
     pub frame: usize,
 }
 
+/// A triangle that a motion stretches beyond its limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Beyond {
+    /// The triangle and its stretch.
+    pub needed: Needed,
+    /// Its limit.
+    pub limit: f32,
+}
+
+impl Beyond {
+    /// The stretch as a part of the limit.
+    fn share(&self) -> f64 {
+        self.needed.stretch / f64::from(self.limit)
+    }
+}
+
 impl MotionStretch {
     /// Measures a motion, in f64. `progress` is called with the number of triangles done, from whichever
     /// thread did them.
@@ -51,7 +68,7 @@ impl MotionStretch {
     ///
     /// # Panics
     /// If the mesh names vertices that it does not have.
-    pub fn of(
+    pub fn new(
         mesh: &Mesh,
         motion: &Motion,
         paths: Paths,
@@ -114,18 +131,18 @@ impl MotionStretch {
         self.triangles.iter().map(limit).collect()
     }
 
-    /// The triangle that goes farthest beyond its limit, with that limit; `None` where all keep within.
+    /// The triangle that is stretched farthest beyond its limit; `None` where all keep within.
     ///
     /// # Panics
     /// If there is not a limit for each triangle.
     #[must_use]
-    pub fn beyond(&self, limits: &[f32]) -> Option<(Needed, f32)> {
+    pub fn beyond(&self, limits: &[f32]) -> Option<Beyond> {
         assert_eq!(limits.len(), self.triangles.len(), "a limit for each triangle");
-        let over = |&(needed, limit): &(Needed, f32)| needed.stretch / f64::from(limit);
-        let all = self.triangles.iter().copied().zip(limits.iter().copied());
-        let worst = all.max_by(|a, b| over(a).total_cmp(&over(b)))?;
+        let all = self.triangles.iter().zip(limits);
+        let all = all.map(|(&needed, &limit)| Beyond { needed, limit });
+        let worst = all.max_by(|a, b| a.share().total_cmp(&b.share()))?;
         // Written so that what is not a number is beyond.
-        if over(&worst) <= 1.0 { None } else { Some(worst) }
+        if worst.share() <= 1.0 { None } else { Some(worst) }
     }
 }
 

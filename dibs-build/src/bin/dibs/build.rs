@@ -5,7 +5,8 @@ use crate::{modes, stretch, tree_file};
 use anyhow::{Result, anyhow, bail};
 use clap::ValueEnum;
 use dibs_build::{
-    Builder, BuiltTree, Construction, Import, IndexWidth, Mesh, Motion, Needed, Paths, read_limits,
+    Beyond, Builder, BuiltTree, Construction, Import, IndexWidth, Mesh, Motion, Needed, Paths,
+    read_limits,
 };
 use std::path::{Path, PathBuf};
 
@@ -130,7 +131,7 @@ fn check_covered(args: &Args, mesh: &Mesh, path: &Path, limits: &[f32]) -> Resul
         ConstructionName::Paper => Paths::Edges,
     };
     let needed = stretch::measure(mesh, &motion, path, paths)?;
-    let Some((worst, limit)) = needed.beyond(limits) else { return Ok(()) };
+    let Some(Beyond { needed: worst, limit, .. }) = needed.beyond(limits) else { return Ok(()) };
     let is_beyond = |(n, limit): &(&Needed, &f32)| n.stretch > f64::from(**limit);
     let beyond = needed.triangles().iter().zip(limits).filter(is_beyond);
     bail!(

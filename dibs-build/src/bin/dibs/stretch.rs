@@ -113,7 +113,7 @@ pub fn run(args: &Args) -> Result<()> {
 /// Measures a motion, behind a progress bar.
 pub fn measure(mesh: &Mesh, motion: &Motion, path: &Path, paths: Paths) -> Result<MotionStretch> {
     let bar = mesh_file::progress_bar("measuring", mesh.triangles.len());
-    let needed = MotionStretch::of(mesh, motion, paths, &|done| bar.set_position(done as u64));
+    let needed = MotionStretch::new(mesh, motion, paths, &|done| bar.set_position(done as u64));
     bar.finish_and_clear();
     needed.map_err(|error| anyhow!("{}: {error}", path.display()))
 }

@@ -65,8 +65,7 @@ pub mod section {
     pub const MODES: u32 = 7;
 }
 
-/// How geodesic radii were measured, which decides what limits their growth (`design` invariant
-/// "coverage").
+/// How geodesic radii were measured, which decides which measured stretch limits their growth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

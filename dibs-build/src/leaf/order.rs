@@ -1,11 +1,11 @@
 //! The order of a leaf's triangles and of their corners, for the controller's stretch check.
 //!
-//! A triangle is measured along two of its edges, from one of its first two corners, its centre. Where the first
-//! of these edges is the second one of the triangle before, whichever way round ([`Join`]), the controller has two
-//! of its corners and one of its edges at hand. So of all orders of a leaf that with the fewest starts is taken.
+//! A triangle is measured along two of its edges, from one of its first two corners, its centre. If the first
+//! of these edges is the second edge of the previous triangle, in either direction ([`Join`]), the controller still
+//! holds two corners and one edge. The order with the fewest starts is chosen.
 //!
-//! The corners of the leaf's first triangle and the third ones of the others are all of its vertices:
-//! a query looks at no others to reject the leaf.
+//! The first triangle's corners and the others' third corners are all of the leaf's vertices: a query tests only
+//! these to reject the leaf.
 
 use dibs_nostd::format::{Join, MAX_LEAF_TRIANGLES, PathKind};
 use glam::DVec3;
@@ -16,14 +16,14 @@ use crate::rest::RestShape;
 /// A triangle of the mesh, and its corners in the order in which they are stored: rotated, so that the
 /// orientation stays.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Placed {
+pub(crate) struct StoredTriangle {
     pub triangle: u32,
     pub corners: [u32; 3],
     /// The centre is the second corner, not the first. Never so where it starts.
     pub is_reversed: bool,
 }
 
-impl Placed {
+impl StoredTriangle {
     /// How it goes on from the triangle before, if it can follow that at all.
     pub fn join(self, before: Option<Self>) -> Option<Join> {
         let joins = |join: &Join| {
@@ -41,52 +41,54 @@ impl Placed {
 }
 
 /// Orders the triangles of each leaf, the first of which may go on from the last one of the leaf before.
-pub(crate) fn arrange<'a>(mesh: &Mesh, leaves: impl IntoIterator<Item = &'a [u32]>) -> Vec<Placed> {
+pub(crate) fn order<'a>(
+    mesh: &Mesh,
+    leaves: impl IntoIterator<Item = &'a [u32]>,
+) -> Vec<StoredTriangle> {
     let mut leaves = leaves.into_iter().map(|leaf| choices(mesh, leaf));
-    let (mut placed, mut orders) = (Vec::new(), Orders::new());
+    let (mut stored, mut orders) = (Vec::new(), Orders::new());
     let mut this = leaves.next();
     while let Some(leaf) = this {
         let next = leaves.next();
-        let before = placed.last().copied();
+        let before = stored.last().copied();
         let order = orders.best(&leaf, before, next.as_deref().unwrap_or_default());
-        placed.extend(order.iter().map(|choice| choice.placed));
+        stored.extend(order.iter().map(|choice| choice.stored));
         this = next;
     }
-    placed
+    stored
 }
 
-/// The triangles of a leaf that even its best order stores at far too pointed a corner, though they have a
-/// better one: alone in a leaf, they are stored at that.
-pub(crate) fn misfits(mesh: &Mesh, leaf: &[u32]) -> Vec<u32> {
+/// The triangles of a leaf that even its best order measures from a corner below 3 degrees, although they have a
+/// wider one. Alone in a leaf they are measured from that.
+pub(crate) fn ill_conditioned(mesh: &Mesh, leaf: &[u32]) -> Vec<u32> {
     let choices = choices(mesh, leaf);
-    if !choices.iter().any(Choice::is_misfit) {
+    if !choices.iter().any(Choice::is_ill_conditioned) {
         return Vec::new();
     }
     let order = Orders::new().best(&choices, None, &[]);
-    let misfits = order.iter().filter(|choice| choice.is_misfit());
-    misfits.map(|choice| choice.placed.triangle).collect()
+    let bad = order.iter().filter(|choice| choice.is_ill_conditioned());
+    bad.map(|choice| choice.stored.triangle).collect()
 }
 
-/// What an order costs: sums of these.
+/// The cost of storing a triangle in one way; that of an order is their sum.
 type Cost = u32;
 
-/// A triangle that starts anew, and one that flips: about as the instructions that the check takes for it, beyond
-/// those for one in a fan.
+/// A triangle that starts anew, and one that flips: about the instructions that the check takes beyond those for a
+/// triangle in a fan.
 const START: Cost = 4 << 8;
 const FLIP: Cost = 1 << 8;
-/// A triangle measured from a corner without any openness. For a whole leaf that is less than a flip: it decides
-/// only between orders that are as good otherwise.
+/// A triangle measured from a corner without any openness. Eight of them cost less than a flip, so that openness
+/// decides only between orders of equal joins.
 const POINTED_MOST: f64 = 31.0;
-/// One at a corner too pointed or too flat to be measured from, though it has a better one: no order of a leaf is
-/// worth that.
+/// A triangle measured from a corner below 18 degrees, although it has a wider one. It outweighs all joins.
 const UNFIT: Cost = 1 << 16;
-/// One at a corner so pointed that the stretch measured from it is off by a thousandth.
-const MISFIT: Cost = 1 << 24;
+/// A triangle measured from a corner below 3 degrees: its stretch is off by a thousandth.
+const ILL_CONDITIONED: Cost = 1 << 24;
 
 /// A way to store one of a leaf's triangles.
 #[derive(Clone, Copy, Debug)]
 struct Choice {
-    placed: Placed,
+    stored: StoredTriangle,
     /// What it costs for its centre.
     cost: Cost,
     /// The triangle's bit among the leaf's.
@@ -97,13 +99,13 @@ struct Choice {
 }
 
 impl Choice {
-    const fn is_misfit(&self) -> bool {
-        self.cost >= MISFIT
+    const fn is_ill_conditioned(&self) -> bool {
+        self.cost >= ILL_CONDITIONED
     }
 
     /// What it costs after that triangle, if it can follow it.
-    fn after(&self, before: Option<Placed>) -> Option<Cost> {
-        Some(match self.placed.join(before)? {
+    fn after(&self, before: Option<StoredTriangle>) -> Option<Cost> {
+        Some(match self.stored.join(before)? {
             Join::Fan => self.cost,
             Join::Flip => self.cost + FLIP,
             Join::Start => self.cost + START,
@@ -131,19 +133,19 @@ fn choices(mesh: &Mesh, leaf: &[u32]) -> Vec<Choice> {
         });
         let best = openness.into_iter().fold(0.0, f64::max);
         let costs = openness.map(|openness| match () {
-            () if openness < POINTED.min(best) => MISFIT,
+            () if openness < POINTED.min(best) => ILL_CONDITIONED,
             () if openness < OPEN.min(best) => UNFIT,
             () => (POINTED_MOST * (1.0 - openness)) as Cost,
         });
         for (first, corners) in rotations.into_iter().enumerate() {
             let second = (first + 1) % 3;
             for (is_reversed, centre) in [(false, first), (true, second)] {
-                // What goes on only on paper, since that would spoil its metric, is measured from its first corner.
+                // Where `share_edge` refuses the join, the first corner is the centre: it must be fit for that.
                 if is_reversed && costs[first] >= UNFIT {
                     continue;
                 }
                 choices.push(Choice {
-                    placed: Placed { triangle, corners, is_reversed },
+                    stored: StoredTriangle { triangle, corners, is_reversed },
                     cost: costs[centre],
                     bit: 1 << i,
                     with_first: bits[first],
@@ -158,8 +160,7 @@ fn choices(mesh: &Mesh, leaf: &[u32]) -> Vec<Choice> {
 /// Ways to store a leaf's triangles, at most.
 const CHOICES: usize = 6 * MAX_LEAF_TRIANGLES as usize;
 
-/// Of all orders of a set of triangles that end with one choice: what the best of them costs, and the choice
-/// before the last.
+/// The cheapest order of a set of triangles that ends with a given choice: its cost, and the choice before the last.
 #[derive(Clone, Copy)]
 struct Best {
     cost: Cost,
@@ -179,7 +180,12 @@ impl Orders {
     }
 
     /// The cheapest order of a leaf, after that triangle and before a leaf of these choices.
-    fn best(&mut self, leaf: &[Choice], before: Option<Placed>, next: &[Choice]) -> Vec<Choice> {
+    fn best(
+        &mut self,
+        leaf: &[Choice],
+        before: Option<StoredTriangle>,
+        next: &[Choice],
+    ) -> Vec<Choice> {
         let all = leaf.iter().fold(0, |bits, choice| bits | choice.bit);
         self.0[..=all].fill([NONE; CHOICES]);
         for (at, choice) in leaf.iter().enumerate() {
@@ -191,7 +197,7 @@ impl Orders {
         let mut joins = Vec::new();
         for (last, before) in leaf.iter().enumerate() {
             for (at, choice) in leaf.iter().enumerate() {
-                match choice.after(Some(before.placed)) {
+                match choice.after(Some(before.stored)) {
                     Some(cost) if cost < choice.cost + START => joins.push((last, at, cost)),
                     _ => (),
                 }
@@ -203,7 +209,7 @@ impl Orders {
             // Only the third corner of a leaf's triangle, but for its first, may be new to the leaf.
             for (at, choice) in leaf.iter().enumerate() {
                 let is_known = set & choice.with_first != 0 && set & choice.with_second != 0;
-                if set & choice.bit == 0 && is_known && !choice.placed.is_reversed {
+                if set & choice.bit == 0 && is_known && !choice.stored.is_reversed {
                     self.offer(set | choice.bit, at, cheapest + choice.cost + START, last);
                 }
             }
@@ -214,7 +220,7 @@ impl Orders {
             }
         }
         let way_out = |at: usize| {
-            let costs = next.iter().filter_map(|choice| choice.after(Some(leaf[at].placed)));
+            let costs = next.iter().filter_map(|choice| choice.after(Some(leaf[at].stored)));
             costs.min().unwrap_or_default()
         };
         let mut order = Vec::new();
@@ -245,10 +251,10 @@ fn cheapest(lasts: &[Best], to_come: impl Fn(usize) -> Cost) -> Option<(usize, C
     possible.map(|(at, best)| (at, best.cost + to_come(at))).min_by_key(|&(_, cost)| cost)
 }
 
-/// Openness of a corner that is good enough: 18 degrees.
+/// Openness of a corner of 18 degrees, which is wide enough.
 const OPEN: f64 = 0.05;
 
-/// Openness of a corner that is far too pointed: 3 degrees.
+/// Openness of a corner of 3 degrees, which is far too pointed.
 const POINTED: f64 = 0.0014;
 
 /// `1 - |cos|` of the angle between two edges, without its cancellation: the check's rounding grows with its

@@ -1,7 +1,9 @@
-//! Patches: triangles that hang together by edges.
+//! Patches: triangles that are connected by edges.
 
-/// The parts of a set of triangles that hang together by edges, in the order of their first triangles.
-pub(crate) fn parts(mesh: &[[u32; 3]], triangles: &[u32]) -> Vec<Vec<u32>> {
+/// The parts of a set of triangles that are connected by edges, in the order of their first triangles.
+///
+/// Cost: quadratic in the set, which is a leaf or little more.
+pub(crate) fn connected_by_edges(mesh: &[[u32; 3]], triangles: &[u32]) -> Vec<Vec<u32>> {
     let mut left = triangles.to_vec();
     let mut parts = Vec::new();
     while !left.is_empty() {
@@ -31,8 +33,8 @@ mod tests {
         [[0, 1, 2], [0, 3, 4], [3, 0, 2], [4, 5, 0], [7, 8, 9], [5, 10, 11]];
 
     #[test]
-    fn parts_hang_together_by_edges() {
+    fn parts_are_connected_by_edges() {
         let all: Vec<u32> = (0..6).collect();
-        assert_eq!(parts(&MESH, &all), [vec![0, 2, 1, 3], vec![4], vec![5]]);
+        assert_eq!(connected_by_edges(&MESH, &all), [vec![0, 2, 1, 3], vec![4], vec![5]]);
     }
 }
