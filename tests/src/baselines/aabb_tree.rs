@@ -6,6 +6,7 @@ use dibs_build::Mesh;
 use glam::{Vec3, Vec3A};
 
 use super::bounds::Axis;
+use super::boxes::{self, BoxTree, Node, Rows, each_once};
 use crate::method::Found;
 
 /// Most triangles of a leaf.
@@ -39,9 +40,7 @@ pub const DEFERRED: u32 = 1 << 31;
 pub struct AabbTree {
     pub(super) boxes: Vec<Bounds>,
     pub(super) links: Vec<Link>,
-    pub(super) positions: Vec<Vec3A>,
-    triangles: Vec<[u32; 3]>,
-    order: Vec<u32>,
+    pub(super) rows: Rows,
     /// The leaves' and the inner nodes' numbers, ascending: a loop over either has no branch to guess.
     leaves: Vec<u32>,
     inner: Vec<u32>,
@@ -70,46 +69,26 @@ impl AabbTree {
         assert!(depth < STACK, "the tree is {depth} deep");
         let Builder { items, links, .. } = builder;
 
-        let mut row = vec![u32::MAX; mesh.positions.len()];
-        let mut order = Vec::with_capacity(mesh.positions.len());
-        let mut triangles = Vec::with_capacity(items.len());
-        for &item in &items {
-            triangles.push(mesh.triangles[item as usize].map(|vertex| {
-                let row = &mut row[vertex as usize];
-                if *row == u32::MAX {
-                    *row = order.len() as u32;
-                    order.push(vertex);
-                }
-                *row
-            }));
-        }
+        let rows = Rows::new(mesh, &items);
         let is_leaf = |&node: &u32| links[node as usize].count > 0;
         let (leaves, inner): (Vec<u32>, Vec<u32>) = (0..links.len() as u32).partition(is_leaf);
         let (mut leaf_vertices, mut leaf_start) = (Vec::new(), vec![0]);
         for &leaf in &leaves {
             let Link { first, count } = links[leaf as usize];
-            let of_leaf = &triangles[first as usize..(first + count) as usize];
-            leaf_vertices.extend(each_once(of_leaf.iter().flatten().copied().collect()));
+            leaf_vertices.extend(rows.vertices(first as usize..(first + count) as usize));
             leaf_start.push(leaf_vertices.len() as u32);
         }
         let mut tree = Self {
             boxes: vec![NOTHING; links.len()],
             links,
-            positions: Vec::new(),
-            triangles,
-            order,
+            rows,
             leaves,
             inner,
             leaf_vertices,
             leaf_start,
         };
-        tree.load(&mesh.positions);
+        tree.rows.load(&mesh.positions);
         tree
-    }
-
-    pub(super) fn load(&mut self, positions: &[Vec3]) {
-        self.positions.clear();
-        self.positions.extend(self.order.iter().map(|&v| Vec3A::from(positions[v as usize])));
     }
 
     /// Refits a range of nodes that holds the descendants of its own: first leaves, then inner nodes
@@ -120,7 +99,8 @@ impl AabbTree {
         let ends = &self.leaf_start[leaves.start + 1..=leaves.end];
         for (&leaf, &end) in self.leaves[leaves].iter().zip(ends) {
             let of_leaf = &self.leaf_vertices[start..end as usize];
-            let bounds = of_leaf.iter().fold(NOTHING, |b, &v| grown(b, self.positions[v as usize]));
+            let positions = self.rows.positions();
+            let bounds = of_leaf.iter().fold(NOTHING, |b, &v| grown(b, positions[v as usize]));
             self.boxes[leaf as usize] = bounds;
             start = end as usize;
         }
@@ -149,62 +129,41 @@ impl AabbTree {
         }
     }
 
-    /// The closest pair. Near child first; `refresh` brings a deferred node's descendants up to date and
-    /// returns its first child.
+    /// The closest pair; `refresh` brings a deferred node's descendants up to date and returns its first child.
     #[inline(always)]
     pub(super) fn closest<A: Axis>(
         &mut self,
         tool: &A,
-        mut refresh: impl FnMut(&mut Self, usize) -> u32,
+        refresh: impl FnMut(&mut Self, usize) -> u32,
     ) -> Found {
-        let axis = tool.prepare();
-        let mut best = f32::INFINITY;
-        let (mut node_tests, mut triangle_tests) = (1, 0);
-        let mut stack = [(0.0_f32, 0_u32); STACK];
-        let mut waiting = 0;
-        let mut node = 0_u32;
-        loop {
-            let Link { first, count } = self.links[node as usize];
-            if count == 0 || count >= DEFERRED {
-                let first = if count == 0 { first } else { refresh(self, node as usize) };
-                node_tests += 2;
-                let [low, high] = self.boxes[first as usize];
-                let left = A::bound(&axis, low, high, best);
-                let [low, high] = self.boxes[first as usize + 1];
-                let right = A::bound(&axis, low, high, best);
-                let right_first = right < left;
-                let (near, far) = if right_first { (right, left) } else { (left, right) };
-                let side = u32::from(right_first);
-                if far < best {
-                    stack[waiting] = (far, first + (side ^ 1));
-                    waiting += 1;
-                }
-                if near < best {
-                    node = first + side;
-                    continue;
-                }
-            } else {
-                for triangle in &self.triangles[first as usize..(first + count) as usize] {
-                    let corners = triangle.map(|v| Vec3::from(self.positions[v as usize]));
-                    triangle_tests += 1;
-                    if let Some(pair) = tool.closest_on_triangle(&corners, best) {
-                        best = pair.distance_squared;
-                    }
-                }
-            }
-            loop {
-                if waiting == 0 {
-                    let separation = (best.sqrt() - tool.radius()).max(0.0);
-                    return Found { separation, tests: Some([node_tests, triangle_tests]) };
-                }
-                waiting -= 1;
-                let (lower, next) = stack[waiting];
-                if lower < best {
-                    node = next;
-                    break;
-                }
-            }
+        boxes::closest::<_, _, STACK>(&mut Refreshed { tree: self, refresh }, tool)
+    }
+}
+
+/// A tree in the midst of a search.
+struct Refreshed<'t, F> {
+    tree: &'t mut AabbTree,
+    refresh: F,
+}
+
+impl<F: FnMut(&mut AabbTree, usize) -> u32> BoxTree for Refreshed<'_, F> {
+    #[inline(always)]
+    fn node(&mut self, node: u32) -> Node {
+        match self.tree.links[node as usize] {
+            Link { first, count: 0 } => Node::Inner(first),
+            Link { count: DEFERRED.., .. } => Node::Inner((self.refresh)(self.tree, node as usize)),
+            Link { first, count } => Node::Leaf(first as usize..(first + count) as usize),
         }
+    }
+
+    #[inline(always)]
+    fn bounds(&self, node: u32) -> Bounds {
+        self.tree.boxes[node as usize]
+    }
+
+    #[inline(always)]
+    fn corners(&self, triangle: usize) -> [Vec3; 3] {
+        self.tree.rows.corners(triangle)
     }
 }
 
@@ -212,12 +171,6 @@ impl AabbTree {
 fn within(numbers: &[u32], range: &Range<usize>) -> Range<usize> {
     let below = |limit: usize| numbers.partition_point(|&number| (number as usize) < limit);
     below(range.start)..below(range.end)
-}
-
-fn each_once(mut numbers: Vec<u32>) -> Vec<u32> {
-    numbers.sort_unstable();
-    numbers.dedup();
-    numbers
 }
 
 #[inline(always)]

@@ -76,16 +76,16 @@ impl Cut {
     }
 
     fn bounds(&self, tree: &AabbTree) -> Bounds {
-        let run = &tree.positions[self.rows.0 as usize..self.rows.1 as usize];
+        let run = &tree.rows.positions()[self.rows.0 as usize..self.rows.1 as usize];
         let start = [run[0]; 2];
         let of_run = run.iter().fold(start, |b, &p| grown(b, p));
-        self.others.iter().fold(of_run, |b, &v| grown(b, tree.positions[v as usize]))
+        self.others.iter().fold(of_run, |b, &v| grown(b, tree.rows.positions()[v as usize]))
     }
 }
 
 impl Method for Hybrid {
     fn load(&mut self, positions: &[Vec3]) {
-        self.tree.load(positions);
+        self.tree.rows.load(positions);
     }
 
     fn update(&mut self) {

@@ -3,6 +3,7 @@
 
 mod aabb_tree;
 pub mod bounds;
+pub mod boxes;
 mod exhaustive;
 mod hybrid;
 mod paper;

@@ -20,7 +20,7 @@ impl Refit {
 
 impl Method for Refit {
     fn load(&mut self, positions: &[Vec3]) {
-        self.tree.load(positions);
+        self.tree.rows.load(positions);
     }
 
     fn update(&mut self) {

@@ -39,6 +39,11 @@ pub const CHECK: Check = Check {
 
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let program = build_for_board(&board()?, "bus")?;
-    let record = Record::measure(effort.board_faults, Place::Board(&program), effort.is_record)?;
+    let record = Record::measure(
+        effort.board_faults,
+        Place::Board(&program),
+        effort.is_record,
+        effort.size(),
+    )?;
     tell(&record, "board.faults", "faults-board.json", effort, figures)
 }

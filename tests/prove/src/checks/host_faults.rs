@@ -37,7 +37,7 @@ pub const CHECK: Check = Check {
 };
 
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
-    let record = Record::measure(effort.faults, Place::Here, effort.is_record)?;
+    let record = Record::measure(effort.faults, Place::Here, effort.is_record, effort.size())?;
     tell(&record, "faults", "faults.json", effort, figures)
 }
 

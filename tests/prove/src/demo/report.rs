@@ -161,7 +161,7 @@ impl Report {
             surface: scene.describe(),
             stretch_limit: scene.surface.stretch,
             controller: machine.describe(),
-            run: Run::now(true),
+            run: Run::now(format!("{} s", outcome.ticks_asked / TICK_RATE)),
             command: command_line(),
             controller_command: outcome.command.clone(),
             broken_promises: Vec::new(),

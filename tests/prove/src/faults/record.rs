@@ -37,7 +37,12 @@ pub const UNDETECTABLE: [&str; 4] = [
 impl Record {
     /// Runs the matrix with this many faults of each kind; on this computer also frames on a bad line, and
     /// where everything is wanted the bytes that frames take.
-    pub fn measure(per_fault: u64, place: Place<'_>, everything: bool) -> Result<Self> {
+    pub fn measure(
+        per_fault: u64,
+        place: Place<'_>,
+        everything: bool,
+        size: String,
+    ) -> Result<Self> {
         let matrix = matrix::run(per_fault, SEED, place)?;
         matrix.iter().for_each(|row| println!("{row}"));
         let (corruption, sizes) = match (place, everything) {
@@ -47,7 +52,7 @@ impl Record {
         };
         corruption.iter().for_each(|row| println!("{row}"));
         sizes.iter().for_each(|row| println!("{row}"));
-        let (undetectable, run) = (UNDETECTABLE, Run::now(everything));
+        let (undetectable, run) = (UNDETECTABLE, Run::now(size));
         Ok(Self { run, per_fault, seed: SEED, undetectable, matrix, corruption, sizes })
     }
 

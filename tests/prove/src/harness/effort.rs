@@ -29,6 +29,8 @@ pub struct Effort {
     pub fuzz_seconds: u32,
     /// Whether the records are for the documents: those of a run of the tests are not.
     pub is_record: bool,
+    /// One in so many of the full size's cases.
+    pub share: u32,
 }
 
 impl Effort {
@@ -47,6 +49,7 @@ impl Effort {
         fault_seconds: 60,
         fuzz_seconds: 60,
         is_record: true,
+        share: 1,
     };
     /// The sizes that every run of the tests can afford.
     pub const TEST: Self = Self {
@@ -63,5 +66,37 @@ impl Effort {
         fault_seconds: 20,
         fuzz_seconds: 60,
         is_record: false,
+        share: 0,
     };
+
+    /// One in `share` of the cases, but at least as many as a run of the tests has.
+    pub fn divided(self, share: u32) -> Self {
+        let wide = |full: usize, least: usize| (full / share as usize).max(least);
+        let narrow = |full: u32, least: u32| (full / share).max(least);
+        let least = Self::TEST;
+        Self {
+            cases: wide(self.cases, least.cases),
+            bits: wide(self.bits, least.bits),
+            costs: wide(self.costs, least.costs),
+            host_costs: wide(self.host_costs, least.host_costs),
+            ticks: narrow(self.ticks, least.ticks),
+            poses: wide(self.poses, least.poses),
+            torn: narrow(self.torn, least.torn),
+            faults: (self.faults / u64::from(share)).max(least.faults),
+            board_faults: (self.board_faults / u64::from(share)).max(least.board_faults),
+            demo_seconds: narrow(self.demo_seconds, least.demo_seconds),
+            fault_seconds: narrow(self.fault_seconds, least.fault_seconds),
+            share,
+            ..self
+        }
+    }
+
+    /// For the records: `full`, `1/4`, or `test`.
+    pub fn size(&self) -> String {
+        match self.share {
+            0 => "test".to_owned(),
+            1 => "full".to_owned(),
+            share => format!("1/{share}"),
+        }
+    }
 }

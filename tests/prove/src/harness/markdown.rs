@@ -71,7 +71,7 @@ fn provenance(out: &mut String, records: &[Record], newest: Option<&Run>) -> Res
     if runs.len() == 1 && missing == 0 && newest.is_whole() {
         writeln!(
             out,
-            "**All of it was measured at commit `{commit}`**, until {date}: {} figures; {compiler}; {machine}; \
+            "**All of it was measured at commit `{commit}`**, until {date}, size `{size}`: {} figures; {compiler}; {machine}; \
              {emulator}.",
             records.len()
         )?;
@@ -79,7 +79,7 @@ fn provenance(out: &mut String, records: &[Record], newest: Option<&Run>) -> Res
     }
     writeln!(
         out,
-        "**NOT OF ONE FULL RUN.** The last is of commit `{commit}`, {date}, size `{size}`; a figure of another \
+        "**NOT OF ONE RUN.** The last is of commit `{commit}`, {date}, size `{size}`; a figure of another \
          says of which in brackets.{}\n",
         if missing > 0 {
             format!(" {missing} figures were never recorded.")

@@ -277,7 +277,7 @@ mod tests {
         commits.sort_unstable();
         commits.dedup();
         let is_whole = commits.len() == 1
-            && records.iter().all(|r| r.run.size == "full" && !r.run.commit.contains("-dirty"))
+            && records.iter().all(|r| r.run.size != "test" && !r.run.commit.contains("-dirty"))
             && promises().all(|(_, promise)| records.iter().any(|r| r.id == promise.id));
         assert!(!says_whole || is_whole, "the head says more than the rows: {commits:?}");
         assert!(commits.iter().all(|commit| text.contains(&format!("`{commit}`"))), "{commits:?}");

@@ -17,13 +17,13 @@ pub struct Run {
     pub compiler: String,
     pub machine: String,
     pub emulator: String,
-    /// `full`, or `test` for as few cases as a run of the tests takes.
+    /// `full`, `1/4` of that, or `test` for as few cases as a run of the tests takes.
     pub size: String,
 }
 
 impl Run {
     /// The one that has just begun.
-    pub fn now(is_full: bool) -> Self {
+    pub fn now(size: String) -> Self {
         let dirty = said("git", &["status", "--porcelain", "--", ".", ":!docs"]);
         let dirty = if dirty.is_empty() { "" } else { "-dirty" };
         Self {
@@ -32,7 +32,7 @@ impl Run {
             compiler: said("rustc", &["--version"]),
             machine: machine(),
             emulator: said("qemu-system-arm", &["--version"]).lines().next().unwrap_or("").into(),
-            size: if is_full { "full" } else { "test" }.to_owned(),
+            size,
         }
     }
 
@@ -41,9 +41,9 @@ impl Run {
         Self { date: other.date.clone(), ..self.clone() } == *other
     }
 
-    /// Whether it tried everything, on a commit that can be had again.
+    /// Whether it is of a commit that can be had again, and of more than a run of the tests tries.
     pub fn is_whole(&self) -> bool {
-        self.size == "full" && !self.commit.ends_with("-dirty") && self.commit != UNKNOWN
+        self.size != "test" && !self.commit.ends_with("-dirty") && self.commit != UNKNOWN
     }
 
     /// The day.

@@ -13,7 +13,7 @@ use crate::data::real;
 use crate::harness::run::Run;
 
 pub fn run(plan: &Plan, options: &Options, records: &mut Records) {
-    let Run { date, commit, compiler, machine, .. } = Run::now(true);
+    let Run { date, commit, compiler, machine, .. } = Run::now(plan.name.to_owned());
     let mut command = "cargo xtask bench".to_owned();
     if options.quick {
         command += " --quick";
