@@ -78,5 +78,5 @@ pub use surface::{
     Travel, VertexTable,
 };
 pub use tool::{ACCURACY, AxisPair, Capsule, MAX_COORDINATE, Sphere, Tool, ToolError};
-pub use tree::{FormatError, Index, Rot, Scrub, Tree, TreeBytes, format};
+pub use tree::{CorruptTreeError, FormatError, Index, Scrub, Tree, TreeBytes, format};
 pub use unavailable::{QueryError, Unavailable};

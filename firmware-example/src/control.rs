@@ -163,7 +163,7 @@ impl Control {
         #[cfg(not(feature = "in-rounds"))]
         let answer = self.query.closest(&frame, tool, &options);
         #[cfg(feature = "in-rounds")]
-        let answer = self.query.closest_in_rounds(&frame, tool, &options);
+        let answer = self.query.closest_wide(&frame, tool, &options);
         record.query_counts = clock().wrapping_sub(start);
         drop(frame);
 

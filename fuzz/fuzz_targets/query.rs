@@ -89,7 +89,7 @@ fn ask(
     budget: Budget,
 ) {
     let tree = *query.tree();
-    let both = [query.closest(rows, tool, options), query.closest_in_rounds(rows, tool, options)];
+    let both = [query.closest(rows, tool, options), query.closest_wide(rows, tool, options)];
     for answer in both.into_iter().flatten() {
         let most = 3 * tree.node_count() + tree.triangle_count();
         assert!(answer.node_tests <= budget.node_tests.min(most) + 1);

@@ -24,23 +24,23 @@ pub fn closest<I: Index, const D: usize>(
     }
 }
 
-/// The same in rounds.
+/// The same by the wide search.
 ///
 /// # Errors
 /// The query's.
 ///
 /// # Panics
 /// If the instrument is not a valid tool.
-pub fn closest_in_rounds<I: Index, const D: usize>(
+pub fn closest_wide<I: Index, const D: usize>(
     query: &mut Query<'_, I, D>,
     vertices: &(impl VertexTable + ?Sized),
     tool: &Instrument,
     options: &Options,
 ) -> Result<Proximity, QueryError> {
     if tool.start == tool.end {
-        query.closest_in_rounds(vertices, &sphere(tool), options)
+        query.closest_wide(vertices, &sphere(tool), options)
     } else {
-        query.closest_in_rounds(vertices, &capsule(tool), options)
+        query.closest_wide(vertices, &capsule(tool), options)
     }
 }
 

@@ -1,4 +1,4 @@
-//! The library under test, as a method of the benchmark: in rounds, since it runs on a host.
+//! The library under test, as a method of the benchmark: by the wide search, since it runs on a host.
 
 use dibs_build::BuiltTree;
 use dibs_nostd::format::MAX_STACK;
@@ -162,8 +162,8 @@ fn ask<I: Index>(
     options: &Options,
 ) -> (Found, Option<u32>) {
     let answer = match tool {
-        Probe::Sphere(sphere) => query.closest_in_rounds(vertices, sphere, options),
-        Probe::Capsule(capsule) => query.closest_in_rounds(vertices, capsule, options),
+        Probe::Sphere(sphere) => query.closest_wide(vertices, sphere, options),
+        Probe::Capsule(capsule) => query.closest_wide(vertices, capsule, options),
     };
     let answer = answer.expect("streams hold finite positions");
     let tests = Some([answer.node_tests, answer.triangle_tests]);

@@ -226,7 +226,7 @@ fn a_query_on_rotten_bytes_ends() {
         let tool = Sphere::new(rows[rng.usize(..rows.len())] * 1.3, 1.0).expect("valid");
         let both = [
             query.closest(rows.as_slice(), &tool, &Options::new()),
-            query.closest_in_rounds(rows.as_slice(), &tool, &Options::new()),
+            query.closest_wide(rows.as_slice(), &tool, &Options::new()),
         ];
         for result in both {
             match result {

@@ -288,6 +288,8 @@ fn every_triangle_is_within_the_stated_accuracy() {
         f64::from(ACCURACY) / U,
         worst[2],
     );
+    // Less than half of what is stated: a kernel that needs more has lost one of its cases.
+    assert!(worst[0] < 8.0 && worst[1] < 8.0 && worst[2] < 4.0, "{worst:?}");
 }
 
 /// A length of zero makes a capsule a sphere.

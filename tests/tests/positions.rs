@@ -25,9 +25,9 @@ fn a_position_that_is_not_finite_is_named() {
             let (rows, options) = (rows.as_slice(), &Options::new());
             let answers: [Result<Proximity, QueryError>; 4] = [
                 query.closest(rows, &sphere, options),
-                query.closest_in_rounds(rows, &sphere, options),
+                query.closest_wide(rows, &sphere, options),
                 query.closest(rows, &capsule, options),
-                query.closest_in_rounds(rows, &capsule, options),
+                query.closest_wide(rows, &capsule, options),
             ];
             for (answer, named) in answers.into_iter().zip(&mut named) {
                 match answer {

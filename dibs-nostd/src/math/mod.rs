@@ -1,4 +1,4 @@
 //! Arithmetic that gives the same bits on host and target.
 
-pub(crate) mod four;
 pub(crate) mod sqrt;
+pub(crate) mod vec3x4;

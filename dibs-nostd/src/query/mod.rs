@@ -16,7 +16,7 @@ pub use tracker::{Fallback, Tracked, Tracker};
 
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
-use search::{Rounds, Search, Waiting};
+use search::{Search, Waiting, WideSearch};
 
 /// A query on one tree, with the fixed stack that its traversal needs: 8 bytes an entry.
 ///
@@ -67,23 +67,23 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         Search::start(&self.tree, &mut self.stack, vertices, tool, options)?.run()
     }
 
-    /// As [`closest`](Self::closest), up to seven subtrees at a time: for processors that work on several
-    /// instructions at once, and by several numbers each.
+    /// As [`closest`](Self::closest), in batches of up to seven subtrees: for processors that overlap instructions
+    /// and have vector registers.
     ///
     /// The same promises, errors and answers (where several triangles are equally close, perhaps another of
     /// them) and mostly fewer tests, but more memory: 2 KiB on the call stack, and it pays only if `STACK`
-    /// is 128 more than [`Tree::stack`]. With less, rounds are smaller. A microcontroller is better off with
+    /// is 128 more than [`Tree::stack`]. With less, batches are smaller. A microcontroller is better off with
     /// `closest`.
     ///
     /// # Errors
     /// Those of [`closest`](Self::closest).
-    pub fn closest_in_rounds<V: VertexTable + ?Sized, T: Tool>(
+    pub fn closest_wide<V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         vertices: &V,
         tool: &T,
         options: &Options,
     ) -> Result<Proximity, QueryError> {
         let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options)?;
-        Rounds::new(search).run()
+        WideSearch::new(search).run()
     }
 }

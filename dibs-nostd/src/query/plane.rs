@@ -4,11 +4,11 @@ use glam::Vec3;
 
 use crate::{Index, Tree, VertexTable};
 
-/// A plane that separates what is beyond it from the tool's axis by more than the reach.
+/// A plane that separates what is beyond it from the tool's axis by more than the cutoff.
 ///
 /// For any vector `n` from the axis' nearest point `q` to some point, the axis lies where
-/// `n . (x - q) <= 0`: it is convex. So all points of a patch with `n . (x - q) > reach |n|` at its
-/// vertices are farther than the reach. No root is taken of what it rejects, and it is tighter than
+/// `n . (x - q) <= 0`: it is convex. So all points of a patch with `n . (x - q) > cutoff |n|` at its
+/// vertices are farther than the cutoff. No root is taken of what it rejects, and it is tighter than
 /// any sphere around the patch: a sphere's lower bound is that of its farthest tangent plane.
 pub(super) struct Plane {
     pub normal: Vec3,

@@ -1,12 +1,16 @@
 //! One search: the tests of nodes, leaves and triangles, and what is known so far.
 
-mod rounds;
+mod finish;
+mod slack;
 mod tick;
+mod wide;
 
 use glam::Vec3;
 
-pub(super) use rounds::Rounds;
 pub(super) use tick::{Outcome, Tick};
+pub(super) use wide::WideSearch;
+
+use slack::{COORDINATES, FLOOR, SLACK, TILT};
 
 use super::plane::Plane;
 use super::{Budget, Options};
@@ -25,41 +29,24 @@ pub(super) struct Waiting {
     pub link: u32,
 }
 
-/// Slack of the pruning comparison, in units of the query's scale: the f32 rounding of both sides.
-///
-/// With `u = 2^-24`, all lengths in a query are at most the scale `S` (distance to the farthest point
-/// of the root sphere, plus twice the axis). A pin's distance is off by at most `8 u S`, a bound
-/// `d - R` by `12 u S`, a plane's by `11 u S`, a triangle's distance by the kernel's
-/// [`crate::ACCURACY`]` S`, `16 u S`: a comparison of any two by at most `28 u S`.
-const SLACK: f32 = 48.0 / 16_777_216.0;
-
-/// What [`Proximity::accuracy`] promises, in units of the scale: the kernel's error plus that of the
-/// pair's last operations.
-const ACCURACY: f32 = 24.0 / 16_777_216.0;
-
-/// Slack of a plane's comparison in units of the coordinates' size `C`, since positions enter it as
-/// they are: each of two dot products is off by at most `3 u C` times the normal's length, the point
-/// on the axis by `2 u C`.
-const COORDINATES: f32 = 16.0 / 16_777_216.0;
-
-/// Slack of a plane's comparison in units of `S^2`: an axis is perpendicular to the shortest vector to
-/// a point within `16 u S`, so that its ends, at most `S / 2` away, are beyond the plane by no more
-/// than half of this.
-const TILT: f32 = 16.0 / 16_777_216.0;
-
-/// Lengths that the kernels count as zero, times a few: what is left of slack and accuracy where tool
-/// and surface are one point.
-const FLOOR: f32 = 1e-14;
-
 /// The direction that a triangle's plane is taken in is that of its corners' mean.
 const THIRD: f32 = 1.0 / 3.0;
 
-/// What is left after a subtree was looked at.
+/// How a look at a subtree ended.
 enum Step {
-    /// What waits on the stack.
+    /// What it left waits on the stack.
     Done,
-    /// All of it: the budget ran out.
+    /// Unfinished: the budget ran out.
     OutOfBudget,
+}
+
+/// The nearest pin so far: a point of the surface, and so an upper bound from the first node on.
+#[derive(Clone, Copy)]
+struct NearestPin {
+    /// Its row in the vertex table.
+    row: u32,
+    /// Its distance from the tool's axis.
+    distance: f32,
 }
 
 /// The state of one search.
@@ -74,13 +61,14 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     radius_scale: f32,
     scale: f32,
     slack: f32,
-    /// Added to the reach where a plane is compared.
+    /// Added to the cutoff where a plane is compared.
     coordinate_slack: f32,
     tilt_slack: f32,
-    /// Distance of the nearest surface point known, plus the slack: what is farther cannot win.
-    reach: f32,
-    reach_squared: f32,
-    pin: (u32, f32),
+    /// Upper bound plus rounding slack: the distance of the nearest surface point known, beyond which nothing
+    /// can be closer.
+    cutoff: f32,
+    cutoff_squared: f32,
+    nearest_pin: NearestPin,
     best: Option<AxisPair>,
     best_squared: f32,
     best_triangle: u32,
@@ -153,18 +141,19 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             slack: SLACK * scale + FLOOR,
             coordinate_slack: COORDINATES * coordinates,
             tilt_slack: TILT * scale * scale,
-            reach: f32::INFINITY,
-            reach_squared: f32::INFINITY,
-            pin: (root.pin, f32::INFINITY),
+            cutoff: f32::INFINITY,
+            cutoff_squared: f32::INFINITY,
+            nearest_pin: NearestPin { row: root.pin, distance: f32::INFINITY },
             best: None,
             best_squared: f32::INFINITY,
             best_triangle: u32::MAX,
         };
-        search.pull_in(root.pin, distance);
+        search.lower_cutoff_to_pin(root.pin, distance);
         if let Some(triangle) = options.warm_start
             && triangle < header.triangles
-            && options.budget.triangle_tests > 0
+            && let Some(left) = search.left.triangle_tests.checked_sub(1)
         {
+            search.left.triangle_tests = left;
             let corners = search.corners(triangle)?;
             search.test_triangle(triangle, &corners);
         }
@@ -173,13 +162,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         Ok(search)
     }
 
-    /// Looks at subtrees, near ones first, until none within reach is left or the budget runs out.
+    /// Looks at subtrees, near ones first, until none below the cutoff is left or the budget runs out.
     pub fn run(mut self) -> Result<Proximity, QueryError> {
         while let Some(top) = self.waiting.checked_sub(1) {
             self.waiting = top;
             let &Waiting { lower, link } =
                 self.stack.get(top).ok_or(QueryError::Corrupt { row: top as u32 })?;
-            if lower > self.reach {
+            if lower > self.cutoff {
                 continue;
             }
             let step = match Link::decode(link) {
@@ -205,19 +194,19 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
 
     /// A pin at this distance is a point of the surface: nothing farther can win.
     #[inline(always)]
-    fn pull_in(&mut self, pin: u32, distance: f32) {
-        if distance < self.pin.1 {
-            self.pin = (pin, distance);
-            self.tighten(distance);
+    fn lower_cutoff_to_pin(&mut self, row: u32, distance: f32) {
+        if distance < self.nearest_pin.distance {
+            self.nearest_pin = NearestPin { row, distance };
+            self.lower_cutoff(distance);
         }
     }
 
     #[inline(always)]
-    fn tighten(&mut self, distance: f32) {
-        let reach = distance + self.slack;
-        if reach < self.reach {
-            self.reach = reach;
-            self.reach_squared = reach * reach;
+    fn lower_cutoff(&mut self, distance: f32) {
+        let cutoff = distance + self.slack;
+        if cutoff < self.cutoff {
+            self.cutoff = cutoff;
+            self.cutoff_squared = cutoff * cutoff;
         }
     }
 
@@ -237,8 +226,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         Some(())
     }
 
-    /// Tests the spheres of a node's children, and the planes of those that are leaves: what is left
-    /// waits. What bounds the node bounds them, so that what is certified never falls back.
+    /// Tests the spheres of a node's children, and the planes of those that are leaves; pushes the rest. A
+    /// parent's bound holds for its children too, so that the certified bound never falls.
     #[inline(always)]
     fn expand(&mut self, parent: f32, first: u32, count: u32) -> Result<Step, QueryError> {
         let corrupt = QueryError::Corrupt { row: first };
@@ -253,13 +242,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             let radius = node.radius_code as f32 * self.radius_scale;
             let normal = self.tool.axis_to(position);
             let squared = normal.dot(normal);
-            let far = self.reach + radius;
+            let far = self.cutoff + radius;
             // What is not a number is not far: the leaves below find out what it is.
             if squared > far * far {
                 continue;
             }
             let distance = sqrt(squared);
-            self.pull_in(node.pin, distance);
+            self.lower_cutoff_to_pin(node.pin, distance);
             // At once, while the vector to its pin is at hand.
             if let Link::Leaf { first, count } = Link::decode(node.link)
                 && let Some(left) = self.left.node_tests.checked_sub(1)
@@ -300,7 +289,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             if triangle == self.best_triangle {
                 continue;
             }
-            let (Some(left), 1..) = (self.left.node_tests.checked_sub(1), self.left.triangle_tests)
+            let (Some(left), Some(triangles_left)) =
+                (self.left.node_tests.checked_sub(1), self.left.triangle_tests.checked_sub(1))
             else {
                 return Ok(Step::OutOfBudget);
             };
@@ -318,6 +308,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             if plane.limit.is_nan() {
                 return Err(QueryError::Position { vertex: self.not_finite(triangle) });
             }
+            self.left.triangle_tests = triangles_left;
             self.test_triangle(triangle, &[a, b, c]);
         }
         Ok(Step::Done)
@@ -333,7 +324,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     #[inline(always)]
     fn plane_across(&self, normal: Vec3, point: Vec3, length: f32) -> Plane {
         let on_axis = point - normal;
-        let beyond = (self.reach + self.coordinate_slack) * length;
+        let beyond = (self.cutoff + self.coordinate_slack) * length;
         Plane { normal, limit: normal.dot(on_axis) + beyond + self.tilt_slack }
     }
 
@@ -349,16 +340,16 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         Ok([self.position(a)?, self.position(b)?, self.position(c)?])
     }
 
+    /// The exact test, which the caller has taken off the budget.
     #[inline(always)]
     fn test_triangle(&mut self, triangle: u32, corners: &[Vec3; 3]) {
-        self.left.triangle_tests = self.left.triangle_tests.saturating_sub(1);
-        if let Some(pair) = self.tool.closest_on_triangle(corners, self.reach_squared)
+        if let Some(pair) = self.tool.closest_on_triangle(corners, self.cutoff_squared)
             && pair.distance_squared < self.best_squared
         {
             self.best_squared = pair.distance_squared;
             self.best_triangle = triangle;
             self.best = Some(pair);
-            self.tighten(sqrt(pair.distance_squared));
+            self.lower_cutoff(sqrt(pair.distance_squared));
         }
     }
 
@@ -368,50 +359,5 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         let rows = self.tree.triangle(triangle).unwrap_or_default();
         let is_finite = |row| self.vertices.position(row).is_some_and(Vec3::is_finite);
         rows.into_iter().find(|&row| !is_finite(row)).unwrap_or(rows[0])
-    }
-
-    /// The answer, where `lower` bounds what was left unexplored.
-    fn finish(&self, lower: f32) -> Result<Proximity, QueryError> {
-        let (pin, pin_distance) = self.pin;
-        let radius = self.tool.radius();
-        let cut_short = lower < f32::INFINITY;
-        let (pair, triangle, corners) = match self.best {
-            Some(pair) if !cut_short || sqrt(pair.distance_squared) <= pin_distance => {
-                let row = self.best_triangle;
-                let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
-                (pair, Some(row), corners)
-            }
-            _ if cut_short => {
-                let position = self.position(pin)?;
-                let point = self.tool.closest_on_triangle(&[position; 3], f32::INFINITY);
-                (point.ok_or(QueryError::Position { vertex: pin })?, None, [pin; 3])
-            }
-            _ => return Err(QueryError::Uncovered { pin }),
-        };
-        let axis_distance = sqrt(pair.distance_squared);
-        let used = u32::saturating_sub;
-        let above_zero = |x: f32| if x > 0.0 { x } else { 0.0 };
-        let separation = above_zero(axis_distance - radius);
-        let left = above_zero(lower - radius);
-        // By its own length: next to contact the points' rounding is not that of the distance.
-        let towards = pair.on_axis - pair.on_surface;
-        let length = sqrt(towards.length_squared());
-        let touches = axis_distance <= 0.0 || length <= 0.0;
-        let direction = if touches { Vec3::ZERO } else { towards / length };
-        Ok(Proximity {
-            separation,
-            lower: if left < separation { left } else { separation },
-            accuracy: ACCURACY * self.scale + FLOOR + self.tree.position_error(),
-            axis_distance,
-            point_on_surface: pair.on_surface,
-            point_on_tool: pair.on_axis - direction * radius,
-            direction,
-            axis_parameter: pair.axis_parameter,
-            triangle,
-            corners,
-            barycentric: pair.barycentric,
-            node_tests: used(self.budget.node_tests, self.left.node_tests).saturating_add(1),
-            triangle_tests: used(self.budget.triangle_tests, self.left.triangle_tests),
-        })
     }
 }

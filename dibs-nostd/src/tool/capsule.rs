@@ -1,8 +1,8 @@
 //! The capsule: a segment with a radius.
 
 use super::{AxisPair, Tool, ToolError, check_point, check_radius, clamp_any, sealed, triangle};
-use crate::math::four::Four;
 use crate::math::sqrt::sqrt;
+use crate::math::vec3x4::Vec3x4;
 use glam::{Vec3, Vec4};
 
 /// Axes shorter than this are points: the squares of their components underflow.
@@ -81,10 +81,10 @@ impl Capsule {
 
 impl sealed::Sealed for Capsule {
     #[inline(always)]
-    fn axis_to_four(&self, points: &Four) -> Four {
+    fn axis_to_four(&self, points: &Vec3x4) -> Vec3x4 {
         let Axis { start, direction, length } = self.axis;
-        let (direction, length) = (Four::splat(direction), Vec4::splat(length));
-        let offset = points.minus(Four::splat(start));
+        let (direction, length) = (Vec3x4::splat(direction), Vec4::splat(length));
+        let offset = points.minus(Vec3x4::splat(start));
         let along = offset.dot(direction);
         let positive = Vec4::select(along.cmpgt(Vec4::ZERO), along, Vec4::ZERO);
         let along = Vec4::select(positive.cmplt(length), positive, length);

@@ -12,6 +12,7 @@
 //! a counterexample.
 
 mod capsule;
+mod edge;
 mod sphere;
 mod triangle;
 
@@ -111,11 +112,11 @@ impl core::error::Error for ToolError {}
 mod sealed {
     use glam::Vec3;
 
-    use crate::math::four::Four;
+    use crate::math::vec3x4::Vec3x4;
 
     pub trait Sealed {
         /// The shortest vectors from the axis to four points, bit by bit those of one after the other.
-        fn axis_to_four(&self, points: &Four) -> Four;
+        fn axis_to_four(&self, points: &Vec3x4) -> Vec3x4;
 
         /// From the axis' start to its end, each component within 2^-23 of the axis' length.
         fn axis_span(&self) -> Vec3;

@@ -1,7 +1,7 @@
 //! The sphere: a point with a radius.
 
 use super::{AxisPair, Tool, ToolError, check_point, check_radius, sealed, triangle};
-use crate::math::four::Four;
+use crate::math::vec3x4::Vec3x4;
 use glam::Vec3;
 
 /// A spherical tool, or with radius zero a point.
@@ -41,8 +41,8 @@ impl Sphere {
 
 impl sealed::Sealed for Sphere {
     #[inline(always)]
-    fn axis_to_four(&self, points: &Four) -> Four {
-        points.minus(Four::splat(self.center))
+    fn axis_to_four(&self, points: &Vec3x4) -> Vec3x4 {
+        points.minus(Vec3x4::splat(self.center))
     }
 
     #[inline(always)]

@@ -32,15 +32,16 @@
 //!   geometric mean, `c u S / 2`, for every `a`.
 
 use super::capsule::Axis;
+use super::edge::{edge_to_point, edge_to_segment};
 use super::{AxisPair, clamp};
 use glam::Vec3;
 
 /// Square of the sine below which two directions count as nearly parallel: 2^-16.
-const SLIVER: f32 = 1.0 / 65_536.0;
+pub(super) const SLIVER: f32 = 1.0 / 65_536.0;
 /// Square of the sine below which the axis counts as parallel to the plane: 2^-24.
 const PARALLEL: f32 = 1.0 / 16_777_216.0;
 /// Squared lengths below this divide nothing: 2^-100, the square of 1e-15.
-const TINY: f32 = 7.888_609e-31;
+pub(super) const TINY: f32 = 7.888_609e-31;
 /// Squared lengths below this make no clear plane, because products of four of them underflow: 2^-40,
 /// the square of 1e-6.
 const SMALL: f32 = 9.094_947e-13;
@@ -159,11 +160,11 @@ fn closest_of_all(axis: &Axis, corners: &[Vec3; 3], limit_squared: f32) -> Optio
 
 /// A pair found so far: where on the axis, and the weights of the second and third corner.
 #[derive(Clone, Copy)]
-struct Candidate {
-    distance_squared: f32,
-    along: f32,
-    v: f32,
-    w: f32,
+pub(super) struct Candidate {
+    pub distance_squared: f32,
+    pub along: f32,
+    pub v: f32,
+    pub w: f32,
 }
 
 impl Candidate {
@@ -316,89 +317,4 @@ impl Projection {
     fn candidate(&self, along: f32) -> Candidate {
         Candidate { distance_squared: self.distance_squared, along, v: self.v, w: self.w }
     }
-}
-
-/// A pair on an edge: where on the axis, and where on the edge (0 to 1).
-#[derive(Clone, Copy)]
-struct OnEdge {
-    distance_squared: f32,
-    along: f32,
-    x: f32,
-}
-
-impl OnEdge {
-    #[inline(always)]
-    fn on_ab(self) -> Candidate {
-        self.candidate(self.x, 0.0)
-    }
-
-    #[inline(always)]
-    fn on_ac(self) -> Candidate {
-        self.candidate(0.0, self.x)
-    }
-
-    #[inline(always)]
-    fn on_bc(self) -> Candidate {
-        self.candidate(1.0 - self.x, self.x)
-    }
-
-    #[inline(always)]
-    fn candidate(self, v: f32, w: f32) -> Candidate {
-        Candidate { distance_squared: self.distance_squared, along: self.along, v, w }
-    }
-}
-
-/// The closest pair between the edge from `corner` along `edge` and the origin, which is the point
-/// `along` the axis.
-#[inline(always)]
-fn edge_to_point(corner: Vec3, edge: Vec3, along: f32) -> OnEdge {
-    let squared = edge.dot(edge);
-    let x = if squared > TINY { clamp(-corner.dot(edge) / squared, 1.0) } else { 0.0 };
-    let apart = corner + x * edge;
-    OnEdge { distance_squared: apart.dot(apart), along, x }
-}
-
-/// The closest pair between the edge from `corner` (relative to the axis' start) along `edge`, and the
-/// axis.
-fn edge_to_segment(axis: &Axis, corner: Vec3, edge: Vec3) -> OnEdge {
-    let (corner_along, edge_along) = (corner.dot(axis.direction), edge.dot(axis.direction));
-    // Seen along the axis: the edge without its part along the axis.
-    let corner_across = corner - corner_along * axis.direction;
-    let edge_across = edge - edge_along * axis.direction;
-    let across_squared = edge_across.dot(edge_across);
-    let x = if across_squared > TINY {
-        clamp(-corner_across.dot(edge_across) / across_squared, 1.0)
-    } else {
-        0.0
-    };
-    let along = corner_along + x * edge_along;
-    if across_squared > SLIVER * edge.dot(edge) {
-        if along >= 0.0 && along <= axis.length {
-            let apart = corner_across + x * edge_across;
-            return OnEdge { distance_squared: apart.dot(apart), along, x };
-        }
-        let along = clamp(along, axis.length);
-        return edge_to_point(corner - along * axis.direction, edge, along);
-    }
-    nearly_parallel(axis, corner, edge, along)
-}
-
-/// [`edge_to_segment`] where the edge's direction across the axis, and so `along`, is as good as unknown;
-/// but then the ends are nearly as good.
-#[cold]
-#[inline(never)]
-fn nearly_parallel(axis: &Axis, corner: Vec3, edge: Vec3, along: f32) -> OnEdge {
-    let (corner_along, edge_along) = (corner.dot(axis.direction), edge.dot(axis.direction));
-    let from = |along: f32| {
-        let along = clamp(along, axis.length);
-        edge_to_point(corner - along * axis.direction, edge, along)
-    };
-    let mut best = from(along);
-    for along in [corner_along, corner_along + edge_along, 0.0, axis.length] {
-        let other = from(along);
-        if other.distance_squared < best.distance_squared {
-            best = other;
-        }
-    }
-    best
 }

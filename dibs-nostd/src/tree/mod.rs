@@ -1,23 +1,36 @@
 //! The tree: a validated view of bytes that stay where they are, in flash or in a file.
 
+/// The operator `?`, for functions that the compiler runs.
+macro_rules! tri {
+    ($result:expr) => {
+        match $result {
+            Ok(value) => value,
+            Err(error) => return Err(error),
+        }
+    };
+}
+
+mod error;
 pub mod format;
+mod header;
 mod index;
 mod scrub;
 pub(crate) mod sections;
 mod stored;
 mod validate;
 
+pub use error::FormatError;
 pub use index::Index;
-pub use scrub::{Rot, Scrub};
+pub use scrub::{CorruptTreeError, Scrub};
 pub use stored::TreeBytes;
-pub use validate::FormatError;
 
 use core::iter;
 use core::marker::PhantomData;
 
 use glam::Vec3;
 
-use crate::tree::format::{Link, Metric, Node, PathKind, section, several};
+use format::{Link, Metric, Node, PathKind, section, several};
+use header::Header;
 use sections::Sections;
 
 /// A deformation invariant bounding sphere tree with its triangles.
@@ -29,23 +42,6 @@ pub struct Tree<'a, I> {
     sections: Sections<'a>,
     header: Header,
     width: PhantomData<I>,
-}
-
-/// The header's fields that a query needs.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Header {
-    pub paths: PathKind,
-    pub mesh_id: u32,
-    pub vertices: u32,
-    pub triangles: u32,
-    pub nodes: u32,
-    pub stack: u32,
-    pub stretch: f32,
-    pub radius_unit: f32,
-    pub position_error: f32,
-    /// Rows of the section table.
-    pub sections: u32,
-    pub checksum: u32,
 }
 
 impl<'a, I: Index> Tree<'a, I> {
@@ -61,18 +57,10 @@ impl<'a, I: Index> Tree<'a, I> {
     /// # Errors
     /// [`FormatError`] names the first thing that is wrong and its value.
     pub const fn from_bytes(bytes: &'a [u8]) -> Result<Self, FormatError> {
-        let header = match validate::header::<I>(bytes) {
-            Ok(header) => header,
-            Err(error) => return Err(error),
-        };
-        let tree = match sections::find::<I>(bytes, &header) {
-            Ok(sections) => Self { sections, header, width: PhantomData },
-            Err(error) => return Err(error),
-        };
-        match validate::well_formed(&tree) {
-            Ok(()) => Ok(tree),
-            Err(error) => Err(error),
-        }
+        let header = tri!(header::read::<I>(bytes));
+        let sections = tri!(sections::find::<I>(bytes, &header));
+        tri!(validate::well_formed::<I>(&header, &sections));
+        Ok(Self { sections, header, width: PhantomData })
     }
 
     /// The same tree on a copy of its bytes, say in tightly coupled memory, without validating them
@@ -176,6 +164,7 @@ impl<'a, I: Index> Tree<'a, I> {
 
     /// Rest metric of a triangle (`docs/format.md`);
     /// `None` outside the table or where the tree was emitted without its metric.
+    #[doc(hidden)]
     #[inline(always)]
     #[must_use]
     pub const fn metric(&self, row: u32) -> Option<Metric> {

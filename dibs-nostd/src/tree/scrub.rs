@@ -2,7 +2,8 @@
 
 use core::fmt;
 
-use crate::tree::format::{CHECKSUM_AT, CRC, HEADER_BYTES, u32_at};
+use crate::tree::format::field::CHECKSUM;
+use crate::tree::format::{CRC, HEADER_BYTES, u32_at};
 
 /// An endless background check of a tree's bytes against their checksum.
 ///
@@ -14,7 +15,7 @@ use crate::tree::format::{CHECKSUM_AT, CRC, HEADER_BYTES, u32_at};
 /// certain stands at [`CRC`]; of other damage one pattern in 2^32 passes.
 ///
 /// ```
-/// use dibs_nostd::{Rot, Scrub};
+/// use dibs_nostd::{CorruptTreeError, Scrub};
 ///
 /// # let (mesh, _) = dibs_build::generate::heart(320).unwrap();
 /// # let built = dibs_build::Builder::new().build(&mesh).unwrap();
@@ -27,8 +28,8 @@ use crate::tree::format::{CHECKSUM_AT, CRC, HEADER_BYTES, u32_at};
 /// bytes[200] ^= 1;
 /// let mut scrub = Scrub::new(&bytes);
 /// let found = (0..bytes.len()).find_map(|_| scrub.step(64).err());
-/// assert!(matches!(found, Some(Rot { .. })));
-/// # Ok::<(), Rot>(())
+/// assert!(matches!(found, Some(CorruptTreeError { .. })));
+/// # Ok::<(), CorruptTreeError>(())
 /// ```
 #[derive(Clone)]
 pub struct Scrub<'a> {
@@ -43,14 +44,14 @@ pub struct Scrub<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
-pub struct Rot {
+pub struct CorruptTreeError {
     /// The checksum in the header.
     pub stated: u32,
     /// The checksum of the bytes.
     pub computed: u32,
 }
 
-impl fmt::Display for Rot {
+impl fmt::Display for CorruptTreeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { stated, computed } = self;
         write!(
@@ -60,7 +61,7 @@ impl fmt::Display for Rot {
     }
 }
 
-impl core::error::Error for Rot {}
+impl core::error::Error for CorruptTreeError {}
 
 impl<'a> Scrub<'a> {
     /// A check of all bytes of a tree, as they were given to [`Tree::from_bytes`](crate::Tree::from_bytes).
@@ -75,12 +76,12 @@ impl<'a> Scrub<'a> {
     /// Cost: linear in `most`, about ten instructions a byte on a Cortex-M7.
     ///
     /// # Errors
-    /// [`Rot`] at the end of a round in which the bytes did not match their checksum.
-    pub fn step(&mut self, most: usize) -> Result<(), Rot> {
+    /// [`CorruptTreeError`] at the end of a round in which the bytes did not match their checksum.
+    pub fn step(&mut self, most: usize) -> Result<(), CorruptTreeError> {
         let rest = self.bytes.get(self.at..).unwrap_or_default();
         let part = rest.get(..most).unwrap_or(rest);
         // The checksum covers everything but itself.
-        let skipped = CHECKSUM_AT.saturating_sub(self.at);
+        let skipped = CHECKSUM.saturating_sub(self.at);
         let before = part.get(..skipped).unwrap_or(part);
         let after = part.get(HEADER_BYTES.saturating_sub(self.at)..).unwrap_or_default();
         self.digest.update(before);
@@ -93,9 +94,9 @@ impl<'a> Scrub<'a> {
         let computed = digest.finalize();
         self.at = 0;
         self.rounds = self.rounds.wrapping_add(1);
-        match u32_at(self.bytes, CHECKSUM_AT) {
+        match u32_at(self.bytes, CHECKSUM) {
             Some(stated) if stated == computed => Ok(()),
-            stated => Err(Rot { stated: stated.unwrap_or_default(), computed }),
+            stated => Err(CorruptTreeError { stated: stated.unwrap_or_default(), computed }),
         }
     }
 

@@ -2,12 +2,12 @@
 //!
 //! To add one: its kind in [`section`], a row in [`rules`], a field of [`Sections`].
 
-use crate::tree::Header;
 use crate::tree::format::{
     self, HEADER_BYTES, LIMIT_BYTES, METRIC_BYTES, SECTION_ALIGN, SECTION_BYTES, node_bytes,
     section, triangle_bytes,
 };
-use crate::{FormatError, Index};
+use crate::tree::header::Header;
+use crate::tree::{FormatError, Index};
 
 /// The parts of a tree's bytes; an optional one that is absent is empty.
 #[derive(Clone, Copy, Debug)]

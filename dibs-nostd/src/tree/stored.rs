@@ -2,7 +2,7 @@
 
 use core::marker::PhantomData;
 
-use crate::tree::format::{STACK_AT, VERTICES_AT, u32_at};
+use crate::tree::format::{field, u32_at};
 use crate::{FormatError, Index, Scrub, Tree};
 
 /// The bytes of a tree in flash, which nobody has validated yet.
@@ -62,13 +62,13 @@ impl<'a, I: Index> TreeBytes<'a, I> {
     /// Vertices that the header states: rows of a vertex table. 0 where there is no header.
     #[must_use]
     pub const fn vertex_count(&self) -> usize {
-        self.word(VERTICES_AT)
+        self.word(field::VERTICES)
     }
 
     /// Entries that the header states for a query's stack. 0 where there is no header.
     #[must_use]
     pub const fn stack(&self) -> usize {
-        self.word(STACK_AT)
+        self.word(field::STACK)
     }
 
     const fn word(&self, at: usize) -> usize {

@@ -27,7 +27,7 @@ pub mod command {
     pub const FRAME: u32 = 2;
     /// A query: [`QUERY_WORDS`](super::QUERY_WORDS). Answered by [`ANSWER_WORDS`](super::ANSWER_WORDS).
     pub const QUERY: u32 = 3;
-    /// The same in rounds, of a frame of rows.
+    /// The same by the wide search, of a frame of rows.
     pub const QUERY_IN_ROUNDS: u32 = 5;
     /// A modal frame, of a tree with modes: 1 for queries that remember positions and 0 for others, the
     /// number of weights, then an `f32` each. Answered by what bounding its stretch took and the
@@ -55,7 +55,7 @@ const SLOTS: usize = 256;
 enum Table<'a> {
     /// From the rows of a frame.
     Rows,
-    /// From the rows of a frame, for a query in rounds.
+    /// From the rows of a frame, for the wide search.
     InRounds,
     /// From weights.
     Modal(ModalSurface<'a, MAX_MODES>),
@@ -233,7 +233,7 @@ fn timed(
     let rows = core::hint::black_box(rows);
     match table {
         Table::Rows => clocked(machine, || query.closest(rows, tool, options)),
-        Table::InRounds => clocked(machine, || query.closest_in_rounds(rows, tool, options)),
+        Table::InRounds => clocked(machine, || query.closest_wide(rows, tool, options)),
         Table::Modal(surface) => clocked(machine, || query.closest(surface, tool, options)),
         Table::Remembered(surface) => {
             clocked(machine, || query.closest(&Memo::<_, SLOTS>::new(surface), tool, options))

@@ -12,7 +12,8 @@
 
 use glam::Vec3;
 
-use super::{ACCURACY, Search, Step, THIRD, Waiting};
+use super::slack::ACCURACY;
+use super::{Search, Step, THIRD, Waiting};
 use crate::math::sqrt::sqrt;
 use crate::query::Budget;
 use crate::query::plane::Plane;
@@ -158,7 +159,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
     /// A bound whose key is not beyond this has to be tested.
     #[inline(always)]
     fn threshold(&self) -> u32 {
-        self.now.wrapping_add(self.unit.up(self.search.reach + self.search.coordinate_slack))
+        self.now.wrapping_add(self.unit.up(self.search.cutoff + self.search.coordinate_slack))
     }
 
     #[inline(always)]
@@ -191,7 +192,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             let corrupt = QueryError::Corrupt { row: top as u32 };
             let &Waiting { lower, link: word } = self.search.stack.get(top).ok_or(corrupt)?;
             let place = Place::from_word(word);
-            if lower > self.search.reach {
+            if lower > self.search.cutoff {
                 self.search.waiting = top;
                 self.front.put_back(place).ok_or(corrupt)?;
                 continue;
@@ -272,10 +273,10 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             let position = search.position(node.pin)?;
             let normal = search.tool.axis_to(position);
             let distance = sqrt(normal.dot(normal));
-            search.pull_in(node.pin, distance);
+            search.lower_cutoff_to_pin(node.pin, distance);
             let own = distance - node.radius_code as f32 * search.radius_scale;
             *key = later(*key, own);
-            if own > search.reach {
+            if own > search.cutoff {
                 continue;
             }
             if let Link::Leaf { first, count } = Link::decode(node.link)
@@ -285,7 +286,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 let plane = search.plane_across(normal, position, distance);
                 let excess = plane.excess(tree, search.vertices, first, count).ok_or(corrupt)?;
                 if excess > 0.0 {
-                    *key = later(*key, search.reach + excess / distance);
+                    *key = later(*key, search.cutoff + excess / distance);
                     continue;
                 }
             }
@@ -347,7 +348,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         }
         let excess = least([a, b, c].map(|corner| plane.normal.dot(corner))) - plane.limit;
         if excess > 0.0 {
-            return Ok(Some(search.reach + excess / distance));
+            return Ok(Some(search.cutoff + excess / distance));
         }
         self.test_exactly(triangle, corners, place)
     }
@@ -372,7 +373,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         search.best_squared = pair.distance_squared;
         search.best_triangle = triangle;
         search.best = Some(pair);
-        search.tighten(distance);
+        search.lower_cutoff(distance);
         self.facing = Facing::new(&self.search);
         let corrupt = QueryError::Corrupt { row: triangle };
         if let Some(place) = self.front.best.replace(place) {

@@ -1,27 +1,32 @@
 //! The tree's bytes: little-endian records at fixed places, read from flash without a parsing pass.
 //!
-//! `docs/format.md` is the specification; this module is its only reader. Everything here is `const`
-//! so that a tree may be validated in a constant too; a generated one is validated when it boots.
+//! `docs/format.md` is the specification; this module is its only reader, [`field`] the table of the header.
+//! Everything here is `const` so that a tree may be validated in a constant too; a generated one is validated when
+//! it boots.
 
+mod metric;
 pub(crate) mod several;
 
-use crate::Index;
+#[doc(hidden)]
+pub use field::CHECKSUM as CHECKSUM_AT;
+pub use metric::{Join, Metric};
+pub(crate) use metric::{metric, metric_row};
+
+use super::Index;
 
 /// First bytes of every tree.
+#[doc(hidden)]
 pub const MAGIC: [u8; 4] = *b"DIBS";
 /// Version of the layout that this crate reads.
 pub const VERSION: u16 = 4;
 /// Bytes of the fixed header; the section table follows it.
+#[doc(hidden)]
 pub const HEADER_BYTES: usize = 64;
 /// Bytes of one row of the section table: kind, offset, length.
+#[doc(hidden)]
 pub const SECTION_BYTES: usize = 12;
-/// Where the checksum stands in the header. It covers every other byte.
-pub const CHECKSUM_AT: usize = 60;
-/// Where the header states the number of vertices.
-pub(crate) const VERTICES_AT: usize = 12;
-/// Where the header states the entries that a traversal's stack needs.
-pub(crate) const STACK_AT: usize = 24;
 /// Every section starts at a multiple of this.
+#[doc(hidden)]
 pub const SECTION_ALIGN: usize = 16;
 /// Most entries that a traversal's stack may need, whatever the tree.
 pub const MAX_STACK: usize = 512;
@@ -31,11 +36,54 @@ pub const MAX_CHILDREN: u32 = 8;
 pub const MAX_LEAF_TRIANGLES: u32 = 8;
 
 /// Bytes of one row of the metric section.
+#[doc(hidden)]
 pub const METRIC_BYTES: usize = 12;
 /// Bytes of one row of the limits section.
+#[doc(hidden)]
 pub const LIMIT_BYTES: usize = 2;
 /// The limit code that stands for the tree's own stretch limit.
+#[doc(hidden)]
 pub const MAX_LIMIT_CODE: u32 = 0xFFFF;
+
+/// Where the header's fields stand: offsets in bytes. Numbers are little-endian, of four bytes unless it says
+/// otherwise.
+#[doc(hidden)]
+pub mod field {
+    use core::ops::Range;
+
+    /// [`VERSION`](super::VERSION), two bytes, after the [`MAGIC`](super::MAGIC).
+    pub const VERSION: usize = 4;
+    /// Bytes of an index, one byte.
+    pub const WIDTH: usize = 6;
+    /// The [`PathKind`](super::PathKind)'s code, one byte.
+    pub const PATHS: usize = 7;
+    /// The mesh id.
+    pub const MESH_ID: usize = 8;
+    /// Number of vertices.
+    pub const VERTICES: usize = 12;
+    /// Number of triangles.
+    pub const TRIANGLES: usize = 16;
+    /// Number of nodes.
+    pub const NODES: usize = 20;
+    /// Entries of the traversal's stack.
+    pub const STACK: usize = 24;
+    /// The stretch limit, `f32`.
+    pub const STRETCH: usize = 28;
+    /// The length of one radius code, `f32`.
+    pub const RADIUS_UNIT: usize = 32;
+    /// How far a vertex may be from the place that the mesh's file has, `f32`.
+    pub const POSITION_ERROR: usize = 36;
+    /// Zeros.
+    pub const RESERVED: Range<usize> = 40..48;
+    /// Rows of the section table.
+    pub const SECTIONS: usize = 48;
+    /// Bytes of the whole tree.
+    pub const LENGTH: usize = 52;
+    /// Zero.
+    pub const LAST: usize = 56;
+    /// The checksum of every other byte.
+    pub const CHECKSUM: usize = 60;
+}
 
 /// CRC-32 (ISO-HDLC, that of zlib and Ethernet) of trees and bus packets, by a table of 1 KiB.
 ///
@@ -44,9 +92,11 @@ pub const MAX_LIMIT_CODE: u32 = 0xFFFF;
 /// applications", DSN 2002). Of other damage one pattern in 2^32 passes.
 ///
 /// A `static`, not a constant: every use of a constant would bring its own table.
+#[doc(hidden)]
 pub static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 /// What a section holds.
+#[doc(hidden)]
 pub mod section {
     /// One record a node, breadth first from the root.
     pub const NODES: u32 = 1;
@@ -154,12 +204,14 @@ pub(crate) struct Node {
 }
 
 /// Bytes of one node record.
+#[doc(hidden)]
 #[must_use]
 pub const fn node_bytes<I: Index>() -> usize {
     2 * I::BYTES + 4
 }
 
 /// Bytes of one triangle row.
+#[doc(hidden)]
 #[must_use]
 pub const fn triangle_bytes<I: Index>() -> usize {
     3 * I::BYTES
@@ -268,91 +320,6 @@ pub(crate) const fn rest_position(rest: &[u8], row: u32) -> Option<glam::Vec3> {
         f32::from_le_bytes([r[4], r[5], r[6], r[7]]),
         f32::from_le_bytes([r[8], r[9], r[10], r[11]]),
     ))
-}
-
-/// How a triangle's stretch is measured: along which of its edges, and by what they are at rest.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Metric {
-    /// Of the edge from the centre to the other of the first two corners; of both edges; and of the edge from
-    /// the centre to the third corner: see `docs/format.md`.
-    pub squares: [f32; 3],
-    /// How the triangle goes on from the one in the row before.
-    pub join: Join,
-    /// The centre is its second corner, not its first.
-    pub is_reversed: bool,
-}
-
-impl Metric {
-    /// The metric in one row. (Each number is read whole, so that it takes one load.)
-    #[inline(always)]
-    pub(crate) const fn new([first, between, second]: [f32; 3]) -> Self {
-        Self {
-            squares: [first.abs(), between, second],
-            join: Join::marked(first),
-            is_reversed: between.to_bits() & 1 != 0,
-        }
-    }
-
-    /// The corners of a triangle, its centre first.
-    #[must_use]
-    pub const fn centre_first<T: Copy>(&self, [a, b, c]: [T; 3]) -> [T; 3] {
-        if self.is_reversed { [b, a, c] } else { [a, b, c] }
-    }
-}
-
-/// What a triangle's first edge, from its centre to the other of its first two corners, is to the triangle in the
-/// row before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Join {
-    /// Nothing that a reader may count on. The centre is the first corner.
-    Start,
-    /// The edge from the centre to the third corner.
-    Fan,
-    /// The same, the other way round: what was the third corner is the centre.
-    Flip,
-}
-
-impl Join {
-    /// As the first number of a row has it: the sign marks a fan, and the lowest bit, where the sign is clear, a
-    /// flip.
-    #[inline(always)]
-    pub(crate) const fn marked(first: f32) -> Self {
-        let bits = first.to_bits();
-        if bits >> 31 != 0 {
-            Self::Fan
-        } else if bits & 1 != 0 {
-            Self::Flip
-        } else {
-            Self::Start
-        }
-    }
-
-    /// Whether a triangle goes on like this from the one before; both by their corners, the centre first.
-    #[must_use]
-    pub const fn is_between(self, [a, _, c]: [u32; 3], [centre, other, _]: [u32; 3]) -> bool {
-        match self {
-            Self::Start => true,
-            Self::Fan => centre == a && other == c,
-            Self::Flip => centre == c && other == a,
-        }
-    }
-}
-
-/// The rest metric of a triangle.
-#[inline(always)]
-pub(crate) const fn metric(metric: &[u8], row: u32) -> Option<Metric> {
-    let Some(tail) = rows_from(metric, row, METRIC_BYTES) else { return None };
-    match tail.first_chunk::<METRIC_BYTES>() {
-        Some(row) => Some(Metric::new(metric_row(row))),
-        None => None,
-    }
-}
-
-/// The numbers in a row of the metric section.
-#[inline(always)]
-pub(crate) const fn metric_row(row: &[u8; METRIC_BYTES]) -> [f32; 3] {
-    let ([first, between, second], _) = row.as_chunks() else { return [0.0; 3] };
-    [f32::from_le_bytes(*first), f32::from_le_bytes(*between), f32::from_le_bytes(*second)]
 }
 
 #[inline(always)]

@@ -155,7 +155,7 @@ fn rotten<'b>(sound: &Tree<'_, u16>, bytes: &'b [u8]) -> Option<Tree<'b, u16>> {
     sound.moved_to(bytes).ok()
 }
 
-fn scrub(bytes: &[u8]) -> Result<(), dibs_nostd::Rot> {
+fn scrub(bytes: &[u8]) -> Result<(), dibs_nostd::CorruptTreeError> {
     Scrub::new(bytes).step(bytes.len())
 }
 

@@ -1,12 +1,12 @@
-//! The same search in rounds: up to seven subtrees at once.
+//! The wide search: batches of up to seven subtrees.
 //!
-//! One subtree after the other is a chain: each takes its distances to say which is next, and a branch
-//! for each child that no processor can foretell. Half of a query's time on a large processor goes there.
-//! A round takes its subtrees together, so that the loads and roots of all their children overlap; judges four
-//! children by one comparison; and sorts what is left without a branch on what is nearer.
+//! One subtree at a time is a chain of dependences: its distances decide which is next, and each child costs a
+//! branch that no processor predicts. Half of a query's time on a large processor goes there. A batch overlaps
+//! the loads and roots of all its children, compares four children by one instruction, and sorts the rest
+//! without branches.
 //!
-//! Little of it is in vain: what waits is nearly always within reach when its turn comes. There is mostly a gain
-//! in tests: the pins of seven subtrees have pulled the reach in before a child is judged.
+//! Batching wastes few tests: most queued subtrees would be visited anyway. It often saves some, because the
+//! pins of seven subtrees lower the cutoff before a child is compared with it.
 
 mod leaf;
 mod order;
@@ -14,41 +14,42 @@ mod order;
 use glam::Vec4;
 
 use super::{Search, Step, Waiting};
-use crate::math::four::{Four, roots};
 use crate::math::sqrt::sqrt;
+use crate::math::vec3x4::{Vec3x4, roots};
 use crate::tree::format::several::four_nodes;
 use crate::tree::format::{Link, MAX_CHILDREN, node_bytes};
 use crate::unavailable::QueryError;
 use crate::{Index, Proximity, Tool, VertexTable};
 
-/// Most subtrees in a round. More overlap, but see a looser reach; and a set of their children must fit in a word.
+/// Most subtrees in a batch. A larger batch hides more latency but prunes with an older bound; and the set of its
+/// children must fit in a word of 64 bits.
 const SUBTREES: usize = 7;
 const MOST: usize = SUBTREES * MAX_CHILDREN as usize;
 const BLOCKS: usize = MOST / 4;
 const MOST_NODE_BYTES: usize = node_bytes::<u32>();
-/// Most entries that a round of several subtrees leaves waiting, so that counts do not depend on the
-/// stack as long as it is large.
+/// Most entries that a batch of several subtrees leaves on the stack, so that counts do not depend on the stack's
+/// size as long as it is large.
 const MOST_WAITING: usize = 128;
 
-/// A search in rounds.
-pub(in crate::query) struct Rounds<'s, 't, I, V: ?Sized, T> {
+/// A search by batches.
+pub(in crate::query) struct WideSearch<'s, 't, I, V: ?Sized, T> {
     search: Search<'s, 't, I, V, T>,
-    /// How many may wait after a round of several subtrees: what is left of the stack is enough for one
-    /// subtree after the other.
+    /// How many entries a batch of several subtrees may leave: the rest of the stack is enough for one subtree at
+    /// a time.
     room: usize,
-    /// Records of the round's children. What comes after them, up to the end of a block of four, is
-    /// other nodes: they may pull in the reach too, and are then left out.
+    /// Records of the batch's children. Other nodes fill the last block of four: their pins may lower the cutoff
+    /// too, and then they are left out.
     records: [u8; (MOST + MAX_CHILDREN as usize) * MOST_NODE_BYTES],
     /// Lower bounds of the children's parents.
     parents: [f32; MOST + MAX_CHILDREN as usize],
     /// Squares of the distances of their pins.
     squares: [Vec4; BLOCKS],
     lowers: [[f32; 4]; BLOCKS],
-    /// What the children in reach are sorted by.
+    /// Sorting keys of the children below the cutoff.
     keys: [[i32; 4]; BLOCKS + 2],
 }
 
-impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'s, 't, I, V, T> {
+impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V, T> {
     pub fn new(search: Search<'s, 't, I, V, T>) -> Self {
         let spare = search.stack.len().saturating_sub(search.tree.stack() as usize);
         Self {
@@ -62,14 +63,14 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'s, 't, I, V, T>
         }
     }
 
-    /// Looks at subtrees, near ones first, until none within reach is left or the budget runs out.
+    /// Looks at subtrees, near ones first, until none below the cutoff is left or the budget runs out.
     pub fn run(mut self) -> Result<Proximity, QueryError> {
         while let Some(top) = self.search.waiting.checked_sub(1) {
             let corrupt = QueryError::Corrupt { row: top as u32 };
             let &Waiting { lower, link } = self.search.stack.get(top).ok_or(corrupt)?;
             let step = match Link::decode(link) {
-                Link::Children { .. } => self.round(),
-                Link::Leaf { .. } if lower > self.search.reach => {
+                Link::Children { .. } => self.expand_batch(),
+                Link::Leaf { .. } if lower > self.search.cutoff => {
                     self.search.waiting = top;
                     continue;
                 }
@@ -87,10 +88,10 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'s, 't, I, V, T>
 
     /// Tests the children of the subtrees on top of the stack.
     #[inline(never)]
-    fn round(&mut self) -> Result<Step, QueryError> {
+    fn expand_batch(&mut self) -> Result<Step, QueryError> {
         let corrupt = QueryError::Corrupt { row: self.search.waiting as u32 };
         let (subtrees, children) = self.take().ok_or(corrupt)?;
-        // All of the round or nothing: with more budget a query goes the same way further.
+        // All of the batch or nothing: with more budget a query takes the same steps, and more of them.
         let Some(left) = self.search.left.node_tests.checked_sub(children as u32) else {
             return Ok(Step::OutOfBudget);
         };
@@ -103,8 +104,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'s, 't, I, V, T>
         Ok(Step::Done)
     }
 
-    /// Copies the children of the nearest subtrees, as many as the stack is enough for. Returns the number of
-    /// subtrees and that of children: those of a subtree that is out of reach by now do not count.
+    /// Copies the children of the nearest subtrees, as many as the stack has room for. Returns the number of
+    /// subtrees and of children; a subtree that is above the cutoff by now has none.
     #[inline(always)]
     fn take(&mut self) -> Option<(usize, usize)> {
         let Self { search, room, records, parents, .. } = self;
@@ -119,13 +120,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'s, 't, I, V, T>
             let place = records.get_mut(children * node_bytes::<I>()..)?;
             search.tree.copy_nodes(first, count, place)?;
             *parents.get_mut(children..)?.first_chunk_mut()? = [lower; MAX_CHILDREN as usize];
-            children = if lower > search.reach { children } else { all };
+            children = if lower > search.cutoff { children } else { all };
             subtrees += 1;
         }
         Some((subtrees, children))
     }
 
-    /// Measures how far the children's pins are. The nearest pulls in the reach.
+    /// Measures the distances of the children's pins. The nearest lowers the cutoff.
     #[inline(always)]
     fn measure(&mut self, children: usize) -> Option<()> {
         let Self { search, records, squares, .. } = self;
@@ -135,17 +136,17 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'s, 't, I, V, T>
         let mut least = Vec4::INFINITY;
         for (nodes, squared) in blocks().zip(squares.iter_mut()) {
             let pins = four_nodes::<I>(nodes)?.map(|node| node.pin);
-            let to = tool.axis_to_four(&Four::of(vertices, pins)?);
+            let to = tool.axis_to_four(&Vec3x4::of(vertices, pins)?);
             *squared = to.dot(to);
             least = Vec4::select(squared.cmplt(least), *squared, least);
         }
         let least = least.min_element();
         let distance = sqrt(least);
-        if distance < search.pin.1 {
+        if distance < search.nearest_pin.distance {
             for (nodes, squared) in blocks().zip(squares.iter()) {
                 let mut equal = u64::from(squared.cmpeq(Vec4::splat(least)).bitmask());
                 if let Some(lane) = next(&mut equal) {
-                    search.pull_in(four_nodes::<I>(nodes)?.get(lane)?.pin, distance);
+                    search.lower_cutoff_to_pin(four_nodes::<I>(nodes)?.get(lane)?.pin, distance);
                     break;
                 }
             }
@@ -153,13 +154,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'s, 't, I, V, T>
         Some(())
     }
 
-    /// Compares the children's spheres with the reach. Returns the set of those within, and of the leaves
-    /// among them.
+    /// Compares the children's spheres with the cutoff. Returns the set of those below, and of the leaves among
+    /// them.
     #[inline(always)]
     fn judge(&mut self, children: usize) -> Option<(u64, u64)> {
         let Self { search, records, parents, squares, lowers, .. } = self;
         let (blocks, bytes) = (children.div_ceil(4), 4 * node_bytes::<I>());
-        let (reach, scale) = (Vec4::splat(search.reach), search.radius_scale);
+        let (cutoff, scale) = (Vec4::splat(search.cutoff), search.radius_scale);
         let (mut near, mut leaves) = (0, 0);
         let nodes = records.get(..blocks * bytes)?.chunks_exact(bytes);
         let parents = parents.as_chunks::<4>().0.get(..blocks)?;
@@ -168,7 +169,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'s, 't, I, V, T>
             let nodes = four_nodes::<I>(nodes)?;
             let codes = nodes.map(|node| node.radius_code as i32 as f32);
             let radius = Vec4::from_array(codes) * scale;
-            let far = reach + radius;
+            let far = cutoff + radius;
             // What is not a number is not far: the leaves below find out what it is.
             let within = !squared.cmpgt(far * far).bitmask() & 0xF;
             near = near << 4 | u64::from(within);

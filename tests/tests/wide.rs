@@ -1,5 +1,5 @@
-//! Queries in rounds: as exact as those of one subtree after the other (`differential.rs` searches for a
-//! miss of either), on any stack, within any budget.
+//! The wide search: as exact as the other one (`differential.rs` searches for a miss of either), on any stack,
+//! within any budget.
 
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
@@ -19,7 +19,7 @@ fn tool(mesh: &Mesh, rng: &mut Rng) -> Sphere {
     Sphere::new(on_surface + unit(rng) * 40.0 * rng.f32(), 2.0).expect("valid")
 }
 
-/// Counts are exact: a change of the tree or of the rounds shows here, and must be meant.
+/// Counts are exact: a change of the tree or of the batches shows here, and must be meant.
 #[test]
 fn counts_of_a_fixed_stream_are_what_they_were() {
     let (mesh, built) = heart();
@@ -38,7 +38,7 @@ fn counts_of_a_fixed_stream_are_what_they_were() {
             Options::new().stretch(measured).warm_start(last),
         ];
         for (count, options) in counts.iter_mut().zip(options) {
-            let found = query.closest_in_rounds(rows.as_slice(), &tool, &options);
+            let found = query.closest_wide(rows.as_slice(), &tool, &options);
             let found = found.expect("an answer");
             *count = (count.0 + found.node_tests, count.1 + found.triangle_tests);
             last = found.triangle;
@@ -75,11 +75,11 @@ fn tests_with<const D: usize>(mesh: &Mesh, built: &BuiltTree, rows: &[Vec3]) -> 
     let mut tests = 0;
     for _ in 0..400 {
         let tool = tool(mesh, &mut rng);
-        let one_by_one = query.closest(rows, &tool, &Options::new()).expect("an answer");
-        let in_rounds = query.closest_in_rounds(rows, &tool, &Options::new()).expect("an answer");
-        let apart = (one_by_one.separation - in_rounds.separation).abs();
-        assert!(apart <= 2.0 * in_rounds.accuracy, "{one_by_one:?} {in_rounds:?}");
-        tests += in_rounds.node_tests;
+        let one_at_a_time = query.closest(rows, &tool, &Options::new()).expect("an answer");
+        let wide = query.closest_wide(rows, &tool, &Options::new()).expect("an answer");
+        let apart = (one_at_a_time.separation - wide.separation).abs();
+        assert!(apart <= 2.0 * wide.accuracy, "{one_at_a_time:?} {wide:?}");
+        tests += wide.node_tests;
     }
     tests
 }
@@ -100,7 +100,7 @@ fn more_budget_tells_no_less() {
         for node_tests in (0..400).step_by(9) {
             let budget = Budget { node_tests, triangle_tests: node_tests / 16 };
             let options = Options::new().budget(budget);
-            let found = query.closest_in_rounds(rows.as_slice(), &tool, &options);
+            let found = query.closest_wide(rows.as_slice(), &tool, &options);
             let found = found.expect("a short budget is no error");
             assert!(found.node_tests <= node_tests + 1, "{budget:?} {found:?}");
             assert!(found.triangle_tests <= budget.triangle_tests, "{budget:?} {found:?}");

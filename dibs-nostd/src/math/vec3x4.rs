@@ -1,4 +1,4 @@
-//! Four points at once, coordinate by coordinate: what a large processor does by one instruction.
+//! Four points at once, coordinate by coordinate: one instruction each on a large processor.
 
 use glam::{Mat4, Vec3, Vec4};
 
@@ -7,13 +7,13 @@ use crate::math::sqrt::sqrt;
 
 /// Four points or vectors. Each operation rounds as that of [`Vec3`] does.
 #[derive(Clone, Copy, Debug)]
-pub struct Four {
+pub struct Vec3x4 {
     pub x: Vec4,
     pub y: Vec4,
     pub z: Vec4,
 }
 
-impl Four {
+impl Vec3x4 {
     /// The positions in four rows; `None` if one is outside the table.
     #[inline(always)]
     pub fn of<V: VertexTable + ?Sized>(vertices: &V, [a, b, c, d]: [u32; 4]) -> Option<Self> {
@@ -53,7 +53,7 @@ impl Four {
     }
 }
 
-/// Four square roots, correctly rounded.
+/// Vec3x4 square roots, correctly rounded.
 #[inline(always)]
 pub fn roots(squares: Vec4) -> Vec4 {
     Vec4::from_array(squares.to_array().map(sqrt))

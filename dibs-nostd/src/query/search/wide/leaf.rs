@@ -1,17 +1,17 @@
-//! Leaves in a round, and triangles four at a time.
+//! Leaves of a batch, and triangles four at a time.
 
 use glam::Vec4;
 
-use super::{Rounds, next};
-use crate::math::four::{Four, roots};
+use super::{WideSearch, next};
+use crate::math::vec3x4::{Vec3x4, roots};
 use crate::query::plane::Plane;
 use crate::query::search::{Search, Step, THIRD};
 use crate::tree::format::{Link, Node, whole_node};
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
 
-impl<I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'_, '_, I, V, T> {
-    /// Tests the planes of those children that are leaves. Returns the set of what is left.
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
+    /// Tests the planes of those children that are leaves. Returns the set of children that remain.
     #[inline(always)]
     pub(super) fn reject_leaves(&mut self, near: u64, mut leaves: u64) -> Option<u64> {
         let (tree, vertices) = (self.search.tree, self.search.vertices);
@@ -57,7 +57,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         self.left.node_tests = left;
         while count > 0 {
             let [a, b, c] = tree.four_triangles(first, count).ok_or(corrupt)?;
-            let corners = |rows| Four::of(vertices, rows).ok_or(corrupt);
+            let corners = |rows| Vec3x4::of(vertices, rows).ok_or(corrupt);
             let within = self.within_own_planes(corners(a)?, corners(b)?, corners(c)?);
             let mut within = u64::from(within) & !(u64::MAX << count);
             while let Some(at) = next(&mut within) {
@@ -77,15 +77,16 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         if triangle == self.best_triangle {
             return Ok(Step::Done);
         }
-        if self.left.triangle_tests == 0 {
+        let Some(left) = self.left.triangle_tests.checked_sub(1) else {
             return Ok(Step::OutOfBudget);
-        }
+        };
         let corners = self.corners(triangle)?;
         let [a, b, c] = corners;
         // Nor is the sum where one corner is not finite.
         if !(a + b + c).is_finite() {
             return Err(QueryError::Position { vertex: self.not_finite(triangle) });
         }
+        self.left.triangle_tests = left;
         self.test_triangle(triangle, &corners);
         Ok(Step::Done)
     }
@@ -93,10 +94,10 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// Which of four triangles, by their corners, are not beyond the plane in the direction of their own corners'
     /// mean.
     #[inline(always)]
-    fn within_own_planes(&self, a: Four, b: Four, c: Four) -> u32 {
+    fn within_own_planes(&self, a: Vec3x4, b: Vec3x4, c: Vec3x4) -> u32 {
         let mean = a.plus(b).plus(c).times(Vec4::splat(THIRD));
         let normal = self.tool.axis_to_four(&mean);
-        let beyond = roots(normal.dot(normal)) * (self.reach + self.coordinate_slack);
+        let beyond = roots(normal.dot(normal)) * (self.cutoff + self.coordinate_slack);
         let limit = normal.dot(mean.minus(normal)) + beyond + self.tilt_slack;
         within(normal, limit, a) | within(normal, limit, b) | within(normal, limit, c)
     }
@@ -112,12 +113,12 @@ impl Plane {
         first: u32,
         count: u32,
     ) -> Option<u32> {
-        let (normal, limit) = (Four::splat(self.normal), Vec4::splat(self.limit));
+        let (normal, limit) = (Vec3x4::splat(self.normal), Vec4::splat(self.limit));
         let [a, b, c, d, e, f, g, h, i, j, k, l] = tree.leaf_vertices(first, count)?;
-        let (one, two) = (Four::of(vertices, [a, b, c, d])?, Four::of(vertices, [e, f, g, h])?);
+        let (one, two) = (Vec3x4::of(vertices, [a, b, c, d])?, Vec3x4::of(vertices, [e, f, g, h])?);
         let mut set = within(normal, limit, one) | within(normal, limit, two) << 4;
         if count > 6 {
-            set |= within(normal, limit, Four::of(vertices, [i, j, k, l])?) << 8;
+            set |= within(normal, limit, Vec3x4::of(vertices, [i, j, k, l])?) << 8;
         }
         Some(set & !(u32::MAX << (count + 2)))
     }
@@ -125,6 +126,6 @@ impl Plane {
 
 /// Which of four points are not beyond a plane, or one each. What is not a number is not beyond.
 #[inline(always)]
-fn within(normal: Four, limit: Vec4, points: Four) -> u32 {
+fn within(normal: Vec3x4, limit: Vec4, points: Vec3x4) -> u32 {
     !normal.dot(points).cmpgt(limit).bitmask() & 0xF
 }

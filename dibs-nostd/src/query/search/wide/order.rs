@@ -1,9 +1,9 @@
-//! The order in which a round's children wait.
+//! The order of a batch's children on the stack.
 
 use core::array;
 use core::hint::black_box;
 
-use super::{Rounds, next};
+use super::{WideSearch, next};
 use crate::query::search::Waiting;
 use crate::tree::format::{Link, whole_node};
 use crate::{Index, Tool, VertexTable};
@@ -11,17 +11,17 @@ use crate::{Index, Tool, VertexTable};
 /// Trees with more nodes than this are larger than a processor's nearest cache.
 const CACHED: u32 = 4096;
 
-/// The low bits of a key, which name a child.
-const NAME: u32 = 63;
+/// The low bits of a key: the child's index, counted backwards.
+const INDEX: u32 = 63;
 
 /// A key that is below all others.
 const NONE: i32 = -1;
 
-impl<I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'_, '_, I, V, T> {
-    /// Lets the children in a set wait, the nearest of all on top.
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
+    /// Pushes the children in a set, the nearest on top.
     ///
-    /// A child's place is the number of those that are farther: counting takes more comparisons than sorting by
-    /// insertion, but four at a time, and no branch depends on them.
+    /// A child's place is the number of children that are farther. Counting takes more comparisons than an
+    /// insertion sort, but four at a time and without a branch.
     #[inline(always)]
     pub(super) fn push(&mut self, mut set: u64) -> Option<()> {
         let Self { search, records, lowers, keys, .. } = self;
@@ -32,14 +32,14 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'_, '_, I, V, T> {
                 && let Link::Children { first, .. } =
                     Link::decode(whole_node::<I>(records, at as u32)?.link)
             {
-                // Only to have it fetched: on a large mesh the memory takes longer than all the rest.
+                // A prefetch: on a large mesh the memory takes longer than all the arithmetic.
                 black_box(search.tree.whole_record(first)?.pin);
             }
-            // Positive numbers are ordered as their bits are. Names make keys differ; of two that are as far, the
-            // later is the nearer.
+            // Positive numbers are ordered as their bits are. The low six bits hold the child's index; ties go to
+            // the later child.
             let distance = (lowers.get(at)? + search.scale).to_bits() & !(1 << 31);
             *keys.as_flattened_mut().get_mut(count)? =
-                (distance & !NAME | (NAME - at as u32)) as i32;
+                (distance & !INDEX | (INDEX - at as u32)) as i32;
             count += 1;
         }
         *keys.as_flattened_mut().get_mut(count..)?.first_chunk_mut()? = [NONE; 8];
@@ -57,7 +57,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Rounds<'_, '_, I, V, T> {
                 }
             }
             for (key, place) in own.iter().zip(farther) {
-                let at = NAME - (*key as u32 & NAME);
+                let at = INDEX - (*key as u32 & INDEX);
                 // None where the block is longer than the stack.
                 if let Some(place) = stack.get_mut(place as usize) {
                     let link = whole_node::<I>(records, at)?.link;

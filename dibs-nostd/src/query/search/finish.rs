@@ -1,0 +1,56 @@
+//! The answer of a search.
+
+use glam::Vec3;
+
+use super::slack::{ACCURACY, FLOOR};
+use super::{NearestPin, Search};
+use crate::math::sqrt::sqrt;
+use crate::query::Proximity;
+use crate::{Index, QueryError, Tool, VertexTable};
+
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
+    /// The answer, where `lower` bounds the unexplored subtrees.
+    pub(super) fn finish(&self, lower: f32) -> Result<Proximity, QueryError> {
+        let NearestPin { row: pin, distance: pin_distance } = self.nearest_pin;
+        let radius = self.tool.radius();
+        let cut_short = lower < f32::INFINITY;
+        let (pair, triangle, corners) = match self.best {
+            Some(pair) if !cut_short || sqrt(pair.distance_squared) <= pin_distance => {
+                let row = self.best_triangle;
+                let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
+                (pair, Some(row), corners)
+            }
+            _ if cut_short => {
+                let position = self.position(pin)?;
+                let point = self.tool.closest_on_triangle(&[position; 3], f32::INFINITY);
+                (point.ok_or(QueryError::Position { vertex: pin })?, None, [pin; 3])
+            }
+            _ => return Err(QueryError::Uncovered { pin }),
+        };
+        let axis_distance = sqrt(pair.distance_squared);
+        let used = u32::saturating_sub;
+        let above_zero = |x: f32| if x > 0.0 { x } else { 0.0 };
+        let separation = above_zero(axis_distance - radius);
+        let left = above_zero(lower - radius);
+        // By its own length: next to contact the points' rounding is not that of the distance.
+        let towards = pair.on_axis - pair.on_surface;
+        let length = sqrt(towards.length_squared());
+        let touches = axis_distance <= 0.0 || length <= 0.0;
+        let direction = if touches { Vec3::ZERO } else { towards / length };
+        Ok(Proximity {
+            separation,
+            lower: if left < separation { left } else { separation },
+            accuracy: ACCURACY * self.scale + FLOOR + self.tree.position_error(),
+            axis_distance,
+            point_on_surface: pair.on_surface,
+            point_on_tool: pair.on_axis - direction * radius,
+            direction,
+            axis_parameter: pair.axis_parameter,
+            triangle,
+            corners,
+            barycentric: pair.barycentric,
+            node_tests: used(self.budget.node_tests, self.left.node_tests).saturating_add(1),
+            triangle_tests: used(self.budget.triangle_tests, self.left.triangle_tests),
+        })
+    }
+}

@@ -1,0 +1,43 @@
+//! The slacks of a search: bounds on the f32 rounding of both sides of every comparison.
+//!
+//! With `u = 2^-24`, all lengths in a query are at most the *scale* `S`: the distance to the farthest point of
+//! the root sphere, plus twice the axis and the tool's radius. The errors below are proven, not measured: the
+//! largest that hill climbing finds in an answer is 4 `u S`, so that no test tells a smaller slack from a
+//! sufficient one. The sums are asserted instead.
+
+use crate::tool::ACCURACY as KERNEL;
+
+/// Half a unit in the last place of 1.
+const U: f32 = 1.0 / 16_777_216.0;
+
+/// Error of a bound `d - R`, in units of `S`: 8 `u` of the pin's distance, 4 `u` of the radius and the difference.
+const BOUND: f32 = 12.0 * U;
+
+/// Error of a plane's comparison in units of `S`, but for [`COORDINATES`] and [`TILT`].
+const PLANE: f32 = 11.0 * U;
+
+/// Slack of the cutoff, in units of `S`.
+pub(super) const SLACK: f32 = 48.0 * U;
+
+/// What [`Proximity::accuracy`](crate::Proximity::accuracy) promises, in units of `S`: the kernel's error plus
+/// that of the pair's last operations, a root, a difference and the tool's radius.
+pub(super) const ACCURACY: f32 = 24.0 * U;
+
+const _: () = {
+    // A subtree's bound, or a plane, against a triangle's distance.
+    assert!(SLACK >= BOUND + KERNEL && SLACK >= PLANE + KERNEL);
+    assert!(ACCURACY >= KERNEL + 4.0 * U && ACCURACY >= BOUND);
+};
+
+/// Slack of a plane's comparison in units of the coordinates' size `C`, since positions enter it as they are:
+/// each of two dot products is off by at most 3 `u C` times the normal's length, the point on the axis by
+/// 2 `u C`. Half of this would do.
+pub(super) const COORDINATES: f32 = 16.0 * U;
+
+/// Slack of a plane's comparison in units of `S^2`: an axis is perpendicular to the shortest vector to a point
+/// within 16 `u S`, so that its ends, at most `S / 2` away, are beyond the plane by no more than half of this.
+pub(super) const TILT: f32 = 16.0 * U;
+
+/// Lengths that the kernels count as zero, times a few: what is left of slack and accuracy where tool and
+/// surface are one point.
+pub(super) const FLOOR: f32 = 1e-14;

@@ -1,0 +1,90 @@
+//! Rows of the metric section.
+
+use super::{METRIC_BYTES, rows_from};
+
+/// How a triangle's stretch is measured: along which of its edges, and by what they are at rest.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Metric {
+    /// Of the edge from the centre to the other of the first two corners; of both edges; and of the edge from
+    /// the centre to the third corner: see `docs/format.md`.
+    pub squares: [f32; 3],
+    /// How the triangle goes on from the one in the row before.
+    pub join: Join,
+    /// The centre is its second corner, not its first.
+    pub is_reversed: bool,
+}
+
+impl Metric {
+    /// The metric in one row. (Each number is read whole, so that it takes one load.)
+    #[inline(always)]
+    pub(crate) const fn new([first, between, second]: [f32; 3]) -> Self {
+        Self {
+            squares: [first.abs(), between, second],
+            join: Join::marked(first),
+            is_reversed: between.to_bits() & 1 != 0,
+        }
+    }
+
+    /// The corners of a triangle, its centre first.
+    #[must_use]
+    pub const fn centre_first<T: Copy>(&self, [a, b, c]: [T; 3]) -> [T; 3] {
+        if self.is_reversed { [b, a, c] } else { [a, b, c] }
+    }
+}
+
+/// What a triangle's first edge, from its centre to the other of its first two corners, is to the triangle in the
+/// row before.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Join {
+    /// Nothing that a reader may count on. The centre is the first corner.
+    Start,
+    /// The edge from the centre to the third corner.
+    Fan,
+    /// The same, the other way round: what was the third corner is the centre.
+    Flip,
+}
+
+impl Join {
+    /// As the first number of a row has it: the sign marks a fan, and the lowest bit, where the sign is clear, a
+    /// flip.
+    #[inline(always)]
+    pub(crate) const fn marked(first: f32) -> Self {
+        let bits = first.to_bits();
+        if bits >> 31 != 0 {
+            Self::Fan
+        } else if bits & 1 != 0 {
+            Self::Flip
+        } else {
+            Self::Start
+        }
+    }
+
+    /// Whether a triangle goes on like this from the one before; both by their corners, the centre first.
+    #[must_use]
+    pub const fn is_between(self, [a, _, c]: [u32; 3], [centre, other, _]: [u32; 3]) -> bool {
+        match self {
+            Self::Start => true,
+            Self::Fan => centre == a && other == c,
+            Self::Flip => centre == c && other == a,
+        }
+    }
+}
+
+/// The rest metric of a triangle.
+#[inline(always)]
+pub(crate) const fn metric(metric: &[u8], row: u32) -> Option<Metric> {
+    let Some(tail) = rows_from(metric, row, METRIC_BYTES) else { return None };
+    match tail.first_chunk::<METRIC_BYTES>() {
+        Some(row) => Some(Metric::new(metric_row(row))),
+        None => None,
+    }
+}
+
+/// The numbers in a row of the metric section.
+#[inline(always)]
+pub(crate) const fn metric_row(row: &[u8; METRIC_BYTES]) -> [f32; 3] {
+    let ([first, between, second], _) = row.as_chunks() else { return [0.0; 3] };
+    [f32::from_le_bytes(*first), f32::from_le_bytes(*between), f32::from_le_bytes(*second)]
+}

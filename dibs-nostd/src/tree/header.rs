@@ -1,0 +1,117 @@
+//! The header: its fields, read and checked.
+
+use crate::tree::format::field as at;
+use crate::tree::format::{CRC, HEADER_BYTES, MAGIC, MAX_STACK, PathKind, VERSION, u32_at};
+use crate::tree::{FormatError, Index};
+
+/// The header's fields that a query needs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Header {
+    pub paths: PathKind,
+    pub mesh_id: u32,
+    pub vertices: u32,
+    pub triangles: u32,
+    pub nodes: u32,
+    pub stack: u32,
+    pub stretch: f32,
+    pub radius_unit: f32,
+    pub position_error: f32,
+    /// Rows of the section table.
+    pub sections: u32,
+    pub checksum: u32,
+}
+
+/// A header field that every builder writes and this read cannot miss, since the length was checked.
+const fn field(bytes: &[u8], offset: usize) -> Result<u32, FormatError> {
+    match u32_at(bytes, offset) {
+        Some(value) => Ok(value),
+        None => {
+            Err(FormatError::Length { expected: HEADER_BYTES as u32, found: bytes.len() as u32 })
+        }
+    }
+}
+
+pub(super) const fn read<I: Index>(bytes: &[u8]) -> Result<Header, FormatError> {
+    let Some(start) = bytes.first_chunk::<HEADER_BYTES>() else {
+        return Err(FormatError::Length {
+            expected: HEADER_BYTES as u32,
+            found: bytes.len() as u32,
+        });
+    };
+    let magic = [start[0], start[1], start[2], start[3]];
+    if u32::from_le_bytes(magic) != u32::from_le_bytes(MAGIC) {
+        return Err(FormatError::Magic { found: magic });
+    }
+    let version = u16::from_le_bytes([start[at::VERSION], start[at::VERSION + 1]]);
+    if version != VERSION {
+        return Err(FormatError::Version { found: version });
+    }
+    let (width, path_code) = (start[at::WIDTH], start[at::PATHS]);
+    if width as usize != I::BYTES {
+        return Err(FormatError::Width { expected: I::BYTES as u8, found: width });
+    }
+    let Some(paths) = PathKind::from_code(path_code) else {
+        return Err(FormatError::Field { offset: at::PATHS as u8, value: path_code as u32 });
+    };
+    let length = tri!(field(bytes, at::LENGTH));
+    if length as usize != bytes.len() {
+        return Err(FormatError::Length { expected: length, found: bytes.len() as u32 });
+    }
+    tri!(checksum(bytes));
+    let header = Header {
+        paths,
+        mesh_id: tri!(field(bytes, at::MESH_ID)),
+        vertices: tri!(field(bytes, at::VERTICES)),
+        triangles: tri!(field(bytes, at::TRIANGLES)),
+        nodes: tri!(field(bytes, at::NODES)),
+        stack: tri!(field(bytes, at::STACK)),
+        stretch: f32::from_bits(tri!(field(bytes, at::STRETCH))),
+        radius_unit: f32::from_bits(tri!(field(bytes, at::RADIUS_UNIT))),
+        position_error: f32::from_bits(tri!(field(bytes, at::POSITION_ERROR))),
+        sections: tri!(field(bytes, at::SECTIONS)),
+        checksum: tri!(field(bytes, at::CHECKSUM)),
+    };
+    let mut reserved = at::RESERVED.start;
+    while reserved < at::RESERVED.end {
+        let value = tri!(field(bytes, reserved));
+        if value != 0 {
+            return Err(FormatError::Field { offset: reserved as u8, value });
+        }
+        reserved += 4;
+    }
+    let last = tri!(field(bytes, at::LAST));
+    let wrong = if header.vertices == 0 || header.vertices > I::MAX_VERTICES {
+        Some((at::VERTICES, header.vertices))
+    } else if header.triangles == 0 || header.triangles >= 1 << 28 {
+        Some((at::TRIANGLES, header.triangles))
+    } else if header.nodes == 0 || header.nodes >= 1 << 28 {
+        Some((at::NODES, header.nodes))
+    } else if header.stack as usize > MAX_STACK {
+        Some((at::STACK, header.stack))
+    } else if !(header.stretch >= 1.0 && header.stretch <= 1e6) {
+        Some((at::STRETCH, header.stretch.to_bits()))
+    } else if !(header.radius_unit >= 0.0 && header.radius_unit <= 1e18) {
+        Some((at::RADIUS_UNIT, header.radius_unit.to_bits()))
+    } else if !(header.position_error >= 0.0 && header.position_error <= 1e18) {
+        Some((at::POSITION_ERROR, header.position_error.to_bits()))
+    } else if last != 0 {
+        Some((at::LAST, last))
+    } else {
+        None
+    };
+    match wrong {
+        Some((offset, value)) => Err(FormatError::Field { offset: offset as u8, value }),
+        None => Ok(header),
+    }
+}
+
+const fn checksum(bytes: &[u8]) -> Result<(), FormatError> {
+    let stated = tri!(field(bytes, at::CHECKSUM));
+    let Some((before, rest)) = bytes.split_at_checked(at::CHECKSUM) else { return Ok(()) };
+    let Some((_, after)) = rest.split_at_checked(4) else { return Ok(()) };
+    let mut digest = CRC.digest();
+    digest.update(before);
+    digest.update(after);
+    let computed = digest.finalize();
+    if computed == stated { Ok(()) } else { Err(FormatError::Checksum { stated, computed }) }
+}

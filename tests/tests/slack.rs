@@ -1,0 +1,203 @@
+//! The slacks of a query, each on surfaces and poses that need it: radii that are used up to their last part
+//! in a thousand, coordinates far from the origin, axes along long triangles.
+
+use dibs_build::{Builder, BuiltTree, Mesh};
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{ACCURACY, Options, Query, Sphere, measure_stretch};
+use dibs_tests::ask;
+use dibs_tests::deform::unit;
+use dibs_tests::oracle::{Instrument, exhaustive};
+use dibs_tests::surfaces;
+use fastrand::Rng;
+use glam::Vec3;
+
+/// A number between `low` and `high`, each decade as likely.
+fn decades(rng: &mut Rng, low: f32, high: f32) -> f32 {
+    low * (high / low).powf(rng.f32())
+}
+
+/// A surface as it is now, with its tree, and the largest error of a query so far in units of its accuracy.
+struct Searched<'b> {
+    built: &'b BuiltTree,
+    rows: Vec<Vec3>,
+    worst: f64,
+}
+
+impl<'b> Searched<'b> {
+    fn new(built: &'b BuiltTree, positions: &[Vec3]) -> Self {
+        Self { built, rows: built.to_rows(positions), worst: 0.0 }
+    }
+
+    /// Compares both searches, with the tree's limit and with the measured stretch, cold and from a triangle that
+    /// is known beforehand, to the exhaustive one.
+    fn check(&mut self, tool: &Instrument, known: &Instrument) {
+        let tree = self.built.tree::<u16>().expect("valid");
+        let rows = self.rows.as_slice();
+        let measured = measure_stretch(&tree, rows).expect("within the limit");
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("enough for any tree");
+        let truth = exhaustive(rows, &surfaces::triangles(&tree), tool).expect("has triangles");
+        let options = Options::new().stretch(measured);
+        let known = ask::closest(&mut query, rows, known, &options).expect("an answer").triangle;
+        for options in [Options::new(), options, options.warm_start(known)] {
+            let both = [
+                ask::closest(&mut query, rows, tool, &options),
+                ask::closest_wide(&mut query, rows, tool, &options),
+            ];
+            for found in both {
+                let found = found.unwrap_or_else(|error| panic!("{tool:?}: {error}"));
+                let off = (f64::from(found.separation) - truth.separation).abs();
+                let off = off / f64::from(found.accuracy);
+                assert!(off <= 1.0, "{off:.1} accuracies off: {tool:?}\n{found:?}\n{truth:?}");
+                self.worst = self.worst.max(off);
+            }
+        }
+    }
+}
+
+/// A ladder of `cells` rectangles along the first axis.
+fn ladder(cells: usize, length: f32, width: f32) -> Mesh {
+    let places = (0..=cells).flat_map(|i| [0.0, width].map(|z| (i, z)));
+    let positions = places.map(|(i, z)| Vec3::new(i as f32 * length, 0.0, z)).collect();
+    let cell = |i: usize| {
+        let a = 2 * i as u32;
+        [[a, a + 2, a + 1], [a + 1, a + 2, a + 3]]
+    };
+    Mesh { positions, triangles: (0..cells).flat_map(cell).collect() }
+}
+
+/// A straight band, stretched to its limit, whose last edge is the closest: every sphere around it reaches
+/// exactly that far. The band's other half runs past the tool and is hardly farther away.
+#[test]
+fn a_radius_is_used_in_full() {
+    const LIMIT: f32 = 1.5;
+    let (cells, cell, width) = (100, 2.0, 1.0);
+    let mesh = ladder(cells, cell, width);
+    let built = Builder::new().stretch(LIMIT).build(&mesh).expect("a valid mesh");
+    let mut rng = Rng::with_seed(51);
+    let mut worst: f64 = 0.0;
+    for _ in 0..400 {
+        let apart = 4.0 + 20.0 * rng.f32();
+        // Along the band: straight to a corner, up by `apart`, and back above itself, beyond its start.
+        let straight = 40.0 * cell * (1.0 + rng.f32() * 0.1) * LIMIT;
+        let place = |along: f32| {
+            let past = along - straight;
+            match past {
+                ..=0.0 => (along, 0.0),
+                _ if past <= apart => (straight, past),
+                _ => (straight - (past - apart), apart),
+            }
+        };
+        let positions: Vec<Vec3> = mesh
+            .positions
+            .iter()
+            .map(|p| {
+                let (x, y) = place(p.x * LIMIT * 0.9995);
+                Vec3::new(x, y, p.z)
+            })
+            .collect();
+        let mut searched = Searched::new(&built, &positions);
+        let before = apart - decades(&mut rng, 1e-3, 0.3);
+        let end = Vec3::new(-before, 0.0, width * rng.f32());
+        let radius = 0.5 * rng.f32();
+        // Above the tool, the other half is closer.
+        let above = Instrument::sphere(end + Vec3::Y, radius);
+        searched.check(&Instrument::sphere(end, radius), &above);
+        searched.check(&Instrument::capsule(end, end + Vec3::Z * 0.1, radius), &above);
+        worst = worst.max(searched.worst);
+    }
+    println!("largest error: {worst:.2} of the stated accuracy");
+}
+
+/// Coordinates of millions, on which the mesh's own places are exact: planes are compared in coordinates as
+/// they are. Next to the centre of a ball every leaf is nearly the closest.
+#[test]
+fn planes_allow_for_large_coordinates() {
+    let mut rng = Rng::with_seed(52);
+    let mut worst: f64 = 0.0;
+    let mut mesh = surfaces::ball(3);
+    mesh.positions.iter_mut().for_each(|p| *p = (*p * 2.0).round());
+    let whole = |rng: &mut Rng, size: f32| {
+        Vec3::from([(); 3].map(|()| (size * (2.0 * rng.f32() - 1.0)).round()))
+    };
+    for leaf in [1, 4] {
+        let built = Builder::new().stretch(1.1).leaf_triangles(leaf).build(&mesh).expect("valid");
+        for _ in 0..60 {
+            let offset = whole(&mut rng, 4_194_304.0);
+            let positions: Vec<Vec3> = mesh.positions.iter().map(|p| p + offset).collect();
+            let mut searched = Searched::new(&built, &positions);
+            for _ in 0..12 {
+                let far = if rng.bool() { 3.0 } else { 60.0 };
+                let start = offset + whole(&mut rng, far);
+                let sphere = Instrument::sphere(start, 0.0);
+                searched.check(&sphere, &sphere);
+                let capsule = Instrument::capsule(start, start + whole(&mut rng, 30.0), 0.0);
+                searched.check(&capsule, &sphere);
+            }
+            worst = worst.max(searched.worst);
+        }
+    }
+    println!("largest error: {worst:.2} of the stated accuracy");
+}
+
+/// A long tube, folded so that its ridges run along an axis in its middle, all about as close. The shortest
+/// vector to one end of a ridge is rounded, and so tilted along the axis: the distance of the other end is a
+/// lever.
+#[test]
+fn planes_allow_for_a_tilt_along_the_axis() {
+    let mut rng = Rng::with_seed(53);
+    let mut worst: f64 = 0.0;
+    for _ in 0..200 {
+        let (length, radius) = (200.0, decades(&mut rng, 0.1, 3.0));
+        let rough = decades(&mut rng, 0.003, 0.1);
+        let turn = glam::Quat::from_axis_angle(unit(&mut rng), rng.f32());
+        let corners = 32;
+        let mut positions = Vec::new();
+        for corner in 0..corners {
+            let (sin, cos) = (std::f32::consts::TAU * corner as f32 / corners as f32).sin_cos();
+            for z in [0.0, length] {
+                let inner = radius + rough * rng.f32();
+                let radius = if corner % 2 == 0 { inner } else { 3.0 * inner };
+                positions.push(turn * Vec3::new(radius * cos, radius * sin, z));
+            }
+        }
+        let side = |corner: u32| {
+            let (a, b) = (2 * corner, 2 * ((corner + 1) % corners));
+            [[a, b, a + 1], [b, b + 1, a + 1]]
+        };
+        let mesh = Mesh { positions, triangles: (0..corners).flat_map(side).collect() };
+        let leaf = 1 + rng.usize(..2);
+        let built = Builder::new().stretch(1.1).leaf_triangles(leaf).build(&mesh).expect("valid");
+        let mut searched = Searched::new(&built, &mesh.positions);
+        for _ in 0..20 {
+            let mut end = |z: f32| {
+                let off = unit(&mut rng) * rough;
+                turn * Vec3::new(off.x, off.y, z)
+            };
+            let (start, end) = (end(-10.0), end(length * 0.8));
+            let capsule = Instrument::capsule(start, end, 0.0);
+            searched.check(&capsule, &Instrument::sphere(capsule.start, 0.0));
+        }
+        worst = worst.max(searched.worst);
+    }
+    println!("largest error: {worst:.2} of the stated accuracy");
+}
+
+/// What an answer states covers what the kernels state of a triangle, as far away as the tool is.
+#[test]
+fn the_accuracy_covers_the_kernels() {
+    let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    let mesh = Mesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2]] };
+    let built = Builder::new().stretch(1.0).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&corners);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("enough for any tree");
+    let mut rng = Rng::with_seed(54);
+    for _ in 0..1_000 {
+        let center = unit(&mut rng) * decades(&mut rng, 1e-3, 1e6);
+        let sphere = Sphere::new(center, 0.0).expect("valid");
+        let found = query.closest(rows.as_slice(), &sphere, &Options::new()).expect("an answer");
+        let size = corners.iter().map(|corner| corner.distance(center)).fold(0.0, f32::max);
+        // And the root that is taken of the square.
+        assert!(found.accuracy >= (ACCURACY + f32::EPSILON) * size, "{center}: {found:?}");
+    }
+}
