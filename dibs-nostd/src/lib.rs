@@ -73,9 +73,9 @@ pub use stretch::{
     Changed, Gate, StretchError, StretchMonitor, Unchecked, Verdict, measure_stretch,
 };
 pub use surface::{
-    Between, FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames, MeasuredStretch,
-    Moved, MovingSurface, Odometer, OutOfTable, PublishError, QuantisedVertices, REGIONS, Step,
-    Travel, VertexTable,
+    Between, FrameAge, FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames, Latest,
+    MeasuredStretch, Moved, MovingSurface, Odometer, OutOfTable, PublishError, QuantisedVertices,
+    REGIONS, Step, Travel, VertexTable,
 };
 pub use tool::{ACCURACY, AxisPair, Capsule, MAX_COORDINATE, Sphere, Tool, ToolError};
 pub use tree::{CorruptTreeError, FormatError, Index, Scrub, Tree, TreeBytes, format};

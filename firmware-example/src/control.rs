@@ -6,7 +6,7 @@ use bytemuck::Zeroable;
 use dibs_nostd::constraint::{ForbiddenRegion, GainError, SpringDamper};
 use dibs_nostd::failsafe::{FailSafe, LimitError, Limits, Observation, Watch};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Capsule, Options, Proximity, QueryError, Tool, Unavailable};
+use dibs_nostd::{Capsule, FrameAge, Options, Proximity, QueryError, Tool, Unavailable};
 
 use crate::surface;
 use crate::telemetry::{Tick, cause_code};
@@ -108,7 +108,6 @@ impl Control {
         };
         let link = self.bus.link.read(self.tick);
         let verdict = self.failsafe.step(&Observation {
-            now: self.tick,
             frame,
             link,
             query_error: match answer {
@@ -145,14 +144,20 @@ impl Control {
         tool: &Capsule,
         clock: impl Fn() -> u32,
         record: &mut Tick,
-    ) -> (Option<(u32, u32)>, Result<Proximity, Unavailable>) {
+    ) -> (Option<FrameAge>, Result<Proximity, Unavailable>) {
         record.tool_start = tool.start().to_array();
         record.tool_end = tool.end().to_array();
         record.tool_radius = tool.radius();
-        let Some(frame) = self.surface.read() else { return (None, Err(Unavailable::NoSurface)) };
+        let latest = self.surface.latest(self.tick);
+        let age = latest.frame();
+        // How old a surface may be is the fail-safe machine's to decide.
+        let frame = match latest.of_any_age() {
+            Ok(frame) => frame,
+            Err(unavailable) => return (age, Err(unavailable)),
+        };
         let label = frame.label();
         record.epoch = label.epoch;
-        record.age = frame.age(self.tick);
+        record.age = age.map_or(u32::MAX, |age| age.age);
         record.position_error = label.position_error;
 
         let mut options = Options::new().warm_start(self.warm_start);
@@ -167,14 +172,13 @@ impl Control {
         record.query_counts = clock().wrapping_sub(start);
         drop(frame);
 
-        let frame = Some((label.epoch, label.received));
         let closest = match answer {
             Ok(closest) => closest,
-            Err(error) => return (frame, Err(Unavailable::Query(error))),
+            Err(error) => return (age, Err(Unavailable::Query(error))),
         };
         self.warm_start = closest.triangle;
         write(&closest, record);
-        (frame, Ok(closest.widened(label.position_error)))
+        (age, Ok(closest.widened(label.position_error)))
     }
 }
 

@@ -2,9 +2,10 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use dibs_nostd::Unavailable;
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{FrameLabel, Frames, PublishError, VertexTable};
+use dibs_nostd::{
+    FrameAge, FrameLabel, FrameReader, Frames, PublishError, Unavailable, VertexTable,
+};
 
 fn label(epoch: u32) -> FrameLabel {
     FrameLabel { epoch, received: epoch.wrapping_mul(3), position_error: 0.5, stretch: None }
@@ -104,10 +105,12 @@ fn age_is_right_over_a_wrap_of_the_clock() {
     writer.begin();
     writer.push(Vec3::ZERO).unwrap();
     writer.publish(FrameLabel { received: u32::MAX - 4, ..label(1) }).unwrap();
-    let frame = reader.read().unwrap();
-    assert_eq!(frame.age(5), 10);
-    assert_eq!(frame.check_age(5, 10), Ok(()));
-    assert_eq!(frame.check_age(5, 9), Err(Unavailable::Stale { age: 10 }));
+    assert_eq!(
+        reader.latest(5).frame(),
+        Some(FrameAge { epoch: 1, received: u32::MAX - 4, age: 10 })
+    );
+    assert!(reader.latest(5).within(10).is_ok());
+    assert_eq!(reader.latest(5).within(9).err(), Some(Unavailable::Stale { age: 10 }));
 }
 
 /// The clock may wrap any number of times: a frame that was found old stays old.
@@ -119,7 +122,7 @@ fn a_frame_does_not_grow_young_again() {
     writer.publish(FrameLabel { received: 1000, ..label(1) }).unwrap();
     let (mut clock, mut last) = (1000_u32, 0);
     for step in 0..50_u64 {
-        let age = reader.read().unwrap().age(clock);
+        let age = age(&mut reader, clock);
         let true_age = step * 0x3FFF_FFFF;
         assert_eq!(u64::from(age), true_age.min(u32::MAX.into()), "step {step}");
         assert!(age >= last);
@@ -129,7 +132,29 @@ fn a_frame_does_not_grow_young_again() {
     // The next frame is young.
     writer.push(Vec3::ZERO).unwrap();
     writer.publish(FrameLabel { received: clock, ..label(2) }).unwrap();
-    assert_eq!(reader.read().unwrap().age(clock.wrapping_add(7)), 7);
+    assert_eq!(age(&mut reader, clock.wrapping_add(7)), 7);
+}
+
+fn age<const N: usize>(reader: &mut FrameReader<'_, N>, now: u32) -> u32 {
+    reader.latest(now).frame().expect("published").age
+}
+
+/// Another core may have stamped the frame a little later than this one read its clock. A frame from farther ahead is
+/// old: one flipped bit of the stamp would else keep a frozen surface fresh for days.
+#[test]
+fn a_frame_from_the_future_is_new_or_old_but_never_in_between() {
+    let frames = Frames::<1>::new();
+    let (mut writer, mut reader) = frames.split().unwrap();
+    let mut publish = |received, epoch| {
+        writer.begin();
+        writer.push(Vec3::ZERO).unwrap();
+        writer.publish(FrameLabel { received, ..label(epoch) }).unwrap();
+    };
+    for (epoch, ahead) in (1..).zip([1, 16, 17, 1 << 10, 1 << 25, 1 << 30, 1 << 31]) {
+        publish(5_u32.wrapping_add(ahead), epoch);
+        let age = age(&mut reader, 5);
+        assert!(if ahead <= 16 { age == 0 } else { age >= 1 << 31 }, "{ahead} ahead: {age}");
+    }
 }
 
 /// Whatever the number of vertices: two buffers, and room for labels.

@@ -326,11 +326,13 @@ fn weights_come_over_the_bus() {
     assert!(bus.reader.read().is_none());
     for (epoch, weights) in (1..).zip(bus.recorded.clone()) {
         assert_eq!(bus.send(epoch, &weights), Ok(Advance::Published { epoch }));
-        let frame = bus.reader.read().expect("published");
+        let frame = bus.reader.latest(7 * epoch + 3);
+        let age = frame.frame().expect("published").age;
+        let frame = frame.within(3).expect("published");
         let surface = bus.modes.surface::<4>(&weights).expect("recorded");
         assert_eq!(positions(&frame), positions(&surface));
         let label = frame.label();
-        assert_eq!((label.epoch, label.received, frame.age(7 * epoch + 3)), (epoch, 7 * epoch, 3));
+        assert_eq!((label.epoch, label.received, age), (epoch, 7 * epoch, 3));
         assert_eq!(label.position_error, bus.modes.position_error());
         let bound = bus.modes.stretch_bound(&weights).expect("recorded");
         assert_eq!(label.stretch.expect("bounded").sigma(), bound.sigma());

@@ -3,8 +3,7 @@
 use glam::Vec3;
 
 use super::{ModalSurface, Modes, WeightsError};
-use crate::surface::{FrameLabel, FrameReader, VertexTable};
-use crate::unavailable::Unavailable;
+use crate::surface::{FrameGuard, FrameLabel, FrameReader, Latest, VertexTable};
 
 /// Reads published weights as surfaces. The double buffer is [`Frames`](crate::Frames) of `K` rows, of
 /// which each holds one weight.
@@ -26,16 +25,21 @@ impl<'f, 'a, const K: usize> ModalReader<'f, 'a, K> {
         Ok(Self { frames, modes: *modes })
     }
 
-    /// The published surface; `None` before the first. O(modes).
+    /// The published surface and its age at `now`, on the receiver's clock. O(modes).
     ///
-    /// The weights are copied: unlike with [`FrameReader::read`], frames are published meanwhile, for
+    /// The weights are copied: unlike with [`FrameReader::latest`], frames are published meanwhile, for
     /// as long as this one is kept.
+    #[inline]
+    pub fn latest(&mut self, now: u32) -> Latest<ModalFrame<'a, K>> {
+        let modes = &self.modes;
+        self.frames.latest(now).map(|frame| ModalFrame::new(modes, &frame))
+    }
+
+    /// The same without a look at its age; `None` before the first.
     #[inline]
     pub fn read(&mut self) -> Option<ModalFrame<'a, K>> {
         let frame = self.frames.read()?;
-        let weights = (0..K as u32).map(|row| frame.position(row).unwrap_or_default().x);
-        let surface = ModalSurface::new(&self.modes, weights);
-        Some(ModalFrame { surface, label: frame.label() })
+        Some(ModalFrame::new(&self.modes, &frame))
     }
 }
 
@@ -46,28 +50,17 @@ pub struct ModalFrame<'a, const K: usize> {
     label: FrameLabel,
 }
 
-impl<const K: usize> ModalFrame<'_, K> {
+impl<'a, const K: usize> ModalFrame<'a, K> {
+    fn new(modes: &Modes<'a>, frame: &FrameGuard<'_, K>) -> Self {
+        let weights = (0..K as u32).map(|row| frame.position(row).unwrap_or_default().x);
+        Self { surface: ModalSurface::new(modes, weights), label: frame.label() }
+    }
+
     /// What is known of this frame. Its position error is that of the modes, against the motion that
     /// they were fitted to.
     #[must_use]
     pub const fn label(&self) -> FrameLabel {
         self.label
-    }
-
-    /// Time since the frame's first packet arrived, in the unit of the receiver's clock. Right over
-    /// one wrap of the clock.
-    #[must_use]
-    pub const fn age(&self, now: u32) -> u32 {
-        now.wrapping_sub(self.label.received)
-    }
-
-    /// What a constraint has to be told when the frame is older than `limit`.
-    ///
-    /// # Errors
-    /// [`Unavailable::Stale`] with the age.
-    pub const fn check_age(&self, now: u32, limit: u32) -> Result<(), Unavailable> {
-        let age = self.age(now);
-        if age > limit { Err(Unavailable::Stale { age }) } else { Ok(()) }
     }
 }
 

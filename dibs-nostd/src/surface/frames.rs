@@ -29,15 +29,13 @@
 //! between its load and its store: at most once an exception, and never in the handler of highest
 //! priority.)
 
-use core::cell::Cell;
 use core::fmt;
 use core::ops::Range;
 
 use glam::Vec3;
 
 use super::atomic::{AtomicBool, AtomicU32, Ordering};
-use super::{MeasuredStretch, VertexTable};
-use crate::unavailable::Unavailable;
+use super::{Ageing, FrameAge, Latest, MeasuredStretch, VertexTable};
 
 /// State word, bit 0: index of the front buffer.
 const FRONT: u32 = 1;
@@ -175,7 +173,10 @@ impl<const N: usize> Buffer<N> {
 /// let frame = reader.read().unwrap();
 /// assert_eq!(frame.position(1), Some(Vec3::Y));
 /// assert_eq!(frame.label().epoch, 7);
-/// assert_eq!(frame.age(1008), 8);
+/// # drop(frame);
+/// let latest = reader.latest(1008); // the receiver's clock
+/// assert_eq!(latest.frame().unwrap().age, 8);
+/// assert!(latest.within(50).is_ok());
 /// ```
 pub struct Frames<const N: usize> {
     buffers: [Buffer<N>; 2],
@@ -213,7 +214,7 @@ impl<const N: usize> Frames<N> {
             return None;
         }
         let writer = FrameWriter { frames: self, back: &self.buffers[1], state: 0, filled: 0 };
-        Some((writer, FrameReader { frames: self, oldest: Cell::new([0; 3]) }))
+        Some((writer, FrameReader { frames: self, ageing: (0, Ageing::default()) }))
     }
 }
 
@@ -330,31 +331,48 @@ impl<const N: usize> FrameWriter<'_, N> {
 /// The end that reads: owned by the control tick.
 pub struct FrameReader<'f, const N: usize> {
     frames: &'f Frames<N>,
-    /// Epoch and clock of the frame asked last, and the greatest age that it was found to have.
-    oldest: Cell<[u32; 3]>,
+    /// Epoch and age of the frame asked for last.
+    ageing: (u32, Ageing),
 }
 
 impl<const N: usize> FrameReader<'_, N> {
+    /// The published frame and its age at `now`, on the receiver's clock: [`Latest::within`] a limit it is given
+    /// out, as [`read`](Self::read) does.
+    #[inline]
+    pub fn latest(&mut self, now: u32) -> Latest<FrameGuard<'_, N>> {
+        let (epoch_before, before) = self.ageing;
+        let Some(guard) = read(self.frames) else { return Latest::new(None) };
+        let FrameLabel { epoch, received, .. } = guard.label();
+        let before = if epoch == epoch_before { before } else { Ageing::default() };
+        let ageing = before.at(now, received);
+        self.ageing = (epoch, ageing);
+        Latest::new(Some((guard, FrameAge { epoch, received, age: ageing.oldest })))
+    }
+
     /// Holds the published frame for as long as the guard lives; `None` before the first.
     ///
     /// Keep the guard for one query, not longer: no frame is published meanwhile. A guard that is
-    /// leaked keeps the surface at its present frame, which its age then tells.
+    /// leaked keeps the surface at its present frame, which its age then tells. The age is not looked at here:
+    /// [`latest`](Self::latest).
     #[inline]
     pub fn read(&mut self) -> Option<FrameGuard<'_, N>> {
-        let state = self.frames.state.fetch_or(READING, Ordering::Acquire);
-        let [first, second] = &self.frames.buffers;
-        let buffer = if state & FRONT == 0 { first } else { second };
-        // Made before the check, so that it clears READING on both ways out.
-        let view = FrameView { buffer };
-        let guard = FrameGuard { state: &self.frames.state, view, oldest: &self.oldest };
-        (state & PUBLISHED != 0).then_some(guard)
+        read(self.frames)
     }
+}
+
+#[inline]
+fn read<const N: usize>(frames: &Frames<N>) -> Option<FrameGuard<'_, N>> {
+    let state = frames.state.fetch_or(READING, Ordering::Acquire);
+    let [first, second] = &frames.buffers;
+    let buffer = if state & FRONT == 0 { first } else { second };
+    // Made before the check, so that it clears READING on both ways out.
+    let guard = FrameGuard { state: &frames.state, view: FrameView { buffer } };
+    (state & PUBLISHED != 0).then_some(guard)
 }
 
 /// The published frame, held still: a [`VertexTable`].
 pub struct FrameGuard<'f, const N: usize> {
     state: &'f AtomicU32,
-    oldest: &'f Cell<[u32; 3]>,
     view: FrameView<'f, N>,
 }
 
@@ -363,33 +381,6 @@ impl<const N: usize> FrameGuard<'_, N> {
     #[must_use]
     pub fn label(&self) -> FrameLabel {
         self.view.buffer.label()
-    }
-
-    /// Time since the frame's first packet arrived, in the unit of the receiver's clock.
-    ///
-    /// The clock may wrap. If ages are asked for at least once in 2^31 units, a frame never seems
-    /// younger than it once was: from 2^32 units on its age is `u32::MAX`.
-    #[must_use]
-    pub fn age(&self, now: u32) -> u32 {
-        let received = self.view.buffer.received.load(Ordering::Relaxed);
-        let epoch = self.view.buffer.epoch.load(Ordering::Relaxed);
-        let [last_epoch, last_received, oldest] = self.oldest.get();
-        let is_same = last_epoch == epoch && last_received == received;
-        let mut age = now.wrapping_sub(received);
-        if is_same && age < oldest {
-            age = u32::MAX;
-        }
-        self.oldest.set([epoch, received, age]);
-        age
-    }
-
-    /// What a constraint has to be told when the frame is older than `limit`.
-    ///
-    /// # Errors
-    /// [`Unavailable::Stale`] with the age.
-    pub fn check_age(&self, now: u32, limit: u32) -> Result<(), Unavailable> {
-        let age = self.age(now);
-        if age > limit { Err(Unavailable::Stale { age }) } else { Ok(()) }
     }
 }
 

@@ -2,8 +2,8 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use super::elapsed;
 use crate::bus::BusHealth;
+use crate::surface::Ageing;
 
 /// The health of the bus at one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,62 +54,89 @@ impl Link {
 /// ```
 #[derive(Debug)]
 pub struct LinkStatus {
-    packet: AtomicU32,
-    heartbeat: AtomicU32,
+    packet: Stamp,
+    heartbeat: Stamp,
     rejections: AtomicU32,
     forgeries: AtomicU32,
     transit: AtomicU32,
     source_age: AtomicU32,
-    /// Bit 0: a packet came. Bit 1: a heartbeat came.
-    seen: AtomicU32,
 }
 
-const PACKET: u32 = 1;
-const HEARTBEAT: u32 = 2;
+/// When something came last, and the greatest age that it was found to have.
+#[derive(Debug)]
+struct Stamp {
+    /// 1 once something came.
+    came: AtomicU32,
+    at: AtomicU32,
+    /// The reader's: the stamp that it looked at last, and its age.
+    aged: AtomicU32,
+    oldest: AtomicU32,
+}
+
+impl Stamp {
+    const fn new() -> Self {
+        Self {
+            came: AtomicU32::new(0),
+            at: AtomicU32::new(0),
+            aged: AtomicU32::new(0),
+            oldest: AtomicU32::new(0),
+        }
+    }
+
+    fn set(&self, at: Option<u32>) {
+        if let Some(at) = at {
+            self.at.store(at, Ordering::Relaxed);
+            self.came.store(1, Ordering::Release);
+        }
+    }
+
+    /// Time since the last; `u32::MAX` before the first.
+    fn age(&self, now: u32) -> u32 {
+        if self.came.load(Ordering::Acquire) == 0 {
+            return u32::MAX;
+        }
+        let before = Ageing {
+            stamp: self.aged.load(Ordering::Relaxed),
+            oldest: self.oldest.load(Ordering::Relaxed),
+        };
+        let Ageing { stamp, oldest } = before.at(now, self.at.load(Ordering::Relaxed));
+        self.aged.store(stamp, Ordering::Relaxed);
+        self.oldest.store(oldest, Ordering::Relaxed);
+        oldest
+    }
+}
 
 impl LinkStatus {
     /// Nothing came yet.
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            packet: AtomicU32::new(0),
-            heartbeat: AtomicU32::new(0),
+            packet: Stamp::new(),
+            heartbeat: Stamp::new(),
             rejections: AtomicU32::new(0),
             forgeries: AtomicU32::new(0),
             transit: AtomicU32::new(u32::MAX),
             source_age: AtomicU32::new(u32::MAX),
-            seen: AtomicU32::new(0),
         }
     }
 
     /// Notes the health of the bus: after each packet and each slice of checking. One writer.
     pub fn set(&self, health: &BusHealth) {
-        let mut seen = 0;
-        if let Some(packet) = health.packet {
-            self.packet.store(packet, Ordering::Relaxed);
-            seen |= PACKET;
-        }
-        if let Some(heartbeat) = health.heartbeat {
-            self.heartbeat.store(heartbeat, Ordering::Relaxed);
-            seen |= HEARTBEAT;
-        }
+        self.packet.set(health.packet);
+        self.heartbeat.set(health.heartbeat);
         self.rejections.store(health.rejections, Ordering::Relaxed);
         self.forgeries.store(health.forgeries, Ordering::Relaxed);
         self.transit.store(health.transit, Ordering::Relaxed);
         self.source_age.store(health.source_age, Ordering::Relaxed);
-        self.seen.store(seen, Ordering::Release);
     }
 
-    /// The health of the bus at `now`.
+    /// The health of the bus at `now`. One reader, which asks at least once in 2^31 units of the clock: then what
+    /// was lost once stays lost when the clock comes around.
     #[must_use]
     pub fn read(&self, now: u32) -> Link {
-        let seen = self.seen.load(Ordering::Acquire);
-        let since = |bit: u32, at: &AtomicU32| {
-            if seen & bit == 0 { u32::MAX } else { elapsed(now, at.load(Ordering::Relaxed)) }
-        };
         Link {
-            silence: since(PACKET, &self.packet),
-            heartbeat: since(HEARTBEAT, &self.heartbeat),
+            silence: self.packet.age(now),
+            heartbeat: self.heartbeat.age(now),
             rejections: self.rejections.load(Ordering::Relaxed),
             forgeries: self.forgeries.load(Ordering::Relaxed),
             transit: self.transit.load(Ordering::Relaxed),

@@ -36,11 +36,11 @@
 //!
 //! # Time
 //!
-//! Any unit, any epoch, wrapping: the control tick's number does. With a surface received at tick `r`
+//! Any unit, wrapping: the control tick's number does. With a surface received at tick `r`
 //! and nothing after it, the first safe step is that of tick `r + safe + 1`, where `safe` is the
-//! second limit on age: never later, and exactly then unless another input comes first. Times are
-//! compared over half the clock's range: 24 days at 1 kHz, after which the machine is long safe and
-//! stays so.
+//! second limit on age: never later, and exactly then unless another input comes first. Ages of surface,
+//! packets and heartbeats follow one rule, that of [`FrameAge`]: a stamp up to 16 units ahead of the clock
+//! is new, one farther ahead is old, and what was found old stays old when the clock comes around.
 
 mod freshness;
 mod limits;
@@ -51,6 +51,7 @@ mod tests;
 use core::fmt;
 
 use crate::query::Proximity;
+use crate::surface::FrameAge;
 use crate::unavailable::{QueryError, Unavailable};
 
 pub use limits::{LimitError, Limits, Watch};
@@ -60,10 +61,8 @@ pub use link::{Link, LinkStatus};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Observation {
-    /// The clock.
-    pub now: u32,
-    /// Epoch of the published frame, and when it was received; `None` before the first.
-    pub frame: Option<(u32, u32)>,
+    /// The published frame and its age: [`Latest::frame`](crate::Latest::frame); `None` before the first.
+    pub frame: Option<FrameAge>,
     /// What is known of the bus.
     pub link: Link,
     /// The error of the query on that frame, if it returned one.
@@ -116,15 +115,16 @@ impl Verdict {
 /// The state machine.
 ///
 /// ```
+/// use dibs_nostd::FrameAge;
 /// use dibs_nostd::failsafe::{FailSafe, Limits, Link, Observation, State, Watch};
 ///
 /// // Ticks of 1 ms: degraded after 50, safe after 200; tissue at up to 0.1 mm a tick.
 /// let limits = Limits::new(Watch::new(50, 200)?, 0.1)?.recovery(2)?.automatic();
 /// let mut machine = FailSafe::new(limits);
 /// let link = Link::CLEAR;
-/// let mut state = |now, epoch, received| {
-///     let frame = Some((epoch, received));
-///     let seen = Observation { now, frame, link, query_error: None, has_rotted: false };
+/// let mut state = |now: u32, epoch, received| {
+///     let frame = Some(FrameAge { epoch, received, age: now - received }); // from `Latest::frame`
+///     let seen = Observation { frame, link, query_error: None, has_rotted: false };
 ///     machine.step(&seen).state
 /// };
 /// assert_eq!(state(1000, 1, 1000), State::Safe); // it starts safe
@@ -138,7 +138,7 @@ pub struct FailSafe {
     limits: Limits,
     state: State,
     cause: Option<Unavailable>,
-    /// The frame of the last step.
+    /// Epoch and clock of the last step's frame.
     frame: Option<(u32, u32)>,
     /// Frames since the last step that was not clear; stops at the number needed.
     run: u16,
@@ -173,11 +173,12 @@ impl FailSafe {
 
     /// One control tick. O(1): ten comparisons of two limits.
     pub fn step(&mut self, seen: &Observation) -> Verdict {
-        let age = seen.frame.map_or(u32::MAX, |(_, received)| elapsed(seen.now, received));
+        let age = seen.frame.map_or(u32::MAX, |frame| frame.age);
         let (level, cause) = self.worst(seen, age);
 
-        let is_new = seen.frame.is_some() && seen.frame != self.frame;
-        self.frame = seen.frame;
+        let frame = seen.frame.map(|frame| (frame.epoch, frame.received));
+        let is_new = frame.is_some() && frame != self.frame;
+        self.frame = frame;
         if level == State::Nominal {
             if is_new && self.run < self.limits.recovery_frames() {
                 self.run += 1;
@@ -262,12 +263,6 @@ impl FailSafe {
 
 fn safe_if(is_safe: bool) -> State {
     if is_safe { State::Safe } else { State::Nominal }
-}
-
-/// Time from `since` to `now`, 0 where `since` is later: another core's clock may be a little ahead.
-const fn elapsed(now: u32, since: u32) -> u32 {
-    let elapsed = now.wrapping_sub(since);
-    if elapsed > i32::MAX as u32 { 0 } else { elapsed }
 }
 
 /// An acknowledgement that came too early.

@@ -6,7 +6,9 @@ use std::vec::Vec;
 
 use proptest::prelude::*;
 
-use super::{FailSafe, LimitError, Limits, Link, Observation, State, Verdict, Watch};
+use super::{FailSafe, LimitError, Limits, Link, LinkStatus, Observation, State, Verdict, Watch};
+use crate::bus::BusHealth;
+use crate::surface::{Ageing, FrameAge};
 use crate::unavailable::{QueryError, Unavailable};
 
 const QUERY: QueryError = QueryError::Corrupt { row: 7 };
@@ -46,8 +48,7 @@ const GOOD: Link = Link::CLEAR;
 /// A step at `now` with a surface of this epoch and age.
 fn seen(now: u32, epoch: u32, age: u32) -> Observation {
     Observation {
-        now,
-        frame: Some((epoch, now.wrapping_sub(age))),
+        frame: Some(FrameAge { epoch, received: now.wrapping_sub(age), age }),
         link: GOOD,
         query_error: None,
         has_rotted: false,
@@ -203,7 +204,7 @@ fn safe_comes_exactly_one_tick_after_the_limit_whatever_the_clock_shows() {
         assert_eq!(first(State::Degraded), Some(AGE.degraded() as usize + 1));
         assert_eq!(first(State::Safe), Some(AGE.safe() as usize + 1));
         assert!(states[AGE.safe() as usize + 1..].iter().all(|&s| s == State::Safe));
-        // A whole turn of the clock later the old surface looks fresh; nothing comes back.
+        // A surface that looked fresh again would bring nothing back.
         assert_eq!(machine.step(&seen(start, 1, 0)).state, State::Safe);
     }
 }
@@ -230,7 +231,8 @@ fn the_margin_is_age_times_speed_in_every_state_that_acts() {
 fn a_slow_second_core_is_not_an_old_surface() {
     let mut machine = FailSafe::new(Limits::new(AGE, SPEED).unwrap().automatic());
     // The receiver's clock is ahead by one.
-    let verdict = machine.step(&seen(1000, 1, u32::MAX));
+    let age = Ageing::default().at(1000, 1001).oldest;
+    let verdict = machine.step(&seen(1000, 1, age));
     assert_eq!((verdict.state, verdict.margin), (State::Nominal, 0.0));
 }
 
@@ -286,17 +288,23 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 
 fn run(steps: &[Step], limits: Limits, start: u32) -> (Vec<Observation>, Vec<Verdict>, Vec<bool>) {
     let mut machine = FailSafe::new(limits);
-    let (mut now, mut epoch, mut frame) = (start, 0_u32, None);
+    let (mut now, mut epoch, mut stamp) = (start, 0_u32, None);
+    let mut ageing = Ageing::default();
     let (mut observations, mut verdicts, mut acknowledged) = (Vec::new(), Vec::new(), Vec::new());
     for step in steps {
         now = now.wrapping_add(step.wait);
         if step.new_frame {
             epoch = epoch.wrapping_add(1);
-            frame = Some((epoch, now.wrapping_sub(step.delay)));
+            stamp = Some(now.wrapping_sub(step.delay));
+            ageing = Ageing::default();
         }
+        let frame = stamp.map(|received| {
+            ageing = ageing.at(now, received);
+            FrameAge { epoch, received, age: ageing.oldest }
+        });
         let Step { link, query_failed, has_rotted, .. } = *step;
         let query_error = query_failed.then_some(QUERY);
-        let seen = Observation { now, frame, link, query_error, has_rotted };
+        let seen = Observation { frame, link, query_error, has_rotted };
         verdicts.push(machine.step(&seen));
         acknowledged.push(step.acknowledge && machine.acknowledge().is_ok());
         observations.push(seen);
@@ -307,10 +315,10 @@ fn run(steps: &[Step], limits: Limits, start: u32) -> (Vec<Observation>, Vec<Ver
 /// Whether an observation is beyond its first (`strict`) or second limits, computed anew.
 fn is_beyond(seen: &Observation, second: bool) -> bool {
     let limit = |watch: Watch| if second { watch.safe() } else { watch.degraded() };
-    let Some((_, received)) = seen.frame else { return true };
+    let Some(frame) = seen.frame else { return true };
     seen.query_error.is_some()
         || seen.has_rotted
-        || seen.now.wrapping_sub(received) > limit(AGE)
+        || frame.age > limit(AGE)
         || seen.link.silence > limit(SILENCE)
         || seen.link.heartbeat > limit(HEARTBEAT)
         || seen.link.rejections > limit(REJECTIONS)
@@ -339,7 +347,8 @@ proptest! {
             prop_assert_eq!(verdict.state, State::Nominal);
             let clear: Vec<usize> =
                 (0..=at).rev().take_while(|&i| !is_beyond(&seen[i], false)).collect();
-            let is_new = |i: usize| i == 0 || seen[i].frame != seen[i - 1].frame;
+            let epoch = |i: usize| seen[i].frame.map(|frame| frame.epoch);
+            let is_new = |i: usize| i == 0 || epoch(i) != epoch(i - 1);
             let new = clear.iter().filter(|&&i| is_new(i)).count();
             prop_assert!(new >= usize::from(frames));
             if before == State::Safe && !automatic {
@@ -347,11 +356,12 @@ proptest! {
             }
         }
         // No later than the rule allows, either.
+        let epoch = |i: usize| seen[i].frame.map(|frame| frame.epoch);
         for (at, verdict) in verdicts.iter().enumerate() {
             if verdict.state == State::Degraded {
                 let clear: Vec<usize> =
                     (0..=at).rev().take_while(|&i| !is_beyond(&seen[i], false)).collect();
-                let new = clear.iter().filter(|&&i| seen[i].frame != seen[i - 1].frame).count();
+                let new = clear.iter().filter(|&&i| epoch(i) != epoch(i - 1)).count();
                 prop_assert!(new < usize::from(frames));
             }
         }
@@ -363,4 +373,50 @@ proptest! {
         let (_, shifted, _) = run(&steps, limits(2, false), start);
         prop_assert_eq!(expected, shifted);
     }
+}
+
+/// Heartbeats were lost while good frames go on: whatever the clock shows from then on, and over more than its
+/// whole range, the machine stays safe, and a single flipped bit of what was received is no way back.
+#[test]
+fn lost_heartbeats_stay_lost_over_the_whole_range_of_the_clock() {
+    for (start, step) in [(0_u32, 0x0FFF_FFFF_u32), (77, 0x7FFF_FFF0), (u32::MAX - 3, 0x1234_5678)]
+    {
+        let link = LinkStatus::new();
+        link.set(&health(start, start));
+        let mut machine = FailSafe::new(limits(1, true));
+        let mut now = start;
+        assert_eq!(machine.step(&observe(now, 0, link.read(now))).state, State::Nominal);
+        for epoch in 1..100 {
+            now = now.wrapping_add(step);
+            link.set(&health(now, start));
+            let verdict = machine.step(&observe(now, epoch, link.read(now)));
+            assert_eq!(verdict.state, State::Safe, "{start}: {epoch} steps of {step}");
+            // The ticks in which the clock comes around to the last heartbeat, too.
+            let again = link.read(start.wrapping_add(epoch % 40).wrapping_sub(20));
+            if u64::from(epoch) * u64::from(step) > 1 << 32 {
+                assert_eq!(again.heartbeat, u32::MAX, "{start}: {epoch} steps of {step}");
+            }
+        }
+        // A heartbeat makes an end of it.
+        now = now.wrapping_add(1);
+        link.set(&health(now, now));
+        assert_eq!(machine.step(&observe(now, 1000, link.read(now))).state, State::Nominal);
+    }
+}
+
+/// A bus on which a packet and a heartbeat came at these times.
+fn health(packet: u32, heartbeat: u32) -> BusHealth {
+    BusHealth {
+        packet: Some(packet),
+        heartbeat: Some(heartbeat),
+        rejections: 0,
+        forgeries: 0,
+        transit: 0,
+        source_age: 0,
+    }
+}
+
+/// A new frame at `now`, with this link.
+fn observe(now: u32, epoch: u32, link: Link) -> Observation {
+    Observation { link, ..seen(now, epoch, 0) }
 }
