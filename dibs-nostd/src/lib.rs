@@ -70,7 +70,8 @@ pub use bus::{Advance, Assembler, BusHealth, LastHeartbeat, Progress, Rejection}
 pub use control::{constraint, failsafe};
 pub use query::{Budget, Cost, Fallback, Options, Proximity, Query, Tracked, Tracker};
 pub use stretch::{
-    Changed, Gate, StretchError, StretchMonitor, Unchecked, Verdict, measure_stretch,
+    Arriving, Changed, Gate, Limits, StretchError, StretchMonitor, Unchecked, Verdict,
+    measure_stretch,
 };
 pub use surface::{
     Between, FrameAge, FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames, Latest,

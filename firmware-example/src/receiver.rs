@@ -1,7 +1,7 @@
 //! Bus reception: bytes in, published frames and statuses out.
 
 use dibs_nostd::wire::{Counters, Deframer, encode_status, enframe, framed_bytes};
-use dibs_nostd::{Advance, Progress, StretchError};
+use dibs_nostd::{Advance, Limits, Progress, StretchError};
 
 use crate::fingerprint::Fingerprint;
 use crate::surface::{self, CENTRE, REACH};
@@ -22,7 +22,11 @@ const REPORT_INTERVAL: u32 = TICK_RATE / 10;
 /// No vertex may be farther out on any axis than this many times the size of the rest shape.
 const ROOM: f32 = 4.0;
 
-/// Triangles checked, or rows copied, in one slice.
+/// No vertex may move faster, in mm a tick, from one published frame to the next: 20 mm in the second that a frame
+/// takes over the emulated serial line. A real heart reaches 0.2 mm a millisecond, over a bus that is fast enough.
+const SPEED: f32 = 0.02;
+
+/// Rows and triangles checked, or rows copied, in one slice.
 const WORK: u32 = 32;
 
 /// Rows of the published frame read through in one slice.
@@ -55,10 +59,11 @@ impl Receiver {
         writer: surface::Writer,
         status: &'static BusStatus,
     ) -> Result<Self, StretchError> {
-        let limit = CENTRE.abs().max_element() + ROOM * REACH;
+        let reach = CENTRE.abs().max_element() + ROOM * REACH;
+        let limits = Limits::reach_mm(reach).speed(SPEED);
         Ok(Self {
             deframer: Deframer::new(),
-            assembler: surface::receiver(tree, writer, limit)?,
+            assembler: surface::receiver(tree, writer, limits)?,
             fingerprint: Fingerprint::new(),
             status,
             reported: 0,

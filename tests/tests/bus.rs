@@ -8,7 +8,9 @@ use dibs_nostd::wire::{
     Body, Deframer, EncodeError, Encoding, Event, FrameEncoder, Packet, PacketError, QuantisedBox,
     Rows, StreamError, enframe, framed_bytes,
 };
-use dibs_nostd::{Advance, Changed, Gate, Progress, Rejection, StretchError, Verdict, VertexTable};
+use dibs_nostd::{
+    Advance, Arriving, Changed, Gate, Progress, Rejection, StretchError, Verdict, VertexTable,
+};
 use dibs_tests::bus::*;
 
 #[test]
@@ -143,8 +145,7 @@ impl Gate for Refuse {
 
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
-        surface: &V,
-        ready: u32,
+        Arriving { surface, ready, .. }: Arriving<'_, V>,
         _: u32,
     ) -> Result<Verdict, StretchError> {
         assert_eq!(surface.len(), N);
@@ -209,8 +210,7 @@ impl Gate for Slow {
 
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
-        _: &V,
-        ready: u32,
+        Arriving { ready, .. }: Arriving<'_, V>,
         work: u32,
     ) -> Result<Verdict, StretchError> {
         assert!(ready <= self.moved.get());

@@ -5,8 +5,9 @@ use dibs_nostd::format::{Join, MAX_STACK};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 use dibs_nostd::{
-    Assembler, Changed, Frames, Gate, MeasuredStretch, Options, Query, QueryError, REGIONS,
-    Rejection, Sphere, StretchError, StretchMonitor, Tree, Verdict, VertexTable, measure_stretch,
+    Arriving, Assembler, Changed, Frames, Gate, Limits, MeasuredStretch, Options, Query,
+    QueryError, REGIONS, Rejection, Sphere, StretchError, StretchMonitor, Tree, Verdict,
+    VertexTable, measure_stretch,
 };
 use dibs_tests::bus::give;
 use dibs_tests::deform::{Deformation, unit};
@@ -261,7 +262,7 @@ fn feed<V: VertexTable + ?Sized>(
             if changed == Changed::Partial && !is_last { ready.min(rows - 1) } else { ready };
         calls += 1;
         assert!(calls < 10_000, "the gate does not come to an end");
-        match gate.advance(surface, ready, rng.u32(..=most))? {
+        match gate.advance(Arriving::new(surface, ready), rng.u32(..=most))? {
             Verdict::Pending => (),
             Verdict::Admitted(measured) => {
                 assert!(ready == rows, "admitted before it was complete");
@@ -295,7 +296,8 @@ fn assert_same(
 fn sliced_is_whole_whatever_the_slices_and_the_packets() {
     let (_, built, frames) = deformed(90, 24);
     let tree = built.tree::<u16>().expect("valid");
-    let mut monitor = StretchMonitor::new(&tree).expect("a metric");
+    let mut monitor =
+        StretchMonitor::new(&tree).expect("a metric").limits(Limits::reach_mm(1e3).shrinkage(0.0));
     let mut rng = Rng::with_seed(25);
     for (round, moved) in frames.iter().enumerate() {
         let mut rows = built.to_rows(moved);
@@ -309,7 +311,9 @@ fn sliced_is_whole_whatever_the_slices_and_the_packets() {
         let sliced = feed(&mut monitor, rows.as_slice(), Changed::Whole, &packets, &mut rng);
         assert_same(sliced, whole);
         assert_eq!(whole.is_err(), round % 3 == 2);
-        let mut new = StretchMonitor::new(&tree).expect("a metric");
+        let mut new = StretchMonitor::new(&tree)
+            .expect("a metric")
+            .limits(Limits::reach_mm(1e3).shrinkage(0.0));
         assert_eq!(feed(&mut new, rows.as_slice(), Changed::Whole, &packets, &mut rng), whole);
     }
 }
@@ -318,7 +322,8 @@ fn sliced_is_whole_whatever_the_slices_and_the_packets() {
 fn partial_is_whole_and_measures_only_what_moved() {
     let (mesh, built, _) = deformed(0, 0);
     let tree = built.tree::<u16>().expect("valid");
-    let mut monitor = StretchMonitor::new(&tree).expect("a metric");
+    let mut monitor =
+        StretchMonitor::new(&tree).expect("a metric").limits(Limits::reach_mm(1e3).shrinkage(0.0));
     let mut rng = Rng::with_seed(26);
     let mut surface = built.to_rows(&mesh.positions);
     let vertices = tree.vertex_count();
@@ -340,7 +345,7 @@ fn partial_is_whole_and_measures_only_what_moved() {
             // Half of a frame that never comes to its end.
             monitor.begin(Changed::Partial);
             monitor.moved(moved);
-            let _ = monitor.advance(next.as_slice(), vertices, 20);
+            let _ = monitor.advance(Arriving::new(next.as_slice(), vertices), 20);
             abandoned += 1;
             continue;
         }
@@ -360,7 +365,7 @@ fn partial_is_whole_and_measures_only_what_moved() {
     monitor.begin(Changed::Partial);
     monitor.moved(7..8);
     let mut work = 0;
-    while monitor.advance(surface.as_slice(), vertices, 1) == Ok(Verdict::Pending) {
+    while monitor.advance(Arriving::new(surface.as_slice(), vertices), 1) == Ok(Verdict::Pending) {
         work += 1;
     }
     assert!(work > 0 && work < tree.triangle_count() / 4, "{work} triangles for one vertex");
@@ -373,11 +378,14 @@ fn a_slice_is_no_longer_than_it_may_be() {
     let (mesh, built, _) = deformed(0, 0);
     let tree = built.tree::<u16>().expect("valid");
     let rows = built.to_rows(&mesh.positions);
-    let mut monitor = StretchMonitor::new(&tree).expect("a metric");
+    let mut monitor =
+        StretchMonitor::new(&tree).expect("a metric").limits(Limits::reach_mm(1e3).shrinkage(0.0));
     for again in [0, REGIONS as u32] {
         monitor.begin(Changed::Whole);
         let mut calls = 1;
-        while monitor.advance(rows.as_slice(), tree.vertex_count(), 1) == Ok(Verdict::Pending) {
+        while monitor.advance(Arriving::new(rows.as_slice(), tree.vertex_count()), 1)
+            == Ok(Verdict::Pending)
+        {
             calls += 1;
         }
         assert_eq!(calls, tree.triangle_count() + again);

@@ -61,18 +61,16 @@ pub mod {name} {{
     pub type Receiver<'t> =
         ::dibs_nostd::Assembler<'static, ::dibs_nostd::StretchMonitor<'t, Index>, VERTICES>;
 
-    /// A receiver for surfaces of this tree, none of whose vertices is farther than `farthest` from the origin on
-    /// any axis.
+    /// A receiver for surfaces of this tree that keep to these limits.
     ///
     /// # Errors
     /// Where the tree was built without its metric.
     pub fn receiver(
         tree: &Tree,
         writer: Writer,
-        farthest: f32,
+        limits: ::dibs_nostd::Limits,
     ) -> ::core::result::Result<Receiver<'_>, ::dibs_nostd::StretchError> {{
-        let monitor = ::dibs_nostd::StretchMonitor::new(tree)?;
-        Ok(Receiver::new(writer, monitor, tree.mesh_id(), farthest))
+        Receiver::for_tree(writer, tree, limits)
     }}
 
     /// A query with the stack that this tree needs.

@@ -1,7 +1,7 @@
 //! The check of a modal frame before it is published.
 
 use super::{ModalSurface, Modes, WeightsError};
-use crate::stretch::{Changed, Gate, StretchError, Verdict};
+use crate::stretch::{Arriving, Changed, Gate, StretchError, Verdict};
 use crate::surface::VertexTable;
 
 /// Admits weights within their ranges whose surface keeps to the stretch limit: the
@@ -57,8 +57,7 @@ impl<G: Gate, const K: usize> Gate for ModalGate<'_, G, K> {
     /// `rows` holds the weights, as an assembler stores them.
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
-        rows: &V,
-        ready: u32,
+        Arriving { surface: rows, ready, .. }: Arriving<'_, V>,
         work: u32,
     ) -> Result<Verdict, StretchError> {
         if (ready as usize) < K {
@@ -81,6 +80,7 @@ impl<G: Gate, const K: usize> Gate for ModalGate<'_, G, K> {
                 self.surface.insert(ModalSurface::new(&self.modes, weights.into_iter()))
             }
         };
-        self.exact.advance(surface, surface.len() as u32, work)
+        let ready = surface.len() as u32;
+        self.exact.advance(Arriving::new(surface, ready), work)
     }
 }

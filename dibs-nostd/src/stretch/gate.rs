@@ -26,6 +26,25 @@ pub enum Verdict {
     Admitted(Option<MeasuredStretch>),
 }
 
+/// A surface that is being received.
+#[derive(Clone, Copy, Debug)]
+pub struct Arriving<'a, V: ?Sized> {
+    /// Its rows: those below `ready` have their final values, the others may hold anything.
+    pub surface: &'a V,
+    /// Only grows within a frame, and is the number of rows once the frame is complete.
+    pub ready: u32,
+    /// The published surface, and the time from its capture to this one's; `None` before the first.
+    pub before: Option<(&'a V, u32)>,
+}
+
+impl<'a, V: ?Sized> Arriving<'a, V> {
+    /// A first surface, of which the rows below `ready` have come.
+    #[must_use]
+    pub const fn new(surface: &'a V, ready: u32) -> Self {
+        Self { surface, ready, before: None }
+    }
+}
+
 /// Checks the surface that is being received, in slices of bounded work.
 ///
 /// For each frame: [`begin`](Self::begin) once, then [`moved`](Self::moved) for each packet and
@@ -41,18 +60,14 @@ pub trait Gate {
         let _ = rows;
     }
 
-    /// Checks at most `work` triangles of those whose corners are all below row `ready`.
-    ///
-    /// Rows below `ready` have their final values; the others may hold anything. `ready` only grows
-    /// within a frame, and is the number of rows once the frame is complete. Admission before that
+    /// Checks at most `work` rows and triangles of those that have come. Admission before the frame is complete
     /// has no effect.
     ///
     /// # Errors
-    /// [`StretchError`] when the surface must not be published; it names the triangle.
+    /// [`StretchError`] when the surface must not be published; it names the triangle or vertex.
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
-        surface: &V,
-        ready: u32,
+        arriving: Arriving<'_, V>,
         work: u32,
     ) -> Result<Verdict, StretchError>;
 
@@ -83,8 +98,7 @@ impl Gate for Unchecked {
 
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
-        _: &V,
-        _: u32,
+        _: Arriving<'_, V>,
         _: u32,
     ) -> Result<Verdict, StretchError> {
         Ok(Verdict::Admitted(None))
@@ -98,8 +112,7 @@ impl<I: Index> Gate for &Tree<'_, I> {
 
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
-        surface: &V,
-        ready: u32,
+        Arriving { surface, ready, .. }: Arriving<'_, V>,
         _: u32,
     ) -> Result<Verdict, StretchError> {
         if (ready as usize) < surface.len() {

@@ -2,7 +2,9 @@
 
 mod gate;
 mod kernel;
+mod limits;
 mod monitor;
+mod motion;
 mod regions;
 mod rows;
 
@@ -11,8 +13,9 @@ use core::fmt;
 use crate::surface::{MeasuredStretch, REGIONS, VertexTable};
 use crate::tree::{Index, Tree};
 
-pub use gate::{Changed, Gate, Unchecked, Verdict};
+pub use gate::{Arriving, Changed, Gate, Unchecked, Verdict};
 use kernel::Worst;
+pub use limits::Limits;
 pub use monitor::StretchMonitor;
 use regions::{of_regions, region_rows};
 
@@ -40,6 +43,22 @@ pub enum StretchError {
         /// Its limit.
         limit: f32,
     },
+    /// A region of the surface has shrunk below its limit: collapsed, or in another unit.
+    Shrunk {
+        /// Row of its first triangle.
+        triangle: u32,
+        /// The least size allowed.
+        limit: f32,
+    },
+    /// A vertex moved farther since the published frame than its speed limit allows.
+    TooFast {
+        /// Row of the vertex.
+        vertex: u32,
+        /// How far it moved (mm).
+        step: f32,
+        /// How far it might have, in the time between the two frames (mm).
+        limit: f32,
+    },
     /// A row outside its table: the tree's bytes changed after they were validated.
     Corrupt {
         /// The row that is missing.
@@ -56,6 +75,15 @@ impl fmt::Display for StretchError {
             }
             Self::Exceeded { triangle, stretch, limit } => {
                 write!(f, "triangle {triangle} is stretched by {stretch}, the tree allows {limit}")
+            }
+            Self::Shrunk { triangle, limit } => {
+                write!(f, "the region of triangle {triangle} shrank below {limit} of its size")
+            }
+            Self::TooFast { vertex, step, limit } => {
+                write!(
+                    f,
+                    "vertex {vertex} moved by {step} since the last frame, {limit} is allowed"
+                )
             }
             Self::Corrupt { row } => write!(f, "row {row} is missing: the tree's bytes changed"),
         }
@@ -90,7 +118,7 @@ pub fn measure_stretch<I: Index, V: VertexTable + ?Sized>(
     for worst in &mut regions {
         let end = triangles.min(first + rows);
         *worst = Worst::none(first);
-        rows::scan(tree, vertices, first..end, tree.vertex_count(), worst)?;
+        rows::scan(tree, vertices, first..end, tree.vertex_count(), worst, &mut rows::Room::any())?;
         first = end;
     }
     Ok(of_regions(tree, &regions, vertices.epoch()))

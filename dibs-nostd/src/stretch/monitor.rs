@@ -3,20 +3,25 @@
 use core::ops::Range;
 
 use super::kernel::Worst;
+use super::motion::{largest_step, too_fast};
 use super::regions::{of_regions, region_rows};
-use super::{Changed, Gate, StretchError, Verdict, check_tables, rows};
+use super::rows::Room;
+use super::{Arriving, Changed, Gate, Limits, StretchError, Verdict, check_tables, rows};
 use crate::surface::{REGIONS, VertexTable};
 use crate::tree::{Index, Tree};
 
 /// Blocks of vertex rows, at most: what a partial frame moved is remembered by them.
 const BLOCKS: usize = 32;
 
+/// No row.
+const NONE: u32 = u32::MAX;
+
 /// All regions, one bit each.
 const ALL: u32 = u32::MAX;
 const _: () = assert!(REGIONS == u32::BITS as usize);
 
 /// Measures every frame before it is published, a few triangles at a time: the [`Gate`] that keeps what
-/// is stretched beyond its limit from the controller, and gives the query the measured stretch.
+/// is stretched, shrunk or moved beyond its limits from the controller, and gives the query the measured stretch.
 ///
 /// A whole frame is measured as it arrives: a triangle can be checked as soon as its corners are there,
 /// and rows are numbered so that corners come about when their triangles do. Of a partial frame only
@@ -26,14 +31,17 @@ const _: () = assert!(REGIONS == u32::BITS as usize);
 /// [`measure_stretch`](super::measure_stretch) on the whole surface, but for the few parts in a million that are
 /// added for rounding, which depend on where a region began; from the same frames always the same bits.
 ///
-/// Cost: [`advance`](Gate::advance) checks at most as many triangles as it is told, and takes
+/// Of a frame's rows those that came are compared with the published ones; see [`Limits`] for what is and what is
+/// not refused.
+///
+/// Cost: [`advance`](Gate::advance) checks at most as many rows and triangles as it is told, and takes
 /// O([`REGIONS`]) besides. RAM: half a kilobyte at most, whatever the surface. Making one takes one pass over
 /// the triangles.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
 /// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
-/// use dibs_nostd::{Advance, Assembler, Frames, StretchMonitor, Tree};
+/// use dibs_nostd::{Advance, Assembler, Frames, Limits, Tree};
 ///
 /// let (heart, motion) = generate::heart(320)?;
 /// let built = Builder::new().stretch(1.5).build(&heart)?;
@@ -41,14 +49,15 @@ const _: () = assert!(REGIONS == u32::BITS as usize);
 ///
 /// static FRAMES: Frames<162> = Frames::new();
 /// let (writer, mut reader) = FRAMES.split().ok_or("taken")?;
-/// let mut assembler = Assembler::new(writer, StretchMonitor::new(&tree)?, tree.mesh_id(), 1e3);
+/// let limits = Limits::reach_mm(300.0).speed(0.2); // mm, mm a tick
+/// let mut assembler = Assembler::for_tree(writer, &tree, limits)?;
 /// let rows = built.to_rows(&motion.frames[9]);
 /// let id = FrameId { mesh_id: tree.mesh_id(), session: 1, epoch: 1 };
 /// let mut sender = FrameEncoder::<_, 512>::new(id, Encoding::Float, rows.as_slice())?;
 /// let mut buffer = [0; 512];
 /// while let Some(packet) = sender.next_packet(&mut buffer) {
 ///     assembler.accept(packet, 0)?;
-///     assembler.advance(60)?; // at most 60 triangles
+///     assembler.advance(60)?; // at most 60 rows and triangles
 /// }
 /// while assembler.advance(60)? == Advance::Pending {}
 ///
@@ -62,7 +71,7 @@ pub struct StretchMonitor<'t, I> {
     tree: &'t Tree<'t, I>,
     /// Which regions have corners in each block of `1 << block_shift` vertex rows.
     touched: [u32; BLOCKS],
-    block_shift: u32,
+    block_shift: u8,
     changed: Changed,
     /// Regions still to be measured.
     left: u32,
@@ -70,16 +79,24 @@ pub struct StretchMonitor<'t, I> {
     /// work. The next partial frame measures them, whether it changes them or not.
     unpublished: u32,
     /// The next triangle of the region that is being measured.
-    next: Option<u32>,
+    next: u32,
     regions: [Worst; REGIONS],
+    speed: f32,
+    shrinkage: f32,
+    /// [`Room`]'s sum of the region that is being measured.
+    room: f32,
+    /// Blocks of rows still to be compared with the published ones, and the next row of the first of them.
+    blocks_left: u32,
+    next_row: u32,
 }
 
 impl<'t, I: Index> StretchMonitor<'t, I> {
-    /// A monitor for surfaces of this tree.
+    /// A monitor for surfaces of this tree, with the limits that [`Limits::reach_mm`] begins with.
     ///
     /// # Errors
     /// [`StretchError::NoMetric`] where the tree was emitted without what it takes.
     pub fn new(tree: &'t Tree<'t, I>) -> Result<Self, StretchError> {
+        let limits = Limits::reach_mm(f32::INFINITY);
         if tree.sections().metric.is_empty() {
             return Err(StretchError::NoMetric);
         }
@@ -101,13 +118,27 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
         Ok(Self {
             tree,
             touched,
-            block_shift,
+            block_shift: block_shift as u8,
             changed: Changed::Whole,
             left: ALL,
             unpublished: ALL,
-            next: None,
+            next: NONE,
             regions: [Worst::none(u32::MAX); REGIONS],
+            speed: limits.speed,
+            shrinkage: limits.shrinkage,
+            room: 0.0,
+            blocks_left: ALL,
+            next_row: 0,
         })
+    }
+
+    /// The same with these limits on speed and size. Reach is the assembler's to limit:
+    /// [`Assembler::for_tree`](crate::Assembler::for_tree).
+    #[must_use]
+    pub const fn limits(mut self, limits: Limits) -> Self {
+        self.speed = limits.speed;
+        self.shrinkage = limits.shrinkage;
+        self
     }
 
     /// The tree whose surfaces are measured.
@@ -116,10 +147,61 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
         self.tree
     }
 
-    /// Triangles that a frame of which every row moved takes, at most: the sum of its slices' work.
+    /// Rows and triangles that a frame of which every row moved takes, at most: the sum of its slices' work.
     #[must_use]
     pub const fn whole_work(&self) -> u32 {
-        self.tree.triangle_count().saturating_add(REGIONS as u32)
+        let rows = self.tree.vertex_count().saturating_add(self.tree.triangle_count());
+        rows.saturating_add(REGIONS as u32)
+    }
+
+    /// Compares rows that have come with the published ones. Returns the work left, and whether all rows are done.
+    fn compare<V: VertexTable + ?Sized>(
+        &mut self,
+        Arriving { surface, ready, before }: Arriving<'_, V>,
+        mut work: u32,
+    ) -> Result<(u32, bool), StretchError> {
+        let Some((before, elapsed)) = before else {
+            self.blocks_left = 0;
+            return Ok((work, true));
+        };
+        // Infinite without a limit; more than the time between, for the clock counts whole units.
+        let limit = self.speed * (elapsed as f32 + 1.0);
+        if limit == f32::INFINITY {
+            self.blocks_left = 0;
+        }
+        let (count, shift) = (self.tree.vertex_count(), u32::from(self.block_shift));
+        while self.blocks_left != 0 {
+            let block = self.blocks_left.trailing_zeros();
+            let first = block.wrapping_shl(shift);
+            let end = first.saturating_add(1_u32.wrapping_shl(shift));
+            let end = if end < count { end } else { count };
+            let from = if self.next_row > first { self.next_row } else { first };
+            let stop = if end < ready { end } else { ready };
+            let stop =
+                if stop.saturating_sub(from) < work { stop } else { from.saturating_add(work) };
+            if from < stop {
+                let step = largest_step(surface, before, from..stop, 0.0);
+                if !(step <= limit * limit) {
+                    return Err(too_fast(surface, before, from..stop, limit));
+                }
+                work = work.saturating_sub(stop - from);
+            }
+            if stop < end {
+                self.next_row = if stop > from { stop } else { from };
+                return Ok((work, false));
+            }
+            self.next_row = 0;
+            self.blocks_left &= self.blocks_left - 1;
+        }
+        Ok((work, true))
+    }
+
+    /// Checks that the region that was measured, from this triangle on, has not shrunk.
+    const fn check_room(&self, triangle: u32) -> Result<(), StretchError> {
+        if self.room >= 0.0 {
+            return Ok(());
+        }
+        Err(StretchError::Shrunk { triangle, limit: self.shrinkage })
     }
 
     /// The rows of a region's triangles.
@@ -135,10 +217,11 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
 impl<I: Index> Gate for StretchMonitor<'_, I> {
     fn begin(&mut self, changed: Changed) {
         self.changed = changed;
-        self.next = None;
-        self.left = match changed {
-            Changed::Whole => ALL,
-            Changed::Partial => self.unpublished,
+        self.next = NONE;
+        self.next_row = 0;
+        (self.left, self.blocks_left) = match changed {
+            Changed::Whole => (ALL, ALL),
+            Changed::Partial => (self.unpublished, 0),
         };
     }
 
@@ -146,31 +229,35 @@ impl<I: Index> Gate for StretchMonitor<'_, I> {
         if self.changed == Changed::Whole || rows.is_empty() {
             return;
         }
-        let first = (rows.start >> self.block_shift) as usize;
-        let last = (rows.end.saturating_sub(1) >> self.block_shift) as usize;
-        for block in self.touched.iter().take(last.saturating_add(1)).skip(first) {
+        let first = (rows.start >> u32::from(self.block_shift)) as usize;
+        let last = (rows.end.saturating_sub(1) >> u32::from(self.block_shift)) as usize;
+        for (number, block) in
+            self.touched.iter().enumerate().take(last.saturating_add(1)).skip(first)
+        {
             self.left |= block;
+            self.blocks_left |= 1_u32.wrapping_shl(number as u32);
         }
     }
 
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
-        surface: &V,
-        ready: u32,
-        mut work: u32,
+        arriving: Arriving<'_, V>,
+        work: u32,
     ) -> Result<Verdict, StretchError> {
+        let Arriving { surface, ready, .. } = arriving;
         check_tables(self.tree, surface)?;
         let is_complete = ready >= self.tree.vertex_count();
         if self.changed == Changed::Partial && !is_complete {
             return Ok(Verdict::Pending);
         }
+        let (mut work, is_compared) = self.compare(arriving, work)?;
         while self.left != 0 {
             let region = self.left.trailing_zeros();
             let rows = self.rows(region);
-            let next = self.next.unwrap_or(rows.start);
+            let next = if self.next == NONE { rows.start } else { self.next };
             let slot = self.regions.get_mut(region as usize);
             let slot = slot.ok_or(StretchError::Corrupt { row: rows.start })?;
-            if self.next.is_none() {
+            if self.next == NONE {
                 if work == 0 {
                     return Ok(Verdict::Pending);
                 }
@@ -183,19 +270,23 @@ impl<I: Index> Gate for StretchMonitor<'_, I> {
                     work -= 1;
                 }
                 *slot = worst;
+                self.room = 0.0;
                 self.unpublished |= 1 << region;
             }
             let stop = if rows.end - next < work { rows.end } else { next + work };
-            let at = rows::scan(self.tree, surface, next..stop, ready, slot)?;
+            let mut room = Room { least: self.shrinkage * self.shrinkage, sum: self.room };
+            let at = rows::scan(self.tree, surface, next..stop, ready, slot, &mut room)?;
+            self.room = room.sum;
             work -= at - next;
             if at < rows.end {
-                self.next = Some(at);
+                self.next = at;
                 return Ok(Verdict::Pending);
             }
-            self.next = None;
+            self.check_room(rows.start)?;
+            self.next = NONE;
             self.left &= self.left - 1;
         }
-        if !is_complete {
+        if !is_complete || !is_compared {
             return Ok(Verdict::Pending);
         }
         let measured = of_regions(self.tree, &self.regions, surface.epoch());

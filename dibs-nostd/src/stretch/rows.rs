@@ -16,20 +16,44 @@ use crate::surface::VertexTable;
 use crate::tree::format::{Join, METRIC_BYTES, Metric, PathKind, metric_row};
 use crate::tree::{Index, Tree, format};
 
+/// How far a region is from having shrunk too much: the sum, over its triangles, of an edge's square now less
+/// `least` times that at rest (where triangles have limits of their own, times the square of their share).
+#[derive(Clone, Copy)]
+pub(super) struct Room {
+    pub least: f32,
+    pub sum: f32,
+}
+
+impl Room {
+    /// For a region that may shrink to nothing.
+    pub const fn any() -> Self {
+        Self { least: 0.0, sum: 0.0 }
+    }
+}
+
 /// Checks the triangles of `rows`, as far as all their corners are below row `ready`, and raises `worst`
-/// where one is stretched more. Returns the row to go on with.
+/// where one is stretched more, and adds up `room`. Returns the row to go on with.
 pub(super) fn scan<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     surface: &V,
     rows: Range<u32>,
     ready: u32,
     worst: &mut Worst,
+    room: &mut Room,
 ) -> Result<u32, StretchError> {
     match (tree.paths(), I::BYTES) {
-        (PathKind::Surface, 2) => run::<I, V, SingularValue, 6>(tree, surface, rows, ready, worst),
-        (PathKind::Surface, _) => run::<I, V, SingularValue, 12>(tree, surface, rows, ready, worst),
-        (PathKind::EdgePath, 2) => run::<I, V, LongestEdge, 6>(tree, surface, rows, ready, worst),
-        (PathKind::EdgePath, _) => run::<I, V, LongestEdge, 12>(tree, surface, rows, ready, worst),
+        (PathKind::Surface, 2) => {
+            run::<I, V, SingularValue, 6>(tree, surface, rows, ready, worst, room)
+        }
+        (PathKind::Surface, _) => {
+            run::<I, V, SingularValue, 12>(tree, surface, rows, ready, worst, room)
+        }
+        (PathKind::EdgePath, 2) => {
+            run::<I, V, LongestEdge, 6>(tree, surface, rows, ready, worst, room)
+        }
+        (PathKind::EdgePath, _) => {
+            run::<I, V, LongestEdge, 12>(tree, surface, rows, ready, worst, room)
+        }
     }
 }
 
@@ -67,6 +91,7 @@ fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
     rows: Range<u32>,
     ready: u32,
     worst: &mut Worst,
+    room: &mut Room,
 ) -> Result<u32, StretchError> {
     let (triangles, _) = tree.sections().triangles.as_chunks::<CORNERS>();
     let bytes = tree.sections().metric;
@@ -82,6 +107,7 @@ fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
                 rows.clone(),
                 ready,
                 worst,
+                room,
             )
         }
         Err(_) => {
@@ -94,6 +120,7 @@ fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
                 rows.clone(),
                 ready,
                 worst,
+                room,
             )
         }
     };
@@ -116,19 +143,20 @@ fn run_on<I: Index, V: VertexTable + ?Sized, M: Measure, R: MetricBits, const CO
     rows: Range<u32>,
     ready: u32,
     worst: &mut Worst,
+    room: &mut Room,
 ) -> Option<u32> {
     let range = rows.start as usize..rows.end as usize;
     let (metrics, triangles) = (metrics.get(range.clone())?, triangles.get(range)?);
     let limit = squared_limit(tree.stretch());
-    let (first, largest) = (rows.start, *worst);
+    let (first, largest, sum) = (rows.start, *worst, *room);
     let row;
-    (row, *worst) = if tree.sections().limits.is_empty() {
+    (row, *worst, room.sum) = if tree.sections().limits.is_empty() {
         measure::<I, V, M, R, CORNERS, true>(
-            surface, metrics, triangles, ready, limit, first, largest,
+            surface, metrics, triangles, ready, limit, first, largest, sum,
         )
     } else {
         measure::<I, V, M, R, CORNERS, false>(
-            surface, metrics, triangles, ready, limit, first, largest,
+            surface, metrics, triangles, ready, limit, first, largest, sum,
         )
     };
     Some(row)
@@ -163,8 +191,9 @@ struct Before {
     third: Vec3,
     /// The edge from the centre to the third corner.
     edge: Vec3,
-    /// What that leaves of the largest square so far.
+    /// What that leaves of the largest square so far, and what the least square leaves of it.
     left: f32,
+    room: f32,
 }
 
 /// Measures triangles, the first of them in row `first`, up to one that has a corner at row `ready` or beyond,
@@ -185,44 +214,50 @@ fn measure<
     limit: f32,
     first: u32,
     mut worst: Worst,
-) -> (u32, Worst) {
+    mut room: Room,
+) -> (u32, Worst, f32) {
     // One comparison does for both.
     let vertices = surface.len() as u32;
     let ready = if ready < vertices { ready } else { vertices };
-    let table = Table { surface, ready, limit };
+    let table = Table { surface, ready, limit, least: room.least };
     let mut row = first;
     let (Some(metric), Some(corners)) = (metrics.first(), triangles.first()) else {
-        return (row, worst);
+        return (row, worst, room.sum);
     };
     let Some(mut before) = table.before::<I, CORNERS>(metric, corners, worst.squared) else {
-        return (row, worst);
+        return (row, worst, room.sum);
     };
     // Two at a time, so that what one leaves to the next takes no moves.
     let (pairs, last_metric) = metrics.as_chunks::<2>();
     let (pairs_of_corners, last_corners) = triangles.as_chunks::<2>();
     for ([m0, m1], [t0, t1]) in pairs.iter().zip(pairs_of_corners) {
         let next = table.next::<I, M, CORNERS, UNIFORM>(before, m0, t0, row, &mut worst);
-        let Some(next) = next else { return (row, worst) };
+        let Some(next) = next else { return (row, worst, room.sum) };
+        room.sum += next.room;
         let next =
             table.next::<I, M, CORNERS, UNIFORM>(next, m1, t1, row.wrapping_add(1), &mut worst);
-        let Some(next) = next else { return (row.wrapping_add(1), worst) };
+        let Some(next) = next else { return (row.wrapping_add(1), worst, room.sum) };
+        room.sum += next.room;
         before = next;
         row = row.wrapping_add(2);
     }
     for (metric, corners) in last_metric.iter().zip(last_corners) {
         let next = table.next::<I, M, CORNERS, UNIFORM>(before, metric, corners, row, &mut worst);
         let Some(next) = next else { break };
+        room.sum += next.room;
         before = next;
         row = row.wrapping_add(1);
     }
-    (row, worst)
+    (row, worst, room.sum)
 }
 
-/// What triangles are measured on: vertices below row `ready`, none of them beyond `limit`, a square.
+/// What triangles are measured on: vertices below row `ready`, none of them beyond `limit`, a square; `least` is
+/// that of [`Room`].
 struct Table<'a, V: ?Sized> {
     surface: &'a V,
     ready: u32,
     limit: f32,
+    least: f32,
 }
 
 impl<V: VertexTable + ?Sized> Table<'_, V> {
@@ -243,7 +278,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let left = largest * rest - edge.length_squared();
         // Not within the largest so far: what is not a number passes nothing, and a closer look is taken.
         let edge = if left > 0.0 { edge } else { Vec3::NAN };
-        Some(Before { centre, third: centre, edge, left })
+        Some(Before { centre, third: centre, edge, left, room: 0.0 })
     }
 
     /// Measures one triangle.
@@ -277,7 +312,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         corners: &[u8; CORNERS],
         largest: f32,
     ) -> Option<Before> {
-        let Before { mut centre, third, edge: mut first, mut left } = before;
+        let Before { mut centre, third, edge: mut first, mut left, .. } = before;
         let [mark, between, second] = metric.bits();
         let (rest_between, rest_second) = (f32::from_bits(between), f32::from_bits(second));
         // The marks of `Join`, the commonest first: written out, since a match would make an enum of them.
@@ -305,10 +340,12 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         }
         let third = self.corner::<I, CORNERS>(corners, 2)?;
         let edge = third - centre;
-        let left_second = largest * rest_second - edge.length_squared();
+        let square = edge.length_squared();
+        let (left_second, room) =
+            (largest * rest_second - square, square - self.least * rest_second);
         let now = Edges { first, second: edge };
         let is_within = M::is_within(left, left_second, largest * rest_between, now);
-        is_within.then_some(Before { centre, third, edge, left: left_second })
+        is_within.then_some(Before { centre, third, edge, left: left_second, room })
     }
 
     /// Raises `worst` if a triangle is stretched more; `None` beyond the limit.
@@ -335,10 +372,12 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
             worst = Worst { squared, triangle: row };
         }
         let [.., rest_second] = metric.squares;
-        let left = worst.squared * rest_second - now.second.length_squared();
+        let square = now.second.length_squared();
+        let (left, room) =
+            (worst.squared * rest_second - square, square - self.least * rest_second);
         // It is within the largest now: below 0 is rounding.
         let left = if left > 0.0 { left } else { 0.0 };
-        Some((Before { centre, third, edge: now.second, left }, worst))
+        Some((Before { centre, third, edge: now.second, left, room }, worst))
     }
 
     /// Positions of a triangle's first two corners, if they are there.

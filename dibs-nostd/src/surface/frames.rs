@@ -34,6 +34,7 @@ use core::ops::Range;
 
 use glam::Vec3;
 
+use super::age::elapsed;
 use super::atomic::{AtomicBool, AtomicU32, Ordering};
 use super::{Ageing, FrameAge, Latest, MeasuredStretch, VertexTable};
 
@@ -409,6 +410,13 @@ impl<const N: usize> VertexTable for FrameGuard<'_, N> {
 #[derive(Clone, Copy)]
 pub struct FrameView<'f, const N: usize> {
     buffer: &'f Buffer<N>,
+}
+
+impl<const N: usize> FrameView<'_, N> {
+    /// Time from this frame to one with the stamp `received`.
+    pub(crate) fn time_to(&self, received: u32) -> u32 {
+        elapsed(received, self.buffer.received.load(Ordering::Relaxed))
+    }
 }
 
 impl<const N: usize> VertexTable for FrameView<'_, N> {

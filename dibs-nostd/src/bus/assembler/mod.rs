@@ -10,8 +10,9 @@ use crate::MAX_COORDINATE;
 use crate::bus::wire::{
     Content, Counters, Event, FrameId, Mac, NoMac, Packet, Status, StreamError,
 };
-use crate::stretch::{Gate, Verdict};
+use crate::stretch::{Arriving, Gate, Limits, StretchError, StretchMonitor, Verdict};
 use crate::surface::{FrameLabel, FrameView, FrameWriter, PublishError};
+use crate::tree::{Index, Tree};
 
 use collector::Collector;
 pub use collector::LastHeartbeat;
@@ -130,6 +131,22 @@ impl<'f, G: Gate, const N: usize> Assembler<'f, G, N> {
     #[must_use]
     pub fn new(writer: FrameWriter<'f, N>, gate: G, mesh_id: u32, max_coordinate: f32) -> Self {
         Assembler::with_mac(writer, gate, mesh_id, max_coordinate, NoMac)
+    }
+}
+
+impl<'f, 't, I: Index, const N: usize> Assembler<'f, StretchMonitor<'t, I>, N> {
+    /// An assembler for surfaces of this tree, which publishes those that keep to its stretch limit and to these
+    /// limits, and checks them in slices.
+    ///
+    /// # Errors
+    /// [`StretchError::NoMetric`] where the tree was emitted without the section that stretch is measured with.
+    pub fn for_tree(
+        writer: FrameWriter<'f, N>,
+        tree: &'t Tree<'t, I>,
+        limits: Limits,
+    ) -> Result<Self, StretchError> {
+        let monitor = StretchMonitor::new(tree)?.limits(limits);
+        Ok(Self::new(writer, monitor, tree.mesh_id(), limits.reach))
     }
 }
 
@@ -300,8 +317,10 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
 
     /// Has the gate check some more of the frame in work.
     fn check(&mut self, ready: u32, work: u32) -> Result<Advance, Rejection> {
-        let verdict = self.gate.advance(&self.writer.back(), ready, work);
         let Some(frame) = &self.collector.frame else { return Ok(Advance::Idle) };
+        let (back, front) = (self.writer.back(), self.writer.front());
+        let before = front.as_ref().map(|front| (front, front.time_to(frame.captured())));
+        let verdict = self.gate.advance(Arriving { surface: &back, ready, before }, work);
         match verdict {
             Err(error) => {
                 let rejection = Rejection::Stretch(error);

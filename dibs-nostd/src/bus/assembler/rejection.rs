@@ -121,6 +121,8 @@ impl Rejection {
             Self::NotFinite { .. } => Event::NotFinite,
             Self::TooFar { .. } => Event::TooFar,
             Self::Digest { .. } => Event::Digest,
+            Self::Stretch(StretchError::Shrunk { .. }) => Event::Shrunk,
+            Self::Stretch(StretchError::TooFast { .. }) => Event::TooFast,
             Self::Stretch(_) => Event::Stretch,
         }
     }

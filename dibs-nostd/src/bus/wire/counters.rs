@@ -56,13 +56,17 @@ pub enum Event {
     TooFar,
     /// The packets are not all of the frame that the commit confirms.
     Digest,
-    /// The gate refused the surface.
+    /// The gate refused the surface: stretched too far, or not measured.
     Stretch,
+    /// The gate refused the surface: a region has shrunk too far.
+    Shrunk,
+    /// The gate refused the surface: a vertex moved too fast.
+    TooFast,
 }
 
 impl Event {
     /// Every event, in the order of the wire.
-    pub const ALL: [Self; 24] = [
+    pub const ALL: [Self; 26] = [
         Self::Published,
         Self::Abandoned,
         Self::Duplicate,
@@ -87,6 +91,8 @@ impl Event {
         Self::TooFar,
         Self::Digest,
         Self::Stretch,
+        Self::Shrunk,
+        Self::TooFast,
     ];
 
     /// Whether a packet or a frame was refused.
@@ -123,6 +129,8 @@ impl Event {
             Self::TooFar => "too far",
             Self::Digest => "digest",
             Self::Stretch => "stretch",
+            Self::Shrunk => "shrunk",
+            Self::TooFast => "too fast",
         }
     }
 }

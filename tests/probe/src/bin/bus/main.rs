@@ -75,7 +75,8 @@ impl<'t, M: Mac> Receiver<'t, M> {
         limit: f32,
         mac: M,
     ) -> Option<Self> {
-        let monitor = StretchMonitor::new(tree).ok()?;
+        let monitor =
+            StretchMonitor::new(tree).ok()?.limits(dibs_nostd::Limits::reach_mm(1e3).speed(1e3));
         let mesh_id = tree.mesh_id();
         let assembler = Assembler::with_mac(writer, monitor, mesh_id, limit, mac);
         let deframer = Deframer::new();

@@ -49,7 +49,8 @@ fn run() -> Option<()> {
         script.read(bytes.get_mut(..length.next_multiple_of(4))?)?;
         let tree = Tree::<u16>::from_bytes(bytes.get(..length)?).ok()?;
         let [untagged, tagged] = &FRAMES;
-        let monitor = StretchMonitor::new(&tree).ok()?;
+        let monitor =
+            StretchMonitor::new(&tree).ok()?.limits(dibs_nostd::Limits::reach_mm(1e3).speed(1e3));
         let mut plain = Assembler::new(untagged.split()?.0, monitor.clone(), tree.mesh_id(), 1e3);
         let mac = AesCmac::new(&KEY, 0, 0);
         let mut guarded = Assembler::with_mac(tagged.split()?.0, monitor, tree.mesh_id(), 1e3, mac);

@@ -1,0 +1,46 @@
+//! How far vertices have moved since the published frame.
+
+use core::ops::Range;
+
+use super::StretchError;
+use crate::math::sqrt::sqrt;
+use crate::surface::VertexTable;
+
+/// The largest squared distance of these rows from where they were before, and of `largest`. Not below it where a
+/// position is not a number.
+#[inline(never)]
+pub(super) fn largest_step<V: VertexTable + ?Sized>(
+    now: &V,
+    before: &V,
+    rows: Range<u32>,
+    mut largest: f32,
+) -> f32 {
+    for row in rows {
+        let (Some(now), Some(before)) = (now.position(row), before.position(row)) else { break };
+        let squared = (now - before).length_squared();
+        // What is not a number counts, too, and stays.
+        if !(squared <= largest) {
+            largest = squared;
+        }
+    }
+    largest
+}
+
+/// Names the first of these rows that moved farther than `limit`.
+#[cold]
+pub(super) fn too_fast<V: VertexTable + ?Sized>(
+    now: &V,
+    before: &V,
+    rows: Range<u32>,
+    limit: f32,
+) -> StretchError {
+    let mut found = StretchError::TooFast { vertex: rows.start, step: f32::INFINITY, limit };
+    for vertex in rows {
+        let step = largest_step(now, before, vertex..vertex.saturating_add(1), 0.0);
+        if !(step <= limit * limit) {
+            found = StretchError::TooFast { vertex, step: sqrt(step), limit };
+            break;
+        }
+    }
+    found
+}

@@ -1,0 +1,196 @@
+//! What is no surface of this tissue is not published, and counted by its own cause: collapsed, in another unit,
+//! mirrored, turned or jumped. And what is one passes.
+
+use std::path::Path;
+
+use dibs_build::{Builder, BuiltTree, Motion, generate};
+use dibs_nostd::glam::{Quat, Vec3};
+use dibs_nostd::wire::{Encoding, Event, FrameId};
+use dibs_nostd::{
+    Advance, Arriving, Assembler, Changed, FrameReader, Frames, Gate, Limits, Rejection,
+    StretchError, StretchMonitor, Tree, Verdict, VertexTable,
+};
+use dibs_tests::bus::collect;
+
+/// Vertices of the generated heart of 1,000 triangles.
+const N: usize = 502;
+/// mm a tick: a heart of one beat a second, at ticks of a millisecond.
+const SPEED: f32 = 0.3;
+
+struct Bus {
+    assembler: Assembler<'static, StretchMonitor<'static, u16>, N>,
+    reader: FrameReader<'static, N>,
+    tree: &'static Tree<'static, u16>,
+    epoch: u32,
+}
+
+impl Bus {
+    fn new(built: &'static BuiltTree, limits: Limits) -> Self {
+        let tree: &Tree<'_, u16> = Box::leak(Box::new(built.tree().unwrap()));
+        let frames: &'static Frames<N> = Box::leak(Box::new(Frames::new()));
+        let (writer, reader) = frames.split().unwrap();
+        let monitor = StretchMonitor::new(tree).unwrap().limits(limits);
+        let assembler = Assembler::new(writer, monitor, tree.mesh_id(), 1e3);
+        Self { assembler, reader, tree, epoch: 0 }
+    }
+
+    /// Sends a frame whose first packet arrives at `now`, with `work` done after every packet.
+    fn send(&mut self, rows: &[Vec3], now: u32, work: u32) -> Result<(), Rejection> {
+        self.epoch += 1;
+        let id = FrameId { mesh_id: self.tree.mesh_id(), session: 1, epoch: self.epoch };
+        let encoder =
+            dibs_nostd::wire::FrameEncoder::<_, 256>::new(id, Encoding::Float, rows).unwrap();
+        for packet in collect(encoder) {
+            self.assembler.accept(&packet, now)?;
+            self.assembler.advance(work)?;
+        }
+        while self.assembler.advance(work)? == Advance::Pending {}
+        assert_eq!(self.assembler.published().map(|id| id.epoch), Some(self.epoch));
+        assert_eq!(self.reader.read().unwrap().position(7), Some(rows[7]));
+        Ok(())
+    }
+
+    fn counted(&self, event: Event) -> u32 {
+        self.assembler.counters().of(event)
+    }
+}
+
+fn heart() -> (&'static BuiltTree, Motion) {
+    let (mesh, motion) = generate::heart(1_000).unwrap();
+    (Box::leak(Box::new(Builder::new().stretch(1.5).build(&mesh).unwrap())), motion)
+}
+
+/// Shapes that no first frame may have.
+fn collapsed(rest: &[Vec3]) -> Vec<(&'static str, Vec<Vec3>)> {
+    let of = |f: &dyn Fn(Vec3) -> Vec3| rest.iter().map(|&p| f(p)).collect();
+    vec![
+        ("all positions 0", of(&|_| Vec3::ZERO)),
+        ("a point", of(&|_| Vec3::new(10.0, 20.0, 30.0))),
+        ("metres for millimetres", of(&|p| p / 1_000.0)),
+        ("a hundredth", of(&|p| p * 0.01)),
+        ("a fifth", of(&|p| p * 0.2)),
+        ("a line", of(&|p| Vec3::new(p.x * 0.2, 0.0, 0.0))),
+    ]
+}
+
+#[test]
+fn a_collapsed_surface_is_refused_from_the_first_frame_on() {
+    let (built, motion) = heart();
+    let rest = built.to_rows(&motion.frames[0]);
+    for work in [1, 7, 50, 10_000] {
+        for (name, rows) in collapsed(&rest) {
+            let mut bus = Bus::new(built, Limits::reach_mm(1e3));
+            let refused = bus.send(&rows, 0, work);
+            let is_shrunk = matches!(refused, Err(Rejection::Stretch(StretchError::Shrunk { .. })));
+            assert!(is_shrunk, "{name}, {work}: {refused:?}");
+            assert_eq!(bus.counted(Event::Shrunk), 1, "{name}");
+            assert_eq!(bus.assembler.counters().rejected(), 1, "{name}: nothing else");
+            assert!(bus.reader.read().is_none());
+            // And a good frame follows.
+            assert_eq!(bus.send(&rest, 0, work), Ok(()));
+        }
+    }
+}
+
+#[test]
+fn a_surface_that_is_mirrored_turned_or_jumped_is_too_fast() {
+    let (built, motion) = heart();
+    let rest = built.to_rows(&motion.frames[0]);
+    let of = |f: &dyn Fn(Vec3) -> Vec3| rest.iter().map(|&p| f(p)).collect::<Vec<_>>();
+    let one = |row: usize| {
+        let mut rows = rest.clone();
+        rows[row] += Vec3::new(0.0, 0.0, 4.0);
+        rows
+    };
+    let wrong = [
+        ("mirrored", of(&|p| p * Vec3::new(-1.0, 1.0, 1.0))),
+        ("turned", of(&|p| Quat::from_rotation_z(0.5) * p)),
+        ("jumped by 200 mm", of(&|p| p + Vec3::new(200.0, 0.0, 0.0))),
+        ("the first vertex", one(0)),
+        ("the last vertex", one(N - 1)),
+        ("one in the middle", one(333)),
+    ];
+    let limits = Limits::reach_mm(1e3).speed(0.1);
+    for work in [1, 7, 50, 10_000] {
+        for (name, rows) in &wrong {
+            let mut bus = Bus::new(built, limits);
+            bus.send(&rest, u32::MAX - 5, work).unwrap();
+            // 30 ticks later, over the wrap of the clock: 3.1 mm are allowed.
+            let refused = bus.send(rows, 24, work);
+            let is_fast = matches!(
+                refused,
+                Err(Rejection::Stretch(StretchError::TooFast { limit, step, .. }))
+                    if step > limit && (limit - 3.1).abs() < 1e-5
+            );
+            assert!(is_fast, "{name}, {work}: {refused:?}");
+            assert_eq!(
+                (bus.counted(Event::TooFast), bus.counted(Event::Stretch)),
+                (1, 0),
+                "{name}"
+            );
+            assert_eq!(bus.assembler.counters().rejected(), 1, "{name}: nothing else");
+        }
+        // As the first frame, turned and moved surfaces are what they are: nothing says where the tissue lies.
+        for (name, rows) in &wrong[..3] {
+            assert_eq!(Bus::new(built, limits).send(rows, 0, work), Ok(()), "{name}");
+        }
+        // Time heals: 200 mm in two seconds are 0.1 mm a tick.
+        let mut bus = Bus::new(built, limits);
+        bus.send(&rest, 0, work).unwrap();
+        assert!(bus.send(&wrong[2].1, 1_990, work).is_err());
+        assert_eq!(bus.send(&wrong[2].1, 2_000, work), Ok(()));
+    }
+}
+
+/// Every recorded motion at its own speed, and every deformation that the stretch limit allows, passes.
+#[test]
+fn the_motion_of_a_heart_is_plausible() {
+    let (built, motion) = heart();
+    let mut bus = Bus::new(built, Limits::reach_mm(1e3).speed(SPEED));
+    let interval = 1_000 / motion.frames.len() as u32;
+    for (number, frame) in (0..).zip(motion.frames.iter().cycle().take(3 * motion.frames.len())) {
+        bus.send(&built.to_rows(frame), number * interval, 64).unwrap();
+    }
+    // Half of its size, in any direction, is still a surface.
+    let rest = built.to_rows(&motion.frames[0]);
+    for scale in [Vec3::splat(0.5), Vec3::new(0.3, 1.0, 1.0), Vec3::new(1.2, 0.5, 0.4)] {
+        let rows: Vec<_> = rest.iter().map(|&p| p * scale).collect();
+        let mut bus = Bus::new(built, Limits::reach_mm(1e3));
+        assert_eq!(bus.send(&rows, 0, 64), Ok(()), "{scale}");
+    }
+}
+
+/// The default limit leaves room on a heart whose motion was recorded: no region shrinks to less than half.
+#[test]
+fn a_recorded_heart_shrinks_far_less_than_the_limit() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    if !data.exists() {
+        println!("skipped: {} is not there", data.display());
+        return;
+    }
+    let mesh = dibs_build::read(data.join("heart_10272.ply")).unwrap().mesh;
+    let motion = Motion::read_pc2(data.join("heart_10272.pc2")).unwrap();
+    let built = Builder::new().stretch(2.5).build(&mesh).unwrap();
+    let tree: Tree<'_, u16> = built.tree().unwrap();
+    for part in [0.25, 0.5] {
+        let mut monitor =
+            StretchMonitor::new(&tree).unwrap().limits(Limits::reach_mm(1e3).shrinkage(part));
+        for (number, frame) in motion.frames.iter().enumerate() {
+            let rows = built.to_rows(frame);
+            monitor.begin(Changed::Whole);
+            let arriving = Arriving::new(rows.as_slice(), rows.len() as u32);
+            let verdict = monitor.advance(arriving, u32::MAX);
+            assert!(matches!(verdict, Ok(Verdict::Admitted(_))), "{number}: {verdict:?}");
+        }
+    }
+}
+
+#[test]
+fn a_limit_that_is_no_number_refuses_every_frame() {
+    let (built, motion) = heart();
+    let rest = built.to_rows(&motion.frames[0]);
+    assert!(Bus::new(built, Limits::reach_mm(1e3).shrinkage(f32::NAN)).send(&rest, 0, 64).is_err());
+    let mut bus = Bus::new(built, Limits::reach_mm(1e3).speed(f32::NAN));
+    assert!(bus.send(&rest, 0, 64).is_ok(), "nothing to compare with");
+    assert!(bus.send(&rest, 5, 64).is_err());
+}
