@@ -164,7 +164,7 @@ impl<'p> Builder<'p> {
     /// Cost: `O(n log^2 n)` for `n` triangles, on all cores.
     ///
     /// # Errors
-    /// [`BuildError`] names what is wrong with the mesh or the options.
+    /// [`BuildError`] names the defect of the mesh or the options.
     pub fn build(&self, surface: &(impl RestSurface + ?Sized)) -> Result<BuiltTree, BuildError> {
         let (mesh, error) = (surface.mesh(), surface.position_error());
         self.check(mesh)?;

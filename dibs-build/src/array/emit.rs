@@ -19,7 +19,7 @@ pub struct BuiltTree {
     pub(super) motion: Option<crate::modes::ModalMotion>,
 }
 
-/// What a tree is and what it costs.
+/// The size and cost of a tree.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[non_exhaustive]
 pub struct Summary {
@@ -62,7 +62,7 @@ pub struct Summary {
     pub modes: Option<ModesSummary>,
 }
 
-/// What the modes of a tree are and cost. Lengths are in the mesh's unit.
+/// The size and cost of a tree's modes. Lengths are in the mesh's unit.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[non_exhaustive]
 pub struct ModesSummary {
@@ -83,7 +83,7 @@ pub struct ModesSummary {
 }
 
 impl Summary {
-    /// What a user should know: one sentence for each thing that is unusual.
+    /// Warnings for a user, a sentence each.
     pub fn warnings(&self) -> impl Iterator<Item = String> + use<> {
         let unmeasurable = self.unmeasurable;
         let sentence = self.first_unmeasurable.map(|[a, b, c]| {
@@ -142,7 +142,7 @@ impl BuiltTree {
         self.order.iter().map(|&vertex| of_mesh[vertex as usize]).collect()
     }
 
-    /// What the tree is and what it costs.
+    /// The tree's size and cost.
     #[must_use]
     pub fn summary(&self) -> Summary {
         // The builder validated these bytes.
@@ -184,7 +184,7 @@ fn write(path: &Path, content: &[u8]) -> Result<(), BuildError> {
     Ok(write_atomically(path, |file| file.write_all(content))?)
 }
 
-/// What a tree is and what it costs, of any validated tree with `length` bytes.
+/// The size and cost of any validated tree of `length` bytes.
 #[must_use]
 pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
     let vertices = tree.vertex_count();

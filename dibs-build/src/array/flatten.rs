@@ -26,7 +26,7 @@ struct Flat {
 
 impl Flat {
     /// Nodes breadth first, so that children follow their parents and siblings are one run; leaves
-    /// depth first, so that what is near on the surface is near in the tables.
+    /// depth first, so that neighbours on the surface are neighbours in the tables.
     fn new(mesh: &Mesh, root: &Cluster) -> Self {
         let mut flat = Self { nodes: Vec::new(), triangles: Vec::new(), stack: 1 };
         let mut leaves = Vec::new();
@@ -63,7 +63,7 @@ impl Flat {
     }
 }
 
-/// What goes into the header besides the tree.
+/// Options and facts that the bytes record beside the nodes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Facts<'a> {
     pub paths: PathKind,
@@ -143,8 +143,7 @@ pub(crate) fn flatten<I: Index>(
     Ok((bytes, order))
 }
 
-/// Mesh vertices in the order in which the leaves come to them, so that what is near on the surface
-/// is near in memory.
+/// Mesh vertices in the order of their first use by a leaf: neighbours on the surface are neighbours in memory.
 fn vertex_order(mesh: &Mesh, triangles: &[StoredTriangle]) -> Vec<u32> {
     let mut seen = vec![false; mesh.positions.len()];
     let corners = triangles.iter().flat_map(|t| t.corners);

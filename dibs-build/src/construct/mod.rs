@@ -58,7 +58,7 @@ pub(crate) enum Content {
     Leaf(Vec<u32>),
 }
 
-/// What every step of one construction needs.
+/// Shared by every step of one construction.
 pub(crate) struct Constructor<'a> {
     pub surface: Surface<'a>,
     pub construction: Construction,

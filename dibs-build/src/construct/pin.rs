@@ -12,7 +12,7 @@ pub(crate) struct Pin {
 /// Sections of at most this many vertices try each of them.
 const TRY_ALL: usize = 12;
 
-/// Rounds of moving the centre away from what is farthest.
+/// Times that the centre is moved away from its farthest vertex, at most.
 const ROUNDS: usize = 4;
 
 /// The geodesic centre, approximately: far seeds first (two sweeps), then the vertex that minimises

@@ -20,7 +20,7 @@ impl Section {
     }
 }
 
-/// What all sections of one build share.
+/// Shared by all sections of one build.
 #[derive(Debug)]
 pub(crate) struct Surface<'a> {
     pub mesh: &'a Mesh,
@@ -39,7 +39,7 @@ pub(crate) struct Searches {
     pub other: Distances,
 }
 
-/// The section that searches are for, and what is around it.
+/// The section that is searched, and the section around it.
 #[derive(Debug)]
 struct Members {
     /// Of each vertex the latest section or surroundings that it was found in.

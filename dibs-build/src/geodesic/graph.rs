@@ -72,13 +72,13 @@ impl Graph {
     }
 }
 
-/// What covers the f64 rounding of a strip's unfolding, as a part of a length.
+/// Allowance for the f64 rounding of a strip's unfolding, as a part of a length.
 const UNFOLDING: f64 = 1e-12;
 
 /// Sine of the angle between a chord and an edge below which it is not certain where they cross.
 const GRAZING: f64 = 1e-5;
 
-/// What covers the rounding of where they cross otherwise, as a part of the chord: some 10 units of
+/// Allowance for the rounding of the crossing point otherwise, as a part of the chord: some 10 units of
 /// 2^-53, over [`GRAZING`].
 const CROSSING: f64 = 1e-9;
 

@@ -24,7 +24,7 @@ pub(crate) struct StoredTriangle {
 }
 
 impl StoredTriangle {
-    /// How it goes on from the triangle before, if it can follow that at all.
+    /// How it joins the previous triangle; `None` if it cannot follow it.
     pub fn join(self, before: Option<Self>) -> Option<Join> {
         let joins = |join: &Join| {
             before.is_some_and(|before| join.is_between(before.centre_first(), self.centre_first()))
@@ -89,7 +89,7 @@ const ILL_CONDITIONED: Cost = 1 << 24;
 #[derive(Clone, Copy, Debug)]
 struct Choice {
     stored: StoredTriangle,
-    /// What it costs for its centre.
+    /// The cost of its centre.
     cost: Cost,
     /// The triangle's bit among the leaf's.
     bit: usize,
@@ -103,7 +103,7 @@ impl Choice {
         self.cost >= ILL_CONDITIONED
     }
 
-    /// What it costs after that triangle, if it can follow it.
+    /// Its cost after that triangle; `None` if it cannot follow it.
     fn after(&self, before: Option<StoredTriangle>) -> Option<Cost> {
         Some(match self.stored.join(before)? {
             Join::Fan => self.cost,
@@ -179,7 +179,7 @@ impl Orders {
         Self(vec![[NONE; CHOICES]; 1 << MAX_LEAF_TRIANGLES])
     }
 
-    /// The cheapest order of a leaf, after that triangle and before a leaf of these choices.
+    /// The cheapest order of a leaf between a stored triangle and a leaf of these choices.
     fn best(
         &mut self,
         leaf: &[Choice],
@@ -245,7 +245,7 @@ impl Orders {
     }
 }
 
-/// The choice that an order ends with at the least cost, with what is to come.
+/// The last choice of the cheapest order, the cost to come included.
 fn cheapest(lasts: &[Best], to_come: impl Fn(usize) -> Cost) -> Option<(usize, Cost)> {
     let possible = lasts.iter().enumerate().filter(|(_, best)| best.cost != Cost::MAX);
     possible.map(|(at, best)| (at, best.cost + to_come(at))).min_by_key(|&(_, cost)| cost)

@@ -48,7 +48,7 @@ pub(crate) fn encode<I: Index>(
     let mut section = Section::new(modes, growths, &weights);
     section.allow_for_rounding(&rest, &triangles);
 
-    // What remains is measured on the surface as the controller will compute it.
+    // Errors and anchors are measured on the surface as the controller will compute it.
     let probe = append(&section.bytes())?;
     let tree = Tree::<I>::from_bytes(&probe).map_err(BuildError::from)?;
     let shapes = Shapes { modes: Modes::of(&tree)?, tree };
@@ -145,7 +145,7 @@ impl Section {
         Self { modes, ranges, growths, unit, slack: 0.0, position_error, rms_error, anchors }
     }
 
-    /// What the stretch bound has to add, because positions are rounded, those of the anchors too, and
+    /// The slack of the stretch bound: positions are rounded, those of the anchors too, and
     /// so is a point between two anchors.
     fn allow_for_rounding(&mut self, rest: &[Vec3], triangles: &Triangles) {
         let weights = || self.ranges.iter().map(largest);

@@ -126,7 +126,7 @@ fn decompose(displacements: &[Vec<DVec3>]) -> Vec<Vec<DVec3>> {
         .collect()
 }
 
-/// Takes one mode after the other out of the displacements, and looks at what is left.
+/// The errors that remain after each mode is taken out of the displacements.
 fn errors(mut left: Vec<Vec<DVec3>>, modes: &[Vec<DVec3>]) -> Vec<ModalError> {
     (1..)
         .zip(modes)

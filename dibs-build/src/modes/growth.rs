@@ -1,4 +1,4 @@
-//! What the modes do to the triangles' stretch: the constants of the run-time bound, in f64, rounded up.
+//! Growth of the triangles' stretch by the modes: the constants of the run-time bound, in f64, rounded up.
 
 use dibs_nostd::format::PathKind;
 use dibs_nostd::{Index, Tree};

@@ -12,7 +12,7 @@ pub struct QuantisedMode {
 }
 
 impl QuantisedMode {
-    /// What the rounded mode does at weight 1.
+    /// The rounded mode's displacements at weight 1.
     pub fn displacements(&self) -> Vec<DVec3> {
         self.rows.iter().map(|row| DVec3::from(row.map(f64::from)) * self.step).collect()
     }

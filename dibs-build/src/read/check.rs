@@ -65,7 +65,7 @@ pub(crate) fn import(raw: &Raw, format: Format, options: &ReadOptions) -> Result
     Ok(Import { mesh: Mesh { positions: surface.positions, triangles }, report })
 }
 
-/// What an error calls a vertex.
+/// A vertex's name in an error.
 fn vertex_name(vertex: usize, format: Format) -> String {
     match format {
         Format::Obj => format!("vertex {}", vertex + 1),

@@ -10,11 +10,11 @@ use thiserror::Error;
 pub struct ReadError {
     /// The file.
     pub path: PathBuf,
-    /// What is wrong with it.
+    /// The defect.
     pub kind: ReadErrorKind,
 }
 
-/// What is wrong with a file. Faces are counted from 1; vertices are named as the file numbers
+/// A defect of a file. Faces are counted from 1; vertices are named as the file numbers
 /// them: from 1 in OBJ, from 0 elsewhere.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -38,7 +38,7 @@ pub enum ReadErrorKind {
         format: Format,
         /// The line, counted from 1, where the format has lines.
         line: Option<usize>,
-        /// What was found there.
+        /// The text found there.
         what: String,
     },
     /// It ends too early.
@@ -48,7 +48,7 @@ pub enum ReadErrorKind {
     Truncated {
         /// The format as which it was read.
         format: Format,
-        /// What should have followed.
+        /// The missing part.
         missing: String,
     },
     /// A count that the file claims contradicts its size.
@@ -57,7 +57,7 @@ pub enum ReadErrorKind {
         if *.at_most { "room for at most " } else { "" }
     )]
     Count {
-        /// What is counted.
+        /// The counted element.
         element: String,
         /// How many the file claims.
         claimed: u64,

@@ -3,9 +3,9 @@
 use super::{Format, ReadErrorKind};
 use std::borrow::Cow;
 
-/// What a file contains, before any check that needs the whole of it.
+/// The contents of a file, before any check that needs the whole of it.
 pub(crate) struct Raw {
-    /// f64, so that what is lost by rounding to f32 is known, and a coordinate too large for f32 can be told from
+    /// f64, so that the loss by rounding to f32 is known, and a coordinate too large for f32 can be told from
     /// an infinite one.
     pub positions: Vec<[f64; 3]>,
     /// The corners of all polygons, one after the other.

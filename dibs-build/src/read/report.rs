@@ -1,4 +1,4 @@
-//! What reading a mesh found and did.
+//! The counts and warnings of an import.
 
 use serde::Serialize;
 use std::fmt;
@@ -91,7 +91,7 @@ pub struct Report {
 const MOST_SILENT: f64 = 1.0 / 4_194_304.0;
 
 impl Report {
-    /// What a user should know: one sentence for each thing that was changed or is unusual.
+    /// Warnings for a user, a sentence for each change and each oddity.
     pub fn warnings(&self) -> impl Iterator<Item = String> + use<> {
         let mut warnings = Vec::new();
         let mut warn = |count: usize, one: &str, several: &str| match count {

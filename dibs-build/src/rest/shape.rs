@@ -16,7 +16,7 @@ use glam::{DVec3, Vec3};
 /// Height of a triangle over its longest edge below which it is flat.
 const FLAT: f64 = 1.0 / 64.0;
 
-/// What the stretch of a triangle is measured against.
+/// The shape that a triangle's stretch is measured against.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RestShape {
     /// Where its corners are, in the order in which they were given.

@@ -16,11 +16,11 @@ use crate::{Mesh, WriteError, write_atomically};
 pub struct LimitsError {
     /// The file.
     pub path: PathBuf,
-    /// What is wrong with it.
+    /// The defect.
     pub kind: LimitsErrorKind,
 }
 
-/// What is wrong with a file of limits.
+/// A defect of a file of limits.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LimitsErrorKind {
@@ -54,7 +54,7 @@ pub enum LimitsErrorKind {
     Line {
         /// The line, counted from 1.
         line: usize,
-        /// What it says.
+        /// Its text.
         text: String,
     },
 }
@@ -86,7 +86,7 @@ pub fn write_limits(
 /// Reads the limits of a mesh's triangles.
 ///
 /// # Errors
-/// [`LimitsError`] names the file and what is wrong, limits of another mesh among it.
+/// [`LimitsError`] names the file and its defect; limits of another mesh are one.
 pub fn read_limits(path: impl AsRef<Path>, mesh: &Mesh) -> Result<Vec<f32>, LimitsError> {
     let path = path.as_ref();
     let text = std::fs::read_to_string(path).map_err(LimitsErrorKind::from);

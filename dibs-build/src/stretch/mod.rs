@@ -1,4 +1,4 @@
-//! What a recorded motion asks of the stretch limits, and limits of single triangles.
+//! The stretch limits that a recorded motion needs, for all triangles alike or for each.
 
 mod file;
 
@@ -83,7 +83,7 @@ impl MotionStretch {
             let mut worst = Needed { triangle, stretch: 0.0, frame: 0 };
             for (frame, positions) in motion.frames.iter().enumerate() {
                 let stretch = stretch(rest, at(positions), paths);
-                // What is not a number, of a triangle without area, stays.
+                // NaN, of a triangle without area, stays.
                 if !(stretch <= worst.stretch) {
                     worst = Needed { stretch, frame, ..worst };
                 }
@@ -98,7 +98,7 @@ impl MotionStretch {
         Ok(Self { triangles })
     }
 
-    /// What each triangle of the mesh needs.
+    /// The largest stretch of each triangle of the mesh.
     #[must_use]
     pub fn triangles(&self) -> &[Needed] {
         &self.triangles
@@ -141,12 +141,12 @@ impl MotionStretch {
         let all = self.triangles.iter().zip(limits);
         let all = all.map(|(&needed, &limit)| Beyond { needed, limit });
         let worst = all.max_by(|a, b| a.share().total_cmp(&b.share()))?;
-        // Written so that what is not a number is beyond.
+        // NaN counts as beyond.
         if worst.share() <= 1.0 { None } else { Some(worst) }
     }
 }
 
-/// What limits have besides their margin.
+/// Allowance for the rounding of the controller's measurement, beside the margin.
 const ROUNDING: f64 = 1.0001;
 
 /// The stretch of a triangle against its rest shape.
