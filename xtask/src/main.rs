@@ -1,5 +1,6 @@
 //! `cargo xtask`: what needs more than cargo.
 
+mod mutants;
 mod prove;
 mod test;
 
@@ -34,6 +35,7 @@ enum Task {
     #[command(disable_help_flag = true)]
     Profile(Passed),
     Fuzz(nightly::FuzzOptions),
+    Mutants(mutants::Options),
     /// Runs the tests of frames, bus and format under the address and the thread sanitizer.
     Sanitize,
     /// Runs the tests of the frames under Miri, where it is installed.
@@ -48,6 +50,7 @@ fn main() -> ExitCode {
         Task::Guarantees(passed) => prove::run("guarantees", &passed),
         Task::Profile(passed) => prove::run("profile", &passed),
         Task::Fuzz(options) => or_say(nightly::missing(), || nightly::fuzz_by_hand(&options)),
+        Task::Mutants(options) => mutants::whole(&options),
         Task::Sanitize => or_say(nightly::missing(), nightly::sanitize_by_hand),
         Task::Miri => or_say(nightly::miri_missing(), nightly::miri),
     };

@@ -10,7 +10,7 @@ use xtask::steps::{Outcome, Steps};
 use xtask::toolchain::Cross;
 use xtask::workspace;
 
-use crate::prove;
+use crate::{mutants, prove};
 
 /// Runs every check: format, lints, documentation, tests, oldest compiler, the board's build, and a
 /// short demo on the emulated board.
@@ -50,6 +50,7 @@ pub fn test(options: &Options) -> Result<()> {
         }
         Err(error) => steps.run("toolchain for the board", || Err(error)),
     }
+    steps.run("mutants of changed lines", mutants::sample);
     if let Err(error) = checks(options.demo_seconds, &mut steps) {
         steps.run("checks of tests/prove", || Err(error));
     }

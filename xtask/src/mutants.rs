@@ -1,0 +1,123 @@
+//! `cargo xtask mutants`: whether the tests notice a changed operator of the core, by `cargo-mutants`.
+//!
+//! Survivors that are accepted stand in `.cargo/mutants.toml`, each with its reason.
+
+use std::fs;
+use std::process::Command;
+use std::time::Duration;
+
+use anyhow::{Context, Result, bail};
+use xtask::process::{quiet, run};
+use xtask::steps::Outcome;
+use xtask::workspace;
+
+/// Version that the lists of survivors are written for.
+const VERSION: &str = "27.1.0";
+
+/// Folders of the core, and the tests that a mutant of theirs is tried on: few, so that it takes seconds.
+const AREAS: [(&str, &[&str]); 3] = [
+    ("dibs-nostd/src/tool", &["kernels", "query"]),
+    ("dibs-nostd/src/query", &["query", "slack", "wide", "positions", "tracker", "differential"]),
+    ("dibs-nostd/src/tree", &["format", "query"]),
+];
+
+/// What cargo-mutants exits with where mutants survived.
+const SURVIVED: i32 = 2;
+
+/// Mutants that CI tries of the lines that changed: each takes a build of the core and its tests.
+const SAMPLE: usize = 4;
+
+/// Changes operators of the core one by one, and lists the changes that no test notices. The whole core takes
+/// hours; one mutant about a minute.
+#[derive(clap::Args)]
+pub struct Options {
+    /// Only files below this folder.
+    #[arg(long, default_value = "dibs-nostd/src")]
+    below: String,
+    /// Every mutant of these parts only, as `1/20`: the second twentieth.
+    #[arg(long, default_value = "0/1")]
+    shard: String,
+}
+
+/// Tries every mutant of the folders asked for.
+pub fn whole(options: &Options) -> Result<()> {
+    install()?;
+    for (folder, tests) in AREAS {
+        if folder.starts_with(&options.below) || options.below.starts_with(folder) {
+            let below = if folder.len() > options.below.len() { folder } else { &options.below };
+            let filter = format!("{below}/**");
+            run(&mut mutants(&["--file", &filter, "--shard", &options.shard], tests))
+                .with_context(|| format!("mutants of {below} survive: see target/mutants.out"))?;
+        }
+    }
+    Ok(())
+}
+
+/// Tries a few mutants of the lines that changed since `main`, or in the last commit.
+pub fn sample() -> Result<Outcome> {
+    if let Err(error) = install() {
+        return Ok(Outcome::Skipped(format!("no cargo-mutants: {error:#}")));
+    }
+    let Some(changes) = changes() else {
+        return Ok(Outcome::Skipped("no earlier commit to compare with".to_owned()));
+    };
+    let diff = workspace::root().join("target/mutants.diff");
+    fs::write(&diff, changes).with_context(|| format!("cannot write {}", diff.display()))?;
+    let diff = diff.display().to_string();
+    let mut tried = 0;
+    for (folder, tests) in AREAS {
+        let filter = format!("{folder}/**");
+        let changed = ["--file", &filter, "--in-diff", &diff];
+        let mut list = mutants(&[&changed[..], &["--list"]].concat(), &[]);
+        let count = quiet(&mut list, Duration::from_secs(120))?.lines().count();
+        if count > 0 && tried < SAMPLE {
+            let shard = format!("0/{}", count.div_ceil(SAMPLE - tried));
+            let mut trial = mutants(&[&changed[..], &["--shard", &shard]].concat(), tests);
+            let status = trial.status().context("cannot start cargo-mutants")?;
+            match status.code() {
+                Some(0) => (),
+                Some(SURVIVED) => {
+                    bail!("no test notices a mutant of a changed line: see target/mutants.out")
+                }
+                _ => return Ok(Outcome::Skipped(format!("cargo-mutants could not run: {status}"))),
+            }
+            tried += count.min(SAMPLE - tried);
+        }
+    }
+    println!("{tried} mutants of changed lines, all noticed");
+    Ok(Outcome::Passed)
+}
+
+/// `cargo mutants` on the core, with these tests.
+fn mutants(arguments: &[&str], tests: &[&str]) -> Command {
+    let mut cargo = Command::new("cargo");
+    cargo.current_dir(workspace::root());
+    // What is built of others' crates serves the mutants too.
+    cargo.env("CARGO_TARGET_DIR", workspace::root().join("target"));
+    cargo.args(["mutants", "--package", "dibs-nostd", "--output", "target"]).args(arguments);
+    cargo.args(["--", "--package", "dibs-tests"]);
+    tests.iter().for_each(|test| drop(cargo.args(["--test", test])));
+    cargo
+}
+
+/// What changed since the branch left `main`, or in the last commit.
+fn changes() -> Option<String> {
+    let git = |arguments: &[&str]| {
+        let mut git = Command::new("git");
+        quiet(git.args(arguments).current_dir(workspace::root()), Duration::from_secs(20)).ok()
+    };
+    let base = git(&["merge-base", "main", "HEAD"]).unwrap_or_default();
+    let is_ahead = git(&["rev-parse", "HEAD"]).is_some_and(|head| head.trim() != base.trim());
+    let base = if is_ahead && !base.trim().is_empty() { base.trim() } else { "HEAD~1" };
+    git(&["diff", base, "HEAD", "--", "dibs-nostd/src"])
+}
+
+fn install() -> Result<()> {
+    let mut version = Command::new("cargo");
+    if quiet(version.args(["mutants", "--version"]), Duration::from_secs(20)).is_ok() {
+        return Ok(());
+    }
+    let mut cargo = Command::new("cargo");
+    cargo.args(["install", "--quiet", "--locked", "cargo-mutants", "--version", VERSION]);
+    quiet(&mut cargo, Duration::from_secs(600)).map(drop)
+}
