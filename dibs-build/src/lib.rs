@@ -18,6 +18,8 @@ mod components;
 mod construct;
 mod error;
 mod export;
+#[cfg(feature = "stream")]
+pub mod faults;
 pub mod generate;
 mod geodesic;
 mod leaf;
@@ -32,6 +34,8 @@ mod script;
 #[cfg(feature = "stream")]
 pub mod stream;
 mod stretch;
+#[cfg(feature = "stream")]
+pub mod transport;
 mod write;
 
 pub use array::{BuiltTree, ModesSummary, Summary, summarise};

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::mem::take;
 use std::sync::LazyLock;
 
-use dibs_build::stream::faults::{Fault, Injector};
+use dibs_build::faults::{Fault, Injector};
 use dibs_build::stream::{SendError, Sender, Settings, SurfaceOrder};
 use dibs_build::{Builder, Motion, generate};
 use dibs_nostd::glam::Vec3;

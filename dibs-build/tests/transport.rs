@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, UdpSocket};
 use std::time::{Duration, Instant};
 
-use dibs_build::stream::{Line, Target, TargetError, Transport};
+use dibs_build::transport::{Line, Target, TargetError, Transport};
 use dibs_nostd::wire::{Deframer, enframe, framed_bytes};
 
 /// Packets with every byte, with zeros in a row, and of all lengths up to a large one.

@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use dibs_build::stream::{SendError, Sender, Settings, SurfaceOrder, Transport};
+use dibs_build::stream::{SendError, Sender, Settings, SurfaceOrder};
+use dibs_build::transport::Transport;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
     AesCmac, Code, Content, Direction, Encoding, FrameEncoder, FrameId, Freshness, Mac, NoMac,

@@ -1,7 +1,8 @@
 //! The imaging side: sends a moving surface to a controller, over a serial line or a socket.
 //!
 //! ```no_run
-//! use dibs_build::stream::{Sender, Settings, SurfaceOrder, Target};
+//! use dibs_build::stream::{Sender, Settings, SurfaceOrder};
+//! use dibs_build::transport::Target;
 //! # let (heart, motion) = dibs_build::generate::heart(500)?;
 //! # let built = dibs_build::Builder::new().build(&heart)?;
 //!
@@ -17,13 +18,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The bytes are specified in `dibs-nostd`'s `docs/wire.md`. [`faults`] damages what is sent, for tests.
+//! The bytes are specified in `dibs-nostd`'s `docs/wire.md`; [`transport`](crate::transport) carries them, and
+//! [`faults`](crate::faults) damages them, for tests.
 
-pub mod faults;
 mod sender;
-mod target;
-mod transport;
 
 pub use sender::{Prepared, SendError, Sender, Sent, Settings, SurfaceOrder, Totals};
-pub use target::{Target, TargetError};
-pub use transport::{Line, Transport};

@@ -18,10 +18,10 @@ use std::time::Duration;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
     Content, Counters, Encoding, FrameEncoder, FrameId, Freshness, Mac, NoMac, QuantisedBox,
-    Status, WeightsEncoder, encode_heartbeat, is_newer,
+    Status, WeightsEncoder, encode_heartbeat,
 };
 
-use super::Transport;
+use crate::transport::Transport;
 use clock::Clock;
 use frame::{apply, coarsened, packets_of};
 use greeting::Greeting;
@@ -304,40 +304,6 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
             self.take(&packet);
         }
         self.superseded.map_or(Ok(()), |session| Err(SendError::Superseded { session }))
-    }
-
-    /// The frame that the receiver has published, if it has said so in this session.
-    #[must_use]
-    pub fn acknowledged(&self) -> Option<u32> {
-        let published = self.status?.published?;
-        let is_own = published.session == self.settings.session
-            && !is_newer(published.epoch, self.epoch)
-            && is_newer(published.epoch, self.before);
-        is_own.then_some(published.epoch)
-    }
-
-    /// Frames of this session that were sent and not acknowledged yet, nor a later one.
-    #[must_use]
-    pub fn in_flight(&self) -> u32 {
-        self.epoch.wrapping_sub(self.acknowledged().unwrap_or(self.before))
-    }
-
-    /// Number of this run: that of the settings, or a later one that was free.
-    #[must_use]
-    pub const fn session(&self) -> u32 {
-        self.settings.session
-    }
-
-    /// What the receiver reported last.
-    #[must_use]
-    pub const fn status(&self) -> Option<&Status> {
-        self.status.as_ref()
-    }
-
-    /// The receiver's counters, as far as it has reported them.
-    #[must_use]
-    pub const fn counters(&self) -> &Counters {
-        &self.counters
     }
 
     /// What was sent since the start.

@@ -1,12 +1,46 @@
 //! What the sender makes of the receiver's statuses.
 
-use dibs_nostd::wire::{Body, Mac, Packet, StatusReport, encode_hello, is_newer};
+use dibs_nostd::wire::{Body, Counters, Mac, Packet, Status, StatusReport, encode_hello, is_newer};
 
 use super::greeting::Greeting;
 use super::{SendError, Sender};
-use crate::stream::Transport;
+use crate::transport::Transport;
 
 impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
+    /// The frame that the receiver has published, if it has said so in this session.
+    #[must_use]
+    pub fn acknowledged(&self) -> Option<u32> {
+        let published = self.status?.published?;
+        let is_own = published.session == self.settings.session
+            && !is_newer(published.epoch, self.epoch)
+            && is_newer(published.epoch, self.before);
+        is_own.then_some(published.epoch)
+    }
+
+    /// Frames of this session that were sent and not acknowledged yet, nor a later one.
+    #[must_use]
+    pub fn in_flight(&self) -> u32 {
+        self.epoch.wrapping_sub(self.acknowledged().unwrap_or(self.before))
+    }
+
+    /// Number of this run: that of the settings, or a later one that was free.
+    #[must_use]
+    pub const fn session(&self) -> u32 {
+        self.settings.session
+    }
+
+    /// What the receiver reported last.
+    #[must_use]
+    pub const fn status(&self) -> Option<&Status> {
+        self.status.as_ref()
+    }
+
+    /// The receiver's counters, as far as it has reported them.
+    #[must_use]
+    pub const fn counters(&self) -> &Counters {
+        &self.counters
+    }
+
     /// Says hello until the receiver answers, where its challenge is not known, or it is not sure that it
     /// is still the same receiver.
     pub(super) fn greet(&mut self) -> Result<(), SendError> {

@@ -3,8 +3,8 @@
 //! Nothing here knows what a frame holds: vertices or weights, and where they are stored.
 
 use super::Rejection;
+use super::arrivals::{Arrivals, Misplaced, Place};
 use super::health::{BusHealth, FrameName, Trouble};
-use super::runs::{Misplaced, Place, Runs};
 use crate::bus::wire::{
     Begin, Commit, Content, Counters, Event, FrameId, Heartbeat, Mac, Packet, PublishedStatus,
     Status, StreamError, is_newer,
@@ -23,7 +23,7 @@ pub(super) struct Frame {
     begin_checksum: u32,
     /// Sum of the packets' shares so far.
     sum: u32,
-    pub runs: Runs,
+    pub arrivals: Arrivals,
     /// The commit's sequence number and digest, once it has come.
     commit: Option<(u16, u32)>,
     /// All packets have come, and the digest is right.
@@ -190,7 +190,7 @@ impl Collector {
             touched: self.now,
             begin_checksum: packet.checksum,
             sum: share,
-            runs: Runs::new(!matches!(begin.content, Content::Partial { .. })),
+            arrivals: Arrivals::new(!matches!(begin.content, Content::Partial { .. })),
             commit: None,
             is_complete: false,
         };
@@ -232,7 +232,7 @@ impl Collector {
     #[inline]
     pub fn take_rows(&mut self, share: u32, place: Place) -> Result<bool, Rejection> {
         let Some(frame) = &mut self.frame else { return Ok(false) };
-        frame.runs.insert(place);
+        frame.arrivals.insert(place);
         frame.sum = frame.sum.wrapping_add(share);
         frame.touched = self.now;
         self.finish()
@@ -251,7 +251,7 @@ impl Collector {
         match frame.commit {
             Some((known, _)) if known == sequence => return Ok(None),
             Some(_) => return Err(Rejection::Order { sequence }),
-            None if frame.runs.reaches(sequence) => return Err(Rejection::Order { sequence }),
+            None if frame.arrivals.reaches(sequence) => return Err(Rejection::Order { sequence }),
             None => frame.commit = Some((sequence, commit.digest)),
         }
         frame.touched = self.now;
@@ -263,11 +263,11 @@ impl Collector {
     fn finish(&mut self) -> Result<bool, Rejection> {
         let Some(frame) = &mut self.frame else { return Ok(false) };
         let Some((sequence, stated)) = frame.commit else { return Ok(false) };
-        if frame.runs.next() != sequence {
+        if frame.arrivals.next() != sequence {
             return Ok(false);
         }
         let computed = frame.sum;
-        let rows = frame.runs.ready();
+        let rows = frame.arrivals.ready();
         if stated != computed {
             self.frame = None;
             return Err(Rejection::Digest { stated, computed });
@@ -386,7 +386,7 @@ impl Frame {
         if self.commit.is_some_and(|(commit, _)| sequence >= commit) {
             return Err(Rejection::Order { sequence });
         }
-        match self.runs.locate(sequence, rows) {
+        match self.arrivals.locate(sequence, rows) {
             Ok(place) => Ok(Some(place)),
             Err(misplaced) => misplaced.rejection(sequence).map_or(Ok(None), Err),
         }

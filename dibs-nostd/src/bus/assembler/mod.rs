@@ -1,10 +1,10 @@
 //! From packets to published frames: the gate between the bus and what the controller acts on.
 
+mod arrivals;
 mod collector;
 mod health;
 mod packets;
 mod rejection;
-mod runs;
 
 use crate::MAX_COORDINATE;
 use crate::bus::wire::{
@@ -234,14 +234,14 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
         }
         let ready = match frame.begin.content {
             Content::Partial { .. } => {
-                let (is_complete, ready) = (frame.is_complete, frame.runs.ready());
+                let (is_complete, ready) = (frame.is_complete, frame.arrivals.ready());
                 if self.copied < N as u32 {
                     self.copy(work);
                     return Ok(if is_complete { Advance::Pending } else { Advance::Idle });
                 }
                 if is_complete { N as u32 } else { ready }
             }
-            _ => frame.runs.ready(),
+            _ => frame.arrivals.ready(),
         };
         self.check(ready, work)
     }

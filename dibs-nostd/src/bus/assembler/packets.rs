@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use glam::Vec3;
 
-use super::{Assembler, Progress, Rejection, runs};
+use super::{Assembler, Progress, Rejection, arrivals};
 use crate::bus::wire::{
     Begin, Body, Content, Encoding, Mac, Packet, Rows, Vertices, Weights, float_position,
     quantised_row,
@@ -156,7 +156,7 @@ impl<G: Gate, M: Mac, const N: usize> Assembler<'_, G, N, M> {
         &mut self,
         epoch: u32,
         share: u32,
-        place: runs::Place,
+        place: arrivals::Place,
         rows: Range<u32>,
     ) -> Result<Progress, Rejection> {
         self.is_dirty = true;

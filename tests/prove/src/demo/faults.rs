@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use controller::telemetry::Tick;
 use controller::{SILENCE_LIMIT, TICK_RATE};
-use dibs_build::stream::faults::Fault;
+use dibs_build::faults::Fault;
 use dibs_nostd::failsafe::State;
 use serde::Serialize;
 

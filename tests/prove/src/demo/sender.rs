@@ -11,8 +11,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use controller::{MTU, TICK_RATE};
-use dibs_build::stream::faults::{Fault, FaultyLine};
-use dibs_build::stream::{Line, SendError, Sender, Settings, SurfaceOrder};
+use dibs_build::faults::{Fault, FaultyLine};
+use dibs_build::stream::{SendError, Sender, Settings, SurfaceOrder};
+use dibs_build::transport::Line;
 use glam::Vec3;
 
 use super::faults::Plan;

@@ -4,7 +4,7 @@ use std::fmt;
 use std::mem::take;
 
 use anyhow::{Result, anyhow};
-use dibs_build::stream::faults::{Fault, Injector};
+use dibs_build::faults::{Fault, Injector};
 use dibs_nostd::Frames;
 use dibs_nostd::wire::NoMac;
 use fastrand::Rng;

@@ -6,7 +6,7 @@ use std::mem::take;
 use std::path::Path;
 
 use anyhow::{Result, ensure};
-use dibs_build::stream::faults::{Fault, Injector};
+use dibs_build::faults::{Fault, Injector};
 use dibs_nostd::Frames;
 use dibs_nostd::wire::{Event, Mac, NoMac};
 use fastrand::Rng;

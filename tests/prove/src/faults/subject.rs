@@ -8,7 +8,8 @@ use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use dibs_build::stream::{Sender, Settings, SurfaceOrder, Transport};
+use dibs_build::stream::{Sender, Settings, SurfaceOrder};
+use dibs_build::transport::Transport;
 use dibs_build::{Builder, BuiltTree, Mesh};
 use dibs_nostd::format::CRC;
 use dibs_nostd::glam::Vec3;

@@ -4,7 +4,8 @@ use super::interrupt::Interrupt;
 use super::report::{self, Display, Outcome};
 use super::{Args, Recording};
 use anyhow::{Result, anyhow, bail};
-use dibs_build::stream::{Line, SendError, Sender};
+use dibs_build::stream::{SendError, Sender};
+use dibs_build::transport::Line;
 use dibs_nostd::wire::Mac;
 use std::time::{Duration, Instant};
 

@@ -1,6 +1,7 @@
 //! What `dibs stream` shows while it runs, and at the end.
 
-use dibs_build::stream::{Line, Sender, Sent};
+use dibs_build::stream::{Sender, Sent};
+use dibs_build::transport::Line;
 use dibs_nostd::wire::{Content, Counters, Event, Mac};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;

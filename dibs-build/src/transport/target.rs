@@ -20,11 +20,11 @@ const CONNECT: Duration = Duration::from_secs(5);
 /// A receiver's address.
 ///
 /// ```
-/// use dibs_build::stream::Target;
+/// use dibs_build::transport::Target;
 /// let target: Target = "serial:/dev/ttyUSB0@921600".parse()?;
 /// assert_eq!(target.to_string(), "serial:/dev/ttyUSB0@921600");
 /// assert!("ttyUSB0".parse::<Target>().is_err());
-/// # Ok::<(), dibs_build::stream::TargetError>(())
+/// # Ok::<(), dibs_build::transport::TargetError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]

@@ -1,4 +1,4 @@
-//! How packets travel: as datagrams, or as COBS frames on a byte stream.
+//! A serial line or a socket, with a thread that reads.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpStream, UdpSocket};
@@ -14,45 +14,7 @@ use std::os::unix::net::UnixStream;
 use dibs_nostd::wire::{Deframer, MAX_PACKET, enframe, framed_bytes};
 use serial2::SerialPort;
 
-/// What a [`Sender`](super::Sender) sends through.
-///
-/// [`Line`] is the one for serial lines and sockets; a CAN adapter, or a fault injector between sender
-/// and receiver, is another implementation.
-pub trait Transport {
-    /// Sends one packet, whole. May block for as long as the line is busy.
-    ///
-    /// # Errors
-    /// What the operating system says; the connection is then of no use any more.
-    fn send(&mut self, packet: &[u8]) -> io::Result<()>;
-
-    /// The next packet that came back, `None` if none is there. Does not block.
-    ///
-    /// # Errors
-    /// [`ErrorKind::UnexpectedEof`] when the other side has closed the connection.
-    fn receive(&mut self) -> io::Result<Option<Vec<u8>>>;
-}
-
-/// Collects packets: for tests, and for programs that carry them by themselves.
-impl Transport for Vec<Vec<u8>> {
-    fn send(&mut self, packet: &[u8]) -> io::Result<()> {
-        self.push(packet.to_vec());
-        Ok(())
-    }
-
-    fn receive(&mut self) -> io::Result<Option<Vec<u8>>> {
-        Ok(None)
-    }
-}
-
-impl<T: Transport + ?Sized> Transport for Box<T> {
-    fn send(&mut self, packet: &[u8]) -> io::Result<()> {
-        (**self).send(packet)
-    }
-
-    fn receive(&mut self) -> io::Result<Option<Vec<u8>>> {
-        (**self).receive()
-    }
-}
+use super::Transport;
 
 /// A line that takes nothing for this long is stuck: a packet is a fraction of a second even on a slow one.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(10);

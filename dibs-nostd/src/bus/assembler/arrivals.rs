@@ -1,14 +1,14 @@
-//! Which packets of a frame have come, without a mark for each.
+//! Which packets of a frame have arrived, without a mark for each.
 
 use core::ops::Range;
 
-/// Separate runs of sequence numbers that can be noted besides the first: so many places of a frame
-/// can be missing at once.
+/// Contiguous ranges of sequence numbers that can be noted besides the first: a frame can have so many gaps
+/// at once.
 pub(super) const GAPS: usize = 7;
 
-/// The packets that have come: consecutive in sequence, and their rows.
+/// Packets of consecutive sequence numbers, and their rows.
 #[derive(Clone, Copy, Debug)]
-struct Run {
+struct Contig {
     /// Sequence numbers, `from..to`; empty where the place is free.
     from: u16,
     to: u16,
@@ -17,25 +17,25 @@ struct Run {
     end: u32,
 }
 
-impl Run {
+impl Contig {
     const FREE: Self = Self { from: 0, to: 0, first: 0, end: 0 };
 }
 
-/// A frame's packets so far, as runs.
+/// A frame's packets so far, as contiguous ranges.
 ///
 /// # Why this proves completeness
 ///
-/// Rows are in the order of the sequence. Each run holds consecutive sequence numbers, and the rows of
-/// a packet were compared with those of its neighbours in the run when it was joined to them: in an
-/// exact frame they follow each other without a gap, in any frame without an overlap. So once the
-/// first run, which begins at sequence 1 and row 0, reaches the commit, and its rows the last row, every
-/// row was in exactly one packet; whatever a sender makes up, it cannot have skipped one.
+/// Rows are in the order of the sequence. Each range holds consecutive sequence numbers, and a packet's rows
+/// were compared with its neighbours' when it joined the range: in an exact frame they follow each other
+/// without a gap, in any frame without an overlap. So once the first range, which begins at sequence 1 and
+/// row 0, reaches the commit, and its rows the last row, every row was in exactly one packet. No sender can
+/// have skipped one, whatever it makes up.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Runs {
+pub(super) struct Arrivals {
     /// From the frame's first packet on.
-    prefix: Run,
+    prefix: Contig,
     /// The others, in no order.
-    islands: [Run; GAPS],
+    others: [Contig; GAPS],
     /// How many of these are in use.
     used: u8,
     /// Rows must follow each other without a gap.
@@ -58,7 +58,7 @@ pub(super) enum Misplaced {
 pub(super) struct Place {
     sequence: u16,
     rows: Range32,
-    /// Places of the runs that end before it and begin after it.
+    /// Places of the ranges that end before it and begin after it.
     before: Option<usize>,
     after: Option<usize>,
     free: usize,
@@ -71,29 +71,29 @@ struct Range32 {
     end: u32,
 }
 
-/// Stands for the first run among the islands' places.
+/// The first range's place: after the others'.
 const PREFIX: usize = GAPS;
 
-impl Runs {
-    /// Nothing has come. In an exact frame every row comes.
+impl Arrivals {
+    /// Nothing has arrived. In an exact frame every row must.
     pub const fn new(is_exact: bool) -> Self {
-        let prefix = Run { from: 1, to: 1, first: 0, end: 0 };
-        Self { prefix, islands: [Run::FREE; GAPS], used: 0, is_exact }
+        let prefix = Contig { from: 1, to: 1, first: 0, end: 0 };
+        Self { prefix, others: [Contig::FREE; GAPS], used: 0, is_exact }
     }
 
-    /// The next sequence number of the first run.
+    /// The next sequence number of the first range.
     pub const fn next(&self) -> u16 {
         self.prefix.to
     }
 
-    /// Rows below this one will not change any more: those of the first run, and what it left out.
+    /// Rows below this one are final: the first range's, and those that it leaves out.
     pub const fn ready(&self) -> u32 {
         self.prefix.end
     }
 
     /// Whether a packet with this sequence number or a later one has come.
     pub fn reaches(&self, sequence: u16) -> bool {
-        self.prefix.to > sequence || self.islands.iter().any(|run| run.to > sequence)
+        self.prefix.to > sequence || self.others.iter().any(|range| range.to > sequence)
     }
 
     /// Where a packet belongs, if it does. O(1) in order, O([`GAPS`]) otherwise.
@@ -106,36 +106,36 @@ impl Runs {
             place.free = 0;
             return Ok(place);
         }
-        for (at, run) in self.islands.iter().enumerate() {
-            if run.from == run.to {
+        for (at, range) in self.others.iter().enumerate() {
+            if range.from == range.to {
                 place.free = at;
             } else {
-                self.meet(run, at, &mut place)?;
+                self.meet(range, at, &mut place)?;
             }
         }
         let is_alone = place.before.is_none() && place.after.is_none();
         if is_alone && place.free == GAPS { Err(Misplaced::Gaps) } else { Ok(place) }
     }
 
-    /// Holds a packet against one run.
+    /// Compares a packet with one range.
     #[inline]
-    fn meet(&self, run: &Run, at: usize, place: &mut Place) -> Result<(), Misplaced> {
+    fn meet(&self, range: &Contig, at: usize, place: &mut Place) -> Result<(), Misplaced> {
         let Place { sequence, rows, .. } = *place;
-        let fits = if run.to <= sequence {
-            if run.to == sequence {
+        let fits = if range.to <= sequence {
+            if range.to == sequence {
                 place.before = Some(at);
             }
-            if self.is_exact && run.to == sequence {
-                run.end == rows.first
+            if self.is_exact && range.to == sequence {
+                range.end == rows.first
             } else {
-                run.end <= rows.first
+                range.end <= rows.first
             }
-        } else if sequence < run.from {
-            let touches = sequence.checked_add(1) == Some(run.from);
+        } else if sequence < range.from {
+            let touches = sequence.checked_add(1) == Some(range.from);
             if touches {
                 place.after = Some(at);
             }
-            if self.is_exact && touches { rows.end == run.first } else { rows.end <= run.first }
+            if self.is_exact && touches { rows.end == range.first } else { rows.end <= range.first }
         } else {
             return Err(Misplaced::Duplicate);
         };
@@ -149,34 +149,34 @@ impl Runs {
         let to = sequence.saturating_add(1);
         match (before, after) {
             (None, None) => {
-                if let Some(run) = self.islands.get_mut(free) {
-                    *run = Run { from: sequence, to, first: rows.first, end: rows.end };
+                if let Some(range) = self.others.get_mut(free) {
+                    *range = Contig { from: sequence, to, first: rows.first, end: rows.end };
                     self.used = self.used.saturating_add(1);
                 }
             }
             (Some(before), None) => {
-                if let Some(run) = self.run_mut(before) {
-                    (run.to, run.end) = (to, rows.end);
+                if let Some(range) = self.range_mut(before) {
+                    (range.to, range.end) = (to, rows.end);
                 }
             }
             (None, Some(after)) => {
-                if let Some(run) = self.run_mut(after) {
-                    (run.from, run.first) = (sequence, rows.first);
+                if let Some(range) = self.range_mut(after) {
+                    (range.from, range.first) = (sequence, rows.first);
                 }
             }
             (Some(before), Some(after)) => {
-                // The first run comes before all others, so what is joined to another is an island.
-                let Some(island) = self.islands.get_mut(after) else { return };
-                let Run { to, end, .. } = core::mem::replace(island, Run::FREE);
+                // The first range begins before all others, so it is never the one after a packet.
+                let Some(other) = self.others.get_mut(after) else { return };
+                let Contig { to, end, .. } = core::mem::replace(other, Contig::FREE);
                 self.used = self.used.saturating_sub(1);
-                if let Some(run) = self.run_mut(before) {
-                    (run.to, run.end) = (to, end);
+                if let Some(range) = self.range_mut(before) {
+                    (range.to, range.end) = (to, end);
                 }
             }
         }
     }
 
-    fn run_mut(&mut self, at: usize) -> Option<&mut Run> {
-        if at == PREFIX { Some(&mut self.prefix) } else { self.islands.get_mut(at) }
+    fn range_mut(&mut self, at: usize) -> Option<&mut Contig> {
+        if at == PREFIX { Some(&mut self.prefix) } else { self.others.get_mut(at) }
     }
 }

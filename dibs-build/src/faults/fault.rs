@@ -1,0 +1,105 @@
+//! The kinds of faults.
+
+/// What can go wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Fault {
+    /// One bit is flipped.
+    FlipOne,
+    /// Two bits are flipped.
+    FlipTwo,
+    /// A run of up to 64 bits is overwritten.
+    Burst,
+    /// The packet is lost.
+    Drop,
+    /// The packet comes twice.
+    Duplicate,
+    /// The packet comes after up to four of its successors.
+    Reorder,
+    /// The end of the packet is missing.
+    Truncate,
+    /// Bytes in the middle are missing; on a stream, the mark between two packets too.
+    Overrun,
+    /// The packet has an earlier epoch. Sealed.
+    StaleEpoch,
+    /// A packet, or all packets, of an earlier frame come again, as they were.
+    Replay,
+    /// The packet has another mesh id. Sealed.
+    WrongMesh,
+    /// Vertices beyond the surface. Sealed.
+    OutOfRange,
+    /// A position, or the quantisation box, is infinite or not a number. Sealed.
+    NotFinite,
+    /// A position, or the quantisation box, is farther out than any surface. Sealed.
+    TooFar,
+    /// A vertex is far from its neighbours, and the frame's digest is made to confirm it. Sealed.
+    Stretch,
+    /// The tag or what it covers is changed. Sealed. Only where packets carry tags.
+    Forgery,
+    /// The sender starts anew in the middle of a frame.
+    SenderRestart,
+    /// The receiver starts anew in the middle of a frame.
+    ReceiverRestart,
+}
+
+impl Fault {
+    /// Every fault.
+    pub const ALL: [Self; 18] = [
+        Self::FlipOne,
+        Self::FlipTwo,
+        Self::Burst,
+        Self::Drop,
+        Self::Duplicate,
+        Self::Reorder,
+        Self::Truncate,
+        Self::Overrun,
+        Self::StaleEpoch,
+        Self::Replay,
+        Self::WrongMesh,
+        Self::OutOfRange,
+        Self::NotFinite,
+        Self::TooFar,
+        Self::Stretch,
+        Self::Forgery,
+        Self::SenderRestart,
+        Self::ReceiverRestart,
+    ];
+
+    /// A short name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::FlipOne => "bit flip (1)",
+            Self::FlipTwo => "bit flip (2)",
+            Self::Burst => "burst",
+            Self::Drop => "drop",
+            Self::Duplicate => "duplicate",
+            Self::Reorder => "reorder",
+            Self::Truncate => "truncate",
+            Self::Overrun => "overrun",
+            Self::StaleEpoch => "stale epoch",
+            Self::Replay => "replay",
+            Self::WrongMesh => "wrong mesh id",
+            Self::OutOfRange => "index out of range",
+            Self::NotFinite => "NaN or infinity",
+            Self::TooFar => "out of box",
+            Self::Stretch => "stretch violation",
+            Self::Forgery => "forged MAC",
+            Self::SenderRestart => "sender restart",
+            Self::ReceiverRestart => "receiver restart",
+        }
+    }
+
+    /// Whether the fault is damage to bytes, which a line can also do to what is around the packet:
+    /// [`Injector::damage`](super::Injector::damage).
+    #[must_use]
+    pub const fn is_damage(self) -> bool {
+        matches!(self, Self::FlipOne | Self::FlipTwo | Self::Burst | Self::Truncate | Self::Overrun)
+    }
+
+    /// Whether a program starts anew: not for an injector to do.
+    #[must_use]
+    pub const fn is_restart(self) -> bool {
+        matches!(self, Self::SenderRestart | Self::ReceiverRestart)
+    }
+}
