@@ -1,10 +1,10 @@
 //! How much longer a crate takes to compile for the tree that it includes, and a build script for its tree.
 //!
 //! `cargo bench -p dibs-tests --bench compile_time -- --write` writes `docs/compile-time.md`. The times are those of
-//! the machine that runs it; nothing asserts them.
+//! the machine that runs it; nothing asserts them. `DIBS_FOLDER` keeps the compiled dependencies for the next run.
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 use std::{env, fs};
@@ -15,8 +15,10 @@ use dibs_build::{Builder, BuiltTree, generate};
 const REPEATS: usize = 5;
 
 fn main() -> Result<()> {
-    let folder = tempfile::tempdir()?;
-    let empty = Crate::new(folder.path(), "empty", None)?;
+    let temporary = tempfile::tempdir()?;
+    let folder = env::var_os("DIBS_FOLDER").map(PathBuf::from);
+    let folder = folder.as_deref().unwrap_or(temporary.path());
+    let empty = Crate::new(folder, "empty", None)?;
     let mut rows = String::new();
     let [check, release] = empty.times()?;
     row(&mut rows, "without a tree", 0, [check, release]);
@@ -27,7 +29,7 @@ fn main() -> Result<()> {
         let built = Builder::new().build(&generate::heart(triangles)?.0)?;
         eprintln!("{triangles} triangles built in {:.1} s", start.elapsed().as_secs_f64());
         let name = format!("{triangles} triangles");
-        let times = Crate::new(folder.path(), &format!("t{triangles}"), Some(&built))?.times()?;
+        let times = Crate::new(folder, &format!("t{triangles}"), Some(&built))?.times()?;
         row(&mut rows, &name, built.blob().len(), times);
     }
     let page = page(&rows);
@@ -57,7 +59,7 @@ fn page(rows: &str) -> String {
 }
 
 /// A crate outside the workspace.
-struct Crate(std::path::PathBuf);
+struct Crate(PathBuf);
 
 impl Crate {
     fn new(folder: &Path, name: &str, tree: Option<&BuiltTree>) -> Result<Self> {
