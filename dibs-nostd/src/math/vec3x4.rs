@@ -2,7 +2,6 @@
 
 use glam::{Mat4, Vec3, Vec4};
 
-use crate::VertexTable;
 use crate::math::sqrt::sqrt;
 
 /// Four points or vectors. Each operation rounds as that of [`Vec3`] does.
@@ -14,11 +13,11 @@ pub struct Vec3x4 {
 }
 
 impl Vec3x4 {
-    /// The positions in four rows; `None` if one is outside the table.
+    /// The positions in four rows of a table; `None` if one is outside.
     #[inline(always)]
-    pub fn of<V: VertexTable + ?Sized>(vertices: &V, [a, b, c, d]: [u32; 4]) -> Option<Self> {
-        let (a, b) = (vertices.position(a)?, vertices.position(b)?);
-        let (c, d) = (vertices.position(c)?, vertices.position(d)?);
+    pub fn of(table: impl Fn(u32) -> Option<Vec3>, [a, b, c, d]: [u32; 4]) -> Option<Self> {
+        let (a, b) = (table(a)?, table(b)?);
+        let (c, d) = (table(c)?, table(d)?);
         // By fewer loads than coordinate by coordinate.
         let columns = [a, b, c, d].map(|position| position.extend(0.0));
         let [a, b, c, d] = columns;

@@ -136,7 +136,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
         let mut least = Vec4::INFINITY;
         for (nodes, squared) in blocks().zip(squares.iter_mut()) {
             let pins = four_nodes::<I>(nodes)?.map(|node| node.pin);
-            let to = tool.axis_to_four(&Vec3x4::of(vertices, pins)?);
+            let to = tool.axis_to_four(&Vec3x4::of(|row| vertices.position(row), pins)?);
             *squared = to.dot(to);
             least = Vec4::select(squared.cmplt(least), *squared, least);
         }

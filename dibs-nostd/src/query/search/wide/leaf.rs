@@ -57,7 +57,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         self.left.node_tests = left;
         while count > 0 {
             let [a, b, c] = tree.four_triangles(first, count).ok_or(corrupt)?;
-            let corners = |rows| Vec3x4::of(vertices, rows).ok_or(corrupt);
+            let corners = |rows| Vec3x4::of(|row| vertices.position(row), rows).ok_or(corrupt);
             let within = self.within_own_planes(corners(a)?, corners(b)?, corners(c)?);
             let mut within = u64::from(within) & !(u64::MAX << count);
             while let Some(at) = next(&mut within) {
@@ -115,10 +115,14 @@ impl Plane {
     ) -> Option<u32> {
         let (normal, limit) = (Vec3x4::splat(self.normal), Vec4::splat(self.limit));
         let [a, b, c, d, e, f, g, h, i, j, k, l] = tree.leaf_vertices(first, count)?;
-        let (one, two) = (Vec3x4::of(vertices, [a, b, c, d])?, Vec3x4::of(vertices, [e, f, g, h])?);
+        let (one, two) = (
+            Vec3x4::of(|row| vertices.position(row), [a, b, c, d])?,
+            Vec3x4::of(|row| vertices.position(row), [e, f, g, h])?,
+        );
         let mut set = within(normal, limit, one) | within(normal, limit, two) << 4;
         if count > 6 {
-            set |= within(normal, limit, Vec3x4::of(vertices, [i, j, k, l])?) << 8;
+            set |=
+                within(normal, limit, Vec3x4::of(|row| vertices.position(row), [i, j, k, l])?) << 8;
         }
         Some(set & !(u32::MAX << (count + 2)))
     }
