@@ -6,9 +6,11 @@ use bytemuck::Zeroable;
 use dibs_nostd::constraint::{ForbiddenRegion, GainError, SpringDamper};
 use dibs_nostd::failsafe::{FailSafe, LimitError, Limits, Observation, Watch};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Capsule, FrameAge, Options, Proximity, QueryError, Tool, Unavailable};
+use dibs_nostd::{
+    Budget, Capsule, Cost, FrameAge, Options, Proximity, QueryError, Tool, Unavailable,
+};
 
-use crate::surface;
+use crate::surface::{self, TREE};
 use crate::telemetry::{Tick, cause_code};
 use crate::{BusStatus, TICK_RATE, instrument};
 
@@ -40,6 +42,16 @@ const TISSUE_SPEED: f32 = 0.001;
 
 /// Frames in a row that recover. Nobody is here to acknowledge: a real robot leaves `automatic` out.
 const RECOVERY_FRAMES: u16 = 1;
+
+/// The most that a query may do: more than the heart's takes, and no surface that is admitted makes it take longer than
+/// a tick.
+const BUDGET: Budget = Budget { node_tests: 1_800, triangle_tests: 150 };
+
+/// Instructions in a tick of 1 ms at 480 MHz, if each takes a cycle.
+const TICK_INSTRUCTIONS: u64 = 480_000;
+
+// What is left is for the rest of the tick: some thousand instructions.
+const _: () = assert!(Cost::M7_CAPSULE.instructions(BUDGET) < TICK_INSTRUCTIONS);
 
 /// Stiffness (N/mm), damping (N s/mm), largest force (N) and margin (mm) of the constraint.
 const STIFFNESS: f32 = 1.0;
@@ -114,7 +126,7 @@ impl Control {
                 Err(Unavailable::Query(error)) => Some(error),
                 _ => None,
             },
-            has_rotted: self.bus.has_rotted(),
+            has_rotted: self.bus.has_rotted() || self.query.tree().check(TREE.bytes()).is_err(),
         });
         self.bus.set_state(verdict.state);
         let admitted = answer.and_then(|closest| verdict.admit(closest));
@@ -160,7 +172,7 @@ impl Control {
         record.age = age.map_or(u32::MAX, |age| age.age);
         record.position_error = label.position_error;
 
-        let mut options = Options::new().warm_start(self.warm_start);
+        let mut options = Options::new().budget(BUDGET).warm_start(self.warm_start);
         if let Some(measured) = label.stretch {
             options = options.stretch(measured);
         }

@@ -21,6 +21,33 @@ pub(crate) struct Header {
     pub checksum: u32,
 }
 
+impl Header {
+    /// Checks that these values are still those of the bytes that they were read from.
+    pub fn check(&self, bytes: &[u8]) -> Result<(), FormatError> {
+        for (offset, value) in [
+            (at::MESH_ID, self.mesh_id),
+            (at::VERTICES, self.vertices),
+            (at::TRIANGLES, self.triangles),
+            (at::NODES, self.nodes),
+            (at::STACK, self.stack),
+            (at::STRETCH, self.stretch.to_bits()),
+            (at::RADIUS_UNIT, self.radius_unit.to_bits()),
+            (at::POSITION_ERROR, self.position_error.to_bits()),
+            (at::SECTIONS, self.sections),
+            (at::CHECKSUM, self.checksum),
+        ] {
+            if u32_at(bytes, offset) != Some(value) {
+                return Err(FormatError::Field { offset: offset as u8, value });
+            }
+        }
+        let paths = self.paths.code();
+        if bytes.get(at::PATHS) != Some(&paths) {
+            return Err(FormatError::Field { offset: at::PATHS as u8, value: paths.into() });
+        }
+        Ok(())
+    }
+}
+
 /// A header field that every builder writes and this read cannot miss, since the length was checked.
 const fn field(bytes: &[u8], offset: usize) -> Result<u32, FormatError> {
     match u32_at(bytes, offset) {

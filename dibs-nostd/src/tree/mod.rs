@@ -63,6 +63,19 @@ impl<'a, I: Index> Tree<'a, I> {
         Ok(Self { sections, header, width: PhantomData })
     }
 
+    /// Checks that what a query uses besides the bytes, the header and the places of the sections as they were
+    /// decoded, is still what the bytes say. The view itself lies in RAM, of which a [`Scrub`] sees nothing: check
+    /// that of a [`Query`](crate::Query), `query.tree()`, once a tick or as often as the scrub makes a round.
+    ///
+    /// Cost: some hundred instructions, whatever the size of the tree.
+    ///
+    /// # Errors
+    /// [`FormatError::Field`] or [`FormatError::Section`] name what has changed.
+    pub fn check(&self, bytes: &[u8]) -> Result<(), FormatError> {
+        self.header.check(bytes)?;
+        self.sections.check::<I>(bytes, &self.header)
+    }
+
     /// The same tree on a copy of its bytes, say in tightly coupled memory, without validating them
     /// again. The header's values stay those that were validated.
     ///

@@ -144,6 +144,58 @@ mod tests {
         }
     }
 
+    /// Every bit of what was decoded from the header, and every place of a section.
+    #[test]
+    fn every_flipped_bit_of_the_decoded_header_is_found() {
+        let (mesh, _) = dibs_build::generate::heart(320).expect("a valid size");
+        let built = dibs_build::Builder::new().build(&mesh).expect("a valid mesh");
+        let bytes = built.blob();
+        let sound = crate::Tree::<u16>::from_bytes(bytes).expect("a valid tree");
+        assert_eq!(sound.check(bytes), Ok(()));
+        let flip = |value: f32, bit| f32::from_bits(value.to_bits() ^ bit);
+        let mut flips = 0;
+        for bit in (0..32).map(|shift| 1_u32 << shift) {
+            for field in 0..10 {
+                let mut tree = sound;
+                let header = &mut tree.header;
+                match field {
+                    0 => header.mesh_id ^= bit,
+                    1 => header.vertices ^= bit,
+                    2 => header.triangles ^= bit,
+                    3 => header.nodes ^= bit,
+                    4 => header.stack ^= bit,
+                    5 => header.stretch = flip(header.stretch, bit),
+                    6 => header.radius_unit = flip(header.radius_unit, bit),
+                    7 => header.position_error = flip(header.position_error, bit),
+                    8 => header.sections ^= bit,
+                    _ => header.checksum ^= bit,
+                }
+                assert!(tree.check(bytes).is_err(), "field {field}, bit {bit:x}");
+                flips += 1;
+            }
+        }
+        assert_eq!(flips, 320);
+        let mut other = sound;
+        other.header.paths = crate::format::PathKind::EdgePath;
+        assert!(other.check(bytes).is_err());
+        let shorter = |part: &mut &[u8]| {
+            *part = part.get(1..).unwrap_or_default();
+        };
+        for section in 0..4 {
+            let mut tree = sound;
+            match section {
+                0 => shorter(&mut tree.sections.nodes),
+                1 => shorter(&mut tree.sections.triangles),
+                2 => shorter(&mut tree.sections.rest),
+                _ => shorter(&mut tree.sections.metric),
+            }
+            assert!(tree.check(bytes).is_err(), "section {section}");
+        }
+        // The same bytes elsewhere are another place.
+        let copy: Vec<u8> = bytes.into();
+        assert!(sound.check(&copy).is_err());
+    }
+
     #[test]
     fn bytes_too_short_for_a_header_are_rot() {
         for length in [0, 1, 59, 62, 63] {

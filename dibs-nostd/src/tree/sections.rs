@@ -114,6 +114,26 @@ pub(crate) const fn find<'a, I: Index>(
 }
 
 impl Sections<'_> {
+    /// Checks that each section is still where the bytes have it.
+    pub fn check<I: Index>(&self, bytes: &[u8], header: &Header) -> Result<(), FormatError> {
+        let found = find::<I>(bytes, header)?;
+        for (kind, here, there) in [
+            (section::NODES, self.nodes, found.nodes),
+            (section::TRIANGLES, self.triangles, found.triangles),
+            (section::VERTEX_ORDER, self.order, found.order),
+            (section::REST, self.rest, found.rest),
+            (section::METRIC, self.metric, found.metric),
+            (section::LIMITS, self.limits, found.limits),
+            (section::MODES, self.modes, found.modes),
+        ] {
+            let is_elsewhere = !here.is_empty() && !core::ptr::eq(here, there);
+            if here.len() != there.len() || is_elsewhere {
+                return Err(FormatError::Section { kind });
+            }
+        }
+        Ok(())
+    }
+
     /// Whether each section is as long as its counterpart.
     pub const fn matches(&self, other: &Sections<'_>) -> bool {
         self.nodes.len() == other.nodes.len()
