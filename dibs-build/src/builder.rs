@@ -42,6 +42,7 @@ pub struct Builder<'p> {
     with_order: bool,
     with_rest: bool,
     with_metric: bool,
+    with_adjacency: bool,
     progress: &'p (dyn Fn(usize) + Sync),
 }
 
@@ -77,6 +78,7 @@ impl<'p> Builder<'p> {
             with_order: true,
             with_rest: true,
             with_metric: true,
+            with_adjacency: true,
             progress: &|_| (),
         }
     }
@@ -149,6 +151,15 @@ impl<'p> Builder<'p> {
         self
     }
 
+    /// Whether the tree knows its triangles' neighbours (6 or 12 bytes a triangle), which a query needs to tell on
+    /// which side of the surface a tool is. A surface without sides (an edge of more than two triangles, or of two
+    /// that are wound against each other) has none in any case.
+    #[must_use]
+    pub fn with_adjacency(mut self, with: bool) -> Self {
+        self.with_adjacency = with;
+        self
+    }
+
     /// Calls back with the number of triangles done, from whichever thread did them.
     #[must_use]
     pub fn progress<'q>(self, report: &'q (dyn Fn(usize) + Sync)) -> Builder<'q>
@@ -205,6 +216,7 @@ impl<'p> Builder<'p> {
             with_order: self.with_order,
             with_rest: self.with_rest,
             with_metric: self.with_metric,
+            with_adjacency: self.with_adjacency,
         };
         let (bytes, order) = flatten::<I>(mesh, &root, facts)?;
         Ok(BuiltTree::new::<I>(bytes, order))

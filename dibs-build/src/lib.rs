@@ -26,6 +26,7 @@ mod leaf;
 mod mesh;
 #[cfg(feature = "modes")]
 pub mod modes;
+mod orient;
 mod pc2;
 mod read;
 mod rest;
@@ -43,6 +44,7 @@ pub use builder::{Builder, IndexWidth};
 pub use construct::Construction;
 pub use error::BuildError;
 pub use mesh::{Mesh, Motion, RestSurface};
+pub use orient::{WindingError, check_winding, orient};
 pub use pc2::MotionMismatch;
 pub use read::{Format, Import, ReadError, ReadErrorKind, ReadOptions, Report, read};
 pub use rest::Paths;

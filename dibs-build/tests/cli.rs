@@ -143,7 +143,7 @@ fn bad_input_is_one_sentence_and_no_output() {
         let error = fails(folder, &format!("query ok.dibs --tool sphere:0,0,5,1 {line}"));
         assert!(error.contains(part), "{line}: {error}");
     }
-    let rest = json(folder, "query ok.dibs --tool sphere:1,1,-5,1 --json");
+    let rest = json(folder, "query ok.dibs --tool sphere:1,1,5,1 --json");
     assert!((rest["separation"].as_f64().unwrap() - 4.0).abs() < 1e-5, "{rest}");
     assert!(distance(vector(&rest["point_on_surface"]), [1.0, 1.0, 0.0]) < 1e-5, "{rest}");
 }
@@ -501,4 +501,73 @@ fn a_tracked_path_is_answered_as_whole_queries_are() {
     std::fs::write(folder.join("bad.csv"), "sphere:1,2,3,4\nsphere:1,2\n").unwrap();
     let error = fails(folder, "track heart.dibs --motion heart.pc2 --path bad.csv");
     assert!(error.starts_with("bad.csv, line 2: "), "{error}");
+}
+
+/// Signed separation, sides, contacts, a chain and a scene; and winding that has no sides is said and mended.
+#[test]
+fn sides_contacts_chains_and_scenes() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+    let points =
+        "v -9 -9 0\nv 9 -9 0\nv 9 9 0\nv -9 9 0\nv -9 -9 18\nv 9 -9 18\nv 9 9 18\nv -9 9 18\n";
+    let faces = ["1 4 3 2", "5 6 7 8", "1 2 6 5", "2 3 7 6", "3 4 8 7", "4 1 5 8"];
+    let obj = |faces: &[String]| format!("{points}f {}\n", faces.join("\nf "));
+    let turned = |face: &str| face.split(' ').rev().collect::<Vec<_>>().join(" ");
+    write("box.obj", &obj(&faces.map(String::from)));
+    write("inward.obj", &obj(&faces.map(turned)));
+    let mut mixed = faces.map(String::from);
+    mixed[2] = turned(faces[2]);
+    write("mixed.obj", &obj(&mixed));
+    succeeds(folder, "build box.obj -o box.dibs");
+    let ask = |tool: &str| json(folder, &format!("query box.dibs --tool {tool} --json"));
+    for (tool, side, separation) in [
+        ("sphere:1,2,24,2", "outside", 4.0),
+        ("sphere:1,2,19,2", "outside", -1.0),
+        ("sphere:1,2,15,2", "inside", -5.0),
+        ("capsule:1,2,15,1,2,40,2", "crossing", -5.0),
+        ("sphere:1,2,18,2", "undefined", -2.0),
+    ] {
+        let answer = ask(tool);
+        assert_eq!(answer["side"], side, "{answer}");
+        assert!((answer["separation"].as_f64().unwrap() - separation).abs() < 1e-3, "{answer}");
+        assert_eq!(answer["side_reason"].is_string(), side == "undefined", "{answer}");
+        assert!(vector(&answer["direction"])[2] > 0.99, "{answer}");
+        assert!(answer.get("contacts").is_none());
+    }
+    // The inner side of a corner of two walls, from outside: the box's edge; and two tools on two boxes.
+    write("far.obj", &obj(&faces.map(String::from)).replace("v -9", "v 31").replace("v 9", "v 49"));
+    succeeds(folder, "build far.obj -o far.dibs");
+    let line =
+        "query box.dibs far.dibs --tool sphere:0,0,21,1 --tool capsule:20,0,9,27.5,0,9,1 --json";
+    let scene = json(folder, &format!("{line} --contacts 5"));
+    assert_eq!((&scene["tree"], &scene["tool"]), (&"box.dibs".into(), &0.into()), "{scene}");
+    let contacts = scene["contacts"].as_array().unwrap();
+    let found: Vec<f64> = contacts.iter().map(|c| c["separation"].as_f64().unwrap()).collect();
+    assert!(
+        found.len() == 2 && (found[0] - 2.0).abs() < 1e-3 && (found[1] - 2.5).abs() < 1e-3,
+        "{scene}"
+    );
+    assert!(contacts.iter().any(|c| c["tree"] == "far.dibs" && vector(&c["normal"])[0] < -0.99));
+    assert!(contacts.iter().all(|c| c["triangle"].as_array().unwrap().len() == 3));
+    let error = fails(folder, &format!("{line} --vertices box.obj"));
+    assert!(error.contains("once for each"), "{error}");
+
+    let warns = |line: &str| {
+        let built = json(folder, &format!("build {line} --json"));
+        let warnings = built["warnings"].as_array().unwrap().iter();
+        let all = warnings.map(|w| w.as_str().unwrap().to_owned()).collect::<Vec<_>>().join("\n");
+        (all, built)
+    };
+    assert!(warns("inward.obj -o inward.dibs").0.contains("faces inwards"));
+    let (warnings, built) = warns("mixed.obj -o mixed.dibs");
+    assert!(warnings.contains("wound against each other") && warnings.contains("--orient"));
+    assert_eq!(built["tree"]["adjacency_bytes"], 0);
+    for (name, turned) in [("inward", 12), ("mixed", 2), ("box", 0)] {
+        let (warnings, built) = warns(&format!("{name}.obj -o {name}.dibs --orient"));
+        assert!(!warnings.contains("wound") && !warnings.contains("inwards"), "{warnings}");
+        assert_eq!(built["turned"], turned);
+        let answer = json(folder, &format!("query {name}.dibs --tool sphere:1,2,15,2 --json"));
+        assert_eq!(answer["side"], "inside", "{name}: {answer}");
+    }
 }

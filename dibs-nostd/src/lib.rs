@@ -68,7 +68,10 @@ mod unavailable;
 pub use bus::wire;
 pub use bus::{Advance, Assembler, BusHealth, LastHeartbeat, Progress, Rejection};
 pub use control::{constraint, failsafe};
-pub use query::{Budget, Cost, Fallback, Options, Proximity, Query, Tracked, Tracker};
+pub use query::{
+    Budget, Contact, Contacts, Cost, Fallback, NoSide, Options, Proximity, Query, Side, Tracked,
+    Tracker,
+};
 pub use stretch::{
     Arriving, Changed, Gate, Limits, StretchError, StretchMonitor, Unchecked, Verdict,
     measure_stretch,

@@ -94,7 +94,7 @@ fn ask(
         let most = 3 * tree.node_count() + tree.triangle_count();
         assert!(answer.node_tests <= budget.node_tests.min(most) + 1);
         assert!(answer.triangle_tests <= budget.triangle_tests.min(tree.triangle_count() + 1));
-        assert!(answer.lower >= 0.0 && answer.lower <= answer.separation);
+        assert!(answer.lower >= -tool.radius() && answer.lower <= answer.separation);
         assert!(answer.separation.is_finite() && answer.accuracy > 0.0);
         assert!(answer.corners.iter().all(|&corner| corner < tree.vertex_count()));
     }

@@ -39,7 +39,7 @@ fn scene(options: Options) -> Scene {
 }
 
 fn cold() -> Scene {
-    scene(Options::new())
+    scene(Options::new().unsigned())
 }
 
 fn warm() -> Scene {
@@ -50,7 +50,7 @@ fn warm() -> Scene {
 }
 
 fn nodes_only() -> Scene {
-    scene(Options::new().budget(Budget { node_tests: 64, triangle_tests: 0 }))
+    scene(Options::new().unsigned().budget(Budget { node_tests: 64, triangle_tests: 0 }))
 }
 
 fn sphere() -> Sphere {

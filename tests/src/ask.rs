@@ -4,7 +4,7 @@ use dibs_nostd::{Capsule, Index, Options, Proximity, Query, QueryError, Sphere, 
 
 use crate::oracle::Instrument;
 
-/// Queries with the tool that the instrument describes: a sphere where its ends coincide.
+/// Unsigned queries with the tool that the instrument describes: a sphere where its ends coincide.
 ///
 /// # Errors
 /// The query's.
@@ -18,9 +18,9 @@ pub fn closest<I: Index, const D: usize>(
     options: &Options,
 ) -> Result<Proximity, QueryError> {
     if tool.start == tool.end {
-        query.closest(vertices, &sphere(tool), options)
+        query.closest(vertices, &sphere(tool), &options.unsigned())
     } else {
-        query.closest(vertices, &capsule(tool), options)
+        query.closest(vertices, &capsule(tool), &options.unsigned())
     }
 }
 
@@ -38,9 +38,9 @@ pub fn closest_wide<I: Index, const D: usize>(
     options: &Options,
 ) -> Result<Proximity, QueryError> {
     if tool.start == tool.end {
-        query.closest_wide(vertices, &sphere(tool), options)
+        query.closest_wide(vertices, &sphere(tool), &options.unsigned())
     } else {
-        query.closest_wide(vertices, &capsule(tool), options)
+        query.closest_wide(vertices, &capsule(tool), &options.unsigned())
     }
 }
 

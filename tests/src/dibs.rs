@@ -161,11 +161,12 @@ fn ask<I: Index>(
     tool: &Probe,
     options: &Options,
 ) -> (Found, Option<u32>) {
+    let options = &options.unsigned();
     let answer = match tool {
         Probe::Sphere(sphere) => query.closest_wide(vertices, sphere, options),
         Probe::Capsule(capsule) => query.closest_wide(vertices, capsule, options),
     };
     let answer = answer.expect("streams hold finite positions");
     let tests = Some([answer.node_tests, answer.triangle_tests]);
-    (Found { separation: answer.separation, tests }, answer.triangle)
+    (Found { separation: answer.separation.max(0.0), tests }, answer.triangle)
 }

@@ -15,6 +15,7 @@ pub mod motions;
 pub mod oracle;
 #[cfg(feature = "builder")]
 pub mod poses;
+pub mod sides;
 #[cfg(feature = "builder")]
 pub mod streams;
 #[cfg(feature = "builder")]

@@ -51,7 +51,7 @@ pub struct ClosestPair {
 pub struct OraclePair {
     /// Distance from the tool's axis to the surface.
     pub axis_distance: f64,
-    /// Distance from the tool's surface to the mesh: 0 where they touch or overlap.
+    /// Distance from the tool's surface to the mesh, as if the axis were outside: negative where they overlap.
     pub separation: f64,
     /// The axis' point.
     pub on_axis: DVec3,
@@ -183,7 +183,7 @@ pub fn exhaustive(
         if best.is_none_or(|b| pair.distance < b.axis_distance) {
             best = Some(OraclePair {
                 axis_distance: pair.distance,
-                separation: (pair.distance - f64::from(tool.radius)).max(0.0),
+                separation: pair.distance - f64::from(tool.radius),
                 on_axis: pair.on_axis,
                 on_surface: pair.on_surface,
                 triangle: number,

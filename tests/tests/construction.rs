@@ -197,7 +197,7 @@ fn a_violated_limit_is_reported_not_tolerated() {
         let at = doubled[rng.usize(..doubled.len())] + unit(&mut rng) * 20.0;
         let tool = Sphere::new(at, 0.0).expect("valid");
         let nearest = doubled.iter().map(|p| p.distance(at)).fold(f32::INFINITY, f32::min);
-        match query.closest(doubled.as_slice(), &tool, &Options::new()) {
+        match query.closest(doubled.as_slice(), &tool, &Options::new().unsigned()) {
             Ok(found) => found.separation > nearest + found.accuracy,
             Err(_) => true,
         }

@@ -39,7 +39,7 @@ fn section(bytes: &[u8], kind: u32) -> (usize, usize) {
 fn the_example_of_the_specification_is_what_the_builder_writes() {
     let mesh = Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]] };
     let builder = Builder::new().stretch(1.5).with_vertex_order(false).with_rest_shape(false);
-    let tree = builder.with_metric(false).build(&mesh).expect("a valid mesh");
+    let tree = builder.with_metric(false).with_adjacency(false).build(&mesh).expect("a valid mesh");
     let text = include_str!("../../docs/format.md");
     let example = text.split("```text").nth(1).and_then(|t| t.split("```").next());
     let digits: String = example.expect("an example").split_whitespace().collect();
@@ -140,8 +140,9 @@ fn a_wrong_value_with_a_right_checksum_is_named() {
 #[test]
 fn a_leaf_whose_vertices_are_not_at_their_places_is_refused() {
     let (mesh, _) = heart(IndexWidth::Bits16);
-    // The rest metric, which is checked too, would be the first to object.
-    let built = Builder::new().with_metric(false).build(&mesh).expect("a valid mesh");
+    // The rest metric and the adjacency, which are checked too, would object as well.
+    let built = Builder::new().with_metric(false).with_adjacency(false).build(&mesh);
+    let built = built.expect("a valid mesh");
     let tree = built.tree::<u16>().expect("valid");
     let bytes = built.blob();
     let table = section(bytes, 2).0;
@@ -174,7 +175,8 @@ fn a_leaf_whose_vertices_are_not_at_their_places_is_refused() {
 #[test]
 fn a_leaf_whose_triangles_come_too_early_is_refused() {
     let (mesh, _) = heart(IndexWidth::Bits16);
-    let built = Builder::new().with_metric(false).build(&mesh).expect("a valid mesh");
+    let built = Builder::new().with_metric(false).with_adjacency(false).build(&mesh);
+    let built = built.expect("a valid mesh");
     let tree = built.tree::<u16>().expect("valid");
     let bytes = built.blob();
     let table = section(bytes, 2).0;

@@ -515,7 +515,8 @@ fn limits_of_single_triangles_spare_tests_on_a_real_heart() {
             let tool = Sphere::new(at, 3.0).expect("valid");
             let mut found = Vec::new();
             for i in 0..2 {
-                let known = [Options::new(), Options::new().stretch(measured[i])];
+                let known =
+                    [Options::new(), Options::new().stretch(measured[i])].map(Options::unsigned);
                 for (options, sums) in known.iter().zip(&mut sums[i]) {
                     let answer = queries[i].closest(rows[i].as_slice(), &tool, options);
                     let answer = answer.expect("finite positions");

@@ -187,7 +187,7 @@ fn wander<const OPENED: usize>(mesh: &Mesh, ticks: usize, seed: u64) -> Tally {
             let budget = (rng.u32(..10) == 0)
                 .then(|| Budget { node_tests: rng.u32(..60), triangle_tests: rng.u32(..6) });
             let share = tick as f32 / ticks_of_frame as f32;
-            let limit = Options::new();
+            let limit = Options::new().unsigned();
             let is_known = rng.bool();
             let known = |stretch| if is_known { limit.stretch(stretch) } else { limit };
             match rng.u32(..4) {
@@ -254,7 +254,7 @@ fn odometers_wrap() {
         // For a long time nothing is tested: bounds get as old as they can.
         let is_starved = tick / 8_000 % 3 == 1;
         let budget = is_starved.then_some(Budget { node_tests: 0, triangle_tests: 1 });
-        subject.tick(&surface, &tool, &Options::new(), budget);
+        subject.tick(&surface, &tool, &Options::new().unsigned(), budget);
     }
     println!("{:?}", subject.tally);
     let [_, _, jumps, _, none] = subject.tally.fallbacks;
@@ -276,7 +276,7 @@ fn a_tick_on_the_path_of_table_3_takes_few_tests() {
         let Probe::Capsule(tool) = beat.tool(tick) else { unreachable!("the beat's is a capsule") };
         let measured = measure_stretch(&tree, rows.as_slice()).expect("within the limit");
         let surface = odometer.step(before.as_slice(), rows.as_slice()).after();
-        subject.ask(&surface, &tool, &Options::new().stretch(measured), None);
+        subject.ask(&surface, &tool, &Options::new().unsigned().stretch(measured), None);
         before = rows;
     }
     let tally = &subject.tally;

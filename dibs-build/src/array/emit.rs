@@ -52,6 +52,8 @@ pub struct Summary {
     pub query_bytes: usize,
     /// The same, for each triangle.
     pub query_bytes_per_triangle: f64,
+    /// Flash of the adjacency, which tells the sides; 0 where the surface has none.
+    pub adjacency_bytes: usize,
     /// Flash of the whole tree with all its optional sections.
     pub flash_bytes: usize,
     /// RAM of the surface: `dibs_nostd::Frames`, two buffers of f32 positions, and their labels.
@@ -207,6 +209,7 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
         mesh_id: tree.mesh_id(),
         query_bytes: tree.query_bytes(),
         query_bytes_per_triangle: tree.query_bytes() as f64 / f64::from(tree.triangle_count()),
+        adjacency_bytes: tree.adjacency_bytes(),
         flash_bytes: length,
         ram_bytes: (24 * vertices as usize + 117).next_multiple_of(4),
         stack_bytes: 8 * tree.stack() as usize,

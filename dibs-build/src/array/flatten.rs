@@ -6,6 +6,7 @@ use dibs_nostd::format::{
 };
 use dibs_nostd::{Index, Tree};
 
+use super::adjacency::adjacency;
 use super::metric::{metric, with_lowest_bit};
 use crate::Mesh;
 use crate::construct::{Cluster, Content};
@@ -73,6 +74,7 @@ pub(crate) struct Facts<'a> {
     pub with_order: bool,
     pub with_rest: bool,
     pub with_metric: bool,
+    pub with_adjacency: bool,
 }
 
 /// The bytes of a tree, and the mesh vertex of each row.
@@ -125,6 +127,11 @@ pub(crate) fn flatten<I: Index>(
     if !facts.shares.is_uniform() {
         let codes = flat.triangles.iter().map(|placed| facts.shares.code(placed.triangle));
         sections.push((section::LIMITS, codes.flat_map(u16::to_le_bytes).collect()));
+    }
+    if facts.with_adjacency
+        && let Some(neighbours) = adjacency::<I>(&flat.triangles)
+    {
+        sections.push((section::ADJACENCY, neighbours));
     }
     let header = [
         identity.finalize(),
@@ -226,7 +233,7 @@ fn code(radius: f64, unit: f32) -> u32 {
     if stored < radius { code + 1 } else { code }
 }
 
-fn put<I: Index>(bytes: &mut Vec<u8>, value: u32) {
+pub(super) fn put<I: Index>(bytes: &mut Vec<u8>, value: u32) {
     bytes.extend(&value.to_le_bytes()[..I::BYTES]);
 }
 

@@ -1,5 +1,6 @@
 //! The tree as a flat array: its bytes, and the files that hold them.
 
+mod adjacency;
 #[cfg(feature = "modes")]
 mod append;
 mod emit;

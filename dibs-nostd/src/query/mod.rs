@@ -1,21 +1,30 @@
 //! The traversal: the closest pair between a tool and the surface as it is now.
 
+mod contacts;
 mod cost;
 mod cost_m7;
 mod cost_x86_64;
+mod depth;
+mod normal;
 mod options;
 mod plane;
 mod proximity;
 mod search;
+mod side;
 mod tracker;
 
+pub use contacts::{Contact, Contacts};
 pub use cost::Cost;
 pub use options::{Budget, Options};
 pub use proximity::Proximity;
+pub use side::{NoSide, Side};
 pub use tracker::{Fallback, Tracked, Tracker};
+
+use glam::Vec3;
 
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
+use depth::Depth;
 use search::{Search, Waiting, WideSearch};
 
 /// A query on one tree, with the fixed stack that its traversal needs: 8 bytes an entry.
@@ -48,10 +57,14 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
 
     /// The closest pair between `tool` and the surface whose vertices are `vertices`.
     ///
+    /// Signed, if the tree has adjacency: [`Proximity::side`] says on which side of the surface the tool is.
+    ///
     /// Exact within [`Proximity::accuracy`] as long as the surface keeps to the stretch limit (or to
     /// the measured stretch in `options`). Pins are vertices of the surface, so their distances are
     /// upper bounds from the first node on. Near children first; squares are compared, and a root is
     /// taken only where an order is needed. A leaf is rejected by one plane, a triangle by another.
+    ///
+    /// Where a capsule's axis crosses the surface, up to 26 searches more, for points of the axis, find how deep.
     ///
     /// Cost: the budget at most; typical counts are in the repository's `docs/benchmarks.md`.
     ///
@@ -64,7 +77,8 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         tool: &T,
         options: &Options,
     ) -> Result<Proximity, QueryError> {
-        Search::start(&self.tree, &mut self.stack, vertices, tool, options)?.run()
+        let found = Search::start(&self.tree, &mut self.stack, vertices, tool, options)?.run()?;
+        signed(&self.tree, &mut self.stack, vertices, tool, options, found)
     }
 
     /// As [`closest`](Self::closest), in batches of up to seven subtrees: for processors that overlap instructions
@@ -84,6 +98,47 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         options: &Options,
     ) -> Result<Proximity, QueryError> {
         let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options)?;
-        WideSearch::new(search).run()
+        let found = WideSearch::new(search).run()?;
+        signed(&self.tree, &mut self.stack, vertices, tool, options, found)
     }
+}
+
+/// The answer with its side and what follows from it.
+#[inline(never)]
+fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
+    tree: &Tree<'_, I>,
+    stack: &mut [Waiting],
+    vertices: &V,
+    tool: &T,
+    options: &Options,
+    mut found: Proximity,
+) -> Result<Proximity, QueryError> {
+    let reason = if !options.is_signed {
+        Some(NoSide::NotAsked)
+    } else if !tree.has_adjacency() {
+        Some(NoSide::NoAdjacency)
+    } else if found.is_cut_short() {
+        Some(NoSide::CutShort)
+    } else {
+        None
+    };
+    if let Some(reason) = reason {
+        found.side = Side::Undefined(reason);
+        return Ok(found);
+    }
+    if found.axis_distance <= found.accuracy && tool.axis_length() > 0.0 {
+        return Depth::new(tree, stack, vertices, tool, options, &found).run();
+    }
+    let on_axis = tool.axis_point(found.axis_parameter);
+    let at = side::of_point(tree, vertices, &found, on_axis)?;
+    found.side = at.side;
+    if at.outward != Vec3::ZERO {
+        found.direction = at.outward;
+        found.point_on_tool = on_axis - at.outward * tool.radius();
+    }
+    if at.side == Side::Inside {
+        found.separation = -found.axis_distance - tool.radius();
+        found.lower = found.separation;
+    }
+    Ok(found)
 }

@@ -30,6 +30,8 @@ pub struct Options {
     pub(super) budget: Budget,
     pub(super) warm_start: Option<u32>,
     pub(super) stretch: Option<MeasuredStretch>,
+    pub(super) is_signed: bool,
+    pub(super) depth_tolerance: Option<f32>,
 }
 
 impl Default for Options {
@@ -42,7 +44,13 @@ impl Options {
     /// No budget, no warm start, and the stretch limit that the tree was built for.
     #[must_use]
     pub const fn new() -> Self {
-        Self { budget: Budget::UNLIMITED, warm_start: None, stretch: None }
+        Self {
+            budget: Budget::UNLIMITED,
+            warm_start: None,
+            stretch: None,
+            is_signed: true,
+            depth_tolerance: None,
+        }
     }
 
     /// Bounds the work.
@@ -57,6 +65,21 @@ impl Options {
     #[must_use]
     pub const fn warm_start(mut self, triangle: Option<u32>) -> Self {
         self.warm_start = triangle;
+        self
+    }
+
+    /// Leaves the side out: the separation is that of a tool outside, at the cost of the distance alone.
+    #[must_use]
+    pub const fn unsigned(mut self) -> Self {
+        self.is_signed = false;
+        self
+    }
+
+    /// How far (mm) the certified interval of a depth may reach where the tool's axis crosses the surface; by
+    /// default a 512th of the axis' length. Less takes more tests.
+    #[must_use]
+    pub const fn depth_tolerance(mut self, tolerance: f32) -> Self {
+        self.depth_tolerance = Some(tolerance);
         self
     }
 

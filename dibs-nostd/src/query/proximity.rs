@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use super::Side;
+
 /// The closest pair between a tool and a surface, with a certified interval for its separation.
 ///
 /// Lengths are in the mesh's own unit (mm in the examples). The true separation lies in
@@ -11,25 +13,32 @@ use glam::Vec3;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct Proximity {
-    /// Separation of the best pair found: the upper end of the certified interval.
-    /// 0 when tool and surface touch or overlap.
+    /// Separation of the best pair found: the upper end of the certified interval. With `d`, the distance from the
+    /// tool's axis to the surface, and `r`, the tool's radius: `d - r` outside, negative where they overlap; `-d - r`
+    /// inside; and where the axis crosses the surface, `-D - r`, with the largest distance `D` of any of its points
+    /// inside.
     pub separation: f32,
-    /// Lower end of the certified interval; equals `separation` unless the budget ran out.
+    /// Lower end of the certified interval. Equals `separation` unless the budget ran out, or the axis crosses the
+    /// surface: then it is lower by at most the tolerance of the depth, see
+    /// [`Options::depth_tolerance`](crate::Options::depth_tolerance), or more if the budget or 24 points of the axis
+    /// did not do.
     pub lower: f32,
     /// No separation above is off by more than this: the f32 rounding of coordinates this large.
     pub accuracy: f32,
-    /// Distance from the tool's axis (a sphere's centre, a capsule's segment) to
-    /// `point_on_surface`; `separation = max(0, axis_distance - radius)`. Below the radius the
-    /// difference is the depth of a shallow penetration.
+    /// On which side of the surface the axis is.
+    pub side: Side,
+    /// Distance from the tool's axis (a sphere's centre, a capsule's segment) to the surface: 0 where it crosses.
     pub axis_distance: f32,
-    /// The surface's point of the closest pair.
+    /// The surface's point of the closest pair; where the axis crosses, the closest to its deepest point.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub point_on_surface: Vec3,
     /// The tool's point of the closest pair, on the tool's own surface.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub point_on_tool: Vec3,
-    /// Unit vector from `point_on_surface` towards the tool's axis; zero when the axis itself
-    /// touches the surface, where no direction is defined.
+    /// Unit vector that leads out: from `point_on_surface` to the tool's axis outside, from the axis to
+    /// `point_on_surface` inside and where it crosses. Next to contact it is the surface's pseudonormal; zero where
+    /// there is none. It can jump where two parts of the surface are equally near (the medial axis), and where a
+    /// capsule's second end passes through the surface.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub direction: Vec3,
     /// Where along the tool's axis the pair sits: 0 at its start, 1 at its end; 0 for a sphere.
@@ -48,6 +57,11 @@ pub struct Proximity {
 }
 
 impl Proximity {
+    /// Whether the budget ran out before the closest point was certain.
+    pub(super) fn is_cut_short(&self) -> bool {
+        self.triangle.is_none() || self.lower < self.separation
+    }
+
     /// The same pair, its accuracy widened by `error` (mm, not negative): how far a vertex may be from
     /// where the table has it, say [`FrameLabel::position_error`](crate::FrameLabel::position_error)
     /// of a quantised frame, or the age of the surface times the tissue's greatest speed. A distance

@@ -1,6 +1,7 @@
 //! One search: the tests of nodes, leaves and triangles, and what is known so far.
 
 mod finish;
+mod near;
 mod slack;
 mod tick;
 mod wide;

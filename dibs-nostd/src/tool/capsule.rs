@@ -114,6 +114,11 @@ impl Tool for Capsule {
         self.axis.length * (1.0 + 2.0 * f32::EPSILON)
     }
 
+    #[inline]
+    fn axis_point(&self, parameter: f32) -> Vec3 {
+        self.axis.start + parameter * self.axis.length * self.axis.direction
+    }
+
     #[inline(always)]
     fn axis_to(&self, point: Vec3) -> Vec3 {
         let Axis { start, direction, length, .. } = self.axis;

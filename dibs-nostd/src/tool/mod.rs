@@ -43,6 +43,9 @@ pub trait Tool: Copy + sealed::Sealed {
     /// Length of the axis, rounded up: 0 for a sphere.
     fn axis_length(&self) -> f32;
 
+    /// The axis' point at a parameter: 0 is its start, 1 its end.
+    fn axis_point(&self, parameter: f32) -> Vec3;
+
     /// The shortest vector from the axis to a point. Each component is within 8 * 2^-24 * `S`, `S`
     /// being the point's distance from the axis' start plus the axis' length.
     fn axis_to(&self, point: Vec3) -> Vec3;

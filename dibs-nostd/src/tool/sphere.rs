@@ -33,6 +33,11 @@ impl Sphere {
         Ok(Self { center, radius })
     }
 
+    /// A point of another tool's axis.
+    pub(crate) const fn point(center: Vec3) -> Self {
+        Self { center, radius: 0.0 }
+    }
+
     /// The centre as given.
     pub fn center(&self) -> Vec3 {
         self.center
@@ -65,6 +70,11 @@ impl Tool for Sphere {
     #[inline]
     fn axis_length(&self) -> f32 {
         0.0
+    }
+
+    #[inline]
+    fn axis_point(&self, _parameter: f32) -> Vec3 {
+        self.center
     }
 
     #[inline(always)]

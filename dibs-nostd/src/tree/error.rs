@@ -105,6 +105,13 @@ pub enum FormatError {
         /// Row of the triangle.
         triangle: u32,
     },
+    /// A triangle's neighbour across an edge is not there, or has another one there.
+    Neighbour {
+        /// Row of the triangle.
+        triangle: u32,
+        /// The edge: 0 from the first corner to the second, 1 to the third, 2 back to the first.
+        edge: u32,
+    },
     /// A traversal's stack needs more or fewer entries than the header states.
     Stack {
         /// Entries in the header.
@@ -147,6 +154,9 @@ impl fmt::Display for FormatError {
             Self::Order { row } => write!(f, "vertex order row {row} is not a vertex"),
             Self::Metric { triangle } => write!(f, "triangle {triangle} has an impossible metric"),
             Self::Limit { triangle } => write!(f, "triangle {triangle} has no stretch limit"),
+            Self::Neighbour { triangle, edge } => {
+                write!(f, "triangle {triangle} has a wrong neighbour across its edge {edge}")
+            }
             Self::Stack { stated, found } => {
                 write!(f, "{found} stack entries are needed, the header states {stated}")
             }

@@ -10,6 +10,7 @@ macro_rules! tri {
     };
 }
 
+mod adjacency;
 mod error;
 pub mod format;
 mod header;
@@ -60,7 +61,9 @@ impl<'a, I: Index> Tree<'a, I> {
         let header = tri!(header::read::<I>(bytes));
         let sections = tri!(sections::find::<I>(bytes, &header));
         tri!(validate::well_formed::<I>(&header, &sections));
-        Ok(Self { sections, header, width: PhantomData })
+        let tree = Self { sections, header, width: PhantomData };
+        tri!(adjacency::check(&tree));
+        Ok(tree)
     }
 
     /// Checks that what a query uses besides the bytes, the header and the places of the sections as they were
@@ -152,6 +155,12 @@ impl<'a, I: Index> Tree<'a, I> {
     #[must_use]
     pub const fn query_bytes(&self) -> usize {
         self.sections.nodes.len() + self.sections.triangles.len()
+    }
+
+    /// Bytes of the adjacency; 0 where the tree has none.
+    #[must_use]
+    pub const fn adjacency_bytes(&self) -> usize {
+        self.sections.adjacency.len()
     }
 
     /// Rows of the three corners of a triangle, or `None` outside the table.

@@ -19,6 +19,7 @@ pub(crate) struct Sections<'a> {
     pub metric: &'a [u8],
     pub limits: &'a [u8],
     pub modes: &'a [u8],
+    pub adjacency: &'a [u8],
 }
 
 /// What a section must be.
@@ -40,7 +41,7 @@ impl Rule {
     }
 }
 
-const COUNT: usize = 7;
+const COUNT: usize = 8;
 
 /// In the order of [`Sections`]' fields.
 const fn rules<I: Index>(header: &Header) -> [Rule; COUNT] {
@@ -54,6 +55,7 @@ const fn rules<I: Index>(header: &Header) -> [Rule; COUNT] {
         Rule::optional(section::LIMITS, triangles, LIMIT_BYTES),
         // `Modes::of` checks it.
         Rule { kind: section::MODES, length: None, required: false },
+        Rule::optional(section::ADJACENCY, triangles, triangle_bytes::<I>()),
     ]
 }
 
@@ -109,8 +111,8 @@ pub(crate) const fn find<'a, I: Index>(
         }
         slot += 1;
     }
-    let [nodes, triangles, order, rest, metric, limits, modes] = parts;
-    Ok(Sections { nodes, triangles, order, rest, metric, limits, modes })
+    let [nodes, triangles, order, rest, metric, limits, modes, adjacency] = parts;
+    Ok(Sections { nodes, triangles, order, rest, metric, limits, modes, adjacency })
 }
 
 impl Sections<'_> {
@@ -143,5 +145,6 @@ impl Sections<'_> {
             && self.metric.len() == other.metric.len()
             && self.limits.len() == other.limits.len()
             && self.modes.len() == other.modes.len()
+            && self.adjacency.len() == other.adjacency.len()
     }
 }

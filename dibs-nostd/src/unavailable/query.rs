@@ -46,6 +46,20 @@ pub enum QueryError {
         /// Row of the nearest pin.
         pin: u32,
     },
+    /// The tree has no adjacency, so that nothing is known of a triangle's surroundings.
+    NoAdjacency,
+    /// A list of contacts without room, or with too much.
+    Contacts {
+        /// Contacts that the list holds.
+        capacity: u32,
+        /// Triangles that it can look at together, at most 65,534.
+        near: u32,
+    },
+    /// A margin that is not a number of at least 0.
+    Margin {
+        /// Its bits.
+        bits: u32,
+    },
     /// A row outside its table: the tree's bytes changed after they were validated.
     Corrupt {
         /// The row that is missing.
@@ -77,6 +91,11 @@ impl fmt::Display for QueryError {
                     "no triangle found within reach of vertex {pin}: over-stretched or corrupt"
                 )
             }
+            Self::NoAdjacency => write!(f, "the tree has no adjacency: build it with"),
+            Self::Contacts { capacity, near } => {
+                write!(f, "a list cannot hold {capacity} contacts and look at {near} triangles")
+            }
+            Self::Margin { bits } => write!(f, "a margin cannot be {}", f32::from_bits(bits)),
             Self::Corrupt { row } => write!(f, "row {row} is missing: the tree's bytes changed"),
         }
     }

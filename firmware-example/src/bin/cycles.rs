@@ -73,7 +73,7 @@ fn measure() -> Result<(), &'static str> {
             }
             let budget = Budget { node_tests, triangle_tests };
             let start = counter.now();
-            let answer = query.closest(&frame, &tool, &Options::new().budget(budget));
+            let answer = query.closest(&frame, &tool, &Options::new().unsigned().budget(budget));
             let cycles = counter.since(start);
             answer.map(|answer| (cycles, answer)).map_err(|_| "the query failed")
         };

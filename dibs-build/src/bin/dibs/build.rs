@@ -6,7 +6,7 @@ use anyhow::{Result, anyhow, bail};
 use clap::ValueEnum;
 use dibs_build::{
     Beyond, Builder, BuiltTree, Construction, Import, IndexWidth, Mesh, Motion, Needed, Paths,
-    read_limits,
+    check_winding, orient, read_limits,
 };
 use std::path::{Path, PathBuf};
 
@@ -17,6 +17,7 @@ Examples:
   dibs build heart.stl -o heart.rs --name heart --weld 0.001
   dibs build scan.obj -o scan.dibs --largest-component --json
   dibs build heart.ply -o heart.dibs --limits heart.limits --motion heart.pc2
+  dibs build scan.obj -o scan.dibs --orient
   dibs build heart.ply -o heart.dibs --motion heart.pc2 --modes 16")]
 pub struct Args {
     /// The rest shape: OBJ, STL, PLY or OFF, told apart by content
@@ -41,6 +42,9 @@ pub struct Args {
     name: Option<String>,
     #[command(flatten)]
     reading: MeshArgs,
+    /// Turn triangles until the surface has an outer side, outwards where it is closed
+    #[arg(long)]
+    orient: bool,
     /// Add displacement modes fitted to the motion, so that as many weights drive the surface
     #[arg(long, value_name = "COUNT", requires = "motion")]
     modes: Option<usize>,
@@ -75,9 +79,15 @@ pub fn run(args: &Args) -> Result<()> {
         Some("dibs") => false,
         _ => bail!("{}: the output's name must end in .dibs or .rs", args.output.display()),
     };
-    let import = mesh_file::read(&args.mesh, &args.reading)?;
-    let Import { mesh, report } = &import;
+    let mut import = mesh_file::read(&args.mesh, &args.reading)?;
     let name = args.mesh.display();
+    let turned = if args.orient {
+        Some(orient(&mut import.mesh).map_err(|error| anyhow!("{name}: {error}"))?)
+    } else {
+        None
+    };
+    let Import { mesh, report } = &import;
+    let winding = check_winding(mesh).err().map(|error| error.to_string());
     let limits = args.limits.as_ref().map(|path| read_limits(path, mesh)).transpose()?;
     if let Some(path) = &args.motion {
         let uniform = || vec![args.stretch; mesh.triangles.len()];
@@ -99,21 +109,25 @@ pub fn run(args: &Args) -> Result<()> {
         tree.write_blob(&args.output)?;
     }
     let summary = tree.summary();
-    for warning in summary.warnings() {
+    let warnings = || winding.clone().into_iter().chain(summary.warnings());
+    for warning in warnings() {
         eprintln!("warning: {name}: {warning}");
     }
     if args.json {
-        let warnings: Vec<String> = report.warnings().chain(summary.warnings()).collect();
+        let warnings: Vec<String> = report.warnings().chain(warnings()).collect();
         let output = args.output.display().to_string();
         println!(
             "{:#}",
             serde_json::json!({
-                "output": output, "mesh": report, "warnings": warnings, "tree": summary,
+                "output": output, "mesh": report, "turned": turned, "warnings": warnings, "tree": summary,
                 "mode_errors": fit.as_ref().map(modes::Fit::errors),
             })
         );
     } else {
         println!("read     {name}: {report}");
+        if let Some(turned) = turned {
+            println!("turned   {turned} triangles");
+        }
         if let Some(fit) = &fit {
             fit.print(summary.modes.map_or(0, |modes| modes.count));
         }

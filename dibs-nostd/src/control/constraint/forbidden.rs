@@ -12,9 +12,8 @@ use crate::unavailable::Unavailable;
 ///
 /// `F = min(max_force, max(0, K (margin - d) - B v))` for `d < margin`, else 0,
 ///
-/// where `v` is the tool's speed away from the surface, negative on approach. In a shallow
-/// penetration `d` goes on below zero as the depth, and the spring goes on with it up to
-/// saturation. When a budget cut the query short, the size of the force is that of the nearest the
+/// where `v` is the tool's speed out of the surface, negative on approach. Inside, `d` is below zero, and the spring
+/// grows with the depth up to saturation. When a budget cut the query short, the size of the force is that of the nearest the
 /// surface could be, and its direction that of the best pair found.
 ///
 /// ```

@@ -1,9 +1,10 @@
 //! From the closest pair to a force: what a dynamic active constraint puts on the robot.
 //!
-//! Two constraints, both a spring and a damper along the closest pair's direction:
-//! [`ForbiddenRegion`] keeps the tool out of a margin around the surface, [`Guidance`] keeps it at a
-//! stand-off. Units: mm, mm/s, N, N/mm, N s/mm, s. Each force costs some tens of f32 operations and
-//! one root, without a loop.
+//! Two constraints, both a spring and a damper along the closest pair's direction: [`ForbiddenRegion`] keeps the tool
+//! out of a margin around the surface, [`Guidance`] keeps it at a stand-off. With all contacts of a tool instead of
+//! one, [`Proxy`] keeps it out with force and torque, and [`VelocityRow`] is what a controller's own quadratic program
+//! takes. Units: mm, mm/s, N, N mm, N/mm, N s/mm, s. A force of one pair costs some tens of f32 operations and one
+//! root, without a loop.
 //!
 //! # What is promised
 //!
@@ -11,6 +12,9 @@
 //!   comes in.
 //! - It is computed from the conservative end of the certified interval, `lower - accuracy`: a query
 //!   that its budget cut short never lets the tool closer.
+//! - Where the surface has sides (a tree with adjacency, see [`Side`](crate::Side)), it leads outwards from first
+//!   contact to any depth, and its size is continuous through contact and through the surface. Where it has none,
+//!   the tool is taken to be outside.
 //! - When the proximity is unknown, the surface stale, or a number not finite, the output is the
 //!   *hold*: pure damping against the tool's velocity, saturated the same way, and the state says
 //!   why. With a velocity that is not finite it is zero.
@@ -28,6 +32,8 @@
 //!   the direction jump from one tick to the next. The size of the force does not, its direction
 //!   does. A narrow gap whose margins overlap is such a place: choose the margin below half the gap.
 //! - A moving surface moves the wall: it does work on the tool, as a beating heart would.
+//! - Where a capsule's second end passes through the surface, the size falls back too: of a crossing tool it is that
+//!   of the deepest point, of one that is wholly inside that of the nearest.
 //! - Saturation: a hand that pushes harder than `max_force` gets through.
 
 /// `?` in a `const fn`.
@@ -42,6 +48,8 @@ macro_rules! tri {
 
 mod forbidden;
 mod guidance;
+mod proxy;
+mod rows;
 #[cfg(test)]
 mod tests;
 
@@ -55,6 +63,8 @@ use crate::unavailable::Unavailable;
 
 pub use forbidden::ForbiddenRegion;
 pub use guidance::Guidance;
+pub use proxy::{Proxy, Wrench};
+pub use rows::VelocityRow;
 
 /// A force on the tool, and how it came about.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -182,7 +192,7 @@ impl SpringDamper {
 /// What a constraint needs to know of a closest pair.
 #[derive(Clone, Copy)]
 struct Approach {
-    /// Unit vector from the surface to the tool.
+    /// Unit vector that leads out.
     direction: Vec3,
     /// Conservative separation, in mm; negative for the depth of a penetration.
     separation: f32,
@@ -201,20 +211,14 @@ impl Approach {
         if direction == Vec3::ZERO {
             return Err(Unavailable::NoDirection);
         }
-        // Along the direction the two points are `axis_distance - radius` apart, which goes on
-        // below zero where the separation stops.
-        let gap = (proximity.point_on_tool - proximity.point_on_surface).dot(direction);
-        let nearest =
-            if proximity.separation > 0.0 || gap > proximity.lower { proximity.lower } else { gap };
         let approach = Self {
             direction,
-            separation: nearest - proximity.accuracy,
+            separation: proximity.lower - proximity.accuracy,
             speed: velocity.dot(direction),
             velocity,
         };
         let is_unit = (direction.length_squared() - 1.0).abs() < 1.0e-3;
         let is_finite = proximity.separation.is_finite()
-            && gap.is_finite()
             && approach.separation.is_finite()
             && approach.speed.is_finite();
         if is_unit && is_finite { Ok(approach) } else { Err(Unavailable::NotFinite) }

@@ -5,6 +5,7 @@ extern crate std;
 use proptest::prelude::*;
 
 use super::*;
+use crate::Side;
 use crate::unavailable::QueryError;
 
 const QUERY: QueryError = QueryError::Corrupt { row: 7 };
@@ -15,10 +16,10 @@ const RADIUS: f32 = 2.5;
 /// A tool of this radius whose axis is `gap + RADIUS` from a point of the surface.
 fn pair(gap: f32, direction: Vec3) -> Proximity {
     let point_on_surface = Vec3::new(1.0, -2.0, 3.0);
-    let separation = if gap > 0.0 { gap } else { 0.0 };
     Proximity {
-        separation,
-        lower: separation,
+        separation: gap,
+        lower: gap,
+        side: Side::Outside,
         accuracy: 0.0,
         axis_distance: gap + RADIUS,
         point_on_surface,
@@ -244,7 +245,7 @@ proptest! {
             prop_assert_eq!(wall().force(Ok(&exact), velocity), ConstraintForce::NONE);
         }
         let mut cut = exact;
-        cut.lower = if exact.lower > slack { exact.lower - slack } else { 0.0 };
+        cut.lower = exact.lower - slack;
         cut.accuracy = accuracy;
         prop_assert!(push(&cut) >= push(&exact));
         // As much as an exact answer at the lower end would, or more.

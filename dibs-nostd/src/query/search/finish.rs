@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::slack::{ACCURACY, FLOOR};
 use super::{NearestPin, Search};
 use crate::math::sqrt::sqrt;
-use crate::query::Proximity;
+use crate::query::{NoSide, Proximity, Side};
 use crate::{Index, QueryError, Tool, VertexTable};
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
@@ -30,8 +30,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         let axis_distance = sqrt(pair.distance_squared);
         let used = u32::saturating_sub;
         let above_zero = |x: f32| if x > 0.0 { x } else { 0.0 };
-        let separation = above_zero(axis_distance - radius);
-        let left = above_zero(lower - radius);
+        let separation = axis_distance - radius;
+        let left = above_zero(lower) - radius;
         // By its own length: next to contact the points' rounding is not that of the distance.
         let towards = pair.on_axis - pair.on_surface;
         let length = sqrt(towards.length_squared());
@@ -41,6 +41,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             separation,
             lower: if left < separation { left } else { separation },
             accuracy: ACCURACY * self.scale + FLOOR + self.tree.position_error(),
+            side: Side::Undefined(NoSide::NotAsked),
             axis_distance,
             point_on_surface: pair.on_surface,
             point_on_tool: pair.on_axis - direction * radius,

@@ -7,7 +7,7 @@ mod tests;
 use glam::Vec3;
 
 use super::search::{Outcome, Search, Tick, Waiting};
-use super::{Budget, Options, Proximity};
+use super::{Budget, Options, Proximity, signed};
 use crate::math::sqrt::sqrt;
 use crate::surface::motion::Unit;
 use crate::unavailable::QueryError;
@@ -187,6 +187,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
                 (self.whole(surface, tool, &options.warm_start(best), tests)?, false)
             }
         };
+        let closest = signed(&self.tree, &mut self.stack, surface, tool, &options, closest)?;
         self.behind = if is_complete { 0 } else { self.behind.saturating_add(moved) };
         self.last = travel.map(|travel| Last::new(tool, travel));
         Ok(Tracked { closest, fallback, opened: self.front.borrow().used() as u32 })

@@ -54,7 +54,7 @@ fn no_bound_exceeds_the_distance() {
             let size = if tick == 7 { 10.0 } else { 0.5 };
             (tip, span) = (tip * 0.999 + vector(size), span * 0.999 + vector(size));
             let tool = Capsule::new(tip, tip + span, 2.0).expect("a valid capsule");
-            let mut options = Options::new();
+            let mut options = Options::new().unsigned();
             if tick % 3 == 2 {
                 options = options.budget(Budget { node_tests: 12, triangle_tests: 2 });
             }

@@ -113,6 +113,8 @@ pub mod section {
     pub const LIMITS: u32 = 6;
     /// Displacement modes (optional).
     pub const MODES: u32 = 7;
+    /// Three neighbours a triangle (optional: sides and contacts need it).
+    pub const ADJACENCY: u32 = 8;
 }
 
 /// How geodesic radii were measured, which decides which measured stretch limits their growth.
@@ -309,6 +311,26 @@ pub(crate) const fn vertex_number<I: Index>(order: &[u8], row: u32) -> Option<u3
     } else {
         u32_at(tail, 0)
     }
+}
+
+/// The code of a triangle's neighbour across one of its three edges.
+#[inline(always)]
+pub(crate) const fn neighbour_code<I: Index>(adjacency: &[u8], row: u32, edge: u32) -> Option<u32> {
+    match triangle::<I>(adjacency, row) {
+        Some([first, second, third]) => match edge {
+            0 => Some(first),
+            1 => Some(second),
+            2 => Some(third),
+            _ => None,
+        },
+        None => None,
+    }
+}
+
+/// The code of an edge that no other triangle has.
+#[must_use]
+pub const fn no_neighbour<I: Index>() -> u32 {
+    if I::BYTES == 2 { 0xFFFF } else { u32::MAX }
 }
 
 #[inline(always)]

@@ -5,6 +5,7 @@ use controller::fingerprint;
 use controller::telemetry::Tick;
 use dibs_nostd::Index;
 use dibs_tests::oracle::{Instrument, closest_pair, exhaustive};
+use dibs_tests::sides;
 use glam::Vec3;
 
 use super::scene::Scene;
@@ -41,8 +42,10 @@ pub fn check(scene: &Scene, link: &Link, tick: &Tick) -> Result<Checked> {
 
     // The bus's quantisation is not an error here: both sides use the vertices as they were decoded.
     let accuracy = f64::from(tick.accuracy);
-    let separation = (f64::from(tick.separation) - truth.separation).abs();
-    let interval = (f64::from(tick.lower) - truth.separation).max(0.0);
+    let (low, high) =
+        sides::signed_separation(&positions, &scene.triangles, &tool, &truth, accuracy);
+    let separation = (low - f64::from(tick.separation)).max(0.0);
+    let interval = (f64::from(tick.lower) - high).max(0.0);
     let point = Vec3::from(tick.point_on_surface).as_dvec3();
     let off_surface = match corners(scene, tick.triangle) {
         Some(rows) => {

@@ -166,7 +166,8 @@ impl Script {
                 (built.to_rows(&positions), tool)
             };
             let (rows, tool) = at(tick - 1);
-            let before = query.closest(&rows[..], &tool, &Options::new()).expect("a query");
+            let before =
+                query.closest(&rows[..], &tool, &Options::new().unsigned()).expect("a query");
             let (rows, tool) = at(tick);
             script.rows(&rows, tree.triangle_count());
             let tool = Instrument::capsule(tool.start(), tool.end(), tool.radius());

@@ -1,0 +1,298 @@
+//! Winding: whether a surface has an outer side, and turning its triangles until it has.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use crate::Mesh;
+
+/// Why a surface has no outer side, or one that is not where it should be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum WindingError {
+    /// Two triangles run along their common edge in the same direction.
+    #[error(
+        "triangles {triangle} and {other} are wound against each other, as {others} more pairs are, so the surface \
+         has no outer side and distances to it no sign: turn them with --orient"
+    )]
+    Inconsistent {
+        /// One triangle.
+        triangle: usize,
+        /// The other one.
+        other: usize,
+        /// How many more such pairs there are.
+        others: usize,
+    },
+    /// More than two triangles share an edge.
+    #[error(
+        "{triangles} triangles share the edge from vertex {from} to vertex {to}, so the surface has no outer side and \
+         distances to it no sign: cut it open there in a mesh editor"
+    )]
+    NonManifold {
+        /// How many.
+        triangles: usize,
+        /// One end of the edge.
+        from: u32,
+        /// The other end.
+        to: u32,
+    },
+    /// Whichever way its triangles are turned, two of them disagree.
+    #[error(
+        "the surface has only one side, like a Moebius strip: triangles {triangle} and {other} disagree however they \
+         are turned, so distances to it have no sign"
+    )]
+    OneSided {
+        /// One triangle.
+        triangle: usize,
+        /// The other one.
+        other: usize,
+    },
+    /// The surface is closed and its normals point inwards.
+    #[error(
+        "the closed surface faces inwards, so what it encloses counts as outside: turn it with --orient, unless the \
+         tool works inside"
+    )]
+    Inward,
+}
+
+/// Checks that a surface has an outer side, and that it is the outside of what it encloses, if it is closed.
+///
+/// Cost: linear in the triangles.
+///
+/// # Errors
+/// [`WindingError`] names the first triangles that are in the way.
+pub fn check_winding(mesh: &Mesh) -> Result<(), WindingError> {
+    let edges = Edges::of(mesh)?;
+    let against = edges.pairs.iter().filter(|pair| !pair.agrees);
+    if let Some(first) = against.clone().next() {
+        let others = against.count() - 1;
+        return Err(WindingError::Inconsistent {
+            triangle: first.triangle,
+            other: first.other,
+            others,
+        });
+    }
+    if edges.border == 0 && volume(mesh, 0..mesh.triangles.len()) < 0.0 {
+        return Err(WindingError::Inward);
+    }
+    Ok(())
+}
+
+/// Turns triangles until the surface has an outer side: as few as possible where it is open; outwards, or inwards for
+/// a hole in what another part encloses, where it is closed. Returns how many were turned.
+///
+/// Cost: linear in the triangles, times the closed parts of the surface.
+///
+/// # Errors
+/// [`WindingError`] where no turning helps; the mesh is then as it was.
+pub fn orient(mesh: &mut Mesh) -> Result<usize, WindingError> {
+    let edges = Edges::of(mesh)?;
+    let count = mesh.triangles.len();
+    let mut around = vec![Vec::new(); count];
+    for pair in &edges.pairs {
+        around[pair.triangle].push((pair.other, pair.agrees));
+        around[pair.other].push((pair.triangle, pair.agrees));
+    }
+    // Whether each triangle is to be turned, for the first of its part to stay.
+    let mut turned: Vec<Option<bool>> = vec![None; count];
+    let mut parts: Vec<Vec<usize>> = Vec::new();
+    for first in 0..count {
+        if turned[first].is_some() {
+            continue;
+        }
+        turned[first] = Some(false);
+        let mut part = vec![first];
+        let mut at = 0;
+        while let Some(&triangle) = part.get(at) {
+            at += 1;
+            let is_turned = turned[triangle] == Some(true);
+            for &(other, agrees) in &around[triangle] {
+                let wanted = is_turned == agrees;
+                match turned[other] {
+                    None => {
+                        turned[other] = Some(wanted);
+                        part.push(other);
+                    }
+                    Some(is) if is != wanted => {
+                        return Err(WindingError::OneSided { triangle, other });
+                    }
+                    Some(_) => (),
+                }
+            }
+        }
+        parts.push(part);
+    }
+    let mut oriented = mesh.clone();
+    for (triangle, corners) in oriented.triangles.iter_mut().enumerate() {
+        if turned[triangle] == Some(true) {
+            corners.swap(1, 2);
+        }
+    }
+    let is_closed = |part: &[usize]| part.iter().all(|&triangle| edges.neighbours[triangle] == 3);
+    let closed: Vec<bool> = parts.iter().map(|part| is_closed(part)).collect();
+    let against: Vec<bool> = (0..parts.len())
+        .map(|row| {
+            let part = &parts[row];
+            if !closed[row] {
+                let moved = part.iter().filter(|&&triangle| turned[triangle] == Some(true));
+                return 2 * moved.count() > part.len();
+            }
+            let inside = oriented.triangles[part[0]][0];
+            let inside = oriented.positions[inside as usize].as_dvec3();
+            let around = (0..parts.len()).filter(|&other| {
+                other != row && closed[other] && winds(&oriented, &parts[other], inside)
+            });
+            let is_hole = around.count() % 2 == 1;
+            (volume(&oriented, part.iter().copied()) < 0.0) != is_hole
+        })
+        .collect();
+    for (part, against) in parts.iter().zip(against) {
+        for &triangle in part.iter().filter(|_| against) {
+            oriented.triangles[triangle].swap(1, 2);
+        }
+    }
+    let changed = mesh.triangles.iter().zip(&oriented.triangles).filter(|(a, b)| a != b).count();
+    *mesh = oriented;
+    Ok(changed)
+}
+
+/// Two triangles with a common edge.
+struct Pair {
+    triangle: usize,
+    other: usize,
+    /// Whether they run along it in opposite directions.
+    agrees: bool,
+}
+
+struct Edges {
+    pairs: Vec<Pair>,
+    /// Triangles across the edges of each triangle.
+    neighbours: Vec<u8>,
+    /// Edges of one triangle.
+    border: usize,
+}
+
+impl Edges {
+    fn of(mesh: &Mesh) -> Result<Self, WindingError> {
+        // The triangles of each edge, and whether they run along it from the lower number to the higher.
+        let mut users: HashMap<(u32, u32), Vec<(usize, bool)>> = HashMap::new();
+        for (triangle, &[a, b, c]) in mesh.triangles.iter().enumerate() {
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                let edge = (from.min(to), from.max(to));
+                users.entry(edge).or_default().push((triangle, from < to));
+            }
+        }
+        let mut edges =
+            Self { pairs: Vec::new(), neighbours: vec![0; mesh.triangles.len()], border: 0 };
+        let mut crowded: Option<((u32, u32), usize)> = None;
+        for (&edge, of) in &users {
+            match of[..] {
+                [_] => edges.border += 1,
+                [(triangle, forward), (other, other_forward)] => {
+                    edges.neighbours[triangle] += 1;
+                    edges.neighbours[other] += 1;
+                    edges.pairs.push(Pair { triangle, other, agrees: forward != other_forward });
+                }
+                _ if crowded.is_none_or(|(least, _)| edge < least) => {
+                    crowded = Some((edge, of.len()));
+                }
+                _ => (),
+            }
+        }
+        if let Some(((from, to), triangles)) = crowded {
+            return Err(WindingError::NonManifold { triangles, from, to });
+        }
+        // The map has no order of its own.
+        edges.pairs.sort_unstable_by_key(|pair| (pair.triangle, pair.other));
+        Ok(edges)
+    }
+}
+
+/// The volume that triangles enclose, negative if they face inwards. Relative to a vertex of theirs.
+fn volume(mesh: &Mesh, triangles: impl IntoIterator<Item = usize>) -> f64 {
+    let origin = mesh.positions.first().copied().unwrap_or_default().as_dvec3();
+    let of = |triangle: usize| {
+        let [a, b, c] =
+            mesh.triangles[triangle].map(|v| mesh.positions[v as usize].as_dvec3() - origin);
+        a.dot(b.cross(c)) / 6.0
+    };
+    triangles.into_iter().map(of).sum()
+}
+
+/// Whether a closed part of a surface winds around a point: by the solid angle of its triangles.
+fn winds(mesh: &Mesh, part: &[usize], point: DVec3) -> bool {
+    let solid_angle = |&triangle: &usize| {
+        let [a, b, c] =
+            mesh.triangles[triangle].map(|v| mesh.positions[v as usize].as_dvec3() - point);
+        let (la, lb, lc) = (a.length(), b.length(), c.length());
+        let volume = a.dot(b.cross(c));
+        2.0 * volume.atan2(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb)
+    };
+    // Half of once around, which is 4 pi.
+    part.iter().map(solid_angle).sum::<f64>().abs() > 2.0 * std::f64::consts::PI
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    fn ball() -> Mesh {
+        crate::generate::heart(320).expect("a valid size").0
+    }
+
+    #[test]
+    fn what_was_turned_is_turned_back() {
+        let good = ball();
+        assert_eq!(check_winding(&good), Ok(()));
+        let mut mesh = good.clone();
+        for triangle in [3, 4, 77] {
+            mesh.triangles[triangle].swap(1, 2);
+        }
+        assert!(matches!(check_winding(&mesh), Err(WindingError::Inconsistent { .. })));
+        assert_eq!(orient(&mut mesh), Ok(3));
+        assert_eq!(mesh, good);
+        mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+        assert_eq!(check_winding(&mesh), Err(WindingError::Inward));
+        assert_eq!(orient(&mut mesh), Ok(good.triangles.len()));
+        assert_eq!(check_winding(&mesh), Ok(()));
+    }
+
+    #[test]
+    fn a_hole_faces_into_itself() {
+        let mut mesh = ball();
+        let (vertices, triangles) = (mesh.positions.len() as u32, mesh.triangles.clone());
+        let middle = mesh.positions.iter().sum::<Vec3>() / vertices as f32;
+        let small = Mesh {
+            positions: vec![middle, middle + Vec3::X, middle + Vec3::Y, middle + Vec3::Z],
+            ..Mesh::default()
+        };
+        mesh.positions.extend(&small.positions);
+        for corners in [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]] {
+            mesh.triangles.push(corners.map(|corner| corner + vertices));
+        }
+        let outer = winds(&mesh, &(0..triangles.len()).collect::<Vec<_>>(), middle.as_dvec3());
+        assert_eq!(orient(&mut mesh), Ok(if outer { 4 } else { 0 }));
+    }
+
+    #[test]
+    fn a_moebius_strip_and_a_fin_are_refused() {
+        let ring = |i: u32| (2 * (i % 5), 2 * (i % 5) + 1);
+        let mut strip = Mesh { positions: vec![Vec3::ZERO; 10], triangles: Vec::new() };
+        for i in 0..5 {
+            let ((a, b), (c, d)) = (ring(i), ring(i + 1));
+            let (c, d) = if i == 4 { (d, c) } else { (c, d) };
+            strip.triangles.extend([[a, b, c], [b, d, c]]);
+        }
+        let before = strip.clone();
+        assert!(matches!(orient(&mut strip), Err(WindingError::OneSided { .. })));
+        assert_eq!(strip, before);
+        let mut fin = ball();
+        let [a, b, _] = fin.triangles[0];
+        let tip = fin.positions.len() as u32;
+        fin.positions.push(Vec3::splat(500.0));
+        fin.triangles.push([a, b, tip]);
+        let error = check_winding(&fin).expect_err("three triangles at an edge");
+        assert!(matches!(error, WindingError::NonManifold { triangles: 3, .. }), "{error}");
+    }
+}

@@ -1,0 +1,69 @@
+//! Contacts as inequalities on the tool's velocity.
+
+use glam::Vec3;
+
+use crate::query::Contact;
+
+/// One inequality on the tool's velocity: `linear . v + angular . w >= least`, with `v`, the velocity of a point of
+/// the tool (mm/s), and `w`, the tool's angular velocity (1/s).
+///
+/// A vector field inequality (Marinho et al., IEEE T-RO 2019) that also knows the surface's own velocity. With it, a
+/// contact's separation falls towards `stand_off` no faster than exponentially, at a rate of `gain`; below, it has to
+/// grow. Plain arrays, for any solver of quadratic programs.
+///
+/// ```
+/// use dibs_build::{Builder, generate};
+/// use dibs_nostd::constraint::VelocityRow;
+/// use dibs_nostd::{Contacts, Options, Query, Sphere, Tree, glam::Vec3};
+///
+/// let (heart, _) = generate::heart(1_000)?;
+/// let built = Builder::new().build(&heart)?;
+/// let tree = Tree::<u16>::from_bytes(built.blob())?;
+/// let rows = built.to_rows(&heart.positions);
+/// let mut query = Query::<_, 32>::new(&tree)?;
+/// let mut contacts = Contacts::<8>::new();
+/// let tool = Sphere::new(Vec3::new(-60.0, 0.0, 20.0), 2.5)?;
+/// query.contacts(rows.as_slice(), &tool, 50.0, &Options::new(), &mut contacts)?;
+/// for contact in contacts.iter() {
+///     let row = VelocityRow::new(contact, contacts.accuracy(), tool.center(), 1.0, 20.0);
+///     let away = Vec3::from(row.linear) * row.least;
+///     assert!(row.allows(away * 1.001, Vec3::ZERO));
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub struct VelocityRow {
+    /// Factors of the linear velocity: the contact's normal.
+    pub linear: [f32; 3],
+    /// Factors of the angular velocity (mm): the lever arm's product with the normal.
+    pub angular: [f32; 3],
+    /// What the sum has to reach (mm/s).
+    pub least: f32,
+}
+
+impl VelocityRow {
+    /// The row of a contact whose separation is within `accuracy` (mm), for the velocity of the tool at `origin`, a
+    /// `stand_off` (mm) and a `gain` (1/s).
+    ///
+    /// Cost: some tens of f32 operations.
+    #[must_use]
+    pub fn new(contact: &Contact, accuracy: f32, origin: Vec3, stand_off: f32, gain: f32) -> Self {
+        let normal = contact.normal;
+        let lever = contact.point_on_tool - origin;
+        let left = contact.separation - accuracy - stand_off;
+        Self {
+            linear: normal.to_array(),
+            angular: lever.cross(normal).to_array(),
+            least: normal.dot(contact.velocity) - gain * left,
+        }
+    }
+
+    /// Whether a velocity keeps to it.
+    #[must_use]
+    pub fn allows(&self, linear: Vec3, angular: Vec3) -> bool {
+        Vec3::from_array(self.linear).dot(linear) + Vec3::from_array(self.angular).dot(angular)
+            >= self.least
+    }
+}

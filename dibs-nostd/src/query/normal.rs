@@ -1,0 +1,236 @@
+//! Normals of the surface as it is now, at a face, an edge or a vertex: where a closest point may be.
+//!
+//! The sign of `(p - c) . n` tells the side of a point `p` whose closest point is `c`, if `n` is the angle-weighted
+//! pseudonormal there (Bærentzen & Aanæs, "Signed distance computation using the angle weighted pseudonormal",
+//! IEEE TVCG 11(3), 2005).
+
+use core::f32::consts::{FRAC_PI_2, PI};
+
+use glam::Vec3;
+
+use crate::math::sqrt::sqrt;
+use crate::{Index, Tree, VertexTable};
+
+/// Most triangles around a vertex.
+const MAX_RING: u32 = 256;
+
+/// Square of the sine below which two edges span no clear plane in f32.
+const FLAT: f32 = 1.0 / 1_048_576.0;
+
+/// The same in f64.
+const FLAT_DOUBLE: f64 = 1e-18;
+
+/// Squares of lengths below this lose their digits.
+const TINY: f32 = 1e-30;
+
+/// Where on a triangle a point is. Edge `e` leads from corner `e` to the next one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Feature {
+    Face,
+    Edge(u32),
+    Vertex(u32),
+}
+
+/// A pseudonormal, not of unit length.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pseudonormal {
+    pub vector: Vec3,
+    /// Sum of the weights of the unit normals that were added up: what rounding is relative to.
+    pub weight: f32,
+}
+
+/// Why there is no pseudonormal.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum NoNormal {
+    /// The feature is on an open boundary.
+    Open,
+    /// A triangle there has no area, or too many meet.
+    Unclear,
+    /// A row outside its table.
+    Corrupt(u32),
+}
+
+impl Feature {
+    /// The feature within `tolerance` of a point of a triangle: a corner rather than an edge, an edge rather than
+    /// the face.
+    pub fn of(corners: &[Vec3; 3], point: Vec3, tolerance: f32) -> Self {
+        let [a, b, c] = *corners;
+        let near = tolerance * tolerance;
+        for (corner, position) in (0..).zip([a, b, c]) {
+            if point.distance_squared(position) <= near {
+                return Self::Vertex(corner);
+            }
+        }
+        let (mut nearest, mut feature) = (near, Self::Face);
+        for (edge, from, to) in [(0, a, b), (1, b, c), (2, c, a)] {
+            let along = to - from;
+            let squared = along.length_squared();
+            let across = (point - from).cross(along).length_squared();
+            if across <= nearest * squared && squared > TINY {
+                nearest = across / squared;
+                feature = Self::Edge(edge);
+            }
+        }
+        feature
+    }
+
+    /// The pseudonormal of a feature of a triangle.
+    ///
+    /// Cost: one normal of a face, two of an edge, at most [`MAX_RING`] of a vertex; about 150 instructions each.
+    pub fn pseudonormal<I: Index, V: VertexTable + ?Sized>(
+        self,
+        tree: &Tree<'_, I>,
+        vertices: &V,
+        triangle: u32,
+    ) -> Result<Pseudonormal, NoNormal> {
+        let at = |row| corners(tree, vertices, row);
+        match self {
+            Self::Face => Ok(Pseudonormal { vector: normal(&at(triangle)?)?.0, weight: 1.0 }),
+            Self::Edge(edge) => {
+                let (other, _) = tree.across(triangle, edge).ok_or(NoNormal::Open)?;
+                let vector = normal(&at(triangle)?)?.0 + normal(&at(other)?)?.0;
+                Ok(Pseudonormal { vector, weight: 2.0 })
+            }
+            Self::Vertex(corner) => {
+                let mut sum = Pseudonormal { vector: Vec3::ZERO, weight: 0.0 };
+                let (mut row, mut corner) = (triangle, corner);
+                for _ in 0..MAX_RING {
+                    let fan = turned(at(row)?, corner);
+                    let (unit, area) = normal(&fan)?;
+                    let [centre, from, to] = fan;
+                    let weight = angle(area, (from - centre).dot(to - centre));
+                    sum.vector += weight * unit;
+                    sum.weight += weight;
+                    let (next, back) = tree.across(row, corner).ok_or(NoNormal::Open)?;
+                    if next == triangle {
+                        return Ok(sum);
+                    }
+                    (row, corner) = (next, if back == 2 { 0 } else { back + 1 });
+                }
+                Err(NoNormal::Unclear)
+            }
+        }
+    }
+}
+
+/// The current positions of a triangle's corners.
+pub(super) fn corners<I: Index, V: VertexTable + ?Sized>(
+    tree: &Tree<'_, I>,
+    vertices: &V,
+    row: u32,
+) -> Result<[Vec3; 3], NoNormal> {
+    let [a, b, c] = tree.triangle(row).ok_or(NoNormal::Corrupt(row))?;
+    let position = |vertex| vertices.position(vertex).ok_or(NoNormal::Corrupt(vertex));
+    Ok([position(a)?, position(b)?, position(c)?])
+}
+
+/// The corners in their order, from one of them on.
+fn turned([a, b, c]: [Vec3; 3], first: u32) -> [Vec3; 3] {
+    match first {
+        0 => [a, b, c],
+        1 => [b, c, a],
+        _ => [c, a, b],
+    }
+}
+
+/// The unit normal of a triangle, and twice its area.
+fn normal(corners: &[Vec3; 3]) -> Result<(Vec3, f32), NoNormal> {
+    let [a, b, c] = *corners;
+    let (ab, ac) = (b - a, c - a);
+    let across = ab.cross(ac);
+    let squared = across.length_squared();
+    if squared > FLAT * ab.length_squared() * ac.length_squared() && squared > TINY {
+        let area = sqrt(squared);
+        return Ok((across / area, area));
+    }
+    flat_normal(corners)
+}
+
+/// [`normal`] of a triangle so flat or small that f32 would not do.
+#[cold]
+#[inline(never)]
+fn flat_normal(corners: &[Vec3; 3]) -> Result<(Vec3, f32), NoNormal> {
+    let [a, b, c] = corners.map(|corner| corner.to_array().map(f64::from));
+    let (ab, ac) = (minus(b, a), minus(c, a));
+    let [x, y, z] = cross(ab, ac);
+    let mut largest = 0.0;
+    for size in [x.abs(), y.abs(), z.abs()] {
+        if size > largest {
+            largest = size;
+        }
+    }
+    // Written so that NaN has no normal.
+    let is_clear = squared([x, y, z]) > FLAT_DOUBLE * squared(ab) * squared(ac);
+    let scaled = Vec3::new((x / largest) as f32, (y / largest) as f32, (z / largest) as f32);
+    let length = sqrt(scaled.length_squared());
+    let area = largest as f32 * length;
+    if is_clear && area > 0.0 && area.is_finite() {
+        Ok((scaled / length, area))
+    } else {
+        Err(NoNormal::Unclear)
+    }
+}
+
+fn minus([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    [a - x, b - y, c - z]
+}
+
+fn cross([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    [b * z - c * y, c * x - a * z, a * y - b * x]
+}
+
+fn squared([x, y, z]: [f64; 3]) -> f64 {
+    x * x + y * y + z * z
+}
+
+/// The angle, 0 to pi, of a sine above 0 and a cosine, both times the same length. Within 1e-6.
+fn angle(sine: f32, cosine: f32) -> f32 {
+    let flank = cosine.abs();
+    let acute =
+        if sine < flank { arctangent(sine / flank) } else { FRAC_PI_2 - arctangent(flank / sine) };
+    if cosine < 0.0 { PI - acute } else { acute }
+}
+
+/// The arctangent of 0 to 1: Abramowitz & Stegun 4.4.49, within 2e-8 but for rounding.
+fn arctangent(x: f32) -> f32 {
+    const TERMS: [f32; 8] = [
+        0.002_866_225_7,
+        -0.016_165_737,
+        0.042_909_614,
+        -0.075_289_64,
+        0.106_562_64,
+        -0.142_088_99,
+        0.199_935_51,
+        -0.333_331_45,
+    ];
+    let squared = x * x;
+    let series = TERMS.iter().fold(0.0, |sum, term| (sum + term) * squared);
+    x + x * series
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_are_those_of_f64() {
+        for step in 1..10_000 {
+            let truth = f64::from(step) * core::f64::consts::PI / 10_000.0;
+            let found = angle((3.0 * truth.sin()) as f32, (3.0 * truth.cos()) as f32);
+            assert!((f64::from(found) - truth).abs() < 1e-6, "{found} for {truth}");
+        }
+    }
+
+    #[test]
+    fn a_sliver_has_the_normal_that_f64_says() {
+        for height in [1e-3, 1e-5, 1e-6] {
+            let corners =
+                [Vec3::new(1.0, 2.0, 0.0), Vec3::new(9.0, 2.0, 0.0), Vec3::new(5.0, 2.0, height)];
+            let (unit, area) = normal(&corners).expect("it has an area");
+            assert!((unit - Vec3::NEG_Y).length() < 1e-6, "{unit}");
+            assert!((area / (8.0 * height) - 1.0).abs() < 1e-6, "{area}");
+        }
+        assert!(normal(&[Vec3::ZERO, Vec3::X, Vec3::X * 3.0]).is_err());
+        assert!(normal(&[Vec3::ZERO, Vec3::X, Vec3::NAN]).is_err());
+    }
+}

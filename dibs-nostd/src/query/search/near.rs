@@ -1,0 +1,105 @@
+//! All triangles within a distance, instead of the closest.
+
+use super::{Search, Waiting};
+use crate::math::sqrt::sqrt;
+use crate::tool::Tool;
+use crate::tree::format::Link;
+use crate::unavailable::QueryError;
+use crate::{Index, VertexTable};
+
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
+    /// Visits every triangle within `limit` of the axis, with the square of its distance. A visit returns the limit
+    /// from then on. What is left unvisited is at least as far as the distance returned.
+    pub fn each_within(
+        mut self,
+        limit: f32,
+        mut visit: impl FnMut(u32, f32) -> f32,
+    ) -> Result<f32, QueryError> {
+        self.set_limit(limit);
+        while let Some(top) = self.waiting.checked_sub(1) {
+            self.waiting = top;
+            let &Waiting { lower, link } =
+                self.stack.get(top).ok_or(QueryError::Corrupt { row: top as u32 })?;
+            if lower > self.cutoff {
+                continue;
+            }
+            let (first, count, is_leaf) = match Link::decode(link) {
+                Link::Children { first, count } => (first, count, false),
+                Link::Leaf { first, count } => (first, count, true),
+            };
+            let Some(left) = self.left.node_tests.checked_sub(count) else {
+                return Ok(self.least_waiting(lower));
+            };
+            self.left.node_tests = left;
+            let is_done = if is_leaf {
+                self.visit_leaf(first, count, &mut visit)?
+            } else {
+                self.wait_for_children(lower, first, count)?;
+                true
+            };
+            if !is_done {
+                return Ok(self.least_waiting(lower));
+            }
+        }
+        Ok(f32::INFINITY)
+    }
+
+    fn set_limit(&mut self, limit: f32) {
+        self.cutoff = limit + self.slack;
+        self.cutoff_squared = self.cutoff * self.cutoff;
+    }
+
+    fn wait_for_children(&mut self, parent: f32, first: u32, count: u32) -> Result<(), QueryError> {
+        let corrupt = QueryError::Corrupt { row: first };
+        let tree = self.tree;
+        let base = self.waiting;
+        for node in tree.records(first, count).ok_or(corrupt)? {
+            let position = self.position(node.pin)?;
+            let radius = node.radius_code as f32 * self.radius_scale;
+            let normal = self.tool.axis_to(position);
+            let squared = normal.dot(normal);
+            let far = self.cutoff + radius;
+            // What is not a number is not far: the leaves below find out what it is.
+            if squared > far * far {
+                continue;
+            }
+            let distance = sqrt(squared);
+            if let Link::Leaf { first, count } = Link::decode(node.link) {
+                let plane = self.plane_across(normal, position, distance);
+                if plane.beyond(tree, self.vertices, first, count).ok_or(corrupt)? == count {
+                    continue;
+                }
+            }
+            let own = distance - radius;
+            let lower = if own > parent { own } else { parent };
+            self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;
+        }
+        Ok(())
+    }
+
+    /// Whether the budget lasted.
+    fn visit_leaf(
+        &mut self,
+        first: u32,
+        count: u32,
+        visit: &mut impl FnMut(u32, f32) -> f32,
+    ) -> Result<bool, QueryError> {
+        for triangle in first..first.saturating_add(count) {
+            let [a, b, c] = self.corners(triangle)?;
+            let plane = self.plane_towards((a + b + c) * super::THIRD);
+            if plane.has_beyond(a) && plane.has_beyond(b) && plane.has_beyond(c) {
+                continue;
+            }
+            if plane.limit.is_nan() {
+                return Err(QueryError::Position { vertex: self.not_finite(triangle) });
+            }
+            let Some(left) = self.left.triangle_tests.checked_sub(1) else { return Ok(false) };
+            self.left.triangle_tests = left;
+            if let Some(pair) = self.tool.closest_on_triangle(&[a, b, c], self.cutoff_squared) {
+                let limit = visit(triangle, pair.distance_squared);
+                self.set_limit(limit);
+            }
+        }
+        Ok(true)
+    }
+}

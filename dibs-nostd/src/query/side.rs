@@ -1,0 +1,134 @@
+//! On which side of the surface a point is.
+
+use core::fmt;
+
+use glam::Vec3;
+
+use super::Proximity;
+use super::normal::{Feature, NoNormal, corners};
+use crate::math::sqrt::sqrt;
+use crate::unavailable::QueryError;
+use crate::{Index, Tree, VertexTable};
+
+/// On which side of the surface a tool's axis is. The outer side is where the triangles' corners are seen counter-
+/// clockwise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Side {
+    /// The axis is outside.
+    Outside,
+    /// The whole axis is inside.
+    Inside,
+    /// The axis crosses the surface.
+    Crossing,
+    /// There is no answer. Separations are then those of a tool outside.
+    Undefined(NoSide),
+}
+
+/// Why a tool is on no side of the surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum NoSide {
+    /// [`Options::unsigned`](crate::Options::unsigned): nobody asked.
+    NotAsked,
+    /// The tree has no adjacency: it was built without, or from a surface that has no sides.
+    NoAdjacency,
+    /// The closest point is on an open boundary of the surface.
+    OpenBoundary,
+    /// The axis is closer to the surface, or to a tie between its features, than the accuracy tells apart.
+    BelowAccuracy,
+    /// A triangle at the closest point has no area, or more than 256 meet there.
+    Degenerate,
+    /// The budget ran out before the closest point was certain.
+    CutShort,
+}
+
+impl fmt::Display for NoSide {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NotAsked => "no side was asked for",
+            Self::NoAdjacency => "the tree has no adjacency",
+            Self::OpenBoundary => "the closest point is on an open boundary",
+            Self::BelowAccuracy => "the sides are closer than the accuracy",
+            Self::Degenerate => "the triangles at the closest point have no clear normal",
+            Self::CutShort => "the budget ran out",
+        })
+    }
+}
+
+impl core::error::Error for NoSide {}
+
+/// Rounding of a coordinate and of a few operations on it, relative to its size.
+const COORDINATES: f32 = 4.0 / 16_777_216.0;
+
+/// Rounding of a pseudonormal, relative to the sum of its weights.
+const NORMAL: f32 = 1e-5;
+
+/// Within this many accuracies the difference of two points tells their direction badly: the pseudonormal does.
+const NEAR: f32 = 8.0;
+
+/// A point's side, and the unit vector that leads out; zero where no normal is known.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PointSide {
+    pub side: Side,
+    pub outward: Vec3,
+}
+
+/// The side of an axis' point whose closest point of the surface is known.
+///
+/// # Why a near tie is no wrong side
+/// Say the distance `d` is within `e` of the truth. A ball of radius `d - e` around the point holds no point of
+/// the surface, so along any straight line of the surface from the closest point found, the direction to the
+/// point is within an angle of `sqrt(2 e / d)` of the normal cone, whichever of several features that are equally
+/// close up to `e` was found. A pseudonormal has no negative product with any direction of its feature's normal
+/// cone. So a product farther from zero than that angle's has the right sign, and any other has none.
+pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
+    tree: &Tree<'_, I>,
+    vertices: &V,
+    pair: &Proximity,
+    on_axis: Vec3,
+) -> Result<PointSide, QueryError> {
+    let undefined = |reason, outward| Ok(PointSide { side: Side::Undefined(reason), outward });
+    let Some(triangle) = pair.triangle else {
+        return undefined(NoSide::CutShort, Vec3::ZERO);
+    };
+    let point = pair.point_on_surface;
+    let error = pair.accuracy + COORDINATES * point.abs().max_element();
+    let found = corners(tree, vertices, triangle).and_then(|corners| {
+        Feature::of(&corners, point, error).pseudonormal(tree, vertices, triangle)
+    });
+    let normal = match found {
+        Ok(normal) => normal,
+        Err(NoNormal::Open) => return undefined(NoSide::OpenBoundary, Vec3::ZERO),
+        Err(NoNormal::Unclear) => return undefined(NoSide::Degenerate, Vec3::ZERO),
+        Err(NoNormal::Corrupt(row)) => return Err(QueryError::Corrupt { row }),
+    };
+    let length = sqrt(normal.vector.length_squared());
+    let unit = normal.vector / length;
+    let is_known = length > NORMAL * normal.weight;
+    let unit = if is_known { unit } else { Vec3::ZERO };
+    let distance = pair.axis_distance;
+    if !(distance > 2.0 * error) {
+        return undefined(NoSide::BelowAccuracy, unit);
+    }
+    let towards = on_axis - point;
+    let height = towards.dot(normal.vector);
+    let doubt = sqrt(2.0 * error * distance) * length + NORMAL * distance * normal.weight;
+    let side = if height > doubt {
+        Side::Outside
+    } else if height < -doubt {
+        Side::Inside
+    } else {
+        return undefined(NoSide::BelowAccuracy, unit);
+    };
+    let is_near = distance <= NEAR * error && is_known;
+    let apart = sqrt(towards.length_squared());
+    let outward = match side {
+        _ if is_near || !(apart > 0.0) => unit,
+        Side::Inside => -towards / apart,
+        _ => towards / apart,
+    };
+    Ok(PointSide { side, outward })
+}

@@ -1,0 +1,114 @@
+//! Which triangle is across an edge: three neighbours a triangle.
+//!
+//! A row of 16-bit codes holds the low 16 bits of its neighbours' rows. An orientable surface has every directed
+//! edge once, so of the few rows with those bits the neighbour is the one that has the edge the other way round.
+//! A border edge has the largest code, and no such row.
+
+use super::{FormatError, Tree, format};
+use crate::Index;
+
+/// Most triangles of a 16-bit tree with adjacency: rows that share their low 16 bits are then at most four.
+pub(crate) const MAX_NARROW_TRIANGLES: u32 = 1 << 18;
+
+impl<I: Index> Tree<'_, I> {
+    /// Whether the tree knows its triangles' neighbours, so that its surface has sides.
+    #[must_use]
+    pub const fn has_adjacency(&self) -> bool {
+        !self.sections.adjacency.is_empty()
+    }
+
+    /// The triangle across an edge: 0 leads from the first corner to the second, 1 to the third, 2 back to the
+    /// first. `None` at a border, outside the table, or where the tree has no adjacency.
+    ///
+    /// Cost: one or two triangle rows read, at most four.
+    #[must_use]
+    pub const fn neighbour(&self, triangle: u32, edge: u32) -> Option<u32> {
+        match self.across(triangle, edge) {
+            Some((row, _)) => Some(row),
+            None => None,
+        }
+    }
+
+    /// The triangle across an edge, and which of its edges that is.
+    #[inline]
+    pub(crate) const fn across(&self, triangle: u32, edge: u32) -> Option<(u32, u32)> {
+        let Some(code) = format::neighbour_code::<I>(self.sections.adjacency, triangle, edge)
+        else {
+            return None;
+        };
+        let Some(corners) = self.triangle(triangle) else { return None };
+        let (from, to) = edge_of(corners, edge);
+        let mut row = code;
+        while row < self.header.triangles {
+            if let Some(other) = self.triangle(row)
+                && let Some(back) = edge_between(other, to, from)
+            {
+                return Some((row, back));
+            }
+            // A 32-bit code is the row itself.
+            if I::BYTES > 2 {
+                return None;
+            }
+            row += 1 << 16;
+        }
+        None
+    }
+}
+
+/// Both ends of an edge of a triangle.
+const fn edge_of([a, b, c]: [u32; 3], edge: u32) -> (u32, u32) {
+    match edge {
+        0 => (a, b),
+        1 => (b, c),
+        _ => (c, a),
+    }
+}
+
+/// Which edge of a triangle leads from one vertex to another.
+const fn edge_between([a, b, c]: [u32; 3], from: u32, to: u32) -> Option<u32> {
+    if a == from && b == to {
+        Some(0)
+    } else if b == from && c == to {
+        Some(1)
+    } else if c == from && a == to {
+        Some(2)
+    } else {
+        None
+    }
+}
+
+/// Whether every neighbour is there, and has this triangle for its own: turning around a vertex then comes back
+/// to where it began, or ends at a border.
+pub(super) const fn check<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatError> {
+    let triangles = tree.header.triangles;
+    if !tree.has_adjacency() {
+        return Ok(());
+    }
+    if I::BYTES == 2 && triangles > MAX_NARROW_TRIANGLES {
+        return Err(FormatError::Section { kind: format::section::ADJACENCY });
+    }
+    let mut triangle = 0;
+    while triangle < triangles {
+        let mut edge = 0;
+        while edge < 3 {
+            let is_right = match tree.across(triangle, edge) {
+                Some((row, back)) => match tree.neighbour(row, back) {
+                    Some(this) => this == triangle && row != triangle,
+                    None => false,
+                },
+                None => {
+                    match format::neighbour_code::<I>(tree.sections.adjacency, triangle, edge) {
+                        Some(code) => code == format::no_neighbour::<I>(),
+                        None => false,
+                    }
+                }
+            };
+            if !is_right {
+                return Err(FormatError::Neighbour { triangle, edge });
+            }
+            edge += 1;
+        }
+        triangle += 1;
+    }
+    Ok(())
+}

@@ -1,0 +1,140 @@
+//! The truth about sides, in f64: generalised winding numbers, pseudonormals, and signed separations.
+
+use glam::{DVec3, Vec3};
+
+use crate::oracle::{Instrument, OraclePair, exhaustive};
+
+/// How often a surface winds around a point: 1 inside a closed surface that faces outwards, 0 outside.
+///
+/// The sum of the triangles' solid angles (van Oosterom & Strackee 1983; Jacobson et al. 2013).
+#[must_use]
+pub fn winding_number(positions: &[Vec3], triangles: &[[u32; 3]], point: DVec3) -> f64 {
+    let solid_angle = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|v| positions[v as usize].as_dvec3() - point);
+        let (la, lb, lc) = (a.length(), b.length(), c.length());
+        let volume = a.dot(b.cross(c));
+        2.0 * volume.atan2(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb)
+    };
+    triangles.iter().map(solid_angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
+}
+
+/// Whether a point is inside a closed surface; `None` where the winding number is neither 0 nor 1, because the
+/// surface cuts itself or the point lies on it.
+#[must_use]
+pub fn is_inside(positions: &[Vec3], triangles: &[[u32; 3]], point: DVec3) -> Option<bool> {
+    let winding = winding_number(positions, triangles, point);
+    if winding.abs() < 0.1 {
+        Some(false)
+    } else if (winding - 1.0).abs() < 0.1 {
+        Some(true)
+    } else {
+        None
+    }
+}
+
+/// How far inside a closed surface a point is, negative outside; `None` where the sides are not clear.
+#[must_use]
+pub fn depth(positions: &[Vec3], triangles: &[[u32; 3]], point: Vec3) -> Option<f64> {
+    let nearest = exhaustive(positions, triangles, &Instrument::sphere(point, 0.0))?;
+    let inside = is_inside(positions, triangles, point.as_dvec3())?;
+    Some(if inside { nearest.axis_distance } else { -nearest.axis_distance })
+}
+
+/// The side of the nearest sheet: the sign of the angle-weighted pseudonormal at the closest point, by looking at all
+/// triangles. It differs from [`is_inside`] only where the surface cuts itself.
+///
+/// # Panics
+/// If there is no triangle.
+#[must_use]
+pub fn is_below(positions: &[Vec3], triangles: &[[u32; 3]], point: Vec3) -> bool {
+    let nearest = exhaustive(positions, triangles, &Instrument::sphere(point, 0.0));
+    let nearest = nearest.expect("has triangles");
+    let corners = |triangle: [u32; 3]| triangle.map(|v| positions[v as usize].as_dvec3());
+    let is_at = |p: DVec3| p.distance(nearest.on_surface) < 1e-9;
+    let row = triangles[nearest.triangle];
+    let vertex = (0..3).find(|&i| is_at(corners(row)[i])).map(|i| row[i]);
+    let on_edge = |a: DVec3, b: DVec3| is_at(a + (b - a) * along(a, b, nearest.on_surface));
+    let edge = (0..3).map(|i| (i, (i + 1) % 3));
+    let edge = edge.into_iter().find(|&(i, j)| on_edge(corners(row)[i], corners(row)[j]));
+    let mut sum = DVec3::ZERO;
+    for (number, &triangle) in triangles.iter().enumerate() {
+        let [a, b, c] = corners(triangle);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let weight = match (vertex, edge) {
+            (Some(vertex), _) => {
+                let Some(at) = triangle.iter().position(|&v| v == vertex) else { continue };
+                let [centre, from, to] = [a, b, c, a, b][at..at + 3] else { unreachable!() };
+                (from - centre).angle_between(to - centre)
+            }
+            (None, Some((i, j))) => {
+                f64::from(u8::from(triangle.contains(&row[i]) && triangle.contains(&row[j])))
+            }
+            (None, None) => f64::from(u8::from(number == nearest.triangle)),
+        };
+        sum += normal * weight;
+    }
+    (point.as_dvec3() - nearest.on_surface).dot(sum) < 0.0
+}
+
+/// Where a point is nearest to on the segment from `a` (0) to `b` (1).
+fn along(a: DVec3, b: DVec3, point: DVec3) -> f64 {
+    ((point - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0)
+}
+
+/// The signed separation of a tool whose axis does not cross a closed surface, given its unsigned closest pair.
+#[must_use]
+pub fn separation(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    tool: &Instrument,
+    pair: &OraclePair,
+) -> Option<f64> {
+    let inside = is_inside(positions, triangles, pair.on_axis)?;
+    let signed = if inside { -pair.axis_distance } else { pair.axis_distance };
+    Some(signed - f64::from(tool.radius))
+}
+
+/// An interval that holds the signed separation of a tool whose axis crosses a closed surface, from the depths of
+/// so many points of it.
+#[must_use]
+pub fn crossing_separation(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    tool: &Instrument,
+    points: u32,
+) -> Option<(f64, f64)> {
+    let mut deepest = 0.0;
+    for step in 0..=points {
+        let at = tool.start.lerp(tool.end, step as f32 / points as f32);
+        let nearest = exhaustive(positions, triangles, &Instrument::sphere(at, 0.0))?;
+        // Only what is deeper than all before needs a side.
+        if nearest.axis_distance > deepest && is_inside(positions, triangles, at.as_dvec3())? {
+            deepest = nearest.axis_distance;
+        }
+    }
+    // Depth changes by at most the way along the axis.
+    let between = f64::from(tool.start.distance(tool.end)) / f64::from(points) / 2.0;
+    let radius = f64::from(tool.radius);
+    Some((-radius - deepest - between, -radius - deepest))
+}
+
+/// An interval that holds the signed separation of any tool from a closed surface: both that of a tool that crosses
+/// and of one that does not where the axis is within `accuracy` of the surface, both sides where it cuts itself.
+#[must_use]
+pub fn signed_separation(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    tool: &Instrument,
+    pair: &OraclePair,
+    accuracy: f64,
+) -> (f64, f64) {
+    const POINTS: u32 = 8;
+    let (distance, radius) = (pair.axis_distance, f64::from(tool.radius));
+    if distance > accuracy {
+        let found = separation(positions, triangles, tool, pair).map(|x| (x, x));
+        return found.unwrap_or((-distance - radius, distance - radius));
+    }
+    let length = f64::from(tool.start.distance(tool.end));
+    let crossing = crossing_separation(positions, triangles, tool, POINTS);
+    (crossing.map_or(-radius - length, |(low, _)| low), -radius)
+}

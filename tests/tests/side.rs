@@ -1,0 +1,415 @@
+//! Sides and signed separations against f64: generalised winding numbers, exhaustive search, dense sampling.
+//!
+//! `DIBS_POSES=1000000` asks for as many poses as that.
+
+use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
+use dibs_nostd::format::{CRC, MAX_STACK};
+use dibs_nostd::{
+    Budget, Capsule, FormatError, NoSide, Options, Proximity, Query, Side, Sphere, Tool, Tree,
+};
+use dibs_tests::oracle::{Instrument, exhaustive};
+use dibs_tests::sides;
+use dibs_tests::surfaces::{self, ball, slivers};
+use fastrand::Rng;
+use glam::Vec3;
+
+/// Poses in all.
+fn poses() -> usize {
+    let asked = std::env::var("DIBS_POSES").ok().map(|n| n.parse().expect("a number of poses"));
+    asked.unwrap_or(if cfg!(debug_assertions) { 400 } else { 10_000 })
+}
+
+struct Closed {
+    name: &'static str,
+    mesh: Mesh,
+    built: BuiltTree,
+    /// Of the poses.
+    share: usize,
+}
+
+fn closed() -> Vec<Closed> {
+    let mut all = vec![
+        ("generated heart", generate::heart(320).expect("a valid size").0, 6),
+        ("generated heart, finer", generate::heart(2_000).expect("a valid size").0, 4),
+        ("generated brain", generate::brain(500).expect("a valid size"), 6),
+        ("ball", ball(2), 4),
+    ];
+    for name in ["heart_10272", "brain_500", "brain_5k"] {
+        let path = format!("{}/../../shared/data/{name}.ply", env!("CARGO_MANIFEST_DIR"));
+        match dibs_build::read(&path) {
+            Ok(import) => all.push((name, import.mesh, 2)),
+            Err(error) => println!("skipped {name}: {error}"),
+        }
+    }
+    let build = |(name, mesh, share): (_, Mesh, _)| {
+        let built = Builder::new().stretch(4.0).build(&mesh).expect("a valid mesh");
+        Closed { name, mesh, built, share }
+    };
+    all.into_iter().map(build).collect()
+}
+
+/// Bends all space, and a surface with it, without folding it: no derivative reaches 1.
+fn bent(mesh: &Mesh, rng: &mut Rng) -> Vec<Vec3> {
+    let mut number = |size: f32| (rng.f32() * 2.0 - 1.0) * size;
+    let scale = Vec3::new(1.0 + number(0.3), 1.0 + number(0.3), 1.0 + number(0.3));
+    let (waves, heights) = (
+        [(); 3].map(|()| Vec3::new(number(0.04), number(0.04), number(0.04))),
+        Vec3::new(number(5.0), number(5.0), number(5.0)),
+    );
+    let [x, y, z] = waves;
+    let bend = |p: &Vec3| {
+        let wave = Vec3::new(x.dot(*p).sin(), y.dot(*p).sin(), z.dot(*p).sin());
+        (*p + heights * wave) * scale
+    };
+    mesh.positions.iter().map(bend).collect()
+}
+
+fn unit(rng: &mut Rng) -> Vec3 {
+    loop {
+        let v = Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5);
+        if v.length_squared() > 0.01 && v.length_squared() < 0.25 {
+            return v.normalize();
+        }
+    }
+}
+
+/// A point next to a vertex, an edge, a face or a sliver, in a fold, or anywhere; and how far off it was put.
+fn point(rows: &[Vec3], triangles: &[[u32; 3]], rng: &mut Rng) -> Vec3 {
+    let [a, b, c] = triangles[rng.usize(..triangles.len())].map(|v| rows[v as usize]);
+    let on_surface = match rng.u32(..3) {
+        0 => a,
+        1 => a.lerp(b, rng.f32()),
+        _ => a.lerp(b, rng.f32()).lerp(c, rng.f32()),
+    };
+    let off = 10_f32.powf(rng.f32() * 6.0 - 4.0);
+    let across = (b - a).cross(c - a).normalize_or_zero() * (if rng.bool() { off } else { -off });
+    match rng.u32(..4) {
+        0 => on_surface + across,
+        1 => on_surface + across + unit(rng) * off,
+        2 => on_surface + unit(rng) * off,
+        _ => on_surface + unit(rng) * 20.0 * rng.f32(),
+    }
+}
+
+/// Decimated until folds touch: these cut themselves here and there.
+const MAY_CUT: [&str; 2] = ["brain_500", "brain_5k"];
+
+#[derive(Default, Debug)]
+struct Tally {
+    poses: usize,
+    inside: usize,
+    undefined: usize,
+    /// Undefined though at least a hundredth of a mm away.
+    undefined_away: usize,
+    away: usize,
+    /// The surface cuts itself there: the side is that of the nearest sheet.
+    self_cut: usize,
+    wrong: usize,
+}
+
+#[test]
+fn no_side_is_wrong_and_few_are_undefined() {
+    let surfaces = closed();
+    let shares: usize = surfaces.iter().map(|surface| surface.share).sum();
+    let mut all = Tally::default();
+    for (seed, surface) in (1..).zip(&surfaces) {
+        let mut rng = Rng::with_seed(seed);
+        let mut tally = Tally::default();
+        let tree = surface.built.tree::<u16>().expect("valid");
+        assert!(tree.has_adjacency(), "{}", surface.name);
+        let triangles = surfaces::triangles(&tree);
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        let count = poses() * surface.share / shares;
+        let mut rows = surface.built.to_rows(&surface.mesh.positions);
+        for number in 0..count {
+            if number % 100 == 99 {
+                rows = surface.built.to_rows(&bent(&surface.mesh, &mut rng));
+            }
+            let at = point(&rows, &triangles, &mut rng);
+            let radius = if rng.bool() { 0.0 } else { 3.0 * rng.f32() };
+            let far = at + unit(&mut rng) * 10.0 * rng.f32();
+            let (tool, found) = if rng.bool() {
+                let sphere = Sphere::new(at, radius).expect("valid");
+                let found = query.closest(rows.as_slice(), &sphere, &Options::new());
+                (Instrument::sphere(at, radius), found)
+            } else {
+                let capsule = Capsule::new(at, far, radius).expect("valid");
+                let found = query.closest(rows.as_slice(), &capsule, &Options::new());
+                (Instrument::capsule(at, far, radius), found)
+            };
+            let found = found.expect("an answer");
+            tally.poses += 1;
+            let pair = exhaustive(&rows, &triangles, &tool).expect("has triangles");
+            if pair.axis_distance == 0.0 {
+                assert!(
+                    matches!(found.side, Side::Crossing | Side::Undefined(NoSide::BelowAccuracy)),
+                    "{}: {tool:?} {found:?}",
+                    surface.name
+                );
+                continue;
+            }
+            tally.away += usize::from(pair.axis_distance > 0.01);
+            let Some(inside) = sides::is_inside(&rows, &triangles, pair.on_axis) else {
+                tally.self_cut += 1;
+                continue;
+            };
+            tally.inside += usize::from(inside);
+            let signed = if inside { -pair.axis_distance } else { pair.axis_distance };
+            let truth = signed - f64::from(radius);
+            let wrong = match found.side {
+                Side::Outside => inside,
+                Side::Inside => !inside,
+                Side::Crossing => pair.axis_distance > f64::from(found.accuracy),
+                Side::Undefined(reason) => {
+                    assert_eq!(reason, NoSide::BelowAccuracy, "{}: {tool:?}", surface.name);
+                    tally.undefined += 1;
+                    tally.undefined_away += usize::from(pair.axis_distance > 0.01);
+                    continue;
+                }
+                other => panic!("{other:?}"),
+            };
+            let off = (f64::from(found.separation) - truth).abs();
+            // What the depth of a crossing axis may be off is its own test's matter.
+            let is_off = found.side != Side::Crossing && off > f64::from(found.accuracy);
+            let may_cut = MAY_CUT.contains(&surface.name);
+            if wrong
+                && may_cut
+                && inside != sides::is_below(&rows, &triangles, pair.on_axis.as_vec3())
+            {
+                tally.self_cut += 1;
+                continue;
+            }
+            if wrong || is_off {
+                tally.wrong += 1;
+                println!("{}: {tool:?} inside: {inside}, off {off}, {found:?}", surface.name);
+            }
+        }
+        println!("{:24} {tally:?}", surface.name);
+        all.poses += tally.poses;
+        all.away += tally.away;
+        all.undefined_away += tally.undefined_away;
+        all.self_cut += tally.self_cut;
+        all.wrong += tally.wrong;
+    }
+    assert_eq!(all.wrong, 0, "{all:?}");
+    assert!(all.undefined_away * 1000 < all.away, "{all:?}");
+    assert!(all.self_cut * 100 < all.poses, "{all:?}");
+}
+
+#[test]
+fn depths_are_those_of_dense_sampling() {
+    const POINTS: u32 = 120;
+    let surfaces = closed();
+    let count = poses() / 60;
+    let (mut crossing, mut wide, mut searches) = (0, 0, 0_u64);
+    for (seed, surface) in (1..).zip(surfaces.iter().filter(|s| s.mesh.triangles.len() < 1_000)) {
+        let mut rng = Rng::with_seed(seed);
+        let tree = surface.built.tree::<u16>().expect("valid");
+        let triangles = surfaces::triangles(&tree);
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        for _ in 0..count / 4 {
+            let rows = surface.built.to_rows(&bent(&surface.mesh, &mut rng));
+            let at = point(&rows, &triangles, &mut rng);
+            let far = at + unit(&mut rng) * 60.0 * rng.f32();
+            let radius = 2.0 * rng.f32();
+            let capsule = Capsule::new(at, far, radius).expect("valid");
+            let tool = Instrument::capsule(at, far, radius);
+            let found = query.closest(rows.as_slice(), &capsule, &Options::new());
+            let found = found.expect("an answer");
+            if found.side != Side::Crossing {
+                continue;
+            }
+            crossing += 1;
+            searches += u64::from(found.node_tests);
+            let truth = sides::crossing_separation(&rows, &triangles, &tool, POINTS);
+            let Some((low, high)) = truth else { continue };
+            let accuracy = f64::from(found.accuracy);
+            let (lower, upper) = (f64::from(found.lower), f64::from(found.separation));
+            assert!(lower <= high + accuracy, "{}: {tool:?} {found:?} {high}", surface.name);
+            assert!(upper >= low - accuracy, "{}: {tool:?} {found:?} {low}", surface.name);
+            // The depth stated is that of the point stated.
+            let deepest = capsule.axis_point(found.axis_parameter);
+            let depth = sides::depth(&rows, &triangles, deepest).expect("a clear side");
+            let stated = -upper - f64::from(radius);
+            let off = (depth.max(0.0) - stated).abs();
+            assert!(stated == 0.0 || off <= accuracy, "{}: off {off} {found:?}", surface.name);
+            let tolerance = capsule.axis_length() / 512.0;
+            wide += usize::from(found.separation - found.lower > tolerance);
+        }
+    }
+    println!(
+        "{crossing} axes cross, {wide} depths wider than the tolerance, {} node tests in the mean",
+        searches / crossing.max(1)
+    );
+    assert!(crossing as usize > count / 10 && wide * 20 < crossing as usize);
+}
+
+/// The reproduction of what was wrong: the separation and the way out of a ball, from far outside to its middle.
+#[test]
+fn the_way_out_of_a_ball_never_turns() {
+    let mesh = ball(4);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let direction = Vec3::new(0.3, 0.2, 0.9).normalize();
+    let mut before: Option<Proximity> = None;
+    for step in 0..6_000 {
+        let out = 60.0 - 0.01 * step as f32;
+        for length in [0.0, 10.0] {
+            let (tip, end) = (direction * out, direction * (out + length));
+            let found = if length > 0.0 {
+                let capsule = Capsule::new(tip, end, 2.0).expect("valid");
+                query.closest(rows.as_slice(), &capsule, &Options::new())
+            } else {
+                query.closest(
+                    rows.as_slice(),
+                    &Sphere::new(tip, 2.0).expect("valid"),
+                    &Options::new(),
+                )
+            };
+            let found = found.expect("an answer");
+            if out > 3.0 && (length == 0.0 || out > 32.0) {
+                assert!(found.direction.dot(direction) > 0.8, "{out}: {found:?}");
+            }
+            if length == 0.0 {
+                if let Some(before) = before {
+                    let change = before.separation - found.separation;
+                    assert!((0.0..0.011).contains(&change) || out < 1.0, "{out}: {change}");
+                }
+                before = Some(found);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_side_that_is_not_there_says_why() {
+    let ask = |built: &BuiltTree, mesh: &Mesh, at: Vec3, options: Options| {
+        let tree = built.tree::<u16>().expect("valid");
+        let rows = built.to_rows(&mesh.positions);
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        let tool = Sphere::new(at, 1.0).expect("valid");
+        query.closest(rows.as_slice(), &tool, &options).expect("an answer")
+    };
+    let is = |found: Proximity, reason| {
+        assert_eq!(found.side, Side::Undefined(reason));
+        assert!((found.separation - (found.axis_distance - 1.0)).abs() < 1e-6);
+    };
+    let open = slivers(20);
+    let built = Builder::new().build(&open).expect("a valid mesh");
+    is(ask(&built, &open, Vec3::new(-5.0, 0.0, 1.0), Options::new()), NoSide::OpenBoundary);
+    let over = ask(&built, &open, Vec3::new(40.0, 2.0, 3.0), Options::new());
+    assert_eq!(over.side, Side::Outside);
+    let under = ask(&built, &open, Vec3::new(40.0, 2.0, -3.0), Options::new());
+    assert_eq!(under.side, Side::Inside);
+    let round = ball(2);
+    let at = Vec3::new(10.0, 9.0, 8.0);
+    let bare = Builder::new().with_adjacency(false).build(&round).expect("a valid mesh");
+    is(ask(&bare, &round, at, Options::new()), NoSide::NoAdjacency);
+    let built = Builder::new().build(&round).expect("a valid mesh");
+    is(ask(&built, &round, at, Options::new().unsigned()), NoSide::NotAsked);
+    let short = Budget { node_tests: 9, triangle_tests: 1 };
+    let cut = ask(&built, &round, at, Options::new().budget(short));
+    assert_eq!(cut.side, Side::Undefined(NoSide::CutShort));
+    assert_eq!(ask(&built, &round, at, Options::new()).side, Side::Inside);
+    is(ask(&built, &round, round.positions[0], Options::new()), NoSide::BelowAccuracy);
+    // Wound against each other: the surface has no sides, and the tree no adjacency.
+    let mut twisted = round.clone();
+    twisted.triangles[7].swap(0, 1);
+    let built = Builder::new().build(&twisted).expect("a valid mesh");
+    is(ask(&built, &twisted, at, Options::new()), NoSide::NoAdjacency);
+}
+
+/// A budget that ends in the search for the depth leaves an interval that holds it.
+#[test]
+fn a_depth_that_was_cut_short_is_certified() {
+    let mesh = ball(3);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let tool = Capsule::new(Vec3::new(5.0, 3.0, 1.0), Vec3::new(60.0, 20.0, -9.0), 2.0);
+    let tool = tool.expect("valid");
+    let whole = query.closest(rows.as_slice(), &tool, &Options::new()).expect("an answer");
+    assert_eq!(whole.side, Side::Crossing);
+    let mut cut_short = 0;
+    for node_tests in (0..whole.node_tests + 40).step_by(5) {
+        let budget = Budget { node_tests, triangle_tests: u32::MAX };
+        let cut = query.closest(rows.as_slice(), &tool, &Options::new().budget(budget));
+        let cut = cut.expect("a short budget is no error");
+        assert!(cut.node_tests <= node_tests + 1, "{budget:?} {cut:?}");
+        if cut.side == Side::Crossing {
+            assert!(cut.lower <= whole.separation && cut.separation >= whole.lower, "{cut:?}");
+            cut_short += usize::from(cut.separation > whole.separation + 1.0);
+        } else {
+            assert_eq!(cut.side, Side::Undefined(NoSide::CutShort));
+        }
+    }
+    assert!(cut_short > 3, "{cut_short}");
+}
+
+fn word(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"))
+}
+
+/// Where a section starts, read by the specification alone.
+fn section(bytes: &[u8], kind: u32) -> usize {
+    let rows = word(bytes, 48) as usize;
+    let row = (0..rows).map(|r| 64 + 12 * r).find(|&at| word(bytes, at) == kind);
+    word(bytes, row.expect("the section is there") + 4) as usize
+}
+
+#[test]
+fn neighbours_share_their_edges_and_wrong_ones_are_refused() {
+    for (index, width) in [(IndexWidth::Bits16, 2), (IndexWidth::Bits32, 4)] {
+        let mesh = ball(2);
+        let built = Builder::new().index(index).build(&mesh).expect("a valid mesh");
+        let at = section(built.blob(), 8);
+        let mut refused = 0;
+        for place in 0..3 * mesh.triangles.len() {
+            let mut bytes = built.blob().to_vec();
+            let code = &mut bytes[at + place * width..][..width];
+            code[0] ^= 1 << (place % 8);
+            let mut digest = CRC.digest();
+            digest.update(&bytes[..60]);
+            digest.update(&bytes[64..]);
+            let sum = digest.finalize();
+            bytes[60..64].copy_from_slice(&sum.to_le_bytes());
+            let error = match width {
+                2 => Tree::<u16>::from_bytes(&bytes).err(),
+                _ => Tree::<u32>::from_bytes(&bytes).err(),
+            };
+            let is_named = matches!(error, Some(FormatError::Neighbour { .. }));
+            assert!(is_named, "neighbour {place}: {error:?}");
+            refused += 1;
+        }
+        assert_eq!(refused, 3 * 128);
+    }
+}
+
+/// More triangles than 16 bits number: neighbours are found by the edge that they share. And what all that takes.
+#[test]
+fn a_tree_with_adjacency_takes_at_most_16_bytes_a_triangle() {
+    let sizes: &[u32] = if cfg!(debug_assertions) { &[2_000] } else { &[10_272, 66_000] };
+    for &triangles in sizes {
+        let mesh = generate::brain(triangles).expect("a valid size");
+        let built = Builder::new().build(&mesh).expect("a valid mesh");
+        let tree = built.tree::<u16>().expect("valid");
+        let summary = built.summary();
+        let bytes = summary.query_bytes + summary.adjacency_bytes + 2 * mesh.positions.len();
+        let each = bytes as f64 / f64::from(triangles);
+        println!(
+            "{triangles} triangles: {each:.2} bytes each, vertex order and adjacency among them"
+        );
+        assert!(each <= 16.0);
+        for row in 0..tree.triangle_count() {
+            let [a, b, c] = tree.triangle(row).expect("in the table");
+            for (edge, from, to) in [(0, a, b), (1, b, c), (2, c, a)] {
+                let other = tree.neighbour(row, edge).expect("a closed surface");
+                let [a, b, c] = tree.triangle(other).expect("in the table");
+                assert!([(a, b), (b, c), (c, a)].contains(&(to, from)), "{row} {edge}");
+            }
+        }
+    }
+}
