@@ -295,7 +295,7 @@ fn a_frozen_source_grows_old() {
         assert!(source.frame(&mut assembler, moment, 1000 * n).is_some());
         let age = 1000 * n.saturating_sub(5);
         assert_eq!(assembler.health().source_age, age);
-        assert_eq!(reader.read().unwrap().age(1000 * n + 7), age + 7);
+        assert_eq!(reader.latest(1000 * n + 7).frame().unwrap().age, age + 7);
     }
     assert!(source.frame(&mut assembler, 5, 200_000).is_some());
     assert_eq!(assembler.health().source_age, 65_535, "or more");

@@ -13,7 +13,7 @@ use dibs_nostd::modes::{
 };
 use dibs_nostd::wire::{self, Encoding, Event, FrameEncoder, FrameId, WeightsEncoder};
 use dibs_nostd::{
-    Advance, Assembler, Changed, Frames, Gate, Index, Options, Query, Rejection, Sphere,
+    Advance, Arriving, Assembler, Changed, Frames, Gate, Index, Options, Query, Rejection, Sphere,
     StretchError, Tree, Verdict, VertexTable, measure_stretch,
 };
 use dibs_tests::ask;
@@ -430,8 +430,8 @@ fn the_gate_is_exact_whatever_the_bound() {
         let exact = measure_stretch(&tree, &surface);
         let before = gate.measured();
         gate.begin(Changed::Whole);
-        assert_eq!(gate.advance(&rows[..], 3, 1), Ok(Verdict::Pending));
-        match (gate.advance(&rows[..], 4, u32::MAX), exact) {
+        assert_eq!(gate.advance(Arriving::new(&rows[..], 3), 1), Ok(Verdict::Pending));
+        match (gate.advance(Arriving::new(&rows[..], 4), u32::MAX), exact) {
             (Ok(Verdict::Admitted(Some(found))), Ok(exact)) => {
                 assert!(found.sigma() >= exact.sigma() * 0.9999);
                 if gate.measured() == before { bounded += 1 } else { measured += 1 }

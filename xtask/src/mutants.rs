@@ -96,7 +96,9 @@ fn mutants(arguments: &[&str], tests: &[&str]) -> Command {
     cargo.env("CARGO_TARGET_DIR", workspace::root().join("target"));
     cargo.args(["mutants", "--package", "dibs-nostd", "--output", "target"]).args(arguments);
     cargo.args(["--", "--package", "dibs-tests"]);
-    tests.iter().for_each(|test| drop(cargo.args(["--test", test])));
+    for test in tests {
+        cargo.args(["--test", test]);
+    }
     cargo
 }
 

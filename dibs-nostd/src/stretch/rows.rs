@@ -135,6 +135,10 @@ fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
 }
 
 /// The same on rows of the metric section as they stand in memory; `None` where there are none.
+#[expect(
+    clippy::too_many_arguments,
+    reason = "arguments stay in registers, fields of a struct do not"
+)]
 fn run_on<I: Index, V: VertexTable + ?Sized, M: Measure, R: MetricBits, const CORNERS: usize>(
     tree: &Tree<'_, I>,
     surface: &V,
@@ -199,6 +203,10 @@ struct Before {
 /// Measures triangles, the first of them in row `first`, up to one that has a corner at row `ready` or beyond,
 /// or that is not certainly within `limit`. Returns its row.
 #[inline(never)]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "arguments stay in registers, fields of a struct do not"
+)]
 fn measure<
     I: Index,
     V: VertexTable + ?Sized,

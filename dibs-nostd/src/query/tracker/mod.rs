@@ -50,7 +50,7 @@ const FARTHEST: u32 = 1 << 29;
 /// let tool = Sphere::new(Vec3::new(70.0, 0.0, 20.0), 2.5)?;
 /// let cold = tracker.closest(&surface, &tool, &Options::new())?;
 ///
-/// let surface = odometer.step(first.as_slice(), second.as_slice());
+/// let surface = odometer.step(first.as_slice(), second.as_slice()).after();
 /// let tool = Sphere::new(Vec3::new(70.1, 0.0, 20.0), 2.5)?;
 /// let warm = tracker.closest(&surface, &tool, &Options::new())?;
 /// assert!(warm.fallback.is_none() && warm.closest.node_tests < cold.closest.node_tests / 2);
