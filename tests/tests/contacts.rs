@@ -34,7 +34,7 @@ fn valleys(rows: &[Vec3], triangles: &[[u32; 3]], tool: [Vec3; 2]) -> (Vec<Valle
         }
     }
     let at = |row: usize| triangles[row].map(|v| rows[v as usize].as_dvec3());
-    let [start, end] = tool.map(|p| p.as_dvec3());
+    let [start, end] = tool.map(Vec3::as_dvec3);
     let pairs: Vec<_> = (0..triangles.len()).map(|row| closest_pair(start, end, at(row))).collect();
     let mut order: Vec<usize> = (0..triangles.len()).collect();
     order.sort_by(|&a, &b| pairs[a].distance.total_cmp(&pairs[b].distance));

@@ -219,6 +219,8 @@ impl Approach {
         };
         let is_unit = (direction.length_squared() - 1.0).abs() < 1.0e-3;
         let is_finite = proximity.separation.is_finite()
+            && proximity.point_on_surface.is_finite()
+            && proximity.point_on_tool.is_finite()
             && approach.separation.is_finite()
             && approach.speed.is_finite();
         if is_unit && is_finite { Ok(approach) } else { Err(Unavailable::NotFinite) }
