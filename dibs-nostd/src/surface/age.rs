@@ -29,7 +29,9 @@ impl Ageing {
     /// The same after a look at `stamp` at the time `now`: `oldest` is its age.
     #[must_use]
     pub const fn at(self, now: u32, stamp: u32) -> Self {
-        let age = elapsed(now, stamp);
+        // A stamp that was found old lies in the past, also just before the clock comes around to it.
+        let is_past = stamp == self.stamp && self.oldest > i32::MAX as u32;
+        let age = if is_past { now.wrapping_sub(stamp) } else { elapsed(now, stamp) };
         let fall = if stamp == self.stamp { self.oldest.saturating_sub(age) } else { 0 };
         let oldest = if fall > i32::MAX as u32 {
             u32::MAX // The clock came around.
