@@ -81,10 +81,12 @@ fn a_budget_of_nothing_tests_no_triangle() {
     let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("enough for any tree");
     for row in (0..rows.len()).step_by(7) {
         let sphere = Sphere::new(rows[row] * 1.2, 1.0).expect("valid");
-        let whole = query.closest(rows.as_slice(), &sphere, &Options::new()).expect("an answer");
+        // Without a side, which a query that was cut short does not know.
+        let unsigned = Options::new().unsigned();
+        let whole = query.closest(rows.as_slice(), &sphere, &unsigned).expect("an answer");
         for node_tests in [0, u32::MAX] {
             let budget = Budget { node_tests, triangle_tests: 0 };
-            let options = Options::new().warm_start(whole.triangle).budget(budget);
+            let options = unsigned.warm_start(whole.triangle).budget(budget);
             for found in [
                 query.closest(rows.as_slice(), &sphere, &options),
                 query.closest_wide(rows.as_slice(), &sphere, &options),
