@@ -9,6 +9,9 @@ use super::Side;
 /// Lengths are in the mesh's own unit (mm in the examples). The true separation lies in
 /// `[lower - accuracy, separation + accuracy]`; the two ends are equal when the query was not cut
 /// short by its budget.
+///
+/// Where [`side`](Self::side) is undefined, the tool is taken to be outside: the interval is that of the unsigned
+/// distance less the radius, and a tool that is inside is deeper than it says.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
