@@ -41,8 +41,7 @@ impl<S: MovingSurface + ?Sized> MovingSurface for &S {
 
 /// The reading of a surface's odometer.
 ///
-/// Between two readings of one odometer no vertex moved farther than
-/// [`since`](Self::since) says.
+/// Two readings of one odometer bound the distance that any vertex moved between them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Travel {

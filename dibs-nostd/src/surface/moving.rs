@@ -63,7 +63,7 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
     /// motion changes.
     ///
     /// Its stretch is at most the later frame's plus `share` times that of the difference of the two:
-    /// see `measure_stretch` of it. Held to 0..=[`FARTHEST_SHARE`].
+    /// see `measure_stretch` of it. Held to 0..=`FARTHEST_SHARE`.
     #[must_use]
     pub fn beyond(&self, share: f32) -> Between<'v, W, V> {
         let share = if share > 0.0 { share } else { 0.0 };

@@ -35,9 +35,9 @@ pub use rejection::Rejection;
 /// With a gate of modes, `N` is their number, and frames hold weights instead: see
 /// [`Gate::weight_range`].
 ///
-/// RAM: half a kilobyte at most besides [`Frames`](crate::Frames) and gate, for any `N`. A surface's buffers,
+/// RAM: some 600 bytes besides [`Frames`](crate::Frames) and gate, for any `N`. A surface's buffers,
 /// both ends of them, assembler and [`StretchMonitor`](crate::StretchMonitor) together take 24 bytes a vertex
-/// and at most 1 KiB.
+/// and at most 1,100 bytes.
 ///
 /// ```
 /// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};

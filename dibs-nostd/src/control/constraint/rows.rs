@@ -26,8 +26,9 @@ use crate::query::Contact;
 /// query.contacts(rows.as_slice(), &tool, 50.0, &Options::new(), &mut contacts)?;
 /// for contact in contacts.iter() {
 ///     let row = VelocityRow::new(contact, contacts.accuracy(), tool.center(), 1.0, 20.0);
-///     let away = Vec3::from(row.linear) * row.least;
-///     assert!(row.allows(away * 1.001, Vec3::ZERO));
+///     let along = |speed: f32| Vec3::from(row.linear) * speed;
+///     assert!(row.allows(along(row.least + 0.01), Vec3::ZERO));
+///     assert!(!row.allows(along(row.least - 0.01), Vec3::ZERO));
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
