@@ -90,9 +90,10 @@ impl<'t, M: Mac> Receiver<'t, M> {
         loop {
             if let Some(byte) = uart::read() {
                 self.received = self.received.wrapping_add(1);
+                let now = self.now();
                 match self.deframer.push(byte) {
                     None => continue,
-                    Some(Ok(packet)) => drop(self.assembler.accept(packet, self.now())),
+                    Some(Ok(packet)) => drop(self.assembler.accept(packet, now)),
                     Some(Err(error)) => self.assembler.count_framing(&error),
                 }
                 has_work = true;
