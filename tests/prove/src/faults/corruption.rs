@@ -72,6 +72,7 @@ fn one(partial: bool, probability: f64, frames: u32, seed: u64) -> Result<Row> {
     let tree = TREE.tree::<u16>()?;
     let mut controller = Controller::new(&buffers, &tree, NoMac);
     let mut source = source(Case { quantised: true, partial }, 1, |_| NoMac);
+    source.challenge(0);
     let (mut injector, mut rng, mut log) =
         (Injector::new(seed), Rng::with_seed(seed), Log::default());
     let interval = 1_000.0 / f64::from(RATE);
