@@ -30,8 +30,9 @@ const FARTHEST: u32 = 1 << 29;
 /// whole query. Another tool is a step to where it is. The stretch in the options may change from tick to tick:
 /// what is remembered is true whatever it becomes.
 ///
-/// `STACK` must be at least [`Tree::stack`]. `OPENED` nodes of the tree are remembered with their children; 256
-/// are enough for a heart of 10,272 triangles. With fewer than it takes, ticks are whole queries.
+/// `STACK` must be at least [`Tree::stack`]. `OPENED` nodes of the tree are remembered with their children: a generated
+/// heart of 10,272 triangles opened 180 at most in 7 s. With fewer than it takes, ticks are whole queries. Meant for a
+/// `static`: by value it can be larger than a controller's stack.
 ///
 /// RAM: 8 bytes an entry of the stack, 44 an opened node, which are about 8 for each of its children.
 ///
