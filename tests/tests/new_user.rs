@@ -11,7 +11,7 @@ use dibs_build::generate;
 const REPOSITORY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
 #[test]
-#[ignore = "compiles for the board and runs in QEMU: a step of `cargo xtask test`"]
+#[ignore = "compiles for the board and runs in QEMU: a step of `cargo xtask test --whole`"]
 fn the_guide_leads_to_an_answer_on_a_host_and_on_the_board() {
     let folder = tempfile::tempdir().expect("a folder outside the repository");
     let guard = User { root: folder.path().join("guard") };
