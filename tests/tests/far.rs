@@ -55,7 +55,7 @@ fn coordinates_far_from_the_origin_are_refused_or_counted() {
                 closest_pair(centre, centre, [a, b, c]).distance
             };
             let truth = import.mesh.triangles.iter().map(distance).fold(f64::INFINITY, f64::min);
-            let error = (f64::from(found.separation) - (truth - 0.5).max(0.0)).abs();
+            let error = (f64::from(found.separation) - (truth - 0.5)).abs();
             worst = worst.max(error / f64::from(found.accuracy));
         }
         assert!(worst <= 1.0, "{away} away: off by {worst} accuracies");
