@@ -433,6 +433,37 @@ fn a_broken_connection_is_made_again() {
     assert!(error.contains("did not come back within 1 s"), "{error}");
 }
 
+/// A receiver that accepts the connection and reads nothing: the program gives up, or ends when it is asked to, with
+/// its totals.
+#[cfg(unix)]
+#[test]
+fn a_receiver_that_reads_nothing_is_named() {
+    let folder = heart();
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let to = format!("--to tcp:{} --rate 100000 --loop", listener.local_addr().unwrap());
+    let given_up = stream(folder.path(), &format!("{to} --retry 0"));
+    let interrupted = stream(folder.path(), &to);
+    let _unread = [listener.accept().unwrap(), listener.accept().unwrap()];
+    std::thread::sleep(Duration::from_secs(3));
+    let kill = Command::new("kill").args(["-INT", &interrupted.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    let outcomes = [given_up, interrupted].map(|mut child| {
+        let start = Instant::now();
+        while child.try_wait().unwrap().is_none() {
+            assert!(start.elapsed() < PATIENCE, "the program waits for ever");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        child.wait_with_output().unwrap()
+    });
+    let [given_up, interrupted] = &outcomes;
+    let error = String::from_utf8_lossy(&given_up.stderr);
+    assert_eq!(given_up.status.code(), Some(1), "{error}");
+    assert!(error.contains("the receiver has taken nothing for 5 s"), "{error}");
+    let totals = totals(interrupted);
+    assert_eq!(totals["interrupted"], true);
+    assert!(totals["frames"].as_u64().unwrap() > 0, "{totals}");
+}
+
 /// A receiver that reports and publishes nothing: the program says so, and goes on.
 #[test]
 fn a_receiver_that_acknowledges_nothing_is_named() {

@@ -121,6 +121,31 @@ fn a_closed_connection_is_told() {
     assert_eq!(error.kind(), ErrorKind::UnexpectedEof);
 }
 
+/// Whoever holds the other end open and reads nothing fills the line. A write then ends within a bound, by an error
+/// that names the cause.
+#[cfg(unix)]
+#[test]
+fn a_line_that_nobody_reads_is_an_error_in_bounded_time() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let over_tcp = open(&format!("tcp:{}", listener.local_addr().unwrap()));
+    let (mine, _unix) = std::os::unix::net::UnixStream::pair().unwrap();
+    let (port, _pty) = serial2::SerialPort::pair().unwrap();
+    let lines = [over_tcp, Line::unix(mine).unwrap(), Line::serial(port).unwrap()];
+    let (done, outcomes) = std::sync::mpsc::channel();
+    for mut line in lines {
+        let done = done.clone();
+        std::thread::spawn(move || {
+            let failed = (0..1_000_000).find_map(|_| line.send(&[0x55; 1024]).err());
+            done.send(failed.expect("a line has no room for a gigabyte"))
+        });
+    }
+    for _ in 0..3 {
+        let error = outcomes.recv_timeout(Duration::from_secs(60)).expect("a write waits for ever");
+        assert_eq!(error.kind(), ErrorKind::TimedOut);
+        assert_eq!(error.to_string(), "the receiver has taken nothing for 5 s");
+    }
+}
+
 #[test]
 fn targets_are_read_and_bad_ones_named() {
     for text in ["serial:/dev/ttyUSB0@115200", "tcp:[::1]:80", "udp:host:5000", "unix:/tmp/x"] {

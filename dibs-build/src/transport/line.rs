@@ -16,8 +16,8 @@ use serial2::SerialPort;
 
 use super::Transport;
 
-/// A line that takes nothing for this long is stuck: a packet is a fraction of a second even on a slow one.
-const WRITE_TIMEOUT: Duration = Duration::from_secs(10);
+/// A line that takes nothing for this long is stuck: a packet is about a second on a slow one.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// How long the reading thread waits before it looks whether it is still wanted.
 const PATIENCE: Duration = Duration::from_millis(50);
@@ -42,7 +42,7 @@ impl Line {
         port.set_read_timeout(PATIENCE)?;
         port.set_write_timeout(WRITE_TIMEOUT)?;
         let reader = port.try_clone()?;
-        Ok(Self::stream(port, reader, || ()))
+        Ok(Self::stream(Port(port), reader, || ()))
     }
 
     /// A TCP connection.
@@ -165,8 +165,7 @@ impl Line {
     /// # Errors
     /// What the operating system says.
     pub fn send_raw(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.writer.write_all(bytes)?;
-        self.writer.flush()
+        write(&mut self.writer, bytes)
     }
 }
 
@@ -178,8 +177,7 @@ impl Transport for Line {
         } else {
             packet
         };
-        self.writer.write_all(bytes)?;
-        self.writer.flush()
+        write(&mut self.writer, bytes)
     }
 
     fn receive(&mut self) -> io::Result<Option<Vec<u8>>> {
@@ -199,9 +197,35 @@ impl Drop for Line {
     }
 }
 
+/// Writes all of it, or says that the line is stuck.
+fn write(writer: &mut (impl Write + ?Sized), bytes: &[u8]) -> io::Result<()> {
+    writer.write_all(bytes).and_then(|()| writer.flush()).map_err(|error| {
+        if !matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) {
+            return error;
+        }
+        let seconds = WRITE_TIMEOUT.as_secs();
+        let text = format!("the receiver has taken nothing for {seconds} s");
+        io::Error::new(ErrorKind::TimedOut, text)
+    })
+}
+
 /// Nothing came in time.
 fn is_patience(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
+}
+
+/// A serial port whose bytes are sent once the system has taken them: waiting until they have left the wire has
+/// no time limit.
+struct Port(SerialPort);
+
+impl Write for Port {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 /// A write is a datagram.

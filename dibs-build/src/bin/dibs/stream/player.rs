@@ -135,6 +135,10 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
             }
             std::thread::sleep(ATTEMPT);
         }
+        // The user waits no longer: the totals are due, and no error.
+        if self.interrupt.is_raised() {
+            return Ok(());
+        }
         bail!(
             "{to}: the connection broke ({error}), and did not come back within {} s",
             self.args.retry
