@@ -233,6 +233,40 @@ fn a_full_front_falls_back_on_whole_queries() {
     assert!(full > 0 && none > 0, "{tally:?}");
 }
 
+/// A tick makes as many triangle tests as its budget has, and no more.
+#[test]
+fn a_tick_takes_all_of_its_budget_and_no_more() {
+    let (mesh, _) = generate::heart(320).expect("a valid size");
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let surface = Odometer::new(&tree).start(rows.as_slice());
+    let mut most = 0;
+    for row in (0..rows.len()).step_by(7) {
+        let sphere = Sphere::new(rows[row] * 1.2, 1.0).expect("valid");
+        let first = |triangle_tests| {
+            let mut tracker = Tracker::<u16, MAX_STACK, 64>::new(&tree).expect("enough");
+            let budget = Budget { node_tests: u32::MAX, triangle_tests };
+            let options = Options::new().unsigned().budget(budget);
+            tracker.closest(&surface, &sphere, &options).expect("an answer").closest
+        };
+        let whole = first(u32::MAX);
+        let enough = whole.triangle_tests;
+        // A triangle is not even looked at unless a test of it is left.
+        assert_eq!(first(enough + 1), whole);
+        most = most.max(enough);
+        for too_few in 0..enough {
+            let found = first(too_few);
+            assert_eq!(found.triangle_tests, too_few, "of {enough}");
+            assert!(found.separation >= whole.separation, "{found:?} {whole:?}");
+            assert!(found.lower <= whole.separation + whole.accuracy, "{found:?} {whole:?}");
+        }
+        // A triangle that was tested would be the closest so far.
+        assert_eq!(first(0).triangle, None);
+    }
+    assert!(most >= 3, "{most} tests at most");
+}
+
 #[test]
 fn odometers_wrap() {
     let mesh = generate::heart(320).expect("a valid size").0;

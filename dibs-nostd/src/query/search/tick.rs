@@ -308,8 +308,8 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 continue;
             }
             let search = &mut self.search;
-            let (Some(left), 1..) =
-                (search.left.node_tests.checked_sub(1), search.left.triangle_tests)
+            let (Some(left), Some(triangles_left)) =
+                (search.left.node_tests.checked_sub(1), search.left.triangle_tests.checked_sub(1))
             else {
                 return Ok(Step::OutOfBudget);
             };
@@ -319,7 +319,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             let bound = if facing > self.facing.within {
                 facing
             } else {
-                match self.test_closely(triangle, &corners, place)? {
+                match self.test_closely(triangle, &corners, place, triangles_left)? {
                     Some(bound) => bound,
                     None => continue,
                 }
@@ -330,12 +330,14 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         Ok(Step::Done)
     }
 
-    /// Tests a triangle against its own plane, then exactly. Returns a bound, unless it is the closest so far.
+    /// Tests a triangle against its own plane, then exactly, which leaves `left` triangle tests of the budget.
+    /// Returns a bound, unless it is the closest so far.
     fn test_closely(
         &mut self,
         triangle: u32,
         corners: &[Vec3; 3],
         place: Place,
+        left: u32,
     ) -> Result<Option<f32>, QueryError> {
         let search = &self.search;
         let &[a, b, c] = corners;
@@ -350,10 +352,12 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         if excess > 0.0 {
             return Ok(Some(search.cutoff + excess / distance));
         }
+        self.search.left.triangle_tests = left;
         self.test_exactly(triangle, corners, place)
     }
 
-    /// Tests a triangle. Returns its distance, unless it is the closest so far, which is then apart.
+    /// The exact test, which the caller has taken off the budget. Returns the triangle's distance, unless it is
+    /// the closest so far, which is then apart.
     #[inline(always)]
     fn test_exactly(
         &mut self,
@@ -362,7 +366,6 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         place: Place,
     ) -> Result<Option<f32>, QueryError> {
         let search = &mut self.search;
-        search.left.triangle_tests = search.left.triangle_tests.saturating_sub(1);
         let Some(pair) = search.tool.closest_on_triangle(corners, f32::INFINITY) else {
             return Err(QueryError::Position { vertex: search.not_finite(triangle) });
         };
