@@ -3,7 +3,7 @@
 
 use dibs_build::{Builder, BuiltTree, Mesh};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{ACCURACY, Options, Query, Sphere, measure_stretch};
+use dibs_nostd::{ACCURACY, Contacts, Odometer, Options, Query, Sphere, Tracker, measure_stretch};
 use dibs_tests::ask;
 use dibs_tests::deform::unit;
 use dibs_tests::oracle::{Instrument, exhaustive};
@@ -65,17 +65,16 @@ fn ladder(cells: usize, length: f32, width: f32) -> Mesh {
     Mesh { positions, triangles: (0..cells).flat_map(cell).collect() }
 }
 
-/// A straight band, stretched to its limit, whose last edge is the closest: every sphere around it reaches
-/// exactly that far. The band's other half runs past the tool and is hardly farther away.
-#[test]
-fn a_radius_is_used_in_full() {
+/// Straight bands, stretched to their limit, whose last edge is the closest to `end`: every sphere around it reaches
+/// exactly that far. The band's other half runs past the tool and is hardly farther away. Calls
+/// `check(built, positions, end, radius)` for each.
+fn for_each_band(number: usize, mut check: impl FnMut(&BuiltTree, &[Vec3], Vec3, f32)) {
     const LIMIT: f32 = 1.5;
     let (cells, cell, width) = (100, 2.0, 1.0);
     let mesh = ladder(cells, cell, width);
     let built = Builder::new().stretch(LIMIT).build(&mesh).expect("a valid mesh");
     let mut rng = Rng::with_seed(51);
-    let mut worst: f64 = 0.0;
-    for _ in 0..400 {
+    for _ in 0..number {
         let apart = 4.0 + 20.0 * rng.f32();
         // Along the band: straight to a corner, up by `apart`, and back above itself, beyond its start.
         let straight = 40.0 * cell * (1.0 + rng.f32() * 0.1) * LIMIT;
@@ -95,17 +94,57 @@ fn a_radius_is_used_in_full() {
                 Vec3::new(x, y, p.z)
             })
             .collect();
-        let mut searched = Searched::new(&built, &positions);
         let before = apart - decades(&mut rng, 1e-3, 0.3);
         let end = Vec3::new(-before, 0.0, width * rng.f32());
-        let radius = 0.5 * rng.f32();
+        check(&built, &positions, end, 0.5 * rng.f32());
+    }
+}
+
+#[test]
+fn a_radius_is_used_in_full() {
+    let mut worst: f64 = 0.0;
+    for_each_band(400, |built, positions, end, radius| {
+        let mut searched = Searched::new(built, positions);
         // Above the tool, the other half is closer.
         let above = Instrument::sphere(end + Vec3::Y, radius);
         searched.check(&Instrument::sphere(end, radius), &above);
         searched.check(&Instrument::capsule(end, end + Vec3::Z * 0.1, radius), &above);
         worst = worst.max(searched.worst);
-    }
+    });
     println!("largest error: {worst:.2} of the stated accuracy");
+}
+
+/// So it is by a tracker, at its first tick and as its tool comes down to the band's end, and by a search for all
+/// contacts within hardly more than the distance.
+#[test]
+fn tracker_and_contacts_use_a_radius_in_full() {
+    for_each_band(100, |built, positions, end, radius| {
+        let tree = built.tree::<u16>().expect("valid");
+        let rows = built.to_rows(positions);
+        let surface = Odometer::new(&tree).start(rows.as_slice());
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("enough for any tree");
+        let options = Options::new();
+        for steps in [0, 20] {
+            let mut tracker =
+                Tracker::<u16, MAX_STACK, 64>::new(&tree).expect("enough for any tree");
+            for step in (0..=steps).rev() {
+                let center = end + Vec3::Y * (step as f32 * 0.05);
+                let tool = Sphere::new(center, radius).expect("valid");
+                let whole = query.closest(&surface, &tool, &options).expect("an answer");
+                let found = tracker.closest(&surface, &tool, &options).expect("an answer").closest;
+                let off = (found.separation - whole.separation).abs();
+                assert!(off <= found.accuracy + whole.accuracy, "{found:?}\n{whole:?}");
+            }
+        }
+        let tool = Sphere::new(end, radius).expect("valid");
+        let whole = query.closest(&surface, &tool, &options).expect("an answer");
+        let mut contacts = Contacts::<4>::new();
+        let margin = whole.separation + 2.0 * whole.accuracy;
+        query.contacts(&surface, &tool, margin, &options, &mut contacts).expect("room for all");
+        let nearest = contacts.iter().map(|contact| contact.separation).reduce(f32::min);
+        let nearest = nearest.expect("the closest pair is a contact");
+        assert!((nearest - whole.separation).abs() <= whole.accuracy, "{nearest}: {whole:?}");
+    });
 }
 
 /// Coordinates of millions, on which the mesh's own places are exact: planes are compared in coordinates as
@@ -147,8 +186,8 @@ fn planes_allow_for_a_tilt_along_the_axis() {
     let mut rng = Rng::with_seed(53);
     let mut worst: f64 = 0.0;
     for _ in 0..200 {
-        let (length, radius) = (200.0, decades(&mut rng, 0.1, 3.0));
-        let rough = decades(&mut rng, 0.003, 0.1);
+        let (length, radius) = (200.0, decades(&mut rng, 0.01, 3.0));
+        let rough = decades(&mut rng, 0.0003, 0.1);
         let turn = glam::Quat::from_axis_angle(unit(&mut rng), rng.f32());
         let corners = 32;
         let mut positions = Vec::new();
@@ -168,12 +207,14 @@ fn planes_allow_for_a_tilt_along_the_axis() {
         let leaf = 1 + rng.usize(..2);
         let built = Builder::new().stretch(1.1).leaf_triangles(leaf).build(&mesh).expect("valid");
         let mut searched = Searched::new(&built, &mesh.positions);
-        for _ in 0..20 {
+        for round in 0..20 {
             let mut end = |z: f32| {
                 let off = unit(&mut rng) * rough;
                 turn * Vec3::new(off.x, off.y, z)
             };
-            let (start, end) = (end(-10.0), end(length * 0.8));
+            // Beyond a ridge's end, the vector to that end leaves the axis far from its start: the longest lever.
+            let reach = if round % 2 == 0 { length + 10.0 } else { length * 0.8 };
+            let (start, end) = (end(-10.0), end(reach));
             let capsule = Instrument::capsule(start, end, 0.0);
             searched.check(&capsule, &Instrument::sphere(capsule.start, 0.0));
         }

@@ -29,14 +29,24 @@ const _: () = {
     assert!(ACCURACY >= KERNEL + 4.0 * U && ACCURACY >= BOUND);
 };
 
-/// Slack of a plane's comparison in units of the coordinates' size `C`, since positions enter it as they are:
-/// each of two dot products is off by at most 3 `u C` times the normal's length, the point on the axis by
-/// 2 `u C`. Half of this would do.
+/// Error of a dot product of a position and a normal, in units of the coordinates' size `C` times the normal's
+/// length.
+const DOT: f32 = 3.0 * U;
+
+/// Error of the point on the axis that a plane goes through, in units of `C`.
+const ON_AXIS: f32 = 2.0 * U;
+
+/// Slack of a plane's comparison in units of `C`, since positions enter it as they are. Half of this would do.
 pub(super) const COORDINATES: f32 = 16.0 * U;
 
-/// Slack of a plane's comparison in units of `S^2`: an axis is perpendicular to the shortest vector to a point
-/// within 16 `u S`, so that its ends, at most `S / 2` away, are beyond the plane by no more than half of this.
+/// How far an axis is from perpendicular to the shortest vector to a point, in units of `S`.
+const PERPENDICULAR: f32 = 16.0 * U;
+
+/// Slack of a plane's comparison in units of `S^2`: an axis' ends, at most `S / 2` away, are beyond the plane by
+/// half of [`PERPENDICULAR`] at most.
 pub(super) const TILT: f32 = 16.0 * U;
+
+const _: () = assert!(COORDINATES >= 2.0 * DOT + ON_AXIS && TILT >= 0.5 * PERPENDICULAR);
 
 /// Lengths that the kernels count as zero, times a few: what is left of slack and accuracy where tool and
 /// surface are one point.
