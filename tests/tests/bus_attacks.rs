@@ -395,6 +395,11 @@ fn a_frame_counts_once() {
         give(&mut assembler, &packet).unwrap();
     }
     assert_eq!(rejections(&assembler), 0);
+    // Recordings of what is over, before anything else went wrong.
+    for packet in frame(5, true).iter().chain(&frame(1, true)) {
+        give(&mut assembler, packet).unwrap_err();
+    }
+    assert_eq!(rejections(&assembler), 0);
     for _ in 0..9 {
         give(&mut assembler, &[0; 64]).unwrap_err();
     }
