@@ -4,6 +4,8 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
+use dibs_nostd::format::CRC;
+
 /// Vertices of the heart, rows of a packet of 1,024 bytes without and with a tag, and the rates.
 const VERTICES: u32 = 5_138;
 const ROWS: [u32; 2] = [(1024 - 22) / 6, (1024 - 28) / 6];
@@ -11,6 +13,13 @@ const FRAMES_A_SECOND: f64 = 40.0;
 const HEARTBEATS_A_SECOND: f64 = 10.0;
 const FORGERIES_A_SECOND: f64 = 10_000.0;
 const HOUR: f64 = 3_600.0;
+/// 1 % of the allowance of a function of SIL 3.
+const ALLOWANCE_AN_HOUR: f64 = 1e-9;
+
+/// A number of thousands.
+fn grouped(number: u32) -> String {
+    format!("{},{:03}", number / 1_000, number % 1_000)
+}
 
 /// The arithmetic, as the page shows it.
 fn arithmetic() -> String {
@@ -38,7 +47,76 @@ fn arithmetic() -> String {
     ] {
         writeln!(text, "{name:<59}{value:.2e}{unit}").unwrap();
     }
+    let one_in = ALLOWANCE_AN_HOUR.recip() * heartbeats * crc;
+    let damaged = grouped(one_in.ceil() as u32);
+    writeln!(text, "without a key, 1e-9 an hour: at most one heartbeat damaged in {damaged}")
+        .unwrap();
     text
+}
+
+/// Which comparison with the allowance holds for which rate, as the page says.
+#[test]
+fn the_rates_compare_with_the_allowance_as_the_page_says() {
+    let text = arithmetic();
+    let is_below = |name: &str| {
+        let line = text.lines().find(|line| line.starts_with(name)).expect("a line");
+        let rate: f64 = line[59..].split(' ').next().unwrap().parse().unwrap();
+        rate < ALLOWANCE_AN_HOUR
+    };
+    assert!(is_below("without a key, damage: a row is wrong"));
+    assert!(is_below("with a key, damage: a row is wrong"));
+    assert!(is_below("with a key, 10,000 forgeries a second: a row is wrong"));
+    assert!(is_below("with a key, damage: a heartbeat that was none"));
+    assert!(!is_below("without a key, damage: a heartbeat that was none"));
+    assert!(!is_below("with a key, 10,000 forgeries a second: a false heartbeat"));
+}
+
+/// What each single flipped bit of a packet does to the remainder of the checksum.
+fn syndromes(bytes: usize) -> Vec<u32> {
+    let mut packet = vec![0; bytes - 4];
+    let undamaged = CRC.checksum(&packet);
+    let mut syndromes: Vec<u32> = (0..32).map(|bit| 1 << bit).collect();
+    for bit in 0..8 * packet.len() {
+        packet[bit / 8] ^= 1 << (bit % 8);
+        syndromes.push(CRC.checksum(&packet) ^ undamaged);
+        packet[bit / 8] ^= 1 << (bit % 8);
+    }
+    syndromes
+}
+
+/// Damage is missed where the syndromes of its bits cancel: no two, three or four do.
+#[test]
+fn the_checksum_finds_as_many_flips_as_the_page_says() {
+    let mut singles = syndromes(1024);
+    singles.sort_unstable();
+    assert!(singles[0] != 0 && singles.windows(2).all(|two| two[0] != two[1]));
+    let mut is_single = vec![false; 1 << 20];
+    let slot = |syndrome: u32| (syndrome >> 12) as usize;
+    singles.iter().for_each(|&syndrome| is_single[slot(syndrome)] = true);
+    for (i, a) in singles.iter().enumerate() {
+        for b in &singles[..i] {
+            let both = a ^ b;
+            assert!(!is_single[slot(both)] || singles.binary_search(&both).is_err(), "three bits");
+        }
+    }
+    let short = syndromes(375);
+    let pairs = short.iter().enumerate().flat_map(|(i, a)| short[..i].iter().map(move |b| a ^ b));
+    let mut pairs: Vec<u32> = pairs.collect();
+    pairs.sort_unstable();
+    assert!(pairs.windows(2).all(|two| two[0] != two[1]), "four bits");
+}
+
+/// The guarantees contain the page, of this one source.
+#[test]
+fn the_guarantees_show_the_black_channel() {
+    let guarantees = include_str!("../../docs/guarantees.md");
+    let page = include_str!("../../docs/black-channel.md");
+    let section = guarantees.split("\n## ").find(|section| section.contains("| masquerade |"));
+    let section = section.expect("a section with the table");
+    for line in page.lines().filter(|line| line.starts_with('|')) {
+        assert!(section.contains(line), "{line}");
+    }
+    assert!(section.contains(&arithmetic()));
 }
 
 #[test]
