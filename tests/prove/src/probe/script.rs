@@ -1,7 +1,7 @@
 //! Scripts for the probe: surfaces, frames and queries, as words.
 
 use dibs_build::modes::ModalFit;
-use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
+use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, Motion, generate};
 use dibs_nostd::modes::{MAX_MODES, Modes};
 use dibs_nostd::{Budget, Cost, Options, Query, Tool, VertexTable};
 use dibs_tests::deform::Deformation;
@@ -127,15 +127,20 @@ impl Script {
         script
     }
 
+    /// A script that begins with the tree of the firmware's heart.
+    fn heart() -> (Self, BuiltTree, Motion) {
+        let (mesh, motion) = generate::heart(10_272).expect("a valid size");
+        let built = build(&mesh, 8);
+        let mut script = Self::default();
+        script.tree(&built);
+        (script, built, motion)
+    }
+
     /// The heart of the firmware in its motion, and a tool that wanders about it: the usual case.
     pub fn usual(queries: usize, seed: u64) -> Self {
         let mut rng = Rng::with_seed(seed);
-        let (mesh, motion) = generate::heart(10_272).expect("a valid size");
-        let built = build(&mesh, 8);
-        let tree = built.tree::<u16>().expect("16-bit indices");
-        let triangles = surfaces::triangles(&tree);
-        let mut script = Self::default();
-        script.tree(&built);
+        let (mut script, built, motion) = Self::heart();
+        let triangles = surfaces::triangles(&built.tree::<u16>().expect("16-bit indices"));
         for positions in motion.frames.iter().step_by(motion.frames.len().div_ceil(8)) {
             let rows = built.to_rows(positions);
             script.rows(&rows, triangles.len() as u32);
@@ -151,14 +156,11 @@ impl Script {
     /// The generated heart as it beats and the capsule of table 3, at ticks spread over the whole path:
     /// each on the surface of its own tick.
     pub fn beating(ticks: u32, knows: Knows) -> Self {
-        let (mesh, motion) = generate::heart(10_272).expect("a valid size");
-        let built = build(&mesh, 8);
+        let (mut script, built, motion) = Self::heart();
         let tree = built.tree::<u16>().expect("16-bit indices");
         let beat = Beat::new(&motion);
         let mut query = Query::<_, 512>::new(&tree).expect("a stack that is large enough");
         let mut positions = Vec::new();
-        let mut script = Self::default();
-        script.tree(&built);
         for tick in (1..PATH_TICKS).step_by((PATH_TICKS / ticks) as usize) {
             let mut at = |tick| {
                 beat.deform(tick, &mut positions);
@@ -182,11 +184,8 @@ impl Script {
     /// The same heart in its motion, with capsules where it hurts: on, in, through and far from it.
     pub fn poses(queries: usize, seed: u64) -> Self {
         let mut rng = Rng::with_seed(seed);
-        let (mesh, motion) = generate::heart(10_272).expect("a valid size");
-        let built = build(&mesh, 8);
+        let (mut script, built, motion) = Self::heart();
         let triangles = surfaces::triangles(&built.tree::<u16>().expect("16-bit indices"));
-        let mut script = Self::default();
-        script.tree(&built);
         let frames = motion.frames.iter().step_by(motion.frames.len().div_ceil(FRAMES_OF_POSES));
         let of_each = queries.div_ceil(frames.len());
         for positions in frames {
