@@ -3,7 +3,7 @@
 use std::process::Command;
 
 use anyhow::Result;
-use xtask::workspace;
+use xtask::{process, workspace};
 
 /// Arguments that are passed on as they are.
 #[derive(clap::Args)]
@@ -19,6 +19,15 @@ pub fn command(features: &[&str]) -> Command {
     cargo.args(["run", "--quiet", "--release", "--package", "dibs-prove", "--manifest-path"]);
     cargo.arg(workspace::root().join("Cargo.toml")).args(features).arg("--");
     cargo
+}
+
+/// The program, built together with the whole workspace: after its tests nothing but the program itself is left to
+/// build, while alone it would have its dependencies with fewer features, and so anew.
+pub fn with_workspace() -> Result<Command> {
+    let mut cargo = Command::new("cargo");
+    cargo.args(["build", "--quiet", "--release", "--workspace", "--bin", "prove"]);
+    process::run(cargo.current_dir(workspace::root()))?;
+    Ok(Command::new(workspace::target().join("release/prove")))
 }
 
 /// Runs a task of the program.

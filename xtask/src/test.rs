@@ -71,7 +71,7 @@ fn checks(demo_seconds: u32, steps: &mut Steps) -> Result<()> {
     let list = workspace::target().join("steps.txt");
     // So that the list of an earlier run is not taken for this one's.
     std::fs::write(&list, "")?;
-    let mut prove = prove::command(&[]);
+    let mut prove = prove::with_workspace()?;
     prove.args(["test", "--demo-seconds", &demo_seconds.to_string(), "--steps"]).arg(&list);
     run(&mut prove)?;
     steps.read(&list)
