@@ -21,11 +21,11 @@ pub fn command(features: &[&str]) -> Command {
     cargo
 }
 
-/// The program, built together with the whole workspace: after its tests nothing but the program itself is left to
-/// build, while alone it would have its dependencies with fewer features, and so anew.
+/// The program, built together with the whole workspace and its tests: after those nothing but the program itself is
+/// left to build, while alone it would have its dependencies with fewer features, and so anew.
 pub fn with_workspace() -> Result<Command> {
     let mut cargo = Command::new("cargo");
-    cargo.args(["build", "--quiet", "--release", "--workspace", "--bin", "prove"]);
+    cargo.args(["build", "--quiet", "--release", "--workspace", "--all-targets"]);
     process::run(cargo.current_dir(workspace::root()))?;
     Ok(Command::new(workspace::target().join("release/prove")))
 }

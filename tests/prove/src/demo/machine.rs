@@ -39,7 +39,12 @@ impl Machine {
     /// Builds the controller: for the board where that is possible and wanted.
     pub fn prepare(options: &Options, scene: &Scene) -> Result<Self> {
         if options.host {
-            return Self::host(scene, "as asked by --host".to_owned());
+            let reason = "as asked by --host".to_owned();
+            if options.is_built {
+                let program = std::env::current_exe()?.with_file_name("host");
+                return Ok(Self::Host { program, reason });
+            }
+            return Self::host(scene, reason);
         }
         match Cross::find().and_then(|cross| Ok((cross, qemu::find()?))) {
             Ok((cross, emulator)) => {

@@ -1,6 +1,7 @@
 //! `cargo xtask demo`: a beating heart streamed to the controller, every answer checked.
 
 mod check;
+pub mod debugger;
 mod faults;
 pub mod machine;
 mod plot;
@@ -17,6 +18,7 @@ use faults::Plan;
 use machine::Machine;
 use report::Report;
 use scene::Scene;
+use session::Harm;
 use xtask::steps::Outcome;
 use xtask::workspace;
 
@@ -53,6 +55,9 @@ pub struct Options {
     /// Whether the board may be replaced by this computer where it cannot be had.
     #[arg(skip)]
     pub board_only: bool,
+    /// Whether the host's controller has been built beside this program.
+    #[arg(skip)]
+    pub is_built: bool,
 }
 
 /// Runs the demo and writes its report and pictures; an error names each promise that was broken.
@@ -65,12 +70,16 @@ pub fn run(options: &Options) -> Result<()> {
     let folder = options.output.clone().unwrap_or_else(|| workspace::target().join("demo"));
     std::fs::create_dir_all(&folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    let faults = options.faults.then(|| Plan::new(options.seed, options.seconds));
-    let outcome = session::run(&scene, &machine, options.seconds, faults, &folder)?;
+    let harm = if options.faults {
+        Harm::Bus(Plan::new(options.seed, options.seconds))
+    } else {
+        Harm::Nothing
+    };
+    let outcome = session::run(&scene, &machine, options.seconds, &harm, &folder)?;
     // Before anything is written: it names the commit, and whether it is clean.
     let report = Report::new(&scene, &machine, &outcome)?;
     plot::draw(&outcome, &folder)?;
-    if faults.is_some() {
+    if options.faults {
         timeline::draw(&outcome, &folder)?;
     }
     report.write(&folder)?;
@@ -80,5 +89,6 @@ pub fn run(options: &Options) -> Result<()> {
 
 /// The demo of `cargo xtask test`, on this computer.
 pub fn on_host(seconds: u32) -> Result<Outcome> {
-    run(&Options { seconds, host: true, ..Options::default() }).map(|()| Outcome::Passed)
+    run(&Options { seconds, host: true, is_built: true, ..Options::default() })
+        .map(|()| Outcome::Passed)
 }

@@ -19,6 +19,7 @@ use xtask::process::shown;
 use xtask::{qemu, workspace};
 
 use super::check::{Checked, Compared, check, compare};
+use super::debugger::{Bits, flip};
 use super::faults::{Faults, Plan};
 use super::machine::Machine;
 use super::scene::Scene;
@@ -26,6 +27,16 @@ use super::sender::{Link, send};
 
 /// Real time that a connected controller may stay silent.
 const SILENCE: Duration = Duration::from_secs(30);
+
+/// What is done to a run.
+#[derive(Clone, Copy)]
+pub enum Harm {
+    Nothing,
+    /// Faults on the bus.
+    Bus(Plan),
+    /// Bits of the board's memory are flipped as soon as a frame is published.
+    Memory(Bits),
+}
 
 /// Everything that a run showed.
 pub struct Outcome {
@@ -39,6 +50,8 @@ pub struct Outcome {
     pub compared: Vec<Compared>,
     /// What was done to the bus, if anything.
     pub faults: Option<Faults>,
+    /// The last tick that was known when memory was changed, if it was.
+    pub flipped_at: Option<u32>,
     /// Ticks that were asked for.
     pub ticks_asked: u32,
     /// Frames sent to the last byte.
@@ -56,9 +69,13 @@ pub fn run(
     scene: &Scene,
     machine: &Machine,
     seconds: u32,
-    faults: Option<Plan>,
+    harm: &Harm,
     folder: &Path,
 ) -> Result<Outcome> {
+    let faults = match harm {
+        Harm::Bus(plan) => Some(plan),
+        Harm::Nothing | Harm::Memory(_) => None,
+    };
     let ticks_asked = seconds * TICK_RATE;
     let sockets = tempfile::tempdir()?;
     let (bus_path, telemetry_path) = (sockets.path().join("bus"), sockets.path().join("telemetry"));
@@ -66,6 +83,13 @@ pub fn run(
     let telemetry_socket = UnixListener::bind(&telemetry_path)?;
 
     let mut command = machine.command(&bus_path, &telemetry_path, ticks_asked);
+    let debugger = match harm {
+        Harm::Memory(bits) => Some((sockets.path().join("debugger"), *bits)),
+        Harm::Nothing | Harm::Bus(_) => None,
+    };
+    if let Some((socket, _)) = &debugger {
+        command.arg("-gdb").arg(format!("unix:{},server=on,wait=off", socket.display()));
+    }
     // As one would type it at the top of the repository.
     let shown = shown(&command)
         .replace(&format!("{}/", workspace::root().display()), "")
@@ -80,16 +104,17 @@ pub fn run(
     let link = Arc::new(Link::default());
     let (to_check, answers) = mpsc::channel::<Tick>();
     let (listened, sent, checked) = thread::scope(|scope| {
-        let sender = scope.spawn(|| send(scene, &link, bus, faults.as_ref()));
+        let sender = scope.spawn(|| send(scene, &link, bus, faults));
         let checker = scope.spawn(|| {
             answers.into_iter().map(|tick| check(scene, &link, &tick)).collect::<Result<Vec<_>>>()
         });
-        let listened = listen(telemetry, &link, &to_check, ticks_asked);
+        let debugger = debugger.as_ref().map(|(socket, bits)| (socket.as_path(), *bits));
+        let listened = listen(telemetry, &link, &to_check, ticks_asked, debugger);
         link.over.store(true, Ordering::Relaxed);
         drop(to_check);
         (listened, joined(sender.join()), joined(checker.join()))
     });
-    let (ticks, summary) = listened?;
+    let Heard { ticks, summary, flipped_at } = listened?;
     let injected = sent?;
     let mut compared = Vec::new();
     for tick in &ticks {
@@ -101,7 +126,8 @@ pub fn run(
         summary,
         checked: checked?,
         compared,
-        faults: faults.map(|plan| Faults::new(&plan, injected)),
+        faults: faults.map(|plan| Faults::new(plan, injected)),
+        flipped_at,
         ticks_asked,
         frames_sent: link.frames_sent.load(Ordering::Relaxed),
         exited_well: status.success(),
@@ -147,18 +173,28 @@ fn accept(socket: &UnixListener, child: &mut Child) -> Result<UnixStream> {
     }
 }
 
-/// Reads telemetry until the summary, and hands every answer to the checker.
+/// What a controller's telemetry told.
+struct Heard {
+    ticks: Vec<Tick>,
+    summary: Summary,
+    flipped_at: Option<u32>,
+}
+
+/// Reads telemetry until the summary, and hands every answer to the checker. With a debugger, flips its bits once a
+/// frame is published.
 fn listen(
     mut telemetry: UnixStream,
     link: &Link,
     to_check: &mpsc::Sender<Tick>,
     ticks_asked: u32,
-) -> Result<(Vec<Tick>, Summary)> {
+    debugger: Option<(&Path, Bits)>,
+) -> Result<Heard> {
     telemetry.set_read_timeout(Some(SILENCE))?;
     let style = "{bar:24} {pos}/{len} ticks  {msg}";
     let bar = ProgressBar::new(ticks_asked.into()).with_style(ProgressStyle::with_template(style)?);
     let mut deframer = Deframer::<MAX_FRAMED>::new();
     let mut ticks = Vec::new();
+    let mut flipped_at = None;
     let mut buffer = [0; 4096];
     loop {
         let bytes = telemetry.read(&mut buffer).context("the controller fell silent")?;
@@ -169,11 +205,18 @@ fn listen(
             match record {
                 Record::Summary(summary) => {
                     bar.finish_and_clear();
-                    return Ok((ticks, summary));
+                    return Ok(Heard { ticks, summary, flipped_at });
                 }
                 Record::Tick(tick) => {
                     link.bytes.store(tick.bytes, Ordering::Relaxed);
                     link.tick.store(tick.tick, Ordering::Relaxed);
+                    if let Some((socket, bits)) = debugger
+                        && flipped_at.is_none()
+                        && tick.frames_published > 0
+                    {
+                        flip(socket, bits).context("no bit was flipped")?;
+                        flipped_at = Some(tick.tick);
+                    }
                     if tick.is_answered() {
                         to_check.send(tick)?;
                     }
