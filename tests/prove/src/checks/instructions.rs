@@ -40,7 +40,8 @@ pub const CHECK: Check = Check {
 fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     valgrind::install_runner()?;
     let mut cargo = Command::new("cargo");
-    cargo.args(["bench", "--quiet", "--package", "dibs-tests", "--bench", "instructions"]);
+    // The whole workspace, as the tests were built.
+    cargo.args(["bench", "--quiet", "--workspace", "--bench", "instructions"]);
     cargo.args(["--", "--output-format=json"]).current_dir(workspace::root());
     let output = cargo.stderr(Stdio::inherit()).output()?;
     ensure!(output.status.success(), "`{}` failed", shown(&cargo));
