@@ -309,12 +309,17 @@ impl<const N: usize> FrameWriter<'_, N> {
         if self.missing() != 0 {
             return Err(PublishError::Incomplete { missing: self.missing() });
         }
-        self.publish_complete(label)
+        self.set_label(label);
+        self.publish_complete()
     }
 
-    /// The same for a frame whose completeness the caller has proved.
-    pub(crate) fn publish_complete(&mut self, label: FrameLabel) -> Result<(), PublishError> {
+    /// Labels the frame being written.
+    pub(crate) fn set_label(&mut self, label: FrameLabel) {
         self.back.set_label(label);
+    }
+
+    /// Publishes a frame that is labelled, and whose completeness the caller has proved.
+    pub(crate) fn publish_complete(&mut self) -> Result<(), PublishError> {
         let next = (self.state ^ FRONT) | PUBLISHED;
         self.frames
             .state
@@ -413,6 +418,11 @@ pub struct FrameView<'f, const N: usize> {
 }
 
 impl<const N: usize> FrameView<'_, N> {
+    /// What is known of the frame; of one being written, nothing certain before it is labelled.
+    pub(crate) fn label(&self) -> FrameLabel {
+        self.buffer.label()
+    }
+
     /// Time from this frame to one with the stamp `received`.
     pub(crate) fn time_to(&self, received: u32) -> u32 {
         elapsed(received, self.buffer.received.load(Ordering::Relaxed))

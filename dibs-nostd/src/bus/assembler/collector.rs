@@ -37,7 +37,6 @@ struct Published {
     captured: u32,
     source_age: u32,
     transit: u32,
-    stretch: Option<f32>,
     /// The greatest age that was reported: a wrap of the clock does not make it young again.
     oldest: u32,
 }
@@ -310,7 +309,7 @@ impl Collector {
     }
 
     /// The frame in work has become the published one.
-    pub fn published(&mut self, frame: &Frame, stretch: Option<f32>) {
+    pub fn published(&mut self, frame: &Frame) {
         self.frame = None;
         self.wants_whole = false;
         let freshness = frame.begin.freshness;
@@ -321,7 +320,6 @@ impl Collector {
             source_age: u32::from(freshness.age_ms),
             // An echo from the future is of another run of this receiver.
             transit: transit.filter(|&transit| transit <= i32::MAX as u32).unwrap_or(u32::MAX),
-            stretch,
             oldest: 0,
         });
         self.trouble = Trouble::new();
@@ -342,7 +340,8 @@ impl Collector {
         self.heartbeat
     }
 
-    pub fn status(&mut self, now: u32, safety: u8, challenge: u32) -> Status {
+    /// What the sender is told; `stretch` is the published frame's.
+    pub fn status(&mut self, now: u32, safety: u8, stretch: Option<f32>, challenge: u32) -> Status {
         let number = self.statuses;
         self.statuses = number.wrapping_add(1);
         let published = self.published.as_mut().map(|published| {
@@ -352,7 +351,7 @@ impl Collector {
                 session: published.id.session,
                 epoch: published.id.epoch,
                 age_ms: published.oldest,
-                stretch: published.stretch,
+                stretch,
             }
         });
         let Self { wants_whole, answer, .. } = *self;

@@ -35,9 +35,9 @@ pub use rejection::Rejection;
 /// With a gate of modes, `N` is their number, and frames hold weights instead: see
 /// [`Gate::weight_range`].
 ///
-/// RAM: some 600 bytes besides [`Frames`](crate::Frames) and gate, for any `N`. A surface's buffers,
+/// RAM: less than half a kilobyte besides [`Frames`](crate::Frames) and gate, for any `N`. A surface's buffers,
 /// both ends of them, assembler and [`StretchMonitor`](crate::StretchMonitor) together take 24 bytes a vertex
-/// and at most 1,100 bytes.
+/// and at most 1,024 bytes.
 ///
 /// ```
 /// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
@@ -63,8 +63,8 @@ pub struct Assembler<'f, G, const N: usize, M = NoMac> {
     mac: M,
     max_coordinate: f32,
     collector: Collector,
-    /// The frame in work has been admitted: only its publication is left.
-    admitted: Option<FrameLabel>,
+    /// The frame in work has been admitted and labelled: only its publication is left.
+    is_admitted: bool,
     /// Rows of the back buffer, from the first on, that are as published but for what the partial
     /// frame in work has changed.
     copied: u32,
@@ -168,7 +168,7 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
             mac,
             max_coordinate,
             collector: Collector::new(mesh_id),
-            admitted: None,
+            is_admitted: false,
             copied: 0,
             is_dirty: false,
             takes_partial: false,
@@ -229,8 +229,8 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
             }
             return Ok(Advance::Idle);
         };
-        if let Some(label) = self.admitted {
-            return Ok(self.publish(label));
+        if self.is_admitted {
+            return Ok(self.publish());
         }
         let ready = match frame.begin.content {
             Content::Partial { .. } => {
@@ -249,7 +249,9 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
     /// What the receiver tells the sender: [`encode_status`](crate::wire::encode_status) makes a packet
     /// of it. `now` in ms; `safety` as in [`Status::safety`].
     pub fn status(&mut self, now: u32, safety: u8) -> Status {
-        self.collector.status(now, safety, self.mac.challenge())
+        let stretch = self.writer.front().and_then(|front| front.label().stretch);
+        let stretch = stretch.map(|stretch| stretch.sigma());
+        self.collector.status(now, safety, stretch, self.mac.challenge())
     }
 
     /// Name of the frame published last.
@@ -332,31 +334,33 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
             Ok(_) if !frame.is_complete => Ok(Advance::Idle),
             Ok(Verdict::Pending) => Ok(Advance::Pending),
             Ok(Verdict::Admitted(stretch)) => {
-                let label = FrameLabel {
+                self.writer.set_label(FrameLabel {
                     epoch: frame.id.epoch,
                     received: frame.captured(),
                     position_error: frame.begin.encoding.error() + self.gate.position_error(),
                     stretch,
-                };
-                self.admitted = Some(label);
-                Ok(self.publish(label))
+                });
+                self.is_admitted = true;
+                Ok(self.publish())
             }
         }
     }
 
-    fn publish(&mut self, label: FrameLabel) -> Advance {
-        let epoch = label.epoch;
-        match (self.writer.publish_complete(label), self.collector.frame) {
-            (Ok(()), Some(frame)) => {
-                self.admitted = None;
+    /// Publishes the frame in work, which is admitted.
+    fn publish(&mut self) -> Advance {
+        let Some(frame) = self.collector.frame else { return Advance::Idle };
+        let epoch = frame.id.epoch;
+        match self.writer.publish_complete() {
+            Ok(()) => {
+                self.is_admitted = false;
                 self.copied = 0;
                 self.is_dirty = false;
-                self.collector.published(&frame, label.stretch.map(|stretch| stretch.sigma()));
+                self.collector.published(&frame);
                 self.gate.published();
                 Advance::Published { epoch }
             }
-            (Err(PublishError::Busy), _) => Advance::Held { epoch },
-            _ => Advance::Idle,
+            Err(PublishError::Busy) => Advance::Held { epoch },
+            Err(_) => Advance::Idle,
         }
     }
 }

@@ -38,8 +38,8 @@ impl<G: Gate, M: Mac, const N: usize> Assembler<'_, G, N, M> {
 
     fn begin(&mut self, packet: &Packet<'_>, begin: Begin) -> Result<Progress, Rejection> {
         // A frame that only waits for a reader is better published than in the way.
-        if let Some(label) = self.admitted {
-            self.publish(label);
+        if self.is_admitted {
+            self.publish();
         }
         let takes_weights = self.gate.weight_range(0).is_some();
         let is_acceptable = |begin: &Begin| {
@@ -58,7 +58,7 @@ impl<G: Gate, M: Mac, const N: usize> Assembler<'_, G, N, M> {
         self.takes_partial |= is_partial;
         let begun = self.collector.begin(packet, begin, share, is_acceptable)?;
         let Some(frame) = begun else { return Ok(Progress::Duplicate) };
-        self.admitted = None;
+        self.is_admitted = false;
         self.clean();
         self.is_box_inside = match begin.encoding {
             Encoding::Float => false,
