@@ -1,28 +1,31 @@
 //! The check of a modal frame before it is published.
 
 use super::{ModalSurface, Modes, WeightsError};
-use crate::stretch::{Arriving, Changed, Gate, StretchError, Verdict};
+use crate::stretch::{Arriving, Changed, Gate, StretchError, Verdict, farthest};
 use crate::surface::VertexTable;
 
-/// Admits weights within their ranges whose surface keeps to the stretch limit: the
+/// Admits weights within their ranges whose surface keeps to the stretch limit, and to a speed limit: the
 /// [`Gate`] of an [`Assembler`](crate::Assembler) of modal frames.
 ///
-/// [`Modes::stretch_bound`] decides in O(modes), whatever the number of triangles. Only where it is
-/// beyond the limit, and so cannot tell, is the surface measured by another gate `G`, in slices if that
-/// is a [`StretchMonitor`](crate::StretchMonitor): between the two nothing is refused that is within the
-/// limit, and nothing admitted that is not.
+/// [`Modes::stretch_bound`] and a bound on how far any vertex moved decide in O(modes), whatever the number of
+/// triangles. Only where one of them is beyond its limit, and so cannot tell, is the surface measured by another
+/// gate `G`, in slices if that is a [`StretchMonitor`](crate::StretchMonitor): between the two nothing is refused
+/// that is within the limits, and no frame admitted that is stretched or moved beyond them.
+///
+/// The limit on speed is `G`'s: [`StretchMonitor::limits`](crate::StretchMonitor::limits). Its limit on size holds
+/// for frames that are measured; the others are as small as weights in their ranges make them.
 #[derive(Clone, Debug)]
 pub struct ModalGate<'a, G, const K: usize> {
     modes: Modes<'a>,
     exact: G,
-    /// The surface that is being measured, where the bound could not tell.
+    /// The surface that is being measured, where a bound could not tell.
     surface: Option<ModalSurface<'a, K>>,
     measured: u32,
 }
 
 impl<'a, G, const K: usize> ModalGate<'a, G, K> {
-    /// A gate for surfaces of exactly `K` modes. `exact` measures those of which the bound cannot tell:
-    /// the tree, or a monitor of it.
+    /// A gate for surfaces of exactly `K` modes. `exact` measures those of which the bounds cannot tell:
+    /// the tree, or a monitor of it, which has a limit on speed.
     ///
     /// # Errors
     /// [`WeightsError::Count`] for another number of modes.
@@ -39,6 +42,16 @@ impl<'a, G, const K: usize> ModalGate<'a, G, K> {
     pub const fn measured(&self) -> u32 {
         self.measured
     }
+
+    /// The weights that these rows hold.
+    fn weights<V: VertexTable + ?Sized>(rows: &V) -> Result<[f32; K], StretchError> {
+        let mut weights = [0.0; K];
+        for (row, weight) in (0..).zip(&mut weights) {
+            let stored = rows.position(row).ok_or(StretchError::Corrupt { row })?;
+            *weight = stored.x;
+        }
+        Ok(weights)
+    }
 }
 
 impl<G: Gate, const K: usize> Gate for ModalGate<'_, G, K> {
@@ -50,37 +63,50 @@ impl<G: Gate, const K: usize> Gate for ModalGate<'_, G, K> {
         self.modes.range(mode as usize)
     }
 
+    fn speed_limit(&self) -> f32 {
+        self.exact.speed_limit()
+    }
+
     fn position_error(&self) -> f32 {
         self.modes.position_error()
     }
 
-    /// `rows` holds the weights, as an assembler stores them.
+    /// The rows hold weights, as an assembler stores them, of this frame and of the published one.
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
-        Arriving { surface: rows, ready, .. }: Arriving<'_, V>,
+        Arriving { surface: rows, ready, before }: Arriving<'_, V>,
         work: u32,
     ) -> Result<Verdict, StretchError> {
         if (ready as usize) < K {
             return Ok(Verdict::Pending);
         }
+        let before = match before {
+            Some((rows, elapsed)) => {
+                let weights = Self::weights(rows)?;
+                Some((ModalSurface::<K>::new(&self.modes, weights.into_iter()), elapsed))
+            }
+            None => None,
+        };
         let surface = match &self.surface {
             Some(surface) => surface,
             None => {
-                let mut weights = [0.0; K];
-                for (row, weight) in (0..).zip(&mut weights) {
-                    let stored = rows.position(row).ok_or(StretchError::Corrupt { row })?;
-                    *weight = stored.x;
-                }
+                let weights = Self::weights(rows)?;
+                let surface = ModalSurface::new(&self.modes, weights.into_iter());
+                let speed = self.exact.speed_limit();
+                let is_slow = before.as_ref().is_none_or(|(before, elapsed)| {
+                    surface.farthest_from(before) <= farthest(speed, *elapsed)
+                });
                 let bound = self.modes.bound(&weights);
-                if bound.sigma() <= self.modes.stretch_limit() {
+                if is_slow && bound.sigma() <= self.modes.stretch_limit() {
                     return Ok(Verdict::Admitted(Some(bound)));
                 }
                 self.measured = self.measured.saturating_add(1);
                 self.exact.begin(Changed::Whole);
-                self.surface.insert(ModalSurface::new(&self.modes, weights.into_iter()))
+                self.surface.insert(surface)
             }
         };
         let ready = surface.len() as u32;
-        self.exact.advance(Arriving::new(surface, ready), work)
+        let before = before.as_ref().map(|(before, elapsed)| (before, *elapsed));
+        self.exact.advance(Arriving { surface, ready, before }, work)
     }
 }

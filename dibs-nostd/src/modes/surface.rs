@@ -6,6 +6,9 @@ use super::{FRACTION_BITS, Modes};
 use crate::surface::VertexTable;
 use crate::tree::format;
 
+/// Above the square root of 3, by more than sums and products of a few numbers are rounded.
+const DIAGONAL: f32 = 1.7321;
+
 /// The surface at some weights: [`Modes::surface`] makes one.
 ///
 /// A copy of its weights and a view of flash; nothing else is stored, and nothing is computed for a
@@ -31,6 +34,16 @@ impl<'a, const K: usize> ModalSurface<'a, K> {
             *gain = (weight * mode.gain) as i32;
         }
         Self { modes: *modes, gains }
+    }
+
+    /// No vertex is farther than this from where it is on `before`, a surface of the same modes (mm), but for the
+    /// rounding of the two positions.
+    ///
+    /// A mode moves a vertex by at most 2^15 of its steps an axis, and rounds down: `gain * 2^15 / 2^16` units, and one.
+    pub(super) fn farthest_from(&self, before: &Self) -> f32 {
+        let halves = |(now, before): (&i32, &i32)| u64::from(now.abs_diff(*before)) + 2;
+        let sum: u64 = self.gains.iter().zip(&before.gains).map(halves).sum();
+        sum as f32 * (0.5 * DIAGONAL) * self.modes.header.unit
     }
 
     /// The modes that move this surface.

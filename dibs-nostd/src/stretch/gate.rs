@@ -82,6 +82,12 @@ pub trait Gate {
         None
     }
 
+    /// The largest speed of any vertex that the gate admits, in mm per unit of the receiver's clock:
+    /// see [`Limits::speed`](crate::Limits::speed). Infinite for one that compares no frames.
+    fn speed_limit(&self) -> f32 {
+        f32::INFINITY
+    }
+
     /// What to add to a frame's position error for how its surface is made of its rows (mm).
     fn position_error(&self) -> f32 {
         0.0

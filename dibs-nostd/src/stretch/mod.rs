@@ -17,6 +17,7 @@ pub use gate::{Arriving, Changed, Gate, Unchecked, Verdict};
 use kernel::Worst;
 pub use limits::Limits;
 pub use monitor::StretchMonitor;
+pub(crate) use motion::farthest;
 use regions::{of_regions, region_rows};
 
 /// Why a stretch could not be measured, or what it is beyond.

@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use super::kernel::Worst;
-use super::motion::{largest_step, too_fast};
+use super::motion::{farthest, largest_step, too_fast};
 use super::regions::{of_regions, region_rows};
 use super::rows::Room;
 use super::{Arriving, Changed, Gate, Limits, StretchError, Verdict, check_tables, rows};
@@ -164,8 +164,7 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
             self.blocks_left = 0;
             return Ok((work, true));
         };
-        // Infinite without a limit; more than the time between, for the clock counts whole units.
-        let limit = self.speed * (elapsed as f32 + 1.0);
+        let limit = farthest(self.speed, elapsed);
         if limit == f32::INFINITY {
             self.blocks_left = 0;
         }
@@ -291,6 +290,10 @@ impl<I: Index> Gate for StretchMonitor<'_, I> {
         }
         let measured = of_regions(self.tree, &self.regions, surface.epoch());
         Ok(Verdict::Admitted(Some(measured)))
+    }
+
+    fn speed_limit(&self) -> f32 {
+        self.speed
     }
 
     fn published(&mut self) {

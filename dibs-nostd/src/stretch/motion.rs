@@ -6,6 +6,12 @@ use super::StretchError;
 use crate::math::sqrt::sqrt;
 use crate::surface::VertexTable;
 
+/// How far a vertex may move in this time (mm); infinite without a limit.
+pub(crate) const fn farthest(speed: f32, elapsed: u32) -> f32 {
+    // More than the time between, for the clock counts whole units.
+    speed * (elapsed as f32 + 1.0)
+}
+
 /// The largest squared distance of these rows from where they were before, and of `largest`. Not below it where a
 /// position is not a number.
 #[inline(never)]
