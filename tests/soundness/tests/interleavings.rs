@@ -4,13 +4,30 @@
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{FrameLabel, Frames, PublishError, VertexTable};
+use loom::cell::UnsafeCell;
 use loom::thread;
 
 const VERTICES: usize = 1;
 
-/// A frame that carries its epoch everywhere.
-fn label(epoch: u32) -> FrameLabel {
-    FrameLabel { epoch, received: epoch + 100, position_error: 0.0, stretch: None }
+/// A cell beside each buffer, touched when the buffer is. Positions are relaxed atomics, so that reading them while
+/// they are written is no data race, and loom lets no load see a later store: only here does it see that nothing orders
+/// a read before the next write. It reports that as a causality violation.
+struct Beside([UnsafeCell<()>; 2]);
+
+impl Beside {
+    fn written(&self, buffer: usize) {
+        self.0[buffer].with_mut(|_| ());
+    }
+
+    fn read(&self, buffer: usize) {
+        self.0[buffer].with(|_| ());
+    }
+}
+
+/// A frame that carries its epoch everywhere, and the buffer that it is in.
+fn label(epoch: u32, buffer: usize) -> FrameLabel {
+    let position_error = buffer as f32;
+    FrameLabel { epoch, received: epoch + 100, position_error, stretch: None }
 }
 
 fn position(epoch: u32) -> Vec3 {
@@ -18,7 +35,8 @@ fn position(epoch: u32) -> Vec3 {
 }
 
 /// The writer publishes three frames, giving up a frame when the reader is in the way; the reader reads
-/// three times. Loom runs this in every order.
+/// three times. Loom runs this in every order, and finds no read that is not ordered against every write of its buffer:
+/// weaken one of the four orderings of `Frames`, and it does.
 #[test]
 fn no_order_of_steps_tears_a_frame() {
     let orders = std::sync::Arc::new(std::sync::atomic::AtomicU32::new(0));
@@ -26,14 +44,17 @@ fn no_order_of_steps_tears_a_frame() {
     loom::model(move || {
         counter.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         let frames: &'static Frames<VERTICES> = Box::leak(Box::new(Frames::new()));
+        let beside: &'static Beside =
+            Box::leak(Box::new(Beside([UnsafeCell::new(()), UnsafeCell::new(())])));
         let (mut writer, mut reader) = frames.split().expect("split once");
         let sender = thread::spawn(move || {
-            let mut published = 0;
+            let (mut published, mut buffer) = (0, 1);
             for epoch in 1..=3 {
                 writer.begin();
+                beside.written(buffer);
                 writer.push(position(epoch)).expect("inside the table");
-                match writer.publish(label(epoch)) {
-                    Ok(()) => published = epoch,
+                match writer.publish(label(epoch, buffer)) {
+                    Ok(()) => (published, buffer) = (epoch, 1 - buffer),
                     Err(PublishError::Busy) => {}
                     Err(other) => panic!("{other}"),
                 }
@@ -43,8 +64,10 @@ fn no_order_of_steps_tears_a_frame() {
         let mut newest = 0;
         for _ in 0..3 {
             if let Some(frame) = reader.read() {
-                let epoch = frame.label().epoch;
-                assert_eq!(frame.label(), label(epoch), "the label is of one epoch");
+                let FrameLabel { epoch, position_error, .. } = frame.label();
+                let buffer = usize::from(position_error == 1.0);
+                assert_eq!(frame.label(), label(epoch, buffer), "the label is of one epoch");
+                beside.read(buffer);
                 assert_eq!(frame.position(0), Some(position(epoch)), "as is the position");
                 assert!(epoch >= newest, "no frame is older than one that was read");
                 newest = epoch;
