@@ -5,10 +5,11 @@ use crate::MeasuredStretch;
 /// The most work that one query may do. It bounds its time; an answer that was cut short is still
 /// valid, with a wider interval.
 ///
-/// To the same question a larger budget never gives a wider interval, at either end. From tick to tick nothing is
-/// promised of the lower end, also where nothing has moved: a warm start spends a test elsewhere, and the lower end of
-/// an answer that is cut short again may fall, by centimetres. Take the larger of two only for one and the same frame
-/// and pose.
+/// Every answer's own interval holds the true separation. To the same question a larger budget gives an interval that
+/// is nowhere wider: the lower end never falls, and the upper end rises by no more than the accuracy. From tick to tick
+/// that holds for the upper end alone, if the answer's triangle is the next warm start and nothing has moved: a warm
+/// start spends a test elsewhere, and the lower end of an answer that is cut short again may fall, by centimetres. Take
+/// the larger of two lower ends only for one and the same frame and pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Budget {
