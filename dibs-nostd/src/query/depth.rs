@@ -11,7 +11,7 @@ use super::search::{Search, Waiting};
 use super::side::{self, NoSide, Side};
 use super::{Budget, Options, Proximity};
 use crate::math::sqrt::sqrt;
-use crate::tool::{Sphere, Tool};
+use crate::tool::{AxisPoint, Tool};
 use crate::unavailable::QueryError;
 use crate::{Index, Tree, VertexTable};
 
@@ -184,7 +184,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         };
         let options = self.options.budget(Budget { node_tests, triangle_tests });
         let options = options.warm_start(near.triangle);
-        let point = Sphere::point(on_axis);
+        let point = AxisPoint(on_axis);
         let found = Search::start(self.tree, self.stack, self.vertices, &point, &options)?.run()?;
         self.options.budget = Budget {
             node_tests: node_tests.saturating_sub(found.node_tests.saturating_sub(1)),

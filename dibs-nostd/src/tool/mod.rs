@@ -11,11 +11,13 @@
 //! The `triangle` module derives the figure; `tests/tests/kernels.rs` in the repository searches for
 //! a counterexample.
 
+mod axis_point;
 mod capsule;
 mod edge;
 mod sphere;
 mod triangle;
 
+pub(crate) use axis_point::AxisPoint;
 pub use capsule::Capsule;
 pub use sphere::Sphere;
 

@@ -33,11 +33,6 @@ impl Sphere {
         Ok(Self { center, radius })
     }
 
-    /// A point of another tool's axis.
-    pub(crate) const fn point(center: Vec3) -> Self {
-        Self { center, radius: 0.0 }
-    }
-
     /// The centre as given.
     pub fn center(&self) -> Vec3 {
         self.center
