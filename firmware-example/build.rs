@@ -22,7 +22,7 @@ fn surface() -> Result<()> {
     println!("cargo::rerun-if-env-changed=DIBS_STRETCH");
     let tree = match env::var_os("DIBS_MESH") {
         Some(path) => dibs_build::tree(&path),
-        None => dibs_build::tree(generate::heart(10_272)?.0),
+        None => dibs_build::tree(generate::heart(10_272)?.mesh),
     };
     let stretch = match env::var("DIBS_STRETCH") {
         Ok(text) => text.parse().with_context(|| format!("DIBS_STRETCH=`{text}`"))?,

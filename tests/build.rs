@@ -23,7 +23,7 @@ fn main() {
 #[cfg(feature = "builder")]
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     look_for_real_meshes();
-    let (mesh, motion) = dibs_build::generate::heart(1_000)?;
+    let dibs_build::generate::MovingMesh { mesh, motion } = dibs_build::generate::heart(1_000)?;
     let tree = dibs_build::tree(mesh.clone()).stretch(1.5).try_emit("heart")?;
     let fit = dibs_build::modes::ModalFit::new(&mesh, &motion)?;
     let out = std::env::var("OUT_DIR")?;

@@ -26,7 +26,7 @@ pub enum IndexWidth {
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
-/// let (mesh, _motion) = generate::heart(1_000)?;
+/// let mesh = generate::heart(1_000)?.mesh;
 /// let tree = Builder::new().stretch(1.5).build(&mesh)?;
 /// assert_eq!(tree.summary().triangles, 1_000);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

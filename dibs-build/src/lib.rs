@@ -45,7 +45,7 @@ pub use construct::Construction;
 pub use error::BuildError;
 pub use mesh::{Mesh, Motion, RestSurface};
 pub use orient::{WindingError, check_winding, orient};
-pub use pc2::MotionMismatch;
+pub use pc2::MotionMismatchError;
 pub use read::{Format, Import, ReadError, ReadErrorKind, ReadOptions, Report, read};
 pub use rest::Paths;
 pub use script::{MeshSource, TreeScript, tree};

@@ -238,7 +238,7 @@ mod tests {
     use glam::Vec3;
 
     fn ball() -> Mesh {
-        crate::generate::heart(320).expect("a valid size").0
+        crate::generate::heart(320).expect("a valid size").mesh
     }
 
     #[test]

@@ -20,7 +20,7 @@ const POINT: usize = 12;
 #[error(
     "frame {frame} of the motion has {found} vertices and the mesh has {expected}; use the mesh that the motion was recorded for"
 )]
-pub struct MotionMismatch {
+pub struct MotionMismatchError {
     /// The first frame that does not fit, counted from 0.
     pub frame: usize,
     /// Vertices of the mesh.
@@ -77,12 +77,14 @@ impl Motion {
     /// Checks that every frame has one position for each of the mesh's vertices.
     ///
     /// # Errors
-    /// [`MotionMismatch`] for the first frame that does not.
-    pub fn check_fits(&self, mesh: &Mesh) -> Result<(), MotionMismatch> {
+    /// [`MotionMismatchError`] for the first frame that does not.
+    pub fn check_fits(&self, mesh: &Mesh) -> Result<(), MotionMismatchError> {
         let expected = mesh.positions.len();
         match self.frames.iter().position(|frame| frame.len() != expected) {
             None => Ok(()),
-            Some(frame) => Err(MotionMismatch { frame, expected, found: self.frames[frame].len() }),
+            Some(frame) => {
+                Err(MotionMismatchError { frame, expected, found: self.frames[frame].len() })
+            }
         }
     }
 }

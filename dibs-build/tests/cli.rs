@@ -320,7 +320,7 @@ fn results_that_nobody_reads_or_no_disk_holds() {
 fn a_mesh_is_what_its_name_says() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let (mesh, _) = dibs_build::generate::heart(320).unwrap();
+    let mesh = dibs_build::generate::heart(320).unwrap().mesh;
     for (name, format) in [
         ("h.ply", Format::Ply),
         ("h.STL", Format::StlBinary),

@@ -17,7 +17,7 @@ fn heart() -> (SurfaceOrder, Vec<u32>, Motion) {
 }
 
 fn make() -> (SurfaceOrder, Vec<u32>, Motion) {
-    let (mesh, motion) = generate::heart(500).unwrap();
+    let generate::MovingMesh { mesh, motion } = generate::heart(500).unwrap();
     let tree = Builder::new().build(&mesh).unwrap();
     let order = SurfaceOrder::of(&tree.tree::<u16>().unwrap());
     (order, tree.vertex_order().to_vec(), motion)

@@ -12,7 +12,7 @@ use dibs_nostd::wire::{
     AesCmac, Deframer, Event, Mac, NoMac, encode_status, enframe, framed_bytes,
 };
 use dibs_nostd::{
-    Advance, Assembler, Frames, Progress, Rejection, StretchMonitor, Tree, VertexTable,
+    Advance, Assembler, Frames, Progress, ReceiveError, StretchMonitor, Tree, VertexTable,
 };
 use serde_json::Value;
 
@@ -158,7 +158,7 @@ fn receive<M: Mac>(
             let now = start.elapsed().as_millis() as u32;
             match assembler.accept(&packet, now) {
                 Ok(Progress::Begun { .. }) => seen.last_begun = Some(Instant::now()),
-                Ok(_) | Err(Rejection::Forged { .. } | Rejection::Unexpected { .. }) => (),
+                Ok(_) | Err(ReceiveError::Forged { .. } | ReceiveError::Unexpected { .. }) => (),
                 Err(rejection) => panic!("{rejection}"),
             }
             loop {

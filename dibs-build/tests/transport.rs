@@ -164,7 +164,7 @@ fn targets_are_read_and_bad_ones_named() {
         assert!(matches!(error, TargetError::Baud { .. }), "{text}: {error}");
     }
     for text in ["unix:/nowhere/at/all", "serial:/nowhere/at/all", "tcp:127.0.0.1:1"] {
-        let error = text.parse::<Target>().unwrap().open().err().expect("nobody is there");
+        let error = text.parse::<Target>().unwrap().open().expect_err("nobody is there");
         assert!(error.to_string().contains(text), "{error}");
     }
 }

@@ -8,13 +8,13 @@
 /// |---|---|
 /// | `TREE` | the bytes in flash, a [`TreeBytes`](crate::TreeBytes): `TREE.validate()` gives the `Tree` |
 /// | `Surface` | the double buffer for its vertices, a [`Frames`](crate::Frames) |
-/// | `Receiver` | the bus's end of it, an [`Assembler`](crate::Assembler) that measures stretch in slices; `receiver` makes one |
+/// | `Receiver` | the bus's end of it (feature `bus`), an [`Assembler`](crate::Assembler) that measures stretch in slices; `receiver` makes one |
 /// | `Reader` | the control loop's end of it |
 /// | `Query` | a [`Query`](crate::Query) with the stack that the tree needs; `WideQuery` for large processors |
 /// | `VERTICES`, `STACK`, `Index` | the sizes, for types of your own |
 /// | `CENTRE`, `REACH` | the rest shape's bounding box, where the tree carries its rest shape |
 ///
-/// A tree with modes brings `MODES` and a module `modal` with the types for surfaces of so many weights.
+/// A tree with modes brings `MODES` and, with the feature `modes`, a module `modal` with the types for surfaces of so many weights.
 ///
 /// The build script is `fn main() { dibs_build::tree("heart.ply").stretch(1.5).emit("heart") }`.
 #[macro_export]
@@ -22,4 +22,36 @@ macro_rules! include_tree {
     ($name:literal) => {
         ::core::include!(::core::concat!(::core::env!("OUT_DIR"), "/", $name, ".rs"));
     };
+}
+
+/// Items of the generated module that need the feature `bus`.
+#[cfg(feature = "bus")]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! if_bus {
+    ($($item:item)*) => { $($item)* };
+}
+
+/// The same without it.
+#[cfg(not(feature = "bus"))]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! if_bus {
+    ($($item:item)*) => {};
+}
+
+/// Items of the generated module that need the feature `modes`.
+#[cfg(feature = "modes")]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! if_modes {
+    ($($item:item)*) => { $($item)* };
+}
+
+/// The same without it.
+#[cfg(not(feature = "modes"))]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! if_modes {
+    ($($item:item)*) => {};
 }

@@ -13,7 +13,7 @@
 //!
 //! | step | type | context |
 //! |---|---|---|
-//! | bytes become packets | [`wire::Deframer`], [`wire::Packet`] | bus interrupt |
+//! | bytes become packets | [`wire::Deframer`] | bus interrupt |
 //! | packets become complete, checked frames | [`Assembler`], [`StretchMonitor`] | bus interrupt |
 //! | frames change hands, never torn | [`Frames`] | both |
 //! | a frame is searched | [`Query`], [`Sphere`], [`Capsule`] | control interrupt |
@@ -28,7 +28,7 @@
 //! use dibs_nostd::{Capsule, Options, Query, Tree, measure_stretch, glam::Vec3};
 //!
 //! // On a host: a tree, as a build script would write it into a static.
-//! let (heart, motion) = generate::heart(1_000)?;
+//! let generate::MovingMesh { mesh: heart, motion } = generate::heart(1_000)?;
 //! let built = Builder::new().stretch(1.5).build(&heart)?;
 //!
 //! // On the target: the tree's bytes, validated once, and a query with a fixed stack.
@@ -46,6 +46,7 @@
 //!
 //! # Features
 //!
+//! - `bus`, `control`, `modes`, on by default: packets and the [`Assembler`]; [`constraint`] and [`failsafe`]; [`modes`].
 //! - `defmt`: `defmt::Format` for every public value and error.
 //! - `authenticity`: [`wire`]'s `AesCmac`, by which a receiver believes only packets with a genuine tag.
 #![no_std]
@@ -53,10 +54,14 @@
 
 pub use glam;
 
-pub mod bus;
-pub mod control;
+#[cfg(feature = "bus")]
+mod bus;
+#[cfg(feature = "control")]
+mod control;
+mod error;
 mod include;
 mod math;
+#[cfg(feature = "modes")]
 pub mod modes;
 mod query;
 mod stretch;
@@ -65,22 +70,29 @@ mod tool;
 mod tree;
 mod unavailable;
 
+#[cfg(feature = "bus")]
 pub use bus::wire;
-pub use bus::{Advance, Assembler, BusHealth, LastHeartbeat, Progress, Rejection};
+#[cfg(feature = "bus")]
+pub use bus::{Advance, Assembler, BusHealth, LastHeartbeat, Progress, ReceiveError};
+#[cfg(feature = "control")]
 pub use control::{constraint, failsafe};
+pub use error::Error;
 pub use query::{
     Budget, Contact, Contacts, Cost, Fallback, NoSide, Options, Proximity, Query, Side, Tracked,
     Tracker,
 };
 pub use stretch::{
-    Arriving, Changed, Gate, Limits, StretchError, StretchMonitor, Unchecked, Verdict,
+    Arriving, Changed, Gate, StretchError, StretchMonitor, SurfaceLimits, Unchecked, Verdict,
     measure_stretch,
 };
 pub use surface::{
     Between, FrameAge, FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames, Latest,
-    MeasuredStretch, Moved, MovingSurface, Odometer, OutOfTable, PublishError, QuantisedVertices,
-    REGIONS, Step, Travel, VertexTable,
+    MeasuredStretch, Moved, MovingSurface, Odometer, OutOfTableError, PublishError,
+    QuantisedVertices, REGIONS, SplitError, Step, Travel, VertexTable,
 };
 pub use tool::{ACCURACY, AxisPair, Capsule, MAX_COORDINATE, Sphere, Tool, ToolError};
-pub use tree::{CorruptTreeError, FormatError, Index, Scrub, Tree, TreeBytes, format};
+/// The bytes of a tree, for its builder: no part of what stays the same from version to version.
+#[doc(hidden)]
+pub use tree::format;
+pub use tree::{CorruptTreeError, FormatError, Index, PathKind, Scrub, Tree, TreeBytes};
 pub use unavailable::{QueryError, Unavailable};

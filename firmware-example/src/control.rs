@@ -67,8 +67,6 @@ pub struct Control {
     failsafe: FailSafe,
     bus: &'static BusStatus,
     tick: u32,
-    /// The last tick's closest triangle: where the next query starts.
-    warm_start: Option<u32>,
     /// The last tick's instrument, for its velocity.
     before: Option<Capsule>,
 }
@@ -91,7 +89,6 @@ impl Control {
             failsafe: FailSafe::new(limits().map_err(SetupError::Limit)?),
             bus,
             tick: 0,
-            warm_start: None,
             before: None,
         })
     }
@@ -137,7 +134,7 @@ impl Control {
             // There is no velocity to damp either.
             (_, None) => Vec3::NAN,
         };
-        let force = self.wall.force(admitted.as_ref().map_err(|unknown| *unknown), velocity);
+        let force = self.wall.force(&admitted, velocity);
 
         record.state = verdict.state as u32;
         record.cause = verdict.cause.map_or(0, |cause| cause_code(&cause));
@@ -149,8 +146,7 @@ impl Control {
         record
     }
 
-    /// The closest pair on the frame published last: which frame, and the answer, widened by the
-    /// quantisation.
+    /// The closest pair on the frame published last, and which frame.
     fn ask(
         &mut self,
         tool: &Capsule,
@@ -172,14 +168,11 @@ impl Control {
         record.age = age.map_or(u32::MAX, |age| age.age);
         record.position_error = label.position_error;
 
-        let mut options = Options::new().budget(BUDGET).warm_start(self.warm_start);
-        if let Some(measured) = label.stretch {
-            options = options.stretch(measured);
-        }
+        let options = Options::new().budget(BUDGET);
         let start = clock();
-        #[cfg(not(feature = "in-rounds"))]
+        #[cfg(not(feature = "wide"))]
         let answer = self.query.closest(&frame, tool, &options);
-        #[cfg(feature = "in-rounds")]
+        #[cfg(feature = "wide")]
         let answer = self.query.closest_wide(&frame, tool, &options);
         record.query_counts = clock().wrapping_sub(start);
         drop(frame);
@@ -188,9 +181,8 @@ impl Control {
             Ok(closest) => closest,
             Err(error) => return (age, Err(Unavailable::Query(error))),
         };
-        self.warm_start = closest.triangle;
         write(&closest, record);
-        (age, Ok(closest.widened(label.position_error)))
+        (age, Ok(closest))
     }
 }
 

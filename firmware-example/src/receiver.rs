@@ -1,7 +1,7 @@
 //! Bus reception: bytes in, published frames and statuses out.
 
 use dibs_nostd::wire::{Counters, Deframer, encode_status, enframe, framed_bytes};
-use dibs_nostd::{Advance, Limits, Progress, StretchError};
+use dibs_nostd::{Advance, Progress, StretchError, SurfaceLimits};
 
 use crate::fingerprint::Fingerprint;
 use crate::surface::{self, CENTRE, REACH};
@@ -60,7 +60,7 @@ impl Receiver {
         status: &'static BusStatus,
     ) -> Result<Self, StretchError> {
         let reach = CENTRE.abs().max_element() + ROOM * REACH;
-        let limits = Limits::reach_mm(reach).speed(SPEED);
+        let limits = SurfaceLimits::reach_mm(reach).speed(SPEED);
         Ok(Self {
             deframer: Deframer::new(),
             assembler: surface::receiver(tree, writer, limits)?,

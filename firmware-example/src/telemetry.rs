@@ -52,7 +52,7 @@ pub struct Tick {
     pub separation: f32,
     /// Lower end of the certified interval, in mm.
     pub lower: f32,
-    /// Stated accuracy of both, in mm.
+    /// Stated accuracy of both, in mm: the position error and the rounding of the query.
     pub accuracy: f32,
     /// The surface's point of the closest pair, in mm.
     pub point_on_surface: [f32; 3],
@@ -90,7 +90,7 @@ pub const fn cause_code(cause: &Unavailable) -> u32 {
         Unavailable::LinkLost { .. } => 4,
         Unavailable::HeartbeatLost { .. } => 5,
         Unavailable::Rejections { .. } => 6,
-        Unavailable::Rot => 7,
+        Unavailable::CorruptTree => 7,
         Unavailable::Delayed { .. } => 9,
         Unavailable::SourceStale { .. } => 10,
         Unavailable::Forgeries { .. } => 11,

@@ -35,7 +35,7 @@ struct Sender {
 
 impl Sender {
     fn new() -> Self {
-        let (mesh, motion) = generate::heart(10_272).expect("a heart");
+        let generate::MovingMesh { mesh, motion } = generate::heart(10_272).expect("a heart");
         let tree = Builder::new().stretch(1.5).build(&mesh).expect("a tree");
         assert_eq!(
             tree.summary().mesh_id,
@@ -77,7 +77,9 @@ impl Sender {
         let (start, end) = (Vec3::from(tick.tool_start), Vec3::from(tick.tool_end));
         let tool = Instrument::capsule(start, end, tick.tool_radius);
         let truth = exhaustive(&self.decoded[&tick.epoch], &self.triangles, &tool).unwrap();
-        let (rows, accuracy) = (&self.decoded[&tick.epoch], f64::from(tick.accuracy));
+        // Both sides have the vertices as they were decoded: no error of their positions.
+        let accuracy = f64::from(tick.accuracy) - f64::from(tick.position_error);
+        let rows = &self.decoded[&tick.epoch];
         let (low, high) = sides::signed_separation(rows, &self.triangles, &tool, &truth, accuracy);
         assert!(f64::from(tick.separation) >= low - accuracy, "tick {}: {low}", tick.tick);
         assert!(f64::from(tick.lower) <= high + accuracy, "tick {}: {high}", tick.tick);

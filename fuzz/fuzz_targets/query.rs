@@ -17,7 +17,7 @@ use libfuzzer_sys::fuzz_target;
 const MOST_LOOKS: u32 = 27;
 
 static SOUND: LazyLock<(Vec<u8>, Vec<Vec3>)> = LazyLock::new(|| {
-    let (mesh, _) = generate::heart(320).expect("a valid size");
+    let mesh = generate::heart(320).expect("a valid size").mesh;
     let built = Builder::new().index(IndexWidth::Bits16).build(&mesh).expect("a valid mesh");
     (built.blob().into(), built.to_rows(&mesh.positions))
 });
@@ -62,7 +62,7 @@ fuzz_target!(|input: &[u8]| {
         let row = words.next() as usize % rows.len();
         rows[row] = words.point();
     }
-    let mut options = Options::new();
+    let mut options = Options::cold();
     let flags = words.next();
     let budget = Budget { node_tests: words.next() % 1_000, triangle_tests: words.next() % 100 };
     if flags & 1 != 0 {

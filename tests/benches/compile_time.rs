@@ -26,7 +26,7 @@ fn main() -> Result<()> {
     for triangles in sizes.split_whitespace() {
         let triangles = triangles.parse().context("DIBS_TRIANGLES")?;
         let start = Instant::now();
-        let built = Builder::new().build(&generate::heart(triangles)?.0)?;
+        let built = Builder::new().build(&generate::heart(triangles)?.mesh)?;
         eprintln!("{triangles} triangles built in {:.1} s", start.elapsed().as_secs_f64());
         let name = format!("{triangles} triangles");
         let times = Crate::new(folder, &format!("t{triangles}"), Some(&built))?.times()?;

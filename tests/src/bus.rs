@@ -3,7 +3,7 @@
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{CHECKSUM_BYTES, Encoding, FrameEncoder, FrameId, Mac, QuantisedBox};
 use dibs_nostd::{
-    Advance, Assembler, FrameReader, Frames, Gate, Rejection, Unchecked, VertexTable,
+    Advance, Assembler, FrameReader, Frames, Gate, ReceiveError, Unchecked, VertexTable,
 };
 
 /// Mesh id of the packets.
@@ -93,7 +93,7 @@ pub fn frame(epoch: u32, quantised: bool) -> Vec<Vec<u8>> {
 pub fn give<G: Gate, M: Mac, const N: usize>(
     assembler: &mut Assembler<'_, G, N, M>,
     packet: &[u8],
-) -> Result<Option<u32>, Rejection> {
+) -> Result<Option<u32>, ReceiveError> {
     give_at(assembler, packet, 0)
 }
 
@@ -105,7 +105,7 @@ pub fn give_at<G: Gate, M: Mac, const N: usize>(
     assembler: &mut Assembler<'_, G, N, M>,
     packet: &[u8],
     now: u32,
-) -> Result<Option<u32>, Rejection> {
+) -> Result<Option<u32>, ReceiveError> {
     assembler.accept(packet, now)?;
     for _ in 0..1000 {
         match assembler.advance(7)? {

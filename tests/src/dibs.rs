@@ -100,7 +100,7 @@ impl<I: Index> Method for Dibs<'_, I> {
     }
 
     fn find(&mut self, tool: &Probe) -> Found {
-        let mut options = Options::new();
+        let mut options = Options::cold();
         if let Some(stretch) = self.stretch {
             options = options.stretch(stretch);
         }
@@ -151,7 +151,7 @@ impl<I: Index> Method for Unordered<'_, I> {
     fn update(&mut self) {}
 
     fn find(&mut self, tool: &Probe) -> Found {
-        ask(&mut self.query, &self.table, tool, &Options::new()).0
+        ask(&mut self.query, &self.table, tool, &Options::cold()).0
     }
 }
 

@@ -12,7 +12,8 @@ use glam::Vec3;
 /// If no heart has so many triangles.
 #[must_use]
 pub fn trembling(triangles: u32, waves: usize, seed: u64) -> (Mesh, Motion) {
-    let (mesh, mut motion) = generate::heart(triangles).expect("a valid size");
+    let generate::MovingMesh { mesh, mut motion } =
+        generate::heart(triangles).expect("a valid size");
     let mut rng = Rng::with_seed(seed);
     let mut vector = |size: f32| Vec3::from([(); 3].map(|()| (rng.f32() - 0.5) * size));
     let waves: Vec<[Vec3; 2]> = (0..waves).map(|_| [vector(0.12), vector(1.0)]).collect();

@@ -19,7 +19,7 @@ pub struct Surface {
 /// Never: the sizes are valid.
 #[must_use]
 pub fn all(lean: bool) -> Vec<Surface> {
-    let heart = generate::heart(320).expect("a valid size").0;
+    let heart = generate::heart(320).expect("a valid size").mesh;
     let brain = generate::brain(500).expect("a valid size");
     let build = |(mesh, leaf): (Mesh, usize)| {
         let builder = Builder::new().index(IndexWidth::Bits16).stretch(1.5).leaf_triangles(leaf);

@@ -9,7 +9,7 @@ use dibs_nostd::wire::{
     Rows, StreamError, enframe, framed_bytes,
 };
 use dibs_nostd::{
-    Advance, Arriving, Changed, Gate, Progress, Rejection, StretchError, Verdict, VertexTable,
+    Advance, Arriving, Changed, Gate, Progress, ReceiveError, StretchError, Verdict, VertexTable,
 };
 use dibs_tests::bus::*;
 
@@ -119,7 +119,7 @@ fn two_frames_of_one_epoch_are_never_mixed() {
                 give(&mut assembler, packet).unwrap();
             }
             let rejection = give(&mut assembler, commit).unwrap_err();
-            assert!(matches!(rejection, Rejection::Digest { .. }), "{rejection}");
+            assert!(matches!(rejection, ReceiveError::Digest { .. }), "{rejection}");
             assert!(published(&mut reader).is_none());
             // The next whole frame is taken, under the same number.
             for packet in &new {
@@ -174,10 +174,10 @@ fn a_refused_surface_is_not_published_and_the_last_one_stays() {
         if refuse {
             // The rows are all there: there is no need to wait for the commit.
             let rejection = give(&mut assembler, last).unwrap_err();
-            assert_eq!(rejection, Rejection::Stretch(StretchError::NoMetric));
+            assert_eq!(rejection, ReceiveError::Stretch(StretchError::NoMetric));
             assert_eq!(assembler.advance(1), Ok(Advance::Idle), "the frame is gone");
             let late = give(&mut assembler, commit);
-            assert_eq!(late, Err(Rejection::Unexpected { epoch }));
+            assert_eq!(late, Err(ReceiveError::Unexpected { epoch }));
             assert_eq!(published(&mut reader).unwrap().0, 1);
             assert_eq!(assembler.published(), Some(id(1)));
         } else {
@@ -238,8 +238,8 @@ fn a_frame_is_checked_in_slices_and_then_published() {
     }
     assert_eq!((began.get(), moved.get(), done.get()), (1, N as u32, 0));
     let next = frame(2, false);
-    assert_eq!(assembler.accept(&next[0], 0), Err(Rejection::Busy { epoch: 2 }));
-    assert_eq!(assembler.accept(&next[1], 0), Err(Rejection::Unexpected { epoch: 2 }));
+    assert_eq!(assembler.accept(&next[0], 0), Err(ReceiveError::Busy { epoch: 2 }));
+    assert_eq!(assembler.accept(&next[1], 0), Err(ReceiveError::Unexpected { epoch: 2 }));
     // 100 triangles, of which 2 for each packet are checked.
     let left = 100 - 2 * packets.len() as u32;
     for _ in 0..left / 2 - 1 {
@@ -276,7 +276,7 @@ fn a_frame_that_meets_a_read_is_held_and_published_later() {
     }
     assert_eq!(assembler.advance(9), Ok(Advance::Held { epoch: 3 }));
     let fourth = frame(4, false);
-    assert_eq!(assembler.accept(&fourth[0], 0), Err(Rejection::Busy { epoch: 4 }));
+    assert_eq!(assembler.accept(&fourth[0], 0), Err(ReceiveError::Busy { epoch: 4 }));
     drop(guard);
     assert_eq!(assembler.accept(&fourth[0], 0), Ok(Progress::Begun { epoch: 4 }));
     assert_eq!(published(&mut reader).unwrap().0, 3);

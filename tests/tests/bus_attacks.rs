@@ -13,7 +13,7 @@ use dibs_nostd::wire::{
     AesCmac, Code, Content, Direction, Encoding, FrameEncoder, FrameId, Freshness, Mac, NoMac,
     encode_heartbeat, encode_status,
 };
-use dibs_nostd::{Advance, Assembler, FrameReader, Frames, Rejection, Unchecked};
+use dibs_nostd::{Advance, Assembler, FrameReader, Frames, ReceiveError, Unchecked};
 use dibs_tests::bus::*;
 
 const KEY: [u8; 16] = *b"a secret of ours";
@@ -157,7 +157,7 @@ fn a_replayed_begin_displaces_nothing() {
             if epoch > 20 && place == 0 {
                 for _ in 0..2 {
                     let replayed = assembler.accept(&recorded, now);
-                    assert_eq!(replayed, Err(Rejection::Stale { epoch: 20 }));
+                    assert_eq!(replayed, Err(ReceiveError::Stale { epoch: 20 }));
                 }
             }
         }
@@ -326,7 +326,7 @@ fn two_frames_of_one_name_are_not_spliced() {
             let is_other = (1..=12).contains(&i) && closest >> (i - 1) & 1 == 1;
             outcome = give(&mut assembler, if is_other { &b[i] } else { &a[i] });
         }
-        assert!(matches!(outcome, Err(Rejection::Digest { .. })), "{outcome:?}");
+        assert!(matches!(outcome, Err(ReceiveError::Digest { .. })), "{outcome:?}");
         assert!(published(&mut reader).is_none());
     }
     // The share that travels nowhere is what the digest sums.
@@ -434,7 +434,7 @@ fn a_forgery_is_verified_once_and_counted_apart() {
         FrameEncoder::<_, 64>::partial(id(2), Encoding::Float, &rows[..], 1, &rows[..]).unwrap();
     let partial = collect(encoder.with_mac(wrong).unwrap());
     for n in 1..=10 {
-        assert_eq!(assembler.accept(&partial[0], n), Err(Rejection::Forged { epoch: 2 }));
+        assert_eq!(assembler.accept(&partial[0], n), Err(ReceiveError::Forged { epoch: 2 }));
         assert_eq!(counting.1.get(), n);
         let health = assembler.health();
         assert_eq!((health.forgeries, health.rejections, health.packet), (n, 0, None));

@@ -4,7 +4,7 @@ use dibs_nostd::wire::{
     AesCmac, Body, Counters, Encoding, Event, FrameEncoder, FrameId, NoMac, Packet, Status,
     TAG_BYTES, WeightsEncoder, encode_heartbeat, encode_status,
 };
-use dibs_nostd::{Assembler, FrameReader, Frames, Progress, Rejection, Unchecked};
+use dibs_nostd::{Assembler, FrameReader, Frames, Progress, ReceiveError, Unchecked};
 use dibs_tests::bus::*;
 use proptest::prelude::*;
 
@@ -101,15 +101,15 @@ fn without_key_and_challenge_nothing_is_published() {
     ];
     for packets in forgeries {
         let (mut assembler, mut reader) = guarded();
-        assert_eq!(give(&mut assembler, &packets[0]), Err(Rejection::Forged { epoch: 1 }));
+        assert_eq!(give(&mut assembler, &packets[0]), Err(ReceiveError::Forged { epoch: 1 }));
         for packet in &packets[1..] {
-            assert_eq!(give(&mut assembler, packet), Err(Rejection::Unexpected { epoch: 1 }));
+            assert_eq!(give(&mut assembler, packet), Err(ReceiveError::Unexpected { epoch: 1 }));
         }
         // Within a genuine frame too.
         let genuine = tagged(1, 1, &mac());
         give(&mut assembler, &genuine[0]).unwrap();
         for packet in &packets {
-            assert_eq!(give(&mut assembler, packet), Err(Rejection::Forged { epoch: 1 }));
+            assert_eq!(give(&mut assembler, packet), Err(ReceiveError::Forged { epoch: 1 }));
         }
         assert!(published(&mut reader).is_none());
         for packet in &genuine[1..] {
@@ -120,7 +120,7 @@ fn without_key_and_challenge_nothing_is_published() {
     }
     // A receiver without a key takes no tags.
     let (mut open, _) = bus();
-    assert_eq!(give(&mut open, &tagged(1, 1, &mac())[0]), Err(Rejection::Forged { epoch: 1 }));
+    assert_eq!(give(&mut open, &tagged(1, 1, &mac())[0]), Err(ReceiveError::Forged { epoch: 1 }));
 }
 
 /// Everything that was ever sent, sent again in any order: no frame comes back.
@@ -163,7 +163,7 @@ fn the_whole_session_is_under_the_tag() {
     let (old, new) = (tagged(0x0001_0007, 4, &mac()), tagged(0x0002_0007, 4, &mac()));
     assert_eq!(old[1][..54], new[1][..54], "but for the tag they are the same");
     give(&mut assembler, &new[0]).unwrap();
-    assert_eq!(give(&mut assembler, &old[1]), Err(Rejection::Forged { epoch: 4 }));
+    assert_eq!(give(&mut assembler, &old[1]), Err(ReceiveError::Forged { epoch: 4 }));
     assert_eq!(give(&mut assembler, &new[1]), Ok(None));
 }
 
@@ -176,10 +176,10 @@ fn heartbeats_and_statuses_are_under_the_tag() {
     let other = encode_heartbeat(&id(9), 1, &mac().with_challenge(1), &mut buffer).to_vec();
     assert_eq!(genuine.len(), 48);
     for packet in [&forged, &other] {
-        assert_eq!(assembler.accept(packet, 0), Err(Rejection::Forged { epoch: 9 }));
+        assert_eq!(assembler.accept(packet, 0), Err(ReceiveError::Forged { epoch: 9 }));
     }
     assert_eq!(assembler.accept(&genuine, 0), Ok(Progress::Heartbeat));
-    assert_eq!(assembler.accept(&genuine, 0), Err(Rejection::Stale { epoch: 9 }));
+    assert_eq!(assembler.accept(&genuine, 0), Err(ReceiveError::Stale { epoch: 9 }));
 
     let status = assembler.status(0, 1);
     assert_eq!(status.challenge, CHALLENGE);

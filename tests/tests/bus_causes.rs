@@ -5,7 +5,7 @@ use dibs_nostd::wire::{
     Content, Counters, Encoding, Event, NoMac, PacketError, QuantisedBox, Status, StreamError,
     WeightsEncoder, encode_status,
 };
-use dibs_nostd::{Progress, Rejection, VertexTable};
+use dibs_nostd::{Progress, ReceiveError, VertexTable};
 use dibs_tests::bus::*;
 
 /// A packet with some bytes changed, and a right checksum.
@@ -16,7 +16,7 @@ fn edit(packet: &[u8], at: usize, value: &[u8]) -> Vec<u8> {
 }
 
 /// What a fault within frame 1 is rejected as, after its begin and third packet have come.
-fn rejection_of(fault: &[u8]) -> Rejection {
+fn rejection_of(fault: &[u8]) -> ReceiveError {
     let good = frame(1, false);
     let (mut assembler, mut reader) = bus();
     give(&mut assembler, &good[0]).unwrap();
@@ -39,14 +39,14 @@ fn rejection_of(fault: &[u8]) -> Rejection {
 fn what_is_no_packet() {
     let good = frame(1, false);
     let (begin, vertices, commit) = (&good[0], &good[1], &good[good.len() - 1]);
-    let packet = |error| Rejection::Packet(error);
+    let packet = |error| ReceiveError::Packet(error);
     assert_eq!(rejection_of(&[0; 21]), packet(PacketError::TooShort { bytes: 21 }));
     let flipped = rejection_of(&{
         let mut damaged = vertices.clone();
         damaged[30] ^= 4;
         damaged
     });
-    assert!(matches!(flipped, Rejection::Packet(PacketError::Checksum { .. })));
+    assert!(matches!(flipped, ReceiveError::Packet(PacketError::Checksum { .. })));
     for version in [0, 1, 2, 255] {
         let fault = edit(vertices, 0, &[version]);
         assert_eq!(rejection_of(&fault), packet(PacketError::Version { version }));
@@ -108,7 +108,7 @@ fn what_is_no_packet() {
     }
     // A tag where the receiver has no key.
     let tagged = rejection_of(&raw(0x84, 1, 1, [2, 0], 0, &[0; 10]));
-    assert_eq!(tagged, Rejection::Forged { epoch: 1 });
+    assert_eq!(tagged, ReceiveError::Forged { epoch: 1 });
 }
 
 #[test]
@@ -116,9 +116,9 @@ fn what_is_a_packet_and_not_right() {
     let good = frame(1, false);
     let (begin, vertices) = (&good[0], &good[1]);
     let rejected = |fault: &[u8], expected| assert_eq!(rejection_of(fault), expected);
-    rejected(&edit(vertices, 4, &[0xFF]), Rejection::WrongMesh { mesh_id: MESH | 0xFF });
-    rejected(&edit(vertices, 8, &[2]), Rejection::Unexpected { epoch: 2 });
-    rejected(&edit(vertices, 2, &[2]), Rejection::Unexpected { epoch: 1 });
+    rejected(&edit(vertices, 4, &[0xFF]), ReceiveError::WrongMesh { mesh_id: MESH | 0xFF });
+    rejected(&edit(vertices, 8, &[2]), ReceiveError::Unexpected { epoch: 2 });
+    rejected(&edit(vertices, 2, &[2]), ReceiveError::Unexpected { epoch: 1 });
     let status = Status {
         published: None,
         wants_whole: false,
@@ -130,36 +130,36 @@ fn what_is_a_packet_and_not_right() {
     };
     let mut buffer = [0; 64];
     let status = encode_status(MESH, &status, &Counters::new(), &NoMac, &mut buffer);
-    rejected(status, Rejection::Unexpected { epoch: 0 });
-    rejected(&edit(begin, 23, &[41, 0, 0]), Rejection::RowCount { rows: 41 });
-    rejected(&frame(1, true)[1], Rejection::Encoding);
+    rejected(status, ReceiveError::Unexpected { epoch: 0 });
+    rejected(&edit(begin, 23, &[41, 0, 0]), ReceiveError::RowCount { rows: 41 });
+    rejected(&frame(1, true)[1], ReceiveError::Encoding);
     let weights = WeightsEncoder::<64>::new(id(2), &[0.5; N])
         .unwrap()
         .next_packet(&mut [0; 64])
         .unwrap()
         .to_vec();
-    rejected(&weights, Rejection::Encoding);
-    rejected(&raw(5, 1, 1, [1, 1], 0, &[0; 4]), Rejection::Encoding);
+    rejected(&weights, ReceiveError::Encoding);
+    rejected(&raw(5, 1, 1, [1, 1], 0, &[0; 4]), ReceiveError::Encoding);
     for first in [38, 40, 0x00FF_FFFF] {
         let fault = edit(vertices, 15, &u32::to_le_bytes(first)[..3]);
-        rejected(&fault, Rejection::OutOfRange { first, count: 3 });
+        rejected(&fault, ReceiveError::OutOfRange { first, count: 3 });
     }
     // Packet 3 has come, with rows 6 to 8: in packet 2 there is room for rows 3 to 5 only.
     for first in [0, 2, 4, 5, 6, 7, 9, 20] {
         let fault = edit(&good[2], 15, &u32::to_le_bytes(first)[..3]);
-        rejected(&fault, Rejection::Order { sequence: 2 });
+        rejected(&fault, ReceiveError::Order { sequence: 2 });
     }
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         for axis in 0..3 {
             let fault = edit(vertices, 18 + 2 * 12 + 4 * axis, &bad.to_le_bytes());
-            rejected(&fault, Rejection::NotFinite { row: 2 });
+            rejected(&fault, ReceiveError::NotFinite { row: 2 });
         }
     }
     for (far, axis) in [(100.01_f32, 0), (-100.01, 1), (1e30, 2)] {
         let fault = edit(vertices, 18 + 12 + 4 * axis, &far.to_le_bytes());
-        rejected(&fault, Rejection::TooFar { row: 1 });
+        rejected(&fault, ReceiveError::TooFar { row: 1 });
     }
-    rejected(&raw_begin(1, 2, 1, N as u32, 1), Rejection::Base { epoch: 1 });
+    rejected(&raw_begin(1, 2, 1, N as u32, 1), ReceiveError::Base { epoch: 1 });
 }
 
 /// A quantisation box may reach beyond the receiver's limit, a vertex may not.
@@ -176,7 +176,7 @@ fn a_box_may_be_larger_than_the_surface() {
     far[9].y = 100.2;
     let packets = packets::<64>(2, Encoding::Quantised(coarse), &far);
     let outcomes: Vec<_> = packets.iter().map(|packet| give(&mut assembler, packet)).collect();
-    assert_eq!(outcomes[2], Err(Rejection::TooFar { row: 9 }));
+    assert_eq!(outcomes[2], Err(ReceiveError::TooFar { row: 9 }));
     assert_eq!(published(&mut reader).unwrap().0, 1);
 }
 
@@ -193,22 +193,25 @@ fn packets_beyond_the_commit_do_not_belong() {
         match sequence {
             1 => assert_eq!(outcome, Ok(None)),
             // With it the frame would be complete, but the digest is that of all packets.
-            2 => assert!(matches!(outcome, Err(Rejection::Digest { .. }))),
-            _ => assert_eq!(outcome, Err(Rejection::Unexpected { epoch: 1 })),
+            2 => assert!(matches!(outcome, Err(ReceiveError::Digest { .. }))),
+            _ => assert_eq!(outcome, Err(ReceiveError::Unexpected { epoch: 1 })),
         }
     }
     let (mut again, _) = bus();
     give(&mut again, &good[0]).unwrap();
     give(&mut again, &edit(commit, 12, &3_u16.to_le_bytes())).unwrap();
-    assert_eq!(give(&mut again, &good[3]), Err(Rejection::Order { sequence: 3 }));
-    assert_eq!(give(&mut again, commit), Err(Rejection::Order { sequence: good.len() as u16 - 1 }));
+    assert_eq!(give(&mut again, &good[3]), Err(ReceiveError::Order { sequence: 3 }));
+    assert_eq!(
+        give(&mut again, commit),
+        Err(ReceiveError::Order { sequence: good.len() as u16 - 1 })
+    );
     // Or last.
     let (mut last, _) = bus();
     for packet in others {
         give(&mut last, packet).unwrap();
     }
     let early = edit(commit, 12, &3_u16.to_le_bytes());
-    assert_eq!(give(&mut last, &early), Err(Rejection::Order { sequence: 3 }));
+    assert_eq!(give(&mut last, &early), Err(ReceiveError::Order { sequence: 3 }));
     assert_eq!(give(&mut last, commit), Ok(Some(1)));
     assert!(published(&mut reader).is_none());
 }
@@ -227,9 +230,9 @@ fn a_frame_without_its_last_rows_is_not_published() {
     }
     let mut commit = edit(commit, 12, &(short.len() as u16).to_le_bytes());
     commit = edit(&commit, 18, &digest.to_le_bytes());
-    assert_eq!(give(&mut assembler, &commit), Err(Rejection::RowCount { rows: 39 }));
+    assert_eq!(give(&mut assembler, &commit), Err(ReceiveError::RowCount { rows: 39 }));
     assert!(published(&mut reader).is_none());
-    assert_eq!(give(&mut assembler, &good[1]), Err(Rejection::Unexpected { epoch: 1 }));
+    assert_eq!(give(&mut assembler, &good[1]), Err(ReceiveError::Unexpected { epoch: 1 }));
 }
 
 /// Every second packet: more gaps than can be noted.
@@ -244,7 +247,7 @@ fn gaps_are_bounded() {
     let mut refused = Vec::new();
     for packet in packets[1..].iter().skip(1).step_by(2) {
         if let Err(rejection) = give(&mut assembler, packet) {
-            assert!(matches!(rejection, Rejection::Gaps { .. }));
+            assert!(matches!(rejection, ReceiveError::Gaps { .. }));
             refused.push(packet);
         }
     }

@@ -6,7 +6,7 @@ use dibs_nostd::wire::{
     encode_heartbeat, encode_status,
 };
 use dibs_nostd::{
-    Advance, Assembler, Frames, LastHeartbeat, Progress, Rejection, Unchecked, VertexTable,
+    Advance, Assembler, Frames, LastHeartbeat, Progress, ReceiveError, Unchecked, VertexTable,
 };
 use dibs_tests::bus::*;
 
@@ -18,7 +18,7 @@ fn frame_of(session: u32, epoch: u32) -> Vec<Vec<u8>> {
 }
 
 /// The last thing that came of a frame.
-fn send(assembler: &mut Bus, session: u32, epoch: u32) -> Result<Option<u32>, Rejection> {
+fn send(assembler: &mut Bus, session: u32, epoch: u32) -> Result<Option<u32>, ReceiveError> {
     let mut last = Ok(None);
     for packet in frame_of(session, epoch) {
         last = give(&mut assembler.0, &packet);
@@ -41,8 +41,8 @@ fn epochs_wrap() {
             [epoch, epoch.wrapping_sub(1), epoch.wrapping_sub(0x7FFF_FFFF), epoch ^ (1 << 31)]
         {
             let packets = frame_of(1, stale);
-            assert_eq!(give(&mut bus.0, &packets[0]), Err(Rejection::Stale { epoch: stale }));
-            assert_eq!(give(&mut bus.0, &packets[1]), Err(Rejection::Stale { epoch: stale }));
+            assert_eq!(give(&mut bus.0, &packets[0]), Err(ReceiveError::Stale { epoch: stale }));
+            assert_eq!(give(&mut bus.0, &packets[1]), Err(ReceiveError::Stale { epoch: stale }));
         }
         assert_eq!(published(&mut bus.1).unwrap().0, epoch);
     }
@@ -61,7 +61,7 @@ fn sessions_supersede_and_wrap() {
         }
         if let Some(before) = last {
             let begin = &frame_of(before, 0x5000_0000)[0];
-            let stale = Rejection::Stale { epoch: 0x5000_0000 };
+            let stale = ReceiveError::Stale { epoch: 0x5000_0000 };
             assert_eq!(give(&mut bus.0, begin), Err(stale), "session {before:#x}");
         }
         assert_eq!(bus.0.published().map(|id| id.session), Some(session));
@@ -84,7 +84,7 @@ fn sessions_are_told_apart_by_both_halves() {
         give(&mut bus.0, packet).unwrap();
     }
     let outcome = give(&mut bus.0, new.last().unwrap());
-    assert!(matches!(outcome, Err(Rejection::Digest { .. })), "{outcome:?}");
+    assert!(matches!(outcome, Err(ReceiveError::Digest { .. })), "{outcome:?}");
     assert_eq!(published(&mut bus.1).unwrap().0, 3);
 }
 
@@ -99,9 +99,9 @@ fn a_newer_frame_supersedes_an_unfinished_one() {
         assert_eq!(bus.0.accept(&second[0], 0), Ok(Progress::Begun { epoch }));
         assert_eq!(bus.0.counters().of(Event::Abandoned), 1);
         // What is left of the first is of no use any more, not even its begin.
-        assert_eq!(give(&mut bus.0, &first[0]), Err(Rejection::Stale { epoch: 1 }));
+        assert_eq!(give(&mut bus.0, &first[0]), Err(ReceiveError::Stale { epoch: 1 }));
         if epoch != 1 {
-            assert_eq!(give(&mut bus.0, &first[5]), Err(Rejection::Unexpected { epoch: 1 }));
+            assert_eq!(give(&mut bus.0, &first[5]), Err(ReceiveError::Unexpected { epoch: 1 }));
         }
         for packet in &second[1..] {
             give(&mut bus.0, packet).unwrap();
@@ -136,7 +136,7 @@ fn a_stray_begin_does_not_block_the_line() {
             give_at(&mut bus.0, packet, now).unwrap();
             let begin = &frame_of(1, 8)[0];
             let outcome = give_at(&mut bus.0, begin, now.wrapping_add(89));
-            assert_eq!(outcome, Err(Rejection::Stale { epoch: 8 }));
+            assert_eq!(outcome, Err(ReceiveError::Stale { epoch: 8 }));
         }
         assert_eq!(give(&mut bus.0, ahead.last().unwrap()), Ok(Some(epoch)));
     }
@@ -181,13 +181,13 @@ fn heartbeats_are_in_order_and_wrap() {
         assert_eq!(assembler.last_heartbeat(), Some(last));
         for replayed in [beat, beat.wrapping_sub(1), beat ^ (1 << 31)] {
             let packet = heartbeat(3, 78, replayed);
-            assert_eq!(assembler.accept(&packet, 0), Err(Rejection::Stale { epoch: 78 }));
+            assert_eq!(assembler.accept(&packet, 0), Err(ReceiveError::Stale { epoch: 78 }));
         }
         assert_eq!(assembler.last_heartbeat(), Some(last));
     }
     // A later session starts to count anew, an earlier one is not heard.
     assert_eq!(assembler.accept(&heartbeat(4, 1, 0), 1), Ok(Progress::Heartbeat));
-    assert_eq!(assembler.accept(&heartbeat(3, 99, 10), 1), Err(Rejection::Stale { epoch: 99 }));
+    assert_eq!(assembler.accept(&heartbeat(3, 99, 10), 1), Err(ReceiveError::Stale { epoch: 99 }));
     assert_eq!(assembler.counters().of(Event::Heartbeat), 5);
 }
 
@@ -197,11 +197,11 @@ fn a_published_frame_decides_whose_heartbeats_count() {
     let mut bus = bus();
     bus.0.accept(&heartbeat(0x5000_0000, 1, 1), 0).unwrap();
     let ours = heartbeat(6, 1, 1);
-    assert_eq!(bus.0.accept(&ours, 0), Err(Rejection::Stale { epoch: 1 }));
+    assert_eq!(bus.0.accept(&ours, 0), Err(ReceiveError::Stale { epoch: 1 }));
     assert_eq!(send(&mut bus, 6, 1), Ok(Some(1)));
     assert_eq!(bus.0.last_heartbeat(), None);
     assert_eq!(bus.0.accept(&ours, 0), Ok(Progress::Heartbeat));
-    assert_eq!(bus.0.accept(&heartbeat(5, 1, 9), 0), Err(Rejection::Stale { epoch: 1 }));
+    assert_eq!(bus.0.accept(&heartbeat(5, 1, 9), 0), Err(ReceiveError::Stale { epoch: 1 }));
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, Event, FrameEncoder, FrameId, QuantisedBox};
 use dibs_nostd::{
-    Advance, Assembler, FrameReader, Frames, Rejection, StretchMonitor, Unchecked, VertexTable,
+    Advance, Assembler, FrameReader, Frames, ReceiveError, StretchMonitor, Unchecked, VertexTable,
 };
 use dibs_tests::bus::*;
 use fastrand::Rng;
@@ -94,7 +94,7 @@ fn another_base_is_refused_and_a_whole_frame_asked_for() {
             FrameEncoder::<_, 64>::partial(id, Encoding::Float, &positions[..], base, &positions);
         collect(encoder.unwrap())[0].clone()
     };
-    let base = |epoch| Err(Rejection::Base { epoch });
+    let base = |epoch| Err(ReceiveError::Base { epoch });
     assert_eq!(give(&mut assembler, &onto(1, 1, 0)), base(0), "nothing is published");
     assert!(assembler.status(0, 0).wants_whole);
     for packet in frame(5, false) {
@@ -152,7 +152,7 @@ fn nothing_of_an_unpublished_frame_shows_up_later() {
                 }
                 match give(&mut assembler, packet) {
                     Ok(outcome) => is_published |= outcome == Some(epoch),
-                    Err(Rejection::Digest { .. }) => {}
+                    Err(ReceiveError::Digest { .. }) => {}
                     Err(other) => panic!("{other} in round {round}"),
                 }
             }
@@ -179,13 +179,13 @@ fn copying_is_bounded_and_rows_wait_for_it() {
     let packets = partial(2, Encoding::Float, &positions, 1, &held);
     // The first partial frame: nothing was copied before.
     assembler.accept(&packets[0], 0).unwrap();
-    assert_eq!(assembler.accept(&packets[1], 0), Err(Rejection::NotReady { first: 10 }));
+    assert_eq!(assembler.accept(&packets[1], 0), Err(ReceiveError::NotReady { first: 10 }));
     assert!(assembler.status(0, 0).wants_whole);
     assert_eq!(assembler.advance(10), Ok(Advance::Idle));
-    assert_eq!(assembler.accept(&packets[1], 0), Err(Rejection::NotReady { first: 10 }));
+    assert_eq!(assembler.accept(&packets[1], 0), Err(ReceiveError::NotReady { first: 10 }));
     assert_eq!(assembler.advance(1), Ok(Advance::Idle));
     assert!(assembler.accept(&packets[1], 0).is_ok());
-    assert_eq!(assembler.accept(&packets[2], 0), Err(Rejection::NotReady { first: 250 }));
+    assert_eq!(assembler.accept(&packets[2], 0), Err(ReceiveError::NotReady { first: 250 }));
     assert_eq!(assembler.advance(240), Ok(Advance::Idle));
     assert!(assembler.accept(&packets[2], 0).is_ok());
     assert!(assembler.accept(&packets[3], 0).is_ok());

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use dibs_nostd::Rejection;
+use dibs_nostd::ReceiveError;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Deframer, Encoding, Event, Packet, QuantisedBox, enframe, framed_bytes};
 use dibs_tests::bus::*;
@@ -27,7 +27,7 @@ proptest! {
             match give(&mut assembler, &frame[i]) {
                 Ok(Some(7)) => is_published = true,
                 // Repetitions after the end are of a frame that is published already.
-                Err(Rejection::Stale { epoch: 7 }) => prop_assert!(is_published),
+                Err(ReceiveError::Stale { epoch: 7 }) => prop_assert!(is_published),
                 outcome => prop_assert!(outcome.is_ok(), "{outcome:?}"),
             }
         }

@@ -11,7 +11,7 @@ use glam::Vec3;
 const STACK: usize = MAX_STACK;
 
 fn heart(triangles: u32) -> Mesh {
-    generate::heart(triangles).expect("a valid size").0
+    generate::heart(triangles).expect("a valid size").mesh
 }
 
 /// Shortest edge paths between all pairs of vertices (Floyd and Warshall).
@@ -197,7 +197,7 @@ fn a_violated_limit_is_reported_not_tolerated() {
         let at = doubled[rng.usize(..doubled.len())] + unit(&mut rng) * 20.0;
         let tool = Sphere::new(at, 0.0).expect("valid");
         let nearest = doubled.iter().map(|p| p.distance(at)).fold(f32::INFINITY, f32::min);
-        match query.closest(doubled.as_slice(), &tool, &Options::new().unsigned()) {
+        match query.closest(doubled.as_slice(), &tool, &Options::cold().unsigned()) {
             Ok(found) => found.separation > nearest + found.accuracy,
             Err(_) => true,
         }
@@ -220,7 +220,7 @@ fn the_bytes_do_not_depend_on_the_threads() {
 
 #[test]
 fn the_heart_takes_at_most_22_bytes_a_triangle() {
-    let (mesh, _) = generate::heart(10_272).expect("the default");
+    let mesh = generate::heart(10_272).expect("the default").mesh;
     let summary = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh").summary();
     println!("{:.2} bytes a triangle", summary.query_bytes_per_triangle);
     assert!(summary.query_bytes_per_triangle <= 22.0);
@@ -326,9 +326,9 @@ fn counts_of_a_fixed_stream_are_what_they_were() {
         let on_surface = mesh.positions[rng.usize(..mesh.positions.len())];
         let tool = Sphere::new(on_surface + unit(&mut rng) * 40.0 * rng.f32(), 2.0).expect("valid");
         let options = [
-            Options::new(),
-            Options::new().stretch(measured),
-            Options::new().stretch(measured).warm_start(last),
+            Options::cold(),
+            Options::cold().stretch(measured),
+            Options::cold().stretch(measured).warm_start(last),
         ];
         for (count, options) in counts.iter_mut().zip(options) {
             let found = query.closest(rows.as_slice(), &tool, &options).expect("an answer");

@@ -110,7 +110,7 @@ fn build(mesh: &Mesh) -> (BuiltTree, Vec<Vec3>) {
 #[test]
 fn no_contact_is_missing_and_none_is_doubled() {
     let shapes = [
-        ("organ", generate::heart(1_000).expect("a valid size").0),
+        ("organ", generate::heart(1_000).expect("a valid size").mesh),
         ("folds", generate::brain(1_000).expect("a valid size")),
         ("convex", ball(3)),
         ("flat", sheet(20, 60.0, |_, _| 0.0)),
@@ -135,7 +135,7 @@ fn no_contact_is_missing_and_none_is_doubled() {
             let radius = 1.5;
             let tool = Capsule::new(from, to, radius).expect("valid");
             let closest = query
-                .contacts(rows.as_slice(), &tool, MARGIN, &Options::new(), &mut contacts)
+                .contacts(rows.as_slice(), &tool, MARGIN, &Options::cold(), &mut contacts)
                 .expect("an answer");
             if closest.side != Side::Outside {
                 continue;
@@ -182,7 +182,7 @@ fn a_flat_wall_along_a_capsule_is_one_contact() {
     {
         let at = |(x, y): (f32, f32)| Vec3::new(x, y, 4.0);
         let tool = Capsule::new(at(from), at(to), 1.0).expect("valid");
-        let answer = query.contacts(rows.as_slice(), &tool, 5.0, &Options::new(), &mut contacts);
+        let answer = query.contacts(rows.as_slice(), &tool, 5.0, &Options::cold(), &mut contacts);
         answer.expect("an answer");
         assert_eq!(contacts.len(), 1, "{contacts:?}");
         let contact = contacts.iter().next().expect("one");
@@ -212,11 +212,13 @@ fn the_far_side_of_a_thin_plate_is_no_contact() {
     let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
     let mut contacts = Contacts::<8>::new();
     let tool = Sphere::new(Vec3::new(0.3, 0.2, 2.0), 1.0).expect("valid");
-    query.contacts(rows.as_slice(), &tool, 5.0, &Options::new(), &mut contacts).expect("an answer");
+    query
+        .contacts(rows.as_slice(), &tool, 5.0, &Options::cold(), &mut contacts)
+        .expect("an answer");
     assert_eq!(contacts.len(), 1);
     let tool = Sphere::new(Vec3::new(0.3, 0.2, -0.4), 1.0).expect("valid");
     let inside = query
-        .contacts(rows.as_slice(), &tool, 5.0, &Options::new(), &mut contacts)
+        .contacts(rows.as_slice(), &tool, 5.0, &Options::cold(), &mut contacts)
         .expect("an answer");
     assert_eq!((contacts.len(), inside.side), (1, Side::Inside));
     assert!(contacts.iter().all(|contact| contact.normal.z > 0.99 && contact.separation < -1.0));
@@ -230,7 +232,7 @@ fn a_short_list_and_a_short_budget_state_what_still_holds() {
     let tool =
         Capsule::new(Vec3::new(-25.0, 1.0, 4.0), Vec3::new(25.0, 3.0, 4.5), 1.0).expect("valid");
     let mut all = Contacts::<64, 4096>::new();
-    query.contacts(rows.as_slice(), &tool, MARGIN, &Options::new(), &mut all).expect("an answer");
+    query.contacts(rows.as_slice(), &tool, MARGIN, &Options::cold(), &mut all).expect("an answer");
     assert!(all.len() > 3 && !all.is_full(), "{}", all.len());
     let holds = |few: &[f32], bound: f32| {
         let below = all.iter().filter(|contact| contact.separation < bound);
@@ -240,16 +242,16 @@ fn a_short_list_and_a_short_budget_state_what_still_holds() {
         below.count()
     };
     let mut few = Contacts::<3, 4096>::new();
-    query.contacts(rows.as_slice(), &tool, MARGIN, &Options::new(), &mut few).expect("an answer");
+    query.contacts(rows.as_slice(), &tool, MARGIN, &Options::cold(), &mut few).expect("an answer");
     assert!(few.is_full() && few.bound() < MARGIN && few.len() == 3);
     assert_eq!(holds(&few.iter().map(|c| c.separation).collect::<Vec<_>>(), few.bound()), 3);
     let mut near = Contacts::<64, 60>::new();
-    query.contacts(rows.as_slice(), &tool, MARGIN, &Options::new(), &mut near).expect("an answer");
+    query.contacts(rows.as_slice(), &tool, MARGIN, &Options::cold(), &mut near).expect("an answer");
     assert!(near.bound() < MARGIN);
     holds(&near.iter().map(|c| c.separation).collect::<Vec<_>>(), near.bound());
     let mut cut_short = 0;
     for node_tests in (0..4_000).step_by(23) {
-        let options = Options::new().budget(Budget { node_tests, triangle_tests: node_tests / 4 });
+        let options = Options::cold().budget(Budget { node_tests, triangle_tests: node_tests / 4 });
         query.contacts(rows.as_slice(), &tool, MARGIN, &options, &mut near).expect("an answer");
         cut_short += usize::from(near.bound() < MARGIN);
         holds(&near.iter().map(|c| c.separation).collect::<Vec<_>>(), near.bound());
@@ -265,20 +267,22 @@ fn what_cannot_be_asked_is_named() {
     let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
     let tool = Sphere::new(Vec3::X * 45.0, 1.0).expect("valid");
     let mut none = Contacts::<0>::new();
-    let refused = query.contacts(rows.as_slice(), &tool, 5.0, &Options::new(), &mut none);
+    let refused = query.contacts(rows.as_slice(), &tool, 5.0, &Options::cold(), &mut none);
     assert_eq!(refused.err(), Some(QueryError::Contacts { capacity: 0, near: 512 }));
     let mut contacts = Contacts::<4>::new();
     for margin in [-1.0, f32::NAN, f32::INFINITY] {
         let refused =
-            query.contacts(rows.as_slice(), &tool, margin, &Options::new(), &mut contacts);
+            query.contacts(rows.as_slice(), &tool, margin, &Options::cold(), &mut contacts);
         assert_eq!(refused.err(), Some(QueryError::Margin { bits: margin.to_bits() }));
     }
     let bare = Builder::new().with_adjacency(false).build(&mesh).expect("a valid mesh");
     let bare = bare.tree::<u16>().expect("valid");
     let mut other = Query::<u16, MAX_STACK>::new(&bare).expect("deep enough");
-    let refused = other.contacts(rows.as_slice(), &tool, 5.0, &Options::new(), &mut contacts);
+    let refused = other.contacts(rows.as_slice(), &tool, 5.0, &Options::cold(), &mut contacts);
     assert_eq!(refused.err(), Some(QueryError::NoAdjacency));
-    query.contacts(rows.as_slice(), &tool, 5.0, &Options::new(), &mut contacts).expect("an answer");
+    query
+        .contacts(rows.as_slice(), &tool, 5.0, &Options::cold(), &mut contacts)
+        .expect("an answer");
     let short: &[Vec3] = &[Vec3::X];
     assert!(matches!(contacts.move_with(short), Err(QueryError::VertexCount { .. })));
     let still = vec![Vec3::new(1.0, 2.0, 3.0); rows.len()];
@@ -286,7 +290,7 @@ fn what_cannot_be_asked_is_named() {
     assert!(contacts.iter().all(|contact| contact.velocity.distance(still[0]) < 1e-5));
     let nearest = contacts.iter().next().expect("one").corners[0];
     rows[nearest as usize].y = f32::NAN;
-    let refused = query.contacts(rows.as_slice(), &tool, 5.0, &Options::new(), &mut contacts);
+    let refused = query.contacts(rows.as_slice(), &tool, 5.0, &Options::cold(), &mut contacts);
     assert!(matches!(refused, Err(QueryError::Position { .. })), "{refused:?}");
     assert!(contacts.is_empty());
 }
@@ -312,14 +316,14 @@ fn pushed(mesh: &Mesh, from: Vec3, by_all: bool) -> (f32, f32) {
     for _ in 0..4_000 {
         let tool = Sphere::new(at, 1.0).expect("valid");
         let closest = query
-            .contacts(rows.as_slice(), &tool, 3.0, &Options::new(), &mut contacts)
+            .contacts(rows.as_slice(), &tool, 3.0, &Options::cold(), &mut contacts)
             .expect("an answer");
         least = f32::min(least, closest.separation);
         let force = if by_all {
             let accuracy = contacts.accuracy();
             proxy.wrench(Ok(contacts.iter()), accuracy, at, velocity, Vec3::ZERO).force
         } else {
-            alone.force(Ok(&closest), velocity).force
+            alone.force(&Ok(closest), velocity).force
         };
         if let Some(before) = before {
             step = f32::max(step, before.distance(force));
@@ -374,7 +378,9 @@ fn one_wall_is_never_two() {
     let spring = SpringDamper::new(1.0, 0.0, 50.0).expect("valid gains");
     let proxy = Proxy::new(spring, 3.0).expect("a valid margin");
     let tool = Sphere::new(Vec3::new(0.2, 0.1, 2.0), 1.0).expect("valid");
-    query.contacts(rows.as_slice(), &tool, 3.0, &Options::new(), &mut contacts).expect("an answer");
+    query
+        .contacts(rows.as_slice(), &tool, 3.0, &Options::cold(), &mut contacts)
+        .expect("an answer");
     let contact = *contacts.iter().next().expect("one");
     for count in [1, 2, 5, 8] {
         let same = std::iter::repeat_n(&contact, count);

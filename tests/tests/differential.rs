@@ -56,10 +56,10 @@ fn run_with<I: Index>(case: &Case<'_>, tree: &Tree<'_, I>, seed: u64) -> Tally {
                 let tool = pose(&rows, &triangles, &mut rng);
                 let truth = exhaustive(&rows, &triangles, &tool).expect("has triangles");
                 let all = [
-                    Options::new(),
-                    Options::new().stretch(measured),
-                    Options::new().stretch(measured).warm_start(last),
-                    Options::new().warm_start(Some(rng.u32(..))),
+                    Options::cold(),
+                    Options::cold().stretch(measured),
+                    Options::cold().stretch(measured).warm_start(last),
+                    Options::cold().warm_start(Some(rng.u32(..))),
                 ];
                 for options in &all[rng.usize(..2)..] {
                     let both = [
@@ -82,7 +82,7 @@ fn run_with<I: Index>(case: &Case<'_>, tree: &Tree<'_, I>, seed: u64) -> Tally {
                     }
                 }
                 let budget = Budget { node_tests: rng.u32(..200), triangle_tests: rng.u32(..20) };
-                let options = Options::new().budget(budget);
+                let options = Options::cold().budget(budget);
                 let both = [
                     ask::closest(&mut query, rows.as_slice(), &tool, &options),
                     ask::closest_wide(&mut query, rows.as_slice(), &tool, &options),
@@ -171,7 +171,7 @@ fn cases_of<'m>(name: &str, mesh: &'m Mesh, queries: usize) -> Vec<Case<'m>> {
 
 #[test]
 fn procedural_meshes_agree_with_exhaustive_search() {
-    let (heart, _) = generate::heart(600).expect("a valid size");
+    let heart = generate::heart(600).expect("a valid size").mesh;
     let brain = generate::brain(1_200).expect("a valid size");
     let sheet = sheet(12);
     let one = Mesh { positions: sheet.positions[..3].to_vec(), triangles: vec![[0, 1, 2]] };

@@ -48,7 +48,7 @@ fn coordinates_far_from_the_origin_are_refused_or_counted() {
             let out = unit(&mut rng) * 30.0 * rng.f32();
             let centre = (exact[vertex].as_vec3() + out).as_dvec3();
             let tool = Sphere::new(centre.as_vec3(), 0.5).unwrap();
-            let options = Options::new().unsigned();
+            let options = Options::cold().unsigned();
             let found = query.closest(rows.as_slice(), &tool, &options).unwrap();
             let distance = |t: &[u32; 3]| {
                 let [a, b, c] = t.map(|v| exact[v as usize]);

@@ -14,7 +14,7 @@ use glam::Vec3;
 /// A heart some of whose triangles have a corner nearly on the opposite edge, or nearly on another corner.
 /// One of them is as flat as `flattest`: its height over its longest edge.
 fn with_flat_triangles(flattest: f32, rng: &mut Rng) -> Mesh {
-    let (mut mesh, _) = generate::heart(320).expect("a valid size");
+    let mut mesh = generate::heart(320).expect("a valid size").mesh;
     let mut touched = vec![false; mesh.positions.len()];
     let count = 8;
     for number in 0..count {
@@ -62,7 +62,7 @@ fn answers_are_right_whatever_is_flat() {
             for _ in 0..12 {
                 let tool = pose(&rows, &triangles, &mut rng);
                 let truth = exhaustive(&rows, &triangles, &tool).expect("has triangles");
-                for options in [Options::new(), Options::new().stretch(measured)] {
+                for options in [Options::cold(), Options::cold().stretch(measured)] {
                     let found = ask::closest(&mut query, rows.as_slice(), &tool, &options);
                     let found = found.expect("a valid query");
                     let off = (f64::from(found.separation) - truth.separation).abs();
@@ -101,7 +101,7 @@ fn what_is_flat_may_unfold() {
         for _ in 0..300 {
             let tool = pose(&rows, &triangles, &mut rng);
             let truth = exhaustive(&rows, &triangles, &tool).expect("has triangles");
-            let found = ask::closest(&mut query, rows.as_slice(), &tool, &Options::new());
+            let found = ask::closest(&mut query, rows.as_slice(), &tool, &Options::cold());
             let found = found.expect("a valid query");
             let off = (f64::from(found.separation) - truth.separation).abs();
             assert!(off <= f64::from(found.accuracy), "limit {limit}, {tool:?}: {found:?}");

@@ -7,7 +7,7 @@ use fastrand::Rng;
 use glam::Vec3;
 
 fn heart(index: IndexWidth) -> (Mesh, BuiltTree) {
-    let (mesh, _) = generate::heart(320).expect("a valid size");
+    let mesh = generate::heart(320).expect("a valid size").mesh;
     let tree = Builder::new().index(index).build(&mesh).expect("a valid mesh");
     (mesh, tree)
 }
@@ -227,8 +227,8 @@ fn a_query_on_rotten_bytes_ends() {
         let mut query = Query::<u16, MAX_STACK>::new(&view).expect("deep enough");
         let tool = Sphere::new(rows[rng.usize(..rows.len())] * 1.3, 1.0).expect("valid");
         let both = [
-            query.closest(rows.as_slice(), &tool, &Options::new()),
-            query.closest_wide(rows.as_slice(), &tool, &Options::new()),
+            query.closest(rows.as_slice(), &tool, &Options::cold()),
+            query.closest_wide(rows.as_slice(), &tool, &Options::cold()),
         ];
         for result in both {
             match result {
@@ -248,7 +248,7 @@ fn a_query_on_rotten_bytes_ends() {
 /// The metric and the limits, read by the specification alone, and what is refused of them.
 #[test]
 fn metric_and_limits_stand_where_the_specification_says() {
-    let (mesh, _) = generate::heart(320).expect("a valid size");
+    let mesh = generate::heart(320).expect("a valid size").mesh;
     let limits: Vec<f32> = (0..320).map(|t| 1.1 + (t % 10) as f32 * 0.1).collect();
     for (index, width) in [(IndexWidth::Bits16, 2), (IndexWidth::Bits32, 4)] {
         let built = Builder::new().index(index).limits(limits.clone()).build(&mesh);

@@ -33,7 +33,7 @@ fn beyond(found: &Proximity, truth: &OraclePair) -> [f64; 2] {
 #[test]
 fn both_ends_hold_the_truth_and_close_in_on_it_as_the_budget_grows() {
     let mut rng = Rng::with_seed(17);
-    let (mesh, _) = generate::heart(1_000).expect("a valid size");
+    let mesh = generate::heart(1_000).expect("a valid size").mesh;
     let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
     let tree = built.tree::<u16>().expect("16-bit indices");
     let triangles = surfaces::triangles(&tree);
@@ -58,7 +58,7 @@ fn both_ends_hold_the_truth_and_close_in_on_it_as_the_budget_grows() {
                 found
             };
             let options =
-                if rng.bool() { Options::new().stretch(measured) } else { Options::new() };
+                if rng.bool() { Options::cold().stretch(measured) } else { Options::cold() };
 
             // One question, ever larger budgets.
             let mut before: Option<Proximity> = None;

@@ -13,8 +13,8 @@ use dibs_nostd::modes::{
 };
 use dibs_nostd::wire::{self, Encoding, Event, FrameEncoder, FrameId, WeightsEncoder};
 use dibs_nostd::{
-    Advance, Arriving, Assembler, Changed, Frames, Gate, Index, Options, Query, Rejection, Sphere,
-    StretchError, Tree, Verdict, VertexTable, measure_stretch,
+    Advance, Arriving, Assembler, Changed, Frames, Gate, Index, Options, Query, ReceiveError,
+    Sphere, StretchError, Tree, Verdict, VertexTable, measure_stretch,
 };
 use dibs_tests::ask;
 use dibs_tests::bus::reseal;
@@ -132,7 +132,7 @@ fn lazy_is_eager<I: Index>(tree: &Tree<'_, I>) {
         let watched = Watched { table: &surface, asked: RefCell::default() };
         for _ in 0..8 {
             let tool = pose(&eager, &triangles, &mut rng);
-            for options in [Options::new(), Options::new().stretch(measured)] {
+            for options in [Options::cold(), Options::cold().stretch(measured)] {
                 watched.asked.borrow_mut().clear();
                 let lazily = ask::closest(&mut query, &watched, &tool, &options).expect("sound");
                 let eagerly =
@@ -222,7 +222,7 @@ fn fits_are_reproducible() {
 
 #[test]
 fn what_cannot_be_fitted_is_named() {
-    let (mesh, motion) = generate::heart(320).expect("a valid size");
+    let generate::MovingMesh { mesh, motion } = generate::heart(320).expect("a valid size");
     let tree = Builder::new().build(&mesh).expect("a valid mesh");
     let fit = |frames: Vec<Vec<Vec3>>| ModalFit::new(&mesh, &Motion { frames, rate: 0.0 });
     assert!(matches!(fit(vec![]), Err(ModesError::Frames { frames: 0 })));
@@ -241,7 +241,7 @@ fn what_cannot_be_fitted_is_named() {
     }
     let bare = Builder::new().with_rest_shape(false).build(&mesh).expect("a valid mesh");
     assert!(matches!(bare.with_modes(&good, 2), Err(ModesError::NoRestShape)));
-    let (other, _) = generate::heart(322).expect("a valid size");
+    let other = generate::heart(322).expect("a valid size").mesh;
     let other = Builder::new().build(&other).expect("a valid mesh");
     assert!(matches!(other.with_modes(&good, 2), Err(ModesError::OtherMesh)));
     let bare = tree.tree::<u16>().expect("valid");
@@ -251,7 +251,7 @@ fn what_cannot_be_fitted_is_named() {
 /// A motion beyond the limit is named, and is no anchor: what is bounded by it stays refused.
 #[test]
 fn frames_beyond_the_limit_are_named() {
-    let (mesh, motion) = generate::heart(320).expect("a valid size");
+    let generate::MovingMesh { mesh, motion } = generate::heart(320).expect("a valid size");
     let fit = ModalFit::new(&mesh, &motion).expect("a motion");
     let tree = Builder::new().stretch(1.2).build(&mesh).expect("a valid mesh");
     let built = tree.with_modes(&fit, 2).expect("so many");
@@ -310,7 +310,7 @@ impl Bus {
     }
 
     /// What the last packet led to, or the first that was rejected.
-    fn send(&mut self, epoch: u32, weights: &[f32]) -> Result<Advance, Rejection> {
+    fn send(&mut self, epoch: u32, weights: &[f32]) -> Result<Advance, ReceiveError> {
         let packets = self.packets(epoch, weights);
         packets.iter().try_fold(Advance::Idle, |_, packet| {
             self.assembler.accept(packet, 7 * epoch)?;
@@ -338,7 +338,7 @@ fn weights_come_over_the_bus() {
         assert_eq!(label.stretch.expect("bounded").sigma(), bound.sigma());
         let mut query = Query::<u16, 32>::new(&bus.tree).expect("deep enough");
         let tool = Sphere::new(Vec3::new(0.0, 0.0, 120.0), 3.0).expect("a tool");
-        let options = Options::new().stretch(label.stretch.expect("bounded"));
+        let options = Options::cold().stretch(label.stretch.expect("bounded"));
         let found = query.closest(&frame, &tool, &options).expect("sound");
         let memo = Memo::<_, 64>::new(&frame);
         let remembered = query.closest(&memo, &tool, &options).expect("sound");
@@ -362,7 +362,7 @@ fn hostile_frames_of_weights_are_rejected_and_counted() {
             let mut weights = good.clone();
             weights[mode] = weight;
             epoch += 1;
-            assert_eq!(bus.send(epoch, &weights), Err(Rejection::TooFar { row }));
+            assert_eq!(bus.send(epoch, &weights), Err(ReceiveError::TooFar { row }));
         }
         for weight in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             // An encoder refuses to send these.
@@ -373,7 +373,7 @@ fn hostile_frames_of_weights_are_rejected_and_counted() {
             let hostile = reseal(packets[1].clone());
             assert!(bus.assembler.accept(&packets[0], 0).is_ok());
             let outcome = bus.assembler.accept(&hostile, 0);
-            assert_eq!(outcome, Err(Rejection::NotFinite { row }));
+            assert_eq!(outcome, Err(ReceiveError::NotFinite { row }));
         }
     }
     let counted = |bus: &Bus, event| bus.assembler.counters().of(event);
@@ -385,13 +385,13 @@ fn hostile_frames_of_weights_are_rejected_and_counted() {
     let mut vertices = FrameEncoder::<_, 64>::new(id, Encoding::Float, &[Vec3::ZERO; 4][..]);
     let mut buffer = [0; 64];
     let begin = vertices.as_mut().expect("can be sent").next_packet(&mut buffer).expect("begins");
-    assert_eq!(bus.assembler.accept(begin, 0), Err(Rejection::Encoding));
+    assert_eq!(bus.assembler.accept(begin, 0), Err(ReceiveError::Encoding));
     // Two frames' packets under one number.
     let mixed = [bus.packets(99, &good), bus.packets(99, &bus.recorded[8])];
     assert!(bus.assembler.accept(&mixed[0][0], 0).is_ok());
     assert!(bus.assembler.accept(&mixed[1][1], 0).is_ok());
     let outcome = bus.assembler.accept(&mixed[0][2], 0);
-    assert!(matches!(outcome, Err(Rejection::Digest { .. })), "{outcome:?}");
+    assert!(matches!(outcome, Err(ReceiveError::Digest { .. })), "{outcome:?}");
     assert_eq!(positions(&bus.reader.read().expect("stays")), published);
     assert_eq!(bus.reader.read().expect("stays").label().epoch, 1);
     assert!(bus.send(100, &bus.recorded[8].clone()).is_ok());
@@ -406,7 +406,7 @@ fn a_receiver_of_vertices_refuses_weights() {
     let mut encoder = WeightsEncoder::<64>::new(id, &weights).expect("can be sent");
     let mut buffer = [0; 64];
     let begin = encoder.next_packet(&mut buffer).expect("begins");
-    assert_eq!(assembler.accept(begin, 0), Err(Rejection::Encoding));
+    assert_eq!(assembler.accept(begin, 0), Err(ReceiveError::Encoding));
 }
 
 /// Where the bound cannot tell, the surface is measured; what is published is within the limit, what is
@@ -526,7 +526,7 @@ dibs_nostd::include_tree!("modal_heart");
 /// The generated module is what the builder built.
 #[test]
 fn the_generated_module_holds_the_modes() {
-    let (mesh, motion) = generate::heart(1_000).expect("a valid size");
+    let generate::MovingMesh { mesh, motion } = generate::heart(1_000).expect("a valid size");
     let fit = ModalFit::new(&mesh, &motion).expect("a motion");
     let tree = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
     let built = tree.with_modes(&fit, 2).expect("so many");
@@ -590,7 +590,7 @@ fn the_real_heart_is_driven_by_its_modes() {
             for _ in 0..20 {
                 let tool = pose(&eager, &triangles, &mut rng);
                 watched.asked.borrow_mut().clear();
-                let options = Options::new().stretch(bound);
+                let options = Options::cold().stretch(bound);
                 let found = ask::closest(&mut query, &watched, &tool, &options).expect("sound");
                 let truth = exhaustive(&eager, &triangles, &tool).expect("has triangles");
                 let error = (truth.separation - f64::from(found.separation)).abs();

@@ -5,8 +5,8 @@ use dibs_build::{Builder, BuiltTree};
 use dibs_nostd::modes::{ModalGate, ModalReader, Modes};
 use dibs_nostd::wire::{Event, FrameId, WeightsEncoder};
 use dibs_nostd::{
-    Advance, Arriving, Assembler, Changed, Frames, Gate, Limits, Rejection, StretchError,
-    StretchMonitor, Tree, VertexTable,
+    Advance, Arriving, Assembler, Changed, Frames, Gate, ReceiveError, StretchError,
+    StretchMonitor, SurfaceLimits, Tree, VertexTable,
 };
 use dibs_tests::motions::trembling;
 use fastrand::Rng;
@@ -43,7 +43,7 @@ fn a_modal_surface_that_jumps_is_too_fast() {
     // A frame every 7 ticks, and the clock counts whole ones.
     let steps = recorded.windows(2).map(|pair| largest_step(&modes, &pair[0], &pair[1]));
     let speed = steps.fold(0.0, f32::max) / 8.0 * 1.0001;
-    let limits = Limits::reach_mm(1e4).speed(speed);
+    let limits = SurfaceLimits::reach_mm(1e4).speed(speed);
 
     let frames: &'static Frames<MODES> = Box::leak(Box::new(Frames::new()));
     let (writer, reader) = frames.split().expect("new");
@@ -80,7 +80,8 @@ fn a_modal_surface_that_jumps_is_too_fast() {
     let step = largest_step(&modes, last, far);
     assert!(step > 2.0 * 8.0 * speed, "{step} is no jump");
     let (refused, counted, _) = send(epoch, far);
-    let Err(Rejection::Stretch(StretchError::TooFast { step: found, limit, .. })) = refused else {
+    let Err(ReceiveError::Stretch(StretchError::TooFast { step: found, limit, .. })) = refused
+    else {
         panic!("{refused:?}")
     };
     assert!(found > limit && found <= step * 1.0001, "{found}, {limit}, {step}");
@@ -112,7 +113,7 @@ fn the_limit_on_the_speed_of_modes_is_exact() {
         let step = largest_step(&modes, &before, &now);
         let (before, now) = (rows(&before), rows(&now));
         for (share, may_pass) in [(0.999, false), (1.001, true), (9.0, true)] {
-            let limits = Limits::reach_mm(1e4).speed(step * share / 5.0);
+            let limits = SurfaceLimits::reach_mm(1e4).speed(step * share / 5.0);
             let exact = monitor.clone().limits(limits);
             let mut gate = ModalGate::<_, MODES>::new(&modes, exact).expect("four modes");
             gate.begin(Changed::Whole);

@@ -25,7 +25,7 @@ fn the_guide_leads_to_an_answer_on_a_host_and_on_the_board() {
     guard.write("Cargo.toml", &with_paths(&manifest));
     guard.write("build.rs", &block(section(1), "`build.rs`"));
     guard.write("src/main.rs", &block(section(1), "`src/main.rs`"));
-    let (heart, _) = generate::heart(1_000).expect("a size");
+    let heart = generate::heart(1_000).expect("a size").mesh;
     heart.write_ply(guard.root.join("heart.ply")).expect("writable");
     let on_host = distance(&guard.cargo("run --release", true));
 

@@ -49,7 +49,7 @@ fn agrees(mesh: &Mesh, width: IndexWidth, seed: u64) -> u64 {
 
 #[test]
 fn it_finds_what_exhaustive_search_finds() {
-    let (heart, _) = generate::heart(600).expect("a valid size");
+    let heart = generate::heart(600).expect("a valid size").mesh;
     let brain = generate::brain(1_200).expect("a valid size");
     // Long triangles, whose elastic spheres matter.
     let slivers = surfaces::slivers(60);

@@ -7,8 +7,8 @@ use dibs_build::{Builder, BuiltTree, Motion, generate};
 use dibs_nostd::glam::{Quat, Vec3};
 use dibs_nostd::wire::{Encoding, Event, FrameId};
 use dibs_nostd::{
-    Advance, Arriving, Assembler, Changed, FrameReader, Frames, Gate, Limits, Rejection,
-    StretchError, StretchMonitor, Tree, Verdict, VertexTable,
+    Advance, Arriving, Assembler, Changed, FrameReader, Frames, Gate, ReceiveError, StretchError,
+    StretchMonitor, SurfaceLimits, Tree, Verdict, VertexTable,
 };
 use dibs_tests::bus::collect;
 
@@ -25,7 +25,7 @@ struct Bus {
 }
 
 impl Bus {
-    fn new(built: &'static BuiltTree, limits: Limits) -> Self {
+    fn new(built: &'static BuiltTree, limits: SurfaceLimits) -> Self {
         let tree: &Tree<'_, u16> = Box::leak(Box::new(built.tree().unwrap()));
         let frames: &'static Frames<N> = Box::leak(Box::new(Frames::new()));
         let (writer, reader) = frames.split().unwrap();
@@ -35,7 +35,7 @@ impl Bus {
     }
 
     /// Sends a frame whose first packet arrives at `now`, with `work` done after every packet.
-    fn send(&mut self, rows: &[Vec3], now: u32, work: u32) -> Result<(), Rejection> {
+    fn send(&mut self, rows: &[Vec3], now: u32, work: u32) -> Result<(), ReceiveError> {
         self.epoch += 1;
         let id = FrameId { mesh_id: self.tree.mesh_id(), session: 1, epoch: self.epoch };
         let encoder =
@@ -56,7 +56,7 @@ impl Bus {
 }
 
 fn heart() -> (&'static BuiltTree, Motion) {
-    let (mesh, motion) = generate::heart(1_000).unwrap();
+    let generate::MovingMesh { mesh, motion } = generate::heart(1_000).unwrap();
     (Box::leak(Box::new(Builder::new().stretch(1.5).build(&mesh).unwrap())), motion)
 }
 
@@ -79,9 +79,10 @@ fn a_collapsed_surface_is_refused_from_the_first_frame_on() {
     let rest = built.to_rows(&motion.frames[0]);
     for work in [1, 7, 50, 10_000] {
         for (name, rows) in collapsed(&rest) {
-            let mut bus = Bus::new(built, Limits::reach_mm(1e3));
+            let mut bus = Bus::new(built, SurfaceLimits::reach_mm(1e3));
             let refused = bus.send(&rows, 0, work);
-            let is_shrunk = matches!(refused, Err(Rejection::Stretch(StretchError::Shrunk { .. })));
+            let is_shrunk =
+                matches!(refused, Err(ReceiveError::Stretch(StretchError::Shrunk { .. })));
             assert!(is_shrunk, "{name}, {work}: {refused:?}");
             assert_eq!(bus.counted(Event::Shrunk), 1, "{name}");
             assert_eq!(bus.assembler.counters().rejected(), 1, "{name}: nothing else");
@@ -110,7 +111,7 @@ fn a_surface_that_is_mirrored_turned_or_jumped_is_too_fast() {
         ("the last vertex", one(N - 1)),
         ("one in the middle", one(333)),
     ];
-    let limits = Limits::reach_mm(1e3).speed(0.1);
+    let limits = SurfaceLimits::reach_mm(1e3).speed(0.1);
     for work in [1, 7, 50, 10_000] {
         for (name, rows) in &wrong {
             let mut bus = Bus::new(built, limits);
@@ -119,7 +120,7 @@ fn a_surface_that_is_mirrored_turned_or_jumped_is_too_fast() {
             let refused = bus.send(rows, 24, work);
             let is_fast = matches!(
                 refused,
-                Err(Rejection::Stretch(StretchError::TooFast { limit, step, .. }))
+                Err(ReceiveError::Stretch(StretchError::TooFast { limit, step, .. }))
                     if step > limit && (limit - 3.1).abs() < 1e-5
             );
             assert!(is_fast, "{name}, {work}: {refused:?}");
@@ -146,7 +147,7 @@ fn a_surface_that_is_mirrored_turned_or_jumped_is_too_fast() {
 #[test]
 fn the_motion_of_a_heart_is_plausible() {
     let (built, motion) = heart();
-    let mut bus = Bus::new(built, Limits::reach_mm(1e3).speed(SPEED));
+    let mut bus = Bus::new(built, SurfaceLimits::reach_mm(1e3).speed(SPEED));
     let interval = 1_000 / motion.frames.len() as u32;
     for (number, frame) in (0..).zip(motion.frames.iter().cycle().take(3 * motion.frames.len())) {
         bus.send(&built.to_rows(frame), number * interval, 64).unwrap();
@@ -155,7 +156,7 @@ fn the_motion_of_a_heart_is_plausible() {
     let rest = built.to_rows(&motion.frames[0]);
     for scale in [Vec3::splat(0.5), Vec3::new(0.3, 1.0, 1.0), Vec3::new(1.2, 0.5, 0.4)] {
         let rows: Vec<_> = rest.iter().map(|&p| p * scale).collect();
-        let mut bus = Bus::new(built, Limits::reach_mm(1e3));
+        let mut bus = Bus::new(built, SurfaceLimits::reach_mm(1e3));
         assert_eq!(bus.send(&rows, 0, 64), Ok(()), "{scale}");
     }
 }
@@ -170,8 +171,9 @@ fn a_recorded_heart_shrinks_far_less_than_the_limit() {
     let built = Builder::new().stretch(2.5).build(&mesh).unwrap();
     let tree: Tree<'_, u16> = built.tree().unwrap();
     for part in [0.25, 0.5] {
-        let mut monitor =
-            StretchMonitor::new(&tree).unwrap().limits(Limits::reach_mm(1e3).shrinkage(part));
+        let mut monitor = StretchMonitor::new(&tree)
+            .unwrap()
+            .limits(SurfaceLimits::reach_mm(1e3).shrinkage(part));
         for (number, frame) in motion.frames.iter().enumerate() {
             let rows = built.to_rows(frame);
             monitor.begin(Changed::Whole);
@@ -186,8 +188,12 @@ fn a_recorded_heart_shrinks_far_less_than_the_limit() {
 fn a_limit_that_is_no_number_refuses_every_frame() {
     let (built, motion) = heart();
     let rest = built.to_rows(&motion.frames[0]);
-    assert!(Bus::new(built, Limits::reach_mm(1e3).shrinkage(f32::NAN)).send(&rest, 0, 64).is_err());
-    let mut bus = Bus::new(built, Limits::reach_mm(1e3).speed(f32::NAN));
+    assert!(
+        Bus::new(built, SurfaceLimits::reach_mm(1e3).shrinkage(f32::NAN))
+            .send(&rest, 0, 64)
+            .is_err()
+    );
+    let mut bus = Bus::new(built, SurfaceLimits::reach_mm(1e3).speed(f32::NAN));
     assert!(bus.send(&rest, 0, 64).is_ok(), "nothing to compare with");
     assert!(bus.send(&rest, 5, 64).is_err());
 }

@@ -7,7 +7,7 @@ use fastrand::Rng;
 
 #[test]
 fn a_position_that_is_not_finite_is_named() {
-    let (mesh, _) = generate::heart(1_280).expect("a valid size");
+    let mesh = generate::heart(1_280).expect("a valid size").mesh;
     let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
     let tree = built.tree::<u16>().expect("valid");
     let rest = built.to_rows(&mesh.positions);
@@ -22,7 +22,7 @@ fn a_position_that_is_not_finite_is_named() {
             let near = rest[vertex] * 1.1;
             let (sphere, capsule) = (Sphere::new(near, 1.0), Capsule::new(near, near * 2.0, 1.0));
             let (sphere, capsule) = (sphere.expect("valid"), capsule.expect("valid"));
-            let (rows, options) = (rows.as_slice(), &Options::new());
+            let (rows, options) = (rows.as_slice(), &Options::cold());
             let answers: [Result<Proximity, QueryError>; 4] = [
                 query.closest(rows, &sphere, options),
                 query.closest_wide(rows, &sphere, options),

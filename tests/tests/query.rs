@@ -6,7 +6,7 @@ use dibs_nostd::{Budget, Options, Query, QueryError, Sphere, VertexTable, measur
 use glam::Vec3;
 
 fn heart() -> (Mesh, BuiltTree) {
-    let (mesh, _) = generate::heart(320).expect("a valid size");
+    let mesh = generate::heart(320).expect("a valid size").mesh;
     let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
     (mesh, built)
 }
@@ -40,7 +40,7 @@ fn a_measurement_of_any_other_frame_is_refused() {
     let sphere = Sphere::new(Vec3::ZERO, 1.0).expect("valid");
     let numbered = |epoch| Numbered { rows: &rows, epoch };
     let measured = measure_stretch(&tree, &numbered(7)).expect("at rest");
-    let options = Options::new().stretch(measured);
+    let options = Options::cold().stretch(measured);
     for expected in [0, 6, 8, u32::MAX] {
         let refused = Err(QueryError::OtherFrame { expected, found: 7 });
         assert_eq!(query.closest(&numbered(expected), &sphere, &options), refused);
@@ -82,7 +82,7 @@ fn a_budget_of_nothing_tests_no_triangle() {
     for row in (0..rows.len()).step_by(7) {
         let sphere = Sphere::new(rows[row] * 1.2, 1.0).expect("valid");
         // Without a side, which a query that was cut short does not know.
-        let unsigned = Options::new().unsigned();
+        let unsigned = Options::cold().unsigned();
         let whole = query.closest(rows.as_slice(), &sphere, &unsigned).expect("an answer");
         for node_tests in [0, u32::MAX] {
             let budget = Budget { node_tests, triangle_tests: 0 };

@@ -29,8 +29,8 @@ struct Closed {
 
 fn closed() -> Vec<Closed> {
     let mut all = vec![
-        ("generated heart", generate::heart(320).expect("a valid size").0, 6),
-        ("generated heart, finer", generate::heart(2_000).expect("a valid size").0, 4),
+        ("generated heart", generate::heart(320).expect("a valid size").mesh, 6),
+        ("generated heart, finer", generate::heart(2_000).expect("a valid size").mesh, 4),
         ("generated brain", generate::brain(500).expect("a valid size"), 6),
         ("ball", ball(2), 4),
     ];
@@ -130,11 +130,11 @@ fn no_side_is_wrong_and_few_are_undefined() {
             let far = at + unit(&mut rng) * 10.0 * rng.f32();
             let (tool, found) = if rng.bool() {
                 let sphere = Sphere::new(at, radius).expect("valid");
-                let found = query.closest(rows.as_slice(), &sphere, &Options::new());
+                let found = query.closest(rows.as_slice(), &sphere, &Options::cold());
                 (Instrument::sphere(at, radius), found)
             } else {
                 let capsule = Capsule::new(at, far, radius).expect("valid");
-                let found = query.closest(rows.as_slice(), &capsule, &Options::new());
+                let found = query.closest(rows.as_slice(), &capsule, &Options::cold());
                 (Instrument::capsule(at, far, radius), found)
             };
             let found = found.expect("an answer");
@@ -214,7 +214,7 @@ fn depths_are_those_of_dense_sampling() {
             let radius = 2.0 * rng.f32();
             let capsule = Capsule::new(at, far, radius).expect("valid");
             let tool = Instrument::capsule(at, far, radius);
-            let found = query.closest(rows.as_slice(), &capsule, &Options::new());
+            let found = query.closest(rows.as_slice(), &capsule, &Options::cold());
             let found = found.expect("an answer");
             if found.side != Side::Crossing {
                 continue;
@@ -260,12 +260,12 @@ fn the_way_out_of_a_ball_never_turns() {
             let (tip, end) = (direction * out, direction * (out + length));
             let found = if length > 0.0 {
                 let capsule = Capsule::new(tip, end, 2.0).expect("valid");
-                query.closest(rows.as_slice(), &capsule, &Options::new())
+                query.closest(rows.as_slice(), &capsule, &Options::cold())
             } else {
                 query.closest(
                     rows.as_slice(),
                     &Sphere::new(tip, 2.0).expect("valid"),
-                    &Options::new(),
+                    &Options::cold(),
                 )
             };
             let found = found.expect("an answer");
@@ -298,27 +298,27 @@ fn a_side_that_is_not_there_says_why() {
     };
     let open = slivers(20);
     let built = Builder::new().build(&open).expect("a valid mesh");
-    is(ask(&built, &open, Vec3::new(-5.0, 0.0, 1.0), Options::new()), NoSide::OpenBoundary);
-    let over = ask(&built, &open, Vec3::new(40.0, 2.0, 3.0), Options::new());
+    is(ask(&built, &open, Vec3::new(-5.0, 0.0, 1.0), Options::cold()), NoSide::OpenBoundary);
+    let over = ask(&built, &open, Vec3::new(40.0, 2.0, 3.0), Options::cold());
     assert_eq!(over.side, Side::Outside);
-    let under = ask(&built, &open, Vec3::new(40.0, 2.0, -3.0), Options::new());
+    let under = ask(&built, &open, Vec3::new(40.0, 2.0, -3.0), Options::cold());
     assert_eq!(under.side, Side::Inside);
     let round = ball(2);
     let at = Vec3::new(10.0, 9.0, 8.0);
     let bare = Builder::new().with_adjacency(false).build(&round).expect("a valid mesh");
-    is(ask(&bare, &round, at, Options::new()), NoSide::NoAdjacency);
+    is(ask(&bare, &round, at, Options::cold()), NoSide::NoAdjacency);
     let built = Builder::new().build(&round).expect("a valid mesh");
-    is(ask(&built, &round, at, Options::new().unsigned()), NoSide::NotAsked);
+    is(ask(&built, &round, at, Options::cold().unsigned()), NoSide::NotAsked);
     let short = Budget { node_tests: 9, triangle_tests: 1 };
-    let cut = ask(&built, &round, at, Options::new().budget(short));
+    let cut = ask(&built, &round, at, Options::cold().budget(short));
     assert_eq!(cut.side, Side::Undefined(NoSide::CutShort));
-    assert_eq!(ask(&built, &round, at, Options::new()).side, Side::Inside);
-    is(ask(&built, &round, round.positions[0], Options::new()), NoSide::BelowAccuracy);
+    assert_eq!(ask(&built, &round, at, Options::cold()).side, Side::Inside);
+    is(ask(&built, &round, round.positions[0], Options::cold()), NoSide::BelowAccuracy);
     // Wound against each other: the surface has no sides, and the tree no adjacency.
     let mut twisted = round.clone();
     twisted.triangles[7].swap(0, 1);
     let built = Builder::new().build(&twisted).expect("a valid mesh");
-    is(ask(&built, &twisted, at, Options::new()), NoSide::NoAdjacency);
+    is(ask(&built, &twisted, at, Options::cold()), NoSide::NoAdjacency);
 }
 
 /// A budget that ends in the search for the depth leaves an interval that holds it.
@@ -331,12 +331,12 @@ fn a_depth_that_was_cut_short_is_certified() {
     let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
     let tool = Capsule::new(Vec3::new(5.0, 3.0, 1.0), Vec3::new(60.0, 20.0, -9.0), 2.0);
     let tool = tool.expect("valid");
-    let whole = query.closest(rows.as_slice(), &tool, &Options::new()).expect("an answer");
+    let whole = query.closest(rows.as_slice(), &tool, &Options::cold()).expect("an answer");
     assert_eq!(whole.side, Side::Crossing);
     let mut cut_short = 0;
     for node_tests in (0..whole.node_tests + 40).step_by(5) {
         let budget = Budget { node_tests, triangle_tests: u32::MAX };
-        let cut = query.closest(rows.as_slice(), &tool, &Options::new().budget(budget));
+        let cut = query.closest(rows.as_slice(), &tool, &Options::cold().budget(budget));
         let cut = cut.expect("a short budget is no error");
         assert!(cut.node_tests <= node_tests + 1, "{budget:?} {cut:?}");
         if cut.side == Side::Crossing {

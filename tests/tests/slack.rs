@@ -36,9 +36,9 @@ impl<'b> Searched<'b> {
         let measured = measure_stretch(&tree, rows).expect("within the limit");
         let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("enough for any tree");
         let truth = exhaustive(rows, &surfaces::triangles(&tree), tool).expect("has triangles");
-        let options = Options::new().stretch(measured);
+        let options = Options::cold().stretch(measured);
         let known = ask::closest(&mut query, rows, known, &options).expect("an answer").triangle;
-        for options in [Options::new(), options, options.warm_start(known)] {
+        for options in [Options::cold(), options, options.warm_start(known)] {
             let both = [
                 ask::closest(&mut query, rows, tool, &options),
                 ask::closest_wide(&mut query, rows, tool, &options),
@@ -123,7 +123,7 @@ fn tracker_and_contacts_use_a_radius_in_full() {
         let rows = built.to_rows(positions);
         let surface = Odometer::new(&tree).start(rows.as_slice());
         let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("enough for any tree");
-        let options = Options::new();
+        let options = Options::cold();
         for steps in [0, 20] {
             let mut tracker =
                 Tracker::<u16, MAX_STACK, 64>::new(&tree).expect("enough for any tree");
@@ -236,7 +236,7 @@ fn the_accuracy_covers_the_kernels() {
     for _ in 0..1_000 {
         let center = unit(&mut rng) * decades(&mut rng, 1e-3, 1e6);
         let sphere = Sphere::new(center, 0.0).expect("valid");
-        let found = query.closest(rows.as_slice(), &sphere, &Options::new()).expect("an answer");
+        let found = query.closest(rows.as_slice(), &sphere, &Options::cold()).expect("an answer");
         let size = corners.iter().map(|corner| corner.distance(center)).fold(0.0, f32::max);
         // And the root that is taken of the square.
         assert!(found.accuracy >= (ACCURACY + f32::EPSILON) * size, "{center}: {found:?}");

@@ -5,8 +5,8 @@ use dibs_nostd::format::{Join, MAX_STACK};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 use dibs_nostd::{
-    Arriving, Assembler, Changed, Frames, Gate, Limits, MeasuredStretch, Options, Query,
-    QueryError, REGIONS, Rejection, Sphere, StretchError, StretchMonitor, Tree, Verdict,
+    Arriving, Assembler, Changed, Frames, Gate, MeasuredStretch, Options, Query, QueryError,
+    REGIONS, ReceiveError, Sphere, StretchError, StretchMonitor, SurfaceLimits, Tree, Verdict,
     VertexTable, measure_stretch,
 };
 use dibs_tests::bus::give;
@@ -18,7 +18,7 @@ use fastrand::Rng;
 /// Never below the truth, and above it by no more than the rounding that is added.
 #[test]
 fn the_measured_stretch_is_the_true_one_rounded_up() {
-    let (mesh, _) = generate::heart(600).expect("a valid size");
+    let mesh = generate::heart(600).expect("a valid size").mesh;
     let mut rng = Rng::with_seed(21);
     for paths in [Paths::Edges, Paths::Surface { crossings: 2 }] {
         let built = Builder::new().stretch(4.0).paths(paths).build(&mesh).expect("a valid mesh");
@@ -44,7 +44,7 @@ fn the_measured_stretch_is_the_true_one_rounded_up() {
 fn a_flat_triangle_does_not_spoil_its_neighbours() {
     let mut rng = Rng::with_seed(37);
     for round in 0..60 {
-        let (mut mesh, _) = generate::heart(320).expect("a valid size");
+        let mut mesh = generate::heart(320).expect("a valid size").mesh;
         // One corner nearly onto the opposite edge: half the angle that is missing from 180 degrees.
         let [a, b, c] = mesh.triangles[rng.usize(..mesh.triangles.len())].map(|v| v as usize);
         let [start, end] = [mesh.positions[b], mesh.positions[c]];
@@ -153,7 +153,7 @@ fn openness(corners: [Vec3; 3]) -> f64 {
 
 /// A heart, its tree, and some deformations of it with the stretch that each truly has.
 fn deformed(rounds: usize, seed: u64) -> (Mesh, BuiltTree, Vec<Vec<Vec3>>) {
-    let (mesh, _) = generate::heart(2_000).expect("a valid size");
+    let mesh = generate::heart(2_000).expect("a valid size").mesh;
     let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
     let mut rng = Rng::with_seed(seed);
     let paths = built.tree::<u16>().expect("valid").paths();
@@ -202,7 +202,7 @@ fn each_region_is_measured_on_its_own() {
 /// one of its own edges, too.
 #[test]
 fn an_edge_between_two_regions_counts_for_both() {
-    let (mesh, _) = generate::heart(2_000).expect("a valid size");
+    let mesh = generate::heart(2_000).expect("a valid size").mesh;
     for paths in [Paths::Edges, Paths::Surface { crossings: 2 }] {
         let built = Builder::new().stretch(3.0).paths(paths).build(&mesh).expect("a valid mesh");
         let tree = built.tree::<u16>().expect("valid");
@@ -296,8 +296,9 @@ fn assert_same(
 fn sliced_is_whole_whatever_the_slices_and_the_packets() {
     let (_, built, frames) = deformed(90, 24);
     let tree = built.tree::<u16>().expect("valid");
-    let mut monitor =
-        StretchMonitor::new(&tree).expect("a metric").limits(Limits::reach_mm(1e3).shrinkage(0.0));
+    let mut monitor = StretchMonitor::new(&tree)
+        .expect("a metric")
+        .limits(SurfaceLimits::reach_mm(1e3).shrinkage(0.0));
     let mut rng = Rng::with_seed(25);
     for (round, moved) in frames.iter().enumerate() {
         let mut rows = built.to_rows(moved);
@@ -313,7 +314,7 @@ fn sliced_is_whole_whatever_the_slices_and_the_packets() {
         assert_eq!(whole.is_err(), round % 3 == 2);
         let mut new = StretchMonitor::new(&tree)
             .expect("a metric")
-            .limits(Limits::reach_mm(1e3).shrinkage(0.0));
+            .limits(SurfaceLimits::reach_mm(1e3).shrinkage(0.0));
         assert_eq!(feed(&mut new, rows.as_slice(), Changed::Whole, &packets, &mut rng), whole);
     }
 }
@@ -322,8 +323,9 @@ fn sliced_is_whole_whatever_the_slices_and_the_packets() {
 fn partial_is_whole_and_measures_only_what_moved() {
     let (mesh, built, _) = deformed(0, 0);
     let tree = built.tree::<u16>().expect("valid");
-    let mut monitor =
-        StretchMonitor::new(&tree).expect("a metric").limits(Limits::reach_mm(1e3).shrinkage(0.0));
+    let mut monitor = StretchMonitor::new(&tree)
+        .expect("a metric")
+        .limits(SurfaceLimits::reach_mm(1e3).shrinkage(0.0));
     let mut rng = Rng::with_seed(26);
     let mut surface = built.to_rows(&mesh.positions);
     let vertices = tree.vertex_count();
@@ -378,8 +380,9 @@ fn a_slice_is_no_longer_than_it_may_be() {
     let (mesh, built, _) = deformed(0, 0);
     let tree = built.tree::<u16>().expect("valid");
     let rows = built.to_rows(&mesh.positions);
-    let mut monitor =
-        StretchMonitor::new(&tree).expect("a metric").limits(Limits::reach_mm(1e3).shrinkage(0.0));
+    let mut monitor = StretchMonitor::new(&tree)
+        .expect("a metric")
+        .limits(SurfaceLimits::reach_mm(1e3).shrinkage(0.0));
     for again in [0, REGIONS as u32] {
         monitor.begin(Changed::Whole);
         let mut calls = 1;
@@ -420,7 +423,7 @@ fn a_query_takes_no_stretch_of_another_tree() {
     let rows = built.to_rows(&mesh.positions);
     let measured = measure_stretch(&tree, rows.as_slice()).expect("at rest");
     let tool = Sphere::new(Vec3::new(0.0, 0.0, 90.0), 2.0).expect("valid");
-    let options = Options::new().stretch(measured);
+    let options = Options::cold().stretch(measured);
     let mut query = Query::<_, MAX_STACK>::new(&tree).expect("deep enough");
     assert!(query.closest(rows.as_slice(), &tool, &options).is_ok());
     let mut query = Query::<_, MAX_STACK>::new(&other).expect("deep enough");
@@ -430,7 +433,7 @@ fn a_query_takes_no_stretch_of_another_tree() {
 
 #[test]
 fn what_cannot_be_measured_is_named() {
-    let (mesh, _) = generate::heart(320).expect("a valid size");
+    let mesh = generate::heart(320).expect("a valid size").mesh;
     let built = Builder::new().stretch(1.2).build(&mesh).expect("a valid mesh");
     let tree = built.tree::<u16>().expect("valid");
     let mut rows = built.to_rows(&mesh.positions);
@@ -453,7 +456,7 @@ fn what_cannot_be_measured_is_named() {
 /// With a tree as the gate, a frame beyond the stretch limit is refused and the triangle named.
 #[test]
 fn a_surface_beyond_the_stretch_limit_is_refused() {
-    let (mesh, _) = generate::heart(320).expect("a valid size");
+    let mesh = generate::heart(320).expect("a valid size").mesh;
     let built = Builder::new().stretch(1.2).build(&mesh).expect("a valid mesh");
     let bytes: &'static [u8] = built.blob().to_vec().leak();
     let tree: &'static Tree<'static, u16> =
@@ -478,7 +481,7 @@ fn a_surface_beyond_the_stretch_limit_is_refused() {
     };
     assert_eq!(send(1, 1.15), Ok(1));
     let refused = send(2, 1.25).expect_err("beyond 1.2");
-    assert!(matches!(refused, Rejection::Stretch(_)), "{refused:?}");
+    assert!(matches!(refused, ReceiveError::Stretch(_)), "{refused:?}");
     let frame = reader.read().expect("the good one stays");
     assert_eq!(frame.label().epoch, 1);
     let sigma = frame.label().stretch.expect("measured").sigma();
@@ -516,7 +519,7 @@ fn limits_of_single_triangles_spare_tests_on_a_real_heart() {
             let mut found = Vec::new();
             for i in 0..2 {
                 let known =
-                    [Options::new(), Options::new().stretch(measured[i])].map(Options::unsigned);
+                    [Options::cold(), Options::cold().stretch(measured[i])].map(Options::unsigned);
                 for (options, sums) in known.iter().zip(&mut sums[i]) {
                     let answer = queries[i].closest(rows[i].as_slice(), &tool, options);
                     let answer = answer.expect("finite positions");

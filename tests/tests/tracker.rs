@@ -187,7 +187,7 @@ fn wander<const OPENED: usize>(mesh: &Mesh, ticks: usize, seed: u64) -> Tally {
             let budget = (rng.u32(..10) == 0)
                 .then(|| Budget { node_tests: rng.u32(..60), triangle_tests: rng.u32(..6) });
             let share = tick as f32 / ticks_of_frame as f32;
-            let limit = Options::new().unsigned();
+            let limit = Options::cold().unsigned();
             let is_known = rng.bool();
             let known = |stretch| if is_known { limit.stretch(stretch) } else { limit };
             match rng.u32(..4) {
@@ -210,7 +210,7 @@ fn wander<const OPENED: usize>(mesh: &Mesh, ticks: usize, seed: u64) -> Tally {
 #[test]
 fn answers_as_whole_queries_do_on_random_walks() {
     let meshes = [
-        generate::heart(1_280).expect("a valid size").0,
+        generate::heart(1_280).expect("a valid size").mesh,
         generate::brain(1_200).expect("a valid size"),
         surfaces::ball(3),
         surfaces::slivers(60),
@@ -226,7 +226,7 @@ fn answers_as_whole_queries_do_on_random_walks() {
 
 #[test]
 fn a_full_front_falls_back_on_whole_queries() {
-    let mesh = generate::heart(1_280).expect("a valid size").0;
+    let mesh = generate::heart(1_280).expect("a valid size").mesh;
     let tally = wander::<6>(&mesh, ticks(8_000) / 4, 5);
     println!("{tally:?}");
     let [_, _, _, full, none] = tally.fallbacks;
@@ -236,7 +236,7 @@ fn a_full_front_falls_back_on_whole_queries() {
 /// A tick makes as many triangle tests as its budget has, and no more.
 #[test]
 fn a_tick_takes_all_of_its_budget_and_no_more() {
-    let (mesh, _) = generate::heart(320).expect("a valid size");
+    let mesh = generate::heart(320).expect("a valid size").mesh;
     let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
     let tree = built.tree::<u16>().expect("valid");
     let rows = built.to_rows(&mesh.positions);
@@ -247,7 +247,7 @@ fn a_tick_takes_all_of_its_budget_and_no_more() {
         let first = |triangle_tests| {
             let mut tracker = Tracker::<u16, MAX_STACK, 64>::new(&tree).expect("enough");
             let budget = Budget { node_tests: u32::MAX, triangle_tests };
-            let options = Options::new().unsigned().budget(budget);
+            let options = Options::cold().unsigned().budget(budget);
             tracker.closest(&surface, &sphere, &options).expect("an answer").closest
         };
         let whole = first(u32::MAX);
@@ -269,7 +269,7 @@ fn a_tick_takes_all_of_its_budget_and_no_more() {
 
 #[test]
 fn odometers_wrap() {
-    let mesh = generate::heart(320).expect("a valid size").0;
+    let mesh = generate::heart(320).expect("a valid size").mesh;
     let built = Builder::new().stretch(1.5).build(&mesh).expect("builds");
     let tree = built.tree::<u16>().expect("16-bit indices");
     let mut subject = Subject::<64>::new(&tree);
@@ -288,7 +288,7 @@ fn odometers_wrap() {
         // For a long time nothing is tested: bounds get as old as they can.
         let is_starved = tick / 8_000 % 3 == 1;
         let budget = is_starved.then_some(Budget { node_tests: 0, triangle_tests: 1 });
-        subject.tick(&surface, &tool, &Options::new().unsigned(), budget);
+        subject.tick(&surface, &tool, &Options::cold().unsigned(), budget);
     }
     println!("{:?}", subject.tally);
     let [_, _, jumps, _, none] = subject.tally.fallbacks;
@@ -297,7 +297,7 @@ fn odometers_wrap() {
 
 #[test]
 fn a_tick_on_the_path_of_table_3_takes_few_tests() {
-    let (mesh, motion) = generate::heart(10_272).expect("a valid size");
+    let generate::MovingMesh { mesh, motion } = generate::heart(10_272).expect("a valid size");
     let built = Builder::new().stretch(1.5).build(&mesh).expect("builds");
     let tree = built.tree::<u16>().expect("valid");
     let beat = Beat::new(&motion);
@@ -310,7 +310,7 @@ fn a_tick_on_the_path_of_table_3_takes_few_tests() {
         let Probe::Capsule(tool) = beat.tool(tick) else { unreachable!("the beat's is a capsule") };
         let measured = measure_stretch(&tree, rows.as_slice()).expect("within the limit");
         let surface = odometer.step(before.as_slice(), rows.as_slice()).after();
-        subject.ask(&surface, &tool, &Options::new().unsigned().stretch(measured), None);
+        subject.ask(&surface, &tool, &Options::cold().unsigned().stretch(measured), None);
         before = rows;
     }
     let tally = &subject.tally;

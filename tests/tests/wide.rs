@@ -9,7 +9,7 @@ use fastrand::Rng;
 use glam::Vec3;
 
 fn heart() -> (Mesh, BuiltTree) {
-    let (mesh, _) = generate::heart(2_000).expect("a valid size");
+    let mesh = generate::heart(2_000).expect("a valid size").mesh;
     let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
     (mesh, built)
 }
@@ -33,9 +33,9 @@ fn counts_of_a_fixed_stream_are_what_they_were() {
     for _ in 0..400 {
         let tool = tool(&mesh, &mut rng);
         let options = [
-            Options::new().unsigned(),
-            Options::new().unsigned().stretch(measured),
-            Options::new().unsigned().stretch(measured).warm_start(last),
+            Options::cold().unsigned(),
+            Options::cold().unsigned().stretch(measured),
+            Options::cold().unsigned().stretch(measured).warm_start(last),
         ];
         for (count, options) in counts.iter_mut().zip(options) {
             let found = query.closest_wide(rows.as_slice(), &tool, &options);
@@ -76,8 +76,8 @@ fn tests_with<const D: usize>(mesh: &Mesh, built: &BuiltTree, rows: &[Vec3]) -> 
     for _ in 0..400 {
         let tool = tool(mesh, &mut rng);
         let one_at_a_time =
-            query.closest(rows, &tool, &Options::new().unsigned()).expect("an answer");
-        let wide = query.closest_wide(rows, &tool, &Options::new().unsigned()).expect("an answer");
+            query.closest(rows, &tool, &Options::cold().unsigned()).expect("an answer");
+        let wide = query.closest_wide(rows, &tool, &Options::cold().unsigned()).expect("an answer");
         let apart = (one_at_a_time.separation - wide.separation).abs();
         assert!(apart <= 2.0 * wide.accuracy, "{one_at_a_time:?} {wide:?}");
         tests += wide.node_tests;
@@ -97,11 +97,11 @@ fn more_budget_tells_no_less() {
     for _ in 0..400 {
         let tool = tool(&mesh, &mut rng);
         let truth =
-            query.closest(rows.as_slice(), &tool, &Options::new().unsigned()).expect("an answer");
+            query.closest(rows.as_slice(), &tool, &Options::cold().unsigned()).expect("an answer");
         let (mut lower, mut upper) = (f32::NEG_INFINITY, f32::INFINITY);
         for node_tests in (0..400).step_by(9) {
             let budget = Budget { node_tests, triangle_tests: node_tests / 16 };
-            let options = Options::new().unsigned().budget(budget);
+            let options = Options::cold().unsigned().budget(budget);
             let found = query.closest_wide(rows.as_slice(), &tool, &options);
             let found = found.expect("a short budget is no error");
             assert!(found.node_tests <= node_tests + 1, "{budget:?} {found:?}");

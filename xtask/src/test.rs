@@ -3,7 +3,7 @@
 use std::process::Command;
 use std::time::Duration;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use xtask::process::{quiet, run};
 use xtask::qemu;
 use xtask::steps::{Outcome, Steps};
@@ -106,11 +106,16 @@ fn oldest_compiler() -> Result<Outcome> {
     run(command.current_dir(workspace::root())).map(|()| Outcome::Passed)
 }
 
-/// The core crate compiles for the board, with and without defmt: `core` is all that it has there.
+/// The core crate compiles for the board, with defmt, and with each of its layers alone or none: `core` is all that it
+/// has there.
 fn core_crate(cross: &Cross) -> Result<Outcome> {
-    for features in [&[][..], &["--features", "defmt"]] {
-        let mut command = cross.cargo("check");
-        run(command.args(["--quiet", "--package", "dibs-nostd"]).args(features))?;
+    let mut check = cross.cargo("check");
+    run(check.args(["--quiet", "--package", "dibs-nostd", "--features", "defmt"]))?;
+    for layer in ["", "bus", "control", "modes", "control,bus", "control,modes", "bus,modes"] {
+        let mut check = cross.cargo("check");
+        check.args(["--quiet", "--package", "dibs-nostd", "--no-default-features"]);
+        run(check.args(["--features", layer]))
+            .with_context(|| format!("dibs-nostd with the layers \"{layer}\" alone"))?;
     }
     Ok(Outcome::Passed)
 }

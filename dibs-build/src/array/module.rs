@@ -57,26 +57,28 @@ pub mod {name} {{
     /// The control loop's end of the buffers.
     pub type Reader = ::dibs_nostd::FrameReader<'static, VERTICES>;
 
-    /// Publishes frames that are complete and within the stretch limit, which it checks in slices.
-    pub type Receiver<'t> =
-        ::dibs_nostd::Assembler<'static, ::dibs_nostd::StretchMonitor<'t, Index>, VERTICES>;
+    ::dibs_nostd::if_bus! {{
+        /// Publishes frames that are complete and within the stretch limit, which it checks in slices.
+        pub type Receiver<'t> =
+            ::dibs_nostd::Assembler<'static, ::dibs_nostd::StretchMonitor<'t, Index>, VERTICES>;
 
-    /// A receiver for surfaces of this tree that keep to these limits.
-    ///
-    /// # Errors
-    /// Where the tree was built without its metric.
-    pub fn receiver(
-        tree: &Tree,
-        writer: Writer,
-        limits: ::dibs_nostd::Limits,
-    ) -> ::core::result::Result<Receiver<'_>, ::dibs_nostd::StretchError> {{
-        Receiver::for_tree(writer, tree, limits)
+        /// A receiver for surfaces of this tree that keep to these limits.
+        ///
+        /// # Errors
+        /// Where the tree was built without its metric.
+        pub fn receiver(
+            tree: &Tree,
+            writer: Writer,
+            limits: ::dibs_nostd::SurfaceLimits,
+        ) -> ::core::result::Result<Receiver<'_>, ::dibs_nostd::StretchError> {{
+            Receiver::for_tree(writer, tree, limits)
+        }}
     }}
 
     /// A query with the stack that this tree needs.
     pub type Query = ::dibs_nostd::Query<'static, Index, STACK>;
 
-    /// The same with the longer stack of a search in rounds, for large processors.
+    /// The same with the longer stack of the wide search, for large processors.
     pub type WideQuery = ::dibs_nostd::Query<'static, Index, {{ STACK + 128 }}>;
 {extent}{modal}}}
 "#
@@ -129,8 +131,10 @@ fn modal_source(ModesSummary { count, position_error, .. }: &ModesSummary) -> St
     /// Displacement modes: weights of a frame.
     pub const MODES: usize = {count};
 
+    ::dibs_nostd::if_modes! {{
     /// The types for a surface that {count} weights drive, within {position_error} of the recorded motion.
     pub mod modal {{
+        #[allow(unused_imports)]
         use super::{{Index, MODES}};
 
         /// Two buffers for the weights.
@@ -142,12 +146,15 @@ fn modal_source(ModesSummary { count, position_error, .. }: &ModesSummary) -> St
         /// The control loop's end of the buffers.
         pub type Reader = ::dibs_nostd::modes::ModalReader<'static, 'static, MODES>;
 
-        /// Publishes frames whose weights, and the stretch that follows from them, are within their limits.
-        pub type Receiver<'t> = ::dibs_nostd::Assembler<
-            'static,
-            ::dibs_nostd::modes::ModalGate<'static, ::dibs_nostd::StretchMonitor<'t, Index>, MODES>,
-            MODES,
-        >;
+        ::dibs_nostd::if_bus! {{
+            /// Publishes frames whose weights, and the stretch that follows from them, are within their limits.
+            pub type Receiver<'t> = ::dibs_nostd::Assembler<
+                'static,
+                ::dibs_nostd::modes::ModalGate<'static, ::dibs_nostd::StretchMonitor<'t, Index>, MODES>,
+                MODES,
+            >;
+        }}
+    }}
     }}
 "#
     )

@@ -14,6 +14,7 @@ use super::Fault;
 const REMEMBERED: usize = 8;
 
 /// Turns packets into faulty ones. The same seed and the same packets give the same faults.
+#[derive(Debug)]
 pub struct Injector {
     rng: Rng,
     /// Packets of the last frames, the present one last.

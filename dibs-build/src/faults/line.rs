@@ -9,6 +9,7 @@ use super::{Fault, Injector};
 use crate::transport::{Line, Transport};
 
 /// A line on which faults happen.
+#[derive(Debug)]
 pub struct FaultyLine {
     line: Line,
     injector: Injector,

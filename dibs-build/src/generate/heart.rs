@@ -7,8 +7,8 @@ use glam::DVec3;
 use super::beat::beat;
 use super::contour::contour;
 use super::remesh::{Surface, area_vector, remesh};
-use super::{GenerateError, check};
-use crate::{Mesh, Motion};
+use super::{GenerateError, MovingMesh, check};
+use crate::Mesh;
 
 const TRIANGLES: RangeInclusive<u32> = 320..=1_000_000;
 
@@ -40,12 +40,12 @@ const RIGHT_CAVITY: Ellipsoid =
 /// [`GenerateError::Stuck`] if the mesh cannot be brought to that number; no such number is known.
 ///
 /// ```
-/// let (heart, motion) = dibs_build::generate::heart(1000)?;
-/// assert_eq!(heart.triangles.len(), 1000);
-/// assert_eq!(motion.frames[0], heart.positions);
+/// let heart = dibs_build::generate::heart(1000)?;
+/// assert_eq!(heart.mesh.triangles.len(), 1000);
+/// assert_eq!(heart.motion.frames[0], heart.mesh.positions);
 /// # Ok::<(), dibs_build::generate::GenerateError>(())
 /// ```
-pub fn heart(triangles: u32) -> Result<(Mesh, Motion), GenerateError> {
+pub fn heart(triangles: u32) -> Result<MovingMesh, GenerateError> {
     check("heart", triangles, TRIANGLES)?;
     // The surface measures about 43,000 mm^2; the rough start has a few times the triangles asked.
     let step = (43_000.0 / f64::from(triangles)).sqrt().clamp(0.8, 3.0);
@@ -63,7 +63,7 @@ pub fn heart(triangles: u32) -> Result<(Mesh, Motion), GenerateError> {
     let (points, triangles) = mesh;
     let mesh = Mesh { positions: points.iter().map(|point| point.as_vec3()).collect(), triangles };
     let motion = beat(&mesh.positions);
-    Ok((mesh, motion))
+    Ok(MovingMesh { mesh, motion })
 }
 
 pub(super) struct Ellipsoid {

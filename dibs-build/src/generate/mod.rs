@@ -17,8 +17,19 @@ mod tests;
 
 use std::ops::RangeInclusive;
 
+use crate::{Mesh, Motion};
+
 pub use brain::brain;
 pub use heart::heart;
+
+/// A surface and how it moves.
+#[derive(Clone, Debug)]
+pub struct MovingMesh {
+    /// The surface at rest.
+    pub mesh: Mesh,
+    /// Its motion: frame 0 is the mesh itself.
+    pub motion: Motion,
+}
 
 /// Why a surface could not be generated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3, Vec3};
 
-use super::{GenerateError, brain, heart};
+use super::{GenerateError, MovingMesh, brain, heart};
 use crate::Mesh;
 
 const HEARTS: [u32; 6] = [320, 322, 500, 1000, 2222, 10272];
@@ -157,7 +157,7 @@ fn checksum(mesh: &Mesh, frames: &[Vec<Vec3>]) -> u32 {
 #[test]
 fn a_heart_is_sound_and_well_shaped() {
     for triangles in HEARTS {
-        let (mesh, _) = heart(triangles).unwrap();
+        let mesh = heart(triangles).unwrap().mesh;
         assert_sound(&mesh, triangles);
         let angles = smallest_angles(&mesh);
         let (least, most) = if triangles < 1000 { (3.0, 10.0) } else { (15.0, 25.0) };
@@ -168,7 +168,7 @@ fn a_heart_is_sound_and_well_shaped() {
 
 #[test]
 fn a_heart_is_of_human_size_and_ejects_blood() {
-    let (mesh, motion) = heart(10_272).unwrap();
+    let MovingMesh { mesh, motion } = heart(10_272).unwrap();
     let low = mesh.positions.iter().copied().reduce(Vec3::min).unwrap();
     let high = mesh.positions.iter().copied().reduce(Vec3::max).unwrap();
     assert!((80.0..110.0).contains(&(high - low).z), "{}", high - low);
@@ -181,7 +181,7 @@ fn a_heart_is_of_human_size_and_ejects_blood() {
 #[test]
 fn a_heart_beats_within_its_stretch_limit() {
     for triangles in HEARTS {
-        let (mesh, motion) = heart(triangles).unwrap();
+        let MovingMesh { mesh, motion } = heart(triangles).unwrap();
         assert_eq!(motion.frames.len(), 25);
         assert!((motion.rate / 25.0 * 60.0 - 72.0).abs() < 1e-3);
         assert_eq!(motion.frames[0], mesh.positions);
@@ -206,7 +206,7 @@ fn a_heart_beats_within_its_stretch_limit() {
 #[test]
 fn a_heart_never_cuts_itself() {
     for triangles in [320, 500, 1000, 2222] {
-        let (mesh, motion) = heart(triangles).unwrap();
+        let MovingMesh { mesh, motion } = heart(triangles).unwrap();
         for frame in [0, 4, 8, 12, 20] {
             let found = self_intersections(&motion.frames[frame], &mesh.triangles);
             assert_eq!(found, 0, "{triangles} triangles, frame {frame}");
@@ -260,7 +260,7 @@ fn invalid_counts_name_the_nearest_valid_one() {
 /// Fixed, so that a change of the shapes, or a machine that gives other bits, is noticed.
 #[test]
 fn the_shapes_are_these_to_the_last_bit() {
-    let (mesh, motion) = heart(1000).unwrap();
+    let MovingMesh { mesh, motion } = heart(1000).unwrap();
     assert_eq!(checksum(&mesh, &motion.frames), 0xab0f_02f4);
     assert_eq!(checksum(&brain(1000).unwrap(), &[]), 0x80d1_e039);
 }

@@ -21,7 +21,7 @@ const NOISE: f64 = 1e-12;
 ///
 /// ```
 /// use dibs_build::{generate, modes::ModalFit};
-/// let (heart, motion) = generate::heart(1_000)?;
+/// let generate::MovingMesh { mesh: heart, motion } = generate::heart(1_000)?;
 /// let fit = ModalFit::new(&heart, &motion)?;
 /// // What more modes buy, before any is chosen: this motion has two.
 /// let [one, two] = fit.errors() else { panic!("other modes") };

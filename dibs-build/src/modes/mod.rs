@@ -13,7 +13,7 @@ pub(crate) use encode::encode;
 pub use fit::ModalFit;
 pub use project::Projector;
 
-use crate::{BuildError, MotionMismatch};
+use crate::{BuildError, MotionMismatchError};
 use dibs_nostd::modes::MAX_MODES;
 
 /// Most frames of a motion that modes are fitted to: the decomposition takes the cube of their number.
@@ -50,7 +50,7 @@ pub const MARGIN: f32 = 0.25;
 pub enum ModesError {
     /// The motion is one of another mesh.
     #[error(transparent)]
-    Mismatch(#[from] MotionMismatch),
+    Mismatch(#[from] MotionMismatchError),
     /// No frame, or too many.
     #[error("modes are fitted to 1 to {MAX_FRAMES} frames, the motion has {frames}: thin it out")]
     Frames {

@@ -12,7 +12,7 @@ use super::ModesError;
 /// ```
 /// use dibs_build::{Builder, generate, modes::{ModalFit, Projector}};
 /// use dibs_nostd::{Tree, modes::Modes};
-/// let (heart, motion) = generate::heart(1_000)?;
+/// let generate::MovingMesh { mesh: heart, motion } = generate::heart(1_000)?;
 /// let fit = ModalFit::new(&heart, &motion)?;
 /// let built = Builder::new().build(&heart)?.with_modes(&fit, 2)?;
 ///

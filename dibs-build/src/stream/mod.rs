@@ -3,7 +3,7 @@
 //! ```no_run
 //! use dibs_build::stream::{Sender, Settings, SurfaceOrder};
 //! use dibs_build::transport::Target;
-//! # let (heart, motion) = dibs_build::generate::heart(500)?;
+//! # let dibs_build::generate::MovingMesh { mesh: heart, motion } = dibs_build::generate::heart(500)?;
 //! # let built = dibs_build::Builder::new().build(&heart)?;
 //!
 //! let target: Target = "serial:/dev/ttyUSB0@921600".parse()?;

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 pub use file::{LimitsError, LimitsErrorKind, read_limits, write_limits};
 
-use crate::pc2::MotionMismatch;
+use crate::pc2::MotionMismatchError;
 use crate::rest::RestShape;
 use crate::{Mesh, Motion, Paths};
 
@@ -20,7 +20,7 @@ use crate::{Mesh, Motion, Paths};
 ///
 /// ```
 /// use dibs_build::{Builder, MotionStretch, Paths, generate};
-/// let (mesh, motion) = generate::heart(1_000)?;
+/// let generate::MovingMesh { mesh, motion } = generate::heart(1_000)?;
 /// let needed = MotionStretch::new(&mesh, &motion, Paths::default(), &|_| ())?;
 /// let tree = Builder::new().limits(needed.limits(0.1)).build(&mesh)?;
 /// assert!(f64::from(tree.summary().stretch) >= needed.worst().stretch * 1.09);
@@ -64,7 +64,7 @@ impl MotionStretch {
     /// thread did them.
     ///
     /// # Errors
-    /// [`MotionMismatch`] where a frame does not fit the mesh.
+    /// [`MotionMismatchError`] where a frame does not fit the mesh.
     ///
     /// # Panics
     /// If the mesh names vertices that it does not have.
@@ -73,7 +73,7 @@ impl MotionStretch {
         motion: &Motion,
         paths: Paths,
         progress: &(dyn Fn(usize) + Sync),
-    ) -> Result<Self, MotionMismatch> {
+    ) -> Result<Self, MotionMismatchError> {
         motion.check_fits(mesh)?;
         let done = std::sync::atomic::AtomicUsize::new(0);
         let needed = |triangle: usize| {

@@ -1,5 +1,6 @@
 //! A serial line or a socket, with a thread that reads.
 
+use std::fmt;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpStream, UdpSocket};
 use std::sync::Arc;
@@ -31,6 +32,14 @@ pub struct Line {
     received: Receiver<io::Result<Vec<u8>>>,
     over: Arc<AtomicBool>,
     hang_up: Box<dyn Fn() + Send>,
+}
+
+impl fmt::Debug for Line {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let is_over = self.over.load(Ordering::Relaxed);
+        let mut line = f.debug_struct("Line");
+        line.field("is_stream", &self.is_stream).field("is_over", &is_over).finish_non_exhaustive()
+    }
 }
 
 impl Line {

@@ -3,4 +3,4 @@
 pub(crate) mod assembler;
 pub mod wire;
 
-pub use assembler::{Advance, Assembler, BusHealth, LastHeartbeat, Progress, Rejection};
+pub use assembler::{Advance, Assembler, BusHealth, LastHeartbeat, Progress, ReceiveError};

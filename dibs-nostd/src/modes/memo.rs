@@ -4,7 +4,7 @@ use core::cell::Cell;
 
 use glam::Vec3;
 
-use crate::surface::VertexTable;
+use crate::surface::{MeasuredStretch, VertexTable};
 
 /// A vertex table that remembers some positions of another one: for a
 /// [`ModalSurface`](super::ModalSurface), of which a query asks for the same vertices a few times, as
@@ -66,5 +66,13 @@ impl<T: VertexTable + ?Sized, const N: usize> VertexTable for Memo<'_, T, N> {
 
     fn epoch(&self) -> Option<u32> {
         self.table.epoch()
+    }
+
+    fn stretch(&self) -> Option<MeasuredStretch> {
+        self.table.stretch()
+    }
+
+    fn position_error(&self) -> f32 {
+        self.table.position_error()
     }
 }

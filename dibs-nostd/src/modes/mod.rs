@@ -25,6 +25,8 @@ use layout::Header;
 
 pub use error::{ModesError, WeightsError};
 pub use gate::ModalGate;
+/// The bytes of the modes, for their builder.
+#[doc(hidden)]
 pub use layout::{ANCHOR_TAIL_BYTES, HEADER_BYTES, MAX_ANCHORS, MODE_BYTES, VERTEX_MODE_BYTES};
 pub use memo::Memo;
 pub use reader::{ModalFrame, ModalReader};
@@ -35,12 +37,15 @@ use glam::Vec3;
 use crate::tree::{Index, Tree, format};
 
 /// Most modes of a surface.
+#[doc(hidden)]
 pub const MAX_MODES: usize = 64;
 
 /// Bits of a weight times a displacement below the unit of their sum.
+#[doc(hidden)]
 pub const FRACTION_BITS: u32 = 16;
 
 /// Largest sum, over the modes, of largest weight times gain: a displacement sum then fits 29 bits.
+#[doc(hidden)]
 pub const MAX_GAIN: f32 = 536_870_912.0;
 
 /// The displacement modes that a tree carries, validated once: a view of bytes in flash.
@@ -51,7 +56,7 @@ pub const MAX_GAIN: f32 = 536_870_912.0;
 /// use dibs_nostd::{Options, Query, Sphere, Tree, glam::Vec3};
 ///
 /// // On a host: two modes are all that this motion has.
-/// let (heart, motion) = generate::heart(1_000)?;
+/// let generate::MovingMesh { mesh: heart, motion } = generate::heart(1_000)?;
 /// let fit = ModalFit::new(&heart, &motion)?;
 /// let built = Builder::new().stretch(1.5).build(&heart)?.with_modes(&fit, 2)?;
 ///
@@ -67,7 +72,7 @@ pub const MAX_GAIN: f32 = 536_870_912.0;
 /// let surface = modes.surface::<2>(&weights)?;
 /// let tool = Sphere::new(Vec3::new(0.0, 0.0, 150.0), 5.0)?;
 /// let closest = query.closest(&surface, &tool, &Options::new().stretch(stretch))?;
-/// assert!(closest.widened(modes.position_error()).accuracy < 0.01);
+/// assert!(closest.accuracy > modes.position_error() && closest.accuracy < 0.01);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug)]

@@ -3,10 +3,11 @@
 use glam::Vec3;
 
 use super::{ModalSurface, Modes, WeightsError};
-use crate::surface::{FrameGuard, FrameLabel, FrameReader, Latest, VertexTable};
+use crate::surface::{FrameGuard, FrameLabel, FrameReader, Latest, MeasuredStretch, VertexTable};
 
 /// Reads published weights as surfaces. The double buffer is [`Frames`](crate::Frames) of `K` rows, of
 /// which each holds one weight.
+#[derive(Debug)]
 pub struct ModalReader<'f, 'a, const K: usize> {
     frames: FrameReader<'f, K>,
     modes: Modes<'a>,
@@ -43,7 +44,7 @@ impl<'f, 'a, const K: usize> ModalReader<'f, 'a, K> {
     }
 }
 
-/// A published modal surface: a [`VertexTable`].
+/// A published modal surface: a [`VertexTable`] that carries the bound of its stretch and its position error.
 #[derive(Clone, Copy, Debug)]
 pub struct ModalFrame<'a, const K: usize> {
     surface: ModalSurface<'a, K>,
@@ -76,5 +77,13 @@ impl<const K: usize> VertexTable for ModalFrame<'_, K> {
 
     fn epoch(&self) -> Option<u32> {
         Some(self.label.epoch)
+    }
+
+    fn stretch(&self) -> Option<MeasuredStretch> {
+        self.label.stretch
+    }
+
+    fn position_error(&self) -> f32 {
+        self.label.position_error
     }
 }

@@ -71,6 +71,11 @@ impl<const K: usize> VertexTable for ModalSurface<'_, K> {
         }
         Some(rest + Vec3::new(x as f32, y as f32, z as f32) * self.modes.header.unit)
     }
+
+    /// Against the motion that the modes were fitted to.
+    fn position_error(&self) -> f32 {
+        self.modes.position_error()
+    }
 }
 
 /// One axis of one mode's share, in units: `smlawb` or `smlawt` on ARM, with the sum that it goes to.

@@ -120,6 +120,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         meeting: &Proximity,
     ) -> Self {
         let mut options = *options;
+        options.stretch = options.stretch.or_else(|| vertices.stretch());
         let Budget { node_tests, triangle_tests } = &mut options.budget;
         *node_tests = node_tests.saturating_sub(meeting.node_tests);
         *triangle_tests = triangle_tests.saturating_sub(meeting.triangle_tests);
@@ -183,9 +184,9 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             });
         };
         let options = self.options.budget(Budget { node_tests, triangle_tests });
-        let options = options.warm_start(near.triangle);
-        let point = AxisPoint(on_axis);
-        let found = Search::start(self.tree, self.stack, self.vertices, &point, &options)?.run()?;
+        let (point, first) = (AxisPoint(on_axis), near.triangle);
+        let search = Search::start(self.tree, self.stack, self.vertices, &point, &options, first)?;
+        let found = search.run()?;
         self.options.budget = Budget {
             node_tests: node_tests.saturating_sub(found.node_tests.saturating_sub(1)),
             triangle_tests: triangle_tests.saturating_sub(found.triangle_tests),

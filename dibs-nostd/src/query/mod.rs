@@ -35,6 +35,8 @@ use search::{Search, Waiting, WideSearch};
 pub struct Query<'t, I, const STACK: usize> {
     tree: Tree<'t, I>,
     stack: [Waiting; STACK],
+    /// Of the last answer.
+    triangle: Option<u32>,
 }
 
 impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
@@ -46,7 +48,8 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         if tree.stack() as usize > STACK {
             return Err(QueryError::Stack { needed: tree.stack(), available: STACK as u32 });
         }
-        Ok(Self { tree: *tree, stack: [Waiting { lower: 0.0, link: 0 }; STACK] })
+        let stack = [Waiting { lower: 0.0, link: 0 }; STACK];
+        Ok(Self { tree: *tree, stack, triangle: None })
     }
 
     /// The tree that is searched.
@@ -59,8 +62,9 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     ///
     /// Signed, if the tree has adjacency: [`Proximity::side`] says on which side of the surface the tool is.
     ///
-    /// Exact within [`Proximity::accuracy`] as long as the surface keeps to the stretch limit (or to
-    /// the measured stretch in `options`). Pins are vertices of the surface, so their distances are
+    /// Exact within [`Proximity::accuracy`], the surface's own position error in it, as long as the surface keeps to
+    /// the stretch limit (or to the stretch that it carries, or that is in `options`). Starts from the last answer's
+    /// triangle, unless `options` say otherwise. Pins are vertices of the surface, so their distances are
     /// upper bounds from the first node on. Near children first; squares are compared, and a root is
     /// taken only where an order is needed. A leaf is rejected by one plane, a triangle by another.
     ///
@@ -77,7 +81,21 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         tool: &T,
         options: &Options,
     ) -> Result<Proximity, QueryError> {
-        let found = Search::start(&self.tree, &mut self.stack, vertices, tool, options)?.run()?;
+        Ok(self.closest_on_table(vertices, tool, options)?.of_table(vertices))
+    }
+
+    /// The same for positions without an error.
+    #[inline(always)]
+    fn closest_on_table<V: VertexTable + ?Sized, T: Tool>(
+        &mut self,
+        vertices: &V,
+        tool: &T,
+        options: &Options,
+    ) -> Result<Proximity, QueryError> {
+        let first = options.first(self.triangle);
+        let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options, first)?;
+        let found = search.run()?;
+        self.triangle = found.triangle.or(self.triangle);
         signed(&self.tree, &mut self.stack, vertices, tool, options, found)
     }
 
@@ -97,9 +115,12 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         tool: &T,
         options: &Options,
     ) -> Result<Proximity, QueryError> {
-        let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options)?;
+        let first = options.first(self.triangle);
+        let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options, first)?;
         let found = WideSearch::new(search).run()?;
-        signed(&self.tree, &mut self.stack, vertices, tool, options, found)
+        self.triangle = found.triangle.or(self.triangle);
+        let found = signed(&self.tree, &mut self.stack, vertices, tool, options, found)?;
+        Ok(found.of_table(vertices))
     }
 }
 

@@ -29,10 +29,21 @@ impl Budget {
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     pub(super) budget: Budget,
-    pub(super) warm_start: Option<u32>,
+    first: First,
     pub(super) stretch: Option<MeasuredStretch>,
     pub(super) is_signed: bool,
     pub(super) depth_tolerance: Option<f32>,
+}
+
+/// The triangle that a query tests first.
+#[derive(Clone, Copy, Debug)]
+enum First {
+    /// That of its last answer.
+    Last,
+    /// None.
+    Cold,
+    /// This one.
+    Triangle(u32),
 }
 
 impl Default for Options {
@@ -42,16 +53,23 @@ impl Default for Options {
 }
 
 impl Options {
-    /// No budget, no warm start, and the stretch limit that the tree was built for.
+    /// No budget; from the query's last answer on; with the stretch that the surface carries, else the limit that the
+    /// tree was built for.
     #[must_use]
     pub const fn new() -> Self {
         Self {
             budget: Budget::UNLIMITED,
-            warm_start: None,
+            first: First::Last,
             stretch: None,
             is_signed: true,
             depth_tolerance: None,
         }
+    }
+
+    /// The same, but cold: what a query answered before makes no difference, to the cost either.
+    #[must_use]
+    pub const fn cold() -> Self {
+        Self::new().warm_start(None)
     }
 
     /// Bounds the work.
@@ -61,12 +79,24 @@ impl Options {
         self
     }
 
-    /// Starts from a triangle, usually the last tick's [`Proximity::triangle`](crate::Proximity::triangle). A wrong or stale one
-    /// costs one triangle test; `None` starts cold.
+    /// Starts from a triangle instead of the query's last answer's. A wrong or stale one costs one triangle test; `None`
+    /// starts cold.
     #[must_use]
     pub const fn warm_start(mut self, triangle: Option<u32>) -> Self {
-        self.warm_start = triangle;
+        self.first = match triangle {
+            Some(triangle) => First::Triangle(triangle),
+            None => First::Cold,
+        };
         self
+    }
+
+    /// The triangle that a query tests first whose last answer was on `last`.
+    pub(super) const fn first(&self, last: Option<u32>) -> Option<u32> {
+        match self.first {
+            First::Last => last,
+            First::Cold => None,
+            First::Triangle(triangle) => Some(triangle),
+        }
     }
 
     /// Leaves the side out: the separation is that of a tool outside, at the cost of the distance alone.
@@ -84,8 +114,8 @@ impl Options {
         self
     }
 
-    /// Uses the stretch measured on the frame that is searched instead of the limit of the tree:
-    /// smaller spheres, fewer tests.
+    /// Uses this stretch, measured on the frame that is searched, instead of the surface's own
+    /// ([`VertexTable::stretch`](crate::VertexTable::stretch)): smaller spheres than the tree's limit has, fewer tests.
     #[must_use]
     pub const fn stretch(mut self, measured: MeasuredStretch) -> Self {
         self.stretch = Some(measured);

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::Side;
+use crate::VertexTable;
 
 /// The closest pair between a tool and a surface, with a certified interval for its separation.
 ///
@@ -66,12 +67,18 @@ impl Proximity {
     }
 
     /// The same pair, its accuracy widened by `error` (mm, not negative): how far a vertex may be from
-    /// where the table has it, say [`FrameLabel::position_error`](crate::FrameLabel::position_error)
-    /// of a quantised frame, or the age of the surface times the tissue's greatest speed. A distance
-    /// changes by at most as much as its points move.
+    /// where the table has it besides its own position error, say the age of the surface times the tissue's greatest
+    /// speed. A distance changes by at most as much as its points move.
     #[must_use]
     pub fn widened(mut self, error: f32) -> Self {
         self.accuracy += error;
         self
+    }
+
+    /// The same pair, as accurate as the positions are that it was found on.
+    #[inline(always)]
+    pub(super) fn of_table<V: VertexTable + ?Sized>(self, vertices: &V) -> Self {
+        let error = vertices.position_error();
+        if error > 0.0 { self.widened(error) } else { self }
     }
 }

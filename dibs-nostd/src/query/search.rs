@@ -19,7 +19,7 @@ use crate::math::sqrt::sqrt;
 use crate::tool::{AxisPair, Tool};
 use crate::tree::format::Link;
 use crate::unavailable::QueryError;
-use crate::{Index, Proximity, Tree, VertexTable};
+use crate::{Index, MeasuredStretch, Proximity, Tree, VertexTable};
 
 /// A subtree that waits for its turn.
 #[derive(Clone, Copy, Debug)]
@@ -78,6 +78,7 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T> {
+    /// A search that tests the triangle `first` before anything else.
     #[inline(always)]
     pub fn start(
         tree: &'s Tree<'t, I>,
@@ -85,6 +86,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         vertices: &'s V,
         tool: &'s T,
         options: &Options,
+        first: Option<u32>,
     ) -> Result<Self, QueryError> {
         let header = tree.header();
         if vertices.len() != header.vertices as usize {
@@ -93,20 +95,22 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
                 found: vertices.len() as u32,
             });
         }
-        let stretch = match options.stretch {
-            None => header.stretch,
-            Some(measured) => {
-                let (expected, found) = (header.checksum, measured.tree());
-                if expected != found {
-                    return Err(QueryError::OtherTree { expected, found });
-                }
-                if let (Some(expected), Some(found)) = (vertices.epoch(), measured.epoch())
-                    && expected != found
-                {
-                    return Err(QueryError::OtherFrame { expected, found });
-                }
-                measured.sigma()
+        let sigma = |measured: &MeasuredStretch| {
+            let (expected, found) = (header.checksum, measured.tree());
+            if expected != found {
+                return Err(QueryError::OtherTree { expected, found });
             }
+            if let (Some(expected), Some(found)) = (vertices.epoch(), measured.epoch())
+                && expected != found
+            {
+                return Err(QueryError::OtherFrame { expected, found });
+            }
+            Ok(measured.sigma())
+        };
+        let stretch = match (&options.stretch, vertices.stretch()) {
+            (Some(measured), _) => sigma(measured)?,
+            (None, Some(measured)) => sigma(&measured)?,
+            (None, None) => header.stretch,
         };
         let root = tree.record(0).ok_or(QueryError::Corrupt { row: 0 })?;
         let radius_scale = header.radius_unit * stretch;
@@ -150,7 +154,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             best_triangle: u32::MAX,
         };
         search.lower_cutoff_to_pin(root.pin, distance);
-        if let Some(triangle) = options.warm_start
+        if let Some(triangle) = first
             && triangle < header.triangles
             && let Some(left) = search.left.triangle_tests.checked_sub(1)
         {

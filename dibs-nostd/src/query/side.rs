@@ -58,8 +58,6 @@ impl fmt::Display for NoSide {
     }
 }
 
-impl core::error::Error for NoSide {}
-
 /// Rounding of a coordinate and of a few operations on it, relative to its size.
 const COORDINATES: f32 = 4.0 / 16_777_216.0;
 

@@ -83,7 +83,7 @@ pub trait Gate {
     }
 
     /// The largest speed of any vertex that the gate admits, in mm per unit of the receiver's clock:
-    /// see [`Limits::speed`](crate::Limits::speed). Infinite for one that compares no frames.
+    /// see [`SurfaceLimits::speed`](crate::SurfaceLimits::speed). Infinite for one that compares no frames.
     fn speed_limit(&self) -> f32 {
         f32::INFINITY
     }

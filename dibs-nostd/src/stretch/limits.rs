@@ -9,20 +9,20 @@
 /// A limit that is not a number refuses every frame.
 ///
 /// ```
-/// use dibs_nostd::Limits;
+/// use dibs_nostd::SurfaceLimits;
 /// // 300 mm around the origin, and 0.2 mm a tick of 1 ms: a beating heart.
-/// let limits = Limits::reach_mm(300.0).speed(0.2);
-/// assert_eq!(limits, Limits::reach_mm(300.0).speed(0.2).shrinkage(0.25));
+/// let limits = SurfaceLimits::reach_mm(300.0).speed(0.2);
+/// assert_eq!(limits, SurfaceLimits::reach_mm(300.0).speed(0.2).shrinkage(0.25));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Limits {
+pub struct SurfaceLimits {
     pub(crate) reach: f32,
     pub(super) speed: f32,
     pub(super) shrinkage: f32,
 }
 
-impl Limits {
+impl SurfaceLimits {
     /// No coordinate of any vertex beyond `reach` (mm) on each axis; the smaller, the more damage it tells from a
     /// surface, and the better the accuracy that every query has. No limit on speed, and regions that shrink to a
     /// quarter of their size are refused.

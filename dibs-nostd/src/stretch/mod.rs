@@ -15,7 +15,7 @@ use crate::tree::{Index, Tree};
 
 pub use gate::{Arriving, Changed, Gate, Unchecked, Verdict};
 use kernel::Worst;
-pub use limits::Limits;
+pub use limits::SurfaceLimits;
 pub use monitor::StretchMonitor;
 pub(crate) use motion::farthest;
 use regions::{of_regions, region_rows};
@@ -94,7 +94,7 @@ impl fmt::Display for StretchError {
 impl core::error::Error for StretchError {}
 
 /// Measures the stretch of a whole frame at once: of every triangle what the tree's
-/// [`PathKind`](crate::format::PathKind) asks for, rounded up by the error of the f32 arithmetic
+/// [`PathKind`](crate::PathKind) asks for, rounded up by the error of the f32 arithmetic
 /// and 2^-17 of itself. [`StretchMonitor`] measures the same in slices.
 ///
 /// Never below the true stretch of any triangle; above the largest by some ten parts in a million, more

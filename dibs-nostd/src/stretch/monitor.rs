@@ -6,7 +6,7 @@ use super::kernel::Worst;
 use super::motion::{farthest, largest_step, too_fast};
 use super::regions::{of_regions, region_rows};
 use super::rows::Room;
-use super::{Arriving, Changed, Gate, Limits, StretchError, Verdict, check_tables, rows};
+use super::{Arriving, Changed, Gate, StretchError, SurfaceLimits, Verdict, check_tables, rows};
 use crate::surface::{REGIONS, VertexTable};
 use crate::tree::{Index, Tree};
 
@@ -31,7 +31,7 @@ const _: () = assert!(REGIONS == u32::BITS as usize);
 /// [`measure_stretch`](super::measure_stretch) on the whole surface, but for the few parts in a million that are
 /// added for rounding, which depend on where a region began; from the same frames always the same bits.
 ///
-/// Of a frame's rows those that came are compared with the published ones; see [`Limits`] for what is and what is
+/// Of a frame's rows those that came are compared with the published ones; see [`SurfaceLimits`] for what is and what is
 /// not refused.
 ///
 /// Cost: [`advance`](Gate::advance) checks at most as many rows and triangles as it is told, and takes
@@ -41,15 +41,15 @@ const _: () = assert!(REGIONS == u32::BITS as usize);
 /// ```
 /// use dibs_build::{Builder, generate};
 /// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
-/// use dibs_nostd::{Advance, Assembler, Frames, Limits, Tree};
+/// use dibs_nostd::{Advance, Assembler, Frames, SurfaceLimits, Tree};
 ///
-/// let (heart, motion) = generate::heart(320)?;
+/// let generate::MovingMesh { mesh: heart, motion } = generate::heart(320)?;
 /// let built = Builder::new().stretch(1.5).build(&heart)?;
 /// let tree = Tree::<u16>::from_bytes(built.blob())?;
 ///
 /// static FRAMES: Frames<162> = Frames::new();
-/// let (writer, mut reader) = FRAMES.split().ok_or("taken")?;
-/// let limits = Limits::reach_mm(300.0).speed(0.2); // mm, mm a tick
+/// let (writer, mut reader) = FRAMES.split()?;
+/// let limits = SurfaceLimits::reach_mm(300.0).speed(0.2); // mm, mm a tick
 /// let mut assembler = Assembler::for_tree(writer, &tree, limits)?;
 /// let rows = built.to_rows(&motion.frames[9]);
 /// let id = FrameId { mesh_id: tree.mesh_id(), session: 1, epoch: 1 };
@@ -91,12 +91,12 @@ pub struct StretchMonitor<'t, I> {
 }
 
 impl<'t, I: Index> StretchMonitor<'t, I> {
-    /// A monitor for surfaces of this tree, with the limits that [`Limits::reach_mm`] begins with.
+    /// A monitor for surfaces of this tree, with the limits that [`SurfaceLimits::reach_mm`] begins with.
     ///
     /// # Errors
     /// [`StretchError::NoMetric`] where the tree was emitted without what it takes.
     pub fn new(tree: &'t Tree<'t, I>) -> Result<Self, StretchError> {
-        let limits = Limits::reach_mm(f32::INFINITY);
+        let limits = SurfaceLimits::reach_mm(f32::INFINITY);
         if tree.sections().metric.is_empty() {
             return Err(StretchError::NoMetric);
         }
@@ -135,7 +135,7 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
     /// The same with these limits on speed and size. Reach is the assembler's to limit:
     /// [`Assembler::for_tree`](crate::Assembler::for_tree).
     #[must_use]
-    pub const fn limits(mut self, limits: Limits) -> Self {
+    pub const fn limits(mut self, limits: SurfaceLimits) -> Self {
         self.speed = limits.speed;
         self.shrinkage = limits.shrinkage;
         self

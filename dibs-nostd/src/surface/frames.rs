@@ -29,13 +29,15 @@
 //! between its load and its store: at most once an exception, and never in the handler of highest
 //! priority.)
 
-use core::fmt;
 use core::ops::Range;
 
 use glam::Vec3;
 
+#[cfg(feature = "bus")]
 use super::age::elapsed;
 use super::atomic::{AtomicBool, AtomicU32, Ordering};
+use super::buffer::{Buffer, FrameLabel, Position};
+use super::error::{OutOfTableError, PublishError, SplitError};
 use super::{Ageing, FrameAge, Latest, MeasuredStretch, VertexTable};
 
 /// State word, bit 0: index of the front buffer.
@@ -44,114 +46,6 @@ const FRONT: u32 = 1;
 const READING: u32 = 2;
 /// State word, bit 2: the front buffer holds a frame.
 const PUBLISHED: u32 = 4;
-
-/// What is known of a published frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct FrameLabel {
-    /// Number of the frame, given by the sender; wraps.
-    pub epoch: u32,
-    /// When the first packet of the frame arrived, less the age that the surface then had, on the
-    /// receiver's clock (wraps).
-    pub received: u32,
-    /// No vertex is farther than this from the position that the sender had, in mm: the
-    /// quantisation on the wire. A separation is off by at most as much.
-    pub position_error: f32,
-    /// Measured stretch of the frame against the rest shape; `None` where nobody measured it.
-    pub stretch: Option<MeasuredStretch>,
-}
-
-/// One position, as bits of `f32`.
-pub(crate) struct Position([AtomicU32; 3]);
-
-impl Position {
-    #[inline(always)]
-    pub fn get(&self) -> Vec3 {
-        let [x, y, z] = &self.0;
-        let load = |bits: &AtomicU32| f32::from_bits(bits.load(Ordering::Relaxed));
-        Vec3::new(load(x), load(y), load(z))
-    }
-
-    #[inline(always)]
-    pub fn set(&self, position: Vec3) {
-        let [x, y, z] = &self.0;
-        x.store(position.x.to_bits(), Ordering::Relaxed);
-        y.store(position.y.to_bits(), Ordering::Relaxed);
-        z.store(position.z.to_bits(), Ordering::Relaxed);
-    }
-
-    #[inline(always)]
-    fn copy(&self, from: &Self) {
-        for (to, from) in self.0.iter().zip(&from.0) {
-            to.store(from.load(Ordering::Relaxed), Ordering::Relaxed);
-        }
-    }
-}
-
-/// One buffer: positions as bits of `f32`, and the label of the frame in it.
-struct Buffer<const N: usize> {
-    positions: [Position; N],
-    epoch: AtomicU32,
-    received: AtomicU32,
-    position_error: AtomicU32,
-    /// Measured stretch; the first word is not a number where there is none.
-    stretch: [AtomicU32; MeasuredStretch::WORDS],
-}
-
-impl<const N: usize> Buffer<N> {
-    #[cfg(not(loom))]
-    const fn new() -> Self {
-        Self {
-            positions: [const { Position([const { AtomicU32::new(0) }; 3]) }; N],
-            epoch: AtomicU32::new(0),
-            received: AtomicU32::new(0),
-            position_error: AtomicU32::new(0),
-            stretch: [const { AtomicU32::new(0) }; MeasuredStretch::WORDS],
-        }
-    }
-
-    #[cfg(loom)]
-    fn new() -> Self {
-        use core::array::from_fn;
-        Self {
-            positions: from_fn(|_| Position(from_fn(|_| AtomicU32::new(0)))),
-            epoch: AtomicU32::new(0),
-            received: AtomicU32::new(0),
-            position_error: AtomicU32::new(0),
-            stretch: from_fn(|_| AtomicU32::new(0)),
-        }
-    }
-
-    #[inline(always)]
-    fn position(&self, vertex: u32) -> Option<Vec3> {
-        self.positions.get(vertex as usize).map(Position::get)
-    }
-
-    fn set_label(&self, label: FrameLabel) {
-        self.epoch.store(label.epoch, Ordering::Relaxed);
-        self.received.store(label.received, Ordering::Relaxed);
-        self.position_error.store(label.position_error.to_bits(), Ordering::Relaxed);
-        let words = match label.stretch {
-            Some(measured) => measured.to_words(),
-            None => [f32::NAN.to_bits(); MeasuredStretch::WORDS],
-        };
-        for (at, word) in self.stretch.iter().zip(words) {
-            at.store(word, Ordering::Relaxed);
-        }
-    }
-
-    fn label(&self) -> FrameLabel {
-        let words = self.stretch.each_ref().map(|word| word.load(Ordering::Relaxed));
-        let epoch = self.epoch.load(Ordering::Relaxed);
-        let is_measured = words.first().is_some_and(|&sigma| !f32::from_bits(sigma).is_nan());
-        FrameLabel {
-            epoch,
-            received: self.received.load(Ordering::Relaxed),
-            position_error: f32::from_bits(self.position_error.load(Ordering::Relaxed)),
-            stretch: is_measured.then(|| MeasuredStretch::from_words(&words, epoch)),
-        }
-    }
-}
 
 /// A double buffer of `N` vertex positions, meant for a `static`.
 ///
@@ -179,6 +73,7 @@ impl<const N: usize> Buffer<N> {
 /// assert_eq!(latest.frame().unwrap().age, 8);
 /// assert!(latest.within(50).is_ok());
 /// ```
+#[derive(Debug)]
 pub struct Frames<const N: usize> {
     buffers: [Buffer<N>; 2],
     state: AtomicU32,
@@ -209,13 +104,16 @@ impl<const N: usize> Frames<N> {
         }
     }
 
-    /// The two ends, once: `None` at every later call, so that there is one writer and one reader.
-    pub fn split(&self) -> Option<(FrameWriter<'_, N>, FrameReader<'_, N>)> {
+    /// The two ends, once, so that there is one writer and one reader.
+    ///
+    /// # Errors
+    /// [`SplitError`] at every later call.
+    pub fn split(&self) -> Result<(FrameWriter<'_, N>, FrameReader<'_, N>), SplitError> {
         if self.split.swap(true, Ordering::AcqRel) {
-            return None;
+            return Err(SplitError);
         }
         let writer = FrameWriter { frames: self, back: &self.buffers[1], state: 0, filled: 0 };
-        Some((writer, FrameReader { frames: self, ageing: (0, Ageing::default()) }))
+        Ok((writer, FrameReader { frames: self, ageing: (0, Ageing::default()) }))
     }
 }
 
@@ -230,6 +128,7 @@ impl<const N: usize> Default for Frames<N> {
 /// A frame is [`begin`](Self::begin), one [`push`](Self::push) for every vertex in the order of the
 /// rows, and [`publish`](Self::publish). An [`Assembler`](crate::Assembler) takes rows in the order in
 /// which they come, and proves by itself that all of them have.
+#[derive(Debug)]
 pub struct FrameWriter<'f, const N: usize> {
     frames: &'f Frames<N>,
     back: &'f Buffer<N>,
@@ -248,12 +147,12 @@ impl<const N: usize> FrameWriter<'_, N> {
     /// Stores the position (mm) of the next row in the back buffer. O(1).
     ///
     /// # Errors
-    /// [`OutOfTable`] when the frame is full; nothing is stored.
+    /// [`OutOfTableError`] when the frame is full; nothing is stored.
     #[inline]
-    pub fn push(&mut self, position: Vec3) -> Result<(), OutOfTable> {
+    pub fn push(&mut self, position: Vec3) -> Result<(), OutOfTableError> {
         let row = self.filled;
         let Some([place]) = self.rows(row..row.saturating_add(1)).and_then(<[_]>::as_array) else {
-            return Err(OutOfTable { vertex: row, vertices: N as u32 });
+            return Err(OutOfTableError { vertex: row, vertices: N as u32 });
         };
         place.set(position);
         self.filled = row.saturating_add(1);
@@ -273,6 +172,7 @@ impl<const N: usize> FrameWriter<'_, N> {
     }
 
     /// Copies rows of the published frame to the back buffer. O(rows).
+    #[cfg(feature = "bus")]
     pub(crate) fn copy(&self, rows: Range<u32>) {
         let range = rows.start as usize..rows.end as usize;
         let front = self.front_buffer().positions.get(range.clone()).unwrap_or_default();
@@ -335,6 +235,7 @@ impl<const N: usize> FrameWriter<'_, N> {
 }
 
 /// The end that reads: owned by the control tick.
+#[derive(Debug)]
 pub struct FrameReader<'f, const N: usize> {
     frames: &'f Frames<N>,
     /// Epoch and age of the frame asked for last.
@@ -376,7 +277,8 @@ fn read<const N: usize>(frames: &Frames<N>) -> Option<FrameGuard<'_, N>> {
     (state & PUBLISHED != 0).then_some(guard)
 }
 
-/// The published frame, held still: a [`VertexTable`].
+/// The published frame, held still: a [`VertexTable`] that carries its measured stretch and its position error.
+#[derive(Debug)]
 pub struct FrameGuard<'f, const N: usize> {
     state: &'f AtomicU32,
     view: FrameView<'f, N>,
@@ -409,14 +311,23 @@ impl<const N: usize> VertexTable for FrameGuard<'_, N> {
     fn epoch(&self) -> Option<u32> {
         Some(self.view.buffer.epoch.load(Ordering::Relaxed))
     }
+
+    fn stretch(&self) -> Option<MeasuredStretch> {
+        self.view.buffer.stretch()
+    }
+
+    fn position_error(&self) -> f32 {
+        self.view.buffer.position_error()
+    }
 }
 
 /// The writer's view of one buffer: a [`VertexTable`].
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct FrameView<'f, const N: usize> {
     buffer: &'f Buffer<N>,
 }
 
+#[cfg(feature = "bus")]
 impl<const N: usize> FrameView<'_, N> {
     /// What is known of the frame; of one being written, nothing certain before it is labelled.
     pub(crate) fn label(&self) -> FrameLabel {
@@ -439,47 +350,3 @@ impl<const N: usize> VertexTable for FrameView<'_, N> {
         self.buffer.position(vertex)
     }
 }
-
-/// A vertex outside the table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub struct OutOfTable {
-    /// The vertex asked for.
-    pub vertex: u32,
-    /// How many there are.
-    pub vertices: u32,
-}
-
-impl fmt::Display for OutOfTable {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "vertex {} is outside a table of {}", self.vertex, self.vertices)
-    }
-}
-
-impl core::error::Error for OutOfTable {}
-
-/// Why a frame was not published.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub enum PublishError {
-    /// Vertices of this frame were never written.
-    Incomplete {
-        /// How many.
-        missing: u32,
-    },
-    /// A read is in progress.
-    Busy,
-}
-
-impl fmt::Display for PublishError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Incomplete { missing } => write!(f, "the frame lacks {missing} vertices"),
-            Self::Busy => write!(f, "a read of the published frame is in progress"),
-        }
-    }
-}
-
-impl core::error::Error for PublishError {}

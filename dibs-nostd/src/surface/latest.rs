@@ -30,6 +30,7 @@ impl<S> Latest<S> {
         Self { surface }
     }
 
+    #[cfg(feature = "modes")]
     pub(crate) fn map<T>(self, of: impl FnOnce(S) -> T) -> Latest<T> {
         Latest { surface: self.surface.map(|(surface, frame)| (of(surface), frame)) }
     }

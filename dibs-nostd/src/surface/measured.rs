@@ -37,6 +37,7 @@ impl MeasuredStretch {
     }
 
     /// One bound for the whole surface, by other means than measuring every triangle.
+    #[cfg(feature = "modes")]
     pub(crate) const fn everywhere(sigma: f32, tree: u32, triangle: u32) -> Self {
         Self { sigma, tree, triangle, epoch: None, regions: [u8::MAX; REGIONS] }
     }

@@ -2,6 +2,8 @@
 
 mod age;
 mod atomic;
+mod buffer;
+mod error;
 mod frames;
 mod latest;
 mod measured;
@@ -10,9 +12,9 @@ mod moving;
 mod vertices;
 
 pub(crate) use age::Ageing;
-pub use frames::{
-    FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames, OutOfTable, PublishError,
-};
+pub use buffer::FrameLabel;
+pub use error::{OutOfTableError, PublishError, SplitError};
+pub use frames::{FrameGuard, FrameReader, FrameView, FrameWriter, Frames};
 pub use latest::{FrameAge, Latest};
 pub(crate) use measured::share;
 pub use measured::{MeasuredStretch, REGIONS};

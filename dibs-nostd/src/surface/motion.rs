@@ -11,7 +11,7 @@ use glam::Vec3;
 
 use super::moving::Step;
 use crate::math::sqrt::sqrt;
-use crate::{Index, Tree, VertexTable};
+use crate::{Index, MeasuredStretch, Tree, VertexTable};
 
 /// A surface whose motion is known: a table of positions, and the reading of its odometer.
 ///
@@ -154,6 +154,14 @@ impl<V: VertexTable + ?Sized> VertexTable for Moved<'_, V> {
     fn epoch(&self) -> Option<u32> {
         self.table.epoch()
     }
+
+    fn stretch(&self) -> Option<MeasuredStretch> {
+        self.table.stretch()
+    }
+
+    fn position_error(&self) -> f32 {
+        self.table.position_error()
+    }
 }
 
 impl<V: VertexTable + ?Sized> MovingSurface for Moved<'_, V> {
@@ -172,7 +180,7 @@ impl<V: VertexTable + ?Sized> MovingSurface for Moved<'_, V> {
 /// use dibs_build::{Builder, generate};
 /// use dibs_nostd::{MovingSurface, Odometer, Tree};
 ///
-/// let (heart, motion) = generate::heart(320)?;
+/// let generate::MovingMesh { mesh: heart, motion } = generate::heart(320)?;
 /// let built = Builder::new().stretch(1.5).build(&heart)?;
 /// let tree = Tree::<u16>::from_bytes(built.blob())?;
 /// let [first, second] = [0, 1].map(|frame: usize| built.to_rows(&motion.frames[frame]));

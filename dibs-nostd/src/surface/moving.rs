@@ -8,7 +8,7 @@
 use glam::Vec3;
 
 use super::motion::{Moved, MovingSurface, Travel};
-use crate::VertexTable;
+use crate::{MeasuredStretch, VertexTable};
 
 /// Two frames that follow one another, as [`Odometer::step`](crate::Odometer::step) measured them.
 ///
@@ -103,6 +103,17 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> VertexTable for Between<'
     fn position(&self, vertex: u32) -> Option<Vec3> {
         let (before, after) = (self.before.position(vertex)?, self.after.position(vertex)?);
         Some(before + (after - before) * self.share)
+    }
+
+    /// Between the two frames a bound of both is one of all; beyond them nobody measured.
+    fn stretch(&self) -> Option<MeasuredStretch> {
+        let (before, after) = (self.before.stretch()?, self.after.stretch()?);
+        if self.share <= 1.0 { before.or_larger(after) } else { None }
+    }
+
+    fn position_error(&self) -> f32 {
+        let (before, after) = (self.before.position_error(), self.after.position_error());
+        (1.0 - self.share).abs() * before + self.share * after
     }
 }
 

@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use super::MeasuredStretch;
+
 /// The positions of one frame, by row. Rows are in the tree's vertex order.
 ///
 /// A table must not change while a query reads it: one query sees one frame.
@@ -16,6 +18,18 @@ pub trait VertexTable {
     /// one frame from being used on another.
     fn epoch(&self) -> Option<u32> {
         None
+    }
+
+    /// The stretch measured on these positions, where somebody did: a query then searches smaller spheres than those
+    /// of the tree's limit.
+    fn stretch(&self) -> Option<MeasuredStretch> {
+        None
+    }
+
+    /// No vertex is farther (mm) than this from where the table has it, say by quantisation: every answer's accuracy
+    /// says so.
+    fn position_error(&self) -> f32 {
+        0.0
     }
 
     /// Whether the table holds no vertex.
@@ -58,6 +72,14 @@ impl<T: VertexTable + ?Sized> VertexTable for &T {
 
     fn epoch(&self) -> Option<u32> {
         (**self).epoch()
+    }
+
+    fn stretch(&self) -> Option<MeasuredStretch> {
+        (**self).stretch()
+    }
+
+    fn position_error(&self) -> f32 {
+        (**self).position_error()
     }
 }
 

@@ -21,6 +21,7 @@ mod stored;
 mod validate;
 
 pub use error::FormatError;
+pub use format::PathKind;
 pub use index::Index;
 pub use scrub::{CorruptTreeError, Scrub};
 pub use stored::TreeBytes;
@@ -30,7 +31,7 @@ use core::marker::PhantomData;
 
 use glam::Vec3;
 
-use format::{Link, Metric, Node, PathKind, section, several};
+use format::{Link, Metric, Node, section, several};
 use header::Header;
 use sections::Sections;
 

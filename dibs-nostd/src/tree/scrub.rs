@@ -17,7 +17,7 @@ use crate::tree::format::{CRC, HEADER_BYTES, u32_at};
 /// ```
 /// use dibs_nostd::{CorruptTreeError, Scrub};
 ///
-/// # let (mesh, _) = dibs_build::generate::heart(320).unwrap();
+/// # let mesh = dibs_build::generate::heart(320).unwrap().mesh;
 /// # let built = dibs_build::Builder::new().build(&mesh).unwrap();
 /// let mut bytes = built.blob().to_vec();
 /// let mut scrub = Scrub::new(&bytes);
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn every_flipped_bit_is_found_whatever_the_share() {
-        let (mesh, _) = dibs_build::generate::heart(320).expect("a valid size");
+        let mesh = dibs_build::generate::heart(320).expect("a valid size").mesh;
         let built = dibs_build::Builder::new().build(&mesh).expect("a valid mesh");
         let sound: Vec<u8> = built.blob().into();
         for share in [1, 7, 61, 64, 1_000, usize::MAX] {
@@ -147,7 +147,7 @@ mod tests {
     /// Every bit of what was decoded from the header, and every place of a section.
     #[test]
     fn every_flipped_bit_of_the_decoded_header_is_found() {
-        let (mesh, _) = dibs_build::generate::heart(320).expect("a valid size");
+        let mesh = dibs_build::generate::heart(320).expect("a valid size").mesh;
         let built = dibs_build::Builder::new().build(&mesh).expect("a valid mesh");
         let bytes = built.blob();
         let sound = crate::Tree::<u16>::from_bytes(bytes).expect("a valid tree");

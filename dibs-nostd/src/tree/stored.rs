@@ -17,7 +17,7 @@ use crate::{FormatError, Index, Scrub, Tree};
 /// ```
 /// use dibs_nostd::{Query, TreeBytes};
 ///
-/// # let (mesh, _) = dibs_build::generate::heart(320).unwrap();
+/// # let mesh = dibs_build::generate::heart(320).unwrap().mesh;
 /// # let built = dibs_build::Builder::new().build(&mesh).unwrap();
 /// let stored = TreeBytes::<u16>::new(built.blob());
 /// let tree = stored.validate()?;

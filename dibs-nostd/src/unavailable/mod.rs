@@ -21,7 +21,7 @@ pub enum Unavailable {
     /// The query failed.
     Query(QueryError),
     /// The tree's bytes changed since they were validated: [`Scrub`](crate::Scrub).
-    Rot,
+    CorruptTree,
     /// No good packet came for longer than allowed.
     LinkLost {
         /// Time since the last one, on the receiver's clock.
@@ -64,7 +64,7 @@ impl fmt::Display for Unavailable {
             Self::NoSurface => write!(f, "no surface was published yet"),
             Self::Stale { age } => write!(f, "the surface is {age} old"),
             Self::Query(error) => error.fmt(f),
-            Self::Rot => write!(f, "the tree's bytes changed"),
+            Self::CorruptTree => write!(f, "the tree's bytes changed"),
             Self::LinkLost { silence } => write!(f, "no good packet came for {silence}"),
             Self::HeartbeatLost { silence } => write!(f, "no heartbeat came for {silence}"),
             Self::Rejections { streak } => {

@@ -46,7 +46,7 @@ fn measure() -> Result<(), &'static str> {
     core.SCB.enable_icache();
     core.SCB.enable_dcache(&mut core.CPUID);
 
-    let (mut writer, mut reader) = FRAMES.split().ok_or("the buffers are taken")?;
+    let (mut writer, mut reader) = FRAMES.split().map_err(|_| "the buffers are taken")?;
     writer.begin();
     let tree = TREE.validate().map_err(|_| "the tree in flash is damaged")?;
     for row in 0..tree.vertex_count() {
@@ -73,7 +73,7 @@ fn measure() -> Result<(), &'static str> {
             }
             let budget = Budget { node_tests, triangle_tests };
             let start = counter.now();
-            let answer = query.closest(&frame, &tool, &Options::new().unsigned().budget(budget));
+            let answer = query.closest(&frame, &tool, &Options::cold().unsigned().budget(budget));
             let cycles = counter.since(start);
             answer.map(|answer| (cycles, answer)).map_err(|_| "the query failed")
         };

@@ -30,7 +30,7 @@ fn main() -> Result<()> {
     let telemetry = UnixStream::connect(argument("TELEMETRY")?)?;
     let ticks: u32 = argument("TICKS")?.to_str().and_then(|t| t.parse().ok()).context("TICKS")?;
 
-    let (writer, reader) = FRAMES.split().context("the buffers are split once")?;
+    let (writer, reader) = FRAMES.split()?;
     let tree = surface::TREE.validate().context("the tree")?;
     let tree: &'static surface::Tree = Box::leak(Box::new(tree));
     let mut receiver = Receiver::new(tree, writer, &BUS).map_err(|error| anyhow!("{error}"))?;

@@ -205,7 +205,7 @@ fn ask(
     let use_measured = word(machine)? != 0;
     let warm = word(machine)?;
     let budget = Budget { node_tests: word(machine)?, triangle_tests: word(machine)? };
-    let mut options = Options::new().unsigned().budget(budget);
+    let mut options = Options::cold().unsigned().budget(budget);
     if warm != u32::MAX {
         options = options.warm_start(Some(warm));
     }

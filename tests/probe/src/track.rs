@@ -129,7 +129,7 @@ impl Session<'_> {
         stretch: MeasuredStretch,
         machine: &impl Machine,
     ) -> Result<[u32; ANSWER_WORDS], Fault> {
-        let options = Options::new().stretch(stretch);
+        let options = Options::cold().stretch(stretch);
         let before = machine.clock();
         let tracked = self.tracker.closest(surface, tool, &options).map_err(|_| Fault)?;
         let took = machine.clock().wrapping_sub(before);

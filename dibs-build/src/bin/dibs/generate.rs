@@ -46,7 +46,7 @@ pub fn run(args: &Args) -> Result<()> {
     let format = Format::from_name(output)?;
     let mesh = match &args.surface {
         Surface::Heart { triangles, motion, .. } => {
-            let (mesh, beat) = generate::heart(*triangles)?;
+            let generate::MovingMesh { mesh, motion: beat } = generate::heart(*triangles)?;
             if let Some(path) = motion {
                 beat.write_pc2(path)?;
                 println!("written  {}: {} frames", path.display(), beat.frames.len());

@@ -142,7 +142,7 @@ fn ask<I: Index>(
             "{name}: {error}; build the tree with a larger --stretch, or with --limits that allow it"
         ),
     };
-    let mut options = Options::new();
+    let mut options = Options::cold();
     if let Some(limit) = args.stretch {
         let measured =
             stretch.ok_or_else(|| anyhow!("{name}: no rest metric to measure a stretch with"))?;

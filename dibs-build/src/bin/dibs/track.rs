@@ -205,7 +205,7 @@ impl<I: Index> Session<'_, I> {
         tool: &impl Tool,
         stretch: MeasuredStretch,
     ) -> Result<(Proximity, Option<Fallback>)> {
-        let options = Options::new().stretch(stretch);
+        let options = Options::cold().stretch(stretch);
         Ok(match &mut self.tracker {
             Some(tracker) => {
                 let found = tracker.closest(surface, tool, &options)?;

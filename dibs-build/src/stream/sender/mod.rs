@@ -13,6 +13,7 @@ pub use frame::{Prepared, Sent};
 pub use order::SurfaceOrder;
 pub use settings::Settings;
 
+use std::fmt;
 use std::time::Duration;
 
 use dibs_nostd::glam::Vec3;
@@ -48,7 +49,7 @@ pub struct Totals {
 /// use dibs_build::stream::{Sender, Settings, SurfaceOrder};
 /// use dibs_build::{Builder, generate};
 ///
-/// let (heart, motion) = generate::heart(500)?;
+/// let generate::MovingMesh { mesh: heart, motion } = generate::heart(500)?;
 /// let tree = Builder::new().build(&heart)?;
 /// let order = SurfaceOrder::of(&tree.tree::<u16>()?);
 /// // A `Vec` collects the packets; `Target::open` gives a line.
@@ -91,6 +92,15 @@ pub struct Sender<T, const MTU: usize, M = NoMac> {
     status: Option<Status>,
     counters: Counters,
     totals: Totals,
+}
+
+/// Without its key.
+impl<T: fmt::Debug, const MTU: usize, M> fmt::Debug for Sender<T, MTU, M> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut sender = f.debug_struct("Sender");
+        sender.field("transport", &self.transport).field("epoch", &self.epoch);
+        sender.field("totals", &self.totals).finish_non_exhaustive()
+    }
 }
 
 impl<T: Transport, const MTU: usize> Sender<T, MTU> {

@@ -2,7 +2,7 @@
 //!
 //! Nothing here knows what a frame holds: vertices or weights, and where they are stored.
 
-use super::Rejection;
+use super::ReceiveError;
 use super::arrivals::{Arrivals, Misplaced, Place};
 use super::health::{BusHealth, FrameName, Trouble};
 use crate::bus::wire::{
@@ -56,6 +56,7 @@ pub struct LastHeartbeat {
 }
 
 /// Keeps order.
+#[derive(Debug)]
 pub(super) struct Collector {
     mesh_id: u32,
     published: Option<Published>,
@@ -107,7 +108,7 @@ impl Collector {
 
     /// Counts a rejection, of a packet or frame with this name, where it has one.
     #[cold]
-    pub fn refuse(&mut self, name: Option<FrameName>, rejection: &Rejection) {
+    pub fn refuse(&mut self, name: Option<FrameName>, rejection: &ReceiveError) {
         self.counters.count(rejection.event());
         let in_work = self.frame.as_ref().map(|frame| FrameName::of(&frame.id));
         self.trouble.note(name, in_work, rejection);
@@ -141,11 +142,11 @@ impl Collector {
         }
     }
 
-    pub fn check_mesh(&self, packet: &Packet<'_>) -> Result<(), Rejection> {
+    pub fn check_mesh(&self, packet: &Packet<'_>) -> Result<(), ReceiveError> {
         if packet.mesh_id == self.mesh_id {
             return Ok(());
         }
-        Err(Rejection::WrongMesh { mesh_id: packet.mesh_id })
+        Err(ReceiveError::WrongMesh { mesh_id: packet.mesh_id })
     }
 
     /// Whether a genuine begin may start a frame: `None` for one that is repeated. Checks what only this
@@ -155,19 +156,19 @@ impl Collector {
         packet: &Packet<'_>,
         begin: Begin,
         share: u32,
-        is_acceptable: impl FnOnce(&Begin) -> Result<(), Rejection>,
-    ) -> Result<Option<Frame>, Rejection> {
+        is_acceptable: impl FnOnce(&Begin) -> Result<(), ReceiveError>,
+    ) -> Result<Option<Frame>, ReceiveError> {
         let epoch = packet.epoch;
         let id = FrameId { mesh_id: self.mesh_id, session: begin.session, epoch };
         if self.published.is_some_and(|published| !id.is_after(&published.id)) {
-            return Err(Rejection::Stale { epoch });
+            return Err(ReceiveError::Stale { epoch });
         }
         is_acceptable(&begin)?;
         if let Content::Partial { base_epoch } = begin.content {
             let base = FrameId { epoch: base_epoch, ..id };
             if self.published.is_none_or(|published| published.id != base) {
                 self.wants_whole = true;
-                return Err(Rejection::Base { epoch: base_epoch });
+                return Err(ReceiveError::Base { epoch: base_epoch });
             }
         }
         if let Some(frame) = &self.frame {
@@ -175,10 +176,10 @@ impl Collector {
                 return Ok(None);
             }
             if frame.is_complete {
-                return Err(Rejection::Busy { epoch });
+                return Err(ReceiveError::Busy { epoch });
             }
             if frame.id.is_after(&id) && self.now.wrapping_sub(frame.touched) < PATIENCE {
-                return Err(Rejection::Stale { epoch });
+                return Err(ReceiveError::Stale { epoch });
             }
             self.counters.count(Event::Abandoned);
         }
@@ -204,14 +205,14 @@ impl Collector {
         &self,
         packet: &Packet<'_>,
         mac: &M,
-    ) -> Result<(&Frame, u32), Rejection> {
+    ) -> Result<(&Frame, u32), ReceiveError> {
         let epoch = packet.epoch;
         match &self.frame {
             Some(frame)
                 if frame.id.epoch == epoch && frame.id.session as u16 == packet.session_low =>
             {
                 let share = packet.verify(mac, frame.id.session);
-                share.map(|share| (frame, share)).ok_or(Rejection::Forged { epoch })
+                share.map(|share| (frame, share)).ok_or(ReceiveError::Forged { epoch })
             }
             _ => {
                 let is_stale = self.published.is_some_and(|published| {
@@ -219,9 +220,9 @@ impl Collector {
                         && !is_newer(epoch, published.id.epoch)
                 });
                 Err(if is_stale {
-                    Rejection::Stale { epoch }
+                    ReceiveError::Stale { epoch }
                 } else {
-                    Rejection::Unexpected { epoch }
+                    ReceiveError::Unexpected { epoch }
                 })
             }
         }
@@ -229,7 +230,7 @@ impl Collector {
 
     /// Notes rows that were stored where `place` says. `Ok(true)` once the frame is complete.
     #[inline]
-    pub fn take_rows(&mut self, share: u32, place: Place) -> Result<bool, Rejection> {
+    pub fn take_rows(&mut self, share: u32, place: Place) -> Result<bool, ReceiveError> {
         let Some(frame) = &mut self.frame else { return Ok(false) };
         frame.arrivals.insert(place);
         frame.sum = frame.sum.wrapping_add(share);
@@ -243,14 +244,16 @@ impl Collector {
         packet: &Packet<'_>,
         commit: Commit,
         mac: &M,
-    ) -> Result<Option<bool>, Rejection> {
+    ) -> Result<Option<bool>, ReceiveError> {
         self.frame_of(packet, mac)?;
         let Some(frame) = &mut self.frame else { return Ok(None) };
         let sequence = packet.sequence;
         match frame.commit {
             Some((known, _)) if known == sequence => return Ok(None),
-            Some(_) => return Err(Rejection::Order { sequence }),
-            None if frame.arrivals.reaches(sequence) => return Err(Rejection::Order { sequence }),
+            Some(_) => return Err(ReceiveError::Order { sequence }),
+            None if frame.arrivals.reaches(sequence) => {
+                return Err(ReceiveError::Order { sequence });
+            }
             None => frame.commit = Some((sequence, commit.digest)),
         }
         frame.touched = self.now;
@@ -259,7 +262,7 @@ impl Collector {
 
     /// Whether the frame is complete; where it is and cannot be right, it is dropped.
     #[inline]
-    fn finish(&mut self) -> Result<bool, Rejection> {
+    fn finish(&mut self) -> Result<bool, ReceiveError> {
         let Some(frame) = &mut self.frame else { return Ok(false) };
         let Some((sequence, stated)) = frame.commit else { return Ok(false) };
         if frame.arrivals.next() != sequence {
@@ -269,12 +272,12 @@ impl Collector {
         let rows = frame.arrivals.ready();
         if stated != computed {
             self.frame = None;
-            return Err(Rejection::Digest { stated, computed });
+            return Err(ReceiveError::Digest { stated, computed });
         }
         let is_partial = matches!(frame.begin.content, Content::Partial { .. });
         if !is_partial && rows != frame.begin.rows {
             self.frame = None;
-            return Err(Rejection::RowCount { rows });
+            return Err(ReceiveError::RowCount { rows });
         }
         frame.is_complete = true;
         Ok(true)
@@ -285,11 +288,11 @@ impl Collector {
         packet: &Packet<'_>,
         heartbeat: Heartbeat,
         mac: &M,
-    ) -> Result<(), Rejection> {
+    ) -> Result<(), ReceiveError> {
         let Heartbeat { session, beat } = heartbeat;
         let epoch = packet.epoch;
         if !packet.is_genuine(mac, session) {
-            return Err(Rejection::Forged { epoch });
+            return Err(ReceiveError::Forged { epoch });
         }
         let before_published =
             self.published.is_some_and(|published| is_newer(published.id.session, session));
@@ -301,7 +304,7 @@ impl Collector {
             }
         });
         if before_published || before_last {
-            return Err(Rejection::Stale { epoch });
+            return Err(ReceiveError::Stale { epoch });
         }
         self.heartbeat = Some(LastHeartbeat { session, beat, epoch, received: self.now });
         self.heartbeat_at = Some(self.now);
@@ -360,11 +363,11 @@ impl Collector {
 }
 
 impl Misplaced {
-    pub fn rejection(self, sequence: u16) -> Option<Rejection> {
+    pub fn rejection(self, sequence: u16) -> Option<ReceiveError> {
         match self {
             Self::Duplicate => None,
-            Self::Order => Some(Rejection::Order { sequence }),
-            Self::Gaps => Some(Rejection::Gaps { sequence }),
+            Self::Order => Some(ReceiveError::Order { sequence }),
+            Self::Gaps => Some(ReceiveError::Gaps { sequence }),
         }
     }
 }
@@ -381,9 +384,9 @@ impl Frame {
         &self,
         sequence: u16,
         rows: core::ops::Range<u32>,
-    ) -> Result<Option<Place>, Rejection> {
+    ) -> Result<Option<Place>, ReceiveError> {
         if self.commit.is_some_and(|(commit, _)| sequence >= commit) {
-            return Err(Rejection::Order { sequence });
+            return Err(ReceiveError::Order { sequence });
         }
         match self.arrivals.locate(sequence, rows) {
             Ok(place) => Ok(Some(place)),

@@ -1,6 +1,6 @@
 //! What is wrong with the bus, in numbers that a fail-safe machine watches.
 
-use super::Rejection;
+use super::ReceiveError;
 use crate::bus::wire::{FrameId, Packet, is_newer};
 
 /// The health of the bus, as the receiver sees it: what
@@ -97,14 +97,14 @@ impl Trouble {
         &mut self,
         name: Option<FrameName>,
         in_work: Option<FrameName>,
-        rejection: &Rejection,
+        rejection: &ReceiveError,
     ) {
         let name = match (rejection, name) {
-            (Rejection::Forged { .. }, _) => {
+            (ReceiveError::Forged { .. }, _) => {
                 self.forgeries = self.forgeries.saturating_add(1);
                 return;
             }
-            (Rejection::WrongMesh { .. } | Rejection::Stale { .. }, _) => return,
+            (ReceiveError::WrongMesh { .. } | ReceiveError::Stale { .. }, _) => return,
             (_, None) => return self.note_damage(),
             (_, Some(name)) => name,
         };

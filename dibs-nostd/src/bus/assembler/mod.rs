@@ -2,23 +2,23 @@
 
 mod arrivals;
 mod collector;
+mod error;
 mod health;
 mod packets;
-mod rejection;
 
 use crate::MAX_COORDINATE;
 use crate::bus::wire::{
     Content, Counters, Event, FrameId, Mac, NoMac, Packet, Status, StreamError,
 };
-use crate::stretch::{Arriving, Gate, Limits, StretchError, StretchMonitor, Verdict};
+use crate::stretch::{Arriving, Gate, StretchError, StretchMonitor, SurfaceLimits, Verdict};
 use crate::surface::{FrameLabel, FrameView, FrameWriter, PublishError};
 use crate::tree::{Index, Tree};
 
 use collector::Collector;
 pub use collector::LastHeartbeat;
+pub use error::ReceiveError;
 pub use health::BusHealth;
 use health::FrameName;
-pub use rejection::Rejection;
 
 /// Assembles frames of `N` vertices from packets, and publishes those that are complete and right.
 ///
@@ -57,6 +57,7 @@ pub use rejection::Rejection;
 /// assert_eq!(assembler.advance(100), Ok(Advance::Published { epoch: 1 }));
 /// assert_eq!(reader.read().unwrap().position(2), Some(Vec3::Z));
 /// ```
+#[derive(Debug)]
 pub struct Assembler<'f, G, const N: usize, M = NoMac> {
     writer: FrameWriter<'f, N>,
     gate: G,
@@ -143,7 +144,7 @@ impl<'f, 't, I: Index, const N: usize> Assembler<'f, StretchMonitor<'t, I>, N> {
     pub fn for_tree(
         writer: FrameWriter<'f, N>,
         tree: &'t Tree<'t, I>,
-        limits: Limits,
+        limits: SurfaceLimits,
     ) -> Result<Self, StretchError> {
         let monitor = StretchMonitor::new(tree)?.limits(limits);
         Ok(Self::new(writer, monitor, tree.mesh_id(), limits.reach))
@@ -183,14 +184,14 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
     /// Cost: O(bytes).
     ///
     /// # Errors
-    /// [`Rejection`] says why the packet or its frame was not taken; it has been counted.
+    /// [`ReceiveError`] says why the packet or its frame was not taken; it has been counted.
     #[inline]
-    pub fn accept(&mut self, packet: &[u8], now: u32) -> Result<Progress, Rejection> {
+    pub fn accept(&mut self, packet: &[u8], now: u32) -> Result<Progress, ReceiveError> {
         self.collector.set_now(now);
         let packet = match Packet::decode(packet) {
             Ok(packet) => packet,
             Err(error) => {
-                let rejection = Rejection::Packet(error);
+                let rejection = ReceiveError::Packet(error);
                 self.collector.refuse(None, &rejection);
                 return Err(rejection);
             }
@@ -219,8 +220,8 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
     /// time when the bus is quiet. Cost: O(`work`), with a gate that is sliced.
     ///
     /// # Errors
-    /// [`Rejection::Stretch`] when the gate refuses the surface; it has been counted.
-    pub fn advance(&mut self, work: u32) -> Result<Advance, Rejection> {
+    /// [`ReceiveError::Stretch`] when the gate refuses the surface; it has been counted.
+    pub fn advance(&mut self, work: u32) -> Result<Advance, ReceiveError> {
         let Some(frame) = &self.collector.frame else {
             self.clean();
             let has_base = self.takes_partial && self.collector.published_id().is_some();
@@ -318,14 +319,14 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
     }
 
     /// Has the gate check some more of the frame in work.
-    fn check(&mut self, ready: u32, work: u32) -> Result<Advance, Rejection> {
+    fn check(&mut self, ready: u32, work: u32) -> Result<Advance, ReceiveError> {
         let Some(frame) = &self.collector.frame else { return Ok(Advance::Idle) };
         let (back, front) = (self.writer.back(), self.writer.front());
         let before = front.as_ref().map(|front| (front, front.time_to(frame.captured())));
         let verdict = self.gate.advance(Arriving { surface: &back, ready, before }, work);
         match verdict {
             Err(error) => {
-                let rejection = Rejection::Stretch(error);
+                let rejection = ReceiveError::Stretch(error);
                 let name = FrameName::of(&frame.id);
                 self.collector.frame = None;
                 self.collector.refuse(Some(name), &rejection);

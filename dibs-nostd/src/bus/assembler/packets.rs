@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use glam::Vec3;
 
-use super::{Assembler, Progress, Rejection, arrivals};
+use super::{Assembler, Progress, ReceiveError, arrivals};
 use crate::bus::wire::{
     Begin, Body, Content, Encoding, Mac, Packet, Rows, Vertices, Weights, float_position,
     quantised_row,
@@ -13,7 +13,7 @@ use crate::stretch::{Changed, Gate};
 
 impl<G: Gate, M: Mac, const N: usize> Assembler<'_, G, N, M> {
     #[inline]
-    pub(super) fn take(&mut self, packet: &Packet<'_>) -> Result<Progress, Rejection> {
+    pub(super) fn take(&mut self, packet: &Packet<'_>) -> Result<Progress, ReceiveError> {
         self.collector.check_mesh(packet)?;
         let epoch = packet.epoch;
         match packet.body {
@@ -32,11 +32,11 @@ impl<G: Gate, M: Mac, const N: usize> Assembler<'_, G, N, M> {
                 self.collector.hello(hello.nonce);
                 Ok(Progress::Hello)
             }
-            Body::Status(_) => Err(Rejection::Unexpected { epoch }),
+            Body::Status(_) => Err(ReceiveError::Unexpected { epoch }),
         }
     }
 
-    fn begin(&mut self, packet: &Packet<'_>, begin: Begin) -> Result<Progress, Rejection> {
+    fn begin(&mut self, packet: &Packet<'_>, begin: Begin) -> Result<Progress, ReceiveError> {
         // A frame that only waits for a reader is better published than in the way.
         if self.is_admitted {
             self.publish();
@@ -44,16 +44,16 @@ impl<G: Gate, M: Mac, const N: usize> Assembler<'_, G, N, M> {
         let takes_weights = self.gate.weight_range(0).is_some();
         let is_acceptable = |begin: &Begin| {
             if begin.rows as usize != N {
-                Err(Rejection::RowCount { rows: begin.rows })
+                Err(ReceiveError::RowCount { rows: begin.rows })
             } else if (begin.content == Content::Modal) != takes_weights {
-                Err(Rejection::Encoding)
+                Err(ReceiveError::Encoding)
             } else {
                 Ok(())
             }
         };
         let is_partial = matches!(begin.content, Content::Partial { .. });
         let share = packet.verify(&self.mac, begin.session);
-        let share = share.ok_or(Rejection::Forged { epoch: packet.epoch })?;
+        let share = share.ok_or(ReceiveError::Forged { epoch: packet.epoch })?;
         // Whatever comes of this one: the next is to find the published rows copied.
         self.takes_partial |= is_partial;
         let begun = self.collector.begin(packet, begin, share, is_acceptable)?;
@@ -76,17 +76,17 @@ impl<G: Gate, M: Mac, const N: usize> Assembler<'_, G, N, M> {
         &mut self,
         packet: &Packet<'_>,
         Vertices { first, rows }: Vertices<'_>,
-    ) -> Result<Progress, Rejection> {
+    ) -> Result<Progress, ReceiveError> {
         let (frame, share) = self.collector.frame_of(packet, &self.mac)?;
         let count = rows.len() as u32;
-        let out_of_range = Rejection::OutOfRange { first, count };
+        let out_of_range = ReceiveError::OutOfRange { first, count };
         let range = first..first.checked_add(count).ok_or(out_of_range)?;
         let limit = self.max_coordinate;
         let grid = match (&rows, frame.begin.encoding, frame.begin.content) {
-            (_, _, Content::Modal) => return Err(Rejection::Encoding),
+            (_, _, Content::Modal) => return Err(ReceiveError::Encoding),
             (Rows::Float(_), Encoding::Float, _) => None,
             (Rows::Quantised(_), Encoding::Quantised(grid), _) => Some(grid),
-            _ => return Err(Rejection::Encoding),
+            _ => return Err(ReceiveError::Encoding),
         };
         let places = self.writer.rows(range.clone()).ok_or(out_of_range)?;
         let Some(place) = frame.locate(packet.sequence, range.clone())? else {
@@ -95,7 +95,7 @@ impl<G: Gate, M: Mac, const N: usize> Assembler<'_, G, N, M> {
         let is_partial = matches!(frame.begin.content, Content::Partial { .. });
         if is_partial && range.end > self.copied {
             self.collector.want_whole();
-            return Err(Rejection::NotReady { first });
+            return Err(ReceiveError::NotReady { first });
         }
         match (rows, grid) {
             (Rows::Quantised(rows), Some(grid)) => {
@@ -113,7 +113,7 @@ impl<G: Gate, M: Mac, const N: usize> Assembler<'_, G, N, M> {
                     place.set(float_position(row));
                 }
             }
-            _ => return Err(Rejection::Encoding),
+            _ => return Err(ReceiveError::Encoding),
         }
         self.stored(packet.epoch, share, place, range)
     }
@@ -122,13 +122,13 @@ impl<G: Gate, M: Mac, const N: usize> Assembler<'_, G, N, M> {
         &mut self,
         packet: &Packet<'_>,
         Weights { first, values }: Weights<'_>,
-    ) -> Result<Progress, Rejection> {
+    ) -> Result<Progress, ReceiveError> {
         let (frame, share) = self.collector.frame_of(packet, &self.mac)?;
         let count = values.len() as u32;
-        let out_of_range = Rejection::OutOfRange { first, count };
+        let out_of_range = ReceiveError::OutOfRange { first, count };
         let range = first..first.checked_add(count).ok_or(out_of_range)?;
         if frame.begin.content != Content::Modal {
-            return Err(Rejection::Encoding);
+            return Err(ReceiveError::Encoding);
         }
         let places = self.writer.rows(range.clone()).ok_or(out_of_range)?;
         let Some(place) = frame.locate(packet.sequence, range.clone())? else {
@@ -138,10 +138,10 @@ impl<G: Gate, M: Mac, const N: usize> Assembler<'_, G, N, M> {
             let value = f32::from_le_bytes(*value);
             let [low, high] = self.gate.weight_range(row).ok_or(out_of_range)?;
             if !value.is_finite() {
-                return Err(Rejection::NotFinite { row });
+                return Err(ReceiveError::NotFinite { row });
             }
             if !(low <= value && value <= high) {
-                return Err(Rejection::TooFar { row });
+                return Err(ReceiveError::TooFar { row });
             }
         }
         for (place, value) in places.iter().zip(values) {
@@ -158,7 +158,7 @@ impl<G: Gate, M: Mac, const N: usize> Assembler<'_, G, N, M> {
         share: u32,
         place: arrivals::Place,
         rows: Range<u32>,
-    ) -> Result<Progress, Rejection> {
+    ) -> Result<Progress, ReceiveError> {
         self.is_dirty = true;
         self.gate.moved(rows);
         Ok(stored(self.collector.take_rows(share, place)?, epoch))
@@ -183,17 +183,17 @@ fn check(
     positions: impl Iterator<Item = Vec3> + Clone,
     first: u32,
     limit: f32,
-) -> Result<(), Rejection> {
+) -> Result<(), ReceiveError> {
     let all = positions.clone().fold(true, |all, position| all & is_within(position, limit));
     if all {
         return Ok(());
     }
     for (row, position) in (first..).zip(positions) {
         if !position.is_finite() {
-            return Err(Rejection::NotFinite { row });
+            return Err(ReceiveError::NotFinite { row });
         }
         if !is_within(position, limit) {
-            return Err(Rejection::TooFar { row });
+            return Err(ReceiveError::TooFar { row });
         }
     }
     Ok(())

@@ -15,6 +15,7 @@
 use super::kind;
 
 /// Lengths of a CAN-FD message, by its data length code.
+#[doc(hidden)]
 pub const LENGTHS: [u8; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
 
 /// The data length code of the shortest message that holds this many bytes; `None` above 64.

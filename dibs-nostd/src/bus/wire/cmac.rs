@@ -21,7 +21,7 @@ use super::{Code, Direction, Mac};
 ///
 /// ```
 /// use dibs_nostd::wire::{AesCmac, Encoding, FrameEncoder, FrameId};
-/// use dibs_nostd::{Assembler, Frames, Rejection, Unchecked, glam::Vec3};
+/// use dibs_nostd::{Assembler, Frames, ReceiveError, Unchecked, glam::Vec3};
 ///
 /// let key = *b"a secret of ours";
 /// let receiver = 7; // this controller's number
@@ -43,7 +43,7 @@ use super::{Code, Direction, Mac};
 ///     }
 ///     assembler.advance(100)
 /// };
-/// assert_eq!(send(b"another's guess.", 1), Err(Rejection::Forged { epoch: 1 }));
+/// assert_eq!(send(b"another's guess.", 1), Err(ReceiveError::Forged { epoch: 1 }));
 /// assert!(send(&key, 1).is_ok());
 /// assert!(reader.read().is_some());
 /// ```

@@ -29,29 +29,39 @@ mod stream;
 
 #[cfg(feature = "authenticity")]
 pub use self::cmac::AesCmac;
-pub use body::{
-    Begin, Body, Commit, Content, Encoding, Freshness, Heartbeat, Hello, Rows, Vertices, Weights,
-};
+/// What a packet holds, for the senders of `dibs-build`: a receiver hands bytes to its assembler.
+#[doc(hidden)]
+pub use body::{Begin, Body, Commit, Content, Heartbeat, Hello, Rows, Vertices, Weights};
+pub use body::{Encoding, Freshness};
 pub(crate) use body::{float_position, quantised_row};
 pub use counters::{Counters, Event};
 pub use encode::{
     EncodeError, FrameEncoder, WeightsEncoder, encode_heartbeat, encode_hello, encode_status,
 };
 pub use error::PacketError;
-pub use id::{FrameId, is_newer};
-pub use mac::{Code, Direction, Mac, NoMac, TAG_BYTES};
+pub use id::FrameId;
+#[doc(hidden)]
+pub use id::is_newer;
+#[doc(hidden)]
+pub use mac::TAG_BYTES;
+pub use mac::{Code, Direction, Mac, NoMac};
+#[doc(hidden)]
 pub use packet::Packet;
 pub use quantised::{BoxError, QuantisedBox};
-pub use status::{PublishedStatus, Status, StatusReport};
+#[doc(hidden)]
+pub use status::PublishedStatus;
+pub use status::{Status, StatusReport};
 pub use stream::{Deframer, StreamError, enframe, framed_bytes};
 
 /// The protocol's version: the first byte of every packet.
 pub const VERSION: u8 = 3;
 
 /// Bytes of the header that every packet starts with.
+#[doc(hidden)]
 pub const HEADER_BYTES: usize = 18;
 
 /// Bytes of the CRC-32 that every packet ends with.
+#[doc(hidden)]
 pub const CHECKSUM_BYTES: usize = 4;
 
 /// Smallest transport unit: a CAN-FD message.
@@ -61,12 +71,15 @@ pub const MIN_MTU: usize = 64;
 pub const MAX_PACKET: usize = HEADER_BYTES + 255 * 12 + TAG_BYTES + CHECKSUM_BYTES;
 
 /// Most rows that a frame can have.
+#[doc(hidden)]
 pub const MAX_ROWS: u32 = (1 << 24) - 1;
 
 /// Most packets between a frame's begin and its commit.
+#[doc(hidden)]
 pub const MAX_CONTENT_PACKETS: u32 = 65_534;
 
 /// Most weights that a modal frame can have.
+#[doc(hidden)]
 pub const MAX_WEIGHTS: u32 = 64;
 
 /// The packet kinds: the second byte. Others are reserved.

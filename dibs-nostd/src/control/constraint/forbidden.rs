@@ -24,7 +24,7 @@ use crate::unavailable::Unavailable;
 /// let wall = ForbiddenRegion::new(spring, 3.0)?; // mm
 ///
 /// // No surface yet: the tool is damped, the state says why.
-/// let safe = wall.force(Err(Unavailable::NoSurface), Vec3::new(100.0, 0.0, 0.0));
+/// let safe = wall.force(&Err(Unavailable::NoSurface), Vec3::new(100.0, 0.0, 0.0));
 /// assert_eq!(safe.state, ConstraintState::Safe(Unavailable::NoSurface));
 /// assert_eq!(safe.force, Vec3::new(-1.0, 0.0, 0.0));
 /// # Ok::<(), dibs_nostd::constraint::GainError>(())
@@ -53,7 +53,7 @@ impl ForbiddenRegion {
     #[must_use]
     pub fn force(
         &self,
-        proximity: Result<&Proximity, Unavailable>,
+        proximity: &Result<Proximity, Unavailable>,
         velocity: Vec3,
     ) -> ConstraintForce {
         match Approach::new(proximity, velocity) {

@@ -23,7 +23,7 @@ use crate::unavailable::Unavailable;
 ///
 /// let spring = SpringDamper::new(0.5, 0.002, 2.0)?;
 /// let guide = Guidance::new(spring, 10.0, 1.0)?; // 9 to 11 mm from the surface is free
-/// let safe = guide.force(Err(Unavailable::Stale { age: 250 }), Vec3::ZERO);
+/// let safe = guide.force(&Err(Unavailable::Stale { age: 250 }), Vec3::ZERO);
 /// assert_eq!(safe.state, ConstraintState::Safe(Unavailable::Stale { age: 250 }));
 /// # Ok::<(), dibs_nostd::constraint::GainError>(())
 /// ```
@@ -55,7 +55,7 @@ impl Guidance {
     #[must_use]
     pub fn force(
         &self,
-        proximity: Result<&Proximity, Unavailable>,
+        proximity: &Result<Proximity, Unavailable>,
         velocity: Vec3,
     ) -> ConstraintForce {
         let approach = match Approach::new(proximity, velocity) {

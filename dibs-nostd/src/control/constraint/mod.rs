@@ -203,10 +203,10 @@ struct Approach {
 
 impl Approach {
     fn new(
-        proximity: Result<&Proximity, Unavailable>,
+        proximity: &Result<Proximity, Unavailable>,
         velocity: Vec3,
     ) -> Result<Self, Unavailable> {
-        let proximity = proximity?;
+        let proximity = proximity.as_ref().map_err(|unavailable| *unavailable)?;
         let direction = proximity.direction;
         if direction == Vec3::ZERO {
             return Err(Unavailable::NoDirection);

@@ -16,7 +16,7 @@ use crate::query::Contact;
 /// use dibs_nostd::constraint::VelocityRow;
 /// use dibs_nostd::{Contacts, Options, Query, Sphere, Tree, glam::Vec3};
 ///
-/// let (heart, _) = generate::heart(1_000)?;
+/// let heart = generate::heart(1_000)?.mesh;
 /// let built = Builder::new().build(&heart)?;
 /// let tree = Tree::<u16>::from_bytes(built.blob())?;
 /// let rows = built.to_rows(&heart.positions);

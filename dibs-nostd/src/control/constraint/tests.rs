@@ -48,7 +48,7 @@ fn close(a: Vec3, b: Vec3) -> bool {
 
 #[test]
 fn the_wall_is_a_spring_and_a_damper() {
-    let at = |gap, speed| wall().force(Ok(&pair(gap, Vec3::Y)), Vec3::new(9.0, speed, 7.0));
+    let at = |gap, speed| wall().force(&Ok(pair(gap, Vec3::Y)), Vec3::new(9.0, speed, 7.0));
     assert_eq!(at(3.0, -100.0), ConstraintForce::NONE);
     assert_eq!(at(50.0, -100.0), ConstraintForce::NONE);
     // 2 N/mm over 1 mm, and 0.01 N s/mm at 100 mm/s of approach; nothing sideways.
@@ -68,7 +68,7 @@ fn the_spring_goes_on_below_the_surface() {
     let soft = SpringDamper::new(0.5, 0.0, 5.0).unwrap();
     let wall = ForbiddenRegion::new(soft, 3.0).unwrap();
     for (gap, force) in [(1.0, 1.0), (0.0, 1.5), (-1.0, 2.0), (-2.0, 2.5)] {
-        let answer = wall.force(Ok(&pair(gap, Vec3::X)), Vec3::ZERO);
+        let answer = wall.force(&Ok(pair(gap, Vec3::X)), Vec3::ZERO);
         assert!(close(answer.force, Vec3::X * force), "{gap}: {answer:?}");
     }
 }
@@ -78,14 +78,14 @@ fn the_interval_counts_from_its_lower_end() {
     let mut cut = pair(8.0, Vec3::X);
     cut.lower = 2.0;
     cut.accuracy = 0.5;
-    assert!(close(wall().force(Ok(&cut), Vec3::ZERO).force, Vec3::X * 3.0));
+    assert!(close(wall().force(&Ok(cut), Vec3::ZERO).force, Vec3::X * 3.0));
     // The guide sees the tool 8.5 mm too near, not 2 mm.
-    assert!(close(guide().force(Ok(&cut), Vec3::ZERO).force, Vec3::X * 5.0));
+    assert!(close(guide().force(&Ok(cut), Vec3::ZERO).force, Vec3::X * 5.0));
 }
 
 #[test]
 fn the_guide_pulls_and_pushes() {
-    let at = |gap, speed| guide().force(Ok(&pair(gap, Vec3::Z)), Vec3::new(1.0, 2.0, speed));
+    let at = |gap, speed| guide().force(&Ok(pair(gap, Vec3::Z)), Vec3::new(1.0, 2.0, speed));
     for gap in [9.0, 9.5, 10.0, 11.0] {
         assert_eq!(at(gap, 500.0), ConstraintForce::NONE, "{gap}");
     }
@@ -108,21 +108,21 @@ fn the_hold_damps_and_says_why() {
         Unavailable::NotFinite,
     ];
     for reason in reasons {
-        let held = wall().force(Err(reason), Vec3::new(0.0, 100.0, 0.0));
+        let held = wall().force(&Err(reason), Vec3::new(0.0, 100.0, 0.0));
         assert_eq!(held.state, ConstraintState::Safe(reason));
         assert!(close(held.force, Vec3::new(0.0, -1.0, 0.0)));
-        let fast = guide().force(Err(reason), Vec3::new(3.0e5, 0.0, 4.0e5));
+        let fast = guide().force(&Err(reason), Vec3::new(3.0e5, 0.0, 4.0e5));
         assert!(close(fast.force, Vec3::new(-3.0, 0.0, -4.0)), "{fast:?}");
-        assert_eq!(wall().force(Err(reason), Vec3::splat(f32::NAN)).force, Vec3::ZERO);
-        assert_eq!(wall().force(Err(reason), Vec3::ZERO).force, Vec3::ZERO);
-        let absurd = wall().force(Err(reason), Vec3::Y * f32::MAX);
+        assert_eq!(wall().force(&Err(reason), Vec3::splat(f32::NAN)).force, Vec3::ZERO);
+        assert_eq!(wall().force(&Err(reason), Vec3::ZERO).force, Vec3::ZERO);
+        let absurd = wall().force(&Err(reason), Vec3::Y * f32::MAX);
         assert_eq!(absurd.force, Vec3::Y * -5.0);
         let free = SPRING.unwrap().with_hold_damping(0.0).unwrap();
         let free = ForbiddenRegion::new(free, 3.0).unwrap();
-        assert_eq!(free.force(Err(reason), Vec3::ONE).force, Vec3::ZERO);
+        assert_eq!(free.force(&Err(reason), Vec3::ONE).force, Vec3::ZERO);
     }
     // A query's answer that gives no direction.
-    let touching = wall().force(Ok(&pair(-RADIUS, Vec3::ZERO)), Vec3::X);
+    let touching = wall().force(&Ok(pair(-RADIUS, Vec3::ZERO)), Vec3::X);
     assert_eq!(touching.state, ConstraintState::Safe(Unavailable::NoDirection));
 }
 
@@ -141,16 +141,16 @@ fn what_is_not_finite_is_not_used() {
             let mut pair = pair(1.0, Vec3::X);
             spoil(&mut pair, bad);
             let safe = ConstraintState::Safe(Unavailable::NotFinite);
-            assert_eq!(wall().force(Ok(&pair), Vec3::ONE).state, safe, "field {which}, {bad}");
-            assert_eq!(guide().force(Ok(&pair), Vec3::ONE).state, safe, "field {which}, {bad}");
+            assert_eq!(wall().force(&Ok(pair), Vec3::ONE).state, safe, "field {which}, {bad}");
+            assert_eq!(guide().force(&Ok(pair), Vec3::ONE).state, safe, "field {which}, {bad}");
         }
-        let moving = wall().force(Ok(&pair(1.0, Vec3::X)), Vec3::new(bad, 0.0, 0.0));
+        let moving = wall().force(&Ok(pair(1.0, Vec3::X)), Vec3::new(bad, 0.0, 0.0));
         assert_eq!(moving.state, ConstraintState::Safe(Unavailable::NotFinite));
         assert_eq!(moving.force, Vec3::ZERO);
     }
     let mut long = pair(1.0, Vec3::X);
     long.direction = Vec3::X * 1.5;
-    assert!(matches!(wall().force(Ok(&long), Vec3::ZERO).state, ConstraintState::Safe(_)));
+    assert!(matches!(wall().force(&Ok(long), Vec3::ZERO).state, ConstraintState::Safe(_)));
 }
 
 #[test]
@@ -218,9 +218,9 @@ proptest! {
         // Denormal forces round by more than a ratio.
         let largest = f64::from(max_force) * (1.0 + 1.0e-3) + 1.0e-44;
         let forces = [
-            ForbiddenRegion::new(spring, a).map(|wall| wall.force(Ok(&any), velocity)),
-            Guidance::new(spring, a, b).map(|guide| guide.force(Ok(&any), velocity)),
-            ForbiddenRegion::new(spring, a).map(|wall| wall.force(Err(Unavailable::Query(QUERY)), velocity)),
+            ForbiddenRegion::new(spring, a).map(|wall| wall.force(&Ok(any), velocity)),
+            Guidance::new(spring, a, b).map(|guide| guide.force(&Ok(any), velocity)),
+            ForbiddenRegion::new(spring, a).map(|wall| wall.force(&Err(Unavailable::Query(QUERY)), velocity)),
         ];
         for answer in forces.into_iter().flatten() {
             prop_assert!(answer.force.is_finite(), "{answer:?}");
@@ -239,10 +239,10 @@ proptest! {
     ) {
         let velocity = Vec3::from(velocity);
         let exact = pair(gap, direction);
-        let push = |pair: &Proximity| wall().force(Ok(pair), velocity).force.dot(direction);
+        let push = |pair: &Proximity| wall().force(&Ok(*pair), velocity).force.dot(direction);
         prop_assert!(push(&exact) >= 0.0);
         if gap >= 3.0 {
-            prop_assert_eq!(wall().force(Ok(&exact), velocity), ConstraintForce::NONE);
+            prop_assert_eq!(wall().force(&Ok(exact), velocity), ConstraintForce::NONE);
         }
         let mut cut = exact;
         cut.lower = exact.lower - slack;

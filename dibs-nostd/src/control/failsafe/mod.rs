@@ -45,7 +45,9 @@
 mod freshness;
 mod limits;
 mod link;
-#[cfg(test)]
+#[cfg(feature = "bus")]
+mod status;
+#[cfg(all(test, feature = "bus"))]
 mod tests;
 
 use core::fmt;
@@ -55,7 +57,9 @@ use crate::surface::FrameAge;
 use crate::unavailable::{QueryError, Unavailable};
 
 pub use limits::{LimitError, Limits, Watch};
-pub use link::{Link, LinkStatus};
+pub use link::Link;
+#[cfg(feature = "bus")]
+pub use status::LinkStatus;
 
 /// What a step of the machine sees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -220,14 +224,14 @@ impl FailSafe {
     /// An operator's acknowledgement: the next step leaves the safe state if it is clear.
     ///
     /// # Errors
-    /// [`NotReady`] unless the last step waited for it; nothing is remembered then.
-    pub fn acknowledge(&mut self) -> Result<(), NotReady> {
+    /// [`AcknowledgeError`] unless the last step waited for it; nothing is remembered then.
+    pub fn acknowledge(&mut self) -> Result<(), AcknowledgeError> {
         let frames = self.limits.recovery_frames().saturating_sub(self.run);
         if self.state == State::Safe && frames == 0 {
             self.acknowledged = true;
             Ok(())
         } else {
-            Err(NotReady { state: self.state, frames })
+            Err(AcknowledgeError { state: self.state, frames })
         }
     }
 
@@ -246,7 +250,7 @@ impl FailSafe {
             worst = (State::Safe, Some(Unavailable::NoSurface));
         }
         let inputs = [
-            (safe_if(seen.has_rotted), Unavailable::Rot),
+            (safe_if(seen.has_rotted), Unavailable::CorruptTree),
             (limits.age.level(age), stale),
             (limits.silence.level(link.silence), silent),
             (limits.heartbeat.level(link.heartbeat), heartbeat),
@@ -269,14 +273,14 @@ fn safe_if(is_safe: bool) -> State {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
-pub struct NotReady {
+pub struct AcknowledgeError {
     /// The machine's state.
     pub state: State,
     /// Good frames that are still missing.
     pub frames: u16,
 }
 
-impl fmt::Display for NotReady {
+impl fmt::Display for AcknowledgeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.state {
             State::Safe => {
@@ -287,4 +291,4 @@ impl fmt::Display for NotReady {
     }
 }
 
-impl core::error::Error for NotReady {}
+impl core::error::Error for AcknowledgeError {}

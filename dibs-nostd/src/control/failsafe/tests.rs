@@ -85,7 +85,7 @@ fn requests() -> Vec<(State, Observation, Option<Unavailable>)> {
     all.push((
         Safe,
         Observation { has_rotted: true, ..seen(2000, 100, 0) },
-        Some(Unavailable::Rot),
+        Some(Unavailable::CorruptTree),
     ));
     for (level, age) in [(Nominal, 50), (Degraded, 51), (Degraded, 200), (Safe, 201)] {
         let cause = (level != Nominal).then_some(Unavailable::Stale { age });

@@ -84,7 +84,7 @@ impl Contact {
 /// use dibs_build::{Builder, generate};
 /// use dibs_nostd::{Capsule, Contacts, Options, Query, Tree, glam::Vec3};
 ///
-/// let (heart, _) = generate::heart(1_000)?;
+/// let heart = generate::heart(1_000)?.mesh;
 /// let built = Builder::new().build(&heart)?;
 /// let tree = Tree::<u16>::from_bytes(built.blob())?;
 /// let rows = built.to_rows(&heart.positions);
@@ -264,7 +264,9 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         if !self.tree.has_adjacency() {
             return Err(QueryError::NoAdjacency);
         }
-        let closest = self.closest(vertices, tool, options)?;
+        let closest = self.closest_on_table(vertices, tool, options)?;
+        let accuracy = closest.accuracy;
+        let closest = closest.of_table(vertices);
         found.accuracy = closest.accuracy;
         if closest.side == Side::Inside || closest.lower > margin {
             found.bound = margin;
@@ -280,8 +282,8 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         };
         let limit = tool.radius() + margin;
         let mut complete = limit;
-        let search =
-            Search::start(&self.tree, &mut self.stack, vertices, tool, &options.budget(budget))?;
+        let options = options.budget(budget);
+        let search = Search::start(&self.tree, &mut self.stack, vertices, tool, &options, None)?;
         let left = search.each_within(limit, |row, square| {
             if let Some(farthest) = basins.push(Near { square, row }) {
                 complete = sqrt(farthest);
@@ -294,7 +296,6 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         if is_crossing && let Some(contact) = Contact::at(&closest) {
             found.insert(contact);
         }
-        let accuracy = closest.accuracy;
         let ridge = (margin * RIDGE) + 2.0 * accuracy;
         let tree = self.tree;
         let mut failed = None;

@@ -40,7 +40,7 @@ const FARTHEST: u32 = 1 << 29;
 /// use dibs_build::{Builder, generate};
 /// use dibs_nostd::{Odometer, Options, Sphere, Tracker, Tree, glam::Vec3};
 ///
-/// let (heart, motion) = generate::heart(1_000)?;
+/// let generate::MovingMesh { mesh: heart, motion } = generate::heart(1_000)?;
 /// let built = Builder::new().stretch(1.5).build(&heart)?;
 /// let tree = Tree::<u16>::from_bytes(built.blob())?;
 /// let mut tracker = Tracker::<_, 64, 128>::new(&tree)?;
@@ -168,11 +168,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
             }
         };
         self.now = self.now.wrapping_add(moved);
-        let mut options = *options;
-        if self.triangle.is_some() {
-            options = options.warm_start(self.triangle);
-        }
-        let search = Search::start(&self.tree, &mut self.stack, surface, tool, &options)?;
+        let first = self.triangle.or(options.first(None));
+        let search = Search::start(&self.tree, &mut self.stack, surface, tool, options, first)?;
         let tick = Tick::new(search, self.front.borrow(), self.unit, self.now, options.budget);
         let (outcome, best) = tick.run(moved)?;
         self.triangle = best.or(self.triangle);
@@ -185,10 +182,11 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
             }
             Outcome::Full { tests } => {
                 fallback = Some(Fallback::Full);
-                (self.whole(surface, tool, &options.warm_start(best), tests)?, false)
+                (self.whole(surface, tool, options, best, tests)?, false)
             }
         };
-        let closest = signed(&self.tree, &mut self.stack, surface, tool, &options, closest)?;
+        let closest = signed(&self.tree, &mut self.stack, surface, tool, options, closest)?;
+        let closest = closest.of_table(surface);
         self.behind = if is_complete { 0 } else { self.behind.saturating_add(moved) };
         self.last = travel.map(|travel| Last::new(tool, travel));
         Ok(Tracked { closest, fallback, opened: self.front.borrow().used() as u32 })
@@ -201,6 +199,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         surface: &S,
         tool: &T,
         options: &Options,
+        first: Option<u32>,
         tests: Budget,
     ) -> Result<Proximity, QueryError> {
         let budget = Budget {
@@ -208,7 +207,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
             triangle_tests: options.budget.triangle_tests.saturating_sub(tests.triangle_tests),
         };
         let options = options.budget(budget);
-        let search = Search::start(&self.tree, &mut self.stack, surface, tool, &options)?;
+        let search = Search::start(&self.tree, &mut self.stack, surface, tool, &options, first)?;
         let mut closest = search.run()?;
         closest.node_tests = closest.node_tests.saturating_add(tests.node_tests);
         closest.triangle_tests = closest.triangle_tests.saturating_add(tests.triangle_tests);

@@ -36,7 +36,7 @@ fn least(tree: &Tree<'_, u16>, link: Link, far: &impl Fn(u32) -> f64) -> f64 {
 
 #[test]
 fn no_bound_exceeds_the_distance() {
-    let (mesh, motion) = generate::heart(1_280).expect("a valid size");
+    let generate::MovingMesh { mesh, motion } = generate::heart(1_280).expect("a valid size");
     let built = Builder::new().stretch(1.5).build(&mesh).expect("builds");
     let tree = Tree::<u16>::from_bytes(built.blob()).expect("valid");
     let mut tracker = Tracker::<_, 128, 128>::new(&tree).expect("enough");
@@ -54,7 +54,7 @@ fn no_bound_exceeds_the_distance() {
             let size = if tick == 7 { 10.0 } else { 0.5 };
             (tip, span) = (tip * 0.999 + vector(size), span * 0.999 + vector(size));
             let tool = Capsule::new(tip, tip + span, 2.0).expect("a valid capsule");
-            let mut options = Options::new().unsigned();
+            let mut options = Options::cold().unsigned();
             if tick % 3 == 2 {
                 options = options.budget(Budget { node_tests: 12, triangle_tests: 2 });
             }

@@ -50,7 +50,7 @@ fn main() -> ! {
         tree.mesh_id(),
         tree.stretch()
     );
-    let Some((writer, reader)) = FRAMES.split() else { semihosting::exit(false) };
+    let Ok((writer, reader)) = FRAMES.split() else { semihosting::exit(false) };
     let Ok(control) = Control::new(tree, reader, &BUS) else {
         defmt::error!("the controller's constants are out of range");
         semihosting::exit(false)

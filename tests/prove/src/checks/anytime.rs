@@ -151,7 +151,7 @@ fn on_one_frame(surface: &Surface, deformation: Deformation, rng: &mut Rng) -> T
     for _ in 0..POSES {
         let tool = pose(&rows, &triangles, rng);
         let truth = exhaustive(&rows, &triangles, &tool).expect("has triangles");
-        let mut options = Options::new();
+        let mut options = Options::cold();
         if rng.bool() {
             options = options.stretch(measured);
         }
@@ -219,7 +219,7 @@ fn judge(answer: &Proximity, truth: &OraclePair, tally: &mut Tally) {
 
     let spring = SpringDamper::new(STIFFNESS, 0.0, MAX_FORCE).expect("valid gains");
     let wall = ForbiddenRegion::new(spring, MARGIN).expect("a valid margin");
-    let force = wall.force(Ok(answer), Vec3::ZERO);
+    let force = wall.force(&Ok(*answer), Vec3::ZERO);
     let needed = (f64::from(STIFFNESS) * (f64::from(MARGIN) - truth.separation))
         .clamp(0.0, f64::from(MAX_FORCE));
     let held = matches!(force.state, ConstraintState::Safe(_));

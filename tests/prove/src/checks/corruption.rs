@@ -129,7 +129,7 @@ fn on_one_pose(surface: &Surface, rng: &mut Rng) -> Tally {
         tally.unscrubbed += u64::from(scrub(&bytes).is_ok());
         match rotten(&sound, &bytes).map(|tree| {
             let mut query = Query::<_, MAX_STACK>::new(&tree).expect("enough for any tree");
-            ask::closest(&mut query, rows.as_slice(), &tool, &Options::new())
+            ask::closest(&mut query, rows.as_slice(), &tool, &Options::cold())
         }) {
             None | Some(Err(_)) => tally.errors += 1,
             Some(Ok(answer)) => {

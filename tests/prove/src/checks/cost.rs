@@ -302,7 +302,7 @@ fn check(machine: &Machine<'_>, queries: usize, figures: &mut Figures) -> Result
 /// Surfaces that the constants are not fitted to: other sizes, shapes and leaves, and real anatomy where it is.
 fn unseen() -> Result<Vec<Subject>> {
     let mut subjects = vec![
-        Subject::new("a generated heart of 2,562 triangles", generate::heart(2_562)?.0, 8),
+        Subject::new("a generated heart of 2,562 triangles", generate::heart(2_562)?.mesh, 8),
         Subject::new("a generated brain of 3,000", generate::brain(3_000)?, 6),
         Subject::new("a ball of 128", surfaces::ball(2), 3),
         Subject::new("1,200 slivers", surfaces::slivers(150), 4),

@@ -51,8 +51,8 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     ensure!(!build.status.success(), "a planted panic path did not break the link");
     ensure!(said.contains("a_panic_path_survived"), "it broke something else:\n{said}");
 
-    let mut in_rounds = firmware::command(&cross, &surface);
-    xtask::process::run(in_rounds.args(["--features", "in-rounds"]))
+    let mut wide = firmware::command(&cross, &surface);
+    xtask::process::run(wide.args(["--features", "wide"]))
         .context("queries in rounds have a panic path")?;
     Ok(Outcome::Passed)
 }

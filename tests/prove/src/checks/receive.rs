@@ -75,7 +75,7 @@ const WAYS: [Way; 4] = [
 
 fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let program = build_for_board(&board()?, "receive")?;
-    let (mesh, motion) = generate::heart(10_272)?;
+    let generate::MovingMesh { mesh, motion } = generate::heart(10_272)?;
     let built = Builder::new().index(IndexWidth::Bits16).stretch(1.5).build(&mesh)?;
     let mut script = Script::default();
     script.bytes(built.blob());

@@ -56,7 +56,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let bits = Bits { address: address(&image, middle)?, mask: 1 << 4 };
     let outcome = session::run(&scene, &machine, SECONDS, &Harm::Memory(bits), folder.path())?;
     let flipped = outcome.flipped_at.context("no frame was published")?;
-    let is_found = |tick: &&Tick| tick.cause == cause_code(&Unavailable::Rot);
+    let is_found = |tick: &&Tick| tick.cause == cause_code(&Unavailable::CorruptTree);
     let found = outcome.ticks.iter().find(is_found).context("the flipped bit was not found")?;
     let after = outcome.ticks.iter().filter(|tick| tick.tick >= found.tick);
     let acted = after.clone().filter(|tick| tick.state != State::Safe as u32).count();

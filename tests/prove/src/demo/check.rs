@@ -16,7 +16,7 @@ use super::sender::Link;
 pub struct Checked {
     /// The tick.
     pub tick: u32,
-    /// Distance of the answer from the truth, in units of its stated accuracy: at most 1 is right.
+    /// Distance of the answer from the truth, in units of [`accuracy_of`] it: at most 1 is right.
     pub error: f64,
 }
 
@@ -25,6 +25,12 @@ impl Checked {
     pub fn is_wrong(&self) -> bool {
         self.error > 1.0 || self.error.is_nan()
     }
+}
+
+/// The accuracy of an answer on the vertices as they were decoded, which both sides use here: the stated one without
+/// the bus's quantisation.
+pub fn accuracy_of(tick: &Tick) -> f64 {
+    f64::from(tick.accuracy) - f64::from(tick.position_error)
 }
 
 /// Checks one answer: its separation, its interval, and its point. The error is the largest of the
@@ -40,8 +46,7 @@ pub fn check(scene: &Scene, link: &Link, tick: &Tick) -> Result<Checked> {
     );
     let truth = exhaustive(&positions, &scene.triangles, &tool).context("no triangles")?;
 
-    // The bus's quantisation is not an error here: both sides use the vertices as they were decoded.
-    let accuracy = f64::from(tick.accuracy);
+    let accuracy = accuracy_of(tick);
     let (low, high) =
         sides::signed_separation(&positions, &scene.triangles, &tool, &truth, accuracy);
     let separation = (low - f64::from(tick.separation)).max(0.0);

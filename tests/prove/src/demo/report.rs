@@ -12,6 +12,7 @@ use dibs_nostd::{QueryError, Unavailable};
 use serde::Serialize;
 use xtask::qemu;
 
+use super::check;
 use super::faults::{Faults, Silence};
 use super::machine::Machine;
 use super::scene::Scene;
@@ -39,7 +40,7 @@ pub struct Report {
     mismatches: usize,
     /// Largest error of an answer, in units of its stated accuracy.
     largest_error: f64,
-    /// Largest stated accuracy, in mm.
+    /// Largest stated accuracy but for the vertices' position error, in mm.
     accuracy_mm: f32,
     /// Largest distance between a vertex and what the bus's quantisation made of it, in mm.
     position_error_mm: f32,
@@ -131,7 +132,7 @@ impl Report {
             queries: answered.len(),
             mismatches: outcome.checked.iter().filter(|c| c.is_wrong()).count(),
             largest_error: outcome.checked.iter().map(|c| c.error).fold(0.0, f64::max),
-            accuracy_mm: largest(|tick| tick.accuracy),
+            accuracy_mm: largest(|tick| check::accuracy_of(tick) as f32),
             position_error_mm: largest(|tick| tick.position_error),
             separation_min_mm: least(|tick| tick.separation),
             separation_max_mm: largest(|tick| tick.separation),

@@ -35,7 +35,10 @@ impl Scene {
     pub fn load(options: &Options) -> Result<Self> {
         let (mesh, motion) = match (&options.mesh, &options.motion) {
             (Some(mesh), Some(motion)) => (dibs_build::read(mesh)?.mesh, Motion::read_pc2(motion)?),
-            _ => generate::heart(HEART_TRIANGLES)?,
+            _ => {
+                let heart = generate::heart(HEART_TRIANGLES)?;
+                (heart.mesh, heart.motion)
+            }
         };
         motion.check_fits(&mesh)?;
         ensure!(!motion.frames.is_empty(), "the motion has no frame");

@@ -63,7 +63,7 @@ impl fmt::Display for Row {
 
 /// The generated heart, and the real one where its files are.
 pub fn run() -> Result<Vec<Row>> {
-    let (mesh, motion) = generate::heart(TRIANGLES)?;
+    let generate::MovingMesh { mesh, motion } = generate::heart(TRIANGLES)?;
     let mut rows = heart("generated", &mesh, &motion)?;
     let data = real().unwrap_or_default();
     let (mesh, motion) = (data.join("heart_10272.ply"), data.join("heart_10272.pc2"));

@@ -39,7 +39,8 @@ pub fn brain(triangles: u32) -> Result<Subject> {
 
 /// The generated heart, and the real one where it is.
 pub fn hearts(triangles: u32) -> Result<Vec<Heart>> {
-    let (mesh, motion) = generate::heart(triangles).context("generating a heart")?;
+    let generate::MovingMesh { mesh, motion } =
+        generate::heart(triangles).context("generating a heart")?;
     let name = "generated heart".to_owned();
     let mut hearts = vec![Heart { name, mesh, motion, stretch: Some(1.5) }];
     if let Some(folder) = real() {

@@ -88,7 +88,7 @@ impl Script {
     /// at centres and middle planes, where all distances are equal.
     pub fn adversarial(queries: usize, draw: Draw, seed: u64) -> Self {
         let subjects = [
-            Subject::new("heart", generate::heart(1_280).expect("a valid size").0, 8),
+            Subject::new("heart", generate::heart(1_280).expect("a valid size").mesh, 8),
             Subject::new("brain", generate::brain(1_200).expect("a valid size"), 4),
             Subject::new("ball", surfaces::ball(3), 8),
             Subject::new("slivers", surfaces::slivers(60), 1),
@@ -129,7 +129,7 @@ impl Script {
 
     /// A script that begins with the tree of the firmware's heart.
     fn heart() -> (Self, BuiltTree, Motion) {
-        let (mesh, motion) = generate::heart(10_272).expect("a valid size");
+        let generate::MovingMesh { mesh, motion } = generate::heart(10_272).expect("a valid size");
         let built = build(&mesh, 8);
         let mut script = Self::default();
         script.tree(&built);
@@ -169,7 +169,7 @@ impl Script {
             };
             let (rows, tool) = at(tick - 1);
             let before =
-                query.closest(&rows[..], &tool, &Options::new().unsigned()).expect("a query");
+                query.closest(&rows[..], &tool, &Options::cold().unsigned()).expect("a query");
             let (rows, tool) = at(tick);
             script.rows(&rows, tree.triangle_count());
             let tool = Instrument::capsule(tool.start(), tool.end(), tool.radius());

@@ -39,6 +39,7 @@ use crate::bus::wire::{
 /// assert_eq!(packets, 3);
 /// # Ok::<(), dibs_nostd::wire::EncodeError>(())
 /// ```
+#[derive(Debug)]
 pub struct FrameEncoder<'a, T: ?Sized, const MTU: usize, M = NoMac> {
     id: FrameId,
     begin: Begin,
@@ -51,6 +52,7 @@ pub struct FrameEncoder<'a, T: ?Sized, const MTU: usize, M = NoMac> {
     digest: u32,
 }
 
+#[derive(Debug)]
 enum Next {
     Begin,
     Vertices { first: u32 },

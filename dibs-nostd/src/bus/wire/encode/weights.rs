@@ -20,6 +20,7 @@ use crate::bus::wire::{
 /// assert_eq!(packets, 4); // begin, ten weights, six weights, commit
 /// # Ok::<(), dibs_nostd::wire::EncodeError>(())
 /// ```
+#[derive(Debug)]
 pub struct WeightsEncoder<'a, const MTU: usize, M = NoMac> {
     id: FrameId,
     weights: &'a [f32],

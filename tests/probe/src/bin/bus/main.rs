@@ -44,7 +44,7 @@ fn run(bytes: &mut [u8]) -> Option<()> {
     let bytes = bytes.get_mut(..length as usize)?;
     script.read(bytes)?;
     let tree = Tree::<u16>::from_bytes(bytes).ok()?;
-    let (writer, reader) = FRAMES.split()?;
+    let (writer, reader) = FRAMES.split().ok()?;
     let limit = f32::from_bits(limit);
     uart::start();
     if is_tagged == 0 {
@@ -75,8 +75,9 @@ impl<'t, M: Mac> Receiver<'t, M> {
         limit: f32,
         mac: M,
     ) -> Option<Self> {
-        let monitor =
-            StretchMonitor::new(tree).ok()?.limits(dibs_nostd::Limits::reach_mm(1e3).speed(1e3));
+        let monitor = StretchMonitor::new(tree)
+            .ok()?
+            .limits(dibs_nostd::SurfaceLimits::reach_mm(1e3).speed(1e3));
         let mesh_id = tree.mesh_id();
         let assembler = Assembler::with_mac(writer, monitor, mesh_id, limit, mac);
         let deframer = Deframer::new();

@@ -49,11 +49,14 @@ fn run() -> Option<()> {
         script.read(bytes.get_mut(..length.next_multiple_of(4))?)?;
         let tree = Tree::<u16>::from_bytes(bytes.get(..length)?).ok()?;
         let [untagged, tagged] = &FRAMES;
-        let monitor =
-            StretchMonitor::new(&tree).ok()?.limits(dibs_nostd::Limits::reach_mm(1e3).speed(1e3));
-        let mut plain = Assembler::new(untagged.split()?.0, monitor.clone(), tree.mesh_id(), 1e3);
+        let monitor = StretchMonitor::new(&tree)
+            .ok()?
+            .limits(dibs_nostd::SurfaceLimits::reach_mm(1e3).speed(1e3));
+        let mut plain =
+            Assembler::new(untagged.split().ok()?.0, monitor.clone(), tree.mesh_id(), 1e3);
         let mac = AesCmac::new(&KEY, 0, 0);
-        let mut guarded = Assembler::with_mac(tagged.split()?.0, monitor, tree.mesh_id(), 1e3, mac);
+        let mut guarded =
+            Assembler::with_mac(tagged.split().ok()?.0, monitor, tree.mesh_id(), 1e3, mac);
         loop {
             let counts = match word(&mut script)? {
                 UNTAGGED => frame::<NoMac>(&mut plain, &mut script)?,

@@ -163,7 +163,7 @@ fn run() -> Option<()> {
         for (row, place) in rest.iter_mut().enumerate() {
             *place = tree.rest_position(row as u32)?;
         }
-        let (writer, mut reader) = FRAMES.split()?;
+        let (writer, mut reader) = FRAMES.split().ok()?;
         let sender = Sender { writer, rest, epoch: 0, next: 0, random: 1 };
         *SENDER.borrow(section).try_borrow_mut().ok()? = Some(sender);
 
@@ -186,13 +186,13 @@ fn run() -> Option<()> {
             if let Some(frame) = reader.read() {
                 // Positions come back after 64 epochs, so that this one of the label does.
                 let watched = Watched::new(&frame, &rest, Some(frame.label().epoch));
-                query.closest(&watched, &tool, &Options::new()).ok()?;
+                query.closest(&watched, &tool, &Options::cold()).ok()?;
                 mixed += u32::from(watched.is_mixed.get());
                 done += 1;
             }
             let watched = Watched::new(&Plain, &rest, None);
             // A surface of two epochs may be stretched beyond what the query allows for.
-            let _ = query.closest(&watched, &tool, &Options::new());
+            let _ = query.closest(&watched, &tool, &Options::cold());
             mixed_plain += u32::from(watched.is_mixed.get());
         }
         core.SYST.disable_interrupt();

@@ -10,7 +10,7 @@ use crate::bus::wire::{Event, PacketError};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
-pub enum Rejection {
+pub enum ReceiveError {
     /// Not a packet, or damaged.
     Packet(PacketError),
     /// A packet of another mesh.
@@ -96,7 +96,7 @@ pub enum Rejection {
     Stretch(StretchError),
 }
 
-impl Rejection {
+impl ReceiveError {
     /// What it is counted as.
     #[must_use]
     pub const fn event(&self) -> Event {
@@ -128,13 +128,13 @@ impl Rejection {
     }
 }
 
-impl From<PacketError> for Rejection {
+impl From<PacketError> for ReceiveError {
     fn from(error: PacketError) -> Self {
         Self::Packet(error)
     }
 }
 
-impl fmt::Display for Rejection {
+impl fmt::Display for ReceiveError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Packet(error) => error.fmt(f),
@@ -173,4 +173,4 @@ impl fmt::Display for Rejection {
     }
 }
 
-impl core::error::Error for Rejection {}
+impl core::error::Error for ReceiveError {}

@@ -1,0 +1,129 @@
+//! What the bus side knows of its own health, for the control tick.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use super::Link;
+use crate::bus::BusHealth;
+use crate::surface::Ageing;
+
+/// Where the bus interrupt notes what came, and the control tick reads it. Meant for a `static`.
+///
+/// Neither waits for the other; each number is exact, together they may be of two moments.
+///
+/// ```
+/// use dibs_nostd::wire::{FrameId, NoMac, encode_heartbeat};
+/// use dibs_nostd::{Assembler, Frames, Unchecked, failsafe::LinkStatus};
+///
+/// static FRAMES: Frames<3> = Frames::new();
+/// static LINK: LinkStatus = LinkStatus::new();
+/// assert_eq!(LINK.read(5).silence, u32::MAX, "nothing came yet");
+///
+/// // Bus interrupt: after each call of `accept` or `advance`.
+/// let (writer, _reader) = FRAMES.split().unwrap();
+/// let mut assembler = Assembler::new(writer, Unchecked, 0xB0D1, 1000.0);
+/// let mut buffer = [0; 64];
+/// let id = FrameId { mesh_id: 0xB0D1, session: 1, epoch: 0 };
+/// assembler.accept(encode_heartbeat(&id, 1, &NoMac, &mut buffer), 10).unwrap();
+/// LINK.set(&assembler.health());
+///
+/// // Control interrupt.
+/// assert_eq!(LINK.read(12).silence, 2);
+/// ```
+#[derive(Debug)]
+pub struct LinkStatus {
+    packet: Stamp,
+    heartbeat: Stamp,
+    rejections: AtomicU32,
+    forgeries: AtomicU32,
+    transit: AtomicU32,
+    source_age: AtomicU32,
+}
+
+/// When something came last, and the greatest age that it was found to have.
+#[derive(Debug)]
+struct Stamp {
+    /// 1 once something came.
+    came: AtomicU32,
+    at: AtomicU32,
+    /// The reader's: the stamp that it looked at last, and its age.
+    aged: AtomicU32,
+    oldest: AtomicU32,
+}
+
+impl Stamp {
+    const fn new() -> Self {
+        Self {
+            came: AtomicU32::new(0),
+            at: AtomicU32::new(0),
+            aged: AtomicU32::new(0),
+            oldest: AtomicU32::new(0),
+        }
+    }
+
+    fn set(&self, at: Option<u32>) {
+        if let Some(at) = at {
+            self.at.store(at, Ordering::Relaxed);
+            self.came.store(1, Ordering::Release);
+        }
+    }
+
+    /// Time since the last; `u32::MAX` before the first.
+    fn age(&self, now: u32) -> u32 {
+        if self.came.load(Ordering::Acquire) == 0 {
+            return u32::MAX;
+        }
+        let before = Ageing {
+            stamp: self.aged.load(Ordering::Relaxed),
+            oldest: self.oldest.load(Ordering::Relaxed),
+        };
+        let Ageing { stamp, oldest } = before.at(now, self.at.load(Ordering::Relaxed));
+        self.aged.store(stamp, Ordering::Relaxed);
+        self.oldest.store(oldest, Ordering::Relaxed);
+        oldest
+    }
+}
+
+impl LinkStatus {
+    /// Nothing came yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            packet: Stamp::new(),
+            heartbeat: Stamp::new(),
+            rejections: AtomicU32::new(0),
+            forgeries: AtomicU32::new(0),
+            transit: AtomicU32::new(u32::MAX),
+            source_age: AtomicU32::new(u32::MAX),
+        }
+    }
+
+    /// Notes the health of the bus: after each packet and each slice of checking. One writer.
+    pub fn set(&self, health: &BusHealth) {
+        self.packet.set(health.packet);
+        self.heartbeat.set(health.heartbeat);
+        self.rejections.store(health.rejections, Ordering::Relaxed);
+        self.forgeries.store(health.forgeries, Ordering::Relaxed);
+        self.transit.store(health.transit, Ordering::Relaxed);
+        self.source_age.store(health.source_age, Ordering::Relaxed);
+    }
+
+    /// The health of the bus at `now`. One reader, which asks at least once in 2^31 units of the clock: then what
+    /// was lost once stays lost when the clock comes around.
+    #[must_use]
+    pub fn read(&self, now: u32) -> Link {
+        Link {
+            silence: self.packet.age(now),
+            heartbeat: self.heartbeat.age(now),
+            rejections: self.rejections.load(Ordering::Relaxed),
+            forgeries: self.forgeries.load(Ordering::Relaxed),
+            transit: self.transit.load(Ordering::Relaxed),
+            source_age: self.source_age.load(Ordering::Relaxed),
+        }
+    }
+}
+
+impl Default for LinkStatus {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,95 @@
+//! One error for a program that tells no two of them apart.
+
+use core::fmt;
+
+/// Defines [`Error`], its `From` of each error that it holds, and what it says: the words of that error.
+macro_rules! errors {
+    ($($(#[doc = $text:literal])+ $(#[cfg($when:meta)])? $name:ident($error:ty),)+) => {
+        /// Any error of this crate: for a program that says what went wrong and stops, or a loop that leaves its tick.
+        ///
+        /// ```
+        /// use dibs_nostd::{Error, Options, Query, Sphere, Tree, glam::Vec3};
+        ///
+        /// fn answer(bytes: &[u8], vertices: &[Vec3]) -> Result<f32, Error> {
+        ///     let tree = Tree::<u16>::from_bytes(bytes)?;
+        ///     let mut query = Query::<_, 32>::new(&tree)?;
+        ///     let tool = Sphere::new(Vec3::ZERO, 2.5)?;
+        ///     Ok(query.closest(vertices, &tool, &Options::new())?.separation)
+        /// }
+        /// assert!(matches!(answer(b"no tree", &[]), Err(Error::Format(_))));
+        /// ```
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+        #[non_exhaustive]
+        pub enum Error {
+            $($(#[doc = $text])+ $(#[cfg($when)])? $name($error),)+
+        }
+
+        impl fmt::Display for Error {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                match self {
+                    $($(#[cfg($when)])? Self::$name(error) => error.fmt(f),)+
+                }
+            }
+        }
+
+        impl core::error::Error for Error {}
+
+        $($(#[cfg($when)])? impl From<$error> for Error {
+            fn from(error: $error) -> Self {
+                Self::$name(error)
+            }
+        })+
+    };
+}
+
+errors! {
+    /// The tree's bytes are no tree of this version.
+    Format(crate::FormatError),
+    /// The tree's bytes changed.
+    CorruptTree(crate::CorruptTreeError),
+    /// Buffers were split twice.
+    Split(crate::SplitError),
+    /// A frame has more vertices than its buffers.
+    OutOfTableError(crate::OutOfTableError),
+    /// A frame was not published.
+    Publish(crate::PublishError),
+    /// A stretch is beyond its limit, or was not measured.
+    Stretch(crate::StretchError),
+    /// There is no such tool.
+    Tool(crate::ToolError),
+    /// A query gave no answer.
+    Query(crate::QueryError),
+    /// There is no proximity to act on.
+    Unavailable(crate::Unavailable),
+    /// A packet, or the frame that it would have finished, was rejected.
+    #[cfg(feature = "bus")]
+    Receive(crate::ReceiveError),
+    /// Bytes are no packet.
+    #[cfg(feature = "bus")]
+    Packet(crate::wire::PacketError),
+    /// A frame cannot be encoded.
+    #[cfg(feature = "bus")]
+    Encode(crate::wire::EncodeError),
+    /// A byte stream lost a packet.
+    #[cfg(feature = "bus")]
+    Stream(crate::wire::StreamError),
+    /// There is no such quantisation box.
+    #[cfg(feature = "bus")]
+    Box(crate::wire::BoxError),
+    /// A gain that no constraint can have.
+    #[cfg(feature = "control")]
+    Gain(crate::constraint::GainError),
+    /// A limit that the fail-safe machine cannot have.
+    #[cfg(feature = "control")]
+    Limit(crate::failsafe::LimitError),
+    /// An acknowledgement came too early.
+    #[cfg(feature = "control")]
+    Acknowledge(crate::failsafe::AcknowledgeError),
+    /// A tree carries no modes, or damaged ones.
+    #[cfg(feature = "modes")]
+    Modes(crate::modes::ModesError),
+    /// Weights that no surface has.
+    #[cfg(feature = "modes")]
+    Weights(crate::modes::WeightsError),
+}

@@ -1,0 +1,125 @@
+//! One of the two buffers: positions and the label of their frame, in relaxed atomics.
+
+use glam::Vec3;
+
+use super::MeasuredStretch;
+use super::atomic::{AtomicU32, Ordering};
+
+/// What is known of a published frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FrameLabel {
+    /// Number of the frame, given by the sender; wraps.
+    pub epoch: u32,
+    /// When the first packet of the frame arrived, less the age that the surface then had, on the
+    /// receiver's clock (wraps).
+    pub received: u32,
+    /// No vertex is farther than this from the position that the sender had, in mm: the
+    /// quantisation on the wire. A separation is off by at most as much.
+    pub position_error: f32,
+    /// Measured stretch of the frame against the rest shape; `None` where nobody measured it.
+    pub stretch: Option<MeasuredStretch>,
+}
+
+/// One position, as bits of `f32`.
+#[derive(Debug)]
+pub(crate) struct Position([AtomicU32; 3]);
+
+impl Position {
+    #[inline(always)]
+    pub fn get(&self) -> Vec3 {
+        let [x, y, z] = &self.0;
+        let load = |bits: &AtomicU32| f32::from_bits(bits.load(Ordering::Relaxed));
+        Vec3::new(load(x), load(y), load(z))
+    }
+
+    #[inline(always)]
+    pub fn set(&self, position: Vec3) {
+        let [x, y, z] = &self.0;
+        x.store(position.x.to_bits(), Ordering::Relaxed);
+        y.store(position.y.to_bits(), Ordering::Relaxed);
+        z.store(position.z.to_bits(), Ordering::Relaxed);
+    }
+
+    #[cfg(feature = "bus")]
+    #[inline(always)]
+    pub fn copy(&self, from: &Self) {
+        for (to, from) in self.0.iter().zip(&from.0) {
+            to.store(from.load(Ordering::Relaxed), Ordering::Relaxed);
+        }
+    }
+}
+
+/// One buffer: positions as bits of `f32`, and the label of the frame in it.
+#[derive(Debug)]
+pub(super) struct Buffer<const N: usize> {
+    pub positions: [Position; N],
+    pub epoch: AtomicU32,
+    pub received: AtomicU32,
+    position_error: AtomicU32,
+    /// Measured stretch; the first word is not a number where there is none.
+    stretch: [AtomicU32; MeasuredStretch::WORDS],
+}
+
+impl<const N: usize> Buffer<N> {
+    #[cfg(not(loom))]
+    pub const fn new() -> Self {
+        Self {
+            positions: [const { Position([const { AtomicU32::new(0) }; 3]) }; N],
+            epoch: AtomicU32::new(0),
+            received: AtomicU32::new(0),
+            position_error: AtomicU32::new(0),
+            stretch: [const { AtomicU32::new(0) }; MeasuredStretch::WORDS],
+        }
+    }
+
+    #[cfg(loom)]
+    pub fn new() -> Self {
+        use core::array::from_fn;
+        Self {
+            positions: from_fn(|_| Position(from_fn(|_| AtomicU32::new(0)))),
+            epoch: AtomicU32::new(0),
+            received: AtomicU32::new(0),
+            position_error: AtomicU32::new(0),
+            stretch: from_fn(|_| AtomicU32::new(0)),
+        }
+    }
+
+    #[inline(always)]
+    pub fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.positions.get(vertex as usize).map(Position::get)
+    }
+
+    pub fn set_label(&self, label: FrameLabel) {
+        self.epoch.store(label.epoch, Ordering::Relaxed);
+        self.received.store(label.received, Ordering::Relaxed);
+        self.position_error.store(label.position_error.to_bits(), Ordering::Relaxed);
+        let words = match label.stretch {
+            Some(measured) => measured.to_words(),
+            None => [f32::NAN.to_bits(); MeasuredStretch::WORDS],
+        };
+        for (at, word) in self.stretch.iter().zip(words) {
+            at.store(word, Ordering::Relaxed);
+        }
+    }
+
+    pub fn label(&self) -> FrameLabel {
+        FrameLabel {
+            epoch: self.epoch.load(Ordering::Relaxed),
+            received: self.received.load(Ordering::Relaxed),
+            position_error: self.position_error(),
+            stretch: self.stretch(),
+        }
+    }
+
+    pub fn position_error(&self) -> f32 {
+        f32::from_bits(self.position_error.load(Ordering::Relaxed))
+    }
+
+    pub fn stretch(&self) -> Option<MeasuredStretch> {
+        let words = self.stretch.each_ref().map(|word| word.load(Ordering::Relaxed));
+        let epoch = self.epoch.load(Ordering::Relaxed);
+        let is_measured = words.first().is_some_and(|&sigma| !f32::from_bits(sigma).is_nan());
+        is_measured.then(|| MeasuredStretch::from_words(&words, epoch))
+    }
+}

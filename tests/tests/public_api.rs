@@ -1,0 +1,168 @@
+//! The public items of both crates are those of `docs/public-api.txt`. `DIBS_WRITE=1` writes it anew.
+//!
+//! An item is what has a path: a type, trait, function, constant or macro, not its methods and fields.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::{env, fs};
+
+use syn::{Attribute, Item, UseTree, Visibility};
+
+const REPOSITORY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+
+/// The core crate has fewer items than this.
+const MOST: usize = 130;
+
+#[test]
+fn the_public_items_are_those_that_are_listed() {
+    let [core, builder] = ["dibs-nostd", "dibs-build"].map(|package| {
+        let source = Path::new(REPOSITORY).join(package).join("src");
+        let mut listing = Listing::default();
+        let name = package.replace('-', "_");
+        listing.module(&source.join("lib.rs"), &source, &name);
+        listing.macros(&source, &name);
+        assert!(listing.missing.is_empty(), "without a file: {:?}", listing.missing);
+        listing.items
+    });
+    assert!(core.contains("dibs_nostd::Query") && core.contains("dibs_nostd::wire::Deframer"));
+    assert!(core.contains("dibs_nostd::include_tree!") && builder.contains("dibs_build::Builder"));
+    assert!(core.len() < MOST, "{} public items", core.len());
+    let lines: Vec<&str> = core.iter().chain(&builder).map(String::as_str).collect();
+    let listing = lines.join("\n") + "\n";
+    let path = Path::new(REPOSITORY).join("docs/public-api.txt");
+    if env::var_os("DIBS_WRITE").is_some() {
+        fs::write(path, listing).expect("writable");
+    } else {
+        let listed = fs::read_to_string(path).unwrap_or_default();
+        assert!(
+            listed == listing,
+            "write it anew with DIBS_WRITE=1, or hide what is new:\n{listing}"
+        );
+    }
+}
+
+#[derive(Default)]
+struct Listing {
+    items: BTreeSet<String>,
+    /// Public modules whose file was not found.
+    missing: Vec<String>,
+}
+
+impl Listing {
+    /// Lists a module: its file, and the folder of its submodules.
+    fn module(&mut self, file: &Path, folder: &Path, path: &str) {
+        let Ok(text) = fs::read_to_string(file) else {
+            self.missing.push(path.to_owned());
+            return;
+        };
+        let code = syn::parse_file(&text).expect("it compiles");
+        self.items(&code.items, folder, path);
+    }
+
+    fn items(&mut self, items: &[Item], folder: &Path, path: &str) {
+        for item in items {
+            let (visibility, attributes, name) = match item {
+                Item::Use(item) if is_public(&item.vis) && !is_hidden(&item.attrs) => {
+                    self.uses(&item.tree, folder, path);
+                    continue;
+                }
+                Item::Mod(item) => {
+                    if is_public(&item.vis) && !is_hidden(&item.attrs) {
+                        let path = format!("{path}::{}", item.ident);
+                        match &item.content {
+                            Some((_, items)) => self.items(items, folder, &path),
+                            None => self.submodule(folder, &item.ident.to_string(), &path),
+                        }
+                    }
+                    continue;
+                }
+                Item::Struct(item) => (&item.vis, &item.attrs, &item.ident),
+                Item::Enum(item) => (&item.vis, &item.attrs, &item.ident),
+                Item::Trait(item) => (&item.vis, &item.attrs, &item.ident),
+                Item::Type(item) => (&item.vis, &item.attrs, &item.ident),
+                Item::Const(item) => (&item.vis, &item.attrs, &item.ident),
+                Item::Static(item) => (&item.vis, &item.attrs, &item.ident),
+                Item::Fn(item) => (&item.vis, &item.attrs, &item.sig.ident),
+                Item::Union(item) => (&item.vis, &item.attrs, &item.ident),
+                _ => continue,
+            };
+            if is_public(visibility) && !is_hidden(attributes) {
+                self.items.insert(format!("{path}::{name}"));
+            }
+        }
+    }
+
+    /// Exported macros, which are the crate's own wherever they stand.
+    fn macros(&mut self, source: &Path, name: &str) {
+        for file in fs::read_dir(source).expect("a folder") {
+            let path = file.expect("a file").path();
+            if path.extension().is_none_or(|extension| extension != "rs") {
+                continue;
+            }
+            let code = syn::parse_file(&fs::read_to_string(path).expect("text")).expect("compiles");
+            for item in code.items {
+                if let Item::Macro(item) = item
+                    && let Some(ident) = &item.ident
+                    && item.attrs.iter().any(|a| a.path().is_ident("macro_export"))
+                    && !is_hidden(&item.attrs)
+                {
+                    self.items.insert(format!("{name}::{ident}!"));
+                }
+            }
+        }
+    }
+
+    /// What a `pub use` brings; of a module, all that it has.
+    fn uses(&mut self, tree: &UseTree, folder: &Path, path: &str) {
+        match tree {
+            UseTree::Path(item) => {
+                let name = item.ident.to_string();
+                let inner = if name == "self" { folder.to_owned() } else { folder.join(name) };
+                self.uses(&item.tree, &inner, path);
+            }
+            UseTree::Name(item) => {
+                let (name, path) = (item.ident.to_string(), format!("{path}::{}", item.ident));
+                match module_file(folder, &name) {
+                    Some((file, folder)) => self.module(&file, &folder, &path),
+                    None => {
+                        self.items.insert(path);
+                    }
+                }
+            }
+            UseTree::Rename(item) => {
+                self.items.insert(format!("{path}::{}", item.rename));
+            }
+            UseTree::Group(group) => {
+                for tree in &group.items {
+                    self.uses(tree, folder, path);
+                }
+            }
+            UseTree::Glob(_) => self.missing.push(format!("{path}::*")),
+        }
+    }
+
+    fn submodule(&mut self, folder: &Path, name: &str, path: &str) {
+        match module_file(folder, name) {
+            Some((file, folder)) => self.module(&file, &folder, path),
+            None => self.missing.push(path.to_owned()),
+        }
+    }
+}
+
+/// The file of a module, and the folder of its submodules.
+fn module_file(folder: &Path, name: &str) -> Option<(PathBuf, PathBuf)> {
+    let inner = folder.join(name);
+    let files = [folder.join(format!("{name}.rs")), inner.join("mod.rs")];
+    Some((files.into_iter().find(|file| file.exists())?, inner))
+}
+
+fn is_public(visibility: &Visibility) -> bool {
+    matches!(visibility, Visibility::Public(_))
+}
+
+fn is_hidden(attributes: &[Attribute]) -> bool {
+    attributes.iter().any(|attribute| {
+        let list = attribute.meta.require_list();
+        attribute.path().is_ident("doc") && list.is_ok_and(|l| l.tokens.to_string() == "hidden")
+    })
+}
