@@ -17,6 +17,7 @@ pub use gate::{Arriving, Changed, Gate, Unchecked, Verdict};
 use kernel::Worst;
 pub use limits::SurfaceLimits;
 pub use monitor::StretchMonitor;
+#[cfg(feature = "modes")]
 pub(crate) use motion::farthest;
 use regions::{of_regions, region_rows};
 
