@@ -81,22 +81,12 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         tool: &T,
         options: &Options,
     ) -> Result<Proximity, QueryError> {
-        Ok(self.closest_on_table(vertices, tool, options)?.of_table(vertices))
-    }
-
-    /// The same for positions without an error.
-    #[inline(always)]
-    fn closest_on_table<V: VertexTable + ?Sized, T: Tool>(
-        &mut self,
-        vertices: &V,
-        tool: &T,
-        options: &Options,
-    ) -> Result<Proximity, QueryError> {
         let first = options.first(self.triangle);
         let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options, first)?;
         let found = search.run()?;
         self.triangle = found.triangle.or(self.triangle);
-        signed(&self.tree, &mut self.stack, vertices, tool, options, found)
+        let error = vertices.position_error();
+        signed(&self.tree, &mut self.stack, vertices, tool, options, found, error)
     }
 
     /// As [`closest`](Self::closest), in batches of up to seven subtrees: for processors that overlap instructions
@@ -119,12 +109,13 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options, first)?;
         let found = WideSearch::new(search).run()?;
         self.triangle = found.triangle.or(self.triangle);
-        let found = signed(&self.tree, &mut self.stack, vertices, tool, options, found)?;
-        Ok(found.of_table(vertices))
+        let error = vertices.position_error();
+        signed(&self.tree, &mut self.stack, vertices, tool, options, found, error)
     }
 }
 
-/// The answer with its side and what follows from it.
+/// The answer with its side and what follows from it, all decided on the positions as they are; `error` is theirs,
+/// and joins the accuracy in the end.
 #[inline(never)]
 fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     tree: &Tree<'_, I>,
@@ -133,6 +124,7 @@ fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     tool: &T,
     options: &Options,
     mut found: Proximity,
+    error: f32,
 ) -> Result<Proximity, QueryError> {
     let reason = if !options.is_signed {
         Some(NoSide::NotAsked)
@@ -145,10 +137,13 @@ fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     };
     if let Some(reason) = reason {
         found.side = Side::Undefined(reason);
+        found.accuracy += error;
         return Ok(found);
     }
     if found.axis_distance <= found.accuracy && tool.axis_length() > 0.0 {
-        return Depth::new(tree, stack, vertices, tool, options, &found).run();
+        let mut found = Depth::new(tree, stack, vertices, tool, options, &found).run()?;
+        found.accuracy += error;
+        return Ok(found);
     }
     let on_axis = tool.axis_point(found.axis_parameter);
     let at = side::of_point(tree, vertices, &found, on_axis)?;
@@ -161,5 +156,6 @@ fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
         found.separation = -found.axis_distance - tool.radius();
         found.lower = found.separation;
     }
+    found.accuracy += error;
     Ok(found)
 }

@@ -3,7 +3,6 @@
 use glam::Vec3;
 
 use super::Side;
-use crate::VertexTable;
 
 /// The closest pair between a tool and a surface, with a certified interval for its separation.
 ///
@@ -73,12 +72,5 @@ impl Proximity {
     pub fn widened(mut self, error: f32) -> Self {
         self.accuracy += error;
         self
-    }
-
-    /// The same pair, as accurate as the positions are that it was found on.
-    #[inline(always)]
-    pub(super) fn of_table<V: VertexTable + ?Sized>(self, vertices: &V) -> Self {
-        let error = vertices.position_error();
-        if error > 0.0 { self.widened(error) } else { self }
     }
 }

@@ -264,10 +264,10 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         if !self.tree.has_adjacency() {
             return Err(QueryError::NoAdjacency);
         }
-        let closest = self.closest_on_table(vertices, tool, options)?;
-        let accuracy = closest.accuracy;
-        let closest = closest.of_table(vertices);
+        let closest = self.closest(vertices, tool, options)?;
         found.accuracy = closest.accuracy;
+        // What follows is decided on the positions as they are.
+        let accuracy = closest.accuracy - vertices.position_error();
         if closest.side == Side::Inside || closest.lower > margin {
             found.bound = margin;
             if let Some(contact) = Contact::at(&closest).filter(|at| at.separation <= margin) {

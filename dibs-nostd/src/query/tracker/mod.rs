@@ -185,8 +185,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
                 (self.whole(surface, tool, options, best, tests)?, false)
             }
         };
-        let closest = signed(&self.tree, &mut self.stack, surface, tool, options, closest)?;
-        let closest = closest.of_table(surface);
+        let error = surface.position_error();
+        let closest = signed(&self.tree, &mut self.stack, surface, tool, options, closest, error)?;
         self.behind = if is_complete { 0 } else { self.behind.saturating_add(moved) };
         self.last = travel.map(|travel| Last::new(tool, travel));
         Ok(Tracked { closest, fallback, opened: self.front.borrow().used() as u32 })
