@@ -85,6 +85,8 @@ mod device {
     pub const NVIC_PRIO_BITS: u8 = 3;
     #[derive(Clone, Copy)]
     pub enum Interrupt { UART0 }
+    pub use self::Interrupt as interrupt;
+    use cortex_m_rt as _;
     unsafe impl cortex_m::interrupt::InterruptNumber for Interrupt {
         fn number(self) -> u16 { self as u16 }
     }
