@@ -64,7 +64,7 @@ impl Effort {
         board_faults: 1,
         demo_seconds: 5,
         fault_seconds: 20,
-        fuzz_seconds: 60,
+        fuzz_seconds: 20,
         is_record: false,
         share: 0,
     };
