@@ -1,11 +1,12 @@
-//! One error for a program that tells no two of them apart.
+//! One error type that every error of this crate becomes by `?`.
 
 use core::fmt;
 
-/// Defines [`Error`], its `From` of each error that it holds, and what it says: the words of that error.
+/// Defines [`Error`] with a variant for each error type, and for each variant its `From` and its message, which is the
+/// inner error's.
 macro_rules! errors {
     ($($(#[doc = $text:literal])+ $(#[cfg($when:meta)])? $name:ident($error:ty),)+) => {
-        /// Any error of this crate: for a program that says what went wrong and stops, or a loop that leaves its tick.
+        /// Any error of this crate. A program that only reports an error, or skips a tick, needs no other type.
         ///
         /// ```
         /// use dibs_nostd::{Error, Options, Query, Sphere, Tree, glam::Vec3};
@@ -51,7 +52,7 @@ errors! {
     /// Buffers were split twice.
     Split(crate::SplitError),
     /// A frame has more vertices than its buffers.
-    OutOfTableError(crate::OutOfTableError),
+    OutOfTable(crate::OutOfTableError),
     /// A frame was not published.
     Publish(crate::PublishError),
     /// A stretch is beyond its limit, or was not measured.

@@ -91,7 +91,7 @@ pub use surface::{
     QuantisedVertices, REGIONS, SplitError, Step, Travel, VertexTable,
 };
 pub use tool::{ACCURACY, AxisPair, Capsule, MAX_COORDINATE, Sphere, Tool, ToolError};
-/// The bytes of a tree, for its builder: no part of what stays the same from version to version.
+/// The layout of a tree's bytes, for `dibs-build`. It may change with any version.
 #[doc(hidden)]
 pub use tree::format;
 pub use tree::{CorruptTreeError, FormatError, Index, PathKind, Scrub, Tree, TreeBytes};

@@ -134,8 +134,7 @@ fn modal_source(ModesSummary { count, position_error, .. }: &ModesSummary) -> St
     ::dibs_nostd::if_modes! {{
     /// The types for a surface that {count} weights drive, within {position_error} of the recorded motion.
     pub mod modal {{
-        #[allow(unused_imports)]
-        use super::{{Index, MODES}};
+        use super::MODES;
 
         /// Two buffers for the weights.
         pub type Surface = ::dibs_nostd::Frames<MODES>;
@@ -150,7 +149,7 @@ fn modal_source(ModesSummary { count, position_error, .. }: &ModesSummary) -> St
             /// Publishes frames whose weights, and the stretch that follows from them, are within their limits.
             pub type Receiver<'t> = ::dibs_nostd::Assembler<
                 'static,
-                ::dibs_nostd::modes::ModalGate<'static, ::dibs_nostd::StretchMonitor<'t, Index>, MODES>,
+                ::dibs_nostd::modes::ModalGate<'static, ::dibs_nostd::StretchMonitor<'t, super::Index>, MODES>,
                 MODES,
             >;
         }}

@@ -7,7 +7,7 @@ use crate::surface::VertexTable;
 /// Admits weights within their ranges whose surface keeps to the stretch limit, and to a speed limit: the
 /// [`Gate`] of an [`Assembler`](crate::Assembler) of modal frames.
 ///
-/// [`Modes::stretch_bound`] and a bound on how far any vertex moved decide in O(modes), whatever the number of
+/// [`Modes::stretch_bound`] and a bound on the vertices' motion decide in O(modes), whatever the number of
 /// triangles. Only where one of them is beyond its limit, and so cannot tell, is the surface measured by another
 /// gate `G`, in slices if that is a [`StretchMonitor`](crate::StretchMonitor): between the two nothing is refused
 /// that is within the limits, and no frame admitted that is stretched or moved beyond them.
@@ -24,8 +24,8 @@ pub struct ModalGate<'a, G, const K: usize> {
 }
 
 impl<'a, G, const K: usize> ModalGate<'a, G, K> {
-    /// A gate for surfaces of exactly `K` modes. `exact` measures those of which the bounds cannot tell:
-    /// the tree, or a monitor of it, which has a limit on speed.
+    /// A gate for surfaces of exactly `K` modes. `exact`, the tree or a monitor of it, measures the surfaces that the
+    /// bounds do not decide. Only a monitor limits the speed.
     ///
     /// # Errors
     /// [`WeightsError::Count`] for another number of modes.

@@ -114,8 +114,8 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     }
 }
 
-/// The answer with its side and what follows from it, all decided on the positions as they are; `error` is theirs,
-/// and joins the accuracy in the end.
+/// Adds the side, and the signed separation that follows from it. Both are decided on the positions in the table;
+/// `error`, the table's position error, is added to the accuracy last.
 #[inline(never)]
 fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     tree: &Tree<'_, I>,

@@ -66,7 +66,7 @@ impl Options {
         }
     }
 
-    /// The same, but cold: what a query answered before makes no difference, to the cost either.
+    /// The same options with a cold start: neither answer nor cost depends on earlier queries.
     #[must_use]
     pub const fn cold() -> Self {
         Self::new().warm_start(None)
@@ -90,7 +90,7 @@ impl Options {
         self
     }
 
-    /// The triangle that a query tests first whose last answer was on `last`.
+    /// The triangle to test first, for a query whose last answer was on the triangle `last`.
     pub(super) const fn first(&self, last: Option<u32>) -> Option<u32> {
         match self.first {
             First::Last => last,

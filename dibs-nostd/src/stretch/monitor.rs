@@ -31,8 +31,7 @@ const _: () = assert!(REGIONS == u32::BITS as usize);
 /// [`measure_stretch`](super::measure_stretch) on the whole surface, but for the few parts in a million that are
 /// added for rounding, which depend on where a region began; from the same frames always the same bits.
 ///
-/// Of a frame's rows those that came are compared with the published ones; see [`SurfaceLimits`] for what is and what is
-/// not refused.
+/// The rows that a frame brings are compared with the published ones; [`SurfaceLimits`] lists the refusals.
 ///
 /// Cost: [`advance`](Gate::advance) checks at most as many rows and triangles as it is told, and takes
 /// O([`REGIONS`]) besides. RAM: half a kilobyte at most, whatever the surface. Making one takes one pass over
