@@ -24,7 +24,8 @@ pub mod telemetry;
 mod upkeep;
 
 pub use control::{
-    Control, SILENCE_LIMIT, SILENCE_WARNING, SURFACE_AGE_LIMIT, SURFACE_AGE_WARNING, SetupError,
+    BUDGET, Control, SILENCE_LIMIT, SILENCE_WARNING, SURFACE_AGE_LIMIT, SURFACE_AGE_WARNING,
+    SetupError, TICK_INSTRUCTIONS,
 };
 pub use fingerprint::fingerprint;
 pub use instrument::instrument;

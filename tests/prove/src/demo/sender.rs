@@ -140,6 +140,12 @@ fn send_all(
     let interval = (TICK_RATE as f32 / scene.rate) as u32;
     let rate = if faults.is_some() { Plan::RATE } else { 0.0 };
     let mut silence = faults.map(Plan::silence_at);
+    // Every frame is to echo a status: the controller does not trust one of which it cannot tell how long it took.
+    while sender.status().is_none() {
+        if !rest(link, sender) {
+            return Ok(());
+        }
+    }
     for positions in scene.motion.frames.iter().cycle() {
         let start = link.now();
         // The last frame before the silence comes through, and the first after it: what is measured is the
