@@ -10,7 +10,7 @@ fn main() -> io::Result<()> {
         fs::copy("../../memory.x", out.join("memory.x"))?;
         println!("cargo:rustc-link-search={}", out.display());
         for argument in ["--nmagic", "-Tlink.x"] {
-            for name in ["probe", "torn", "receive", "bus", "track"] {
+            for name in ["probe", "torn", "receive", "bus", "track", "tick"] {
                 println!("cargo:rustc-link-arg-bin={name}={argument}");
             }
         }

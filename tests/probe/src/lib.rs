@@ -7,6 +7,7 @@
 
 pub mod bus;
 pub mod receive;
+pub mod tick;
 pub mod track;
 
 use dibs_nostd::glam::Vec3;

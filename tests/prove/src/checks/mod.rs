@@ -19,6 +19,7 @@ mod receive;
 mod rot;
 mod sanitizers;
 mod stack;
+mod ticks;
 mod torn;
 
 use crate::harness::Check;
@@ -29,6 +30,7 @@ pub const CHECKS: &[Check] = &[
     cost::BOARD,
     cost::HOST,
     path::CHECK,
+    ticks::CHECK,
     bits::CHECK,
     link::CHECK,
     stack::CHECK,

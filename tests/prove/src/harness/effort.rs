@@ -1,7 +1,7 @@
 //! How much is tried.
 
 /// Sizes of the checks.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub struct Effort {
     /// Cases on this computer.
     pub cases: usize,
@@ -15,6 +15,8 @@ pub struct Effort {
     pub ticks: u32,
     /// Adversarial poses on the board.
     pub poses: usize,
+    /// Frames chosen to make the firmware's tick dear.
+    pub tick_frames: usize,
     /// Queries under which frames are published.
     pub torn: u32,
     /// Faults of each kind on the bus of this computer.
@@ -42,6 +44,7 @@ impl Effort {
         host_costs: 100_000,
         ticks: 2_000,
         poses: 10_000,
+        tick_frames: 400,
         torn: 100_000,
         faults: 100_000,
         board_faults: 100,
@@ -59,6 +62,7 @@ impl Effort {
         host_costs: 5_000,
         ticks: 250,
         poses: 1_000,
+        tick_frames: 40,
         torn: 8_000,
         faults: 300,
         board_faults: 1,
@@ -81,6 +85,7 @@ impl Effort {
             host_costs: wide(self.host_costs, least.host_costs),
             ticks: narrow(self.ticks, least.ticks),
             poses: wide(self.poses, least.poses),
+            tick_frames: wide(self.tick_frames, least.tick_frames),
             torn: narrow(self.torn, least.torn),
             faults: (self.faults / u64::from(share)).max(least.faults),
             board_faults: (self.board_faults / u64::from(share)).max(least.board_faults),

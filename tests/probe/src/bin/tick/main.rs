@@ -1,0 +1,78 @@
+//! The firmware's own receiver and control tick on the emulated board, fed from a script instead of a line: what a tick
+//! takes on frames that were chosen to make it dear.
+//!
+//! Reads commands from `script.bin`, in little-endian words ([`probe::tick`]), and writes an answer for each tick to
+//! `answers.bin`. With `-icount shift=6` the clock counts 1.6 to an instruction.
+#![no_std]
+#![no_main]
+
+#[path = "../board/clock.rs"]
+mod clock;
+#[path = "../board/exit.rs"]
+mod exit;
+#[path = "../board/files.rs"]
+mod files;
+
+use controller::surface::{self, Surface};
+use controller::{BusStatus, Control, Receiver};
+use cortex_m_rt::entry;
+use exit::exit;
+use probe::tick::{ANSWER_WORDS, BYTES, END, SKIP, TICK};
+
+static FRAMES: Surface = Surface::new();
+static BUS: BusStatus = BusStatus::new();
+
+#[entry]
+fn main() -> ! {
+    static mut TREE: Option<surface::Tree> = None;
+    clock::start();
+    let done = surface::TREE.validate().ok().and_then(|tree| run(TREE.insert(tree)));
+    exit(done.is_some());
+}
+
+fn run(tree: &'static surface::Tree) -> Option<()> {
+    let (writer, reader) = FRAMES.split().ok()?;
+    let mut receiver = Receiver::new(tree, writer, &BUS).ok()?;
+    let mut control = Control::new(tree, reader, &BUS).ok()?;
+    let mut script = files::Input::open()?;
+    let mut answers = files::Output::create()?;
+    loop {
+        match word(&mut script)? {
+            SKIP => control.skip(word(&mut script)?),
+            BYTES => {
+                let count = word(&mut script)?;
+                for _ in 0..count {
+                    let mut byte = [0];
+                    script.read(&mut byte)?;
+                    receiver.byte(byte[0], control.now());
+                }
+                while receiver.work() {}
+                let padding = count.wrapping_neg() as usize % 4;
+                script.read([0; 3].get_mut(..padding)?)?;
+            }
+            TICK => {
+                for _ in 0..word(&mut script)? {
+                    for word in tick(&mut control) {
+                        answers.write(&word.to_le_bytes())?;
+                    }
+                }
+            }
+            END => return answers.flush(),
+            _ => return None,
+        }
+    }
+}
+
+fn tick(control: &mut Control) -> [u32; ANSWER_WORDS] {
+    let start = clock::now();
+    let record = control.tick(clock::now);
+    let took = clock::now().wrapping_sub(start);
+    let epoch = if record.is_answered() { record.epoch } else { 0 };
+    [took, record.node_tests, record.triangle_tests, epoch]
+}
+
+fn word(script: &mut files::Input) -> Option<u32> {
+    let mut bytes = [0; 4];
+    script.read(&mut bytes)?;
+    Some(u32::from_le_bytes(bytes))
+}
