@@ -50,7 +50,7 @@ fn main() -> ExitCode {
         Task::Guarantees(passed) => prove::run("guarantees", &passed),
         Task::Profile(passed) => prove::run("profile", &passed),
         Task::Fuzz(options) => or_say(nightly::missing(), || nightly::fuzz_by_hand(&options)),
-        Task::Mutants(options) => mutants::whole(&options),
+        Task::Mutants(options) => mutants::mutants(&options),
         Task::Sanitize => or_say(nightly::missing(), nightly::sanitize_by_hand),
         Task::Miri => or_say(nightly::miri_missing(), nightly::miri),
     };

@@ -44,10 +44,24 @@ pub struct Options {
     /// Every mutant of these parts only, as `1/20`: the second twentieth.
     #[arg(long, default_value = "0/1")]
     shard: String,
+    /// Instead a few mutants of the lines that changed since `main`, or in the last commit.
+    #[arg(long, conflicts_with_all = ["below", "shard"])]
+    changed: bool,
+}
+
+/// Tries the mutants asked for.
+pub fn mutants(options: &Options) -> Result<()> {
+    if !options.changed {
+        return whole(options);
+    }
+    match sample()? {
+        Outcome::Skipped(reason) => bail!("no mutant was tried: {reason}"),
+        _ => Ok(()),
+    }
 }
 
 /// Tries every mutant of the folders asked for.
-pub fn whole(options: &Options) -> Result<()> {
+fn whole(options: &Options) -> Result<()> {
     install()?;
     let mut areas = 0;
     for (folder, tests) in AREAS {
@@ -55,7 +69,7 @@ pub fn whole(options: &Options) -> Result<()> {
             let below = if folder.len() > options.below.len() { folder } else { &options.below };
             let is_file = workspace::root().join(below).is_file();
             let filter = if is_file { below.to_owned() } else { format!("{below}/**") };
-            run(&mut mutants(&["--file", &filter, "--shard", &options.shard], tests))
+            run(&mut command(&["--file", &filter, "--shard", &options.shard], tests))
                 .with_context(|| format!("mutants of {below} survive: see target/mutants.out"))?;
             areas += 1;
         }
@@ -80,11 +94,11 @@ pub fn sample() -> Result<Outcome> {
     for (folder, tests) in AREAS {
         let filter = format!("{folder}/**");
         let changed = ["--file", &filter, "--in-diff", &diff];
-        let mut list = mutants(&[&changed[..], &["--list"]].concat(), &[]);
+        let mut list = command(&[&changed[..], &["--list"]].concat(), &[]);
         let count = quiet(&mut list, Duration::from_secs(120))?.lines().count();
         if count > 0 && tried < SAMPLE {
             let shard = format!("0/{}", count.div_ceil(SAMPLE - tried));
-            let mut trial = mutants(&[&changed[..], &["--shard", &shard]].concat(), tests);
+            let mut trial = command(&[&changed[..], &["--shard", &shard]].concat(), tests);
             let status = trial.status().context("cannot start cargo-mutants")?;
             match status.code() {
                 Some(0) => (),
@@ -101,7 +115,7 @@ pub fn sample() -> Result<Outcome> {
 }
 
 /// `cargo mutants` on the core, with these tests and the core's own.
-fn mutants(arguments: &[&str], tests: &[&str]) -> Command {
+fn command(arguments: &[&str], tests: &[&str]) -> Command {
     let mut cargo = Command::new("cargo");
     cargo.current_dir(workspace::root());
     // What is built of others' crates serves the mutants too.
