@@ -46,6 +46,12 @@ enum Task {
         #[arg(long)]
         steps: PathBuf,
     },
+    /// Runs those checks that run beside the others, for another process.
+    #[command(hide = true)]
+    Beside {
+        /// Through which the two talk.
+        folder: PathBuf,
+    },
 }
 
 fn main() -> ExitCode {
@@ -61,6 +67,7 @@ fn main() -> ExitCode {
             steps.run("demo on this computer", || demo::on_host(demo_seconds));
             steps.write(&file)
         }
+        Task::Beside { folder } => harness::lanes::run(&folder),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -51,6 +51,15 @@ pub const CHECKS: &[Check] = &[
     instructions::CHECK,
 ];
 
+/// Names of the checks that build and run programs of their own, and take the other core.
+pub const BESIDE: [&str; 5] = [
+    sanitizers::ADDRESS.name,
+    sanitizers::THREAD.name,
+    interleavings::CHECK.name,
+    miri::CHECK.name,
+    fuzz::CHECK.name,
+];
+
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;

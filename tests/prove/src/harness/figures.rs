@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 /// Figures by name: numbers, and a few texts.
-#[derive(Default)]
+#[derive(Default, Serialize, Deserialize)]
 pub struct Figures {
     measured: BTreeMap<String, Value>,
 }
@@ -21,6 +22,11 @@ impl Figures {
     pub fn text(&mut self, name: &str, value: String) {
         println!("{name}: {value}");
         self.measured.insert(name.to_owned(), Value::from(value));
+    }
+
+    /// Takes over those of another run.
+    pub fn append(&mut self, mut other: Self) {
+        self.measured.append(&mut other.measured);
     }
 
     /// A figure, if it was measured.

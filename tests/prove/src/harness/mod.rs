@@ -5,6 +5,7 @@
 mod effort;
 mod faults;
 pub mod figures;
+pub mod lanes;
 mod markdown;
 pub mod promise;
 pub mod record;
@@ -13,9 +14,10 @@ pub mod run;
 use anyhow::{Result, ensure};
 use xtask::steps::{Outcome, Steps};
 
-use crate::checks::CHECKS;
+use crate::checks::{BESIDE, CHECKS};
 pub use effort::Effort;
 use figures::Figures;
+use lanes::Beside;
 use promise::Promise;
 use record::Raise;
 use run::Run;
@@ -94,20 +96,39 @@ pub struct Measured {
     pub run: Run,
 }
 
-/// Runs the checks, each as a step.
+impl Measured {
+    /// Nothing yet.
+    fn new(run: Run) -> Self {
+        Self { figures: Figures::default(), skipped: Vec::new(), run }
+    }
+
+    /// Runs the checks with the names that are wanted, each as a step.
+    fn run_each(&mut self, effort: &Effort, is_wanted: impl Fn(&str) -> bool, steps: &mut Steps) {
+        for check in CHECKS.iter().filter(|check| is_wanted(check.name)) {
+            steps.run(check.name, || {
+                let outcome = (check.run)(effort, &mut self.figures)?;
+                if matches!(outcome, Outcome::Skipped(_)) {
+                    self.skipped.push(check.name);
+                }
+                let broken = check.broken(&self.figures);
+                ensure!(broken.is_empty(), "{}", broken.join("\n"));
+                Ok(outcome)
+            });
+        }
+    }
+}
+
+/// Runs the checks: all, in two lanes, or those whose names contain `only`.
 fn run(effort: &Effort, only: Option<&str>, steps: &mut Steps) -> Measured {
-    let run = Run::now(effort.size());
-    let mut measured = Measured { figures: Figures::default(), skipped: Vec::new(), run };
-    for check in CHECKS.iter().filter(|check| only.is_none_or(|only| check.name.contains(only))) {
-        steps.run(check.name, || {
-            let outcome = (check.run)(effort, &mut measured.figures)?;
-            if matches!(outcome, Outcome::Skipped(_)) {
-                measured.skipped.push(check.name);
-            }
-            let broken = check.broken(&measured.figures);
-            ensure!(broken.is_empty(), "{}", broken.join("\n"));
-            Ok(outcome)
-        });
+    let mut measured = Measured::new(Run::now(effort.size()));
+    if let Some(only) = only {
+        measured.run_each(effort, |name| name.contains(only), steps);
+        return measured;
+    }
+    let beside = Beside::start(effort);
+    measured.run_each(effort, |name| !BESIDE.contains(&name), steps);
+    if let Err(error) = beside.and_then(|beside| beside.join(&mut measured, steps)) {
+        steps.run("the checks beside", || Err(error));
     }
     measured
 }

@@ -1,0 +1,86 @@
+//! Two lanes of checks: most wait for one emulator, which takes one core; sanitizers, fuzzers and the model checker
+//! build and run programs of their own, in a process beside, whose output is shown once both have ended.
+
+use std::env;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command};
+
+use anyhow::{Context, Result, ensure};
+use serde::{Deserialize, Serialize};
+use xtask::steps::Steps;
+use xtask::workspace;
+
+use super::figures::Figures;
+use super::run::Run;
+use super::{Effort, Measured};
+use crate::checks::{BESIDE, CHECKS};
+
+/// Files through which the two processes talk.
+const EFFORT: &str = "effort.json";
+const FOUND: &str = "found.json";
+const STEPS: &str = "steps.txt";
+const LOG: &str = "log.txt";
+
+/// What the process beside has found.
+#[derive(Serialize, Deserialize)]
+struct Found {
+    figures: Figures,
+    skipped: Vec<String>,
+}
+
+/// The process beside.
+pub struct Beside {
+    process: Child,
+    folder: PathBuf,
+}
+
+impl Beside {
+    /// Starts it.
+    pub fn start(effort: &Effort) -> Result<Self> {
+        let folder = workspace::target().join("beside");
+        // So that nothing of an earlier run is taken for this one's.
+        if folder.exists() {
+            fs::remove_dir_all(&folder)?;
+        }
+        fs::create_dir_all(&folder)?;
+        fs::write(folder.join(EFFORT), serde_json::to_string(effort)?)?;
+        let log = File::create(folder.join(LOG))?;
+        let mut command = Command::new(env::current_exe()?);
+        command.arg("beside").arg(&folder).stdout(log.try_clone()?).stderr(log);
+        Ok(Self { process: command.spawn()?, folder })
+    }
+
+    /// Waits for it, and takes over its figures and steps.
+    pub fn join(mut self, measured: &mut Measured, steps: &mut Steps) -> Result<()> {
+        let status = self.process.wait()?;
+        let log = fs::read(self.folder.join(LOG))?;
+        print!("{}", String::from_utf8_lossy(&log));
+        ensure!(status.success(), "the process ended with {status}");
+        steps.read(&self.folder.join(STEPS))?;
+        let found: Found = read(&self.folder.join(FOUND))?;
+        measured.figures.append(found.figures);
+        let names = CHECKS.iter().map(|check| check.name);
+        measured
+            .skipped
+            .extend(names.filter(|&name| found.skipped.iter().any(|skipped| skipped == name)));
+        Ok(())
+    }
+}
+
+/// Does the work of the process beside.
+pub fn run(folder: &Path) -> Result<()> {
+    let effort: Effort = read(&folder.join(EFFORT))?;
+    let mut steps = Steps::default();
+    let mut measured = Measured::new(Run::now(effort.size()));
+    measured.run_each(&effort, |name| BESIDE.contains(&name), &mut steps);
+    let skipped = measured.skipped.iter().map(|&name| name.to_owned()).collect();
+    let found = Found { figures: measured.figures, skipped };
+    fs::write(folder.join(FOUND), serde_json::to_string(&found)?)?;
+    steps.write(&folder.join(STEPS))
+}
+
+fn read<T: for<'de> Deserialize<'de>>(file: &Path) -> Result<T> {
+    let text = fs::read_to_string(file).with_context(|| format!("no {}", file.display()))?;
+    serde_json::from_str(&text).with_context(|| format!("{} is not whole", file.display()))
+}
