@@ -94,6 +94,7 @@ pub const fn cause_code(cause: &Unavailable) -> u32 {
         Unavailable::Delayed { .. } => 9,
         Unavailable::SourceStale { .. } => 10,
         Unavailable::Forgeries { .. } => 11,
+        Unavailable::CutShort => 12,
         _ => 8,
     }
 }
@@ -113,6 +114,7 @@ pub const fn cause_name(code: u32) -> &'static str {
         9 => "delayed on its way",
         10 => "source stands still",
         11 => "forgeries",
+        12 => "budget too small",
         _ => "number not finite",
     }
 }

@@ -9,12 +9,16 @@ pub mod deform;
 #[cfg(feature = "builder")]
 pub mod dibs;
 #[cfg(feature = "builder")]
+pub mod hand;
+#[cfg(feature = "builder")]
 pub mod method;
 #[cfg(feature = "builder")]
 pub mod motions;
 pub mod oracle;
 #[cfg(feature = "builder")]
 pub mod poses;
+#[cfg(feature = "builder")]
+pub mod side_poses;
 pub mod sides;
 #[cfg(feature = "builder")]
 pub mod streams;

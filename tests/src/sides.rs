@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::oracle::{Instrument, OraclePair, exhaustive};
+use crate::oracle::{Instrument, OraclePair, closest_pair, exhaustive};
 
 /// How often a surface winds around a point: 1 inside a closed surface that faces outwards, 0 outside.
 ///
@@ -42,18 +42,13 @@ pub fn depth(positions: &[Vec3], triangles: &[[u32; 3]], point: Vec3) -> Option<
 
 /// The side of the nearest sheet: the sign of the angle-weighted pseudonormal at the closest point, by looking at all
 /// triangles. It differs from [`is_inside`] only where the surface cuts itself.
-///
-/// # Panics
-/// If there is no triangle.
 #[must_use]
-pub fn is_below(positions: &[Vec3], triangles: &[[u32; 3]], point: Vec3) -> bool {
-    let nearest = exhaustive(positions, triangles, &Instrument::sphere(point, 0.0));
-    let nearest = nearest.expect("has triangles");
+pub fn is_below(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -> bool {
     let corners = |triangle: [u32; 3]| triangle.map(|v| positions[v as usize].as_dvec3());
-    let is_at = |p: DVec3| p.distance(nearest.on_surface) < 1e-9;
-    let row = triangles[nearest.triangle];
+    let is_at = |p: DVec3| p.distance(pair.on_surface) < 1e-9;
+    let row = triangles[pair.triangle];
     let vertex = (0..3).find(|&i| is_at(corners(row)[i])).map(|i| row[i]);
-    let on_edge = |a: DVec3, b: DVec3| is_at(a + (b - a) * along(a, b, nearest.on_surface));
+    let on_edge = |a: DVec3, b: DVec3| is_at(a + (b - a) * along(a, b, pair.on_surface));
     let edge = (0..3).map(|i| (i, (i + 1) % 3));
     let edge = edge.into_iter().find(|&(i, j)| on_edge(corners(row)[i], corners(row)[j]));
     let mut sum = DVec3::ZERO;
@@ -69,11 +64,40 @@ pub fn is_below(positions: &[Vec3], triangles: &[[u32; 3]], point: Vec3) -> bool
             (None, Some((i, j))) => {
                 f64::from(u8::from(triangle.contains(&row[i]) && triangle.contains(&row[j])))
             }
-            (None, None) => f64::from(u8::from(number == nearest.triangle)),
+            (None, None) => f64::from(u8::from(number == pair.triangle)),
         };
         sum += normal * weight;
     }
-    (point.as_dvec3() - nearest.on_surface).dot(sum) < 0.0
+    (pair.on_axis - pair.on_surface).dot(sum) < 0.0
+}
+
+/// Whether the sheet nearest to a point proves that the surface cuts itself there.
+///
+/// A triangle parts what the surface winds around `k` times, above it, from what it winds around `k + 1` times. Where a
+/// closed surface that faces outwards does not cut itself, `k` is 0. Looked at are places next to the closest point, on
+/// each triangle that touches it, and as near to that triangle as to be within a fold.
+#[must_use]
+pub fn is_cut(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -> bool {
+    let winds = |at: DVec3| winding_number(positions, triangles, at);
+    let corners = |triangle: &[u32; 3]| triangle.map(|v| positions[v as usize].as_dvec3());
+    let proves = |triangle: &[u32; 3], (share, height): (f64, f64)| {
+        let [a, b, c] = corners(triangle);
+        let at = pair.on_surface.lerp((a + b + c) / 3.0, share);
+        let across = (b - a).cross(c - a);
+        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+        // A share of how far the place is from the triangle's edges.
+        let up = across.normalize_or_zero() * (across.length() / longest * share * height);
+        let (above, below) = (winds(at + up), winds(at - up));
+        // Only this sheet parts them so: no other is between the two places.
+        (below - above - 1.0).abs() < 0.1 && above.abs() > 0.9
+    };
+    let touches = |triangle: &&[u32; 3]| {
+        closest_pair(pair.on_surface, pair.on_surface, corners(triangle)).distance < 1e-9
+    };
+    let touching: Vec<_> = triangles.iter().filter(touches).collect();
+    [(1e-3, 3e-3), (1e-2, 1e-5), (1e-5, 3e-3), (1e-2, 1e-7)]
+        .into_iter()
+        .any(|place| touching.iter().any(|triangle| proves(triangle, place)))
 }
 
 /// Where a point is nearest to on the segment from `a` (0) to `b` (1).

@@ -87,3 +87,22 @@ pub fn slivers(rows: u32) -> Mesh {
     }
     Mesh { positions, triangles }
 }
+
+/// A square grid around the origin, each of its squares cut in two, as high as a function of x and y says.
+#[must_use]
+pub fn sheet(cells: u32, size: f32, height: impl Fn(f32, f32) -> f32) -> Mesh {
+    let at = |x: u32, y: u32| y * (cells + 1) + x;
+    let mut mesh = Mesh::default();
+    for y in 0..=cells {
+        for x in 0..=cells {
+            let place = |n: u32| (n as f32 / cells as f32 - 0.5) * size;
+            let (px, py) = (place(x), place(y));
+            mesh.positions.push(Vec3::new(px, py, height(px, py)));
+            if x < cells && y < cells {
+                let (a, b, c, d) = (at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1));
+                mesh.triangles.extend([[a, b, d], [a, d, c]]);
+            }
+        }
+    }
+    mesh
+}

@@ -1,13 +1,15 @@
-//! Contacts against an exhaustive list in f64, and what a force of all of them holds that one of them does not.
+//! Contacts against an exhaustive list in f64, and their force and inequalities.
 
 use std::collections::HashMap;
 
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
-use dibs_nostd::constraint::{ForbiddenRegion, Proxy, SpringDamper, VelocityRow};
+use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, Proxy, SpringDamper, VelocityRow};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Budget, Capsule, Contacts, Options, Query, QueryError, Side, Sphere};
+use dibs_nostd::{
+    Budget, Capsule, Contacts, Options, Query, QueryError, Side, Sphere, Unavailable,
+};
 use dibs_tests::oracle::closest_pair;
-use dibs_tests::surfaces::{self, ball};
+use dibs_tests::surfaces::{self, ball, sheet};
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -81,24 +83,6 @@ fn valleys(rows: &[Vec3], triangles: &[[u32; 3]], tool: [Vec3; 2]) -> (Vec<Valle
         Valley { distance: pairs[row].distance, ridge, up: normal.dot(towards) }
     });
     (found.collect(), labels)
-}
-
-/// A grid of squares, each cut in two, bent by a function of x and y.
-fn sheet(cells: u32, size: f32, height: impl Fn(f32, f32) -> f32) -> Mesh {
-    let at = |x: u32, y: u32| y * (cells + 1) + x;
-    let mut mesh = Mesh::default();
-    for y in 0..=cells {
-        for x in 0..=cells {
-            let place = |n: u32| (n as f32 / cells as f32 - 0.5) * size;
-            let (px, py) = (place(x), place(y));
-            mesh.positions.push(Vec3::new(px, py, height(px, py)));
-            if x < cells && y < cells {
-                let (a, b, c, d) = (at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1));
-                mesh.triangles.extend([[a, b, d], [a, d, c]]);
-            }
-        }
-    }
-    mesh
 }
 
 fn build(mesh: &Mesh) -> (BuiltTree, Vec<Vec3>) {
@@ -244,6 +228,11 @@ fn a_short_list_and_a_short_budget_state_what_still_holds() {
     let mut few = Contacts::<3, 4096>::new();
     query.contacts(rows.as_slice(), &tool, MARGIN, &Options::cold(), &mut few).expect("an answer");
     assert!(few.is_full() && few.bound() < MARGIN && few.len() == 3);
+    assert_eq!(few.within(MARGIN).expect("the deepest are known").count(), 3);
+    let farther = few.within(2.0 * MARGIN).err();
+    let margin = QueryError::Margin { bits: (2.0 * MARGIN).to_bits() };
+    assert_eq!(farther, Some(Unavailable::Query(margin)));
+    assert_eq!(Contacts::<3>::new().within(0.0).err(), Some(Unavailable::CutShort));
     assert_eq!(holds(&few.iter().map(|c| c.separation).collect::<Vec<_>>(), few.bound()), 3);
     let mut near = Contacts::<64, 60>::new();
     query.contacts(rows.as_slice(), &tool, MARGIN, &Options::cold(), &mut near).expect("an answer");
@@ -254,9 +243,55 @@ fn a_short_list_and_a_short_budget_state_what_still_holds() {
         let options = Options::cold().budget(Budget { node_tests, triangle_tests: node_tests / 4 });
         query.contacts(rows.as_slice(), &tool, MARGIN, &options, &mut near).expect("an answer");
         cut_short += usize::from(near.bound() < MARGIN);
+        let refused = near.within(MARGIN).err();
+        assert!(
+            refused.is_none() || refused == Some(Unavailable::CutShort) && near.bound() < MARGIN
+        );
         holds(&near.iter().map(|c| c.separation).collect::<Vec<_>>(), near.bound());
     }
     assert!(cut_short > 20, "{cut_short}");
+}
+
+/// Inside, what a short budget found nearest would lead in.
+#[test]
+fn no_budget_turns_the_force_inwards() {
+    let mesh = ball(4);
+    let (built, rows) = build(&mesh);
+    let tree = built.tree::<u16>().expect("valid");
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut contacts = Contacts::<8>::new();
+    let spring = SpringDamper::new(1.0, 0.0, 50.0).expect("valid gains");
+    let (wall, proxy) = (ForbiddenRegion::new(spring, 5.0), Proxy::new(spring, 5.0));
+    let (wall, proxy) = (wall.expect("a valid margin"), proxy.expect("a valid margin"));
+    let out = Vec3::new(0.3, 0.2, 0.9).normalize();
+    let (mut held, mut pushed) = (0, 0);
+    for height in [-12.0, -3.0, -0.5, 0.5, 4.0] {
+        let tool = Sphere::new(out * (40.0 + height), 1.0).expect("valid");
+        for node_tests in 0..150 {
+            let budget = Budget { node_tests, triangle_tests: node_tests / 4 };
+            let options = Options::cold().budget(budget);
+            let closest = query.contacts(rows.as_slice(), &tool, 5.0, &options, &mut contacts);
+            let closest = closest.expect("a short budget is no error");
+            let alone = wall.force(&Ok(closest), Vec3::ZERO);
+            let accuracy = contacts.accuracy();
+            let within = contacts.within(5.0);
+            let all = proxy.wrench(within, accuracy, tool.center(), Vec3::ZERO, Vec3::ZERO);
+            let forces = [(alone.force, alone.state), (all.force, all.state)];
+            for (force, state) in forces {
+                if state == ConstraintState::Safe(Unavailable::CutShort) {
+                    held += 1;
+                    continue;
+                }
+                pushed += 1;
+                let enough = 0.9 * (5.0 - (height - 1.0));
+                assert!(
+                    force.dot(out) > enough.max(0.0),
+                    "{height}, {budget:?}: {force} {closest:?}"
+                );
+            }
+        }
+    }
+    assert!(held > 50 && pushed > 50, "{held} {pushed}");
 }
 
 #[test]
@@ -293,78 +328,6 @@ fn what_cannot_be_asked_is_named() {
     let refused = query.contacts(rows.as_slice(), &tool, 5.0, &Options::cold(), &mut contacts);
     assert!(matches!(refused, Err(QueryError::Position { .. })), "{refused:?}");
     assert!(contacts.is_empty());
-}
-
-const TICK: f32 = 0.001;
-/// N, below the saturation.
-const PUSH: f32 = 2.0;
-const MOST: f32 = 5.0;
-
-/// A hand of 200 g that pushes a sphere down into something for four seconds. Returns the least signed separation and
-/// how much the force changed from one tick to the next at most, after first contact.
-fn pushed(mesh: &Mesh, from: Vec3, by_all: bool) -> (f32, f32) {
-    let (built, rows) = build(mesh);
-    let tree = built.tree::<u16>().expect("valid");
-    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
-    let mut contacts = Contacts::<8>::new();
-    let spring = SpringDamper::new(2.0, 0.002, MOST).expect("valid gains");
-    let proxy = Proxy::new(spring, 3.0).expect("a valid margin");
-    let alone = ForbiddenRegion::new(spring, 3.0).expect("a valid margin");
-    let (mass, damping) = (2e-4, 0.006);
-    let (mut at, mut velocity, mut least, mut step) = (from, Vec3::ZERO, f32::INFINITY, 0.0);
-    let mut before: Option<Vec3> = None;
-    for _ in 0..4_000 {
-        let tool = Sphere::new(at, 1.0).expect("valid");
-        let closest = query
-            .contacts(rows.as_slice(), &tool, 3.0, &Options::cold(), &mut contacts)
-            .expect("an answer");
-        least = f32::min(least, closest.separation);
-        let force = if by_all {
-            let accuracy = contacts.accuracy();
-            proxy.wrench(Ok(contacts.iter()), accuracy, at, velocity, Vec3::ZERO).force
-        } else {
-            alone.force(&Ok(closest), velocity).force
-        };
-        if let Some(before) = before {
-            step = f32::max(step, before.distance(force));
-        }
-        before = Some(force).filter(|force| force.length() > 0.0);
-        let all = force - Vec3::Z * PUSH - velocity * damping;
-        velocity += all * (TICK / mass);
-        at += velocity * TICK;
-        if at.z < -20.0 {
-            break;
-        }
-    }
-    (least, step)
-}
-
-/// A narrow groove: its walls lean 12 degrees from upright, so one of them alone cannot bear the hand.
-#[test]
-fn a_hand_does_not_get_through() {
-    let flat = sheet(20, 60.0, |_, _| 0.0);
-    let groove = sheet(40, 40.0, |x, _| 4.7 * x.abs());
-    let corner = sheet(40, 40.0, |x, y| x.abs() + y.abs());
-    let mut results = Vec::new();
-    for (name, mesh, from) in [
-        ("flat wall", &flat, Vec3::new(0.3, 0.2, 4.6)),
-        ("sphere", &ball(4), Vec3::new(0.4, 0.3, 44.6)),
-        ("corner", &corner, Vec3::new(0.5, 0.4, 12.0)),
-        ("groove", &groove, Vec3::new(0.2, 0.3, 30.0)),
-    ] {
-        for by_all in [true, false] {
-            let (least, step) = pushed(mesh, from, by_all);
-            let which = if by_all { "all contacts" } else { "closest pair" };
-            println!(
-                "{name:10} {which}: separation at least {least:.3} mm, largest step {step:.3} N"
-            );
-            results.push((name, by_all, least));
-        }
-    }
-    for &(name, by_all, least) in &results {
-        assert!(!by_all || least > -1.0, "{name}: the centre went through, {least}");
-    }
-    assert!(results.iter().any(|&(_, by_all, least)| !by_all && least < -1.0));
 }
 
 /// Twice the same wall is that wall, and no force where nothing is near.

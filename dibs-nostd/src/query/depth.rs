@@ -1,9 +1,10 @@
 //! How deep a capsule's axis reaches below the surface that it crosses.
 //!
-//! The depth along the axis, positive inside and negative outside, changes by at most the way along it, and is at
-//! most the distance to any one point of the surface. So what is known at two points bounds it between them, and the
-//! part of the axis with the highest bound is divided next (Piyavskii and Shubert, with the second bound besides)
-//! until no part can be deeper than the deepest point found by more than the tolerance.
+//! The depth along the axis, positive inside and negative outside, changes by at most the way along it, and is at most
+//! the distance to any one triangle of the surface. That distance is convex along the axis, so the triangles that are
+//! closest to two points bound the depth between them. The part of the axis with the highest bound is divided next
+//! (Piyavskii and Shubert, with the second bound besides) until no part can be deeper than the deepest point found by
+//! more than the tolerance.
 
 use glam::Vec3;
 
@@ -15,8 +16,8 @@ use crate::tool::{AxisPoint, Tool};
 use crate::unavailable::QueryError;
 use crate::{Index, Tree, VertexTable};
 
-/// Most points of the axis that are looked at besides its ends.
-const MAX_POINTS: usize = 24;
+/// Most points of the axis that are looked at, its ends and the point where it meets the surface among them.
+const POINTS: usize = 28;
 
 /// The tolerance, unless it is chosen: this part of the axis' length.
 const TOLERANCE: f32 = 1.0 / 512.0;
@@ -24,62 +25,96 @@ const TOLERANCE: f32 = 1.0 / 512.0;
 /// How near to an end a part is divided, as a part of its length.
 const NEAREST_SPLIT: f32 = 0.125;
 
-/// A point of the axis, and what was found there.
+/// Most places that are tried for where two triangles are equally far.
+const ROUNDS: u32 = 3;
+
+/// A point of the axis, and the triangle that was found closest to it: a pin three times where the budget ended.
 #[derive(Clone, Copy)]
 struct Sample {
     /// Where it is on the axis, as a length from its start.
     along: f32,
     on_axis: Vec3,
-    on_surface: Vec3,
     /// It is at most as deep as this.
     depth: f32,
     triangle: Option<u32>,
+    corners: [Vec3; 3],
 }
 
-/// A part of the axis between two samples.
+impl Sample {
+    /// Square of the distance from a point to the triangle.
+    fn square(&self, point: Vec3) -> f32 {
+        let pair = AxisPoint(point).closest_on_triangle(&self.corners, f32::INFINITY);
+        pair.map_or(f32::INFINITY, |pair| pair.distance_squared)
+    }
+}
+
+/// A sample, and the part of the axis from there to another one.
 #[derive(Clone, Copy)]
 struct Part {
     from: Sample,
-    to: Sample,
-    /// No point of it is deeper.
+    /// Row of the part that the other one begins.
+    next: usize,
+    /// No point of the part is deeper.
     bound: f32,
     /// Where it is divided next.
     split: f32,
 }
 
 impl Part {
-    fn new(from: Sample, to: Sample) -> Self {
+    /// Of the axis' end.
+    fn none(from: Sample) -> Self {
+        Self { from, next: 0, bound: 0.0, split: 0.0 }
+    }
+
+    /// The part up to `to`. A bound that is no higher than `enough` is not lowered further.
+    fn new(from: Sample, to: &Sample, next: usize, enough: f32) -> Self {
         let length = to.along - from.along;
-        // What is surely outside is left out.
+        // The rest is surely outside.
         let first = from.along + above_zero(-from.depth);
         let last = to.along - above_zero(-to.depth);
         if !(first < last) {
-            let bound = above_zero(if from.depth > to.depth { from.depth } else { to.depth });
-            return Self { from, to, bound, split: first };
+            return Self {
+                from,
+                next,
+                bound: above_zero(larger(from.depth, to.depth)),
+                split: first,
+            };
+        }
+        let slope = (from.depth + to.depth + length) * 0.5;
+        let middle = (first + last) * 0.5;
+        if slope <= enough {
+            return Self { from, next, bound: slope, split: middle };
         }
         let direction = (to.on_axis - from.on_axis) / length;
-        let to_nearer = |along: f32| {
+        let squares = |along: f32| {
             let point = from.on_axis + direction * (along - from.along);
-            let one = (point - from.on_surface).length_squared();
-            let other = (point - to.on_surface).length_squared();
-            if one < other { one } else { other }
+            [from.square(point), to.square(point)]
         };
-        // Where both surface points are equally far: the difference of the squares is linear.
-        let ahead = (from.on_axis - to.on_surface).length_squared()
-            - (from.on_axis - from.on_surface).length_squared();
-        let equal = from.along + ahead / (2.0 * direction.dot(to.on_surface - from.on_surface));
-        let is_between = equal > first && equal < last;
-        let peak = if is_between { equal } else { (first + last) * 0.5 };
-        // Of the lesser of two convex functions, the largest is at an end or where they change places.
-        let mut highest = to_nearer(first);
-        for along in [peak, last] {
-            let square = to_nearer(along);
-            if square > highest {
-                highest = square;
+        let (at_first, at_last) = (squares(first), squares(last));
+        // By how much the triangle of the first sample is nearer: linear along the axis where both are points.
+        let lead = |[one, other]: [f32; 2]| other - one;
+        let (mut low, mut high) = ((first, lead(at_first)), (last, lead(at_last)));
+        let (mut least, mut peak) = (f32::INFINITY, middle);
+        for _ in 0..ROUNDS {
+            let equal = low.0 + (high.0 - low.0) * (low.1 / (low.1 - high.1));
+            let is_between = equal > low.0 && equal < high.0;
+            let along = if is_between { equal } else { (low.0 + high.0) * 0.5 };
+            let here = squares(along);
+            let highest = larger(convex(at_first, here), convex(here, at_last));
+            if highest < least {
+                (least, peak) = (highest, along);
+            }
+            if least <= enough * enough {
+                break;
+            }
+            let side = (along, lead(here));
+            if side.1 > 0.0 {
+                low = side;
+            } else {
+                high = side;
             }
         }
-        let convex = sqrt(highest);
-        let slope = (from.depth + to.depth + length) * 0.5;
+        let convex = sqrt(least);
         let margin = (last - first) * NEAREST_SPLIT;
         let split = if peak < first + margin {
             first + margin
@@ -88,8 +123,18 @@ impl Part {
         } else {
             peak
         };
-        Self { from, to, bound: if convex < slope { convex } else { slope }, split }
+        Self { from, next, bound: if convex < slope { convex } else { slope }, split }
     }
+}
+
+/// The most that the lesser of two convex functions can be between two places, from their values there.
+fn convex([one, other]: [f32; 2], [one_next, other_next]: [f32; 2]) -> f32 {
+    let (most, other_most) = (larger(one, one_next), larger(other, other_next));
+    if most < other_most { most } else { other_most }
+}
+
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 fn above_zero(x: f32) -> f32 {
@@ -132,19 +177,17 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         let meeting = self.answer;
         let length = self.tool.axis_length();
         let tolerance = self.options.depth_tolerance.unwrap_or(length * TOLERANCE);
-        let crossing = Sample {
-            along: meeting.axis_parameter * length,
-            on_axis: self.tool.axis_point(meeting.axis_parameter),
-            on_surface: meeting.point_on_surface,
-            depth: meeting.axis_distance + meeting.accuracy,
-            triangle: meeting.triangle,
-        };
+        let depth = meeting.axis_distance + meeting.accuracy;
+        let crossing =
+            self.sample(meeting.axis_parameter * length, meeting.axis_parameter, depth, &meeting)?;
         let start = self.look(0.0, length, &crossing)?;
         let end = self.look(length, length, &crossing)?;
-        let mut parts = [Part::new(start, crossing); MAX_POINTS];
-        let [_, second, ..] = &mut parts;
-        *second = Part::new(crossing, end);
-        let mut count = 2;
+        let mut enough = self.deepest + tolerance;
+        let mut parts = [Part::none(end); POINTS];
+        let [first, second, ..] = &mut parts;
+        *first = Part::new(start, &crossing, 1, enough);
+        *second = Part::new(crossing, &end, 2, enough);
+        let mut count = 3;
         let bound = loop {
             let [mut part, ..] = parts;
             let mut highest = 0;
@@ -153,18 +196,19 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
                     (highest, part) = (row, *other);
                 }
             }
-            let Part { from, to, bound, split } = part;
+            let Part { from, next, bound, split } = part;
+            let is_spent = self.options.budget.node_tests == 0;
+            let to = parts.get(next).map(|part| part.from);
+            let Some(to) = to.filter(|_| bound > enough && !is_spent) else { break bound };
             let Some(free) = parts.get_mut(count) else { break bound };
-            if !(bound > self.deepest + tolerance) || self.options.budget.node_tests == 0 {
-                break bound;
-            }
             let near = if split - from.along < to.along - split { &from } else { &to };
             let middle = self.look(split, length, near)?;
-            *free = Part::new(middle, to);
-            count += 1;
+            enough = self.deepest + tolerance;
+            *free = Part::new(middle, &to, next, enough);
             if let Some(divided) = parts.get_mut(highest) {
-                *divided = Part::new(from, middle);
+                *divided = Part::new(from, &middle, count, enough);
             }
+            count += 1;
         };
         self.finish(&meeting, bound)
     }
@@ -221,8 +265,22 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         if found.accuracy > answer.accuracy {
             answer.accuracy = found.accuracy;
         }
-        let on_surface = found.point_on_surface;
-        Ok(Sample { along, on_axis, on_surface, depth, triangle: found.triangle })
+        self.sample(along, parameter, depth, &found)
+    }
+
+    /// What a pair says of the axis' point at a parameter.
+    fn sample(
+        &self,
+        along: f32,
+        parameter: f32,
+        depth: f32,
+        found: &Proximity,
+    ) -> Result<Sample, QueryError> {
+        let on_axis = self.tool.axis_point(parameter);
+        let position = |row| self.vertices.position(row).ok_or(QueryError::Corrupt { row });
+        let [a, b, c] = found.corners;
+        let corners = [position(a)?, position(b)?, position(c)?];
+        Ok(Sample { along, on_axis, depth, triangle: found.triangle, corners })
     }
 
     /// The answer, where no point of the axis is deeper than `bound`.

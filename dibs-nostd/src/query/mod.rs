@@ -68,7 +68,7 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     /// upper bounds from the first node on. Near children first; squares are compared, and a root is
     /// taken only where an order is needed. A leaf is rejected by one plane, a triangle by another.
     ///
-    /// Where a capsule's axis crosses the surface, up to 26 searches more, for points of the axis, find how deep.
+    /// Where a capsule's axis crosses the surface, up to 27 searches more, for points of the axis, find how deep.
     ///
     /// Cost: the budget at most; typical counts are in the repository's `docs/benchmarks.md`.
     ///
@@ -126,11 +126,13 @@ fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     mut found: Proximity,
     error: f32,
 ) -> Result<Proximity, QueryError> {
+    // Nothing is closer than a triangle that is touched, wherever the budget ended.
+    let touches = found.triangle.is_some() && found.axis_distance <= found.accuracy;
     let reason = if !options.is_signed {
         Some(NoSide::NotAsked)
     } else if !tree.has_adjacency() {
         Some(NoSide::NoAdjacency)
-    } else if found.is_cut_short() {
+    } else if found.is_cut_short() && !touches {
         Some(NoSide::CutShort)
     } else {
         None
@@ -140,7 +142,7 @@ fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
         found.accuracy += error;
         return Ok(found);
     }
-    if found.axis_distance <= found.accuracy && tool.axis_length() > 0.0 {
+    if touches && tool.axis_length() > 0.0 {
         let mut found = Depth::new(tree, stack, vertices, tool, options, &found).run()?;
         found.accuracy += error;
         return Ok(found);

@@ -23,7 +23,7 @@ pub struct Proximity {
     pub separation: f32,
     /// Lower end of the certified interval. Equals `separation` unless the budget ran out, or the axis crosses the
     /// surface: then it is lower by at most the tolerance of the depth, see
-    /// [`Options::depth_tolerance`](crate::Options::depth_tolerance), or more if the budget or 24 points of the axis
+    /// [`Options::depth_tolerance`](crate::Options::depth_tolerance), or more if the budget or 28 points of the axis
     /// did not do.
     pub lower: f32,
     /// No separation above is off by more than this: the f32 rounding of coordinates this large.

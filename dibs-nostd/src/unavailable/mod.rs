@@ -54,6 +54,8 @@ pub enum Unavailable {
     },
     /// The tool's axis touches the surface: no direction leads out.
     NoDirection,
+    /// The budget ended before it was known on which side of the surface the tool is, or which contacts it has.
+    CutShort,
     /// A number is not finite, or the direction is not a unit vector.
     NotFinite,
 }
@@ -76,6 +78,9 @@ impl fmt::Display for Unavailable {
             Self::SourceStale { age } => write!(f, "the surface was {age} old when it was sent"),
             Self::Forgeries { count } => write!(f, "{count} packets were forged"),
             Self::NoDirection => write!(f, "the tool's axis touches the surface"),
+            Self::CutShort => {
+                write!(f, "the budget ended before the side or the contacts were known")
+            }
             Self::NotFinite => write!(f, "a number is not finite"),
         }
     }

@@ -10,13 +10,13 @@
 //!
 //! - A force is finite and never larger than `max_force` (up to the direction's rounding), whatever
 //!   comes in.
-//! - It is computed from the conservative end of the certified interval, `lower - accuracy`: a query
-//!   that its budget cut short never lets the tool closer.
+//! - It is computed from the conservative end of the certified interval, `lower - accuracy`.
 //! - Where the surface has sides (a tree with adjacency, see [`Side`](crate::Side)), it leads outwards from first
-//!   contact to any depth, and its size is continuous through contact and through the surface. Where it has none,
-//!   the tool is taken to be outside.
-//! - When the proximity is unknown, the surface stale, or a number not finite, the output is the
-//!   *hold*: pure damping against the tool's velocity, saturated the same way, and the state says
+//!   contact to any depth, and its size is continuous through contact and through the surface. Where it has none, or
+//!   the query was [`unsigned`](crate::Options::unsigned), the tool is taken to be outside, and a query that its budget
+//!   cut short never lets it closer.
+//! - When the proximity is unknown, the surface stale, a number not finite, or the budget ended before the side was
+//!   known, the output is the *hold*: pure damping against the tool's velocity, saturated the same way, and the state says
 //!   why. With a velocity that is not finite it is zero.
 //!
 //! # What is not: passivity
@@ -52,13 +52,14 @@ mod proxy;
 mod rows;
 #[cfg(test)]
 mod tests;
+mod walls;
 
 use core::fmt;
 
 use glam::Vec3;
 
 use crate::math::sqrt::sqrt;
-use crate::query::Proximity;
+use crate::query::{NoSide, Proximity, Side};
 use crate::unavailable::Unavailable;
 
 pub use forbidden::ForbiddenRegion;
@@ -208,8 +209,12 @@ impl Approach {
     ) -> Result<Self, Unavailable> {
         let proximity = proximity.as_ref().map_err(|unavailable| *unavailable)?;
         let direction = proximity.direction;
-        if direction == Vec3::ZERO {
-            return Err(Unavailable::NoDirection);
+        match proximity.side {
+            // Inside, that direction would lead in.
+            Side::Undefined(NoSide::CutShort) => return Err(Unavailable::CutShort),
+            Side::Undefined(NoSide::Degenerate) => return Err(Unavailable::NoDirection),
+            _ if direction == Vec3::ZERO => return Err(Unavailable::NoDirection),
+            _ => (),
         }
         let approach = Self {
             direction,

@@ -2,19 +2,11 @@
 
 use glam::Vec3;
 
+use super::walls::{COMPLIANCE, MOST, Wall, displacement};
 use super::{ConstraintState, GainError, SpringDamper, positive};
 use crate::math::sqrt::sqrt;
 use crate::query::Contact;
 use crate::unavailable::Unavailable;
-
-/// Most contacts that take part: the deepest.
-const MOST: usize = 8;
-
-/// Rounds of the solver.
-const ROUNDS: u32 = 32;
-
-/// How much of its depth a contact yields under its own force: so that two contacts with one wall share it.
-const COMPLIANCE: f32 = 1.0 / 16.0;
 
 /// A force and a torque on the tool, and how they came about.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,12 +42,14 @@ impl defmt::Format for Wrench {
 /// torque.
 ///
 /// What it solves is the least `|t|^2` under `n . t >= margin - d` for each of the eight deepest contacts, each of
-/// which yields by a 16th: 32 rounds of coordinate descent on the contacts' forces. Those are continuous in depths
-/// and normals, and a contact that appears at the margin's edge begins with nothing.
+/// which yields by a 16th, exactly but for rounding, by an active set. So the displacement is continuous in depths and
+/// normals, and a contact that appears at the margin's edge begins with nothing. Where no two contacts face each other,
+/// each is pushed out of by at least its own depth.
 ///
 /// The damper acts against the tool's speed into the surface, relative to the surface where it moves.
 ///
-/// Cost: about 30 f32 operations a round for each pair of contacts within the margin.
+/// Cost: about 30 f32 operations a step for each contact within the margin; at most 32 steps, about as many as there
+/// are contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Proxy {
@@ -66,10 +60,8 @@ pub struct Proxy {
 /// A contact within the margin.
 #[derive(Clone, Copy)]
 struct Held {
-    normal: Vec3,
+    wall: Wall,
     lever: Vec3,
-    /// How far within the margin (mm).
-    depth: f32,
     /// Speed of the tool out of the surface (mm/s).
     speed: f32,
     /// How far it moves the proxy (mm).
@@ -77,8 +69,12 @@ struct Held {
 }
 
 impl Held {
-    const NONE: Self =
-        Self { normal: Vec3::ZERO, lever: Vec3::ZERO, depth: 0.0, speed: 0.0, push: 0.0 };
+    const NONE: Self = Self { wall: Wall::NONE, lever: Vec3::ZERO, speed: 0.0, push: 0.0 };
+
+    /// The moment of its push.
+    fn turned(&self) -> Vec3 {
+        self.lever.cross(self.wall.normal * self.push)
+    }
 }
 
 impl Proxy {
@@ -93,8 +89,9 @@ impl Proxy {
 
     /// The force on the tool at this tick, and its torque about `origin`.
     ///
-    /// `contacts` are those of [`Contacts`](crate::Contacts), deepest first, within `accuracy` (mm); `velocity` (mm/s)
-    /// is the tool's at `origin`, `angular` (1/s) its angular velocity. Where there is no answer, the hold.
+    /// `contacts` are those of [`Contacts::within`](crate::Contacts::within) this margin or more, deepest first, each
+    /// within `accuracy` (mm); `velocity` (mm/s) is the tool's at `origin`, `angular` (1/s) its angular velocity. Where there is
+    /// no answer, or the budget ended before all contacts were known, the hold.
     #[must_use]
     pub fn wrench<'c>(
         &self,
@@ -109,39 +106,30 @@ impl Proxy {
             Err(reason) => return self.hold(velocity, reason),
         };
         let mut held = [Held::NONE; MOST];
-        let mut count = 0;
+        let mut is_in = false;
+        let mut free = held.iter_mut();
         for contact in contacts {
             let depth = self.margin - (contact.separation - accuracy);
-            if depth <= 0.0 {
-                continue;
-            }
-            let Some(place) = held.get_mut(count) else { break };
+            is_in |= !(depth <= 0.0);
+            let Some(place) = free.next() else { break };
             let lever = contact.point_on_tool - origin;
             let relative = velocity + angular.cross(lever) - contact.velocity;
             let normal = contact.normal;
-            *place = Held { normal, lever, depth, speed: normal.dot(relative), push: 0.0 };
-            count += 1;
+            let wall = Wall::new(normal, depth);
+            *place = Held { wall, lever, speed: normal.dot(relative), push: 0.0 };
         }
-        if count == 0 {
+        if !is_in {
             return Wrench::NONE;
         }
-        for _ in 0..ROUNDS {
-            for row in 0..count {
-                let moved = total(&held, |held| held.normal * held.push);
-                let Some(held) = held.get_mut(row) else { break };
-                // The depth counts as that much deeper as the contact will yield.
-                let wanted = held.depth * (1.0 + COMPLIANCE);
-                let left = wanted - held.normal.dot(moved) - COMPLIANCE * held.push;
-                let push = held.push + left / (1.0 + COMPLIANCE);
-                held.push = if push > 0.0 { push } else { 0.0 };
-            }
+        let moved = displacement(held.map(|held| held.wall));
+        for held in &mut held {
+            held.push = held.wall.above(moved) / COMPLIANCE;
         }
-        self.push(&held, velocity)
+        self.push(&held, moved, velocity)
     }
 
-    fn push(&self, held: &[Held; MOST], velocity: Vec3) -> Wrench {
-        let moved = total(held, |held| held.normal * held.push);
-        let turned = total(held, |held| held.lever.cross(held.normal * held.push));
+    fn push(&self, held: &[Held; MOST], moved: Vec3, velocity: Vec3) -> Wrench {
+        let turned = held.iter().fold(Vec3::ZERO, |sum, held| sum + held.turned());
         let (mut pushes, mut leaving) = (0.0, 0.0);
         for held in held {
             pushes += held.push;
@@ -182,8 +170,4 @@ impl Proxy {
         let held = self.spring.hold(velocity, reason);
         Wrench { force: held.force, torque: Vec3::ZERO, state: held.state }
     }
-}
-
-fn total(held: &[Held; MOST], of: impl Fn(&Held) -> Vec3) -> Vec3 {
-    held.iter().fold(Vec3::ZERO, |sum, held| sum + of(held))
 }

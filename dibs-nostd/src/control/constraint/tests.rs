@@ -5,8 +5,8 @@ extern crate std;
 use proptest::prelude::*;
 
 use super::*;
-use crate::Side;
 use crate::unavailable::QueryError;
+use crate::{NoSide, Side};
 
 const QUERY: QueryError = QueryError::Corrupt { row: 7 };
 
@@ -124,6 +124,26 @@ fn the_hold_damps_and_says_why() {
     // A query's answer that gives no direction.
     let touching = wall().force(&Ok(pair(-RADIUS, Vec3::ZERO)), Vec3::X);
     assert_eq!(touching.state, ConstraintState::Safe(Unavailable::NoDirection));
+}
+
+/// Where the budget left the side open, the direction may lead in.
+#[test]
+fn a_side_that_is_not_known_is_held() {
+    for (reason, held) in [
+        (NoSide::CutShort, Some(Unavailable::CutShort)),
+        (NoSide::Degenerate, Some(Unavailable::NoDirection)),
+        (NoSide::NotAsked, None),
+        (NoSide::NoAdjacency, None),
+        (NoSide::OpenBoundary, None),
+        (NoSide::BelowAccuracy, None),
+    ] {
+        let mut pair = pair(1.0, Vec3::X);
+        pair.side = Side::Undefined(reason);
+        for force in [wall().force(&Ok(pair), Vec3::Y), guide().force(&Ok(pair), Vec3::Y)] {
+            assert_eq!(held.map(ConstraintState::Safe).unwrap_or(force.state), force.state);
+            assert_eq!(held.is_some(), close(force.force, Vec3::Y * -0.01), "{reason:?}");
+        }
+    }
 }
 
 #[test]

@@ -8,7 +8,7 @@ use super::search::Search;
 use super::side::{self, Side};
 use super::{Budget, NoSide, Options, Proximity, Query};
 use crate::math::sqrt::sqrt;
-use crate::unavailable::QueryError;
+use crate::unavailable::{QueryError, Unavailable};
 use crate::{Index, Tool, VertexTable};
 use basins::{Basins, Near};
 
@@ -111,6 +111,9 @@ struct List<const N: usize> {
     bound: f32,
     accuracy: f32,
     is_full: bool,
+    /// The margin that was asked for.
+    margin: f32,
+    is_cut_short: bool,
 }
 
 impl<const N: usize, const NEAR: usize> Default for Contacts<N, NEAR> {
@@ -129,6 +132,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             bound: f32::NEG_INFINITY,
             accuracy: 0.0,
             is_full: false,
+            margin: f32::NEG_INFINITY,
+            is_cut_short: true,
         };
         Self { found, basins: Basins::new() }
     }
@@ -150,8 +155,28 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         self.found.count == 0
     }
 
+    /// The contacts, deepest first, for a constraint that acts within `margin` (mm), at most that of the query. A list
+    /// that is full has the deepest, which is no error here.
+    ///
+    /// # Errors
+    /// [`Unavailable::CutShort`] if the budget ended before all within the margin were known, or no query filled the
+    /// list; [`QueryError::Margin`] if the query's margin was less.
+    pub fn within(
+        &self,
+        margin: f32,
+    ) -> Result<impl Iterator<Item = &Contact> + Clone, Unavailable> {
+        let List { bound, is_cut_short, .. } = self.found;
+        if is_cut_short && !(bound >= margin) {
+            return Err(Unavailable::CutShort);
+        }
+        if !(margin <= self.found.margin) {
+            return Err(QueryError::Margin { bits: margin.to_bits() }.into());
+        }
+        Ok(self.iter())
+    }
+
     /// Every contact whose separation is below this (mm) is in the list: the margin, unless the list or `NEAR` was too
-    /// short, or the budget ran out.
+    /// short, or the budget ran out. Where it ran out before the side was known, no number is below.
     #[must_use]
     pub const fn bound(&self) -> f32 {
         self.found.bound
@@ -193,6 +218,8 @@ impl<const N: usize> List<N> {
         self.count = 0;
         self.bound = f32::NEG_INFINITY;
         self.is_full = false;
+        self.margin = f32::NEG_INFINITY;
+        self.is_cut_short = true;
     }
 
     /// Takes a contact to its place; if there is no room, the farthest gives way.
@@ -233,7 +260,8 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     ///
     /// Two valleys of the distance are one contact unless a ridge of more than a 64th of the margin parts them, so a
     /// flat wall along a capsule is one. Pairs with the inner side of a sheet, say the far side of an organ, are
-    /// none. Where the side is undefined the tool is taken to be outside.
+    /// none. Where the side is undefined the tool is taken to be outside; where it is because the budget ended, nothing is
+    /// certain about those that are not in the list.
     ///
     /// Cost: that of [`closest`](Self::closest), a range search, and some hundred instructions a triangle within the
     /// margin.
@@ -265,11 +293,12 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
             return Err(QueryError::NoAdjacency);
         }
         let closest = self.closest(vertices, tool, options)?;
-        found.accuracy = closest.accuracy;
+        (found.accuracy, found.margin) = (closest.accuracy, margin);
         // What follows is decided on the positions as they are.
         let accuracy = closest.accuracy - vertices.position_error();
-        if closest.side == Side::Inside || closest.lower > margin {
-            found.bound = margin;
+        let has_side = closest.side != Side::Undefined(NoSide::CutShort);
+        if closest.side == Side::Inside || (closest.lower > margin && has_side) {
+            (found.bound, found.is_cut_short) = (margin, false);
             if let Some(contact) = Contact::at(&closest).filter(|at| at.separation <= margin) {
                 found.insert(contact);
             }
@@ -291,7 +320,9 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
             complete
         })?;
         let least = if left < complete { left } else { complete };
-        found.bound = least - tool.radius();
+        found.is_cut_short = !has_side || left < limit;
+        // Inside, and deeper than all that was seen, its contact would be the deepest.
+        found.bound = if has_side { least - tool.radius() } else { f32::NEG_INFINITY };
         let is_crossing = closest.side == Side::Crossing;
         if is_crossing && let Some(contact) = Contact::at(&closest) {
             found.insert(contact);

@@ -1,0 +1,97 @@
+//! The least displacement that a few walls ask for.
+//!
+//! Each wall asks that `normal . t` be at least its depth, and yields in proportion to the force on it. With the
+//! compliance `c`, that is the least of the convex function
+//!
+//! `c |t|^2 + sum of max(0, wanted - normal . t)^2`, `wanted = (1 + c) depth`, or the depth itself below 0,
+//!
+//! of three unknowns, of which the walls whose term is not 0 *act*. While these stay the same it is quadratic. From no
+//! displacement at all, where every wall acts whose depth is above 0, a step leads towards the least of the present quadratic, as far as the
+//! first place where a wall ceases to act or begins. The next step goes on to the same side of that place, for the one
+//! wall does not turn it (Sherman & Morrison), so every step lowers the function, and one that meets no such place
+//! ends at its least.
+
+use glam::Vec3;
+
+/// Most walls.
+pub(super) const MOST: usize = 8;
+
+/// How much of its depth a wall yields under its own force: so that two contacts with one wall share it.
+pub(super) const COMPLIANCE: f32 = 1.0 / 16.0;
+
+/// Most steps.
+const STEPS: u32 = 32;
+
+/// One wall, and how deep the tool is in it.
+#[derive(Clone, Copy)]
+pub(super) struct Wall {
+    /// Unit vector that leads out.
+    pub normal: Vec3,
+    /// The depth (mm), and as much more as the wall yields if nothing else holds it.
+    wanted: f32,
+    acts: bool,
+}
+
+impl Wall {
+    /// None.
+    pub const NONE: Self = Self { normal: Vec3::ZERO, wanted: 0.0, acts: false };
+
+    /// A wall that the tool is `depth` mm in, or as much below 0 away from.
+    pub fn new(normal: Vec3, depth: f32) -> Self {
+        let wanted = if depth < 0.0 { depth } else { depth * (1.0 + COMPLIANCE) };
+        Self { normal, wanted, acts: depth > 0.0 }
+    }
+
+    /// How far a displacement stays below what the wall asks for, as far as it does.
+    pub fn above(&self, moved: Vec3) -> f32 {
+        let left = self.left(moved);
+        // Written so that NaN stays.
+        if left <= 0.0 { 0.0 } else { left }
+    }
+
+    fn left(&self, moved: Vec3) -> f32 {
+        self.wanted - self.normal.dot(moved)
+    }
+}
+
+/// The displacement.
+pub(super) fn displacement(mut walls: [Wall; MOST]) -> Vec3 {
+    let mut at = Vec3::ZERO;
+    let mut is_refined = false;
+    for _ in 0..STEPS {
+        let step = to_least(&walls, at);
+        let (mut share, mut first) = (1.0, None);
+        for wall in &mut walls {
+            let rate = wall.normal.dot(step);
+            let may_turn = if wall.acts { rate > 0.0 } else { rate < 0.0 };
+            let place = wall.left(at) / rate;
+            if may_turn && place < share {
+                share = if place > 0.0 { place } else { 0.0 };
+                first = Some(wall);
+            }
+        }
+        at += step * share;
+        match first {
+            Some(wall) => wall.acts = !wall.acts,
+            None if is_refined => break,
+            // Once more, from there: rounding is relative to the step.
+            None => is_refined = true,
+        }
+    }
+    at
+}
+
+/// The way to where the function of those walls that act is least, by Cramer's rule.
+fn to_least(walls: &[Wall; MOST], at: Vec3) -> Vec3 {
+    let (mut x, mut y, mut z) = (Vec3::X * COMPLIANCE, Vec3::Y * COMPLIANCE, Vec3::Z * COMPLIANCE);
+    let mut right = at * -COMPLIANCE;
+    for wall in walls.iter().filter(|wall| wall.acts) {
+        let normal = wall.normal;
+        x += normal * normal.x;
+        y += normal * normal.y;
+        z += normal * normal.z;
+        right += normal * wall.left(at);
+    }
+    let (yz, zx, xy) = (y.cross(z), z.cross(x), x.cross(y));
+    Vec3::new(right.dot(yz), right.dot(zx), right.dot(xy)) / x.dot(yz)
+}

@@ -1,0 +1,212 @@
+//! Sides and signed separations, judged pose by pose in f64: by generalised winding numbers, by exhaustive search, and
+//! where a surface is shown to cut itself by the pseudonormal of the nearest sheet.
+
+use std::ops::AddAssign;
+
+use dibs_build::{Builder, BuiltTree, Mesh, generate};
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{Capsule, NoSide, Options, Query, Side, Sphere};
+use fastrand::Rng;
+use glam::Vec3;
+
+use crate::oracle::{Instrument, exhaustive};
+use crate::sides;
+use crate::surfaces::{self, ball};
+
+/// A closed surface and its tree.
+pub struct Closed {
+    /// Its name.
+    pub name: &'static str,
+    /// At rest.
+    pub mesh: Mesh,
+    /// Its tree.
+    pub built: BuiltTree,
+    /// Of the poses.
+    pub share: usize,
+}
+
+/// Generated hearts and brains, a ball, and the real heart and brains where they are.
+///
+/// # Panics
+/// Never: the sizes are valid.
+#[must_use]
+pub fn closed() -> Vec<Closed> {
+    let mut all = vec![
+        ("generated heart", generate::heart(320).expect("a valid size").mesh, 6),
+        ("generated heart, finer", generate::heart(2_000).expect("a valid size").mesh, 4),
+        ("generated brain", generate::brain(500).expect("a valid size"), 6),
+        ("ball", ball(2), 4),
+    ];
+    for name in ["heart_10272", "brain_500", "brain_5k"] {
+        let path = format!("{}/../../shared/data/{name}.ply", env!("CARGO_MANIFEST_DIR"));
+        match dibs_build::read(&path) {
+            Ok(import) => all.push((name, import.mesh, 2)),
+            Err(error) => println!("skipped {name}: {error}"),
+        }
+    }
+    let build = |(name, mesh, share): (_, Mesh, _)| {
+        let built = Builder::new().stretch(4.0).build(&mesh).expect("a valid mesh");
+        Closed { name, mesh, built, share }
+    };
+    all.into_iter().map(build).collect()
+}
+
+/// Bends all space, and a surface with it, without folding it: no derivative reaches 1.
+#[must_use]
+pub fn bent(mesh: &Mesh, rng: &mut Rng) -> Vec<Vec3> {
+    let mut number = |size: f32| (rng.f32() * 2.0 - 1.0) * size;
+    let scale = Vec3::new(1.0 + number(0.3), 1.0 + number(0.3), 1.0 + number(0.3));
+    let (waves, heights) = (
+        [(); 3].map(|()| Vec3::new(number(0.04), number(0.04), number(0.04))),
+        Vec3::new(number(5.0), number(5.0), number(5.0)),
+    );
+    let [x, y, z] = waves;
+    let bend = |p: &Vec3| {
+        let wave = Vec3::new(x.dot(*p).sin(), y.dot(*p).sin(), z.dot(*p).sin());
+        (*p + heights * wave) * scale
+    };
+    mesh.positions.iter().map(bend).collect()
+}
+
+/// A direction.
+pub fn unit(rng: &mut Rng) -> Vec3 {
+    loop {
+        let v = Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5);
+        if v.length_squared() > 0.01 && v.length_squared() < 0.25 {
+            return v.normalize();
+        }
+    }
+}
+
+/// A point next to a vertex, an edge, a face or a sliver, in a fold, or anywhere; and how far off it was put.
+///
+/// # Panics
+/// If there is no triangle.
+pub fn point(rows: &[Vec3], triangles: &[[u32; 3]], rng: &mut Rng) -> Vec3 {
+    let [a, b, c] = triangles[rng.usize(..triangles.len())].map(|v| rows[v as usize]);
+    let on_surface = match rng.u32(..3) {
+        0 => a,
+        1 => a.lerp(b, rng.f32()),
+        _ => a.lerp(b, rng.f32()).lerp(c, rng.f32()),
+    };
+    let off = 10_f32.powf(rng.f32() * 6.0 - 4.0);
+    let across = (b - a).cross(c - a).normalize_or_zero() * (if rng.bool() { off } else { -off });
+    match rng.u32(..4) {
+        0 => on_surface + across,
+        1 => on_surface + across + unit(rng) * off,
+        2 => on_surface + unit(rng) * off,
+        _ => on_surface + unit(rng) * 20.0 * rng.f32(),
+    }
+}
+
+/// What became of poses.
+#[derive(Clone, Copy, Default, Debug)]
+pub struct Tally {
+    /// Poses.
+    pub poses: usize,
+    /// Of which the axis is inside.
+    pub inside: usize,
+    /// Of which the side is undefined.
+    pub undefined: usize,
+    /// Undefined though at least a hundredth of a mm away.
+    pub undefined_away: usize,
+    /// At least that far away.
+    pub away: usize,
+    /// The surface is shown to cut itself there: the side is that of the nearest sheet.
+    pub self_cut: usize,
+    /// Of which side or separation is wrong.
+    pub wrong: usize,
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.poses += other.poses;
+        self.inside += other.inside;
+        self.undefined += other.undefined;
+        self.undefined_away += other.undefined_away;
+        self.away += other.away;
+        self.self_cut += other.self_cut;
+        self.wrong += other.wrong;
+    }
+}
+
+/// Poses that are judged together, on one shape of a surface.
+pub const POSES_OF_A_FRAME: usize = 100;
+
+/// Judges poses on one shape of a surface; prints those that are wrong.
+///
+/// # Panics
+/// If a query fails, or a side is undefined for another reason than the accuracy.
+#[must_use]
+pub fn judge(surface: &Closed, seed: u64) -> Tally {
+    let mut rng = Rng::with_seed(seed);
+    let mut tally = Tally::default();
+    let tree = surface.built.tree::<u16>().expect("valid");
+    assert!(tree.has_adjacency(), "{}", surface.name);
+    let triangles = surfaces::triangles(&tree);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    // As it is at rest, now and then.
+    let moved = if seed.is_multiple_of(8) {
+        surface.mesh.positions.clone()
+    } else {
+        bent(&surface.mesh, &mut rng)
+    };
+    let rows = surface.built.to_rows(&moved);
+    for _ in 0..POSES_OF_A_FRAME {
+        let at = point(&rows, &triangles, &mut rng);
+        let radius = if rng.bool() { 0.0 } else { 3.0 * rng.f32() };
+        let far = at + unit(&mut rng) * 10.0 * rng.f32();
+        let (tool, found) = if rng.bool() {
+            let sphere = Sphere::new(at, radius).expect("valid");
+            let found = query.closest(rows.as_slice(), &sphere, &Options::cold());
+            (Instrument::sphere(at, radius), found)
+        } else {
+            let capsule = Capsule::new(at, far, radius).expect("valid");
+            let found = query.closest(rows.as_slice(), &capsule, &Options::cold());
+            (Instrument::capsule(at, far, radius), found)
+        };
+        let found = found.expect("an answer");
+        tally.poses += 1;
+        let pair = exhaustive(&rows, &triangles, &tool).expect("has triangles");
+        if pair.axis_distance == 0.0 {
+            assert!(
+                matches!(found.side, Side::Crossing | Side::Undefined(NoSide::BelowAccuracy)),
+                "{}: {tool:?} {found:?}",
+                surface.name
+            );
+            continue;
+        }
+        tally.away += usize::from(pair.axis_distance > 0.01);
+        let says = match found.side {
+            Side::Outside => false,
+            Side::Inside => true,
+            Side::Crossing => {
+                // What the depth of a crossing axis may be off is its own test's matter.
+                tally.wrong += usize::from(pair.axis_distance > f64::from(found.accuracy));
+                continue;
+            }
+            Side::Undefined(reason) => {
+                assert_eq!(reason, NoSide::BelowAccuracy, "{}: {tool:?}", surface.name);
+                tally.undefined += 1;
+                tally.undefined_away += usize::from(pair.axis_distance > 0.01);
+                continue;
+            }
+            other => panic!("{other:?}"),
+        };
+        let winds_around = sides::is_inside(&rows, &triangles, pair.on_axis);
+        let mut inside = winds_around.unwrap_or_default();
+        if winds_around != Some(says) && sides::is_cut(&rows, &triangles, &pair) {
+            inside = sides::is_below(&rows, &triangles, &pair);
+            tally.self_cut += 1;
+        }
+        tally.inside += usize::from(inside);
+        let signed = if inside { -pair.axis_distance } else { pair.axis_distance };
+        let truth = signed - f64::from(radius);
+        let off = (f64::from(found.separation) - truth).abs();
+        if inside != says || off > f64::from(found.accuracy) {
+            tally.wrong += 1;
+            println!("{}: {tool:?} inside: {inside}, off {off}, {found:?}", surface.name);
+        }
+    }
+    tally
+}

@@ -1,0 +1,21 @@
+//! What a force of all contacts holds that one of the closest pair alone does not.
+
+use dibs_tests::hand::scenes;
+
+#[test]
+fn a_hand_does_not_get_through() {
+    let mut alone_failed = Vec::new();
+    for scene in scenes() {
+        let name = scene.name;
+        for by_all in [true, false] {
+            let pushed = scene.push(by_all);
+            let which = if by_all { "all contacts" } else { "closest pair" };
+            println!("{name:13} {which}: {pushed:?}");
+            assert!(!by_all || !pushed.is_through(), "{name}: the centre went through, {pushed:?}");
+            if !by_all && pushed.is_through() {
+                alone_failed.push(name);
+            }
+        }
+    }
+    assert_eq!(alone_failed, ["corner", "groove"]);
+}

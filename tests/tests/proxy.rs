@@ -1,0 +1,212 @@
+//! The proxy's force against every active set tried in f64: the same, outward, continuous, and no wall twice.
+
+use dibs_build::Builder;
+use dibs_nostd::constraint::{Proxy, SpringDamper};
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{Contact, Contacts, Options, Query, Sphere};
+use dibs_tests::surfaces::sheet;
+use fastrand::Rng;
+use glam::{DMat3, DVec3, Vec3};
+
+const MARGIN: f32 = 3.0;
+/// As the library has it.
+const COMPLIANCE: f64 = 1.0 / 16.0;
+/// Relative to the largest depth: f32, whose errors the compliance may multiply by 16.
+const TOLERANCE: f64 = 2e-4;
+
+/// Sets of walls: `DIBS_POSES` of them.
+fn cases() -> usize {
+    let asked = std::env::var("DIBS_POSES").ok().map(|n| n.parse().expect("a number of cases"));
+    asked.unwrap_or(if cfg!(debug_assertions) { 300 } else { 20_000 })
+}
+
+/// A contact to make others of.
+fn contact() -> Contact {
+    let mesh = sheet(4, 20.0, |_, _| 0.0);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut contacts = Contacts::<1>::new();
+    let tool = Sphere::new(Vec3::new(0.2, 0.1, 2.0), 1.0).expect("valid");
+    let found = query.contacts(rows.as_slice(), &tool, MARGIN, &Options::cold(), &mut contacts);
+    found.expect("an answer");
+    *contacts.iter().next().expect("one")
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Wall {
+    normal: Vec3,
+    depth: f32,
+    at: Vec3,
+}
+
+/// Force and torque of a spring of 1 N/mm that never saturates: the displacement, and its moment.
+fn found(template: &Contact, walls: &[Wall]) -> [DVec3; 2] {
+    let spring = SpringDamper::new(1.0, 0.0, 1e9).expect("valid gains");
+    let proxy = Proxy::new(spring, MARGIN).expect("a valid margin");
+    let contacts: Vec<Contact> = walls
+        .iter()
+        .map(|wall| {
+            let mut contact = *template;
+            contact.normal = wall.normal;
+            contact.separation = MARGIN - wall.depth;
+            contact.point_on_tool = wall.at;
+            contact
+        })
+        .collect();
+    let wrench = proxy.wrench(Ok(contacts.iter()), 0.0, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+    [wrench.force.as_dvec3(), wrench.torque.as_dvec3()]
+}
+
+/// The same by trying every set of walls that may act: displacement, moment, and the walls' pushes.
+fn truth(walls: &[Wall]) -> ([DVec3; 2], Vec<f64>) {
+    let wanted = |wall: &Wall| {
+        let depth = f64::from(MARGIN - (MARGIN - wall.depth));
+        if depth > 0.0 { depth * (1.0 + COMPLIANCE) } else { depth }
+    };
+    for set in 0..1_u32 << walls.len() {
+        let acts = |row: usize| set >> row & 1 == 1;
+        let mut matrix = DMat3::from_diagonal(DVec3::splat(COMPLIANCE));
+        let mut right = DVec3::ZERO;
+        for (_, wall) in walls.iter().enumerate().filter(|&(row, _)| acts(row)) {
+            let normal = wall.normal.as_dvec3();
+            matrix += DMat3::from_cols(normal * normal.x, normal * normal.y, normal * normal.z);
+            right += normal * wanted(wall);
+        }
+        let moved = matrix.inverse() * right;
+        let left: Vec<f64> =
+            walls.iter().map(|wall| wanted(wall) - wall.normal.as_dvec3().dot(moved)).collect();
+        let is_right = |(row, &left): (usize, &f64)| {
+            if acts(row) { left >= -1e-10 } else { left <= 1e-10 }
+        };
+        if left.iter().enumerate().all(is_right) {
+            let pushes: Vec<f64> = left.iter().map(|left| left.max(0.0) / COMPLIANCE).collect();
+            let moment = walls
+                .iter()
+                .zip(&pushes)
+                .map(|(wall, push)| wall.at.as_dvec3().cross(wall.normal.as_dvec3() * push));
+            return ([moved, moment.sum()], pushes);
+        }
+    }
+    panic!("one set is right: {walls:?}");
+}
+
+fn unit(rng: &mut Rng) -> Vec3 {
+    loop {
+        let v = Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5);
+        if v.length_squared() > 0.01 && v.length_squared() < 0.25 {
+            return v.normalize();
+        }
+    }
+}
+
+/// Up to eight walls: anyhow, nearly the same, in pairs that face each other, or around a groove's axis.
+fn walls(rng: &mut Rng) -> Vec<Wall> {
+    let kind = rng.u32(..4);
+    let (axis, main) = (unit(rng), unit(rng));
+    let count = rng.usize(1..=8);
+    let mut walls: Vec<Wall> = (0..count)
+        .map(|row| {
+            let other = unit(rng);
+            let normal = match kind {
+                0 => other,
+                1 => (main + other * 10_f32.powf(-rng.f32() * 5.0)).normalize(),
+                2 => (main * [1.0, -1.0][row % 2] + other * 0.1 * rng.f32()).normalize(),
+                _ => (other - axis * axis.dot(other) * (1.0 + 0.1 * rng.f32())).normalize(),
+            };
+            let depth = if rng.bool() { 2.0 } else { 10_f32.powf(rng.f32() * 4.0 - 3.0) };
+            // Or not within the margin yet.
+            let depth = if row > 0 && rng.u32(..4) == 0 { -depth } else { depth };
+            Wall { normal, depth, at: other * 5.0 }
+        })
+        .collect();
+    // As a list of contacts has them.
+    walls.sort_by(|a, b| b.depth.total_cmp(&a.depth));
+    walls
+}
+
+#[test]
+fn the_force_is_that_of_the_best_of_all_active_sets() {
+    let template = contact();
+    let mut rng = Rng::with_seed(1);
+    let (mut worst, mut several) = ([0.0_f64; 2], 0);
+    for _ in 0..cases() {
+        let walls = walls(&mut rng);
+        let ([moved, moment], pushes) = truth(&walls);
+        let [force, torque] = found(&template, &walls);
+        let deepest = f64::from(walls[0].depth);
+        let all: f64 = pushes.iter().sum();
+        // Where all but cancels, force and torque keep the proportion of the rest.
+        let off = [force.distance(moved) / deepest, torque.distance(moment) / (5.0 * all)];
+        assert!(off[0] < TOLERANCE && off[1] < TOLERANCE, "{off:?} {walls:?} {force} {moved}");
+        worst = [worst[0].max(off[0]), worst[1].max(off[1])];
+        several += usize::from(pushes.iter().filter(|&&push| push > 0.0).count() > 2);
+        // Outward: no two walls that face each other, and each is held by its own depth at least.
+        let face = |a: &Wall| walls.iter().any(|b| a.normal.dot(b.normal) < 0.0);
+        if !walls.iter().any(face) {
+            for wall in &walls {
+                let out = force.dot(wall.normal.as_dvec3()) - f64::from(wall.depth);
+                assert!(out > -TOLERANCE * deepest, "{wall:?} of {walls:?}: {out}");
+            }
+        }
+        // The deepest wall of two that face each other wins, and no sum of walls is more than the compliance allows.
+        if let [one, other] = walls[..] {
+            let out = force.dot((one.normal - other.normal).as_dvec3());
+            assert!(out > -TOLERANCE * deepest, "{walls:?}: {out}");
+        }
+    }
+    println!("{several} of {} with more than two walls that act, worst {worst:?}", cases());
+    assert!(several * 5 > cases());
+}
+
+/// A small change of the walls changes the force little; the compliance `c` bounds by how much: depths alone by
+/// `sqrt(8) / (2 sqrt(c))` times their change, normals by `16 / c` times the displacement, at most `sqrt(8 / c)` depths.
+#[test]
+fn the_force_is_continuous() {
+    let template = contact();
+    let mut rng = Rng::with_seed(2);
+    let wanted = 1.0 + COMPLIANCE;
+    let by_depths = wanted * 8_f64.sqrt() / (2.0 * COMPLIANCE.sqrt());
+    let by_normals = wanted * (16.0 / COMPLIANCE + 8.0) * (8.0 / COMPLIANCE).sqrt();
+    let mut steepest = [0.0_f64; 2];
+    for number in 0..cases() {
+        let walls = walls(&mut rng);
+        let small = 1e-3;
+        let mut near = walls.clone();
+        for wall in &mut near {
+            wall.depth += small * (rng.f32() * 2.0 - 1.0);
+            if number % 2 == 1 {
+                wall.normal = (wall.normal + unit(&mut rng) * small * rng.f32()).normalize();
+            }
+        }
+        let [one, _] = found(&template, &walls);
+        // One that comes, farther off than the proxy is moved.
+        if near.len() < 8 && rng.bool() {
+            let depth = -0.1 - one.length() as f32;
+            near.push(Wall { normal: unit(&mut rng), depth, at: Vec3::ZERO });
+        }
+        let [other, _] = found(&template, &near);
+        let change = one.distance(other) / f64::from(small);
+        let scale = [1.0, 1.0 + f64::from(walls[0].depth)][number % 2];
+        steepest[number % 2] = steepest[number % 2].max(change / scale);
+    }
+    println!("the force changes by at most {steepest:?} times as much as the walls do");
+    assert!(steepest[0] < by_depths && steepest[1] < by_normals, "{by_depths} {by_normals}");
+}
+
+/// Any number of contacts with one wall are that wall, up to the compliance.
+#[test]
+fn one_wall_is_never_two() {
+    let template = contact();
+    let mut rng = Rng::with_seed(3);
+    for _ in 0..cases() / 20 {
+        let wall = Wall { normal: unit(&mut rng), depth: 0.01 + rng.f32() * 9.0, at: Vec3::ZERO };
+        for count in 1..=8 {
+            let [force, _] = found(&template, &vec![wall; count]);
+            let times = force.length() / f64::from(wall.depth);
+            let most = 1.0 + COMPLIANCE;
+            assert!((1.0 - TOLERANCE..most + TOLERANCE).contains(&times), "{count}: {times}");
+        }
+    }
+}
