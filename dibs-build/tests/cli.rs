@@ -1,41 +1,15 @@
 //! The `dibs` program, as a script would run it.
 
-use dibs_build::Format;
-use dibs_nostd::modes::{ModalGate, ModalReader, Modes};
-use dibs_nostd::{Advance, Assembler, Frames, Tree, VertexTable};
-use serde_json::Value;
+mod program;
+
 use std::net::UdpSocket;
-use std::path::Path;
-use std::process::{Command, Output};
-use std::time::Duration;
+use std::process::Command;
 
-fn dibs(folder: &Path, line: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_dibs"))
-        .current_dir(folder)
-        .args(line.split_whitespace())
-        .output()
-        .unwrap()
-}
+use dibs_build::Format;
+use dibs_nostd::Tree;
+use serde_json::Value;
 
-fn succeeds(folder: &Path, line: &str) -> String {
-    let output = dibs(folder, line);
-    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
-
-fn json(folder: &Path, line: &str) -> Value {
-    serde_json::from_str(&succeeds(folder, line)).unwrap()
-}
-
-/// Exit code 1, nothing on standard output, and one line on standard error.
-fn fails(folder: &Path, line: &str) -> String {
-    let output = dibs(folder, line);
-    let error = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{line}: {error}");
-    assert!(output.stdout.is_empty(), "{line}");
-    assert_eq!(error.lines().filter(|line| line.starts_with("error: ")).count(), 1, "{error}");
-    error.lines().last().unwrap().trim_start_matches("error: ").to_owned()
-}
+use program::{dibs, fails, json, succeeds};
 
 fn vector(value: &Value) -> [f64; 3] {
     serde_json::from_value(value.clone()).unwrap()
@@ -146,91 +120,6 @@ fn bad_input_is_one_sentence_and_no_output() {
     let rest = json(folder, "query ok.dibs --tool sphere:1,1,5,1 --json");
     assert!((rest["separation"].as_f64().unwrap() - 4.0).abs() < 1e-5, "{rest}");
     assert!(distance(vector(&rest["point_on_surface"]), [1.0, 1.0, 0.0]) < 1e-5, "{rest}");
-}
-
-#[test]
-fn modes_are_fitted_shown_and_written() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    succeeds(folder, "generate heart --triangles 1000 -o heart.ply --motion heart.pc2");
-    let line = "build heart.ply -o heart.dibs --motion heart.pc2 --modes";
-    let built = json(folder, &format!("{line} 2 --json"));
-    assert_eq!(built["tree"]["modes"]["count"], 2);
-    assert_eq!(json(folder, "inspect heart.dibs --json"), built["tree"]);
-    let errors = built["mode_errors"].as_array().unwrap();
-    let error = |modes: usize| errors[modes - 1]["max"].as_f64().unwrap();
-    assert!(errors.len() == 2 && error(1) > 1.0 && error(2) < 1e-4, "{errors:?}");
-    let stated = built["tree"]["modes"]["position_error"].as_f64().unwrap();
-    assert!(stated >= error(2) && stated < 1e-3, "{stated}");
-    assert!(succeeds(folder, &format!("{line} 1")).contains("<- written"));
-    assert!(succeeds(folder, "inspect heart.dibs").contains("modes    1, within"));
-    succeeds(folder, "build heart.ply -o heart.rs --motion heart.pc2 --modes 2");
-    let source = std::fs::read_to_string(folder.join("heart.rs")).unwrap();
-    assert!(source.contains("pub const MODES: usize = 2"), "{source}");
-
-    let error = fails(folder, &format!("{line} 2 --stretch 1.2"));
-    assert!(error.contains("triangles beyond their limits"), "{error}");
-
-    std::fs::write(folder.join("old.dibs"), "what was there before").unwrap();
-    succeeds(folder, "generate heart --triangles 998 -o other.ply --motion other.pc2");
-    for (line, part) in [
-        ("heart.pc2 --modes 0", "0 modes cannot be had: the motion has 2"),
-        ("heart.pc2 --modes 3", "3 modes cannot be had: the motion has 2"),
-        ("other.pc2 --modes 2", "has 501 vertices and the mesh has 502"),
-        ("absent.pc2 --modes 2", "absent.pc2"),
-        ("heart.ply --modes 2", "heart.ply"),
-    ] {
-        let error = fails(folder, &format!("build heart.ply -o old.dibs --motion {line}"));
-        assert!(error.contains(part), "{line}: {error}");
-    }
-    let before = std::fs::read_to_string(folder.join("old.dibs")).unwrap();
-    assert_eq!(before, "what was there before");
-}
-
-/// From the program, over UDP, to the surface that a controller searches.
-#[test]
-fn weights_are_streamed() {
-    const MODES: usize = 2;
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    succeeds(folder, "generate heart --triangles 1000 -o heart.ply --motion heart.pc2");
-    succeeds(folder, "build heart.ply -o heart.dibs --motion heart.pc2 --modes 2");
-    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
-    socket.set_read_timeout(Some(Duration::from_millis(500))).unwrap();
-    let to = format!("--to udp:{} --modes", socket.local_addr().unwrap());
-    let sent = json(folder, &format!("stream heart.dibs heart.pc2 {to} --rate 500 --json"));
-    assert_eq!(sent["frames"], 25);
-    // A begin of 64 bytes, two weights in 32, and a commit of 32.
-    assert!(sent["bytes_per_frame"].as_f64().unwrap() >= 128.0, "{sent}");
-
-    let blob: &'static [u8] = std::fs::read(folder.join("heart.dibs")).unwrap().leak();
-    let tree = Tree::<u16>::from_bytes(blob).unwrap();
-    let modes = Modes::of(&tree).unwrap();
-    let frames: &'static Frames<MODES> = Box::leak(Box::new(Frames::new()));
-    let (writer, reader) = frames.split().unwrap();
-    let gate = ModalGate::<_, MODES>::new(&modes, &tree).unwrap();
-    let mut assembler = Assembler::new(writer, gate, tree.mesh_id(), 1e4);
-    let mut reader = ModalReader::new(reader, &modes).unwrap();
-    let motion = dibs_build::Motion::read_pc2(folder.join("heart.pc2")).unwrap();
-    let (mut buffer, mut published) = ([0; 2048], 0);
-    while let Ok(length) = socket.recv(&mut buffer) {
-        assembler.accept(&buffer[..length], 0).unwrap();
-        let Ok(Advance::Published { .. }) = assembler.advance(u32::MAX) else { continue };
-        let (frame, recorded) = (reader.read().unwrap(), &motion.frames[published]);
-        for row in 0..tree.vertex_count() {
-            let exact = recorded[tree.vertex_number(row).unwrap() as usize];
-            let away = frame.position(row).unwrap().distance(exact);
-            assert!(away <= frame.label().position_error, "frame {published}, row {row}: {away}");
-        }
-        published += 1;
-    }
-    assert_eq!(published, 25);
-
-    succeeds(folder, "build heart.ply -o bare.dibs");
-    let error = fails(folder, &format!("stream bare.dibs heart.pc2 {to}"));
-    assert!(error.contains("--motion and --modes"), "{error}");
-    let error = fails(folder, &format!("stream heart.ply heart.pc2 {to}"));
-    assert!(error.contains("heart.ply"), "{error}");
 }
 
 /// The program and the library agree on what is wrong with a file, and on what they make of it; what the library
@@ -366,99 +255,6 @@ fn it_says_its_name_and_counts_in_english() {
     assert_eq!(warnings, "warning: soup.obj: 4 open border edges\n");
     let (read, _) = of("one");
     assert!(read.contains("3 vertices, 1 triangle\n") && !read.contains("1 triangles"), "{read}");
-}
-
-#[test]
-fn limits_are_learned_from_a_motion_and_hold_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    succeeds(folder, "generate heart --triangles 1000 -o heart.ply --motion heart.pc2");
-    let line =
-        "stretch heart.ply heart.pc2 --margin 0.05 --limits heart.limits --picture heart.svg";
-    let learned = json(folder, &format!("{line} --json"));
-    let worst = &learned["worst"][0];
-    let (largest, uniform) =
-        (worst["stretch"].as_f64().unwrap(), learned["uniform_limit"].as_f64());
-    assert!((largest * 1.05 - uniform.unwrap()).abs() < 1e-3, "{learned}");
-    assert_eq!(learned["percentiles"][5][1], worst["stretch"]);
-    assert!(std::fs::read_to_string(folder.join("heart.svg")).unwrap().contains("<svg"));
-    assert!(succeeds(folder, "stretch heart.ply heart.pc2 --edges").contains("worst    triangle"));
-
-    // What is learned holds the motion; less does not, and says which triangle and what to do.
-    let built = json(
-        folder,
-        "build heart.ply -o heart.dibs --limits heart.limits --motion heart.pc2 --json",
-    );
-    let limit = built["tree"]["stretch"].as_f64().unwrap();
-    assert!((limit - uniform.unwrap()).abs() < 1e-6);
-    assert!(built["tree"]["least_stretch_limit"].as_f64().unwrap() < limit - 0.05);
-    let plain =
-        json(folder, "build heart.ply -o plain.dibs --stretch 1.5 --motion heart.pc2 --json");
-    assert_eq!(plain["tree"]["least_stretch_limit"], plain["tree"]["stretch"]);
-    let error = fails(folder, "build heart.ply -o old.dibs --stretch 1.02 --motion heart.pc2");
-    let named = format!("most of all triangle {} in frame {}", worst["triangle"], worst["frame"]);
-    assert!(error.contains(&named) && error.contains("dibs stretch --limits"), "{error}");
-    assert!(!folder.join("old.dibs").exists());
-
-    // Both trees give the same distances on a frame of the motion.
-    let tool = "--tool sphere:-70,5,20,3 --vertices heart.pc2 --frame 9 --stretch 2 --json";
-    let [one, other] =
-        ["heart", "plain"].map(|tree| json(folder, &format!("query {tree}.dibs {tool}")));
-    assert_eq!(one["separation"], other["separation"]);
-}
-
-#[test]
-fn limits_that_cannot_be_used_are_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    succeeds(folder, "generate heart --triangles 1000 -o heart.ply --motion heart.pc2");
-    succeeds(folder, "generate heart --triangles 998 -o other.ply --motion other.pc2");
-    succeeds(folder, "stretch heart.ply heart.pc2 --limits heart.limits");
-    let text = std::fs::read_to_string(folder.join("heart.limits")).unwrap();
-    let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
-    let lines: Vec<&str> = text.lines().collect();
-    write("short.limits", &lines[..500].join("\n"));
-    write("low.limits", &text.replace(lines[700], "0.5"));
-    write("none.limits", "v 1 2 3");
-    for (line, expected) in [
-        ("build other.ply -o t.dibs --limits heart.limits", "is of mesh"),
-        ("build heart.ply -o t.dibs --limits short.limits", "limits for 1000 triangles"),
-        ("build heart.ply -o t.dibs --limits low.limits", "'0.5' is not a limit"),
-        ("build heart.ply -o t.dibs --limits none.limits", "no file of stretch limits"),
-        ("build heart.ply -o t.dibs --limits missing.limits", "cannot be read"),
-        ("stretch heart.ply other.pc2", "vertices and the mesh has"),
-        ("stretch heart.ply heart.pc2 --margin=-1", "a margin of -1 makes no sense"),
-        ("build heart.ply -o t.dibs --stretch 0.5", "a stretch limit of 0.5 makes no sense"),
-    ] {
-        let error = fails(folder, line);
-        assert!(error.contains(expected), "{line}: {error}");
-        assert!(!folder.join("t.dibs").exists());
-    }
-}
-
-/// A triangle that no f32 arithmetic can measure is named when the tree is built, not when the controller
-/// refuses every frame.
-#[test]
-fn what_the_stretch_check_cannot_measure_is_warned_of() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    let square = "v 0 0 0\nv 10 0 0\nv 10 10 0\nv 0 10 0\n";
-    let write = |name: &str, rest: &str| {
-        std::fs::write(folder.join(name), format!("{square}{rest}")).unwrap();
-    };
-    write("good.obj", "f 1 2 3\nf 1 3 4\n");
-    write("flat.obj", "v 0.01 0.00001 0\nf 1 2 3\nf 1 3 4\nf 2 1 5\n");
-    write("tiny.obj", "v 1e-8 0 0\nv 0 1e-8 0\nf 1 2 3\nf 1 3 4\nf 1 5 6\n");
-    for (mesh, unmeasurable) in [("good", 0), ("flat", 0), ("tiny", 1)] {
-        let output = dibs(folder, &format!("build {mesh}.obj -o {mesh}.dibs --json"));
-        let errors = String::from_utf8(output.stderr).unwrap();
-        assert!(output.status.success(), "{errors}");
-        let built: Value = serde_json::from_slice(&output.stdout).unwrap();
-        assert_eq!(built["tree"]["unmeasurable"], unmeasurable, "{built}");
-        let warned = built["warnings"].to_string().contains("0, 4 and 5) are too small");
-        assert_eq!(warned, unmeasurable > 0, "{built}");
-        assert_eq!(errors.contains("weld or drop them"), unmeasurable > 0, "{errors}");
-    }
 }
 
 #[test]

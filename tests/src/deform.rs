@@ -2,7 +2,7 @@
 
 use std::f32::consts::TAU;
 
-use dibs_build::Mesh;
+use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::PathKind;
 use fastrand::Rng;
 use glam::{Quat, Vec3};
@@ -139,4 +139,22 @@ pub fn unit(rng: &mut Rng) -> Vec3 {
             return v.normalize();
         }
     }
+}
+
+/// A heart, its tree, and some deformations of it with the stretch that each truly has.
+///
+/// # Panics
+/// Never: a heart of this size exists.
+#[must_use]
+pub fn deformed(rounds: usize, seed: u64) -> (Mesh, BuiltTree, Vec<Vec<Vec3>>) {
+    let mesh = generate::heart(2_000).expect("a valid size").mesh;
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
+    let mut rng = Rng::with_seed(seed);
+    let paths = built.tree::<u16>().expect("valid").paths();
+    let frames = (0..rounds).map(|round| {
+        let deformation = Deformation::ALL[round % Deformation::ALL.len()];
+        deformation.apply(&mesh, paths, 1.0 + rng.f32() * 0.45, &mut rng)
+    });
+    let frames = frames.collect();
+    (mesh, built, frames)
 }

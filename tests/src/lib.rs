@@ -13,6 +13,8 @@ pub mod hand;
 #[cfg(feature = "builder")]
 pub mod method;
 #[cfg(feature = "builder")]
+pub mod modal;
+#[cfg(feature = "builder")]
 pub mod motions;
 pub mod oracle;
 #[cfg(feature = "builder")]

@@ -1,0 +1,191 @@
+//! Weights on a bus: received, bounded or measured, refused and counted.
+
+use dibs_build::Builder;
+use dibs_build::modes::ModalFit;
+use dibs_nostd::modes::{Memo, ModalGate, ModalReader, Modes};
+use dibs_nostd::wire::{self, Encoding, Event, FrameEncoder, FrameId, WeightsEncoder};
+use dibs_nostd::{
+    Advance, Arriving, Assembler, Changed, Frames, Gate, Options, Query, ReceiveError, Sphere,
+    StretchError, Tree, Verdict, measure_stretch,
+};
+use dibs_tests::bus::reseal;
+use dibs_tests::modal::{anywhere, positions, small};
+use dibs_tests::motions::trembling;
+use fastrand::Rng;
+use glam::Vec3;
+
+/// Everything between a sender's weights and a controller's query.
+struct Bus {
+    tree: Tree<'static, u16>,
+    modes: Modes<'static>,
+    assembler: Assembler<'static, ModalGate<'static, &'static Tree<'static, u16>, 4>, 4>,
+    reader: ModalReader<'static, 'static, 4>,
+    recorded: Vec<Vec<f32>>,
+}
+
+fn bus() -> Bus {
+    let (built, _) = small(4);
+    let bytes: &'static [u8] = built.blob().to_vec().leak();
+    let tree: &'static Tree<'static, u16> =
+        Box::leak(Box::new(Tree::from_bytes(bytes).expect("valid")));
+    let modes = Modes::of(tree).expect("valid");
+    let frames: &'static Frames<4> = Box::leak(Box::new(Frames::new()));
+    let (writer, reader) = frames.split().expect("new");
+    let gate = ModalGate::new(&modes, tree).expect("four modes");
+    Bus {
+        tree: *tree,
+        modes,
+        assembler: Assembler::new(writer, gate, tree.mesh_id(), 1e4),
+        reader: ModalReader::new(reader, &modes).expect("four modes"),
+        recorded: built.modal_motion().expect("has modes").weights.clone(),
+    }
+}
+
+impl Bus {
+    fn packets(&self, epoch: u32, weights: &[f32]) -> Vec<Vec<u8>> {
+        let id = FrameId { mesh_id: self.tree.mesh_id(), session: 1, epoch };
+        let mut encoder = WeightsEncoder::<64>::new(id, weights).expect("can be sent");
+        let mut buffer = [0; 64];
+        let mut packets = Vec::new();
+        while let Some(packet) = encoder.next_packet(&mut buffer) {
+            packets.push(packet.to_vec());
+        }
+        packets
+    }
+
+    /// What the last packet led to, or the first that was rejected.
+    fn send(&mut self, epoch: u32, weights: &[f32]) -> Result<Advance, ReceiveError> {
+        let packets = self.packets(epoch, weights);
+        packets.iter().try_fold(Advance::Idle, |_, packet| {
+            self.assembler.accept(packet, 7 * epoch)?;
+            self.assembler.advance(u32::MAX)
+        })
+    }
+}
+
+/// A frame of weights becomes the surface that these weights make, with all that is known of it.
+#[test]
+fn weights_come_over_the_bus() {
+    let mut bus = bus();
+    assert!(bus.reader.read().is_none());
+    for (epoch, weights) in (1..).zip(bus.recorded.clone()) {
+        assert_eq!(bus.send(epoch, &weights), Ok(Advance::Published { epoch }));
+        let frame = bus.reader.latest(7 * epoch + 3);
+        let age = frame.frame().expect("published").age;
+        let frame = frame.within(3).expect("published");
+        let surface = bus.modes.surface::<4>(&weights).expect("recorded");
+        assert_eq!(positions(&frame), positions(&surface));
+        let label = frame.label();
+        assert_eq!((label.epoch, label.received, age), (epoch, 7 * epoch, 3));
+        assert_eq!(label.position_error, bus.modes.position_error());
+        let bound = bus.modes.stretch_bound(&weights).expect("recorded");
+        assert_eq!(label.stretch.expect("bounded").sigma(), bound.sigma());
+        let mut query = Query::<u16, 32>::new(&bus.tree).expect("deep enough");
+        let tool = Sphere::new(Vec3::new(0.0, 0.0, 120.0), 3.0).expect("a tool");
+        let options = Options::cold().stretch(label.stretch.expect("bounded"));
+        let found = query.closest(&frame, &tool, &options).expect("sound");
+        let memo = Memo::<_, 64>::new(&frame);
+        let remembered = query.closest(&memo, &tool, &options).expect("sound");
+        assert_eq!(format!("{found:?}"), format!("{remembered:?}"));
+    }
+}
+
+/// Weights that no surface has, frames of vertices, and packets that are not all of one frame: refused
+/// and counted, and the last good surface stays.
+#[test]
+fn hostile_frames_of_weights_are_rejected_and_counted() {
+    let mut bus = bus();
+    let good = bus.recorded[5].clone();
+    assert!(bus.send(1, &good).is_ok());
+    let published = positions(&bus.reader.read().expect("published"));
+    let mut epoch = 1;
+    for mode in 0..4 {
+        let [low, high] = bus.modes.range(mode).expect("there");
+        let row = mode as u32;
+        for weight in [low.next_down(), high.next_up(), f32::MAX] {
+            let mut weights = good.clone();
+            weights[mode] = weight;
+            epoch += 1;
+            assert_eq!(bus.send(epoch, &weights), Err(ReceiveError::TooFar { row }));
+        }
+        for weight in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            // An encoder refuses to send these.
+            epoch += 1;
+            let mut packets = bus.packets(epoch, &good);
+            let at = wire::HEADER_BYTES + 4 * mode;
+            packets[1][at..at + 4].copy_from_slice(&weight.to_le_bytes());
+            let hostile = reseal(packets[1].clone());
+            assert!(bus.assembler.accept(&packets[0], 0).is_ok());
+            let outcome = bus.assembler.accept(&hostile, 0);
+            assert_eq!(outcome, Err(ReceiveError::NotFinite { row }));
+        }
+    }
+    let counted = |bus: &Bus, event| bus.assembler.counters().of(event);
+    assert_eq!(counted(&bus, Event::TooFar), 12);
+    assert_eq!(counted(&bus, Event::NotFinite), 12);
+    assert!(bus.send(97, &good[1..]).is_err());
+    assert_eq!(counted(&bus, Event::RowCount), 1);
+    let id = FrameId { mesh_id: bus.tree.mesh_id(), session: 1, epoch: 98 };
+    let mut vertices = FrameEncoder::<_, 64>::new(id, Encoding::Float, &[Vec3::ZERO; 4][..]);
+    let mut buffer = [0; 64];
+    let begin = vertices.as_mut().expect("can be sent").next_packet(&mut buffer).expect("begins");
+    assert_eq!(bus.assembler.accept(begin, 0), Err(ReceiveError::Encoding));
+    // Two frames' packets under one number.
+    let mixed = [bus.packets(99, &good), bus.packets(99, &bus.recorded[8])];
+    assert!(bus.assembler.accept(&mixed[0][0], 0).is_ok());
+    assert!(bus.assembler.accept(&mixed[1][1], 0).is_ok());
+    let outcome = bus.assembler.accept(&mixed[0][2], 0);
+    assert!(matches!(outcome, Err(ReceiveError::Digest { .. })), "{outcome:?}");
+    assert_eq!(positions(&bus.reader.read().expect("stays")), published);
+    assert_eq!(bus.reader.read().expect("stays").label().epoch, 1);
+    assert!(bus.send(100, &bus.recorded[8].clone()).is_ok());
+}
+
+/// A vertex receiver takes no weights.
+#[test]
+fn a_receiver_of_vertices_refuses_weights() {
+    let (mut assembler, _) = dibs_tests::bus::bus();
+    let id = FrameId { mesh_id: dibs_tests::bus::MESH, session: 1, epoch: 1 };
+    let weights = [0.0; dibs_tests::bus::N];
+    let mut encoder = WeightsEncoder::<64>::new(id, &weights).expect("can be sent");
+    let mut buffer = [0; 64];
+    let begin = encoder.next_packet(&mut buffer).expect("begins");
+    assert_eq!(assembler.accept(begin, 0), Err(ReceiveError::Encoding));
+}
+
+/// Where the bound cannot tell, the surface is measured; what is published is within the limit, what is
+/// refused for its stretch is not, whatever the bound said.
+#[test]
+fn the_gate_is_exact_whatever_the_bound() {
+    let (mesh, motion) = trembling(320, 3, 6);
+    let fit = ModalFit::new(&mesh, &motion).expect("a motion");
+    let rest = Builder::new().stretch(1.2).build(&mesh).expect("a valid mesh");
+    let built = rest.with_modes(&fit, 4).expect("so many");
+    let tree = built.tree::<u16>().expect("valid");
+    let modes = Modes::of(&tree).expect("valid");
+    let mut gate = ModalGate::<_, 4>::new(&modes, &tree).expect("four modes");
+    let mut rng = Rng::with_seed(11);
+    let (mut bounded, mut measured, mut refused) = (0, 0, 0);
+    for _ in 0..2_000 {
+        let mut weights = anywhere(&modes, &mut rng);
+        weights.iter_mut().for_each(|weight| *weight *= 0.8);
+        let rows: Vec<Vec3> = weights.iter().map(|w| Vec3::new(*w, 0.0, 0.0)).collect();
+        let surface = modes.surface::<4>(&weights).expect("in range");
+        let exact = measure_stretch(&tree, &surface);
+        let before = gate.measured();
+        gate.begin(Changed::Whole);
+        assert_eq!(gate.advance(Arriving::new(&rows[..], 3), 1), Ok(Verdict::Pending));
+        match (gate.advance(Arriving::new(&rows[..], 4), u32::MAX), exact) {
+            (Ok(Verdict::Admitted(Some(found))), Ok(exact)) => {
+                assert!(found.sigma() >= exact.sigma() * 0.9999);
+                if gate.measured() == before { bounded += 1 } else { measured += 1 }
+            }
+            (Err(StretchError::Exceeded { .. }), Err(StretchError::Exceeded { .. })) => {
+                refused += 1;
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+    println!("{bounded} admitted by the bound, {measured} by measurement, {refused} refused");
+    assert!(bounded > 100 && measured > 20 && refused > 20);
+}

@@ -1,0 +1,192 @@
+//! The stretch check in slices comes to what a measurement of the whole frame does.
+
+use dibs_nostd::{
+    Arriving, Changed, Gate, MeasuredStretch, REGIONS, StretchError, StretchMonitor, SurfaceLimits,
+    Tree, Verdict, VertexTable, measure_stretch,
+};
+use dibs_tests::deform::{deformed, unit};
+use fastrand::Rng;
+
+/// Feeds a frame as a bus would: packets of rows in some order, and slices of work between them.
+fn feed<V: VertexTable + ?Sized>(
+    gate: &mut impl Gate,
+    surface: &V,
+    changed: Changed,
+    packets: &[std::ops::Range<u32>],
+    rng: &mut Rng,
+) -> Result<MeasuredStretch, StretchError> {
+    let rows = surface.len() as u32;
+    let mut come = vec![changed == Changed::Partial; rows as usize];
+    packets.iter().cloned().flatten().for_each(|row| come[row as usize] = false);
+    gate.begin(changed);
+    let most = 1 + rng.u32(..400);
+    let (mut ready, mut calls) = (0, 0);
+    let mut order: Vec<_> = packets.to_vec();
+    if rng.bool() {
+        rng.shuffle(&mut order);
+    }
+    let mut order = order.into_iter();
+    loop {
+        let packet = order.next();
+        let is_last = packet.is_none();
+        for row in packet.clone().into_iter().flatten() {
+            come[row as usize] = true;
+        }
+        packet.into_iter().for_each(|rows| gate.moved(rows));
+        while ready < rows && come[ready as usize] {
+            ready += 1;
+        }
+        let ready =
+            if changed == Changed::Partial && !is_last { ready.min(rows - 1) } else { ready };
+        calls += 1;
+        assert!(calls < 10_000, "the gate does not come to an end");
+        match gate.advance(Arriving::new(surface, ready), rng.u32(..=most))? {
+            Verdict::Pending => (),
+            Verdict::Admitted(measured) => {
+                assert!(ready == rows, "admitted before it was complete");
+                return Ok(measured.expect("a monitor measures"));
+            }
+        }
+    }
+}
+
+fn in_packets(rows: u32, each: usize) -> Vec<std::ops::Range<u32>> {
+    (0..rows).step_by(each).map(|first| first..rows.min(first + each as u32)).collect()
+}
+
+/// A monitor that has measured other frames before comes to the same, but for the rounding that is added.
+fn assert_same(
+    sliced: Result<MeasuredStretch, StretchError>,
+    whole: Result<MeasuredStretch, StretchError>,
+) {
+    let (Ok(sliced), Ok(whole)) = (sliced, whole) else {
+        return assert_eq!(sliced, whole);
+    };
+    let (sigma, exact) = (sliced.sigma(), whole.sigma());
+    assert!((sigma / exact - 1.0).abs() < 2e-5, "{sigma} for {exact}");
+    // A region's stretch is stored in parts of 256 of that.
+    for (region, exact) in sliced.regions().into_iter().zip(whole.regions()) {
+        assert!((region - exact).abs() < sigma * 1.01 / 256.0, "{region} for {exact}");
+    }
+}
+
+#[test]
+fn sliced_is_whole_whatever_the_slices_and_the_packets() {
+    let (_, built, frames) = deformed(90, 24);
+    let tree = built.tree::<u16>().expect("valid");
+    let mut monitor = StretchMonitor::new(&tree)
+        .expect("a metric")
+        .limits(SurfaceLimits::reach_mm(1e3).shrinkage(0.0));
+    let mut rng = Rng::with_seed(25);
+    for (round, moved) in frames.iter().enumerate() {
+        let mut rows = built.to_rows(moved);
+        let packets = in_packets(tree.vertex_count(), [1, 3, 7, 40][round % 4]);
+        if round % 3 == 2 {
+            // One vertex is pulled out, in every third frame.
+            let at = rng.usize(..rows.len());
+            rows[at] += unit(&mut rng) * 30.0;
+        }
+        let whole = measure_stretch(&tree, rows.as_slice());
+        let sliced = feed(&mut monitor, rows.as_slice(), Changed::Whole, &packets, &mut rng);
+        assert_same(sliced, whole);
+        assert_eq!(whole.is_err(), round % 3 == 2);
+        let mut new = StretchMonitor::new(&tree)
+            .expect("a metric")
+            .limits(SurfaceLimits::reach_mm(1e3).shrinkage(0.0));
+        assert_eq!(feed(&mut new, rows.as_slice(), Changed::Whole, &packets, &mut rng), whole);
+    }
+}
+
+#[test]
+fn partial_is_whole_and_measures_only_what_moved() {
+    let (mesh, built, _) = deformed(0, 0);
+    let tree = built.tree::<u16>().expect("valid");
+    let mut monitor = StretchMonitor::new(&tree)
+        .expect("a metric")
+        .limits(SurfaceLimits::reach_mm(1e3).shrinkage(0.0));
+    let mut rng = Rng::with_seed(26);
+    let mut surface = built.to_rows(&mesh.positions);
+    let vertices = tree.vertex_count();
+    // Without anything published a partial frame is measured whole.
+    let first =
+        feed(&mut monitor, surface.as_slice(), Changed::Partial, &in_packets(1, 1), &mut rng);
+    assert_eq!(first, measure_stretch(&tree, surface.as_slice()));
+    monitor.published();
+    let (mut refused, mut abandoned) = (0, 0);
+    for _ in 0..400 {
+        let mut next = surface.clone();
+        let first = rng.u32(..vertices);
+        let moved = first..vertices.min(first + 1 + rng.u32(..60));
+        let push = unit(&mut rng) * rng.f32() * 1.2;
+        moved.clone().for_each(|row| next[row as usize] += push);
+        let whole = measure_stretch(&tree, next.as_slice());
+        let packets: Vec<_> = moved.clone().map(|row| row..row + 1).collect();
+        if rng.u32(..5) == 0 {
+            // Half of a frame that never comes to its end.
+            monitor.begin(Changed::Partial);
+            monitor.moved(moved);
+            let _ = monitor.advance(Arriving::new(next.as_slice(), vertices), 20);
+            abandoned += 1;
+            continue;
+        }
+        let partial = feed(&mut monitor, next.as_slice(), Changed::Partial, &packets, &mut rng);
+        assert_same(partial, whole);
+        match partial {
+            Ok(_) => {
+                monitor.published();
+                surface = next;
+            }
+            Err(_) => refused += 1,
+        }
+    }
+    assert!(refused > 10 && abandoned > 10, "{refused} refused, {abandoned} abandoned");
+
+    // One vertex: a few regions' triangles, not all.
+    monitor.begin(Changed::Partial);
+    monitor.moved(7..8);
+    let mut work = 0;
+    while monitor.advance(Arriving::new(surface.as_slice(), vertices), 1) == Ok(Verdict::Pending) {
+        work += 1;
+    }
+    assert!(work > 0 && work < tree.triangle_count() / 4, "{work} triangles for one vertex");
+}
+
+/// No call does more work than it is told: with work for one triangle a frame takes as many calls as
+/// it has triangles, and from the second on one more for each region, whose worst triangle comes first.
+#[test]
+fn a_slice_is_no_longer_than_it_may_be() {
+    let (mesh, built, _) = deformed(0, 0);
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let mut monitor = StretchMonitor::new(&tree)
+        .expect("a metric")
+        .limits(SurfaceLimits::reach_mm(1e3).shrinkage(0.0));
+    for again in [0, REGIONS as u32] {
+        monitor.begin(Changed::Whole);
+        let mut calls = 1;
+        while monitor.advance(Arriving::new(rows.as_slice(), tree.vertex_count()), 1)
+            == Ok(Verdict::Pending)
+        {
+            calls += 1;
+        }
+        assert_eq!(calls, tree.triangle_count() + again);
+        assert!(calls <= monitor.whole_work());
+    }
+}
+
+/// Bytes may stand anywhere: where they are not aligned the measurement is the same.
+#[test]
+fn an_odd_address_changes_nothing() {
+    let (_, built, frames) = deformed(9, 29);
+    let aligned = built.tree::<u16>().expect("valid");
+    let mut room = vec![0; built.blob().len() + 4];
+    for at in 0..4 {
+        room[at..][..built.blob().len()].copy_from_slice(built.blob());
+        let tree = Tree::<u16>::from_bytes(&room[at..][..built.blob().len()]).expect("valid");
+        for moved in &frames {
+            let rows = built.to_rows(moved);
+            let measured = measure_stretch(&tree, rows.as_slice());
+            assert_eq!(measured, measure_stretch(&aligned, rows.as_slice()));
+        }
+    }
+}
