@@ -1,12 +1,12 @@
-//! How much longer a crate takes to compile for the tree that it includes, and a build script for its tree.
+//! How much longer a crate takes to compile for the tree that it includes, and how long a build script takes to build it.
 //!
 //! `cargo bench -p dibs-tests --bench compile_time -- --write` writes `docs/compile-time.md`. The times are those of
-//! the machine that runs it; nothing asserts them. `DIBS_FOLDER` keeps the compiled dependencies for the next run.
+//! the machine that runs it; nothing asserts them. `DIBS_FOLDER` keeps the compiled dependencies for the next run,
+//! `DIBS_TRIANGLES` takes other sizes. The program `dibs` comes from `cargo build --release --workspace`.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Instant;
 use std::{env, fs};
 
 use anyhow::{Context, Result, ensure};
@@ -18,21 +18,31 @@ fn main() -> Result<()> {
     let temporary = tempfile::tempdir()?;
     let folder = env::var_os("DIBS_FOLDER").map(PathBuf::from);
     let folder = folder.as_deref().unwrap_or(temporary.path());
-    let empty = Crate::new(folder, "empty", None)?;
-    let mut rows = String::new();
-    let [check, release] = empty.times()?;
-    row(&mut rows, "without a tree", 0, [check, release]);
+    let (mut rows, mut scripts) = (String::new(), String::new());
+    let without = Crate::new(folder, "empty", None)?.times()?;
+    row(&mut rows, "without a tree", 0, without, without);
     let sizes = env::var("DIBS_TRIANGLES").unwrap_or_else(|_| "10000 100000".to_owned());
     for triangles in sizes.split_whitespace() {
         let triangles = triangles.parse().context("DIBS_TRIANGLES")?;
-        let start = Instant::now();
-        let built = Builder::new().build(&generate::heart(triangles)?.mesh)?;
-        eprintln!("{triangles} triangles built in {:.1} s", start.elapsed().as_secs_f64());
+        let mesh = generate::heart(triangles)?.mesh;
+        let built = Builder::new().build(&mesh)?;
         let name = format!("{triangles} triangles");
         let times = Crate::new(folder, &format!("t{triangles}"), Some(&built))?.times()?;
-        row(&mut rows, &name, built.blob().len(), times);
+        row(&mut rows, &name, built.blob().len(), times, without);
+
+        let file = folder.join("heart.ply");
+        mesh.write_ply(&file)?;
+        let [plain, optimised] = [("plain", ""), ("optimised", LINES)]
+            .map(|(name, lines)| script_time(folder, name, lines, &file));
+        let (plain, optimised, program) = (plain?, optimised?, program_time(&file)?);
+        let ratio = optimised / program;
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            scripts,
+            "| {triangles} | {plain:.1} | {optimised:.1} | {program:.1} | {ratio:.2} |"
+        );
     }
-    let page = page(&rows);
+    let page = page(&rows, &scripts);
     print!("{page}");
     if env::args().any(|argument| argument == "--write") {
         fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/compile-time.md"), page)?;
@@ -40,22 +50,84 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-fn row(rows: &mut String, name: &str, bytes: usize, [check, release]: [f64; 2]) {
+fn row(rows: &mut String, name: &str, bytes: usize, times: [f64; 2], without: [f64; 2]) {
+    let [check, release] = times;
+    let [more_check, more_release] = [check - without[0], release - without[1]];
     // Writing to a String cannot fail.
-    let _ = writeln!(rows, "| {name} | {} | {check:.2} | {release:.2} |", bytes / 1000);
+    let _ = writeln!(
+        rows,
+        "| {name} | {} | {check:.2} | {more_check:+.2} | {release:.2} | {more_release:+.2} |",
+        bytes / 1000
+    );
 }
 
-fn page(rows: &str) -> String {
+fn page(rows: &str, scripts: &str) -> String {
     let compiler = Command::new("rustc").arg("--version").output();
     let compiler = compiler.map(|o| String::from_utf8_lossy(&o.stdout).trim().to_owned());
     let compiler = compiler.unwrap_or_default();
     format!(
         "# Compile time\n\n\
-         Written by `cargo bench -p dibs-tests --bench compile_time -- --write`, with {compiler}.\n\n\
-         Seconds of processor time, cargo's included, that `cargo check` and `cargo build --release` take for a crate \
-         that includes\na tree and validates it at run time, after an edit of its source: the least of {REPEATS}.\n\n\
-         | crate | tree, kB | check | release |\n|---|---|---|---|\n{rows}"
+         Written by `cargo bench -p dibs-tests --bench compile_time -- --write`, with {compiler}. Seconds of processor \
+         time of\nthe machine that ran it: other load does not count, another machine has other figures.\n\n\
+         ## A crate that includes a tree\n\n\
+         After an edit of its source, `cargo check` and `cargo build --release`, cargo's own time included: the least \
+         of {REPEATS}. The\ncrate includes a tree and validates it when it runs; *more* is against the crate without.\n\n\
+         | crate | tree, kB | check | more | release | more |\n|---|---|---|---|---|---|\n{rows}\n\
+         ## A build script\n\n\
+         `dibs_build::tree(\"heart.ply\").emit(\"heart\")` in `cargo build`, whose profile optimises nothing: one run, \
+         the compilation\nof the script not counted. *With the lines* is with these in the user's `Cargo.toml`:\n\n\
+         ```toml\n{LINES}```\n\n\
+         | triangles | without | with the lines | `dibs build` | times `dibs build` |\n|---|---|---|---|---|\n{scripts}"
     )
+}
+
+/// What the README has a user write into `Cargo.toml`.
+const LINES: &str = "[profile.dev.package.dibs-build]\nopt-level = 3\n";
+
+/// Processor time that a build script takes for the tree of a mesh, in an unoptimised profile with these lines.
+fn script_time(folder: &Path, name: &str, lines: &str, mesh: &Path) -> Result<f64> {
+    let root = folder.join(name);
+    fs::create_dir_all(root.join("src"))?;
+    let builder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../dibs-build").canonicalize()?;
+    let manifest = format!(
+        "[package]\nname = {name:?}\nedition = \"2024\"\n[workspace]\n[build-dependencies]\n\
+         dibs-build = {{ path = {builder:?}, default-features = false }}\n{lines}"
+    );
+    fs::write(root.join("Cargo.toml"), manifest)?;
+    fs::copy(builder.join("../Cargo.lock"), root.join("Cargo.lock"))?;
+    fs::write(root.join("src/lib.rs"), "")?;
+    fs::copy(mesh, root.join("heart.ply"))?;
+    let script = r#"
+fn main() {
+    dibs_build::tree("heart.ply").emit("heart");
+    std::fs::write("stat", std::fs::read("/proc/self/stat").unwrap()).unwrap();
+}
+"#;
+    fs::write(root.join("build.rs"), script)?;
+    cargo(&root, &["build", "--quiet"])?;
+    // The script's own time: fields 14 and 15.
+    processor_time(&fs::read_to_string(root.join("stat"))?, 11)
+}
+
+/// Processor time that the program takes for the same.
+fn program_time(mesh: &Path) -> Result<f64> {
+    let here = env::current_exe()?;
+    let program = here.ancestors().nth(2).context("a target folder")?.join("dibs");
+    let before = time_of_children()?;
+    let tree = mesh.with_extension("dibs");
+    let built = Command::new(&program).arg("build").arg(mesh).arg("-o").arg(&tree).output();
+    let built = built.with_context(|| format!("{}: not built", program.display()))?;
+    ensure!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+    Ok(time_of_children()? - before)
+}
+
+fn cargo(folder: &Path, arguments: &[&str]) -> Result<()> {
+    let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.args(arguments).current_dir(folder);
+    // The compiler itself, and one folder for all, so that dependencies are compiled once.
+    cargo.env("RUSTC_WRAPPER", "").env("CARGO_TARGET_DIR", folder.join("../target"));
+    ensure!(cargo.status()?.success(), "cargo failed in {}", folder.display());
+    Ok(())
 }
 
 /// A crate outside the workspace.
@@ -97,14 +169,10 @@ impl Crate {
         for repeat in 0..=REPEATS {
             let file = self.0.join("src/lib.rs");
             fs::write(&file, format!("{}// {repeat}\n", fs::read_to_string(&file)?))?;
-            let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-            cargo.args(arguments).arg("--quiet").current_dir(&self.0);
-            // The compiler itself, and one folder for all, so that dependencies are compiled once.
-            cargo.env("RUSTC_WRAPPER", "").env("CARGO_TARGET_DIR", self.0.join("../target"));
-            let before = processor_time()?;
-            ensure!(cargo.status()?.success(), "cargo failed in {}", self.0.display());
+            let before = time_of_children()?;
+            cargo(&self.0, &[arguments, &["--quiet"]].concat())?;
             if repeat > 0 {
-                least = least.min(processor_time()? - before);
+                least = least.min(time_of_children()? - before);
             }
         }
         Ok(least)
@@ -112,10 +180,14 @@ impl Crate {
 }
 
 /// Seconds of processor time of the processes that this one has waited for: other load does not count.
-fn processor_time() -> Result<f64> {
-    let stat = fs::read_to_string("/proc/self/stat").context("this takes Linux")?;
+fn time_of_children() -> Result<f64> {
+    processor_time(&fs::read_to_string("/proc/self/stat").context("this takes Linux")?, 13)
+}
+
+/// The sum of two neighbouring times of `/proc/PID/stat`, counted from the field after the name.
+fn processor_time(stat: &str, first: usize) -> Result<f64> {
     let (_, fields) = stat.rsplit_once(')').context("a name in parentheses")?;
-    let ticks = fields.split_whitespace().skip(13).take(2).map(str::parse::<f64>);
+    let ticks = fields.split_whitespace().skip(first).take(2).map(str::parse::<f64>);
     // Always 100 ticks a second, as far as user space sees.
     Ok(ticks.sum::<Result<f64, _>>()? / 100.0)
 }
