@@ -6,11 +6,11 @@ use std::sync::LazyLock;
 
 use dibs_build::{Builder, IndexWidth, generate};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::format::{CHECKSUM_AT, CRC};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
     Budget, Capsule, NoSide, Options, Query, Side, Sphere, Tool, Tree, measure_stretch,
 };
+use dibs_tests::tree_bytes::reseal;
 use libfuzzer_sys::fuzz_target;
 
 /// The search for the closest pair, and up to 26 more for the depth of an axis.
@@ -51,10 +51,7 @@ fuzz_target!(|input: &[u8]| {
         let at = words.next() as usize % places * 4;
         bytes[at..at + 4].copy_from_slice(&words.next().to_le_bytes());
     }
-    let mut digest = CRC.digest();
-    digest.update(&bytes[..CHECKSUM_AT]);
-    digest.update(&bytes[CHECKSUM_AT + 4..]);
-    bytes[CHECKSUM_AT..CHECKSUM_AT + 4].copy_from_slice(&digest.finalize().to_le_bytes());
+    reseal(&mut bytes);
     let Ok(tree) = Tree::<u16>::from_bytes(&bytes) else { return };
     let Ok(mut query) = Query::<_, MAX_STACK>::new(&tree) else { return };
 

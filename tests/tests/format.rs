@@ -3,6 +3,7 @@
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
 use dibs_nostd::format::{CRC, Link, MAX_STACK};
 use dibs_nostd::{FormatError, Options, Query, QueryError, Sphere, Tree};
+use dibs_tests::tree_bytes::{reseal, section};
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -20,19 +21,8 @@ fn word(bytes: &[u8], at: usize) -> u32 {
 fn with_word(bytes: &[u8], at: usize, value: u32) -> Vec<u8> {
     let mut changed = bytes.to_vec();
     changed[at..at + 4].copy_from_slice(&value.to_le_bytes());
-    let mut digest = CRC.digest();
-    digest.update(&changed[..60]);
-    digest.update(&changed[64..]);
-    changed[60..64].copy_from_slice(&digest.finalize().to_le_bytes());
+    reseal(&mut changed);
     changed
-}
-
-/// Offset and length of a section, read by the specification alone.
-fn section(bytes: &[u8], kind: u32) -> (usize, usize) {
-    let rows = word(bytes, 48) as usize;
-    let row = (0..rows).map(|r| 64 + 12 * r).find(|&at| word(bytes, at) == kind);
-    let at = row.expect("the section is there");
-    (word(bytes, at + 4) as usize, word(bytes, at + 8) as usize)
 }
 
 #[test]

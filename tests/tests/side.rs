@@ -3,7 +3,7 @@
 //! `DIBS_POSES=1000000` asks for as many poses as that.
 
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
-use dibs_nostd::format::{CRC, MAX_STACK};
+use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
     Budget, Capsule, FormatError, NoSide, Options, Proximity, Query, Side, Sphere, Tool, Tree,
 };
@@ -11,6 +11,7 @@ use dibs_tests::oracle::{Instrument, exhaustive};
 use dibs_tests::side_poses::{POSES_OF_A_FRAME, Tally, bent, closed, judge, point, unit};
 use dibs_tests::sides;
 use dibs_tests::surfaces::{self, ball, slivers};
+use dibs_tests::tree_bytes::{reseal, section};
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -210,33 +211,18 @@ fn a_depth_that_was_cut_short_is_certified() {
     assert!(cut_short > 3, "{cut_short}");
 }
 
-fn word(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"))
-}
-
-/// Where a section starts, read by the specification alone.
-fn section(bytes: &[u8], kind: u32) -> usize {
-    let rows = word(bytes, 48) as usize;
-    let row = (0..rows).map(|r| 64 + 12 * r).find(|&at| word(bytes, at) == kind);
-    word(bytes, row.expect("the section is there") + 4) as usize
-}
-
 #[test]
 fn neighbours_share_their_edges_and_wrong_ones_are_refused() {
     for (index, width) in [(IndexWidth::Bits16, 2), (IndexWidth::Bits32, 4)] {
         let mesh = ball(2);
         let built = Builder::new().index(index).build(&mesh).expect("a valid mesh");
-        let at = section(built.blob(), 8);
+        let (at, _) = section(built.blob(), 8);
         let mut refused = 0;
         for place in 0..3 * mesh.triangles.len() {
             let mut bytes = built.blob().to_vec();
             let code = &mut bytes[at + place * width..][..width];
             code[0] ^= 1 << (place % 8);
-            let mut digest = CRC.digest();
-            digest.update(&bytes[..60]);
-            digest.update(&bytes[64..]);
-            let sum = digest.finalize();
-            bytes[60..64].copy_from_slice(&sum.to_le_bytes());
+            reseal(&mut bytes);
             let error = match width {
                 2 => Tree::<u16>::from_bytes(&bytes).err(),
                 _ => Tree::<u32>::from_bytes(&bytes).err(),

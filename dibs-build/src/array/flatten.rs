@@ -1,13 +1,11 @@
 //! From a tree of sections to the flat array: order, round up, write.
 
-use dibs_nostd::format::{
-    CHECKSUM_AT, CRC, HEADER_BYTES, Join, Link, MAGIC, PathKind, SECTION_ALIGN, SECTION_BYTES,
-    VERSION, section,
-};
+use dibs_nostd::format::{CRC, HEADER_BYTES, Join, Link, MAGIC, PathKind, VERSION, field, section};
 use dibs_nostd::{Index, Tree};
 
 use super::adjacency::adjacency;
 use super::metric::{metric, with_lowest_bit};
+use super::sections::{put_word, write};
 use crate::Mesh;
 use crate::construct::{Cluster, Content};
 use crate::error::BuildError;
@@ -133,19 +131,26 @@ pub(crate) fn flatten<I: Index>(
     {
         sections.push((section::ADJACENCY, neighbours));
     }
-    let header = [
-        identity.finalize(),
-        order.len() as u32,
-        flat.triangles.len() as u32,
-        flat.nodes.len() as u32,
-        flat.stack,
-        facts.stretch.to_bits(),
-        unit.to_bits(),
-        facts.position_error.to_bits(),
-        0,
-        0,
-    ];
-    let bytes = assemble::<I>(facts.paths, header, &sections)?;
+    let mut header = [0; HEADER_BYTES];
+    header[..MAGIC.len()].copy_from_slice(&MAGIC);
+    header[field::VERSION..][..2].copy_from_slice(&VERSION.to_le_bytes());
+    header[field::WIDTH] = I::BYTES as u8;
+    header[field::PATHS] = facts.paths.code();
+    for (at, word) in [
+        (field::MESH_ID, identity.finalize()),
+        (field::VERTICES, order.len() as u32),
+        (field::TRIANGLES, flat.triangles.len() as u32),
+        (field::NODES, flat.nodes.len() as u32),
+        (field::STACK, flat.stack),
+        (field::STRETCH, facts.stretch.to_bits()),
+        (field::RADIUS_UNIT, unit.to_bits()),
+        (field::POSITION_ERROR, facts.position_error.to_bits()),
+    ] {
+        put_word(&mut header, at, word);
+    }
+    let sections: Vec<(u32, &[u8])> =
+        sections.iter().map(|(kind, part)| (*kind, &part[..])).collect();
+    let bytes = write(header, &sections)?;
     Tree::<I>::from_bytes(&bytes)?;
     Ok((bytes, order))
 }
@@ -235,43 +240,4 @@ fn code(radius: f64, unit: f32) -> u32 {
 
 pub(super) fn put<I: Index>(bytes: &mut Vec<u8>, value: u32) {
     bytes.extend(&value.to_le_bytes()[..I::BYTES]);
-}
-
-fn assemble<I: Index>(
-    paths: PathKind,
-    header: [u32; 10],
-    sections: &[(u32, Vec<u8>)],
-) -> Result<Vec<u8>, BuildError> {
-    let mut offset = (HEADER_BYTES + sections.len() * SECTION_BYTES) as u64;
-    let mut table = Vec::new();
-    for (kind, content) in sections {
-        offset = offset.next_multiple_of(SECTION_ALIGN as u64);
-        table.push((*kind, offset, content.len() as u64));
-        offset += content.len() as u64;
-    }
-    let too_large = |_| BuildError::TooLarge { bytes: offset };
-    let length = u32::try_from(offset).map_err(too_large)?;
-
-    let mut bytes = Vec::with_capacity(length as usize);
-    bytes.extend(MAGIC);
-    bytes.extend(VERSION.to_le_bytes());
-    bytes.extend([I::BYTES as u8, paths.code()]);
-    header.into_iter().for_each(|field| bytes.extend(field.to_le_bytes()));
-    for field in [sections.len() as u32, length, 0, 0] {
-        bytes.extend(field.to_le_bytes());
-    }
-    for &(kind, offset, length) in &table {
-        for field in [kind, offset as u32, length as u32] {
-            bytes.extend(field.to_le_bytes());
-        }
-    }
-    for ((_, content), (_, offset, _)) in sections.iter().zip(table) {
-        bytes.resize(offset as usize, 0);
-        bytes.extend(content);
-    }
-    let mut digest = CRC.digest();
-    digest.update(&bytes[..CHECKSUM_AT]);
-    digest.update(&bytes[CHECKSUM_AT + 4..]);
-    bytes[CHECKSUM_AT..CHECKSUM_AT + 4].copy_from_slice(&digest.finalize().to_le_bytes());
-    Ok(bytes)
 }

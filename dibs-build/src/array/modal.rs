@@ -3,8 +3,8 @@
 use dibs_nostd::Index;
 use dibs_nostd::format::section;
 
-use super::append::append;
 use super::emit::BuiltTree;
+use super::sections::append;
 use crate::error::BuildError;
 use crate::modes::{self, ModalFit, ModalMotion, ModesError};
 

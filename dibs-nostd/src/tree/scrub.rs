@@ -181,12 +181,14 @@ mod tests {
         let shorter = |part: &mut &[u8]| {
             *part = part.get(1..).unwrap_or_default();
         };
-        for section in 0..4 {
+        for section in 0..6 {
             let mut tree = sound;
             match section {
                 0 => shorter(&mut tree.sections.nodes),
                 1 => shorter(&mut tree.sections.triangles),
                 2 => shorter(&mut tree.sections.rest),
+                3 => shorter(&mut tree.sections.order),
+                4 => shorter(&mut tree.sections.adjacency),
                 _ => shorter(&mut tree.sections.metric),
             }
             assert!(tree.check(bytes).is_err(), "section {section}");

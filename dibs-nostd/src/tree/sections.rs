@@ -1,6 +1,6 @@
 //! The sections of a tree: which there are, how long each must be, and where they stand.
 //!
-//! To add one: its kind in [`section`], a row in [`rules`], a field of [`Sections`].
+//! To add one: its kind in [`section`], a row in [`rules`], a field of [`Sections`] and of its `all`.
 
 use crate::tree::format::{
     self, HEADER_BYTES, LIMIT_BYTES, METRIC_BYTES, SECTION_ALIGN, SECTION_BYTES, node_bytes,
@@ -115,22 +115,21 @@ pub(crate) const fn find<'a, I: Index>(
     Ok(Sections { nodes, triangles, order, rest, metric, limits, modes, adjacency })
 }
 
-impl Sections<'_> {
+impl<'a> Sections<'a> {
+    /// All sections, in the order of [`rules`].
+    const fn all(&self) -> [&'a [u8]; COUNT] {
+        let Self { nodes, triangles, order, rest, metric, limits, modes, adjacency } = *self;
+        [nodes, triangles, order, rest, metric, limits, modes, adjacency]
+    }
+
     /// Checks that each section is still where the bytes have it.
     pub fn check<I: Index>(&self, bytes: &[u8], header: &Header) -> Result<(), FormatError> {
         let found = find::<I>(bytes, header)?;
-        for (kind, here, there) in [
-            (section::NODES, self.nodes, found.nodes),
-            (section::TRIANGLES, self.triangles, found.triangles),
-            (section::VERTEX_ORDER, self.order, found.order),
-            (section::REST, self.rest, found.rest),
-            (section::METRIC, self.metric, found.metric),
-            (section::LIMITS, self.limits, found.limits),
-            (section::MODES, self.modes, found.modes),
-        ] {
+        let places = self.all().into_iter().zip(found.all());
+        for (rule, (here, there)) in rules::<I>(header).into_iter().zip(places) {
             let is_elsewhere = !here.is_empty() && !core::ptr::eq(here, there);
             if here.len() != there.len() || is_elsewhere {
-                return Err(FormatError::Section { kind });
+                return Err(FormatError::Section { kind: rule.kind });
             }
         }
         Ok(())
@@ -138,13 +137,14 @@ impl Sections<'_> {
 
     /// Whether each section is as long as its counterpart.
     pub const fn matches(&self, other: &Sections<'_>) -> bool {
-        self.nodes.len() == other.nodes.len()
-            && self.triangles.len() == other.triangles.len()
-            && self.order.len() == other.order.len()
-            && self.rest.len() == other.rest.len()
-            && self.metric.len() == other.metric.len()
-            && self.limits.len() == other.limits.len()
-            && self.modes.len() == other.modes.len()
-            && self.adjacency.len() == other.adjacency.len()
+        let (these, others) = (self.all(), other.all());
+        let mut slot = 0;
+        while slot < COUNT {
+            if these[slot].len() != others[slot].len() {
+                return false;
+            }
+            slot += 1;
+        }
+        true
     }
 }

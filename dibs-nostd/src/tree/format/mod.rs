@@ -7,8 +7,6 @@
 mod metric;
 pub(crate) mod several;
 
-#[doc(hidden)]
-pub use field::CHECKSUM as CHECKSUM_AT;
 pub use metric::{Join, Metric};
 pub(crate) use metric::{metric, metric_row};
 
