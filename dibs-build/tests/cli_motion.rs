@@ -81,7 +81,7 @@ fn weights_are_streamed() {
         let Ok(Advance::Published { .. }) = assembler.advance(u32::MAX) else { continue };
         let (frame, recorded) = (reader.read().unwrap(), &motion.frames[published]);
         for row in 0..tree.vertex_count() {
-            let exact = recorded[tree.vertex_number(row).unwrap() as usize];
+            let exact = recorded[tree.vertex_number(row).unwrap().0 as usize];
             let away = frame.position(row).unwrap().distance(exact);
             assert!(away <= frame.label().position_error, "frame {published}, row {row}: {away}");
         }

@@ -173,7 +173,7 @@ fn receive<M: Mac>(
                         seen.stated = seen.stated.max(label.position_error);
                         let recorded = &motion.frames[(epoch as usize - 1) % FRAMES];
                         for row in 0..tree.vertex_count() {
-                            let exact = recorded[tree.vertex_number(row).unwrap() as usize];
+                            let exact = recorded[tree.vertex_number(row).unwrap().0 as usize];
                             let error = frame.position(row).unwrap().distance(exact);
                             assert!(error <= label.position_error, "frame {epoch}: {error}");
                             seen.error = seen.error.max(error);

@@ -94,5 +94,8 @@ pub use tool::{ACCURACY, AxisPair, Capsule, MAX_COORDINATE, Sphere, Tool, ToolEr
 /// The layout of a tree's bytes, for `dibs-build`. It may change with any version.
 #[doc(hidden)]
 pub use tree::format;
-pub use tree::{CorruptTreeError, FormatError, Index, PathKind, Scrub, Tree, TreeBytes};
+pub use tree::{
+    CorruptTreeError, FormatError, Index, PathKind, Scrub, Tree, TreeBytes, TriangleRow,
+    VertexNumber,
+};
 pub use unavailable::{QueryError, Unavailable};

@@ -237,7 +237,7 @@ fn write(answer: &Proximity, record: &mut Tick) {
     record.lower = answer.lower;
     record.accuracy = answer.accuracy;
     record.point_on_surface = answer.point_on_surface.to_array();
-    record.triangle = answer.triangle.unwrap_or(u32::MAX);
+    record.triangle = answer.triangle.map_or(u32::MAX, |triangle| triangle.0);
     record.node_tests = answer.node_tests;
     record.triangle_tests = answer.triangle_tests;
 }

@@ -8,7 +8,7 @@ use dibs_build::{Builder, IndexWidth, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
-    Budget, Capsule, NoSide, Options, Query, Side, Sphere, Tool, Tree, measure_stretch,
+    Budget, Capsule, NoSide, Options, Query, Side, Sphere, Tool, Tree, TriangleRow, measure_stretch,
 };
 use dibs_tests::tree_bytes::reseal;
 use libfuzzer_sys::fuzz_target;
@@ -66,7 +66,7 @@ fuzz_target!(|input: &[u8]| {
         options = options.budget(budget);
     }
     if flags & 2 != 0 {
-        options = options.warm_start(Some(words.next()));
+        options = options.warm_start(Some(TriangleRow(words.next())));
     }
     if flags & 4 != 0
         && let Ok(measured) = measure_stretch(&tree, rows.as_slice())

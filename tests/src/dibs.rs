@@ -3,7 +3,8 @@
 use dibs_build::BuiltTree;
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
-    Index, MeasuredStretch, Options, Query, StretchError, Tree, VertexTable, measure_stretch,
+    Index, MeasuredStretch, Options, Query, StretchError, Tree, TriangleRow, VertexTable,
+    measure_stretch,
 };
 use glam::Vec3;
 
@@ -75,7 +76,7 @@ struct Dibs<'t, I> {
     rows: Vec<Vec3>,
     knowledge: Knowledge,
     stretch: Option<MeasuredStretch>,
-    last: Option<u32>,
+    last: Option<TriangleRow>,
 }
 
 impl<'t, I: Index> Dibs<'t, I> {
@@ -160,7 +161,7 @@ fn ask<I: Index>(
     vertices: &(impl VertexTable + ?Sized),
     tool: &Probe,
     options: &Options,
-) -> (Found, Option<u32>) {
+) -> (Found, Option<TriangleRow>) {
     let options = &options.unsigned();
     let answer = match tool {
         Probe::Sphere(sphere) => query.closest_wide(vertices, sphere, options),

@@ -1,7 +1,7 @@
 //! Small surfaces of every kind, so that exhaustive search is cheap enough for a million cases.
 
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
-use dibs_nostd::{Index, Tree};
+use dibs_nostd::{Index, Tree, TriangleRow};
 use glam::Vec3;
 
 /// A mesh and its tree.
@@ -35,7 +35,9 @@ pub fn all(lean: bool) -> Vec<Surface> {
 /// Never: every row is inside the table.
 #[must_use]
 pub fn triangles<I: Index>(tree: &Tree<'_, I>) -> Vec<[u32; 3]> {
-    (0..tree.triangle_count()).map(|row| tree.triangle(row).expect("inside the table")).collect()
+    (0..tree.triangle_count())
+        .map(|row| tree.corners(TriangleRow(row)).expect("inside the table"))
+        .collect()
 }
 
 /// An octahedron whose triangles are split into four, this many times: every vertex is at the same distance

@@ -2,7 +2,7 @@
 
 use dibs_build::{BuildError, Builder, BuiltTree, Construction, IndexWidth, Mesh, Paths, generate};
 use dibs_nostd::format::{Link, MAX_STACK, PathKind};
-use dibs_nostd::{Index, Options, Query, Sphere, Tree, measure_stretch};
+use dibs_nostd::{Index, Options, Query, Sphere, Tree, TriangleRow, measure_stretch};
 use dibs_tests::deform::{Deformation, unit};
 use dibs_tests::stretch;
 use fastrand::Rng;
@@ -44,7 +44,7 @@ fn all_pairs(mesh: &Mesh) -> Vec<Vec<f64>> {
 
 /// Calls `visit` with every node's pin, radius and vertices, as vertex numbers of the mesh.
 fn each_node<I: Index>(tree: &Tree<'_, I>, visit: &mut impl FnMut(u32, f64, &[u32])) {
-    let number = |row: u32| tree.vertex_number(row).expect("in the tree");
+    let number = |row: u32| tree.vertex_number(row).expect("in the tree").0;
     for row in 0..tree.node_count() {
         let (pin, radius, _) = tree.node(row).expect("in the tree");
         let mut vertices = Vec::new();
@@ -52,7 +52,7 @@ fn each_node<I: Index>(tree: &Tree<'_, I>, visit: &mut impl FnMut(u32, f64, &[u3
         while let Some(row) = below.pop() {
             match tree.node(row).expect("in the tree").2 {
                 Link::Leaf { first, count } => {
-                    let rows = (first..first + count).filter_map(|t| tree.triangle(t));
+                    let rows = (first..first + count).filter_map(|t| tree.corners(TriangleRow(t)));
                     vertices.extend(rows.flatten().map(number));
                 }
                 Link::Children { first, count } => below.extend(first..first + count),

@@ -129,7 +129,7 @@ fn no_contact_is_missing_and_none_is_doubled() {
             assert!(contacts.bound() >= MARGIN && !contacts.is_full());
             let mut found = vec![0; truth.len()];
             for contact in contacts.iter() {
-                let valley = label[contact.triangle as usize];
+                let valley = label[contact.triangle.0 as usize];
                 found[valley] += 1;
                 let off = f64::from(contact.separation + radius) - truth[valley].distance;
                 let off = off.abs() - f64::from(contacts.accuracy());

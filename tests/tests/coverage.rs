@@ -8,7 +8,7 @@
 
 use dibs_build::{Builder, BuiltTree, Construction, Mesh, Paths};
 use dibs_nostd::format::Link;
-use dibs_nostd::{Tree, measure_stretch};
+use dibs_nostd::{Tree, TriangleRow, measure_stretch};
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -26,7 +26,8 @@ fn spheres(tree: &Tree<'_, u16>) -> Vec<Sphere> {
         while let Some(row) = below.pop() {
             match tree.node(row).expect("in the tree").2 {
                 Link::Leaf { first, count } => {
-                    let corners = (first..first + count).filter_map(|row| tree.triangle(row));
+                    let corners =
+                        (first..first + count).filter_map(|row| tree.corners(TriangleRow(row)));
                     covered.extend(corners.flatten().map(|vertex| vertex as usize));
                 }
                 Link::Children { first, count } => below.extend(first..first + count),

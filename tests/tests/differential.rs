@@ -3,11 +3,11 @@
 
 use dibs_build::{Builder, BuiltTree, Construction, IndexWidth, Mesh, Paths, generate};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Budget, Index, Options, Proximity, Query, Tree, measure_stretch};
-use dibs_tests::ask;
+use dibs_nostd::{Budget, Index, Options, Proximity, Query, Tree, TriangleRow, measure_stretch};
 use dibs_tests::deform::Deformation;
 use dibs_tests::oracle::{Instrument, OraclePair, exhaustive};
 use dibs_tests::poses::pose;
+use dibs_tests::{ask, surfaces};
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -44,7 +44,7 @@ fn run_with<I: Index>(case: &Case<'_>, tree: &Tree<'_, I>, seed: u64) -> Tally {
     let mut rng = Rng::with_seed(seed);
     let mut query = Query::<I, MAX_STACK>::new(tree).expect("enough for any tree");
     let mut tally = Tally::default();
-    let triangles = triangle_rows(tree);
+    let triangles = surfaces::triangles(tree);
     while tally.queries < case.queries {
         for deformation in Deformation::ALL {
             let moved = deformation.apply(case.mesh, tree.paths(), tree.stretch(), &mut rng);
@@ -59,7 +59,7 @@ fn run_with<I: Index>(case: &Case<'_>, tree: &Tree<'_, I>, seed: u64) -> Tally {
                     Options::cold(),
                     Options::cold().stretch(measured),
                     Options::cold().stretch(measured).warm_start(last),
-                    Options::cold().warm_start(Some(rng.u32(..))),
+                    Options::cold().warm_start(Some(TriangleRow(rng.u32(..)))),
                 ];
                 for options in &all[rng.usize(..2)..] {
                     let both = [
@@ -95,10 +95,6 @@ fn run_with<I: Index>(case: &Case<'_>, tree: &Tree<'_, I>, seed: u64) -> Tally {
         }
     }
     tally
-}
-
-fn triangle_rows<I: Index>(tree: &Tree<'_, I>) -> Vec<[u32; 3]> {
-    (0..tree.triangle_count()).map(|t| tree.triangle(t).expect("in the table")).collect()
 }
 
 /// The error of an answer's separation in units of its accuracy; asserts that its parts agree.

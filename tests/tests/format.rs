@@ -2,7 +2,7 @@
 
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
 use dibs_nostd::format::{CRC, Link, MAX_STACK};
-use dibs_nostd::{FormatError, Options, Query, QueryError, Sphere, Tree};
+use dibs_nostd::{FormatError, Options, Query, QueryError, Sphere, Tree, TriangleRow};
 use dibs_tests::tree_bytes::{reseal, section};
 use fastrand::Rng;
 use glam::Vec3;
@@ -140,9 +140,10 @@ fn a_leaf_whose_vertices_are_not_at_their_places_is_refused() {
     for row in 0..tree.node_count() {
         let Some((.., Link::Leaf { first, count })) = tree.node(row) else { continue };
         for triangle in first + 1..first + count {
-            let [a, b, c] = tree.triangle(triangle).expect("in the tree");
+            let [a, b, c] = tree.corners(TriangleRow(triangle)).expect("in the tree");
             let others = (first..first + count).filter(|&t| t != triangle);
-            let is_new = |v| others.clone().all(|t| !tree.triangle(t).unwrap().contains(&v));
+            let is_new =
+                |v| others.clone().all(|t| !tree.corners(TriangleRow(t)).unwrap().contains(&v));
             if !is_new(c) {
                 continue;
             }
@@ -179,9 +180,10 @@ fn a_leaf_whose_triangles_come_too_early_is_refused() {
             let mut swapped = bytes.to_vec();
             swapped[at..at + 12].rotate_left(6);
             let sealed = with_word(&swapped, 0, word(&swapped, 0));
-            let known: Vec<u32> =
-                (first..triangle).flat_map(|t| tree.triangle(t).expect("in the tree")).collect();
-            let [a, b, _] = tree.triangle(triangle + 1).expect("in the tree");
+            let known: Vec<u32> = (first..triangle)
+                .flat_map(|t| tree.corners(TriangleRow(t)).expect("in the tree"))
+                .collect();
+            let [a, b, _] = tree.corners(TriangleRow(triangle + 1)).expect("in the tree");
             match [a, b].into_iter().find(|v| !known.contains(v)) {
                 Some(vertex) => {
                     let error = Tree::<u16>::from_bytes(&sealed).expect_err("a new first corner");

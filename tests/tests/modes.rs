@@ -10,18 +10,14 @@ use dibs_build::{Builder, IndexWidth, Motion, MotionStretch, Paths, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::modes::{self, MAX_MODES, ModalSurface, Modes, WeightsError};
 use dibs_nostd::{Index, Options, Query, StretchError, Tree, VertexTable, measure_stretch};
-use dibs_tests::ask;
 use dibs_tests::modal::{anywhere, positions, small};
 use dibs_tests::motions::trembling;
 use dibs_tests::oracle::exhaustive;
 use dibs_tests::poses::pose;
 use dibs_tests::tree_bytes::{reseal as reseal_tree, section};
+use dibs_tests::{ask, surfaces};
 use fastrand::Rng;
 use glam::Vec3;
-
-fn triangle_rows<I: Index>(tree: &Tree<'_, I>) -> Vec<[u32; 3]> {
-    (0..tree.triangle_count()).map(|row| tree.triangle(row).expect("in the table")).collect()
-}
 
 /// The stated errors hold at every vertex of every frame, and are reached; the same positions come out
 /// of a sum in f64, but for rounding.
@@ -102,7 +98,7 @@ fn lazy_is_eager_bit_for_bit_and_right() {
 fn lazy_is_eager<I: Index>(tree: &Tree<'_, I>) {
     let mut rng = Rng::with_seed(3);
     let modes = Modes::of(tree).expect("valid");
-    let triangles = triangle_rows(tree);
+    let triangles = surfaces::triangles(tree);
     let mut query = Query::<I, MAX_STACK>::new(tree).expect("deep enough");
     let (mut queries, mut computed) = (0, 0);
     while queries < 400 {
@@ -362,7 +358,7 @@ fn the_real_heart_is_driven_by_its_modes() {
         let recorded = built.modal_motion().expect("has modes");
         assert!(count < 24 || recorded.beyond_limit.is_empty());
         assert!(count < 24 || modes.position_error() < 0.002);
-        let triangles = triangle_rows(&tree);
+        let triangles = surfaces::triangles(&tree);
         let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
         let (mut queries, mut asked, mut distinct) = (0, 0, 0);
         let mut above: [Vec<f32>; 3] = Default::default();

@@ -3,28 +3,12 @@
 use dibs_build::modes::ModalFit;
 use dibs_build::{Builder, Mesh, Paths};
 use dibs_nostd::modes::Modes;
-use dibs_nostd::{Index, Tree, VertexTable};
+use dibs_nostd::{Tree, TriangleRow};
+use dibs_tests::modal::{anywhere, positions};
 use dibs_tests::motions::trembling;
-use dibs_tests::stretch;
 use dibs_tests::tree_bytes::{reseal, section};
+use dibs_tests::{stretch, surfaces};
 use fastrand::Rng;
-use glam::Vec3;
-
-fn positions(surface: &impl VertexTable) -> Vec<Vec3> {
-    let rows = 0..surface.len() as u32;
-    rows.map(|row| surface.position(row).expect("in the table")).collect()
-}
-
-/// Weights anywhere in the admitted ranges.
-fn anywhere(modes: &Modes<'_>, rng: &mut Rng) -> Vec<f32> {
-    let range = |mode| modes.range(mode).expect("there is one");
-    let within = |[low, high]: [f32; 2]| (low + (high - low) * rng.f32()).clamp(low, high);
-    (0..modes.count()).map(range).map(within).collect()
-}
-
-fn triangle_rows<I: Index>(tree: &Tree<'_, I>) -> Vec<[u32; 3]> {
-    (0..tree.triangle_count()).map(|row| tree.triangle(row).expect("in the table")).collect()
-}
 
 /// The bound is never below the true stretch, whatever the weights, and at a recorded frame hardly
 /// above it.
@@ -42,8 +26,10 @@ fn the_stretch_bound_is_sound_and_tight() {
             builder.build(&mesh).expect("a valid mesh").with_modes(&fit, 10).expect("so many");
         let tree = built.tree::<u16>().expect("valid");
         let modes = Modes::of(&tree).expect("valid");
-        let rows =
-            Mesh { positions: built.to_rows(&mesh.positions), triangles: triangle_rows(&tree) };
+        let rows = Mesh {
+            positions: built.to_rows(&mesh.positions),
+            triangles: surfaces::triangles(&tree),
+        };
         let recorded = &built.modal_motion().expect("has modes").weights;
         let mut rng = Rng::with_seed(5);
         let check = |weights: &[f32], most: f64| {
@@ -51,7 +37,7 @@ fn the_stretch_bound_is_sound_and_tight() {
             let now = positions(&surface);
             // Counted as the part of its limit that it takes.
             let share = |triangle: u32| {
-                let limit = tree.stretch_limit(triangle).expect("in the table");
+                let limit = tree.stretch_limit(TriangleRow(triangle)).expect("in the table");
                 let own = stretch::of_triangle(&rows, &now, triangle as usize, tree.paths());
                 own * f64::from(tree.stretch()) / f64::from(limit)
             };

@@ -6,6 +6,7 @@ use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
     Budget, Capsule, FormatError, NoSide, Options, Proximity, Query, Side, Sphere, Tool, Tree,
+    TriangleRow,
 };
 use dibs_tests::oracle::{Instrument, exhaustive};
 use dibs_tests::side_poses::{POSES_OF_A_FRAME, Tally, bent, closed, judge, point, unit};
@@ -250,11 +251,11 @@ fn a_tree_with_adjacency_takes_at_most_16_bytes_a_triangle() {
             "{triangles} triangles: {each:.2} bytes each, vertex order and adjacency among them"
         );
         assert!(each <= 16.0);
-        for row in 0..tree.triangle_count() {
-            let [a, b, c] = tree.triangle(row).expect("in the table");
+        for row in (0..tree.triangle_count()).map(TriangleRow) {
+            let [a, b, c] = tree.corners(row).expect("in the table");
             for (edge, from, to) in [(0, a, b), (1, b, c), (2, c, a)] {
                 let other = tree.neighbour(row, edge).expect("a closed surface");
-                let [a, b, c] = tree.triangle(other).expect("in the table");
+                let [a, b, c] = tree.corners(other).expect("in the table");
                 assert!([(a, b), (b, c), (c, a)].contains(&(to, from)), "{row} {edge}");
             }
         }

@@ -6,7 +6,7 @@ use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 use dibs_nostd::{
     Assembler, Frames, MeasuredStretch, Options, Query, QueryError, REGIONS, ReceiveError, Sphere,
-    StretchError, Tree, measure_stretch,
+    StretchError, Tree, TriangleRow, measure_stretch,
 };
 use dibs_tests::bus::give;
 use dibs_tests::deform::{Deformation, deformed, unit};
@@ -59,7 +59,8 @@ fn a_flat_triangle_does_not_spoil_its_neighbours() {
         for row in 0..tree.triangle_count() {
             let at = |v| tree.rest_position(v).expect("a row").as_dvec3();
             let metric = tree.metric(row).expect("a row");
-            let [a, b, c] = metric.centre_first(tree.triangle(row).expect("a row").map(at));
+            let [a, b, c] =
+                metric.centre_first(tree.corners(TriangleRow(row)).expect("a row").map(at));
             let (e1, e2) = (b - a, c - a);
             let squares = [e1.length_squared(), e1.dot(e2), e2.length_squared()];
             if e1.angle_between(e2).sin() > 0.35 {
@@ -156,8 +157,10 @@ fn each_region_is_measured_on_its_own() {
     let tree = built.tree::<u16>().expect("valid");
     let mut of_row = Vec::new();
     for row in 0..tree.triangle_count() {
-        let mut corners =
-            tree.triangle(row).expect("in the table").map(|r| built.vertex_order()[r as usize]);
+        let mut corners = tree
+            .corners(TriangleRow(row))
+            .expect("in the table")
+            .map(|r| built.vertex_order()[r as usize]);
         corners.sort_unstable();
         let same = |t: &[u32; 3]| {
             let mut t = *t;
@@ -177,8 +180,12 @@ fn each_region_is_measured_on_its_own() {
             assert!(region >= truth, "{region} is below {truth}");
             assert!(region <= truth.max(0.5) + sigma * 1.01 / 256.0, "{region} for {truth}");
         }
-        let named =
-            stretch::of_triangle(&mesh, moved, of_row[measured.triangle() as usize], tree.paths());
+        let named = stretch::of_triangle(
+            &mesh,
+            moved,
+            of_row[measured.triangle().0 as usize],
+            tree.paths(),
+        );
         assert!(named * 1.00002 >= sigma || sigma < 0.500_001, "{named} named for {sigma}");
     }
 }
@@ -201,7 +208,8 @@ fn an_edge_between_two_regions_counts_for_both() {
                 continue;
             }
             // All is small but that edge, with the third corner in its middle.
-            let [a, b, c] = tree.triangle(first).expect("a row").map(|row| row as usize);
+            let [a, b, c] =
+                tree.corners(TriangleRow(first)).expect("a row").map(|row| row as usize);
             let mut moved: Vec<Vec3> = rest.iter().map(|position| *position * 0.3).collect();
             moved[b] = moved[a] + (rest[b] - rest[a]) * 0.6;
             moved[c] = (moved[a] + moved[b]) * 0.5;
@@ -245,7 +253,7 @@ fn what_cannot_be_measured_is_named() {
         let right = std::mem::replace(&mut rows[40].z, wrong);
         let refused = measure_stretch(&tree, rows.as_slice()).expect_err("is wrong");
         let StretchError::Exceeded { triangle, .. } = refused else { panic!("{refused}") };
-        assert!(tree.triangle(triangle).expect("named").contains(&40), "{refused}");
+        assert!(tree.corners(triangle).expect("named").contains(&40), "{refused}");
         rows[40].z = right;
     }
     let without = Builder::new().with_metric(false).build(&mesh).expect("a valid mesh");

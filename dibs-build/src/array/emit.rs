@@ -4,7 +4,7 @@ use std::path::Path;
 
 use dibs_nostd::format::PathKind;
 use dibs_nostd::modes::Modes;
-use dibs_nostd::{FormatError, Index, Tree};
+use dibs_nostd::{FormatError, Index, Tree, TriangleRow};
 
 use crate::error::BuildError;
 use crate::write_atomically;
@@ -191,7 +191,8 @@ fn write(path: &Path, content: &[u8]) -> Result<(), BuildError> {
 pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
     let vertices = tree.vertex_count();
     let unmeasurable = || (0..tree.triangle_count()).filter(|&row| !is_measurable(tree, row));
-    let in_mesh = |row: u32| row_of(tree.triangle(row)?, |v| tree.vertex_number(v).or(Some(v)));
+    let number = |vertex| tree.vertex_number(vertex).map_or(Some(vertex), |number| Some(number.0));
+    let in_mesh = |row| row_of(tree.corners(TriangleRow(row))?, number);
     Summary {
         triangles: tree.triangle_count(),
         vertices,
@@ -200,7 +201,7 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
         index_bits: 8 * I::BYTES as u32,
         stretch: tree.stretch(),
         least_stretch_limit: (0..tree.triangle_count())
-            .filter_map(|row| tree.stretch_limit(row))
+            .filter_map(|row| tree.stretch_limit(TriangleRow(row)))
             .fold(tree.stretch(), f32::min),
         unmeasurable: unmeasurable().count() as u32,
         first_unmeasurable: unmeasurable().next().and_then(in_mesh),
@@ -228,7 +229,7 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
 /// Whether the stretch check can pass a triangle at rest; true where there is nothing to check with.
 fn is_measurable<I: Index>(tree: &Tree<'_, I>, row: u32) -> bool {
     let Some(metric) = tree.metric(row) else { return true };
-    let corners = tree.triangle(row).and_then(|c| row_of(c, |v| tree.rest_position(v)));
+    let corners = tree.corners(TriangleRow(row)).and_then(|c| row_of(c, |v| tree.rest_position(v)));
     let [first, between, second] = metric.squares;
     let Some(corners) = corners else { return first > 0.0 };
     let [a, b, c] = metric.centre_first(corners);

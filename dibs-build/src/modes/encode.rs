@@ -101,7 +101,7 @@ impl<'a, I: Index> Shapes<'a, I> {
             Ok(measured) => Ok(Some(Anchor {
                 weights: weights.to_vec(),
                 sigma: measured.sigma(),
-                triangle: measured.triangle(),
+                triangle: measured.triangle().0,
             })),
             Err(StretchError::Exceeded { .. }) => Ok(None),
             Err(error) => Err(ModesError::Stretch(error)),

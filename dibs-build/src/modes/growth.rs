@@ -1,7 +1,7 @@
 //! Growth of the triangles' stretch by the modes: the constants of the run-time bound, in f64, rounded up.
 
 use dibs_nostd::format::PathKind;
-use dibs_nostd::{Index, Tree};
+use dibs_nostd::{Index, Tree, TriangleRow};
 use glam::DVec3;
 
 use crate::rest::RestShape;
@@ -31,7 +31,7 @@ impl Triangles {
     pub fn new<I: Index>(tree: &Tree<'_, I>) -> Option<Self> {
         let rows = 0..tree.triangle_count();
         let corners: Vec<[u32; 3]> =
-            rows.clone().map(|row| tree.triangle(row)).collect::<Option<_>>()?;
+            rows.clone().map(|row| tree.corners(TriangleRow(row))).collect::<Option<_>>()?;
         let shape = |row: u32| {
             let [a, b, c] = corners[row as usize];
             let at = |vertex| tree.rest_position(vertex);
@@ -42,7 +42,7 @@ impl Triangles {
                 PathKind::EdgePath => Measure::Edges([x1, e2.length(), e1.distance(e2)]),
                 _ => Measure::Surface { x1, x2: e1.dot(e2) / x1, y2: e1.cross(e2).length() / x1 },
             };
-            let limit = f64::from(tree.stretch_limit(row)?);
+            let limit = f64::from(tree.stretch_limit(TriangleRow(row))?);
             Some(Shape { strictness: f64::from(tree.stretch()) / limit, measure })
         };
         let shapes = rows.map(shape).collect::<Option<_>>()?;

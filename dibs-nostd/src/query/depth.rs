@@ -14,7 +14,7 @@ use super::{Budget, Options, Proximity};
 use crate::math::sqrt::sqrt;
 use crate::tool::{AxisPoint, Tool};
 use crate::unavailable::QueryError;
-use crate::{Index, Tree, VertexTable};
+use crate::{Index, Tree, TriangleRow, VertexTable};
 
 /// Most points of the axis that are looked at, its ends and the point where it meets the surface among them.
 const POINTS: usize = 28;
@@ -36,7 +36,7 @@ struct Sample {
     on_axis: Vec3,
     /// It is at most as deep as this.
     depth: f32,
-    triangle: Option<u32>,
+    triangle: Option<TriangleRow>,
     corners: [Vec3; 3],
 }
 

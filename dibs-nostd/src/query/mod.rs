@@ -23,7 +23,7 @@ pub use tracker::{Fallback, Tracked, Tracker};
 use glam::Vec3;
 
 use crate::unavailable::QueryError;
-use crate::{Index, Tool, Tree, VertexTable};
+use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
 use depth::Depth;
 use search::{Search, Waiting, WideSearch};
 
@@ -36,7 +36,7 @@ pub struct Query<'t, I, const STACK: usize> {
     tree: Tree<'t, I>,
     stack: [Waiting; STACK],
     /// Of the last answer.
-    triangle: Option<u32>,
+    triangle: Option<TriangleRow>,
 }
 
 impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {

@@ -1,6 +1,6 @@
 //! What a query may know beforehand, and how much it may do.
 
-use crate::MeasuredStretch;
+use crate::{MeasuredStretch, TriangleRow};
 
 /// The most work that one query may do. It bounds its time; an answer that was cut short is still
 /// valid, with a wider interval.
@@ -43,7 +43,7 @@ enum First {
     /// None.
     Cold,
     /// This one.
-    Triangle(u32),
+    Triangle(TriangleRow),
 }
 
 impl Default for Options {
@@ -82,7 +82,7 @@ impl Options {
     /// Starts from a triangle instead of the query's last answer's. A wrong or stale one costs one triangle test; `None`
     /// starts cold.
     #[must_use]
-    pub const fn warm_start(mut self, triangle: Option<u32>) -> Self {
+    pub const fn warm_start(mut self, triangle: Option<TriangleRow>) -> Self {
         self.first = match triangle {
             Some(triangle) => First::Triangle(triangle),
             None => First::Cold,
@@ -91,7 +91,7 @@ impl Options {
     }
 
     /// The triangle to test first, for a query whose last answer was on the triangle `last`.
-    pub(super) const fn first(&self, last: Option<u32>) -> Option<u32> {
+    pub(super) const fn first(&self, last: Option<TriangleRow>) -> Option<TriangleRow> {
         match self.first {
             First::Last => last,
             First::Cold => None,

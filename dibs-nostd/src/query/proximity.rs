@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::Side;
+use crate::TriangleRow;
 
 /// The closest pair between a tool and a surface, with a certified interval for its separation.
 ///
@@ -46,9 +47,9 @@ pub struct Proximity {
     pub direction: Vec3,
     /// Where along the tool's axis the pair sits: 0 at its start, 1 at its end; 0 for a sphere.
     pub axis_parameter: f32,
-    /// The triangle of `point_on_surface`, as its row in the tree's triangle table. `None` when the
-    /// budget ran out while a pin was still the best point known; `corners` then repeats the pin.
-    pub triangle: Option<u32>,
+    /// The triangle of `point_on_surface`. `None` when the budget ran out while a pin was still the best point known;
+    /// `corners` then repeats the pin.
+    pub triangle: Option<TriangleRow>,
     /// That triangle's corners, as rows of the vertex table.
     pub corners: [u32; 3],
     /// Weights of the three corners at `point_on_surface`: not negative, sum 1.

@@ -19,7 +19,7 @@ use crate::math::sqrt::sqrt;
 use crate::tool::{AxisPair, Tool};
 use crate::tree::format::Link;
 use crate::unavailable::QueryError;
-use crate::{Index, MeasuredStretch, Proximity, Tree, VertexTable};
+use crate::{Index, MeasuredStretch, Proximity, Tree, TriangleRow, VertexTable};
 
 /// A subtree that waits for its turn.
 #[derive(Clone, Copy, Debug)]
@@ -86,7 +86,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         vertices: &'s V,
         tool: &'s T,
         options: &Options,
-        first: Option<u32>,
+        first: Option<TriangleRow>,
     ) -> Result<Self, QueryError> {
         let header = tree.header();
         if vertices.len() != header.vertices as usize {
@@ -154,7 +154,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             best_triangle: u32::MAX,
         };
         search.lower_cutoff_to_pin(root.pin, distance);
-        if let Some(triangle) = first
+        if let Some(TriangleRow(triangle)) = first
             && triangle < header.triangles
             && let Some(left) = search.left.triangle_tests.checked_sub(1)
         {

@@ -8,7 +8,7 @@ use super::Proximity;
 use super::normal::{Feature, NoNormal, corners};
 use crate::math::sqrt::sqrt;
 use crate::unavailable::QueryError;
-use crate::{Index, Tree, VertexTable};
+use crate::{Index, Tree, TriangleRow, VertexTable};
 
 /// On which side of the surface a tool's axis is. The outer side is where the triangles' corners are seen counter-
 /// clockwise.
@@ -89,7 +89,7 @@ pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
     on_axis: Vec3,
 ) -> Result<PointSide, QueryError> {
     let undefined = |reason, outward| Ok(PointSide { side: Side::Undefined(reason), outward });
-    let Some(triangle) = pair.triangle else {
+    let Some(TriangleRow(triangle)) = pair.triangle else {
         return undefined(NoSide::CutShort, Vec3::ZERO);
     };
     let point = pair.point_on_surface;

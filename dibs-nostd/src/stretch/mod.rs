@@ -11,7 +11,7 @@ mod rows;
 use core::fmt;
 
 use crate::surface::{MeasuredStretch, REGIONS, VertexTable};
-use crate::tree::{Index, Tree};
+use crate::tree::{Index, Tree, TriangleRow};
 
 pub use gate::{Arriving, Changed, Gate, Unchecked, Verdict};
 use kernel::Worst;
@@ -37,8 +37,8 @@ pub enum StretchError {
     },
     /// A triangle is stretched beyond its limit: distances on this frame would be wrong.
     Exceeded {
-        /// Row of the triangle.
-        triangle: u32,
+        /// The triangle.
+        triangle: TriangleRow,
         /// Its stretch; not a number or infinite where a position is, or where the triangle is too
         /// small at rest to be measured.
         stretch: f32,
@@ -47,8 +47,8 @@ pub enum StretchError {
     },
     /// A region of the surface has shrunk below its limit: collapsed, or in another unit.
     Shrunk {
-        /// Row of its first triangle.
-        triangle: u32,
+        /// Its first triangle.
+        triangle: TriangleRow,
         /// The least size allowed.
         limit: f32,
     },

@@ -8,7 +8,7 @@ use super::regions::{of_regions, region_rows};
 use super::rows::Room;
 use super::{Arriving, Changed, Gate, StretchError, SurfaceLimits, Verdict, check_tables, rows};
 use crate::surface::{REGIONS, VertexTable};
-use crate::tree::{Index, Tree};
+use crate::tree::{Index, Tree, TriangleRow};
 
 /// Blocks of vertex rows, at most: what a partial frame moved is remembered by them.
 const BLOCKS: usize = 32;
@@ -199,7 +199,7 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
         if self.room >= 0.0 {
             return Ok(());
         }
-        Err(StretchError::Shrunk { triangle, limit: self.shrinkage })
+        Err(StretchError::Shrunk { triangle: TriangleRow(triangle), limit: self.shrinkage })
     }
 
     /// The rows of a region's triangles.

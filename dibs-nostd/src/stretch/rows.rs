@@ -14,7 +14,7 @@ use super::kernel::{
 };
 use crate::surface::VertexTable;
 use crate::tree::format::{Join, METRIC_BYTES, Metric, PathKind, metric_row};
-use crate::tree::{Index, Tree, format};
+use crate::tree::{Index, Tree, TriangleRow, format};
 
 /// How far a region is from having shrunk too much: the sum, over its triangles, of an edge's square now less
 /// `least` times that at rest (where triangles have limits of their own, times the square of their share).
@@ -438,7 +438,8 @@ fn edges<I: Index, V: VertexTable + ?Sized>(
 
 /// Names a triangle beyond its limit, both in terms of its rest shape.
 #[cold]
-fn exceeded<I: Index>(tree: &Tree<'_, I>, triangle: u32, squared: f32) -> StretchError {
+fn exceeded<I: Index>(tree: &Tree<'_, I>, row: u32, squared: f32) -> StretchError {
+    let triangle = TriangleRow(row);
     let limit = tree.stretch_limit(triangle).unwrap_or(tree.stretch());
     let stretch = root_up(squared) * (limit / tree.stretch());
     StretchError::Exceeded { triangle, stretch, limit }

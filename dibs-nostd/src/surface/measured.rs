@@ -1,5 +1,7 @@
 //! The measured stretch of one frame, as it travels with the frame.
 
+use crate::tree::TriangleRow;
+
 /// Regions that a surface is divided into for its measured stretch: equal runs of triangle rows, which
 /// are patches of the surface because rows stand leaf by leaf.
 pub const REGIONS: usize = 32;
@@ -66,8 +68,8 @@ impl MeasuredStretch {
 
     /// The triangle that is stretched most.
     #[must_use]
-    pub const fn triangle(&self) -> u32 {
-        self.triangle
+    pub const fn triangle(&self) -> TriangleRow {
+        TriangleRow(self.triangle)
     }
 
     /// Checksum of the tree that it was measured with.

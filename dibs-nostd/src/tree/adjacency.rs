@@ -4,7 +4,7 @@
 //! edge once, so of the few rows with those bits the neighbour is the one that has the edge the other way round.
 //! A border edge has the largest code, and no such row.
 
-use super::{FormatError, Tree, format};
+use super::{FormatError, Tree, TriangleRow, format};
 use crate::Index;
 
 /// Most triangles of a 16-bit tree with adjacency: rows that share their low 16 bits are then at most four.
@@ -22,9 +22,9 @@ impl<I: Index> Tree<'_, I> {
     ///
     /// Cost: one or two triangle rows read, at most four.
     #[must_use]
-    pub const fn neighbour(&self, triangle: u32, edge: u32) -> Option<u32> {
-        match self.across(triangle, edge) {
-            Some((row, _)) => Some(row),
+    pub const fn neighbour(&self, triangle: TriangleRow, edge: u32) -> Option<TriangleRow> {
+        match self.across(triangle.0, edge) {
+            Some((row, _)) => Some(TriangleRow(row)),
             None => None,
         }
     }
@@ -92,8 +92,8 @@ pub(super) const fn check<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatErro
         let mut edge = 0;
         while edge < 3 {
             let is_right = match tree.across(triangle, edge) {
-                Some((row, back)) => match tree.neighbour(row, back) {
-                    Some(this) => this == triangle && row != triangle,
+                Some((row, back)) => match tree.across(row, back) {
+                    Some((this, _)) => this == triangle && row != triangle,
                     None => false,
                 },
                 None => {

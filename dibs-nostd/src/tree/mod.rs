@@ -15,6 +15,7 @@ mod error;
 pub mod format;
 mod header;
 mod index;
+mod row;
 mod scrub;
 pub(crate) mod sections;
 mod stored;
@@ -23,6 +24,7 @@ mod validate;
 pub use error::FormatError;
 pub use format::PathKind;
 pub use index::Index;
+pub use row::{TriangleRow, VertexNumber};
 pub use scrub::{CorruptTreeError, Scrub};
 pub use stored::TreeBytes;
 
@@ -164,18 +166,25 @@ impl<'a, I: Index> Tree<'a, I> {
         self.sections.adjacency.len()
     }
 
-    /// Rows of the three corners of a triangle, or `None` outside the table.
-    #[inline(always)]
+    /// Vertex rows of the three corners of a triangle, or `None` outside the table.
     #[must_use]
-    pub const fn triangle(&self, row: u32) -> Option<[u32; 3]> {
+    pub const fn corners(&self, triangle: TriangleRow) -> Option<[u32; 3]> {
+        self.triangle(triangle.0)
+    }
+
+    #[inline(always)]
+    pub(crate) const fn triangle(&self, row: u32) -> Option<[u32; 3]> {
         format::triangle::<I>(self.sections.triangles, row)
     }
 
     /// The mesh's own number of the vertex in `row`; `None` outside the table or where the tree was
     /// emitted without its vertex order.
     #[must_use]
-    pub const fn vertex_number(&self, row: u32) -> Option<u32> {
-        format::vertex_number::<I>(self.sections.order, row)
+    pub const fn vertex_number(&self, row: u32) -> Option<VertexNumber> {
+        match format::vertex_number::<I>(self.sections.order, row) {
+            Some(number) => Some(VertexNumber(number)),
+            None => None,
+        }
     }
 
     /// Rest position of the vertex in `row` (mm); `None` outside the table or where the tree was
@@ -197,7 +206,7 @@ impl<'a, I: Index> Tree<'a, I> {
     /// Stretch limit of a triangle: the tree's, or less where the tree was built with limits for each
     /// triangle. `None` outside the table.
     #[must_use]
-    pub const fn stretch_limit(&self, row: u32) -> Option<f32> {
+    pub const fn stretch_limit(&self, TriangleRow(row): TriangleRow) -> Option<f32> {
         if self.sections.limits.is_empty() {
             return if row < self.header.triangles { Some(self.header.stretch) } else { None };
         }

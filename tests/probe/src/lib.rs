@@ -14,7 +14,7 @@ use dibs_nostd::glam::Vec3;
 use dibs_nostd::modes::{MAX_MODES, Memo, ModalSurface, Modes};
 use dibs_nostd::{
     Budget, Capsule, MeasuredStretch, Options, Proximity, Query, QueryError, Sphere, Tool, Tree,
-    VertexTable, measure_stretch,
+    TriangleRow, VertexTable, measure_stretch,
 };
 
 /// What a word at the start of a record means.
@@ -208,7 +208,7 @@ fn ask(
     let budget = Budget { node_tests: word(machine)?, triangle_tests: word(machine)? };
     let mut options = Options::cold().unsigned().budget(budget);
     if warm != u32::MAX {
-        options = options.warm_start(Some(warm));
+        options = options.warm_start(Some(TriangleRow(warm)));
     }
     if use_measured && let Some(measured) = measured {
         options = options.stretch(measured);
@@ -270,7 +270,7 @@ fn words(took: u32, answer: &Proximity) -> [u32; ANSWER_WORDS] {
         answer.accuracy.to_bits(),
         answer.axis_distance.to_bits(),
         answer.axis_parameter.to_bits(),
-        answer.triangle.unwrap_or(u32::MAX),
+        answer.triangle.map_or(u32::MAX, |triangle| triangle.0),
         sx,
         sy,
         sz,

@@ -5,7 +5,7 @@
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
     Capsule, Fallback, MeasuredStretch, MovingSurface, Odometer, Options, Query, Step, Tracker,
-    Tree, measure_stretch,
+    Tree, TriangleRow, measure_stretch,
 };
 
 use crate::{Fault, Machine, point, put, word};
@@ -91,7 +91,7 @@ pub fn run(memory: &mut Memory, machine: &mut impl Machine) -> Result<(), Fault>
 struct Session<'t> {
     query: Query<'t, u16, STACK>,
     tracker: Tracker<'t, u16, STACK, OPENED>,
-    last: Option<u32>,
+    last: Option<TriangleRow>,
 }
 
 impl Session<'_> {

@@ -8,7 +8,7 @@
 
 use dibs_build::BuiltTree;
 use dibs_nostd::format::Link;
-use dibs_nostd::{Index, Tool};
+use dibs_nostd::{Index, Tool, TriangleRow};
 use glam::Vec3;
 
 use crate::method::{Found, Method, Probe};
@@ -96,7 +96,7 @@ fn nodes<I: Index>(built: &BuiltTree) -> Vec<Node> {
             Node::Inner { pin, radius: radius * tree.stretch(), children: [first, first + 1] }
         }
         (pin, _, Link::Leaf { first, count: 1 }) => {
-            let [a, b, c] = tree.triangle(first).expect("inside the table");
+            let [a, b, c] = tree.corners(TriangleRow(first)).expect("inside the table");
             let corners = if pin == b {
                 [b, c, a]
             } else if pin == c {

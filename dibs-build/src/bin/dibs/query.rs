@@ -162,7 +162,8 @@ fn ask<I: Index>(
             ToolSpec::Capsule(capsule) => closest(tree, &positions, capsule, margin, &options),
         }
         .map_err(|error| anyhow!("{name}: {error}"))?;
-        let in_mesh = |rows: [u32; 3]| rows.map(|row| tree.vertex_number(row).unwrap_or(row));
+        let vertex = |row| tree.vertex_number(row).map_or(row, |vertex| vertex.0);
+        let in_mesh = |rows: [u32; 3]| rows.map(vertex);
         let pair = [number, tool];
         contacts.extend(touches.into_iter().map(|contact| {
             let triangle = in_mesh(contact.corners);
@@ -225,7 +226,7 @@ fn current(path: &Path, frame: Option<usize>) -> Result<Vec<Vec3>> {
 pub fn rows<I: Index>(tree: &Tree<'_, I>, path: &Path, of_mesh: &[Vec3]) -> Result<Vec<Vec3>> {
     (0..tree.vertex_count())
         .map(|row| {
-            let vertex = tree.vertex_number(row).unwrap_or(row);
+            let vertex = tree.vertex_number(row).map_or(row, |number| number.0);
             of_mesh.get(vertex as usize).copied().ok_or_else(|| {
                 anyhow!(
                     "{}: has {} vertices and the tree uses vertex {vertex}; give the positions of \

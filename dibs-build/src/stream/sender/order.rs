@@ -17,7 +17,8 @@ impl SurfaceOrder {
     /// That of a tree: the tree that the receiver has, or one built from the same mesh in the same way.
     #[must_use]
     pub fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
-        let order = (0..tree.vertex_count()).map(|row| tree.vertex_number(row).unwrap_or(row));
+        let number = |row| tree.vertex_number(row).map_or(row, |number| number.0);
+        let order = (0..tree.vertex_count()).map(number);
         Self { mesh_id: tree.mesh_id(), order: order.collect() }
     }
 

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::unavailable::QueryError;
-use crate::{NoSide, Side};
+use crate::{NoSide, Side, TriangleRow};
 
 const QUERY: QueryError = QueryError::Corrupt { row: 7 };
 
@@ -26,7 +26,7 @@ fn pair(gap: f32, direction: Vec3) -> Proximity {
         point_on_tool: point_on_surface + direction * gap,
         direction,
         axis_parameter: 0.0,
-        triangle: Some(0),
+        triangle: Some(TriangleRow(0)),
         corners: [0, 1, 2],
         barycentric: [1.0, 0.0, 0.0],
         node_tests: 0,

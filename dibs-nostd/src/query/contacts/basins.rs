@@ -91,7 +91,7 @@ impl<const N: usize> Basins<N> {
         let mut valleys = [NONE; 3];
         let mut lowest = entry as u16;
         for (valley, edge) in valleys.iter_mut().zip(0..) {
-            if let Some(known) = tree.neighbour(row, edge).and_then(|across| self.find(across)) {
+            if let Some(known) = tree.across(row, edge).and_then(|(across, _)| self.find(across)) {
                 *valley = self.bottom(known);
                 if *valley < lowest {
                     lowest = *valley;

@@ -9,7 +9,7 @@ use super::side::{self, Side};
 use super::{Budget, NoSide, Options, Proximity, Query};
 use crate::math::sqrt::sqrt;
 use crate::unavailable::{QueryError, Unavailable};
-use crate::{Index, Tool, VertexTable};
+use crate::{Index, Tool, TriangleRow, VertexTable};
 use basins::{Basins, Near};
 
 /// Ridges of this part of the margin do not part two contacts.
@@ -33,8 +33,8 @@ pub struct Contact {
     pub point_on_tool: Vec3,
     /// Where along the tool's axis the pair sits: 0 at its start, 1 at its end.
     pub axis_parameter: f32,
-    /// The triangle of `point_on_surface`: its row in the tree.
-    pub triangle: u32,
+    /// The triangle of `point_on_surface`.
+    pub triangle: TriangleRow,
     /// That triangle's corners, as rows of the vertex table.
     pub corners: [u32; 3],
     /// Weights of the corners at `point_on_surface`.
@@ -51,7 +51,7 @@ impl Contact {
         point_on_surface: Vec3::ZERO,
         point_on_tool: Vec3::ZERO,
         axis_parameter: 0.0,
-        triangle: 0,
+        triangle: TriangleRow(0),
         corners: [0; 3],
         barycentric: [0.0; 3],
         velocity: Vec3::ZERO,
@@ -386,7 +386,7 @@ fn pair_at<I: Index, V: VertexTable + ?Sized, T: Tool>(
         point_on_tool: found.on_axis,
         direction,
         axis_parameter: found.axis_parameter,
-        triangle: Some(row),
+        triangle: Some(TriangleRow(row)),
         corners,
         barycentric: found.barycentric,
         node_tests: 0,

@@ -6,7 +6,7 @@ use super::slack::{ACCURACY, FLOOR};
 use super::{NearestPin, Search};
 use crate::math::sqrt::sqrt;
 use crate::query::{NoSide, Proximity, Side};
-use crate::{Index, QueryError, Tool, VertexTable};
+use crate::{Index, QueryError, Tool, TriangleRow, VertexTable};
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// The answer, where `lower` bounds the unexplored subtrees.
@@ -18,7 +18,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             Some(pair) if !cut_short || sqrt(pair.distance_squared) <= pin_distance => {
                 let row = self.best_triangle;
                 let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
-                (pair, Some(row), corners)
+                (pair, Some(TriangleRow(row)), corners)
             }
             _ if cut_short => {
                 let position = self.position(pin)?;

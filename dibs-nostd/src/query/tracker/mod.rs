@@ -11,7 +11,7 @@ use super::{Budget, Options, Proximity, signed};
 use crate::math::sqrt::sqrt;
 use crate::surface::motion::Unit;
 use crate::unavailable::QueryError;
-use crate::{Index, MovingSurface, Tool, Travel, Tree};
+use crate::{Index, MovingSurface, Tool, Travel, Tree, TriangleRow};
 use front::Front;
 
 /// Units that the odometer may count between two looks at a bound: half of what it can tell apart.
@@ -68,7 +68,7 @@ pub struct Tracker<'t, I, const STACK: usize, const OPENED: usize> {
     now: u32,
     /// Units since everything due was looked at.
     behind: u32,
-    triangle: Option<u32>,
+    triangle: Option<TriangleRow>,
 }
 
 /// Where tool and surface were.
@@ -172,6 +172,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         let search = Search::start(&self.tree, &mut self.stack, surface, tool, options, first)?;
         let tick = Tick::new(search, self.front.borrow(), self.unit, self.now, options.budget);
         let (outcome, best) = tick.run(moved)?;
+        let best = best.map(TriangleRow);
         self.triangle = best.or(self.triangle);
         let (closest, is_complete) = match outcome {
             Outcome::Answer { closest, is_complete, restarted } => {
@@ -199,7 +200,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         surface: &S,
         tool: &T,
         options: &Options,
-        first: Option<u32>,
+        first: Option<TriangleRow>,
         tests: Budget,
     ) -> Result<Proximity, QueryError> {
         let budget = Budget {

@@ -6,7 +6,7 @@ use std::ops::AddAssign;
 use anyhow::Result;
 use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Budget, Options, Proximity, Query, measure_stretch};
+use dibs_nostd::{Budget, Options, Proximity, Query, TriangleRow, measure_stretch};
 use dibs_tests::ask;
 use dibs_tests::deform::Deformation;
 use dibs_tests::oracle::{OraclePair, exhaustive};
@@ -156,7 +156,7 @@ fn on_one_frame(surface: &Surface, deformation: Deformation, rng: &mut Rng) -> T
             options = options.stretch(measured);
         }
         if rng.bool() {
-            options = options.warm_start(Some(rng.u32(..tree.triangle_count() + 2)));
+            options = options.warm_start(Some(TriangleRow(rng.u32(..tree.triangle_count() + 2))));
         }
         let mut ask = |options: &Options| {
             ask::closest(&mut query, rows.as_slice(), &tool, options).expect("a sound tree")

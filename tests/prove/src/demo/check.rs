@@ -3,7 +3,7 @@
 use anyhow::{Context, Result};
 use controller::fingerprint;
 use controller::telemetry::Tick;
-use dibs_nostd::Index;
+use dibs_nostd::{Index, TriangleRow};
 use dibs_tests::oracle::{Instrument, closest_pair, exhaustive};
 use dibs_tests::sides;
 use glam::Vec3;
@@ -84,7 +84,7 @@ pub fn compare(link: &Link, tick: &Tick, compared: &mut Vec<Compared>) {
 
 fn corners(scene: &Scene, triangle: u32) -> Option<[u32; 3]> {
     fn of<I: Index>(scene: &Scene, triangle: u32) -> Option<[u32; 3]> {
-        scene.tree.tree::<I>().ok()?.triangle(triangle)
+        scene.tree.tree::<I>().ok()?.corners(TriangleRow(triangle))
     }
     match scene.tree.index_bits() {
         16 => of::<u16>(scene, triangle),

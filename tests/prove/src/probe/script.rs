@@ -174,7 +174,7 @@ impl Script {
             script.rows(&rows, tree.triangle_count());
             let tool = Instrument::capsule(tool.start(), tool.end(), tool.radius());
             let knows = knows == Knows::Everything;
-            let warm = before.triangle.filter(|_| knows).unwrap_or(u32::MAX);
+            let warm = before.triangle.filter(|_| knows).map_or(u32::MAX, |triangle| triangle.0);
             script.query(&tool, true, knows, warm, Budget::UNLIMITED, None);
         }
         script.words.push(command::END);
