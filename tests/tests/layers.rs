@@ -1,6 +1,7 @@
 //! Dependencies between the folders of a crate point one way.
 //!
-//! `DIBS_CHECKOUT=FOLDER cargo test -p dibs-tests --test layers -- --nocapture` prints those of another checkout.
+//! `docs/dependencies.md` lists them: `DIBS_WRITE=1` writes that list anew. `DIBS_CHECKOUT=FOLDER cargo test -p dibs-tests
+//! --test layers -- --nocapture` prints those of another checkout.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -21,6 +22,25 @@ fn the_builder_has_no_mutual_imports() {
     let imports = imports("dibs-build");
     assert!(imports["builder"].contains("array"), "nothing was read: {imports:?}");
     assert_eq!(cycle(&imports), None);
+}
+
+#[test]
+fn the_page_lists_the_imports_of_today() {
+    let tables = ["dibs-build", "dibs-nostd"].map(|package| table(package, &imports(package)));
+    let now = tables.concat();
+    println!("{now}");
+    if env::var_os("DIBS_CHECKOUT").is_some() {
+        return;
+    }
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/dependencies.md");
+    let page = fs::read_to_string(&path).expect("the page");
+    let (head, rest) = page.split_once("## Now\n\n").expect("a section for today");
+    let (listed, before) = rest.split_once("## Before\n").expect("a section for before");
+    if env::var_os("DIBS_WRITE").is_some() {
+        fs::write(path, format!("{head}## Now\n\n{now}## Before\n{before}")).expect("writable");
+    } else {
+        assert_eq!(listed, now, "write it anew with DIBS_WRITE=1");
+    }
 }
 
 #[test]
@@ -48,7 +68,7 @@ fn cycle(imports: &Imports) -> Option<BTreeSet<&str>> {
     (!left.is_empty()).then_some(left)
 }
 
-/// The imports between the top folders of a crate, and the table of them.
+/// The imports between the top folders of a crate.
 fn imports(package: &str) -> Imports {
     let checkout = env::var("DIBS_CHECKOUT").unwrap_or_else(|_| "..".to_owned());
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join(checkout).join(package).join("src");
@@ -68,16 +88,21 @@ fn imports(package: &str) -> Imports {
     // A module that is a name for another one, as `wire`, has no row.
     let rows: BTreeSet<String> = imports.keys().cloned().collect();
     imports.values_mut().for_each(|to| to.retain(|to| rows.contains(to)));
-    println!("| {package} | imports from |\n|---|---|");
-    for (from, to) in &imports {
+    imports
+}
+
+/// The rows of the page. A name in bold is imported from both sides.
+fn table(package: &str, imports: &Imports) -> String {
+    let mut rows = format!("| {package} | imports from |\n|---|---|\n");
+    for (from, to) in imports {
         let mark = |to: &String| {
             let is_mutual = imports[to].contains(from);
             if is_mutual { format!("**{to}**") } else { to.clone() }
         };
-        println!("| {from} | {} |", to.iter().map(mark).collect::<Vec<_>>().join(", "));
+        let to = to.iter().map(mark).collect::<Vec<_>>().join(", ");
+        rows.push_str(&format!("| {from} | {to} |\n"));
     }
-    println!();
-    imports
+    rows + "\n"
 }
 
 /// The folder of each name that `lib.rs` has, modules among them.

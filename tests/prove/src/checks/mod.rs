@@ -69,7 +69,7 @@ mod tests {
 
     use super::*;
 
-    /// A row without a check of that name, or a check without a row.
+    /// A row without a check of that name, a check or a test without a row, or a link to nowhere.
     #[test]
     fn the_page_of_proofs_names_every_check_and_files_that_exist() {
         let docs = workspace::root().join("docs");
@@ -79,8 +79,18 @@ mod tests {
         let named: BTreeSet<&str> = rows.map(str::trim).skip(2).collect();
         let checks: BTreeSet<&str> = CHECKS.iter().map(|check| check.name).collect();
         assert_eq!(named, checks);
-        for link in page.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+        let links = page.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+        let links: BTreeSet<&str> = links.collect();
+        for link in &links {
             assert!(docs.join(link).exists(), "{link} is not there");
+        }
+        for folder in ["tests/tests", "dibs-build/tests", "firmware-example/tests"] {
+            let files = fs::read_dir(workspace::root().join(folder)).expect("a folder");
+            let names = files.map(|file| file.expect("an entry").file_name());
+            for name in names.filter_map(|name| name.into_string().ok()) {
+                let link = format!("../{folder}/{name}");
+                assert!(!name.ends_with(".rs") || links.contains(&link[..]), "{link}: no row");
+            }
         }
     }
 
