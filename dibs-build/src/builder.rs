@@ -1,4 +1,4 @@
-//! The builder: what a `build.rs` or the `dibs` program calls.
+//! The builder, for a `build.rs` and the `dibs` program.
 
 use dibs_nostd::Index;
 use dibs_nostd::format::{MAX_CHILDREN, MAX_LEAF_TRIANGLES};

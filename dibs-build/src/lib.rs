@@ -9,8 +9,8 @@
 //! The program then says `dibs_nostd::include_tree!("heart")`. [`tree`] is made of parts: [`read`]
 //! imports and checks a mesh (OBJ, STL, PLY, OFF), [`Builder`] makes the tree, [`BuiltTree`] is written as a
 //! Rust module or as a blob. [`Motion`] is a recorded deformation (PC2), [`modes`] make a
-//! few weights of it, and [`generate`] makes procedural hearts and brains. The library prints nothing; the program `dibs` (feature `cli`,
-//! on by default) does.
+//! few weights of it, and [`generate`] makes procedural hearts and brains. The library prints nothing; the program
+//! `dibs` (feature `cli`, on by default) does.
 
 mod array;
 mod builder;

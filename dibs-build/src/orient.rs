@@ -36,7 +36,7 @@ pub enum WindingError {
         /// The other end.
         to: u32,
     },
-    /// Whichever way its triangles are turned, two of them disagree.
+    /// Two of its triangles disagree whichever way they are turned.
     #[error(
         "the surface has only one side, like a Moebius strip: triangles {triangle} and {other} disagree however they \
          are turned, so distances to it have no sign"

@@ -92,7 +92,7 @@ impl TreeScript {
         self
     }
 
-    /// What else the builder can do: `with(|builder| builder.with_rest_shape(false))`.
+    /// The builder's other options: `with(|builder| builder.with_rest_shape(false))`.
     pub fn with(mut self, change: impl FnOnce(Builder<'static>) -> Builder<'static>) -> Self {
         self.builder = change(self.builder);
         self
@@ -101,7 +101,7 @@ impl TreeScript {
     /// Builds the tree and writes it where `dibs_nostd::include_tree!(name)` finds it.
     ///
     /// Tells cargo to run the script again when a file that was read, or the script, has changed, and only
-    /// then; shows as cargo's warnings what is unusual about the mesh. If anything fails, the script ends
+    /// then; shows the import's warnings as cargo's. If anything fails, the script ends
     /// with one sentence as cargo's error: the file, the element, the remedy.
     pub fn emit(self, name: &str) {
         if let Err(error) = self.try_emit(name) {
@@ -110,7 +110,7 @@ impl TreeScript {
         }
     }
 
-    /// The same for a script that goes on after an error.
+    /// The same for a script that continues after an error.
     ///
     /// # Errors
     /// Whatever reading, building or writing returns.

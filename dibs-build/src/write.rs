@@ -5,17 +5,17 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// A file that could not be written. What was there before is untouched.
+/// A file that could not be written. An older file there is untouched.
 #[derive(Debug, Error)]
 #[error("{}: {kind}", path.display())]
 pub struct WriteError {
     /// The file.
     pub path: PathBuf,
-    /// What went wrong.
+    /// The reason.
     pub kind: WriteErrorKind,
 }
 
-/// What keeps a file from being written.
+/// Why a file cannot be written.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum WriteErrorKind {
@@ -61,7 +61,7 @@ pub fn write_atomically(
 }
 
 fn write(path: &Path, contents: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-    // A link stays a link: what it points to is replaced.
+    // A link stays a link: its target is replaced.
     let target = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
     if target.metadata().is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir()) {
         return fill(&File::create(&target)?, contents);

@@ -61,7 +61,7 @@ pub const BUDGET: Budget = Budget { node_tests: 1_800, triangle_tests: 150 };
 /// Instructions in a tick of 1 ms at 480 MHz, if each takes a cycle: the deadline of a tick.
 pub const TICK_INSTRUCTIONS: u64 = 480_000;
 
-// What is left is for the rest of the tick: some thousand instructions.
+// The rest of the tick takes some thousand instructions.
 const _: () = assert!(Cost::M7_CAPSULE.instructions(BUDGET) < TICK_INSTRUCTIONS);
 
 /// Stiffness (N/mm), damping (N s/mm), largest force (N) and margin (mm) of the constraint.

@@ -1,4 +1,4 @@
-//! Proof of what was published: a checksum of the whole surface, for whoever knows what was sent.
+//! A checksum of the whole published surface, for comparison with the one sent.
 
 use dibs_nostd::VertexTable;
 use dibs_nostd::format::CRC;

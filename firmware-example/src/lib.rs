@@ -11,7 +11,7 @@
 //!   [`Receiver::report`] tells the sender, and [`Upkeep::step`] checks the tree in flash.
 //!
 //! Between them stand [`Frames`](dibs_nostd::Frames), where a frame is published by one atomic
-//! operation, and [`BusStatus`], plain counters and marks. [`telemetry`] is what the tick tells the world.
+//! operation, and [`BusStatus`], plain counters and marks. [`telemetry`] is the tick's record for the host.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 

@@ -53,7 +53,7 @@ impl Receiver {
     /// A receiver that publishes surfaces of `tree` through `writer`.
     ///
     /// # Errors
-    /// [`StretchError`] when the tree lacks what the stretch is measured against.
+    /// [`StretchError`] when the tree lacks its metric.
     pub fn new(
         tree: &'static surface::Tree,
         writer: surface::Writer,
@@ -111,7 +111,7 @@ impl Receiver {
         false
     }
 
-    /// What has happened on the bus since start.
+    /// The events on the bus since the start.
     #[must_use]
     pub const fn counters(&self) -> &Counters {
         self.assembler.counters()
@@ -121,7 +121,7 @@ impl Receiver {
         self.assembler.gate().tree().mesh_id()
     }
 
-    /// What goes back to the sender now, framed for the line: `None` unless a status is due. `tick` is
+    /// The status for the sender, framed for the line: `None` unless a status is due. `tick` is
     /// the present control tick, 1 ms.
     pub fn report<'b>(&mut self, tick: u32, line: &'b mut [u8; STATUS_FRAMED]) -> Option<&'b [u8]> {
         if !self.has_news && tick.wrapping_sub(self.reported) < REPORT_INTERVAL {

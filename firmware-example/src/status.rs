@@ -1,4 +1,4 @@
-//! What control tick, bus and background tell each other besides the frames themselves.
+//! Messages between control tick, bus and background besides the frames themselves.
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
@@ -9,7 +9,7 @@ use dibs_nostd::wire::{Counters, Event};
 /// other way. Each is exact; together they may be of two moments.
 #[derive(Debug, Default)]
 pub struct BusStatus {
-    /// What the fail-safe machine watches.
+    /// The numbers that the fail-safe machine watches.
     pub link: LinkStatus,
     bytes: AtomicU32,
     published: AtomicU32,

@@ -1,4 +1,4 @@
-//! What the controller tells the world: one record a tick, and a summary at the end.
+//! The controller's records for the host: one a tick, and a summary at the end.
 //!
 //! A record is its fields in order, little-endian, 32 bits each, then a CRC-32 (ISO-HDLC) of them,
 //! framed with COBS and a zero byte. The first field tells which record it is.
@@ -19,7 +19,7 @@ const LARGEST: usize =
 /// Largest record on the line, in bytes.
 pub const MAX_FRAMED: usize = framed_bytes(LARGEST + CHECKSUM);
 
-/// What happened in one control tick.
+/// One control tick.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Tick {
@@ -99,7 +99,7 @@ pub const fn cause_code(cause: &Unavailable) -> u32 {
     }
 }
 
-/// What to call a cause's number.
+/// The name of a cause's number.
 #[must_use]
 pub const fn cause_name(code: u32) -> &'static str {
     match code {
@@ -130,7 +130,7 @@ impl Tick {
     }
 }
 
-/// What happened in the whole run.
+/// The whole run.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Summary {
@@ -146,7 +146,7 @@ pub struct Summary {
     pub tick_counts: u32,
     /// Records that found the queue full.
     pub records_dropped: u32,
-    /// 1 if the bus ever lost a byte because nobody read it in time, else 0.
+    /// 1 if the bus ever lost a byte that was not read in time, else 0.
     pub bus_overrun: u32,
     /// Largest stack use, in bytes.
     pub stack_bytes: u32,
@@ -157,7 +157,7 @@ pub struct Summary {
     pub bus_masked_counts: u32,
     /// Rounds of the background check of the tree.
     pub scrub_rounds: u32,
-    /// What happened on the bus: `dibs_nostd::wire::Event::ALL`, in that order.
+    /// Counters of the bus: `dibs_nostd::wire::Event::ALL`, in that order.
     pub events: [u32; Event::ALL.len()],
 }
 

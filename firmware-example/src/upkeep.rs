@@ -1,4 +1,4 @@
-//! What the background does besides the bus: it keeps an eye on the tree in flash.
+//! The background's work besides the bus: the check of the tree in flash.
 
 use dibs_nostd::Scrub;
 
@@ -8,7 +8,7 @@ use crate::surface;
 /// Bytes checked in one slice.
 const SLICE: usize = 256;
 
-/// The background check of the tree. What it finds goes to the control tick, which is safe from then on.
+/// The background check of the tree. Its finding goes to the control tick, which is safe from then on.
 pub struct Upkeep {
     scrub: Scrub<'static>,
     status: &'static BusStatus,

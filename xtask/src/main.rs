@@ -1,4 +1,4 @@
-//! `cargo xtask`: what needs more than cargo.
+//! `cargo xtask`: tasks that need more than cargo.
 
 mod mutants;
 mod prove;

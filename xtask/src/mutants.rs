@@ -28,7 +28,7 @@ const AREAS: [(&str, &[&str]); 6] = [
     ),
 ];
 
-/// What cargo-mutants exits with where mutants survived.
+/// The exit code of cargo-mutants where mutants survived.
 const SURVIVED: i32 = 2;
 
 /// Mutants that CI tries of the lines that changed: each takes a build of the core and its tests.
@@ -118,7 +118,7 @@ pub fn sample() -> Result<Outcome> {
 fn command(arguments: &[&str], tests: &[&str]) -> Command {
     let mut cargo = Command::new("cargo");
     cargo.current_dir(workspace::root());
-    // What is built of others' crates serves the mutants too.
+    // Dependencies that are built already serve the mutants too.
     cargo.env("CARGO_TARGET_DIR", workspace::root().join("target"));
     cargo.args(["mutants", "--package", "dibs-nostd", "--output", "target"]).args(arguments);
     cargo.args(["--", "--package", "dibs-tests", "--package", "dibs-nostd", "--lib"]);
@@ -128,7 +128,7 @@ fn command(arguments: &[&str], tests: &[&str]) -> Command {
     cargo
 }
 
-/// What changed since the branch left `main`, or in the last commit.
+/// The files changed since the branch left `main`, or in the last commit.
 fn changes() -> Option<String> {
     let git = |arguments: &[&str]| {
         let mut git = Command::new("git");

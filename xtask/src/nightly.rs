@@ -1,4 +1,4 @@
-//! What needs the nightly compiler: fuzzers, sanitizers and Miri. Without one they say so.
+//! Fuzzers, sanitizers and Miri, which need the nightly compiler. Without one they say so.
 
 use std::fs;
 use std::path::PathBuf;
@@ -28,17 +28,17 @@ pub struct FuzzOptions {
     pub target: Option<String>,
 }
 
-/// What came of a fuzz target.
+/// The outcome of a fuzz target.
 pub struct Fuzzed {
     /// Its name.
     pub target: &'static str,
     /// Inputs that it ran.
     pub inputs: u64,
-    /// What it said, where it found something.
+    /// Its output, where it found something.
     pub finding: Option<String>,
 }
 
-/// What came of the tests under a sanitizer.
+/// The outcome of the tests under a sanitizer.
 pub struct Sanitized {
     /// Tests that passed.
     pub tests: u64,
@@ -70,7 +70,7 @@ fn nightly(arguments: &[&str]) -> Command {
     cargo
 }
 
-/// Runs the fuzz targets. What they find is for the caller to judge.
+/// Runs the fuzz targets. The caller judges their findings.
 pub fn fuzz(options: &FuzzOptions) -> Result<Vec<Fuzzed>> {
     if quiet(Command::new("cargo").args(["fuzz", "--version"]), MOMENT).is_err() {
         let mut cargo = Command::new("cargo");
@@ -119,7 +119,7 @@ pub fn fuzz(options: &FuzzOptions) -> Result<Vec<Fuzzed>> {
     Ok(fuzzed)
 }
 
-/// Runs the fuzz targets for their user: an error names what was found.
+/// Runs the fuzz targets for a user: an error names the finding.
 pub fn fuzz_by_hand(options: &FuzzOptions) -> Result<()> {
     for Fuzzed { target, inputs, finding } in fuzz(options)? {
         println!("{target}: {inputs} inputs in {} s", options.seconds);

@@ -18,7 +18,7 @@ pub fn run(command: &mut Command) -> Result<()> {
 }
 
 /// Runs a command quietly and returns its standard output; on failure or after `limit` the error
-/// holds the last line of what it said.
+/// holds the last line of its output.
 pub fn quiet(command: &mut Command, limit: Duration) -> Result<String> {
     let name = shown(command);
     let mut child = command
@@ -64,7 +64,7 @@ pub fn shown(command: &Command) -> String {
 
 fn text(mut pipe: impl Read) -> String {
     let mut bytes = Vec::new();
-    // What could be read before an error is what the message needs.
+    // The message needs the output from before an error.
     let _ = pipe.read_to_end(&mut bytes);
     String::from_utf8_lossy(&bytes).into_owned()
 }

@@ -16,7 +16,7 @@ const REASON_LINES: usize = 4;
 const PASSED: &str = "passed";
 const FAILED: &str = "FAILED";
 
-/// What a step came to.
+/// The result of a step.
 pub enum Outcome {
     /// It did what it should.
     Passed,
@@ -84,7 +84,7 @@ impl Steps {
         let count = |word| self.lines.iter().filter(|line| line.starts_with(word)).count();
         println!("\n{}", self.lines.join("\n"));
         println!("{} passed, {} failed", count(PASSED), count(FAILED));
-        // The list above says what; a message of its own would no longer be its last line.
+        // The list above names the failures; a message here would no longer leave it the last line.
         if count(FAILED) > 0 {
             std::process::exit(1);
         }

@@ -19,7 +19,7 @@ pub struct Options {
     /// Seconds of the controller's time in the demo.
     #[arg(long, default_value_t = 5)]
     pub demo_seconds: u32,
-    /// Also what is slow: an empty crate brought to an answer on the board by the guide alone, and a few mutants
+    /// Also the slow tests: an empty crate brought to an answer on the board by the guide alone, and a few mutants
     /// of the lines that changed.
     #[arg(long)]
     pub whole: bool,

@@ -9,7 +9,7 @@ use dibs_nostd::{FormatError, Index, Tree, TriangleRow};
 use crate::error::BuildError;
 use crate::write_atomically;
 
-/// A tree as bytes, with what a host needs to know about it.
+/// A tree as bytes, with the facts that a host needs.
 #[derive(Clone, Debug)]
 pub struct BuiltTree {
     pub(super) bytes: Vec<u8>,
@@ -234,7 +234,7 @@ fn is_measurable<I: Index>(tree: &Tree<'_, I>, row: u32) -> bool {
     let Some(corners) = corners else { return first > 0.0 };
     let [a, b, c] = metric.centre_first(corners);
     let (e1, e2) = ((b - a).as_dvec3(), (c - a).as_dvec3());
-    // The builder has made the metric smaller by what the check's rounding may amount to.
+    // The builder has made the metric smaller by the check's largest rounding.
     let limit = f64::from(tree.stretch()).powi(2);
     let left = |rest: f32, now: f64| limit * f64::from(rest) - now;
     let (x, z) = (left(first, e1.length_squared()), left(second, e2.length_squared()));

@@ -1,6 +1,6 @@
 //! The kinds of faults.
 
-/// What can go wrong.
+/// Faults of a line, a sender or an attacker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Fault {
@@ -34,7 +34,7 @@ pub enum Fault {
     TooFar,
     /// A vertex is far from its neighbours, and the frame's digest is made to confirm it. Sealed.
     Stretch,
-    /// The tag or what it covers is changed. Sealed. Only where packets carry tags.
+    /// The tag or a byte under it is changed. Sealed. Only where packets carry tags.
     Forgery,
     /// The sender starts anew in the middle of a frame.
     SenderRestart,

@@ -1,4 +1,4 @@
-//! One packet, and what a fault makes of it.
+//! One packet under a fault.
 
 use std::collections::VecDeque;
 
@@ -23,7 +23,7 @@ pub struct Injector {
     late: Vec<(usize, Vec<u8>)>,
     /// Rows of the surface, from the last begin.
     rows: u32,
-    /// What is to be added to the frame's digest.
+    /// The sum to add to the frame's digest.
     digest: u32,
 }
 

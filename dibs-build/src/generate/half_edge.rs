@@ -198,7 +198,7 @@ impl HalfEdges {
         self.alive -= 2;
     }
 
-    /// Points and triangles without the gaps of what was removed.
+    /// Points and triangles without the gaps of removed ones.
     pub fn into_parts(self) -> (Vec<DVec3>, Vec<[u32; 3]>) {
         let mut renumbered = vec![DEAD; self.points.len()];
         let mut points = Vec::new();

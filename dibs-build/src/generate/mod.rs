@@ -44,7 +44,7 @@ pub enum GenerateError {
     TriangleCount {
         /// "heart" or "brain".
         surface: &'static str,
-        /// What was asked for.
+        /// The number asked for.
         asked: u32,
         /// The valid number next to it (the smaller of two).
         nearest: u32,
@@ -61,9 +61,9 @@ pub enum GenerateError {
     Stuck {
         /// "heart" or "brain".
         surface: &'static str,
-        /// What was asked for.
+        /// The number asked for.
         asked: u32,
-        /// What was reached.
+        /// The number reached.
         reached: usize,
     },
 }

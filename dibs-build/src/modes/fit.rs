@@ -23,7 +23,7 @@ const NOISE: f64 = 1e-12;
 /// use dibs_build::{generate, modes::ModalFit};
 /// let generate::MovingMesh { mesh: heart, motion } = generate::heart(1_000)?;
 /// let fit = ModalFit::new(&heart, &motion)?;
-/// // What more modes buy, before any is chosen: this motion has two.
+/// // The error by number of modes, before one is chosen: this motion has two.
 /// let [one, two] = fit.errors() else { panic!("other modes") };
 /// assert!(one.max > 1.0 && two.max < 1e-4);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use crate::rest::RestShape;
 
-/// The triangles of a tree, ready to tell what a displacement does to them.
+/// The triangles of a tree, ready to measure displacements.
 pub struct Triangles {
     corners: Vec<[u32; 3]>,
     shapes: Vec<Shape>,

@@ -35,7 +35,7 @@ pub struct ModalError {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ModalMotion {
-    /// One weight a mode, for each recorded frame: what a sender sends.
+    /// One weight a mode, for each recorded frame, ready to be sent.
     pub weights: Vec<Vec<f32>>,
     /// Frames that stretch the surface beyond the tree's limit: a receiver rejects them.
     pub beyond_limit: Vec<usize>,

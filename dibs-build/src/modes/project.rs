@@ -1,4 +1,4 @@
-//! From positions to weights, for whoever sends them.
+//! From positions to weights, for senders.
 
 use dibs_nostd::modes::Modes;
 use glam::{DVec3, Vec3};

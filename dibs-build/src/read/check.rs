@@ -1,4 +1,4 @@
-//! From what a file says to a mesh that a tree can be built on: every check, in order.
+//! From a file's elements to a mesh that a tree can be built on: every check, in order.
 
 use super::polygon::Triangulator;
 use super::raw::Raw;

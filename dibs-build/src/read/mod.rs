@@ -1,4 +1,4 @@
-//! Mesh files: OBJ, STL, PLY and OFF, recognised by what they contain.
+//! Mesh files: OBJ, STL, PLY and OFF, recognised by their contents.
 
 mod check;
 mod error;
@@ -19,12 +19,12 @@ use crate::mesh::{Mesh, RestSurface};
 use crate::rounding::round_up;
 use std::path::Path;
 
-/// A mesh that passed every check, and what was found and done on the way.
+/// A mesh that passed every check, and the report of findings and repairs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Import {
     /// The surface: one connected component, no degenerate and no duplicate triangle.
     pub mesh: Mesh,
-    /// Counts of what was read, welded, dropped and found.
+    /// Counts of the elements read, welded, dropped and found.
     pub report: Report,
 }
 

@@ -45,7 +45,7 @@ impl fmt::Display for Format {
     }
 }
 
-/// Counts of what was read, welded, dropped and found.
+/// Counts of the elements read, welded, dropped and found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// The format that the content has.

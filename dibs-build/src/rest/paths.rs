@@ -5,10 +5,10 @@ use dibs_nostd::format::PathKind;
 /// How far along-surface distances look beyond the mesh's edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Paths {
-    /// Mesh edges only, as in the paper. The stretch of each edge is what limits the tree.
+    /// Mesh edges only, as in the paper. The tree's limit is on the stretch of each edge.
     Edges,
     /// Mesh edges and chords across up to this many edges (1: pairs of triangles). The largest
-    /// singular value of each triangle is what limits the tree.
+    /// singular value of each triangle: the tree's limit is on that.
     Surface {
         /// Most edges that a chord crosses.
         crossings: u32,

@@ -2,8 +2,8 @@
 
 use dibs_nostd::format::MAX_LIMIT_CODE;
 
-/// Each triangle's limit as a part of the largest, rounded up to what a 16-bit code can tell. Everything
-/// that is built goes by these, so that what the controller enforces is what the radii allow.
+/// Each triangle's limit as a part of the largest, rounded up to a 16-bit code. Everything
+/// that is built uses these, so that the controller enforces the limits for which the radii are made.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Shares {
     /// One a triangle; empty where all have the same limit.

@@ -93,7 +93,7 @@ impl Line {
             move |packets| {
                 match reader.recv(&mut buffer) {
                     Ok(bytes) => packets.push(buffer[..bytes].to_vec()),
-                    // Nobody listens there, or not yet: the sender goes on, as with any lost datagram.
+                    // No receiver there, or not yet: the sender continues, as after any lost datagram.
                     Err(error) if error.kind() == ErrorKind::ConnectionRefused => (),
                     Err(error) => return Err(error),
                 }
@@ -116,7 +116,7 @@ impl Line {
             if bytes == 0 {
                 return Err(ErrorKind::UnexpectedEof.into());
             }
-            // What was damaged on the way back is as good as not sent: the next status follows.
+            // A damaged status is dropped: the next one follows.
             let whole = buffer[..bytes]
                 .iter()
                 .filter_map(|&byte| deframer.push(byte).and_then(Result::ok).map(<[u8]>::to_vec));
@@ -141,7 +141,7 @@ impl Line {
                     Ok(()) => (),
                     Err(error) if is_patience(&error) => (),
                     Err(error) => {
-                        // Nobody to tell where the owner is gone.
+                        // The owner may be gone.
                         let _ = to_owner.send(Err(error));
                         return;
                     }
@@ -169,10 +169,10 @@ impl Line {
         self.is_stream
     }
 
-    /// Sends bytes as they are: what a damaged line would make of a packet. For fault injection.
+    /// Sends bytes as they are, damaged packets too. For fault injection.
     ///
     /// # Errors
-    /// What the operating system says.
+    /// The operating system's error.
     pub fn send_raw(&mut self, bytes: &[u8]) -> io::Result<()> {
         write(&mut self.writer, bytes)
     }
@@ -243,7 +243,7 @@ struct Datagrams(UdpSocket);
 impl Write for Datagrams {
     fn write(&mut self, packet: &[u8]) -> io::Result<usize> {
         match self.0.send(packet) {
-            // The answer to an earlier datagram: nobody listens yet.
+            // The answer to an earlier datagram: there is no receiver yet.
             Err(error) if error.kind() == ErrorKind::ConnectionRefused => Ok(packet.len()),
             sent => sent,
         }

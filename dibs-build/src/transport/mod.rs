@@ -8,7 +8,7 @@ use std::io;
 pub use line::Line;
 pub use target::{Target, TargetError};
 
-/// What a [`Sender`](crate::stream::Sender) sends through.
+/// The way out of a [`Sender`](crate::stream::Sender).
 ///
 /// [`Line`] is the one for serial lines and sockets; a CAN adapter, or a fault injector between sender
 /// and receiver, is another implementation.
@@ -16,7 +16,7 @@ pub trait Transport {
     /// Sends one packet, whole. May block for as long as the line is busy.
     ///
     /// # Errors
-    /// What the operating system says; the connection is then of no use any more.
+    /// The operating system's error; the connection is then of no use any more.
     fn send(&mut self, packet: &[u8]) -> io::Result<()>;
 
     /// The next packet that came back, `None` if none is there. Does not block.

@@ -59,13 +59,13 @@ pub enum TargetError {
         "`{text}` is no target: serial:PORT[@BAUD], tcp:HOST:PORT, udp:HOST:PORT[@LOCAL_PORT] or unix:PATH"
     )]
     Kind {
-        /// What was given.
+        /// The text given.
         text: String,
     },
     /// A baud rate that is no positive number.
     #[error("`{text}`: the baud rate `{baud}` is not a positive whole number")]
     Baud {
-        /// What was given.
+        /// The text given.
         text: String,
         /// The part after the `@`.
         baud: String,
@@ -77,7 +77,7 @@ pub enum TargetError {
     Open {
         /// The target.
         target: Target,
-        /// What the operating system says.
+        /// The operating system's error.
         source: std::io::Error,
     },
 }
@@ -137,7 +137,7 @@ impl Target {
     /// Connects.
     ///
     /// # Errors
-    /// [`TargetError::Open`] with what the operating system says.
+    /// [`TargetError::Open`] with the operating system's error.
     pub fn open(&self) -> Result<Line, TargetError> {
         self.connect().map_err(|source| TargetError::Open { target: self.clone(), source })
     }

@@ -21,7 +21,7 @@ use super::layout::{self, Anchor};
 use super::{Modes, WeightsError};
 use crate::surface::MeasuredStretch;
 
-/// What covers the f32 rounding of a bound.
+/// Allowance for the f32 rounding of a bound.
 const ROUNDING: f32 = 1.0 + 1.0 / 65_536.0;
 
 impl Modes<'_> {

@@ -1,4 +1,4 @@
-//! What can be wrong with modes, and with weights.
+//! Defects of modes, and of weights.
 
 use core::fmt;
 
@@ -73,7 +73,7 @@ pub enum WeightsError {
         /// The first such mode.
         mode: u32,
     },
-    /// A weight is further from what was recorded than the stored margin allows.
+    /// A weight is farther from its recorded range than the stored margin allows.
     OutOfRange {
         /// The first such mode.
         mode: u32,

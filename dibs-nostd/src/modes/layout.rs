@@ -23,7 +23,7 @@ pub(super) struct Header {
     pub unit: f32,
     pub position_error: f32,
     pub rms_error: f32,
-    /// What the stretch bound adds for rounding.
+    /// Allowance of the stretch bound for rounding.
     pub slack: f32,
     pub margin: f32,
 }

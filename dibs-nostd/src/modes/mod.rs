@@ -7,11 +7,11 @@
 //!
 //! | | |
 //! |---|---|
-//! | [`Modes`] | what the builder fitted, read from the tree's bytes and validated once |
+//! | [`Modes`] | the builder's fit, read from the tree's bytes and validated once |
 //! | [`ModalSurface`] | the surface at some weights: a [`VertexTable`](crate::VertexTable) |
 //! | [`Modes::stretch_bound`] | how far it is stretched, in time that does not depend on the vertices |
 //! | [`ModalGate`], [`ModalReader`] | both ends of a bus that carries weights |
-//! | [`Memo`] | remembers what was computed, for the length of a query |
+//! | [`Memo`] | remembers positions, for the length of a query |
 
 mod bound;
 mod error;
@@ -150,7 +150,7 @@ impl<'a> Modes<'a> {
         self.mesh_id
     }
 
-    /// The stretch limit of the tree: what [`stretch_bound`](Self::stretch_bound) must not exceed.
+    /// The stretch limit of the tree, which [`stretch_bound`](Self::stretch_bound) must not exceed.
     #[must_use]
     pub const fn stretch_limit(&self) -> f32 {
         self.limit
@@ -172,7 +172,7 @@ impl<'a> Modes<'a> {
         self.header.rms_error
     }
 
-    /// How far [`range`](Self::range) goes beyond what was recorded, as a part of the recorded range.
+    /// How far [`range`](Self::range) goes beyond the recorded range, as a part of it.
     #[must_use]
     pub const fn margin(&self) -> f32 {
         self.header.margin

@@ -57,7 +57,7 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         Self { surface: ModalSurface::new(modes, weights), label: frame.label() }
     }
 
-    /// What is known of this frame. Its position error is that of the modes, against the motion that
+    /// The facts about this frame. Its position error is that of the modes, against the motion that
     /// they were fitted to.
     #[must_use]
     pub const fn label(&self) -> FrameLabel {

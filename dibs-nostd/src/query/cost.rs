@@ -1,24 +1,24 @@
-//! From a deadline to a budget, by a fitted bound on what a query costs.
+//! From a deadline to a budget, by a fitted bound on a query's cost.
 
 use super::Budget;
 
-/// A fitted bound on what a query costs: `base + n * node_test + t * triangle_test`, in instructions, where `n`
+/// A fitted bound on a query's cost: `base + n * node_test + t * triangle_test`, in instructions, where `n`
 /// and `t` are the node and triangle tests that a [`Budget`] limits. The budget is exact; the instructions of a
 /// test are measured, not proved.
 ///
 /// The constants are the plane above some hundred thousand adversarial queries about four small surfaces, on an
 /// emulated Cortex-M7 and on x86-64, plus a margin of 20 %. They are checked on surfaces and poses that the fit has
-/// not seen: the repository's `docs/guarantees.md` says on which, how many were above, how tight the bound is, and what a number of
-/// instructions says about a number of cycles. They are for [`Query::closest`](crate::Query::closest), vertex
+/// not seen: the repository's `docs/guarantees.md` says on which, how many were above, how tight the bound is, and how
+/// instructions relate to cycles. They are for [`Query::closest`](crate::Query::closest), vertex
 /// tables that are slices of `Vec3`, and the firmware's profile or an optimised build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Cost {
-    /// What every query costs: setting it up, the root, a warm start's bookkeeping, and the answer.
+    /// The cost of every query: setting it up, the root, a warm start's bookkeeping, and the answer.
     pub base: u32,
-    /// What a node test costs, be its sphere stored or elastic.
+    /// The cost of a node test, be its sphere stored or elastic.
     pub node_test: u32,
-    /// What an exact triangle test costs, on top of the elastic test before it.
+    /// The cost of an exact triangle test, on top of the elastic test before it.
     pub triangle_test: u32,
 }
 

@@ -147,9 +147,9 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
     stack: &'s mut [Waiting],
     vertices: &'s V,
     tool: &'s T,
-    /// Its budget is what is left of it.
+    /// Its budget is the rest of the query's.
     options: Options,
-    /// What is known: the deepest point so far.
+    /// The deepest point so far.
     answer: Proximity,
     deepest: f32,
 }

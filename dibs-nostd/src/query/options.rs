@@ -1,4 +1,4 @@
-//! What a query may know beforehand, and how much it may do.
+//! A query's options: prior knowledge and a budget.
 
 use crate::{MeasuredStretch, TriangleRow};
 
@@ -24,7 +24,7 @@ impl Budget {
     pub const UNLIMITED: Self = Self { node_tests: u32::MAX, triangle_tests: u32::MAX };
 }
 
-/// What a query may know beforehand. None of it changes what the answer is, only what it costs, except
+/// Prior knowledge for a query, and its budget. Prior knowledge changes an answer's cost, not the answer, except
 /// that a budget may widen the interval.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
@@ -79,7 +79,7 @@ impl Options {
         self
     }
 
-    /// Starts from a triangle instead of the query's last answer's. A wrong or stale one costs one triangle test; `None`
+    /// Starts from this triangle instead of the last answer's. A wrong or stale one costs one triangle test; `None`
     /// starts cold.
     #[must_use]
     pub const fn warm_start(mut self, triangle: Option<TriangleRow>) -> Self {

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::{Index, Tree, VertexTable};
 
-/// A plane that separates what is beyond it from the tool's axis by more than the cutoff.
+/// A plane: points beyond it are farther from the tool's axis than the cutoff.
 ///
 /// For any vector `n` from the axis' nearest point `q` to some point, the axis lies where
 /// `n . (x - q) <= 0`: it is convex. So all points of a patch with `n . (x - q) > cutoff |n|` at its

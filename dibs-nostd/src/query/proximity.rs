@@ -1,4 +1,4 @@
-//! What a query answers: the closest pair and how certain it is.
+//! A query's answer: the closest pair and how certain it is.
 
 use glam::Vec3;
 

@@ -1,4 +1,4 @@
-//! One search: the tests of nodes, leaves and triangles, and what is known so far.
+//! One search: the tests of nodes, leaves and triangles, and the best pair so far.
 
 mod finish;
 mod near;
@@ -35,7 +35,7 @@ const THIRD: f32 = 1.0 / 3.0;
 
 /// How a look at a subtree ended.
 enum Step {
-    /// What it left waits on the stack.
+    /// The rest waits on the stack.
     Done,
     /// Unfinished: the budget ran out.
     OutOfBudget,
@@ -73,7 +73,7 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     best: Option<AxisPair>,
     best_squared: f32,
     best_triangle: u32,
-    /// What is left of the budget.
+    /// The rest of the budget.
     left: Budget,
 }
 
@@ -187,7 +187,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         self.finish(f32::INFINITY)
     }
 
-    /// The least lower bound of what waits and of a subtree that was not finished.
+    /// The least lower bound of the waiting subtrees and of one that was not finished.
     #[inline(always)]
     fn least_waiting(&self, lower: f32) -> f32 {
         let waiting = self.stack.iter().take(self.waiting).map(|left| left.lower);
@@ -248,7 +248,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             let normal = self.tool.axis_to(position);
             let squared = normal.dot(normal);
             let far = self.cutoff + radius;
-            // What is not a number is not far: the leaves below find out what it is.
+            // A NaN counts as near: the leaves below name the vertex that it comes from.
             if squared > far * far {
                 continue;
             }

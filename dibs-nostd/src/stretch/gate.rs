@@ -1,4 +1,4 @@
-//! The last check of a frame before it is published: a trait, so that what is checked can be chosen.
+//! The last check of a frame before it is published: a trait, so that a user can choose the check.
 
 use core::ops::Range;
 
@@ -6,7 +6,7 @@ use super::{StretchError, measure_stretch};
 use crate::surface::{MeasuredStretch, VertexTable};
 use crate::tree::{Index, Tree};
 
-/// What a frame changes of the published surface.
+/// The part of the published surface that a frame changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Changed {
@@ -88,7 +88,7 @@ pub trait Gate {
         f32::INFINITY
     }
 
-    /// What to add to a frame's position error for how its surface is made of its rows (mm).
+    /// The error (mm) of making the surface from the frame's rows: added to the frame's position error.
     fn position_error(&self) -> f32 {
         0.0
     }

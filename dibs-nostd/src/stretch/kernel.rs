@@ -28,7 +28,7 @@ use crate::math::sqrt::sqrt;
 /// Half a unit in the last place of 1.
 pub(super) const U: f32 = 1.0 / 16_777_216.0;
 
-/// What no measurement goes below: the square of a half. A surface that shrank more than that is
+/// The least square that is measured, that of a half. A surface that shrank more than that is
 /// searched no faster, and products stay away from underflow.
 pub(super) const LEAST: f32 = 0.25;
 
@@ -55,18 +55,18 @@ pub(super) struct Edges {
     pub second: Vec3,
 }
 
-/// What a path kind measures.
+/// The measure of a path kind.
 pub(super) trait Measure {
     /// The squares of a triangle as it is now.
     fn squares(now: Edges) -> Squares;
 
-    /// Whether the stretch is certainly at most `sqrt(limit)`. False for what is not a number.
+    /// Whether the stretch is certainly at most `sqrt(limit)`. False for NaN.
     fn within(rest: &Squares, now: &Squares, limit: f32) -> bool;
 
     /// About the square of the stretch.
     fn estimate(rest: &Squares, now: &Squares) -> f32;
 
-    /// The same as [`within`](Self::within), of what is left of the limit: `first` by the first edge, which is
+    /// The same as [`within`](Self::within), from the slack of two edges: `first` by the first edge, which is
     /// known to be within it, and `second` by the second one; `between` is the limit times the rest square.
     /// `first` is not negative; if it is 0, false is right, too. Where it is true, `second` is positive.
     fn is_within(first: f32, second: f32, between: f32, now: Edges) -> bool;
@@ -99,7 +99,7 @@ impl Measure for SingularValue {
         mean + sqrt(half * half + pq * pq)
     }
 
-    /// What is above a square is positive, and with `first` so is `second`.
+    /// A number above a square is positive, and with `first` so is `second`.
     #[inline(always)]
     fn is_within(first: f32, second: f32, between: f32, now: Edges) -> bool {
         let between = between - now.first.dot(now.second);
@@ -125,7 +125,7 @@ impl Measure for LongestEdge {
         let mut worst = 0.0;
         for (rest, now) in rest.iter().zip(now) {
             let ratio = now / rest;
-            // Written so that what is not a number stays.
+            // Written so that a NaN stays.
             if !(ratio <= worst) {
                 worst = ratio;
             }
@@ -181,7 +181,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// What is compared with the limit's square is never above it, and hardly below.
+        /// The square that is compared with the limit's is never above it, and hardly below.
         #[test]
         fn a_limit_is_squared_downwards(limit in 1.0_f32..1e6) {
             let (exact, squared) = (f64::from(limit).powi(2), f64::from(squared_limit(limit)));

@@ -1,12 +1,11 @@
-//! What a surface may be besides not too stretched: chosen by whoever knows the tissue.
+//! Limits of a surface besides its stretch, chosen by a user who knows the tissue.
 
 /// Limits that a surface must keep to before it is published; the tree knows its stretch limit by itself.
 ///
-/// They tell nonsense from a surface: what stands still in another place or shape than it could be in. What they
-/// do not tell: a first frame that is turned, mirrored or moved as a whole (only the next one would be too fast),
-/// and a part of a region that shrinks while the rest of it makes up for that.
+/// They refuse surfaces in impossible places or shapes. They do not see a first frame that is turned, mirrored or moved
+/// as a whole (only the next one would be too fast), or a part of a region that shrinks while the rest makes up for it.
 ///
-/// A limit that is not a number refuses every frame.
+/// A limit of NaN refuses every frame.
 ///
 /// ```
 /// use dibs_nostd::SurfaceLimits;

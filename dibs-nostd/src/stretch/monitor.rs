@@ -10,7 +10,7 @@ use super::{Arriving, Changed, Gate, StretchError, SurfaceLimits, Verdict, check
 use crate::surface::{REGIONS, VertexTable};
 use crate::tree::{Index, Tree, TriangleRow};
 
-/// Blocks of vertex rows, at most: what a partial frame moved is remembered by them.
+/// Blocks of vertex rows, at most: they mark the rows that a partial frame moved.
 const BLOCKS: usize = 32;
 
 /// No row.
@@ -93,7 +93,7 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
     /// A monitor for surfaces of this tree, with the limits that [`SurfaceLimits::reach_mm`] begins with.
     ///
     /// # Errors
-    /// [`StretchError::NoMetric`] where the tree was emitted without what it takes.
+    /// [`StretchError::NoMetric`] where the tree was emitted without its metric.
     pub fn new(tree: &'t Tree<'t, I>) -> Result<Self, StretchError> {
         let limits = SurfaceLimits::reach_mm(f32::INFINITY);
         if tree.sections().metric.is_empty() {

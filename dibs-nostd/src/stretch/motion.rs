@@ -24,7 +24,7 @@ pub(super) fn largest_step<V: VertexTable + ?Sized>(
     for row in rows {
         let (Some(now), Some(before)) = (now.position(row), before.position(row)) else { break };
         let squared = (now - before).length_squared();
-        // What is not a number counts, too, and stays.
+        // A NaN counts, too, and stays.
         if !(squared <= largest) {
             largest = squared;
         }

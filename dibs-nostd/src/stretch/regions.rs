@@ -21,7 +21,7 @@ pub(super) fn of_regions<I: Index>(
             worst = *region;
         }
     }
-    // What passed at the limit is within it, whatever the root's rounding says.
+    // A square that passed at the limit is within it, whatever the root's rounding says.
     let within = |squared: f32| {
         let sigma = root_up(squared);
         if sigma > tree.stretch() { tree.stretch() } else { sigma }

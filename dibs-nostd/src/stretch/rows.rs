@@ -1,8 +1,8 @@
 //! The check of many triangles, row by row: where the time of a measurement goes.
 //!
-//! What a triangle shares with the one before is carried over ([`Join`]). What an edge leaves of the largest
-//! square so far, `L r - g` for its squares at rest and now, is the same number for both of its triangles, but in
-//! a tree that is not `UNIFORM`: there triangles have limits of their own, and `r` is not the same for both.
+//! Corners shared with the triangle before are carried over ([`Join`]). So is an edge's slack under the largest square
+//! `L` so far: `L r - g`, with its squares `r` at rest and `g` now. Both of its triangles have the same `r`, except in a
+//! tree that is not `UNIFORM`, whose triangles have limits of their own.
 
 use core::ops::Range;
 
@@ -58,7 +58,7 @@ pub(super) fn scan<I: Index, V: VertexTable + ?Sized>(
 }
 
 /// Raises `worst` where one triangle is stretched more, if all its corners are below row `ready`. Returns whether
-/// they are. What is beyond its limit is left to [`scan`].
+/// they are. Triangles beyond their limit are left to [`scan`].
 pub(super) fn look<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     surface: &V,
@@ -188,15 +188,16 @@ impl MetricBits for [u8; METRIC_BYTES] {
     }
 }
 
-/// What a triangle leaves to the next.
+/// The state that a triangle leaves to the next.
 #[derive(Clone, Copy)]
 struct Before {
     centre: Vec3,
     third: Vec3,
     /// The edge from the centre to the third corner.
     edge: Vec3,
-    /// What that leaves of the largest square so far, and what the least square leaves of it.
+    /// The edge's slack under the largest square so far.
     left: f32,
+    /// The edge's room above the least square.
     room: f32,
 }
 
@@ -235,7 +236,7 @@ fn measure<
     let Some(mut before) = table.before::<I, CORNERS>(metric, corners, worst.squared) else {
         return (row, worst, room.sum);
     };
-    // Two at a time, so that what one leaves to the next takes no moves.
+    // Two at a time, so that the state between them takes no moves.
     let (pairs, last_metric) = metrics.as_chunks::<2>();
     let (pairs_of_corners, last_corners) = triangles.as_chunks::<2>();
     for ([m0, m1], [t0, t1]) in pairs.iter().zip(pairs_of_corners) {
@@ -259,7 +260,7 @@ fn measure<
     (row, worst, room.sum)
 }
 
-/// What triangles are measured on: vertices below row `ready`, none of them beyond `limit`, a square; `least` is
+/// The surface to measure: vertices below row `ready`, no triangle beyond `limit`, a square; `least` is
 /// that of [`Room`].
 struct Table<'a, V: ?Sized> {
     surface: &'a V,
@@ -269,7 +270,7 @@ struct Table<'a, V: ?Sized> {
 }
 
 impl<V: VertexTable + ?Sized> Table<'_, V> {
-    /// What the first triangle of a run needs to know of the one before it: from its own first two corners.
+    /// The state that the first triangle of a run needs of the one before it, from its own first two corners.
     #[inline(always)]
     fn before<I: Index, const CORNERS: usize>(
         &self,
@@ -284,7 +285,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let edge = if metric.join == Join::Flip { centre - other } else { other - centre };
         let [rest, ..] = metric.squares;
         let left = largest * rest - edge.length_squared();
-        // Not within the largest so far: what is not a number passes nothing, and a closer look is taken.
+        // Not within the largest so far, or NaN, which passes nothing: a closer look is taken.
         let edge = if left > 0.0 { edge } else { Vec3::NAN };
         Some(Before { centre, third: centre, edge, left, room: 0.0 })
     }

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::MeasuredStretch;
 use super::atomic::{AtomicU32, Ordering};
 
-/// What is known of a published frame.
+/// The facts about a published frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FrameLabel {
@@ -17,7 +17,7 @@ pub struct FrameLabel {
     /// No vertex is farther than this from the position that the sender had, in mm: the
     /// quantisation on the wire. A separation is off by at most as much.
     pub position_error: f32,
-    /// Measured stretch of the frame against the rest shape; `None` where nobody measured it.
+    /// Measured stretch of the frame against the rest shape; `None` where it was not measured.
     pub stretch: Option<MeasuredStretch>,
 }
 

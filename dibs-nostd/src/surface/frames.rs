@@ -123,7 +123,7 @@ impl<const N: usize> Default for Frames<N> {
     }
 }
 
-/// The end that writes: owned by whoever receives vertices.
+/// The end that writes: owned by the receiver of vertices.
 ///
 /// A frame is [`begin`](Self::begin), one [`push`](Self::push) for every vertex in the order of the
 /// rows, and [`publish`](Self::publish). An [`Assembler`](crate::Assembler) takes rows in the order in
@@ -228,7 +228,7 @@ impl<const N: usize> FrameWriter<'_, N> {
         let [first, second] = &self.frames.buffers;
         self.back = if next & FRONT == 0 { second } else { first };
         self.state = next;
-        // What the back buffer holds now is an old frame: it must be begun before it is published.
+        // The back buffer now holds an old frame: it must be begun before it is published.
         self.filled = 0;
         Ok(())
     }
@@ -285,7 +285,7 @@ pub struct FrameGuard<'f, const N: usize> {
 }
 
 impl<const N: usize> FrameGuard<'_, N> {
-    /// What is known of this frame.
+    /// The facts about this frame.
     #[must_use]
     pub fn label(&self) -> FrameLabel {
         self.view.buffer.label()
@@ -329,7 +329,7 @@ pub struct FrameView<'f, const N: usize> {
 
 #[cfg(feature = "bus")]
 impl<const N: usize> FrameView<'_, N> {
-    /// What is known of the frame; of one being written, nothing certain before it is labelled.
+    /// The facts about the frame; of one being written, nothing certain before it is labelled.
     pub(crate) fn label(&self) -> FrameLabel {
         self.buffer.label()
     }

@@ -13,7 +13,7 @@ pub const REGIONS: usize = 32;
 /// refuses another's.
 ///
 /// Where triangles have limits of their own, a stretch counts as the part of its limit that it takes,
-/// times the tree's limit: that is what the tree's radii grow with.
+/// times the tree's limit: the tree's radii grow with that.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MeasuredStretch {

@@ -3,7 +3,7 @@
 //! A bound of a distance holds for as long as nothing has moved by more than it has to spare. So all that
 //! has to be known of a moving surface is a number that grows, from frame to frame, by at least the
 //! distance that any vertex moved. Two readings of it, however many frames apart, bound the motion between
-//! them: frames that nobody looked at add up by themselves.
+//! them: frames that were not looked at add up by themselves.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -15,9 +15,9 @@ use crate::{Index, MeasuredStretch, Tree, VertexTable};
 
 /// A surface whose motion is known: a table of positions, and the reading of its odometer.
 ///
-/// Sealed: only what measures a motion may state one.
+/// Sealed: only a measurement may state a motion.
 pub trait MovingSurface: VertexTable + sealed::Sealed {
-    /// The odometer's reading at this frame; `None` where nobody measures the motion.
+    /// The odometer's reading at this frame; `None` where the motion is not measured.
     fn travel(&self) -> Option<Travel>;
 }
 
@@ -77,7 +77,7 @@ impl Travel {
     }
 }
 
-/// What lengths are counted in where they are added up: a power of two, 2^-24 of the tree's root sphere or less.
+/// The unit in which lengths are added up: a power of two, 2^-24 of the tree's root sphere or less.
 ///
 /// Integers add without rounding, and wrap without a seam.
 #[derive(Clone, Copy, Debug)]
@@ -100,7 +100,7 @@ impl Unit {
         Self { length: power / 16_777_216.0, inverse: 16_777_216.0 / power }
     }
 
-    /// A length in units, rounded down: 0 for what is not a number or negative, at most [`FAR`].
+    /// A length in units, rounded down: 0 for NaN and below 0, at most [`FAR`].
     #[inline(always)]
     pub(crate) fn down(self, length: f32) -> u32 {
         let units = (length * self.inverse) as i32;
@@ -126,7 +126,7 @@ pub(crate) const FAR: i32 = 1 << 30;
 
 /// A table of positions, with the reading of its surface's [`Odometer`].
 ///
-/// It borrows the table: what was measured cannot change while it lives.
+/// It borrows the table: measured positions cannot change while it lives.
 #[derive(Debug)]
 pub struct Moved<'v, V: ?Sized> {
     pub(super) table: &'v V,
@@ -245,7 +245,7 @@ impl Odometer {
             if squared > largest {
                 largest = squared;
             }
-            // What is not a number is not below infinity either.
+            // A NaN is not below infinity either.
             is_measured &= squared < f32::INFINITY;
         }
         // Differences and squares are rounded by a few parts in 2^24, and underflow below 1e-22.

@@ -12,7 +12,7 @@ use crate::{MeasuredStretch, VertexTable};
 
 /// Two frames that follow one another, as [`Odometer::step`](crate::Odometer::step) measured them.
 ///
-/// It borrows both: what was measured cannot change while it lives.
+/// It borrows both: measured positions cannot change while it lives.
 #[derive(Debug)]
 pub struct Step<'v, W: ?Sized, V: ?Sized> {
     pub(super) before: &'v W,
@@ -47,10 +47,10 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
     ///
     /// Its stretch is at most the larger of the two frames' (gradients are linear in positions, and the largest
     /// singular value is convex): see [`MeasuredStretch::or_larger`](crate::MeasuredStretch::or_larger).
-    /// What is not in 0..=1 becomes the nearer of the two.
+    /// A number outside 0..=1 becomes the nearer of the two.
     #[must_use]
     pub fn at(&self, share: f32) -> Between<'v, W, V> {
-        // Written so that what is not a number becomes a frame.
+        // Written so that a NaN becomes a frame.
         let share = if share > 0.0 { share } else { 0.0 };
         let share = if share < 1.0 { share } else { 1.0 };
         // Off by less than a few units; a tracker spares more.
@@ -58,9 +58,9 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
         self.moved_by(share, self.from.beyond(along, 0))
     }
 
-    /// The surface after the later frame, if every vertex goes on as it moved between the two: `share` 1 is as
-    /// long after as the earlier frame was before, 0 the later frame itself. On time, and wrong by as much as the
-    /// motion changes.
+    /// The surface after the later frame, if every vertex keeps the velocity that it had between the two: `share` 1 is
+    /// as long after as the earlier frame was before, 0 the later frame itself. It is on time, and wrong by as much as
+    /// the motion changes.
     ///
     /// Its stretch is at most the later frame's plus `share` times that of the difference of the two:
     /// see `measure_stretch` of it. Held to 0..=`FARTHEST_SHARE`.
@@ -105,7 +105,7 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> VertexTable for Between<'
         Some(before + (after - before) * self.share)
     }
 
-    /// Between the two frames a bound of both is one of all; beyond them nobody measured.
+    /// Between the two frames a bound of both is one of all; beyond them there is no measurement.
     fn stretch(&self) -> Option<MeasuredStretch> {
         let (before, after) = (self.before.stretch()?, self.after.stretch()?);
         if self.share <= 1.0 { before.or_larger(after) } else { None }

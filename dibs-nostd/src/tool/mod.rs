@@ -32,7 +32,7 @@ pub const ACCURACY: f32 = 16.0 / 16_777_216.0;
 /// accuracy holds: fourth powers of distances must stay finite in f32.
 pub const MAX_COORDINATE: f32 = 536_870_912.0;
 
-/// A rigid instrument: what a query measures from. [`Sphere`] and [`Capsule`] implement it.
+/// A rigid instrument, from which a query measures. [`Sphere`] and [`Capsule`] implement it.
 ///
 /// All lengths are in the mesh's own unit (mm in the examples), all points in the mesh's frame.
 pub trait Tool: Copy + sealed::Sealed {

@@ -168,7 +168,7 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// What any pair below the limit improves on.
+    /// The limit as a pair: any pair below it improves on it.
     #[inline(always)]
     fn none(limit_squared: f32) -> Self {
         Self { distance_squared: limit_squared, along: 0.0, v: 0.0, w: 0.0 }

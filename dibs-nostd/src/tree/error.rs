@@ -95,7 +95,7 @@ pub enum FormatError {
         /// Row of the vertex order.
         row: u32,
     },
-    /// A triangle's rest metric is not finite, is negative, or goes on from an edge that is not there.
+    /// A triangle's rest metric is not finite, is negative, or continues an edge that is not there.
     Metric {
         /// Row of the triangle.
         triangle: u32,

@@ -51,10 +51,10 @@ pub struct Tree<'a, I> {
 impl<'a, I: Index> Tree<'a, I> {
     /// Validates the bytes of a tree, and gives a view of them.
     ///
-    /// Once, at start-up: a generated tree by [`TreeBytes::validate`], which calls this. (`const`, but slow
-    /// there: the compiler takes a second or two for every thousand triangles.) Checks the layout, the CRC-32, and that the tree is well formed: children after parents, every index
-    /// inside its table, every triangle in exactly one leaf, depth as stated. What it cannot check is
-    /// that the radii cover this mesh: that is the builder's promise, tied to the mesh id.
+    /// Call it once, at start-up; for a generated tree [`TreeBytes::validate`] does. Checks the layout, the CRC-32, and
+    /// that the tree is well formed: children after parents, every index inside its table, every triangle in exactly one
+    /// leaf, depth as stated. It cannot check that the radii cover this mesh: that is the builder's promise, tied to the
+    /// mesh id. (It is `const`, but slow in a constant: the compiler takes a second or two for every thousand triangles.)
     ///
     /// Cost: linear in the bytes, no memory beyond a fixed stack of [`format::MAX_STACK`] words.
     ///
@@ -69,14 +69,14 @@ impl<'a, I: Index> Tree<'a, I> {
         Ok(tree)
     }
 
-    /// Checks that what a query uses besides the bytes, the header and the places of the sections as they were
-    /// decoded, is still what the bytes say. The view itself lies in RAM, of which a [`Scrub`] sees nothing: check
-    /// that of a [`Query`](crate::Query), `query.tree()`, once a tick or as often as the scrub makes a round.
+    /// Checks this view itself, the decoded header and the places of the sections, against the bytes. The view lies in
+    /// RAM, which a [`Scrub`] does not read: check that of a [`Query`](crate::Query), `query.tree()`, once a tick or as
+    /// often as the scrub makes a round.
     ///
     /// Cost: some hundred instructions, whatever the size of the tree.
     ///
     /// # Errors
-    /// [`FormatError::Field`] or [`FormatError::Section`] name what has changed.
+    /// [`FormatError::Field`] or [`FormatError::Section`] name the change.
     pub fn check(&self, bytes: &[u8]) -> Result<(), FormatError> {
         self.header.check(bytes)?;
         self.sections.check::<I>(bytes, &self.header)
@@ -154,7 +154,7 @@ impl<'a, I: Index> Tree<'a, I> {
         self.header.paths
     }
 
-    /// Bytes of nodes and triangles: what a query reads besides the vertex table.
+    /// Bytes of nodes and triangles, which a query reads besides the vertex table.
     #[must_use]
     pub const fn query_bytes(&self) -> usize {
         self.sections.nodes.len() + self.sections.triangles.len()

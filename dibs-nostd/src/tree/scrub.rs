@@ -144,7 +144,7 @@ mod tests {
         }
     }
 
-    /// Every bit of what was decoded from the header, and every place of a section.
+    /// Every bit of the decoded header, and every place of a section.
     #[test]
     fn every_flipped_bit_of_the_decoded_header_is_found() {
         let mesh = dibs_build::generate::heart(320).expect("a valid size").mesh;

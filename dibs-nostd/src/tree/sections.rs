@@ -22,7 +22,7 @@ pub(crate) struct Sections<'a> {
     pub adjacency: &'a [u8],
 }
 
-/// What a section must be.
+/// The length that a section must have, and whether it must be there.
 #[derive(Clone, Copy)]
 struct Rule {
     kind: u32,

@@ -5,7 +5,7 @@ use core::marker::PhantomData;
 use crate::tree::format::{field, u32_at};
 use crate::{FormatError, Index, Scrub, Tree};
 
-/// The bytes of a tree in flash, which nobody has validated yet.
+/// The bytes of a tree in flash, not validated yet.
 ///
 /// No query takes these bytes: [`validate`](Self::validate) is the only way from them to a [`Tree`].
 /// Call it once, at start-up. The sizes of buffers and stacks are constants all the same, so that a

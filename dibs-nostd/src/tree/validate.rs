@@ -207,7 +207,7 @@ const fn tables<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
     Ok(())
 }
 
-/// Whether a triangle's metric is one, and the edge that it goes on from is there.
+/// Whether a triangle's metric is one, and the edge that it continues is there.
 const fn is_metric<I: Index>(parts: &Parts<'_, I>, row: u32) -> bool {
     let Some(metric) = parts.metric(row) else { return false };
     let [first, second, third] = metric.squares;

@@ -37,7 +37,7 @@ pub enum Unavailable {
         /// Frames refused or damaged.
         streak: u32,
     },
-    /// The surface was longer on its way than allowed, or nobody knows how long.
+    /// The surface was longer on its way than allowed, or for an unknown time.
     Delayed {
         /// From the status that it echoes to its arrival, on the receiver's clock.
         transit: u32,

@@ -1,4 +1,4 @@
-//! What a query costs in cycles, on a board of your own: its `Cost`, from the cycle counter of the debug
+//! A query's cost in cycles, on a board of your own: its `Cost`, from the cycle counter of the debug
 //! watchpoint unit (DWT). Where that stands still, as in an emulator, `SysTick` takes its place, and says so.
 //!
 //! Change `memory.x` to your part, raise its clock before the measurement as your product does, and run
@@ -91,7 +91,7 @@ fn measure() -> Result<(), &'static str> {
     Ok(())
 }
 
-/// What counts.
+/// The counter.
 #[derive(Clone, Copy, PartialEq)]
 enum Counter {
     /// The core's cycles, in 32 bits.

@@ -51,7 +51,7 @@ fn main() -> Result<()> {
                 Err(error) if error.kind() == ErrorKind::WouldBlock => {}
                 Err(_) => return,
             }
-            // What the board's idle loop would do meanwhile.
+            // The work of the board's idle loop.
             for _ in 0..SLICES {
                 receiver.work();
                 upkeep.step();

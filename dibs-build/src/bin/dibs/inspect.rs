@@ -1,4 +1,4 @@
-//! `dibs inspect`: what a tree file is, and that it is intact.
+//! `dibs inspect`: a tree file's sizes and facts, and whether it is intact.
 
 use crate::tree_file::{self, AnyTree};
 use anyhow::Result;

@@ -19,7 +19,7 @@ pub struct MeshArgs {
     largest_component: bool,
 }
 
-/// Reads a mesh, and says on standard error what is odd about it.
+/// Reads a mesh, and prints its warnings on standard error.
 pub fn read(path: &Path, args: &MeshArgs) -> Result<Import> {
     let options = ReadOptions {
         weld_tolerance: args.weld,

@@ -51,7 +51,7 @@ impl Fit {
         self.fit.errors()
     }
 
-    /// What other numbers of modes would have given.
+    /// The errors with other numbers of modes.
     pub fn print(&self, chosen: usize) {
         println!("motion   {}: modes against its largest and RMS error", self.path.display());
         for error in self.errors() {

@@ -1,4 +1,4 @@
-//! Standard output and standard error, which may be a full disk or a pipe that nobody reads any more.
+//! Standard output and standard error, which may be a full disk or a closed pipe.
 //!
 //! The `println!` and `eprintln!` of this program: unlike the standard ones they do not panic.
 
@@ -19,7 +19,7 @@ macro_rules! eprintln {
 /// Why the first line that could not be printed was not.
 static FAILURE: OnceLock<io::Error> = OnceLock::new();
 
-/// Prints a line of results. After a failure nothing more is printed, but the work goes on: files are still written.
+/// Prints a line of results. After a failure nothing more is printed, but files are still written.
 pub fn print(line: fmt::Arguments<'_>) {
     if FAILURE.get().is_none()
         && let Err(error) = writeln!(io::stdout(), "{line}")

@@ -214,7 +214,7 @@ fn current(path: &Path, frame: Option<usize>) -> Result<Vec<Vec3>> {
             Ok(frames.swap_remove(frame))
         }
         (false, Some(_)) => bail!("{name}: --frame needs a .pc2 file"),
-        // What is connected is the tree's matter here.
+        // The tree has decided what is connected.
         (false, None) => {
             let options = ReadOptions { largest_component: true, ..Import::options() };
             Ok(options.read(path)?.mesh.positions)
@@ -239,7 +239,7 @@ pub fn rows<I: Index>(tree: &Tree<'_, I>, path: &Path, of_mesh: &[Vec3]) -> Resu
         .collect()
 }
 
-/// What the side is called, and why there is none.
+/// The side's name, or why there is none.
 fn side_name(side: Side) -> (&'static str, Option<String>) {
     match side {
         Side::Outside => ("outside", None),

@@ -1,4 +1,4 @@
-//! One frame's packets, what they do to the receiver's table, and what was sent.
+//! One frame's packets, their effect on the receiver's table, and their count.
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Body, Content, Encoding, FrameEncoder, Mac, Packet, QuantisedBox, Rows};
@@ -14,7 +14,7 @@ pub struct Sent {
     pub rows: usize,
     /// Packets that it took.
     pub packets: usize,
-    /// Bytes of these, without what a byte stream adds.
+    /// Bytes of these, without a byte stream's framing.
     pub bytes: usize,
     /// No vertex is farther than this from where the receiver has it, in mm.
     pub error: f32,
@@ -40,7 +40,7 @@ impl Prepared {
         Self { sent, packets }
     }
 
-    /// What will have been sent.
+    /// The counts once it is sent.
     #[must_use]
     pub const fn sent(&self) -> &Sent {
         &self.sent
@@ -59,7 +59,7 @@ pub(super) fn packets_of<M: Mac, const MTU: usize>(
     packets
 }
 
-/// Does to the positions what the receiver will do; how many there were.
+/// Applies the packets to the positions as the receiver will; returns their number.
 pub(super) fn apply(packet: &[u8], encoding: Encoding, held: &mut [Vec3]) -> usize {
     let Ok(Packet { body: Body::Vertices(vertices), .. }) = Packet::decode(packet) else {
         return 0;

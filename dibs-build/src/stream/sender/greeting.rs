@@ -9,7 +9,7 @@ const INTERVAL: Duration = Duration::from_millis(50);
 /// A question that waits for its answer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Greeting {
-    /// What the answer repeats: random, and not 0.
+    /// The number that the answer repeats: random, and not 0.
     nonce: u32,
     /// When it was last asked.
     sent: Option<Duration>,

@@ -1,4 +1,4 @@
-//! From positions to packets, and what comes back.
+//! From positions to packets, and the statuses on the way back.
 
 mod clock;
 mod error;
@@ -27,7 +27,7 @@ use clock::Clock;
 use frame::{apply, coarsened, packets_of};
 use greeting::Greeting;
 
-/// What was sent since the start.
+/// Totals since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Totals {
     /// Frames.
@@ -36,7 +36,7 @@ pub struct Totals {
     pub partial: u64,
     /// Packets, heartbeats included.
     pub packets: u64,
-    /// Bytes, without what a byte stream adds.
+    /// Bytes, without a byte stream's framing.
     pub bytes: u64,
     /// Statuses that came back.
     pub statuses: u64,
@@ -316,7 +316,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.superseded.map_or(Ok(()), |session| Err(SendError::Superseded { session }))
     }
 
-    /// What was sent since the start.
+    /// Totals since the start.
     #[must_use]
     pub const fn totals(&self) -> &Totals {
         &self.totals
@@ -329,7 +329,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.held.as_ref().map(|(epoch, held)| (*epoch, held.as_slice()))
     }
 
-    /// What the packets go through.
+    /// The way of the packets.
     pub const fn transport(&mut self) -> &mut T {
         &mut self.transport
     }
@@ -359,7 +359,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         if !self.settings.quantised {
             return Ok(Encoding::Float);
         }
-        // A position that is not finite is what is wrong, not the box: the encoder names it.
+        // Not the box is wrong but a position that is not finite: the encoder names it.
         let Some(grid) = QuantisedBox::covering(rows) else { return Ok(Encoding::Float) };
         let tolerance = self.settings.partial.unwrap_or(0.0);
         Ok(Encoding::Quantised(coarsened(grid, tolerance)))

@@ -1,4 +1,4 @@
-//! What the sender makes of the receiver's statuses.
+//! The sender's reaction to the receiver's statuses.
 
 use dibs_nostd::wire::{Body, Counters, Mac, Packet, Status, StatusReport, encode_hello, is_newer};
 
@@ -29,7 +29,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.settings.session
     }
 
-    /// What the receiver reported last.
+    /// The receiver's last report.
     #[must_use]
     pub const fn status(&self) -> Option<&Status> {
         self.status.as_ref()
@@ -56,7 +56,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.put(&hello)
     }
 
-    /// Takes in a packet that came back. What is no status of this mesh is not for this sender.
+    /// Takes in a packet that came back. Only statuses of this mesh are for this sender.
     pub(super) fn take(&mut self, packet: &[u8]) {
         let Ok(packet) = Packet::decode(packet) else { return };
         let Body::Status(report) = packet.body else { return };

@@ -1,4 +1,4 @@
-//! The order of frames and packets: what is new, what is old, and when a frame is complete.
+//! The order of frames and packets: which are new, which are old, and when a frame is complete.
 //!
 //! Nothing here knows what a frame holds: vertices or weights, and where they are stored.
 
@@ -30,7 +30,7 @@ pub(super) struct Frame {
     pub is_complete: bool,
 }
 
-/// What was published last.
+/// The frame that was published last.
 #[derive(Clone, Copy, Debug)]
 struct Published {
     id: FrameId,
@@ -125,7 +125,7 @@ impl Collector {
         self.answer = nonce;
     }
 
-    /// What a fail-safe machine watches.
+    /// The numbers that a fail-safe machine watches.
     pub fn health(&self) -> BusHealth {
         let (transit, source_age) = match &self.published {
             Some(published) => (published.transit, published.source_age),
@@ -343,7 +343,7 @@ impl Collector {
         self.heartbeat
     }
 
-    /// What the sender is told; `stretch` is the published frame's.
+    /// The status for the sender; `stretch` is the published frame's.
     pub fn status(&mut self, now: u32, safety: u8, stretch: Option<f32>, challenge: u32) -> Status {
         let number = self.statuses;
         self.statuses = number.wrapping_add(1);

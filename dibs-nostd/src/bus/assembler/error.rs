@@ -97,7 +97,7 @@ pub enum ReceiveError {
 }
 
 impl ReceiveError {
-    /// What it is counted as.
+    /// The event that counts it.
     #[must_use]
     pub const fn event(&self) -> Event {
         match self {

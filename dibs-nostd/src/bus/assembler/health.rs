@@ -1,4 +1,4 @@
-//! What is wrong with the bus, in numbers that a fail-safe machine watches.
+//! The bus's health, in numbers that a fail-safe machine watches.
 
 use super::ReceiveError;
 use crate::bus::wire::{FrameId, Packet, is_newer};

@@ -1,4 +1,4 @@
-//! From packets to published frames: the gate between the bus and what the controller acts on.
+//! From packets to published frames: the gate between the bus and the surface that the controller acts on.
 
 mod arrivals;
 mod collector;
@@ -22,15 +22,15 @@ use health::FrameName;
 
 /// Assembles frames of `N` vertices from packets, and publishes those that are complete and right.
 ///
-/// [`accept`](Self::accept) takes packets, in the bus interrupt. [`advance`](Self::advance) does what
-/// takes longer, in slices: it checks the surface ([`Gate`]), publishes it, and copies what partial
+/// [`accept`](Self::accept) takes packets, in the bus interrupt. [`advance`](Self::advance) does the
+/// longer work, in slices: it checks the surface ([`Gate`]), publishes it, and copies the rows that partial
 /// frames build on. The two must not interrupt each other: call both in the bus interrupt, or `advance`
 /// elsewhere below the control tick's priority with the bus interrupt masked, for as short as its work.
 ///
 /// A frame is published when every row has come in a packet of its own place in the sequence, the
 /// commit's digest confirms that all packets were of one frame, and the gate admits the surface. Until
 /// then, and after any rejection, the frame published last stays. `docs/wire.md` has the whole table of
-/// what happens to which packet. With a [`Mac`], nothing without a genuine tag gets any further.
+/// packets and outcomes. With a [`Mac`], a packet without a genuine tag is dropped first.
 ///
 /// With a gate of modes, `N` is their number, and frames hold weights instead: see
 /// [`Gate::weight_range`].
@@ -77,7 +77,7 @@ pub struct Assembler<'f, G, const N: usize, M = NoMac> {
     is_box_inside: bool,
 }
 
-/// What a packet led to.
+/// The outcome of a packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -102,7 +102,7 @@ pub enum Progress {
     Hello,
 }
 
-/// What a slice of work led to.
+/// The outcome of a slice of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -247,7 +247,7 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
         self.check(ready, work)
     }
 
-    /// What the receiver tells the sender: [`encode_status`](crate::wire::encode_status) makes a packet
+    /// The receiver's status for the sender: [`encode_status`](crate::wire::encode_status) makes a packet
     /// of it. `now` in ms; `safety` as in [`Status::safety`].
     pub fn status(&mut self, now: u32, safety: u8) -> Status {
         let stretch = self.writer.front().and_then(|front| front.label().stretch);
@@ -267,13 +267,13 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
         self.collector.last_heartbeat()
     }
 
-    /// What has happened since start.
+    /// The events since the start.
     #[must_use]
     pub const fn counters(&self) -> &Counters {
         &self.collector.counters
     }
 
-    /// Counts bytes of a stream that were no packet: what a [`Deframer`](crate::wire::Deframer) reports.
+    /// Counts bytes of a stream that were no packet, as a [`Deframer`](crate::wire::Deframer) reports.
     pub fn count_framing(&mut self, error: &StreamError) {
         self.collector.refuse_bytes(error);
     }
@@ -296,7 +296,7 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
         &self.gate
     }
 
-    /// What makes the tags.
+    /// The authenticator, which makes the tags.
     #[must_use]
     pub const fn mac(&self) -> &M {
         &self.mac

@@ -1,4 +1,4 @@
-//! What each packet does to the frame in work.
+//! The effect of each packet on the frame in work.
 
 use core::ops::Range;
 

@@ -1,10 +1,10 @@
-//! What packets say.
+//! The contents of packets.
 
 use glam::Vec3;
 
 use super::{QuantisedBox, StatusReport};
 
-/// What a packet says.
+/// The contents of a packet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Body<'a> {
@@ -18,7 +18,7 @@ pub enum Body<'a> {
     Commit(Commit),
     /// The sender lives.
     Heartbeat(Heartbeat),
-    /// What the receiver has: the only packet on the way back.
+    /// The receiver's state: the only packet on the way back.
     Status(StatusReport<'a>),
     /// The sender asks for a status.
     Hello(Hello),
@@ -29,7 +29,7 @@ pub enum Body<'a> {
 pub struct Begin {
     /// The sender's session, all of it.
     pub session: u32,
-    /// What the frame holds.
+    /// The contents of the frame.
     pub content: Content,
     /// How its positions are written.
     pub encoding: Encoding,
@@ -51,7 +51,7 @@ pub struct Freshness {
     pub echo: Option<u32>,
 }
 
-/// What a frame holds.
+/// The contents of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

@@ -1,10 +1,10 @@
-//! What a receiver counts: the order is the protocol's.
+//! A receiver's counters, in the protocol's order.
 
 use core::fmt;
 
 use super::StatusReport;
 
-/// What can happen to packets and frames at a receiver. Each has a counter; its number on the wire is
+/// Events at a receiver, of packets and of frames. Each has a counter; its number on the wire is
 /// its place here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -30,7 +30,7 @@ pub enum Event {
     WrongMesh,
     /// The tag is wrong, or missing where one is asked for.
     Forged,
-    /// Session or epoch not later than what is here.
+    /// Session or epoch not later than the published frame's.
     Stale,
     /// A packet of a frame that is not being received.
     Unexpected,
@@ -141,7 +141,7 @@ impl fmt::Display for Event {
     }
 }
 
-/// What has happened since the receiver's start: one counter an [`Event`], each stops at its largest
+/// The events since the receiver's start: one counter an [`Event`], each stops at its largest
 /// value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

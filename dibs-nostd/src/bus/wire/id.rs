@@ -1,6 +1,6 @@
 //! Which frame: mesh, session, epoch, and their order.
 
-/// What names a frame: whose surface, which run of its sender, and the number within that run.
+/// The name of a frame: whose surface, which run of its sender, and the number within that run.
 ///
 /// Order is that of (session, epoch): a sender that starts again takes a later session, and may then
 /// number its frames from anywhere.

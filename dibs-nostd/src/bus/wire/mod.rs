@@ -4,7 +4,7 @@
 //! [`Vertices`] or [`Weights`], and one [`Commit`]. [`FrameEncoder`] and [`WeightsEncoder`] make the
 //! packets on the sender's side, [`Packet::decode`] reads one in place on the receiver's, and the
 //! [`Assembler`](crate::Assembler) makes frames of them. A [`Heartbeat`] tells the receiver that the
-//! sender lives, a [`Status`] tells the sender what came of its frames, a [`Hello`] asks for one.
+//! sender lives, a [`Status`] reports to the sender which frames were published, a [`Hello`] asks for one.
 //!
 //! On a byte stream each packet is framed with COBS: [`enframe`] and [`Deframer`]. On UDP a packet is
 //! one datagram, on CAN-FD one message: [`canfd`].
@@ -29,7 +29,7 @@ mod stream;
 
 #[cfg(feature = "authenticity")]
 pub use self::cmac::AesCmac;
-/// What a packet holds, for the senders of `dibs-build`: a receiver hands bytes to its assembler.
+/// A packet's contents, for the senders of `dibs-build`: a receiver hands bytes to its assembler.
 #[doc(hidden)]
 pub use body::{Begin, Body, Commit, Content, Heartbeat, Hello, Rows, Vertices, Weights};
 pub use body::{Encoding, Freshness};

@@ -22,9 +22,9 @@ pub struct Packet<'a> {
     pub sequence: u16,
     /// The packet's CRC-32.
     pub checksum: u32,
-    /// What the packet says.
+    /// The contents of the packet.
     pub body: Body<'a>,
-    /// What the tag covers, and the tag.
+    /// The bytes under the tag, and the tag.
     tag: Option<(&'a [u8], &'a [u8; TAG_BYTES])>,
 }
 

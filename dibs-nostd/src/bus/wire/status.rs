@@ -1,6 +1,6 @@
-//! What the receiver reports back to the sender.
+//! The receiver's report to the sender.
 
-/// What the receiver has published, and what it needs.
+/// The frame that the receiver has published, and its needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Status {
@@ -16,7 +16,7 @@ pub struct Status {
     pub clock: u32,
     /// The nonce of the last [`Hello`](super::Hello) that came; 0 before the first.
     pub answer: u32,
-    /// What the receiver's tags are bound to: [`Mac::challenge`](super::Mac::challenge).
+    /// The number to which the receiver's tags are bound: [`Mac::challenge`](super::Mac::challenge).
     pub challenge: u32,
 }
 

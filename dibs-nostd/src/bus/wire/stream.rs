@@ -217,7 +217,7 @@ mod tests {
     const MTU: usize = 300;
     type Outcome = Result<Vec<u8>, StreamError>;
 
-    /// What the crate's state machine makes of a stream.
+    /// The crate's state machine, on a stream.
     fn reference(stream: &[u8]) -> Vec<Outcome> {
         let mut state = DecoderState::Idle;
         let (mut packet, mut outcomes) = (Vec::new(), Vec::new());

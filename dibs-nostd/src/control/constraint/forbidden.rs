@@ -13,8 +13,8 @@ use crate::unavailable::Unavailable;
 /// `F = min(max_force, max(0, K (margin - d) - B v))` for `d < margin`, else 0,
 ///
 /// where `v` is the tool's speed out of the surface, negative on approach. Inside, `d` is below zero, and the spring
-/// grows with the depth up to saturation. When a budget cut the query short, the size of the force is that of the nearest the
-/// surface could be, and its direction that of the best pair found.
+/// grows with the depth up to saturation. When a budget cut the query short, the size of the force is for the nearest
+/// place where the surface could be, its direction that of the best pair found.
 ///
 /// ```
 /// use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};

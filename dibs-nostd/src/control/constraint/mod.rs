@@ -1,4 +1,4 @@
-//! From the closest pair to a force: what a dynamic active constraint puts on the robot.
+//! From the closest pair to the force of a dynamic active constraint.
 //!
 //! Two constraints, both a spring and a damper along the closest pair's direction: [`ForbiddenRegion`] keeps the tool
 //! out of a margin around the surface, [`Guidance`] keeps it at a stand-off. With all contacts of a tool instead of
@@ -6,7 +6,7 @@
 //! takes. Units: mm, mm/s, N, N mm, N/mm, N s/mm, s. A force of one pair costs some tens of f32 operations and one
 //! root, without a loop.
 //!
-//! # What is promised
+//! # Promises
 //!
 //! - A force is finite and never larger than `max_force` (up to the direction's rounding), whatever
 //!   comes in.
@@ -19,7 +19,7 @@
 //!   known, the output is the *hold*: pure damping against the tool's velocity, saturated the same way, and the state says
 //!   why. With a velocity that is not finite it is zero.
 //!
-//! # What is not: passivity
+//! # No promise: passivity
 //!
 //! A sampled virtual wall puts out energy. Colgate and Schenkel ("Passivity of a class of sampled-data
 //! systems", J. Robotic Systems 14, 1997; ACC 1994) show that with sampling period `T`, stiffness `K`
@@ -103,7 +103,7 @@ pub enum ConstraintState {
     Safe(Unavailable),
 }
 
-/// A spring and a damper with a largest force: what the constraints are made of.
+/// A spring and a damper with a largest force: the part that all constraints share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SpringDamper {
@@ -190,7 +190,7 @@ impl SpringDamper {
     }
 }
 
-/// What a constraint needs to know of a closest pair.
+/// The part of a closest pair that a constraint needs.
 #[derive(Clone, Copy)]
 struct Approach {
     /// Unit vector that leads out.

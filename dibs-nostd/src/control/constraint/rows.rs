@@ -40,7 +40,7 @@ pub struct VelocityRow {
     pub linear: [f32; 3],
     /// Factors of the angular velocity (mm): the lever arm's product with the normal.
     pub angular: [f32; 3],
-    /// What the sum has to reach (mm/s).
+    /// The least sum allowed (mm/s).
     pub least: f32,
 }
 

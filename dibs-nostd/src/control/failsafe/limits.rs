@@ -1,4 +1,4 @@
-//! What the machine tolerates.
+//! The machine's limits.
 
 use core::fmt;
 
@@ -58,7 +58,7 @@ impl Watch {
     }
 }
 
-/// What the machine tolerates, and what it takes to recover.
+/// The machine's limits, and its conditions for recovery.
 ///
 /// Only the age must be watched; every other input is off until its limits are given. One
 /// good frame and an acknowledgement recover, until more frames are asked for, or no acknowledgement.

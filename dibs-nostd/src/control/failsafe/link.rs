@@ -1,4 +1,4 @@
-//! What the control tick knows of the bus's health.
+//! The control tick's view of the bus's health.
 
 /// The health of the bus at one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,7 +12,7 @@ pub struct Link {
     pub rejections: u32,
     /// Forged packets since then.
     pub forgeries: u32,
-    /// Time that the published frame was on its way, at most; `u32::MAX` where nobody knows.
+    /// Time that the published frame was on its way, at most; `u32::MAX` where it is unknown.
     pub transit: u32,
     /// Age of the published frame when it was sent; `u32::MAX` before the first.
     pub source_age: u32,

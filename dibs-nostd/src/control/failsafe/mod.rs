@@ -61,13 +61,13 @@ pub use link::Link;
 #[cfg(feature = "bus")]
 pub use status::LinkStatus;
 
-/// What a step of the machine sees.
+/// The input of a step of the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Observation {
     /// The published frame and its age: [`Latest::frame`](crate::Latest::frame); `None` before the first.
     pub frame: Option<FrameAge>,
-    /// What is known of the bus.
+    /// The bus's health.
     pub link: Link,
     /// The error of the query on that frame, if it returned one.
     pub query_error: Option<QueryError>,
@@ -88,7 +88,7 @@ pub enum State {
     Safe,
 }
 
-/// What a step came to.
+/// The result of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Verdict {
@@ -104,7 +104,7 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// What the constraint may act on: the answer widened by the margin, or why there is none.
+    /// The answer that the constraint may act on, widened by the margin, or why there is none.
     ///
     /// # Errors
     /// The cause in the safe state.

@@ -1,4 +1,4 @@
-//! What the bus side knows of its own health, for the control tick.
+//! The bus side's own view of its health, for the control tick.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -6,7 +6,7 @@ use super::Link;
 use crate::bus::BusHealth;
 use crate::surface::Ageing;
 
-/// Where the bus interrupt notes what came, and the control tick reads it. Meant for a `static`.
+/// The bus interrupt's notes for the control tick. Meant for a `static`.
 ///
 /// Neither waits for the other; each number is exact, together they may be of two moments.
 ///

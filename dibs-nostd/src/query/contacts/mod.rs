@@ -294,7 +294,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         }
         let closest = self.closest(vertices, tool, options)?;
         (found.accuracy, found.margin) = (closest.accuracy, margin);
-        // What follows is decided on the positions as they are.
+        // From here on the positions decide, as they are.
         let accuracy = closest.accuracy - vertices.position_error();
         let has_side = closest.side != Side::Undefined(NoSide::CutShort);
         if closest.side == Side::Inside || (closest.lower > margin && has_side) {

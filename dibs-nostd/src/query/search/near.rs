@@ -9,7 +9,7 @@ use crate::{Index, VertexTable};
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// Visits every triangle within `limit` of the axis, with the square of its distance. A visit returns the limit
-    /// from then on. What is left unvisited is at least as far as the distance returned.
+    /// from then on. The unvisited rest is at least as far as the distance returned.
     pub fn each_within(
         mut self,
         limit: f32,
@@ -59,7 +59,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             let normal = self.tool.axis_to(position);
             let squared = normal.dot(normal);
             let far = self.cutoff + radius;
-            // What is not a number is not far: the leaves below find out what it is.
+            // A NaN counts as near: the leaves below name the vertex that it comes from.
             if squared > far * far {
                 continue;
             }

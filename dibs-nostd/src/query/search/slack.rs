@@ -19,7 +19,7 @@ const PLANE: f32 = 11.0 * U;
 /// Slack of the cutoff, in units of `S`.
 pub(super) const SLACK: f32 = 48.0 * U;
 
-/// What [`Proximity::accuracy`](crate::Proximity::accuracy) promises, in units of `S`: the kernel's error plus
+/// The error within [`Proximity::accuracy`](crate::Proximity::accuracy), in units of `S`: the kernel's error plus
 /// that of the pair's last operations, a root, a difference and the tool's radius.
 pub(super) const ACCURACY: f32 = 24.0 * U;
 

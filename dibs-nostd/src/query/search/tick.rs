@@ -1,10 +1,9 @@
 //! A search that begins with the front of the one before: it tests the bounds that have run out, and no others.
 //!
-//! The odometer counts how far tool and surface have moved, rounded up. A bound that is found at reading `now`
-//! is kept as the reading `now + bound` at which nothing is left of it. It still holds if less than that
-//! has gone by: what is left of it is the difference. So a child has to be tested again once its reading is not beyond
-//! `now` plus the cutoff: a number that never falls while answers are exact, since a distance shrinks by no
-//! more than the odometer counts.
+//! The odometer counts how far tool and surface have moved, rounded up. A bound found at reading `now` is kept as
+//! the reading `now + bound`, at which it has run out. Until then the difference of the readings is still a bound. So a
+//! child has to be tested again once its reading is not beyond `now` plus the cutoff. That number never falls while
+//! answers are exact, since a distance shrinks by no more than the odometer counts.
 //!
 //! Rounding. A bound is stored less the slack of its own search, and compared with the cutoff, which has the
 //! slack of this one: so the errors of both are covered, whatever their scales. Positions may be rounded
@@ -103,7 +102,8 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         Self { search, front, unit, now, margin, facing }
     }
 
-    /// Tests what has run out after a motion of `moved` units. Returns the closest triangle too, where one was tested.
+    /// Tests the bounds that a motion of `moved` units makes run out. Returns the closest triangle too, where one was
+    /// tested.
     pub fn run(mut self, moved: u32) -> Result<(Outcome, Option<u32>), QueryError> {
         let outcome = self.test_what_is_due(moved)?;
         Ok((outcome, self.search.best.map(|_| self.search.best_triangle)))
@@ -128,7 +128,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             let nowhere = Place { node: NOWHERE, slot: 0 };
             self.front.open(root.link, nowhere, self.now).ok_or(corrupt)?;
         }
-        // What is opened from now on is tested at once.
+        // Nodes opened from now on are tested at once.
         let (mut from, end) = (0, self.front.used());
         while let Some(at) = self.front.next_due(from..end, self.threshold()) {
             match self.visit(at as u16)? {
@@ -183,7 +183,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         self.front.node(place.node)?.keys.get_mut(usize::from(place.slot))
     }
 
-    /// Tests what is due below an opened node, and opens what is within reach.
+    /// Tests the bounds that are due below an opened node, and opens the children within the cutoff.
     fn visit(&mut self, at: u16) -> Result<Visit, QueryError> {
         if let Step::OutOfBudget = self.test_due(at)? {
             return Ok(Visit::OutOfBudget);

@@ -170,7 +170,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
             let codes = nodes.map(|node| node.radius_code as i32 as f32);
             let radius = Vec4::from_array(codes) * scale;
             let far = cutoff + radius;
-            // What is not a number is not far: the leaves below find out what it is.
+            // A NaN counts as near: the leaves below name the vertex that it comes from.
             let within = !squared.cmpgt(far * far).bitmask() & 0xF;
             near = near << 4 | u64::from(within);
             let links = Vec4::from_array(nodes.map(|node| f32::from_bits(node.link)));

@@ -14,7 +14,7 @@ pub(in crate::query) fn is_before(a: u32, b: u32) -> bool {
 /// A node whose children (or, of a leaf, whose triangles) have bounds of their own.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::query) struct Opened {
-    /// What is below the node, as a link; [`UNUSED`] where this place is free.
+    /// The node's children or triangles, as a link; [`UNUSED`] where this place is free.
     pub link: u32,
     /// Place of the node above; of a free place, the next free one.
     pub parent: u16,

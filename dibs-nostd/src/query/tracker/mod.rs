@@ -1,4 +1,4 @@
-//! The closest pair from tick to tick: a tick costs what has changed.
+//! The closest pair from tick to tick: a tick costs in proportion to the change.
 
 pub(super) mod front;
 #[cfg(test)]
@@ -21,14 +21,14 @@ const FARTHEST: u32 = 1 << 29;
 ///
 /// A search leaves a *front*: subtrees that were rejected by a lower bound, triangles that were tested. When
 /// the tool moves by at most `a` (the larger of its ends' steps) and the surface by at most `b`, each of these
-/// bounds still holds, less `a + b`. So a tracker keeps the front from tick to tick, and tests what has run
-/// out: as a rule some ten of a thousand bounds. The answers are those of [`Query::closest`](crate::Query::closest),
+/// bounds still holds, less `a + b`. So a tracker keeps the front from tick to tick, and tests the bounds that have
+/// run out: as a rule some ten of a thousand. The answers are those of [`Query::closest`](crate::Query::closest),
 /// within their accuracy. (Fronts of bounding volume trees: Klosowski et al. 1998, Tang et al. 2010. Bounds that
 /// expire: kinetic data structures; Barbič & James 2010.)
 ///
-/// How far the surface moved comes with it, as [`MovingSurface::travel`]; where nobody measured it the tick is a
-/// whole query. Another tool is a step to where it is. The stretch in the options may change from tick to tick:
-/// what is remembered is true whatever it becomes.
+/// The surface carries its motion, as [`MovingSurface::travel`]; where it was not measured, the tick is a whole query.
+/// Another tool counts as a step to its place. The stretch in the options may change from tick to tick: remembered
+/// bounds hold for any.
 ///
 /// `STACK` must be at least [`Tree::stack`]. `OPENED` nodes of the tree are remembered with their children: a generated
 /// heart of 10,272 triangles opened 180 at most in 7 s. With fewer than it takes, ticks are whole queries. Meant for a
@@ -80,7 +80,7 @@ struct Last {
     travel: Travel,
 }
 
-/// What a tick found.
+/// The answer of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -144,7 +144,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
     /// The closest pair between `tool` and the surface as it is now.
     ///
     /// As [`Query::closest`](crate::Query::closest), warm start included. Under a budget the interval is as
-    /// certain as there, and the next tick goes on where this one ended.
+    /// certain as there, and the next tick continues where this one ended.
     ///
     /// Cost: the budget at most, and one number for each opened node.
     ///
@@ -193,7 +193,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         Ok(Tracked { closest, fallback, opened: self.front.borrow().used() as u32 })
     }
 
-    /// A whole query, with what so many tests have left of the budget.
+    /// A whole query, with the budget that so many tests have left.
     #[cold]
     fn whole<S: MovingSurface + ?Sized, T: Tool>(
         &mut self,

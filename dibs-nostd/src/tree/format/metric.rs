@@ -9,7 +9,7 @@ pub struct Metric {
     /// Of the edge from the centre to the other of the first two corners; of both edges; and of the edge from
     /// the centre to the third corner: see `docs/format.md`.
     pub squares: [f32; 3],
-    /// How the triangle goes on from the one in the row before.
+    /// How the triangle continues the one in the row before.
     pub join: Join,
     /// The centre is its second corner, not its first.
     pub is_reversed: bool,
@@ -61,7 +61,7 @@ impl Join {
         }
     }
 
-    /// Whether a triangle goes on like this from the one before; both by their corners, the centre first.
+    /// Whether a triangle continues the one before in this way; both by their corners, the centre first.
     #[must_use]
     pub const fn is_between(self, [a, _, c]: [u32; 3], [centre, other, _]: [u32; 3]) -> bool {
         match self {

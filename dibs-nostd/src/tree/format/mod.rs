@@ -93,7 +93,7 @@ pub mod field {
 #[doc(hidden)]
 pub static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
-/// What a section holds.
+/// Kinds of sections.
 #[doc(hidden)]
 pub mod section {
     /// One record a node, breadth first from the root.
@@ -147,7 +147,7 @@ impl PathKind {
     }
 }
 
-/// What is below a node: its children, or a leaf's triangles. Both are one run of rows.
+/// A node's children, or a leaf's triangles. Both are one run of rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Link {
     /// Rows `first..first + count` of the node table.

@@ -6,7 +6,7 @@
 use super::{Node, node_bytes};
 use crate::Index;
 
-/// Copies eight node records: those of a run of `count`, and what follows them.
+/// Copies eight node records: a run of `count`, and the bytes after it.
 #[inline(always)]
 pub(crate) fn copy_nodes<I: Index>(
     nodes: &[u8],

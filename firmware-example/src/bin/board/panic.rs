@@ -1,4 +1,4 @@
-//! What must never run: the panic and fault handlers.
+//! The panic and fault handlers, which must never run.
 
 use cortex_m_rt::exception;
 

@@ -30,7 +30,7 @@ static MASKED: AtomicU32 = AtomicU32::new(0);
 /// Longest section with the bus interrupt disabled, in clock counts.
 static BUS_MASKED: AtomicU32 = AtomicU32::new(0);
 
-/// What the control interrupt owns.
+/// The control interrupt's own state.
 struct Timeline {
     control: Control,
     records: Producer<'static, Tick>,

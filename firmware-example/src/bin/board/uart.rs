@@ -40,7 +40,7 @@ impl Uart {
         }
     }
 
-    /// Both ways; what arrives asks for an interrupt, what leaves is polled.
+    /// Both ways: a byte that arrives asks for an interrupt, sending is polled.
     pub fn start_receiving(&self) {
         self.divisor.write(DIVISOR);
         self.control.write(TRANSMIT_ENABLE | RECEIVE_ENABLE | RECEIVE_INTERRUPT_ENABLE);
@@ -65,7 +65,7 @@ impl Uart {
         Some(byte)
     }
 
-    /// Whether a byte was ever lost because nobody read the one before.
+    /// Whether a byte was ever lost because the one before was not read in time.
     pub fn has_overrun(&self) -> bool {
         self.state.read() & RECEIVE_OVERRUN != 0
     }

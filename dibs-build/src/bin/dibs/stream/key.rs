@@ -1,4 +1,4 @@
-//! `--key FILE`: what packets are authenticated by.
+//! `--key FILE`: the key of the packets' tags.
 
 use anyhow::{Context, Result, ensure};
 use std::path::Path;

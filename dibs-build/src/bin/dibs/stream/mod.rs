@@ -109,7 +109,7 @@ pub fn run(args: &Args) -> Result<()> {
     }
 }
 
-/// What is sent.
+/// The surface to send.
 struct Recording {
     /// Positions, in the mesh's order.
     frames: Vec<Vec<Vec3>>,

@@ -15,7 +15,7 @@ const SILENT: Duration = Duration::from_secs(2);
 /// Between two attempts to connect.
 const ATTEMPT: Duration = Duration::from_millis(200);
 
-/// Between two looks at what came back.
+/// Time between two looks at the line back.
 const GLANCE: Duration = Duration::from_millis(2);
 
 pub struct Player<'a, const MTU: usize, M> {
@@ -85,7 +85,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
             due += interval;
             self.send((number % recorded) as usize)?;
         }
-        // What is on its way is to be acknowledged, where anybody does.
+        // Wait for frames on their way to be acknowledged, where the receiver acknowledges any.
         let end = Instant::now();
         while self.sender.in_flight() > 0
             && self.sender.status().is_some()

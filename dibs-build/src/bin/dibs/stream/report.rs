@@ -1,4 +1,4 @@
-//! What `dibs stream` shows while it runs, and at the end.
+//! The display of `dibs stream`, while it runs and at the end.
 
 use dibs_build::stream::{Sender, Sent};
 use dibs_build::transport::Line;
@@ -8,7 +8,7 @@ use std::fmt::Write;
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-/// What happens, as it happens: one line on a terminal, a line a second elsewhere.
+/// Progress: one line on a terminal, a line a second elsewhere.
 pub struct Display {
     bar: ProgressBar,
     last: Instant,

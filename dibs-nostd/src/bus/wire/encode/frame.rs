@@ -89,7 +89,7 @@ impl<'a, T: VertexTable + ?Sized, const MTU: usize> FrameEncoder<'a, T, MTU> {
     /// them, which is as `held` in the frame `base_epoch` of the same session. With a few others in
     /// between, where that saves packets.
     ///
-    /// `held` must be what the receiver decoded: for a quantised base, not what was quantised.
+    /// `held` must be the positions that the receiver decoded: for a quantised base, not those before quantising.
     ///
     /// # Errors
     /// As [`new`](Self::new), and [`EncodeError::Base`].

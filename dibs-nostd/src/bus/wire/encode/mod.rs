@@ -1,4 +1,4 @@
-//! Packets as bytes, for whoever sends them.
+//! Packets as bytes, for senders.
 
 mod frame;
 mod weights;

@@ -128,7 +128,7 @@ impl Plane {
     }
 }
 
-/// Which of four points are not beyond a plane, or one each. What is not a number is not beyond.
+/// Which of four points are not beyond a plane, or one each. A NaN is not beyond.
 #[inline(always)]
 fn within(normal: Vec3x4, limit: Vec4, points: Vec3x4) -> u32 {
     !normal.dot(points).cmpgt(limit).bitmask() & 0xF
