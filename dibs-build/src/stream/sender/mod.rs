@@ -7,11 +7,13 @@ mod greeting;
 mod order;
 mod reply;
 mod settings;
+mod totals;
 
 pub use error::SendError;
 pub use frame::{Prepared, Sent};
 pub use order::SurfaceOrder;
 pub use settings::Settings;
+pub use totals::Totals;
 
 use std::fmt;
 use std::time::Duration;
@@ -26,21 +28,6 @@ use crate::transport::Transport;
 use clock::Clock;
 use frame::{apply, coarsened, packets_of};
 use greeting::Greeting;
-
-/// Totals since the start.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Totals {
-    /// Frames.
-    pub frames: u64,
-    /// Of these, partial ones.
-    pub partial: u64,
-    /// Packets, heartbeats included.
-    pub packets: u64,
-    /// Bytes, without a byte stream's framing.
-    pub bytes: u64,
-    /// Statuses that came back.
-    pub statuses: u64,
-}
 
 /// Sends the frames of a moving surface, in packets of at most `MTU` bytes, and listens to what the
 /// receiver reports.
@@ -409,8 +396,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
 
     fn put(&mut self, packet: &[u8]) -> Result<(), SendError> {
         self.transport.send(packet).map_err(SendError::Line)?;
-        self.totals.packets += 1;
-        self.totals.bytes += packet.len() as u64;
+        self.totals.count(packet);
         Ok(())
     }
 }

@@ -10,6 +10,7 @@ pub mod scene;
 mod sender;
 pub mod session;
 mod timeline;
+mod transition;
 
 use std::path::PathBuf;
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use controller::telemetry::{Summary, Tick, cause_code, cause_name};
+use controller::telemetry::{Summary, Tick, cause_code};
 use controller::{SILENCE_LIMIT, SURFACE_AGE_LIMIT, TICK_RATE};
 use dibs_nostd::failsafe::State;
 use dibs_nostd::wire::Event;
@@ -17,6 +17,7 @@ use super::faults::{Faults, Silence};
 use super::machine::Machine;
 use super::scene::Scene;
 use super::session::Outcome;
+use super::transition::Transition;
 use crate::harness::run::Run;
 
 /// Instructions a second of the emulated processor's time.
@@ -284,8 +285,7 @@ impl Report {
             ),
         );
         for change in &self.transitions {
-            let Transition { tick, from, to, cause, age } = change;
-            row("", format!("tick {tick}: {from} to {to}, {cause}, surface {age} ms old"));
+            row("", change.to_string());
         }
         row(
             "answers",
@@ -356,41 +356,6 @@ impl Report {
         }
         println!("every promise kept");
         Ok(())
-    }
-}
-
-/// A change of the fail-safe machine's state.
-#[derive(Serialize)]
-pub struct Transition {
-    tick: u32,
-    from: &'static str,
-    to: &'static str,
-    cause: &'static str,
-    /// Age of the surface, in ms.
-    age: u32,
-}
-
-impl Transition {
-    /// The changes of a run.
-    pub fn all(ticks: &[Tick]) -> Vec<Self> {
-        let changes = ticks.array_windows().filter(|[a, b]| a.state != b.state);
-        changes
-            .map(|[before, after]| Self {
-                tick: after.tick,
-                from: state_name(before.state),
-                to: state_name(after.state),
-                cause: cause_name(after.cause),
-                age: after.age * 1_000 / TICK_RATE,
-            })
-            .collect()
-    }
-}
-
-fn state_name(state: u32) -> &'static str {
-    match state {
-        0 => "nominal",
-        1 => "degraded",
-        _ => "safe",
     }
 }
 

@@ -1,7 +1,5 @@
 //! One fault at a time, and then as many undisturbed frames as recovery takes.
 
-use std::collections::BTreeMap;
-use std::fmt;
 use std::mem::take;
 use std::path::Path;
 
@@ -12,9 +10,9 @@ use dibs_nostd::wire::{Event, Mac, NoMac};
 use fastrand::Rng;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
-use serde::Serialize;
 
 use super::board::Board;
+use super::row::Row;
 use super::subject::{
     Case, Controller, Log, N, Receiver, Source, TREE, framed, mac_under, noticed, source, surface,
 };
@@ -24,53 +22,6 @@ const CHUNK: u64 = 500;
 
 /// Undisturbed frames after which a receiver that still publishes nothing has failed.
 const PATIENCE: u32 = 20;
-
-/// What became of the faults of one kind.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct Row {
-    pub fault: &'static str,
-    pub injected: u64,
-    /// Something was rejected, abandoned or ignored as a duplicate, or the frame was not published.
-    pub detected: u64,
-    /// Nothing was noticed, and the frame was published as it was sent.
-    pub harmless: u64,
-    /// Nothing was noticed, and something else was published; or anything wrong was.
-    pub published_wrong: u64,
-    /// How often each cause was counted.
-    pub rejected: BTreeMap<&'static str, u64>,
-    /// Undisturbed frames until one was published; 0 where the disturbed one was.
-    pub recovered_frames_mean: f64,
-    pub recovered_frames_max: u32,
-    /// Packets from the fault to the next publication.
-    pub recovered_packets_mean: f64,
-    pub recovered_packets_max: u32,
-    /// Faults after which nothing was published any more.
-    pub not_recovered: u64,
-    #[serde(skip)]
-    sums: [u64; 2],
-}
-
-impl fmt::Display for Row {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let causes: Vec<_> =
-            self.rejected.iter().map(|(cause, n)| format!("{cause} {n}")).collect();
-        write!(
-            f,
-            "{:<20} {:>7} injected, {:>7} detected, {:>6} harmless, {} published wrong, recovered \
-             within {:.2} frames ({} at most), {:.1} packets ({} at most); {}",
-            self.fault,
-            self.injected,
-            self.detected,
-            self.harmless,
-            self.published_wrong,
-            self.recovered_frames_mean,
-            self.recovered_frames_max,
-            self.recovered_packets_mean,
-            self.recovered_packets_max,
-            causes.join(", ")
-        )
-    }
-}
 
 /// Where the receivers run.
 #[derive(Clone, Copy)]
@@ -373,29 +324,5 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
                 *self.row.rejected.entry(event.name()).or_default() += n;
             }
         }
-    }
-}
-
-impl Row {
-    fn plus(mut self, other: Self) -> Self {
-        self.injected += other.injected;
-        self.detected += other.detected;
-        self.harmless += other.harmless;
-        self.published_wrong += other.published_wrong;
-        self.not_recovered += other.not_recovered;
-        self.recovered_frames_max = self.recovered_frames_max.max(other.recovered_frames_max);
-        self.recovered_packets_max = self.recovered_packets_max.max(other.recovered_packets_max);
-        self.sums = [self.sums[0] + other.sums[0], self.sums[1] + other.sums[1]];
-        for (cause, n) in other.rejected {
-            *self.rejected.entry(cause).or_default() += n;
-        }
-        self
-    }
-
-    fn finished(mut self, fault: Fault) -> Self {
-        self.fault = fault.name();
-        let [frames, packets] = self.sums.map(|sum| sum as f64 / self.injected.max(1) as f64);
-        (self.recovered_frames_mean, self.recovered_packets_mean) = (frames, packets);
-        self
     }
 }

@@ -4,8 +4,10 @@ mod board;
 mod corruption;
 mod matrix;
 mod record;
+mod row;
 mod sizes;
 mod subject;
 
-pub use matrix::{Place, Row};
+pub use matrix::Place;
 pub use record::Record;
+pub use row::Row;

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result, ensure};
 use serde::Serialize;
 
-use super::{Place, corruption, matrix, sizes};
+use super::{Place, Row, corruption, matrix, sizes};
 use crate::harness::run::Run;
 
 /// First of the seeds.
@@ -19,7 +19,7 @@ pub struct Record {
     pub seed: u64,
     /// What no receiver can tell from the truth.
     pub undetectable: [&'static str; 4],
-    pub matrix: Vec<matrix::Row>,
+    pub matrix: Vec<Row>,
     pub corruption: Vec<corruption::Row>,
     pub sizes: Vec<sizes::Row>,
 }
