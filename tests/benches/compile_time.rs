@@ -81,7 +81,7 @@ fn page(rows: &str, scripts: &str) -> String {
     )
 }
 
-/// What the README has a user write into `Cargo.toml`.
+/// The README's lines for a user's `Cargo.toml`.
 const LINES: &str = "[profile.dev.package.dibs-build]\nopt-level = 3\n";
 
 /// Processor time that a build script takes for the tree of a mesh, in an unoptimised profile with these lines.

@@ -1,4 +1,4 @@
-//! A small surface on a bus: what the bus tests share.
+//! A small surface on a bus, for the bus tests.
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{CHECKSUM_BYTES, Encoding, FrameEncoder, FrameId, Mac, QuantisedBox};
@@ -10,7 +10,7 @@ use dibs_nostd::{
 pub const MESH: u32 = 0xD1B5_0001;
 /// Vertices of the surface.
 pub const N: usize = 40;
-/// An assembler without a gate, and what reads its frames.
+/// An assembler without a gate, and the reader of its frames.
 pub type Bus = (Assembler<'static, Unchecked, N>, FrameReader<'static, N>);
 
 /// A fresh bus without a gate.
@@ -89,7 +89,7 @@ pub fn frame(epoch: u32, quantised: bool) -> Vec<Vec<u8>> {
 /// was published, if any.
 ///
 /// # Errors
-/// What the assembler rejected.
+/// The assembler's rejections.
 pub fn give<G: Gate, M: Mac, const N: usize>(
     assembler: &mut Assembler<'_, G, N, M>,
     packet: &[u8],
@@ -100,7 +100,7 @@ pub fn give<G: Gate, M: Mac, const N: usize>(
 /// The same, at a time on the receiver's clock.
 ///
 /// # Errors
-/// What the assembler rejected.
+/// The assembler's rejections.
 pub fn give_at<G: Gate, M: Mac, const N: usize>(
     assembler: &mut Assembler<'_, G, N, M>,
     packet: &[u8],

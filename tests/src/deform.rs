@@ -9,7 +9,7 @@ use glam::{Quat, Vec3};
 
 use crate::stretch;
 
-/// What is done to the mesh.
+/// The kind of deformation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Deformation {
     /// Nothing but a rigid motion.

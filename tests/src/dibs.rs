@@ -13,7 +13,7 @@ use crate::method::{Found, Method, Probe};
 /// Entries of the traversal's stack: enough for every tree that the builder makes.
 const STACK: usize = MAX_STACK;
 
-/// What a query may know besides the surface.
+/// A query's prior knowledge besides the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Knowledge {
     /// The frame's stretch, measured in `update`.
@@ -35,7 +35,7 @@ pub fn queries<'t>(built: &'t BuiltTree, knowledge: Knowledge) -> Box<dyn Method
 }
 
 /// The same queries where the vertices stay in the mesh's own order and are looked up through the
-/// tree's table of it: what the order of vertices is worth.
+/// tree's table of it, to show the gain of the vertex order.
 ///
 /// # Panics
 /// If the bytes are not those of a tree.

@@ -1,4 +1,4 @@
-//! What the benchmark asks of every method, ours and others'.
+//! The benchmark's interface to every method, ours and others'.
 
 use dibs_nostd::{Capsule, Sphere};
 use glam::Vec3;
@@ -12,7 +12,7 @@ pub enum Probe {
     Capsule(Capsule),
 }
 
-/// What a method found.
+/// A method's answer.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Found {
     /// Distance from the tool's surface to the mesh; 0 where they touch or overlap.

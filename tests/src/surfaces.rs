@@ -13,7 +13,7 @@ pub struct Surface {
 }
 
 /// An organ with folds, a bumpy ball, a closed ball whose centre is equally far from everything, and a
-/// flat patch of slivers. Lean trees hold only what a query reads.
+/// flat patch of slivers. Lean trees hold only the sections that a query reads.
 ///
 /// # Panics
 /// Never: the sizes are valid.

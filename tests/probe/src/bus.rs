@@ -1,4 +1,4 @@
-//! What the fault matrix and the receiver on the board agree on.
+//! The protocol between the fault matrix and the receiver on the board.
 
 /// Vertices of the surface.
 pub const VERTICES: usize = 66;

@@ -17,7 +17,7 @@ use dibs_nostd::{
     TriangleRow, VertexTable, measure_stretch,
 };
 
-/// What a word at the start of a record means.
+/// The meanings of the word at the start of a record.
 pub mod command {
     /// End of the script.
     pub const END: u32 = 0;
@@ -64,7 +64,7 @@ enum Table<'a> {
     Remembered(ModalSurface<'a, MAX_MODES>),
 }
 
-/// What a program must offer to run a script.
+/// The machine on which a script runs.
 pub trait Machine {
     /// Fills the buffer from the script.
     ///
@@ -242,7 +242,7 @@ fn timed(
     }
 }
 
-/// What is measured: the function that callgrind looks for, so it must stay one.
+/// The measured function: callgrind looks for it, so it must stay one.
 #[inline(never)]
 fn clocked(
     machine: &impl Machine,

@@ -1,4 +1,4 @@
-//! What the program `receive` and whoever writes its script agree on.
+//! The protocol between the program `receive` and the writer of its script.
 
 /// Vertices of the surface: the heart of 10,272 triangles.
 pub const VERTICES: usize = 5_138;

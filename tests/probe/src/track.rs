@@ -10,7 +10,7 @@ use dibs_nostd::{
 
 use crate::{Fault, Machine, point, put, word};
 
-/// What a word at the start of a record means.
+/// The meanings of the word at the start of a record.
 pub mod command {
     /// End of the script.
     pub const END: u32 = 0;
@@ -87,7 +87,7 @@ pub fn run(memory: &mut Memory, machine: &mut impl Machine) -> Result<(), Fault>
     if next == command::END { Ok(()) } else { Err(Fault) }
 }
 
-/// What lives from frame to frame.
+/// The state from frame to frame.
 struct Session<'t> {
     query: Query<'t, u16, STACK>,
     tracker: Tracker<'t, u16, STACK, OPENED>,

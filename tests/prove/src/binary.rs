@@ -12,7 +12,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail, ensure};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 
-/// What entering an exception puts on the stack: 26 words with the FPU's registers, and alignment.
+/// Stack that entering an exception takes: 26 words with the FPU's registers, and alignment.
 const EXCEPTION_FRAME: u32 = 26 * 4 + 8;
 
 /// One function of the binary.
@@ -43,7 +43,7 @@ pub struct Worst {
     pub bus: u32,
     /// The control tick.
     pub control: u32,
-    /// All of them on top of each other with what exceptions put between them, and a fault.
+    /// All of them on top of each other, with the exceptions' entries between them, and a fault.
     pub total: u32,
 }
 

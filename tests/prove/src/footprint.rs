@@ -1,4 +1,4 @@
-//! What the board's program says about itself: its sections and symbols.
+//! The board's program: its sections and symbols.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, elf};
 
-/// What a linked program needs of the board.
+/// A linked program's needs of the board.
 pub struct Footprint {
     /// Code, constants and the initial values of variables.
     pub flash: u64,

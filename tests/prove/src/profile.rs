@@ -46,7 +46,7 @@ const PARTS: [Part; 6] = [
     Part { name: "spheres of children", functions: &["expand"] },
     Part { name: "setting up, warm start, answer", functions: &["start", "finish"] },
 ];
-/// What none of them has.
+/// The rest.
 const REST: &str = "loop over subtrees";
 
 /// Measures, and writes docs/performance.md.

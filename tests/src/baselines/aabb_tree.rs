@@ -22,7 +22,7 @@ pub type Bounds = [Vec3A; 2];
 
 const NOTHING: Bounds = [Vec3A::INFINITY, Vec3A::NEG_INFINITY];
 
-/// What a node holds. Children are adjacent, after their parent, and all descendants of a node are one
+/// A node. Children are adjacent, after their parent, and all descendants of a node are one
 /// range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Link {

@@ -5,7 +5,7 @@ use glam::{Vec3, Vec3A};
 
 /// A tool whose axis can be bounded against boxes.
 pub trait Axis: Tool {
-    /// What a bound needs of the axis, worked out once a query.
+    /// The axis in the form that a bound needs, once a query.
     type Prepared: Copy;
 
     /// Works it out.

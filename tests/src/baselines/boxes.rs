@@ -1,4 +1,4 @@
-//! What trees of boxes share: rows in the order of the leaves, and one search, near child first.
+//! The common part of trees of boxes: rows in the order of the leaves, and one search, near child first.
 
 use std::ops::Range;
 

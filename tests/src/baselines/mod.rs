@@ -1,4 +1,4 @@
-//! What the paper compares with, written to win: flat arrays in f32, SAH splits, one tight loop to
+//! The paper's baselines, written to win: flat arrays in f32, SAH splits, one tight loop to
 //! refit, SIMD boxes, near child first, and the triangle kernels of the library under test.
 
 mod aabb_tree;

@@ -58,7 +58,7 @@ impl<'t> Paper<'t> {
         tool.axis_distance_squared(self.position(pin)).sqrt() - tool.radius() - radius
     }
 
-    /// Lowers the separation found so far by what is below a node.
+    /// Lowers the separation found so far by a node's subtree.
     fn search(&self, node: u32, tool: &impl Tool, found: &mut Found, tests: &mut [u32; 2]) {
         match self.nodes[node as usize] {
             Node::Leaf { corners } => {

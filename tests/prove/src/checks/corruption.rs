@@ -118,7 +118,7 @@ fn on_one_pose(surface: &Surface, rng: &mut Rng) -> Tally {
     let rows = built.to_rows(&surface.mesh.positions);
     let tool = pose(&rows, &triangles, rng);
     let truth = exhaustive(&rows, &triangles, &tool).expect("has triangles").separation;
-    // What a sound tree needs at the most, and the root.
+    // The most that a sound tree needs, and the root.
     let most = 3 * sound.node_count() + sound.triangle_count() + 1;
     let mut bytes = built.blob().to_vec();
     let mut tally = Tally::default();

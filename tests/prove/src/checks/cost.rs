@@ -132,7 +132,7 @@ pub const HOST: Check = Check {
 /// surfaces one was 13 per cent above their plane.
 const MARGIN: f64 = 20.0;
 
-/// What a query cost.
+/// A query's cost.
 #[derive(Clone, Copy)]
 struct Sample {
     tests: [u32; 2],
@@ -176,7 +176,7 @@ impl Machine<'_> {
         }
     }
 
-    /// What the figures' names begin with.
+    /// The beginning of the figures' names.
     fn prefix(&self) -> &'static str {
         match self {
             Self::M7(_) => "cost",

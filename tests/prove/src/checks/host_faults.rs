@@ -41,7 +41,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     tell(&record, "faults", "faults.json", effort, figures)
 }
 
-/// Notes what a matrix came to, and writes its record.
+/// Notes the figures of a matrix, and writes its record.
 pub fn tell(
     record: &Record,
     prefix: &str,

@@ -1,4 +1,4 @@
-//! Modal surfaces on the board: the host's bits, and what a vertex, a bound and a query take.
+//! Modal surfaces on the board: the host's bits, and instructions of a vertex, a bound and a query.
 
 use anyhow::{Result, ensure};
 use xtask::steps::Outcome;

@@ -1,4 +1,4 @@
-//! What a query takes on the board: the paper's moving tool about a beating heart, and poses that hurt.
+//! A query's instructions on the board: the paper's moving tool about a beating heart, and adversarial poses.
 
 use anyhow::Result;
 use xtask::steps::Outcome;

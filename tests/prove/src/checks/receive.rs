@@ -1,4 +1,4 @@
-//! What receiving a frame and checking its stretch take on the board, a vertex and a packet.
+//! Instructions of receiving a frame and checking its stretch on the board, a vertex and a packet.
 
 use std::fs;
 use std::path::Path;
@@ -112,7 +112,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-/// What the board reads.
+/// The board's input.
 #[derive(Default)]
 struct Script {
     words: Vec<u32>,

@@ -112,7 +112,7 @@ fn overflow_is_noticed(cross: &Cross) -> Result<bool> {
             None => thread::sleep(Duration::from_millis(20)),
         }
     };
-    // The program of before, for whoever comes next.
+    // The program of before, for the next check.
     firmware::build(cross, &Surface::default())?;
     Ok(code == Some(1))
 }

@@ -11,7 +11,7 @@ use glam::Vec3;
 use super::scene::Scene;
 use super::sender::Link;
 
-/// What the check of one answer found.
+/// The result of checking one answer.
 #[derive(Clone, Copy, Debug)]
 pub struct Checked {
     /// The tick.
@@ -63,12 +63,12 @@ pub fn check(scene: &Scene, link: &Link, tick: &Tick) -> Result<Checked> {
     Ok(Checked { tick: tick.tick, error: largest / accuracy })
 }
 
-/// A published frame, held as a whole against what was sent.
+/// A published frame, compared as a whole with the frame sent.
 #[derive(Clone, Copy, Debug)]
 pub struct Compared {
     /// Its epoch.
     pub epoch: u32,
-    /// Whether every vertex is, to the bit, what was sent.
+    /// Whether every vertex is the one sent, to the bit.
     pub is_same: bool,
 }
 

@@ -48,7 +48,7 @@ fn receive(board: &mut UnixStream) -> Result<String> {
     loop {
         board.read_exact(&mut byte)?;
         match byte[0] {
-            // What came before, such as the acknowledgement, is no answer.
+            // Earlier bytes, such as the acknowledgement, are no answer.
             b'$' => answer.clear(),
             b'#' => break,
             byte => answer.push(byte.into()),

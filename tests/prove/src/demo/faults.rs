@@ -1,4 +1,4 @@
-//! What is done to the bus, and what came of it.
+//! Faults on the bus, and their outcome.
 
 use std::collections::BTreeMap;
 
@@ -10,10 +10,10 @@ use serde::Serialize;
 
 use super::session::Outcome;
 
-/// What is to be done to the bus.
+/// The plan of faults on the bus.
 #[derive(Clone, Copy)]
 pub struct Plan {
-    /// What the faults are drawn from.
+    /// The faults' seed.
     pub seed: u64,
     seconds: u32,
 }
@@ -22,7 +22,7 @@ impl Plan {
     /// Probability that a packet meets a fault.
     pub const RATE: f64 = 0.03;
 
-    /// What happens: all that can happen on a line of packets without tags.
+    /// The kinds of faults: all that can happen on a line of packets without tags.
     pub const KINDS: &[Fault] = &[
         Fault::FlipOne,
         Fault::FlipTwo,
@@ -56,10 +56,10 @@ impl Plan {
     }
 }
 
-/// What was done to the bus.
+/// The faults on the bus.
 #[derive(Clone, Serialize)]
 pub struct Faults {
-    /// What the faults were drawn from.
+    /// The faults' seed.
     seed: u64,
     /// Probability of a fault a packet.
     rate: f64,
@@ -68,7 +68,7 @@ pub struct Faults {
 }
 
 impl Faults {
-    /// What has happened by plan.
+    /// The planned faults that have happened.
     pub fn new(plan: &Plan, injected: Vec<(Fault, u64)>) -> Self {
         let happened = injected.into_iter().filter(|&(_, count)| count > 0);
         let injected = happened.map(|(fault, count)| (fault.name(), count)).collect();
@@ -81,7 +81,7 @@ impl Faults {
     }
 }
 
-/// What the silent line led to, as the controller's own records have it; in ms.
+/// The effect of the silent line, by the controller's own records; in ms.
 #[derive(Clone, Serialize)]
 pub struct Silence {
     /// Tick of the first safe output.

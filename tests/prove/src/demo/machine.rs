@@ -19,7 +19,7 @@ pub enum Machine {
     Board {
         /// The firmware.
         program: PathBuf,
-        /// What it needs of the board.
+        /// Its needs of the board.
         footprint: Footprint,
         /// The toolchain that built it.
         toolchain: String,

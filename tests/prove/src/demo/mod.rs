@@ -47,7 +47,7 @@ pub struct Options {
     /// Puts faults of every kind on the bus, and silences it once for a while.
     #[arg(long)]
     pub faults: bool,
-    /// What the faults are drawn from.
+    /// The faults' seed.
     #[arg(long, default_value_t = 1, requires = "faults")]
     pub seed: u64,
     /// Folder for the report and the pictures; `demo` in Cargo's target folder if absent.

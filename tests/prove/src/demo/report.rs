@@ -23,17 +23,17 @@ use crate::harness::run::Run;
 /// Instructions a second of the emulated processor's time.
 const INSTRUCTION_RATE: f64 = 25e6 * qemu::INSTRUCTIONS_A_COUNT as f64;
 
-/// What a run showed, for machines and people. What a run on the host cannot show is `null`.
+/// The result of a run, for machines and people. Facts that a run on the host cannot show are `null`.
 #[derive(Serialize)]
 pub struct Report {
     frames_sent: u32,
     frames_published: u32,
     frames_rejected: u32,
-    /// What was done to the bus.
+    /// The faults on the bus.
     faults: Option<Faults>,
-    /// What a line that fell silent led to.
+    /// The states that a silent line led to.
     silence: Option<Silence>,
-    /// What happened on the bus, by what the wire protocol calls it.
+    /// Events on the bus, by their names in the wire protocol.
     bus_events: BTreeMap<&'static str, u32>,
     ticks: u32,
     queries: usize,
@@ -43,7 +43,7 @@ pub struct Report {
     largest_error: f64,
     /// Largest stated accuracy but for the vertices' position error, in mm.
     accuracy_mm: f32,
-    /// Largest distance between a vertex and what the bus's quantisation made of it, in mm.
+    /// Largest distance between a vertex and its quantised position on the bus, in mm.
     position_error_mm: f32,
     separation_min_mm: f32,
     separation_max_mm: f32,
@@ -218,7 +218,7 @@ impl Report {
             // The last frame may have been on its way when the run ended.
             promise(published + 1 >= sent, format!("{published} of {sent} frames were published"));
         }
-        // How often a frame comes is up to this computer; what is done without one is the promise.
+        // How often a frame comes is up to this computer; the behaviour without one is the promise.
         let acting = || outcome.ticks.iter().filter(|tick| tick.state != State::Safe as u32);
         let too_old = acting().filter(|tick| tick.age > SURFACE_AGE_LIMIT).count();
         promise(too_old == 0, format!("{too_old} ticks acted on a surface that was too old"));
@@ -359,7 +359,7 @@ impl Report {
     }
 }
 
-/// What happened on the bus at all.
+/// The bus's events that were counted.
 fn events(summary: &Summary) -> BTreeMap<&'static str, u32> {
     let counted = Event::ALL.into_iter().zip(summary.events);
     counted.filter(|&(_, count)| count > 0).map(|(event, count)| (event.name(), count)).collect()

@@ -14,11 +14,11 @@ const MARGIN: f32 = 1.02;
 /// Beyond any motion: the limit of the tree that measures what a motion needs.
 const ANY_STRETCH: f32 = 1_000.0;
 
-/// What moves, and the tree that the firmware has of it.
+/// The moving surface, and the firmware's tree of it.
 pub struct Scene {
-    /// What to call the surface.
+    /// The surface's name.
     name: String,
-    /// What the firmware's build script is told.
+    /// The input of the firmware's build script.
     pub surface: Surface,
     /// The tree; the firmware builds the same one, byte for byte.
     pub tree: BuiltTree,

@@ -29,7 +29,7 @@ const ARRIVAL: Duration = Duration::from_millis(500);
 /// is not acknowledged by then was lost.
 const ANSWER: u32 = TICK_RATE / 20;
 
-/// What sender and listener tell each other.
+/// Messages between sender and listener.
 #[derive(Default)]
 pub struct Link {
     /// Bytes that the controller has counted.
@@ -90,7 +90,7 @@ impl Write for Paced {
             if now != arrived {
                 (arrived, start) = (now, Instant::now());
             } else if start.elapsed() > ARRIVAL {
-                // What has not come by now was lost on the way.
+                // A frame that has not come by now was lost on the way.
                 self.sent = arrived;
             }
         }

@@ -28,7 +28,7 @@ use super::sender::{Link, send};
 /// Real time that a connected controller may stay silent.
 const SILENCE: Duration = Duration::from_secs(30);
 
-/// What is done to a run.
+/// The harm done to a run.
 #[derive(Clone, Copy)]
 pub enum Harm {
     Nothing,
@@ -48,7 +48,7 @@ pub struct Outcome {
     pub checked: Vec<Checked>,
     /// The comparison of every published frame.
     pub compared: Vec<Compared>,
-    /// What was done to the bus, if anything.
+    /// The faults on the bus, if any.
     pub faults: Option<Faults>,
     /// The last tick that was known when memory was changed, if it was.
     pub flipped_at: Option<u32>,
@@ -173,7 +173,7 @@ fn accept(socket: &UnixListener, child: &mut Child) -> Result<UnixStream> {
     }
 }
 
-/// What a controller's telemetry told.
+/// A controller's telemetry.
 struct Heard {
     ticks: Vec<Tick>,
     summary: Summary,
@@ -229,7 +229,7 @@ fn listen(
     }
 }
 
-/// What the progress line says of a tick.
+/// The progress line of a tick.
 fn line(tick: &Tick) -> String {
     let instructions = u64::from(tick.query_counts) * u64::from(qemu::INSTRUCTIONS_A_COUNT);
     let epoch = tick.epoch;

@@ -1,4 +1,4 @@
-//! The picture of a run with faults: how old the surface was, and what the controller made of it.
+//! The picture of a run with faults: the surface's age and the controller's state.
 
 use std::path::Path;
 

@@ -29,7 +29,7 @@ pub struct Board {
     counters: Counters,
     published: u32,
     wrong: u64,
-    /// What the emulator and its socket were started in.
+    /// The folder of the emulator and its socket.
     _folder: TempDir,
 }
 

@@ -159,7 +159,7 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
         life.row
     }
 
-    /// What a receiver draws when it starts.
+    /// The challenge that a receiver draws when it starts.
     fn any_mac(&mut self) -> M {
         (self.keyed_mac)(if M::TAGGED { self.rng.u32(..) } else { 0 })
     }

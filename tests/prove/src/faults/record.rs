@@ -1,4 +1,4 @@
-//! What is written, and what must hold.
+//! The record of a run, and its conditions.
 
 use std::path::Path;
 
@@ -17,14 +17,14 @@ pub struct Record {
     pub run: Run,
     pub per_fault: u64,
     pub seed: u64,
-    /// What no receiver can tell from the truth.
+    /// Faults that no receiver can tell from the truth.
     pub undetectable: [&'static str; 4],
     pub matrix: Vec<Row>,
     pub corruption: Vec<corruption::Row>,
     pub sizes: Vec<sizes::Row>,
 }
 
-/// What no receiver can tell from the truth.
+/// Faults that no receiver can tell from the truth.
 pub const UNDETECTABLE: [&str; 4] = [
     "damage after which the CRC-32 is right again: none of up to 32 neighbouring bits, one in 2^32 of \
      the rest; it must then pass the limits on coordinates and stretch too",

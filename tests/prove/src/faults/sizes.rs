@@ -23,7 +23,7 @@ const TOLERANCES: [f32; 4] = [0.01, 0.05, 0.1, 0.5];
 const MODES: [usize; 4] = [2, 8, 16, 64];
 /// Ticks of a control loop a second.
 const TICKS: f32 = 1_000.0;
-/// Seconds of a heartbeat, which is what both motions are.
+/// Seconds of a heartbeat: both motions are one.
 const BEAT: f32 = 1.0;
 
 /// One heart, sent in one way.
@@ -77,7 +77,7 @@ pub fn run() -> Result<Vec<Row>> {
 }
 
 fn heart(name: &'static str, mesh: &Mesh, motion: &Motion) -> Result<Vec<Row>> {
-    // Any limit: what is sent does not depend on it.
+    // Any limit: the packets do not depend on it.
     let tree = Builder::new().stretch(4.0).build(mesh)?;
     let order = SurfaceOrder::of(&tree.tree::<u16>()?);
     let recorded = motion.frames.len() as f32 / BEAT;

@@ -168,10 +168,10 @@ impl Log {
 
 /// A receiving end, wherever it runs.
 pub trait Receiver {
-    /// What it has counted.
+    /// Its counters.
     fn counters(&self) -> &Counters;
 
-    /// What it would report now.
+    /// Its status at this moment.
     fn status(&mut self) -> Vec<u8>;
 
     /// A packet arrives as a message of its own.

@@ -66,7 +66,7 @@ fn newest(records: &[Record]) -> Option<&Run> {
     records.iter().map(|record| &record.run).max()
 }
 
-/// Whether all that stands below is of one commit; otherwise, what is of which.
+/// Whether all rows below are of one commit; otherwise, which row is of which.
 fn provenance(out: &mut String, records: &[Record], newest: Option<&Run>) -> Result<()> {
     let Some(newest) = newest else { return Ok(()) };
     let missing = promises().filter(|(_, p)| records.iter().all(|r| r.id != p.id)).count();

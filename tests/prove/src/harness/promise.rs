@@ -1,4 +1,4 @@
-//! A promise: a figure, and what it must be.
+//! A promise: a figure and its bound.
 
 use std::fmt;
 
@@ -16,7 +16,7 @@ pub struct Promise {
     pub limits: &'static str,
 }
 
-/// What a figure must be.
+/// The bound of a figure.
 #[derive(Clone, Copy)]
 pub enum Bound {
     /// It informs.

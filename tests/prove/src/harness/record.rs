@@ -13,7 +13,7 @@ use super::run::Run;
 use super::{Check, Measured, markdown};
 use crate::checks::CHECKS;
 
-/// A promise, the figure that was measured for it, and what bounds it.
+/// A promise, the figure that was measured for it, and its bound.
 #[derive(Clone, Debug, Serialize, Deserialize, PartialEq)]
 pub struct Record {
     pub id: String,
@@ -29,7 +29,7 @@ pub struct Record {
     /// Of a golden figure, the lowest that was ever recorded, or the one that it was raised to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub floor: Option<f64>,
-    /// Why the floor was raised, and from what.
+    /// Why the floor was raised, and from which figure.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub raised: String,
     pub run: Run,
@@ -76,7 +76,7 @@ pub fn write(measured: &Measured, raise: Raise<'_>) -> Result<()> {
     Ok(())
 }
 
-/// The records after a run, and what the run broke.
+/// The records after a run, and the promises that the run broke.
 fn merge(before: &[Record], measured: &Measured, raise: Raise<'_>) -> (Vec<Record>, Vec<String>) {
     let (mut records, mut broken) = (Vec::new(), Vec::new());
     for (check, promise) in promises() {

@@ -52,7 +52,7 @@ impl Run {
     }
 }
 
-/// What stands for a fact that cannot be had.
+/// Stands for a fact that cannot be had.
 pub const UNKNOWN: &str = "unknown";
 
 /// The processor, its cores, and the operating system.

@@ -40,7 +40,7 @@ pub fn run(plan: &Plan, records: &mut Records) -> Result<()> {
     one(plan, &heart.name, &heart.mesh, records)
 }
 
-/// The default comes first; every other variant differs from it in what its name says.
+/// The default comes first; every other variant differs from it as its name says.
 fn variants(mesh: &Mesh) -> Result<Vec<Variant>> {
     let default = || Builder::new().stretch(STRETCH);
     let surface = |crossings| default().paths(Paths::Surface { crossings });

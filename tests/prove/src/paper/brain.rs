@@ -21,7 +21,7 @@ pub const STRETCH: f32 = 2.0;
 pub const TOOLS: [&str; 2] = ["sphere", "capsule"];
 /// Independent seeds that a cell's queries come from.
 pub const SEEDS: u64 = 5;
-/// Seeds of what is not measured.
+/// Seeds of the warm-up, which is not measured.
 const TRAINING: u64 = 1_000;
 
 /// Runs the experiment on every size of the plan.

@@ -1,4 +1,4 @@
-//! What the run ran on, and how.
+//! The run's machine, compiler and command.
 
 use std::path::Path;
 
@@ -40,7 +40,7 @@ pub fn run(plan: &Plan, options: &Options, records: &mut Records) {
     records.push(Record::number(&cell, "", "clock", clock(), "us"));
 }
 
-/// What `cargo xtask demo` reports, as far as it is needed here.
+/// The part of the demo's report that is needed here.
 #[derive(Deserialize)]
 struct Demo {
     ticks: u64,
@@ -55,7 +55,7 @@ struct Demo {
 /// The board's clock, in Hz.
 const CLOCK_RATE: f64 = 480e6;
 
-/// Adds what the demo showed on the emulated Cortex-M7.
+/// Adds the demo's figures on the emulated Cortex-M7.
 pub fn cortex_m7(path: &Path, records: &mut Records) -> Result<()> {
     let name = path.display();
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {name}"))?;

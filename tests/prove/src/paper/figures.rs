@@ -89,7 +89,7 @@ fn line(
     points.collect()
 }
 
-/// Figure 4: what a step takes, against the size of the mesh.
+/// Figure 4: the time of a step, against the size of the mesh.
 fn total_against_size(area: &Area<'_>, records: &Records, tool: &str) -> Result<()> {
     let methods =
         [PAPER, DIBS, MEASURED, REFIT, HYBRID, OBVHS, PARRY_BVH, PARRY_TRIMESH, EXHAUSTIVE];

@@ -14,7 +14,7 @@ use glam::Vec3;
 use super::record::{Cell, Record, Records};
 use super::statistics::Summary;
 
-/// What a method's `update` is for.
+/// The purpose of a method's `update`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Update {
     /// Nothing is done.
@@ -98,7 +98,7 @@ impl<'a> Contender<'a> {
     }
 }
 
-/// What was measured of one method with one tool: one value a step, times in microseconds.
+/// The samples of one method with one tool: one value a step, times in microseconds.
 #[derive(Clone, Debug, Default)]
 pub struct Samples {
     pub update: Vec<f64>,
@@ -118,7 +118,7 @@ struct Step {
     reference: Vec<Option<(&'static str, f32)>>,
 }
 
-/// Contenders, and what was measured so far.
+/// Contenders, and their samples so far.
 pub struct Race<'a> {
     contenders: Vec<Contender<'a>>,
     /// By contender, then by tool.
@@ -137,7 +137,7 @@ impl<'a> Race<'a> {
         Self { contenders, samples, separations, waiting: Vec::new(), done: 0 }
     }
 
-    /// Forgets what was measured: the end of the warm-up.
+    /// Forgets the samples: the end of the warm-up.
     pub fn reset(&mut self) -> Result<()> {
         self.finish()?;
         let contenders = std::mem::take(&mut self.contenders);
@@ -239,7 +239,7 @@ fn microseconds(start: Instant) -> f64 {
     start.elapsed().as_nanos() as f64 / 1e3
 }
 
-/// What reading the clock twice takes, in microseconds: part of every time measured.
+/// The time of reading the clock twice, in microseconds: part of every time measured.
 pub fn clock() -> f64 {
     let readings: Vec<f64> = (0..10_000).map(|_| microseconds(Instant::now())).collect();
     Summary::of(&readings).mean

@@ -1,4 +1,4 @@
-//! What the methods are called.
+//! The methods' names.
 
 pub const PAPER: &str = "dibs-paper";
 /// The paper's construction, searched as the paper does.
@@ -14,7 +14,7 @@ pub const OBVHS: &str = "obvhs";
 pub const PARRY_TRIMESH: &str = "parry-trimesh";
 pub const PARRY_BVH: &str = "parry-bvh";
 
-/// What refits: what DIBS is compared with.
+/// Methods that refit, with which DIBS is compared.
 pub const OTHERS: [&str; 6] = [REFIT, HYBRID, OBVHS, PARRY_BVH, PARRY_TRIMESH, EXHAUSTIVE];
 
 /// A name for people.

@@ -60,7 +60,7 @@ impl Plan {
         }
     }
 
-    /// What the arguments ask for.
+    /// The plan of these arguments.
     pub fn of(options: &Options) -> Self {
         let mut plan = if options.quick { Self::quick() } else { Self::full() };
         let most = options.queries.unwrap_or(usize::MAX);

@@ -28,7 +28,7 @@ pub struct Record {
     pub max: f64,
     pub n: u64,
     pub unit: String,
-    /// What is not a number.
+    /// The text of a fact, which is not a number.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub note: String,
 }
@@ -84,7 +84,7 @@ impl Cell {
     }
 }
 
-/// Five significant digits: what a measurement is worth, and what a diff can be read by.
+/// Five significant digits: no measurement is better, and a diff stays readable.
 fn short(value: f64) -> f64 {
     format!("{value:.4e}").parse().unwrap_or(value)
 }

@@ -25,7 +25,7 @@ pub const EXPERIMENT: &str = "paper-search";
 /// Most queries of a cell: the mean of this many is within a few percent.
 const MOST: usize = 2_000;
 
-/// Counts anew what the records hold of this experiment.
+/// Counts this experiment anew, and compares the records.
 pub fn run(plan: &Plan, records: &mut Records) -> Result<()> {
     records.0.retain(|record| record.experiment != EXPERIMENT);
     for &(triangles, queries) in &plan.brains {

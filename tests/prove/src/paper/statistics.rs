@@ -6,11 +6,11 @@
 //! So: medians with order-statistic confidence intervals; the *ratio* of two methods' times on the same
 //! query; and the exact sign test on it, which assumes nothing but that queries are independent (they
 //! are: frame and pose are drawn anew for each), adjusted for many comparisons after Holm. With
-//! thousands of queries every difference is significant: the ratio and its interval are what matters.
+//! thousands of queries every difference is significant: the ratio and its interval matter.
 
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-/// What is told of a sample.
+/// The summary of a sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Summary {
     pub mean: f64,

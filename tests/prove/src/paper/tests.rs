@@ -1,4 +1,4 @@
-//! The benchmark itself: it runs, its methods agree, and its documents are what its records say.
+//! The benchmark itself: it runs, its methods agree, and its documents are those of its records.
 
 use std::path::Path;
 
@@ -28,7 +28,7 @@ fn the_committed_documents_are_what_the_committed_records_say() {
     check(&workspace::root().join("docs"));
 }
 
-/// Every document of a folder is what its records give.
+/// Every document of a folder is the one that its records give.
 fn check(folder: &Path) {
     let records = Records::read(&folder.join("benchmarks.json")).expect("readable");
     for (name, expected) in super::documents(&records).expect("drawable") {

@@ -18,11 +18,11 @@ use xtask::{qemu, valgrind, workspace};
 
 use self::script::{Record, Script};
 
-/// One answer: its words, of which the first is what it took on the clock.
+/// One answer: its words, of which the first is its time on the clock.
 pub struct Answer<'a> {
-    /// What was asked.
+    /// The question.
     pub record: Record,
-    /// What came back.
+    /// The answers.
     pub words: &'a [u32],
     /// Instructions that it took, where they were counted.
     pub instructions: u32,
@@ -210,7 +210,7 @@ impl Build {
         }
         let queries = script.queries();
         ensure!(counts.len() == queries + 1, "{} counts of {queries} queries", counts.len());
-        // The first part is what comes before the first query.
+        // The first part comes before the first query.
         answers.counts = Some(counts.split_off(1));
         Ok(answers)
     }

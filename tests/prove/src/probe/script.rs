@@ -19,11 +19,11 @@ use probe::command;
 #[derive(Default)]
 pub struct Script {
     words: Vec<u32>,
-    /// What an answer's place in the answers belongs to.
+    /// The kind of each answer, by its place.
     pub records: Vec<Record>,
 }
 
-/// What the probe is asked, in order.
+/// The questions to the probe, in order.
 #[derive(Clone, Copy, Debug)]
 pub enum Record {
     /// The stretch of a frame of this many triangles.
@@ -61,7 +61,7 @@ pub enum Draw {
     Deadline([Cost; 2]),
 }
 
-/// What a query is told beforehand.
+/// A query's prior knowledge.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Knows {
     /// Nothing: cold, with the tree's limit on stretch.

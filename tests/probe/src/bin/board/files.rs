@@ -76,7 +76,7 @@ impl Output {
         Some(())
     }
 
-    /// Hands on what is buffered.
+    /// Hands on the buffered bytes.
     pub fn flush(&mut self) -> Option<()> {
         let arguments = [self.handle, self.buffer.as_ptr().expose_provenance(), self.used];
         // SAFETY: SYS_WRITE takes a handle, and the address and size of a buffer.

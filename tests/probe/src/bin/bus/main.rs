@@ -55,7 +55,7 @@ fn run(bytes: &mut [u8]) -> Option<()> {
     }
 }
 
-/// What the bus does on the board.
+/// The bus on the board.
 struct Receiver<'t, M> {
     mesh_id: u32,
     deframer: Deframer<MTU>,
@@ -118,7 +118,7 @@ impl<'t, M: Mac> Receiver<'t, M> {
             Ok(Advance::Pending) => return true,
             Ok(Advance::Published { .. }) => {
                 self.published = self.published.wrapping_add(1);
-                // What a control tick would see.
+                // The control tick's view.
                 if let Some(frame) = self.reader.read() {
                     let mut digest = CRC.digest();
                     for row in 0..VERTICES as u32 {

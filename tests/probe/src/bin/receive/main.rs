@@ -1,4 +1,4 @@
-//! What receiving and checking a frame takes on the board: with and without tags, packet by packet.
+//! Instructions of receiving and checking a frame on the board: with and without tags, packet by packet.
 //!
 //! Reads from `script.bin`, in little-endian words: the length of a tree of [`VERTICES`] vertices and its
 //! bytes, padded to a word; then frames, each as [`UNTAGGED`] or [`TAGGED`], the number of its packets,
@@ -70,7 +70,7 @@ fn run() -> Option<()> {
     })
 }
 
-/// What calls took on the clock.
+/// Times of calls on the clock.
 #[derive(Default)]
 struct Stopwatch {
     sum: u32,

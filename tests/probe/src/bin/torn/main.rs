@@ -37,7 +37,7 @@ static BYTES: Mutex<RefCell<[u8; 64 * 1024]>> = Mutex::new(RefCell::new([0; 64 *
 static PUBLISHED: AtomicU32 = AtomicU32::new(0);
 static PUT_OFF: AtomicU32 = AtomicU32::new(0);
 
-/// What the interrupt owns.
+/// The interrupt's own state.
 struct Sender {
     writer: FrameWriter<'static, VERTICES>,
     rest: [Vec3; VERTICES],

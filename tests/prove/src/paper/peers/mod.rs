@@ -1,4 +1,4 @@
-//! What a user would pick instead today.
+//! The libraries that a user would pick instead today.
 
 mod obvhs;
 mod parry_bvh;
