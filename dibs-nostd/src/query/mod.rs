@@ -11,6 +11,7 @@ mod plane;
 mod proximity;
 mod search;
 mod side;
+mod swept;
 mod tracker;
 
 pub use contacts::{Contact, Contacts};
@@ -18,6 +19,7 @@ pub use cost::Cost;
 pub use options::{Budget, Options};
 pub use proximity::Proximity;
 pub use side::{NoSide, Side};
+pub use swept::{Sweep, Swept};
 pub use tracker::{Fallback, Tracked, Tracker};
 
 use glam::Vec3;

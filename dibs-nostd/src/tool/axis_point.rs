@@ -22,6 +22,11 @@ impl sealed::Sealed for AxisPoint {
     fn axis_span(&self) -> Vec3 {
         Vec3::ZERO
     }
+
+    #[inline(always)]
+    fn towards(&self, to: &Self, share: f32) -> Self {
+        Self(self.0 + (to.0 - self.0) * share)
+    }
 }
 
 impl Tool for AxisPoint {

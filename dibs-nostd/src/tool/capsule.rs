@@ -1,6 +1,8 @@
 //! The capsule: a segment with a radius.
 
-use super::{AxisPair, Tool, ToolError, check_point, check_radius, clamp_any, sealed, triangle};
+use super::{
+    AxisPair, Tool, ToolError, check_point, check_radius, clamp_any, larger, sealed, triangle,
+};
 use crate::math::sqrt::sqrt;
 use crate::math::vec3x4::Vec3x4;
 use glam::{Vec3, Vec4};
@@ -31,6 +33,21 @@ pub(super) struct Axis {
 }
 
 impl Axis {
+    /// The segment from `start` to `end`.
+    #[inline(always)]
+    fn new(start: Vec3, end: Vec3) -> Self {
+        let span = end - start;
+        let length = sqrt(span.dot(span));
+        if length > SHORTEST {
+            // Three divisions rather than one: `length * direction` is then within two roundings of
+            // `span`, however `length` was rounded.
+            let direction = Vec3::new(span.x / length, span.y / length, span.z / length);
+            Self { start, direction, length }
+        } else {
+            Self::point(start)
+        }
+    }
+
     /// A segment of length zero.
     pub(super) fn point(start: Vec3) -> Self {
         Self { start, direction: Vec3::ZERO, length: 0.0 }
@@ -55,17 +72,7 @@ impl Capsule {
         check_point(start)?;
         check_point(end)?;
         check_radius(radius)?;
-        let span = end - start;
-        let length = sqrt(span.dot(span));
-        let axis = if length > SHORTEST {
-            // Three divisions rather than one: `length * direction` is then within two roundings of
-            // `span`, however `length` was rounded.
-            let direction = Vec3::new(span.x / length, span.y / length, span.z / length);
-            Axis { start, direction, length }
-        } else {
-            Axis::point(start)
-        };
-        Ok(Self { axis, radius })
+        Ok(Self { axis: Axis::new(start, end), radius })
     }
 
     /// The segment's first end, as given.
@@ -94,6 +101,13 @@ impl sealed::Sealed for Capsule {
     #[inline(always)]
     fn axis_span(&self) -> Vec3 {
         self.axis.length * self.axis.direction
+    }
+
+    #[inline(always)]
+    fn towards(&self, to: &Self, share: f32) -> Self {
+        let between = |from: Vec3, to: Vec3| from + (to - from) * share;
+        let (start, end) = (between(self.start(), to.start()), between(self.end(), to.end()));
+        Self { axis: Axis::new(start, end), radius: larger(self.radius, to.radius) }
     }
 }
 

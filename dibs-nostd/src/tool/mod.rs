@@ -119,12 +119,15 @@ mod sealed {
 
     use crate::math::vec3x4::Vec3x4;
 
-    pub trait Sealed {
+    pub trait Sealed: Sized {
         /// The shortest vectors from the axis to four points, bit by bit those of one after the other.
         fn axis_to_four(&self, points: &Vec3x4) -> Vec3x4;
 
         /// From the axis' start to its end, each component within 2^-23 of the axis' length.
         fn axis_span(&self) -> Vec3;
+
+        /// The tool after a share of its way to `to`, with the larger radius.
+        fn towards(&self, to: &Self, share: f32) -> Self;
     }
 }
 
@@ -141,6 +144,11 @@ fn check_point(point: Vec3) -> Result<(), ToolError> {
 
 fn check_radius(value: f32) -> Result<(), ToolError> {
     if (0.0..=MAX_COORDINATE).contains(&value) { Ok(()) } else { Err(ToolError::Radius { value }) }
+}
+
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
 }
 
 /// `x` limited to `0..=high`; NaN stays NaN, so that it is never taken for a distance.

@@ -1,6 +1,6 @@
 //! The sphere: a point with a radius.
 
-use super::{AxisPair, Tool, ToolError, check_point, check_radius, sealed, triangle};
+use super::{AxisPair, Tool, ToolError, check_point, check_radius, larger, sealed, triangle};
 use crate::math::vec3x4::Vec3x4;
 use glam::Vec3;
 
@@ -48,6 +48,12 @@ impl sealed::Sealed for Sphere {
     #[inline(always)]
     fn axis_span(&self) -> Vec3 {
         Vec3::ZERO
+    }
+
+    #[inline(always)]
+    fn towards(&self, to: &Self, share: f32) -> Self {
+        let center = self.center + (to.center - self.center) * share;
+        Self { center, radius: larger(self.radius, to.radius) }
     }
 }
 

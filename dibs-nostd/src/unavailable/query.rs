@@ -60,6 +60,11 @@ pub enum QueryError {
         /// Its bits.
         bits: u32,
     },
+    /// A share of the way between two frames that is not in 0..=1.
+    Share {
+        /// Its bits.
+        bits: u32,
+    },
     /// A row outside its table: the tree's bytes changed after they were validated.
     Corrupt {
         /// The row that is missing.
@@ -96,6 +101,9 @@ impl fmt::Display for QueryError {
                 write!(f, "a list cannot hold {capacity} contacts and look at {near} triangles")
             }
             Self::Margin { bits } => write!(f, "a margin cannot be {}", f32::from_bits(bits)),
+            Self::Share { bits } => {
+                write!(f, "a share of the way between frames cannot be {}", f32::from_bits(bits))
+            }
             Self::Corrupt { row } => write!(f, "row {row} is missing: the tree's bytes changed"),
         }
     }

@@ -1,0 +1,161 @@
+//! Between ticks: whether tool and surface, both on their way, come closer than a margin, and when first.
+
+use super::tracker::Tracker;
+use super::{Options, Proximity, Side};
+use crate::math::sqrt::sqrt;
+use crate::unavailable::QueryError;
+use crate::{Index, Step, Tool, VertexTable};
+
+/// What a sweep found. Times are shares of the way: 0 at its start, 1 at its end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub struct Swept {
+    /// Before this time they are certainly not closer than the margin. 1 or more: they never are.
+    pub clear_until: f32,
+    /// The first time at which they were seen within the margin, or farther by no more than the
+    /// [accuracy](Proximity::accuracy) and the rounding of positions on the way. `None` where they never were; then, if
+    /// `clear_until` is less than 1, the looks were too few to tell.
+    pub contact: Option<f32>,
+    /// The closest pair at the end of the way.
+    pub at_end: Proximity,
+    /// How often the tracker was asked.
+    pub looks: u32,
+}
+
+/// The way of tool and surface from one tick to the next: the ends of the tool's axis and the surface's vertices each
+/// go straight and evenly.
+#[derive(Debug)]
+pub struct Sweep<'s, 'v, W: ?Sized, V: ?Sized, T> {
+    /// The surface's frames.
+    pub step: &'s Step<'v, W, V>,
+    /// Where between the frames the surface starts and ends, each in 0..=1.
+    pub shares: [f32; 2],
+    /// The tool at the start and at the end. On its way it has the larger of their radii.
+    pub tools: [T; 2],
+}
+
+impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized, T: Tool> Sweep<'_, '_, W, V, T> {
+    fn check(&self, margin: f32) -> Result<(), QueryError> {
+        // No range contains what is not a number.
+        if !(0.0..f32::INFINITY).contains(&margin) {
+            return Err(QueryError::Margin { bits: margin.to_bits() });
+        }
+        match self.shares.into_iter().find(|share| !(0.0..=1.0).contains(share)) {
+            Some(share) => Err(QueryError::Share { bits: share.to_bits() }),
+            None => Ok(()),
+        }
+    }
+
+    /// Most by which a distance can change on the whole way, rounded up.
+    fn most(&self) -> f32 {
+        const U: f32 = 1.0 / 16_777_216.0;
+        let [from, to] = &self.tools;
+        let start = to.axis_start() - from.axis_start();
+        let end = start + (to.axis_span() - from.axis_span());
+        let (start, end) = (start.length_squared(), end.length_squared());
+        let tool = sqrt(if start > end { start } else { end });
+        let [first, last] = self.shares;
+        let lengths = from.axis_length() + to.axis_length();
+        (tool + (last - first).abs() * self.step.length()) * (1.0 + 16.0 * U) + 8.0 * U * lengths
+    }
+
+    /// How large the numbers are that an instant of the way is computed from.
+    fn size(&self) -> f32 {
+        let of = |tool: &T| tool.axis_start().abs().max_element() + tool.axis_length();
+        let [from, to] = &self.tools;
+        of(from) + of(to) + self.step.length()
+    }
+}
+
+impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OPENED> {
+    /// Whether tool and surface come closer than `margin` (mm, not negative) on their way, and when first.
+    ///
+    /// By conservative advancement (Mirtich 1996): a distance changes by no more than tool and surface
+    /// move, so a pair at one instant clears the time before and after in which its distance cannot be used up. As
+    /// a rule the pair at the end, which a tick asks for anyway, clears the whole way. If not, it goes on from the
+    /// start, at most `looks` times in all. Nothing is jumped over at any speed: time that is not cleared is
+    /// stated as such. The distance is that to the surface itself, from either side.
+    ///
+    /// The stretch in the options must hold on the whole way: that of both frames, by
+    /// [`MeasuredStretch::or_larger`](crate::MeasuredStretch::or_larger). Their budget is that of each look.
+    ///
+    /// Cost: `looks` times that of [`closest`](Self::closest), and once at least.
+    ///
+    /// # Errors
+    /// [`QueryError::Margin`] and [`QueryError::Share`] for what is not in range, and those of
+    /// [`closest`](Self::closest).
+    pub fn sweep<W: VertexTable + ?Sized, V: VertexTable + ?Sized, T: Tool>(
+        &mut self,
+        way: &Sweep<'_, '_, W, V, T>,
+        margin: f32,
+        looks: u32,
+        options: &Options,
+    ) -> Result<Swept, QueryError> {
+        way.check(margin)?;
+        let (most, size) = (way.most(), way.size());
+        let ([from, to], [first, last]) = (&way.tools, way.shares);
+        let mut look = |time: f32, options: &Options| {
+            let tool = from.towards(to, time);
+            let surface = way.step.at(first + time * (last - first));
+            let found = self.closest(&surface, &tool, options)?.closest;
+            Ok(Look::new(found, margin, ROUNDING * (size + found.axis_distance), tool.radius()))
+        };
+        let at_end = look(1.0, options)?;
+        let mut swept = Swept { clear_until: 0.0, contact: None, at_end: at_end.found, looks: 1 };
+        // Cleared from here on.
+        let end = 1.0 - at_end.spare / most * ROUND_DOWN;
+        if at_end.touches {
+            swept.contact = Some(1.0);
+        }
+        let unsigned = options.unsigned();
+        let mut time = 0.0;
+        while swept.looks < looks && !(time > end) {
+            let now = look(time, &unsigned)?;
+            swept.looks += 1;
+            if now.touches {
+                swept.contact = Some(time);
+                break;
+            }
+            let next = time + now.spare / most * ROUND_DOWN;
+            // So little to spare that time stands still.
+            if !(next > time) {
+                break;
+            }
+            time = next;
+        }
+        swept.clear_until = if time > end { ALWAYS } else { time };
+        Ok(swept)
+    }
+}
+
+/// An instant of the way.
+struct Look {
+    found: Proximity,
+    /// How much closer they may come before the margin is reached; 0 if they might be there.
+    spare: f32,
+    /// Whether they are within the margin, as far as can be told.
+    touches: bool,
+}
+
+impl Look {
+    fn new(found: Proximity, margin: f32, rounding: f32, radius: f32) -> Self {
+        let separation = found.axis_distance - radius;
+        // Signed answers are exact; others bound the distance to the surface.
+        let lower = match found.side {
+            Side::Undefined(_) => found.lower,
+            _ => separation,
+        };
+        let error = found.accuracy + rounding;
+        // Written so that nothing is spared that is not a number.
+        let spare = if lower > margin + error { lower - margin - error } else { 0.0 };
+        Self { found, spare, touches: spare <= 0.0 && separation <= margin + error }
+    }
+}
+
+/// After the end of the way.
+const ALWAYS: f32 = 2.0;
+/// Taken off a time, for the rounding of its quotient.
+const ROUND_DOWN: f32 = 1.0 - 8.0 / 16_777_216.0;
+/// Both tool and surface are rounded at an instant, and the instant itself: this much of their size.
+const ROUNDING: f32 = 48.0 / 16_777_216.0;
