@@ -286,6 +286,8 @@ fn a_tracked_path_is_answered_as_whole_queries_are() {
             let apart =
                 |key| tracked[key].as_f64().unwrap() - whole["separation"].as_f64().unwrap();
             assert!(apart("separation").abs() < 1e-3 && apart("lower").abs() < 1e-3, "{tracked}");
+            assert_eq!(tracked["side"], "outside");
+            assert_eq!(tracked["side"], whole["side"]);
             assert_eq!(tracked["fallback"].is_null(), tick > 0, "{tracked}");
             assert!(whole["fallback"].is_null());
         }

@@ -240,7 +240,7 @@ pub fn rows<I: Index>(tree: &Tree<'_, I>, path: &Path, of_mesh: &[Vec3]) -> Resu
 }
 
 /// The side's name, or why there is none.
-fn side_name(side: Side) -> (&'static str, Option<String>) {
+pub fn side_name(side: Side) -> (&'static str, Option<String>) {
     match side {
         Side::Outside => ("outside", None),
         Side::Inside => ("inside", None),

@@ -1,6 +1,6 @@
 //! `dibs track`: a tool on its path about a moving surface, tick by tick.
 
-use crate::query::{STACK, ToolSpec, parse_tool, rows};
+use crate::query::{STACK, ToolSpec, parse_tool, rows, side_name};
 use crate::tree_file::{self, AnyTree};
 use anyhow::{Context, Result, anyhow, bail};
 use dibs_build::Motion;
@@ -170,11 +170,13 @@ impl<I: Index> Session<'_, I> {
         self.fallbacks += usize::from(fallback.is_some());
         let (separation, lower) = (proximity.separation, proximity.lower);
         let (nodes, triangles) = (proximity.node_tests, proximity.triangle_tests);
+        let (side, _) = side_name(proximity.side);
         if self.json {
             let line = serde_json::json!({
                 "tick": tick,
                 "separation": separation,
                 "lower": lower,
+                "side": side,
                 "node_tests": nodes,
                 "triangle_tests": triangles,
                 "fallback": fallback.map(word),
@@ -182,7 +184,10 @@ impl<I: Index> Session<'_, I> {
             writeln!(self.out, "{line}")?;
         } else {
             let fallback = fallback.map_or("", word);
-            writeln!(self.out, "{tick:6} {separation:12.5} {nodes:6} {triangles:5} {fallback}")?;
+            writeln!(
+                self.out,
+                "{tick:6} {separation:12.5} {side:9} {nodes:6} {triangles:5} {fallback}"
+            )?;
         }
         Ok(())
     }
