@@ -65,11 +65,10 @@ pub fn run(memory: &mut Memory, machine: &mut impl Machine) -> Result<(), Fault>
     let count = tree.vertex_count() as usize;
     let [before, after] = frames.each_mut().map(|rows| rows.get_mut(..count));
     let (mut before, mut after) = (before.ok_or(Fault)?, after.ok_or(Fault)?);
-    let mut session = Session {
-        query: Query::new(&tree).map_err(|_| Fault)?,
-        tracker: Tracker::new(&tree).map_err(|_| Fault)?,
-        last: None,
-    };
+    // Where it is made: the board's stack has no room for a second one.
+    let Ok(mut tracker) = Tracker::new(&tree) else { return Err(Fault) };
+    let query = Query::new(&tree).map_err(|_| Fault)?;
+    let mut session = Session { query, tracker: &mut tracker, last: None };
     let mut odometer = Odometer::new(&tree);
     let mut stretch: Option<MeasuredStretch> = None;
     let mut next = word(machine)?;
@@ -88,13 +87,13 @@ pub fn run(memory: &mut Memory, machine: &mut impl Machine) -> Result<(), Fault>
 }
 
 /// The state from frame to frame.
-struct Session<'t> {
+struct Session<'s, 't> {
     query: Query<'t, u16, STACK>,
-    tracker: Tracker<'t, u16, STACK, OPENED>,
+    tracker: &'s mut Tracker<'t, u16, STACK, OPENED>,
     last: Option<TriangleRow>,
 }
 
-impl Session<'_> {
+impl Session<'_, '_> {
     /// The ticks of a frame. Returns the command that is none.
     fn ticks(
         &mut self,
@@ -129,7 +128,7 @@ impl Session<'_> {
         stretch: MeasuredStretch,
         machine: &impl Machine,
     ) -> Result<[u32; ANSWER_WORDS], Fault> {
-        let options = Options::cold().stretch(stretch);
+        let options = Options::cold().unsigned().stretch(stretch);
         let before = machine.clock();
         let tracked = self.tracker.closest(surface, tool, &options).map_err(|_| Fault)?;
         let took = machine.clock().wrapping_sub(before);

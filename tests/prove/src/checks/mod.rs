@@ -21,6 +21,7 @@ mod sanitizers;
 mod stack;
 mod ticks;
 mod torn;
+mod tracked;
 
 use crate::harness::Check;
 
@@ -30,6 +31,7 @@ pub const CHECKS: &[Check] = &[
     cost::BOARD,
     cost::HOST,
     path::CHECK,
+    tracked::CHECK,
     ticks::CHECK,
     bits::CHECK,
     link::CHECK,
