@@ -13,8 +13,8 @@ pub mod track;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::modes::{MAX_MODES, Memo, ModalSurface, Modes};
 use dibs_nostd::{
-    Budget, Capsule, MeasuredStretch, Options, Proximity, Query, QueryError, Sphere, Tool, Tree,
-    TriangleRow, VertexTable, measure_stretch,
+    Budget, Capsule, Contacts, MeasuredStretch, Options, Proximity, Query, QueryError, Sphere,
+    Tool, Tree, TriangleRow, VertexTable, measure_stretch,
 };
 
 /// The meanings of the word at the start of a record.
@@ -36,11 +36,23 @@ pub mod command {
     pub const WEIGHTS: u32 = 4;
 }
 
-/// Words of a query: the axis' ends, the radius, 1 for a capsule and 0 for a sphere, 1 to use the
-/// measured stretch, the warm start or `u32::MAX`, and the budget's node and triangle tests.
+/// How a query is asked: the bits of one of its words.
+pub mod how {
+    /// With the measured stretch.
+    pub const MEASURED: u32 = 1;
+    /// With side and signed separation.
+    pub const SIGNED: u32 = 2;
+    /// With the contacts within [`MARGIN`](super::MARGIN) besides, of a frame of rows.
+    pub const CONTACTS: u32 = 4;
+}
+
+/// Words of a query: the axis' ends, the radius, 1 for a capsule and 0 for a sphere, [`how`] it is asked, the warm
+/// start or `u32::MAX`, and the budget's node and triangle tests.
 pub const QUERY_WORDS: usize = 12;
 /// Words of an answer: what it took on the clock, then everything in a [`Proximity`].
 pub const ANSWER_WORDS: usize = 24;
+/// Margin of the contacts, in mm.
+pub const MARGIN: f32 = 5.0;
 /// Largest tree, in bytes.
 pub const TREE_BYTES: usize = 1 << 20;
 /// Most vertices.
@@ -203,23 +215,41 @@ fn ask(
     let (start, end) = (point(machine)?, point(machine)?);
     let radius = f32::from_bits(word(machine)?);
     let is_capsule = word(machine)? != 0;
-    let use_measured = word(machine)? != 0;
+    let how = word(machine)?;
     let warm = word(machine)?;
     let budget = Budget { node_tests: word(machine)?, triangle_tests: word(machine)? };
-    let mut options = Options::cold().unsigned().budget(budget);
+    let mut options = Options::cold().budget(budget);
+    if how & how::SIGNED == 0 {
+        options = options.unsigned();
+    }
     if warm != u32::MAX {
         options = options.warm_start(Some(TriangleRow(warm)));
     }
-    if use_measured && let Some(measured) = measured {
+    if how & how::MEASURED != 0
+        && let Some(measured) = measured
+    {
         options = options.stretch(measured);
     }
     if is_capsule {
         let tool = Capsule::new(start, end, radius).map_err(|_| Fault)?;
-        timed(query, table, rows, &tool, &options, machine)
+        timed(query, table, rows, &tool, how, &options, machine)
     } else {
         let tool = Sphere::new(start, radius).map_err(|_| Fault)?;
-        timed(query, table, rows, &tool, &options, machine)
+        timed(query, table, rows, &tool, how, &options, machine)
     }
+}
+
+/// The contacts have a stack frame of their own: modal surfaces need the room.
+#[inline(never)]
+fn contacts(
+    query: &mut Query<'_, u16, STACK>,
+    rows: &[Vec3],
+    tool: &impl Tool,
+    options: &Options,
+    machine: &impl Machine,
+) -> Result<[u32; ANSWER_WORDS], Fault> {
+    let mut contacts = Contacts::<8>::new();
+    clocked(machine, || query.contacts(rows, tool, MARGIN, options, &mut contacts))
 }
 
 fn timed(
@@ -227,12 +257,14 @@ fn timed(
     table: &Table<'_>,
     rows: &[Vec3],
     tool: &impl Tool,
+    how: u32,
     options: &Options,
     machine: &impl Machine,
 ) -> Result<[u32; ANSWER_WORDS], Fault> {
     // As a controller has them: behind a pointer that the compiler knows nothing of.
     let rows = core::hint::black_box(rows);
     match table {
+        Table::Rows if how & how::CONTACTS != 0 => contacts(query, rows, tool, options, machine),
         Table::Rows => clocked(machine, || query.closest(rows, tool, options)),
         Table::InRounds => clocked(machine, || query.closest_wide(rows, tool, options)),
         Table::Modal(surface) => clocked(machine, || query.closest(surface, tool, options)),

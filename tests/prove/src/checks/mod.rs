@@ -8,6 +8,7 @@ pub mod cost;
 mod demo;
 mod demo_faults;
 mod fuzz;
+mod hand;
 mod host_faults;
 pub mod instructions;
 mod interleavings;
@@ -18,6 +19,8 @@ mod path;
 mod receive;
 mod rot;
 mod sanitizers;
+mod sides;
+mod signed;
 mod stack;
 mod ticks;
 mod torn;
@@ -28,11 +31,14 @@ use crate::harness::Check;
 /// All checks, in the order of the document.
 pub const CHECKS: &[Check] = &[
     anytime::CHECK,
+    sides::CHECK,
+    hand::CHECK,
     cost::BOARD,
     cost::HOST,
     path::CHECK,
     tracked::CHECK,
     ticks::CHECK,
+    signed::CHECK,
     bits::CHECK,
     link::CHECK,
     stack::CHECK,

@@ -6,7 +6,7 @@ use xtask::steps::Outcome;
 use crate::harness::figures::Figures;
 use crate::harness::promise::{Bound, Promise, criteria::TIMING, golden, note};
 use crate::harness::{Check, Effort};
-use crate::probe::script::{Knows, Record, Script};
+use crate::probe::script::{Asks, Knows, Record, Script};
 use crate::probe::{Answers, board, build_for_board, on_board};
 
 pub const CHECK: Check = Check {
@@ -67,9 +67,9 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let program = build_for_board(&board()?, "probe")?;
     let ask = |script: Script| on_board(&program, &script, true);
     for (name, knows) in [("warm", Knows::Everything), ("cold", Knows::Nothing)] {
-        tell(name, &ask(Script::beating(effort.ticks, knows))?, figures);
+        tell(name, &ask(Script::beating(effort.ticks, knows, Asks::Distance))?, figures);
     }
-    tell("poses", &ask(Script::poses(effort.poses, 41))?, figures);
+    tell("poses", &ask(Script::poses(effort.poses, Asks::Distance, 41))?, figures);
     Ok(Outcome::Passed)
 }
 

@@ -5,6 +5,8 @@
 pub struct Effort {
     /// Cases on this computer.
     pub cases: usize,
+    /// Poses whose side must be right.
+    pub sides: usize,
     /// Queries that must give the same bits.
     pub bits: usize,
     /// Queries that must keep to their bound.
@@ -39,6 +41,7 @@ impl Effort {
     /// The sizes that the documents state.
     pub const FULL: Self = Self {
         cases: 1_000_000,
+        sides: 1_000_000,
         bits: 100_000,
         costs: 100_000,
         host_costs: 100_000,
@@ -57,6 +60,7 @@ impl Effort {
     /// The sizes that every run of the tests can afford.
     pub const TEST: Self = Self {
         cases: 100_000,
+        sides: 4_000,
         bits: 10_000,
         costs: 10_000,
         host_costs: 5_000,
@@ -80,6 +84,7 @@ impl Effort {
         let least = Self::TEST;
         Self {
             cases: wide(self.cases, least.cases),
+            sides: wide(self.sides, least.sides),
             bits: wide(self.bits, least.bits),
             costs: wide(self.costs, least.costs),
             host_costs: wide(self.host_costs, least.host_costs),

@@ -13,12 +13,14 @@ use dibs_tests::streams::Beat;
 use dibs_tests::surfaces;
 use fastrand::Rng;
 use glam::Vec3;
-use probe::command;
+use probe::{command, how};
 
 /// A script, and how many queries are in it.
 #[derive(Default)]
 pub struct Script {
     words: Vec<u32>,
+    /// How every query is asked, besides with the measured stretch or without.
+    how: u32,
     /// The kind of each answer, by its place.
     pub records: Vec<Record>,
 }
@@ -68,6 +70,27 @@ pub enum Knows {
     Nothing,
     /// The last tick's triangle, and the measured stretch of its own frame.
     Everything,
+}
+
+/// What a query is asked for.
+#[derive(Clone, Copy)]
+pub enum Asks {
+    /// The unsigned distance.
+    Distance,
+    /// Side and signed separation too.
+    Side,
+    /// And contacts within [`probe::MARGIN`].
+    Contacts,
+}
+
+impl Asks {
+    fn how(self) -> u32 {
+        match self {
+            Self::Distance => 0,
+            Self::Side => how::SIGNED,
+            Self::Contacts => how::SIGNED | how::CONTACTS,
+        }
+    }
 }
 
 /// A surface to ask about, and the most triangles of a leaf of its tree.
@@ -155,8 +178,9 @@ impl Script {
 
     /// The generated heart as it beats and the capsule of table 3, at ticks spread over the whole path:
     /// each on the surface of its own tick.
-    pub fn beating(ticks: u32, knows: Knows) -> Self {
+    pub fn beating(ticks: u32, knows: Knows, asks: Asks) -> Self {
         let (mut script, built, motion) = Self::heart();
+        script.how = asks.how();
         let tree = built.tree::<u16>().expect("16-bit indices");
         let beat = Beat::new(&motion);
         let mut query = Query::<_, 512>::new(&tree).expect("a stack that is large enough");
@@ -182,9 +206,10 @@ impl Script {
     }
 
     /// The same heart in its motion, with capsules where it hurts: on, in, through and far from it.
-    pub fn poses(queries: usize, seed: u64) -> Self {
+    pub fn poses(queries: usize, asks: Asks, seed: u64) -> Self {
         let mut rng = Rng::with_seed(seed);
         let (mut script, built, motion) = Self::heart();
+        script.how = asks.how();
         let triangles = surfaces::triangles(&built.tree::<u16>().expect("16-bit indices"));
         let frames = motion.frames.iter().step_by(motion.frames.len().div_ceil(FRAMES_OF_POSES));
         let of_each = queries.div_ceil(frames.len());
@@ -336,7 +361,8 @@ impl Script {
         let points = [tool.start, tool.end].map(|p| p.to_array().map(f32::to_bits));
         self.words.extend(points.as_flattened());
         self.words.push(tool.radius.to_bits());
-        self.words.extend([u32::from(is_capsule), u32::from(measured), warm]);
+        let how = self.how | if measured { how::MEASURED } else { 0 };
+        self.words.extend([u32::from(is_capsule), how, warm]);
         self.words.extend([budget.node_tests, budget.triangle_tests]);
         self.records.push(Record::Query { is_capsule, deadline });
     }

@@ -1,0 +1,62 @@
+//! A simulated hand that leans on the constraint: held by all contacts, not always by the closest pair alone.
+
+use anyhow::Result;
+use dibs_tests::hand::{PUSH, Pushed, scenes};
+use xtask::steps::Outcome;
+
+use crate::harness::figures::Figures;
+use crate::harness::promise::{Bound, Promise, criteria::FLOW, note};
+use crate::harness::{Check, Effort};
+
+pub const CHECK: Check = Check {
+    name: "a hand on this computer",
+    run: check,
+    promises: &[
+        Promise {
+            id: "hand.through",
+            says: "A simulated hand does not get through: flat wall, corner, gap, groove, sphere, beating heart",
+            criterion: FLOW,
+            bound: Bound::Is(0.0),
+            unit: "of {hand.scenes} got the instrument's centre through; the least separation of an instrument of 1 mm was \
+         {hand.least} mm",
+            limits: "200 g, 20 N s/m, pushed with {hand.push} N of 5 for 4 s at 1 kHz; 1 N/mm, 2 N s/m, margin 5 mm.",
+        },
+        Promise {
+            id: "hand.alone",
+            says: "The closest pair alone lets it through: in the corner, and in the groove, whose walls lean 12 degrees from upright",
+            criterion: FLOW,
+            bound: Bound::AtLeast(1.0),
+            unit: "of {hand.scenes}",
+            limits: "The same hand.",
+        },
+        note("hand.scenes"),
+        note("hand.least"),
+        note("hand.push"),
+        Promise {
+            id: "hand.step",
+            says: "The largest change of the force from one tick to the next",
+            criterion: FLOW,
+            bound: Bound::Informs,
+            unit: "N by all contacts; {hand.step.alone} N by the closest pair alone",
+            limits: "The same pushes, the first contact among them.",
+        },
+        note("hand.step.alone"),
+    ],
+};
+
+fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
+    let scenes = scenes();
+    let push = |by_all| scenes.iter().map(|scene| scene.push(by_all)).collect::<Vec<Pushed>>();
+    let (all, alone) = (push(true), push(false));
+    let through = |pushed: &[Pushed]| pushed.iter().filter(|one| one.is_through()).count() as f64;
+    let rounded = |x: f32| (f64::from(x) * 1e3).round() / 1e3;
+    let step = |pushed: &[Pushed]| rounded(pushed.iter().fold(0.0, |most, one| one.step.max(most)));
+    figures.note("hand.through", through(&all));
+    figures.note("hand.alone", through(&alone));
+    figures.note("hand.scenes", scenes.len() as f64);
+    figures.note("hand.least", rounded(all.iter().fold(f32::INFINITY, |a, b| a.min(b.least))));
+    figures.note("hand.push", rounded(PUSH));
+    figures.note("hand.step", step(&all));
+    figures.note("hand.step.alone", step(&alone));
+    Ok(Outcome::Passed)
+}
