@@ -112,7 +112,7 @@ fn limits_are_learned_from_a_motion_and_hold_it() {
     assert!(std::fs::read_to_string(folder.join("heart.svg")).unwrap().contains("<svg"));
     assert!(succeeds(folder, "stretch heart.ply heart.pc2 --edges").contains("worst    triangle"));
 
-    // What is learned holds the motion; less does not, and says which triangle and what to do.
+    // The learned limits hold the motion. Lower ones do not: the error names a triangle and the remedy.
     let built = json(
         folder,
         "build heart.ply -o heart.dibs --limits heart.limits --motion heart.pc2 --json",

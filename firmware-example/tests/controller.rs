@@ -26,6 +26,15 @@ fn firmware_tree() -> &'static surface::Tree {
     TREE.get_or_init(|| surface::TREE.validate().expect("valid"))
 }
 
+/// A controller's two ends, and its notes.
+fn controller() -> (Receiver, Control, &'static BusStatus) {
+    let frames: &'static Surface = Box::leak(Box::new(Surface::new()));
+    let bus: &'static BusStatus = Box::leak(Box::new(BusStatus::new()));
+    let (writer, reader) = frames.split().unwrap();
+    let receiver = Receiver::new(firmware_tree(), writer, bus).unwrap();
+    (receiver, Control::new(firmware_tree(), reader, bus).unwrap(), bus)
+}
+
 /// The sending side: the generated heart, in the tree's order.
 struct Sender {
     frames: Vec<Vec<Vec3>>,
@@ -99,11 +108,7 @@ fn force(tick: &Tick) -> f32 {
 
 #[test]
 fn every_answer_is_that_of_one_whole_frame() {
-    static FRAMES: Surface = Surface::new();
-    static BUS: BusStatus = BusStatus::new();
-    let (writer, reader) = FRAMES.split().unwrap();
-    let mut receiver = Receiver::new(firmware_tree(), writer, &BUS).unwrap();
-    let mut control = Control::new(firmware_tree(), reader, &BUS).unwrap();
+    let (mut receiver, mut control, bus) = controller();
     let mut sender = Sender::new();
 
     let first = control.tick(|| 0);
@@ -131,20 +136,16 @@ fn every_answer_is_that_of_one_whole_frame() {
                 if force(&tick) > 0.0 { acting += 1 } else { free += 1 }
             }
         }
-        assert_eq!(BUS.published(), epoch);
+        assert_eq!(bus.published(), epoch);
     }
-    assert_eq!(BUS.rejected(), 0);
+    assert_eq!(bus.rejected(), 0);
     assert!(answers > 10_000 && checked > 2_000, "{answers} answers, {checked} checked");
     assert!(acting > 100 && free > 100, "the wall acted {acting} times and was still {free} times");
 }
 
 #[test]
 fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
-    static FRAMES: Surface = Surface::new();
-    static BUS: BusStatus = BusStatus::new();
-    let (writer, reader) = FRAMES.split().unwrap();
-    let mut receiver = Receiver::new(firmware_tree(), writer, &BUS).unwrap();
-    let mut control = Control::new(firmware_tree(), reader, &BUS).unwrap();
+    let (mut receiver, mut control, bus) = controller();
     let mut sender = Sender::new();
     let mut feed = |bytes: &[u8], now: u32| {
         for &byte in bytes {
@@ -158,8 +159,8 @@ fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
     damaged[9_000] ^= 4;
     feed(&damaged, control.now());
     let tick = control.tick(|| 0);
-    assert_eq!((tick.epoch, BUS.published()), (1, 1), "the damaged frame is not acted on");
-    assert!(BUS.rejected() > 0);
+    assert_eq!((tick.epoch, bus.published()), (1, 1), "the damaged frame is not acted on");
+    assert!(bus.rejected() > 0);
 
     // The line is cut: two seconds later, to the tick, the output is safe.
     assert_eq!(tick.state, State::Nominal as u32);
@@ -209,15 +210,11 @@ fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
     }
 }
 
-/// What the age alone does not show: a frame that was long on its way, one that was old when it was sent, one of which
-/// nobody knows, and frames that are refused in a row. And a good one recovers.
+/// The age alone does not show a frame that was long on its way, one that was old when it was sent, one without an echo,
+/// or a row of refused frames. Each makes the output safe, and a good frame recovers.
 #[test]
 fn a_late_frame_an_old_one_and_a_row_of_refused_ones_make_the_output_safe() {
-    static FRAMES: Surface = Surface::new();
-    static BUS: BusStatus = BusStatus::new();
-    let (writer, reader) = FRAMES.split().unwrap();
-    let mut receiver = Receiver::new(firmware_tree(), writer, &BUS).unwrap();
-    let mut control = Control::new(firmware_tree(), reader, &BUS).unwrap();
+    let (mut receiver, mut control, _bus) = controller();
     let mut sender = Sender::new();
     control.skip(100_000);
     let mut epoch = 0;

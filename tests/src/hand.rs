@@ -20,7 +20,7 @@ const DAMPING: f32 = 0.002;
 const MOST: f32 = 5.0;
 const MARGIN: f32 = 5.0;
 
-/// What the hand pushes with (N): nine tenths of the saturation.
+/// The hand's push (N): nine tenths of the saturation.
 pub const PUSH: f32 = 0.9 * MOST;
 
 /// The hand's mass (200 g, in N s^2/mm) and damper (N s/mm), and the instrument's radius (mm).
@@ -28,7 +28,7 @@ const MASS: f32 = 2e-4;
 const DAMPER: f32 = 0.02;
 const RADIUS: f32 = 1.0;
 
-/// What is pushed into, from where, and which way.
+/// A surface, the place that the hand starts from, and the direction of its push.
 pub struct Scene {
     /// Its name.
     pub name: &'static str,
@@ -38,7 +38,7 @@ pub struct Scene {
     push: Vec3,
 }
 
-/// What became of a push.
+/// The outcome of a push.
 #[derive(Clone, Copy, Debug)]
 pub struct Pushed {
     /// Least signed separation (mm): below minus the radius the instrument's centre was through the surface.

@@ -9,6 +9,7 @@ use dibs_nostd::{Capsule, NoSide, Options, Query, Side, Sphere};
 use fastrand::Rng;
 use glam::Vec3;
 
+use crate::deform::unit;
 use crate::oracle::{Instrument, exhaustive};
 use crate::sides;
 use crate::surfaces::{self, ball};
@@ -21,7 +22,7 @@ pub struct Closed {
     pub mesh: Mesh,
     /// Its tree.
     pub built: BuiltTree,
-    /// Of the poses.
+    /// Its share of the poses.
     pub share: usize,
 }
 
@@ -68,16 +69,6 @@ pub fn bent(mesh: &Mesh, rng: &mut Rng) -> Vec<Vec3> {
     mesh.positions.iter().map(bend).collect()
 }
 
-/// A direction.
-pub fn unit(rng: &mut Rng) -> Vec3 {
-    loop {
-        let v = Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5);
-        if v.length_squared() > 0.01 && v.length_squared() < 0.25 {
-            return v.normalize();
-        }
-    }
-}
-
 /// A point next to a vertex, an edge, a face or a sliver, in a fold, or anywhere; and how far off it was put.
 ///
 /// # Panics
@@ -99,14 +90,14 @@ pub fn point(rows: &[Vec3], triangles: &[[u32; 3]], rng: &mut Rng) -> Vec3 {
     }
 }
 
-/// What became of poses.
+/// How many poses came to which end.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Tally {
     /// Poses.
     pub poses: usize,
-    /// Of which the axis is inside.
+    /// Poses whose axis is inside.
     pub inside: usize,
-    /// Of which the side is undefined.
+    /// Poses whose side is undefined.
     pub undefined: usize,
     /// Undefined though at least a hundredth of a mm away.
     pub undefined_away: usize,
@@ -114,7 +105,7 @@ pub struct Tally {
     pub away: usize,
     /// The surface is shown to cut itself there: the side is that of the nearest sheet.
     pub self_cut: usize,
-    /// Of which side or separation is wrong.
+    /// Poses whose side or separation is wrong.
     pub wrong: usize,
 }
 
@@ -181,7 +172,7 @@ pub fn judge(surface: &Closed, seed: u64) -> Tally {
             Side::Outside => false,
             Side::Inside => true,
             Side::Crossing => {
-                // What the depth of a crossing axis may be off is its own test's matter.
+                // Depths have a test of their own.
                 tally.wrong += usize::from(pair.axis_distance > f64::from(found.accuracy));
                 continue;
             }

@@ -4,6 +4,7 @@ use dibs_build::Builder;
 use dibs_nostd::constraint::{Proxy, SpringDamper};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Contact, Contacts, Options, Query, Sphere};
+use dibs_tests::deform::unit;
 use dibs_tests::surfaces::sheet;
 use fastrand::Rng;
 use glam::{DMat3, DVec3, Vec3};
@@ -90,15 +91,6 @@ fn truth(walls: &[Wall]) -> ([DVec3; 2], Vec<f64>) {
         }
     }
     panic!("one set is right: {walls:?}");
-}
-
-fn unit(rng: &mut Rng) -> Vec3 {
-    loop {
-        let v = Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5);
-        if v.length_squared() > 0.01 && v.length_squared() < 0.25 {
-            return v.normalize();
-        }
-    }
 }
 
 /// Up to eight walls: anyhow, nearly the same, in pairs that face each other, or around a groove's axis.

@@ -8,8 +8,9 @@ use dibs_nostd::{
     Budget, Capsule, FormatError, NoSide, Options, Proximity, Query, Side, Sphere, Tool, Tree,
     TriangleRow,
 };
+use dibs_tests::deform::unit;
 use dibs_tests::oracle::{Instrument, exhaustive};
-use dibs_tests::side_poses::{POSES_OF_A_FRAME, Tally, bent, closed, judge, point, unit};
+use dibs_tests::side_poses::{POSES_OF_A_FRAME, Tally, bent, closed, judge, point};
 use dibs_tests::sides;
 use dibs_tests::surfaces::{self, ball, slivers};
 use dibs_tests::tree_bytes::{reseal, section};

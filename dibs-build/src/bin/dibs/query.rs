@@ -214,7 +214,7 @@ fn current(path: &Path, frame: Option<usize>) -> Result<Vec<Vec3>> {
             Ok(frames.swap_remove(frame))
         }
         (false, Some(_)) => bail!("{name}: --frame needs a .pc2 file"),
-        // The tree has decided what is connected.
+        // The tree is of the largest component: others are no error here.
         (false, None) => {
             let options = ReadOptions { largest_component: true, ..Import::options() };
             Ok(options.read(path)?.mesh.positions)

@@ -13,8 +13,9 @@ use crate::unavailable::Unavailable;
 /// `F = min(max_force, max(0, K (margin - d) - B v))` for `d < margin`, else 0,
 ///
 /// where `v` is the tool's speed out of the surface, negative on approach. Inside, `d` is below zero, and the spring
-/// grows with the depth up to saturation. When a budget cut the query short, the size of the force is for the nearest
-/// place where the surface could be, its direction that of the best pair found.
+/// grows with the depth up to saturation. Where a budget cut the query short, the side is unknown, and the output is the
+/// hold. Of a query without sides ([`Options::unsigned`](crate::Options::unsigned)), `lower` stands for the nearest place
+/// where the surface could be, and the direction is that of the best pair found.
 ///
 /// ```
 /// use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};

@@ -5,9 +5,9 @@
 //!
 //! `c |t|^2 + sum of max(0, wanted - normal . t)^2`, `wanted = (1 + c) depth`, or the depth itself below 0,
 //!
-//! of three unknowns, of which the walls whose term is not 0 *act*. While these stay the same it is quadratic. From no
-//! displacement at all, where every wall acts whose depth is above 0, a step leads towards the least of the present quadratic, as far as the
-//! first place where a wall ceases to act or begins. The next step goes on to the same side of that place, for the one
+//! of three unknowns. A wall *acts* where its term is not 0, and while the same walls act, the function is quadratic. The
+//! search starts without displacement, where every wall acts whose depth is above 0. A step leads towards the least of
+//! the present quadratic, as far as the first place where a wall ceases to act or begins. The next step goes on to the same side of that place, for the one
 //! wall does not turn it (Sherman & Morrison), so every step lowers the function, and one that meets no such place
 //! ends at its least.
 
@@ -42,7 +42,7 @@ impl Wall {
         Self { normal, wanted, acts: depth > 0.0 }
     }
 
-    /// How far a displacement stays below what the wall asks for, as far as it does.
+    /// The part of the wanted displacement that is missing (mm); 0 where none is.
     pub fn above(&self, moved: Vec3) -> f32 {
         let left = self.left(moved);
         // Written so that NaN stays.

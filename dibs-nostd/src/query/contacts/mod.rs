@@ -155,8 +155,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         self.found.count == 0
     }
 
-    /// The contacts, deepest first, for a constraint that acts within `margin` (mm), at most that of the query. A list
-    /// that is full has the deepest, which is no error here.
+    /// The contacts, deepest first, for a constraint that acts within `margin` (mm). A full list is no error: it has the
+    /// deepest.
     ///
     /// # Errors
     /// [`Unavailable::CutShort`] if the budget ended before all within the margin were known, or no query filled the
@@ -260,8 +260,8 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     ///
     /// Two valleys of the distance are one contact unless a ridge of more than a 64th of the margin parts them, so a
     /// flat wall along a capsule is one. Pairs with the inner side of a sheet, say the far side of an organ, are
-    /// none. Where the side is undefined the tool is taken to be outside; where it is because the budget ended, nothing is
-    /// certain about those that are not in the list.
+    /// none. Where the side is undefined the tool is taken to be outside. If that is because the budget ended, contacts
+    /// may be missing at any distance: see [`Contacts::within`].
     ///
     /// Cost: that of [`closest`](Self::closest), a range search, and some hundred instructions a triangle within the
     /// margin.

@@ -1,8 +1,5 @@
 //! Instructions of receiving a frame and checking its stretch on the board, a vertex and a packet.
 
-use std::fs;
-use std::path::Path;
-
 use anyhow::{Result, ensure};
 use dibs_build::stream::{Sender, Settings, SurfaceOrder};
 use dibs_build::{Builder, BuiltTree, IndexWidth, Motion, generate};
@@ -14,7 +11,7 @@ use xtask::steps::Outcome;
 use crate::harness::figures::Figures;
 use crate::harness::promise::{Bound, Promise, criteria::TIMING, golden};
 use crate::harness::{Check, Effort};
-use crate::probe::{COUNTING, board, build_for_board, run_on_board};
+use crate::probe::{COUNTING, board, build_for_board, padded, run_on_board};
 
 pub const CHECK: Check = Check {
     name: "receiving on the board",
@@ -83,11 +80,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
         script.frames(way, &built, &motion)?;
     }
     script.words.push(0);
-    let answers = run_on_board(&program, &script.finish(), COUNTING, |answers: &Path| {
-        let bytes = fs::read(answers)?;
-        let words = bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-        Ok(words.collect::<Vec<_>>())
-    })?;
+    let answers = run_on_board(&program, &script.finish(), COUNTING)?;
     let (answers, _) = answers.as_chunks::<ANSWER_WORDS>();
     ensure!(answers.len() == FRAMES * WAYS.len(), "{} frames answered", answers.len());
     let mut a_packet = Vec::new();
@@ -121,12 +114,7 @@ struct Script {
 impl Script {
     fn bytes(&mut self, bytes: &[u8]) {
         self.words.push(bytes.len() as u32);
-        let word = |part: &[u8]| {
-            let mut bytes = [0; 4];
-            bytes[..part.len()].copy_from_slice(part);
-            u32::from_le_bytes(bytes)
-        };
-        self.words.extend(bytes.chunks(4).map(word));
+        self.words.extend(padded(bytes));
     }
 
     /// Frames of one way, in a session of their own.

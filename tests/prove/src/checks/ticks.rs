@@ -1,9 +1,6 @@
 //! The longest control tick: the firmware's own receiver and tick on the emulated board, on frames that it admits and
 //! that a search chose to make the tick dear.
 
-use std::fs;
-use std::path::Path;
-
 use anyhow::{Context, Result, ensure};
 use controller::surface::{self, CENTRE, REACH};
 use controller::{BUDGET, MTU, TICK_INSTRUCTIONS, instrument};
@@ -28,7 +25,7 @@ use xtask::steps::Outcome;
 use crate::harness::figures::Figures;
 use crate::harness::promise::{Bound, Promise, criteria::TIMING, note};
 use crate::harness::{Check, Effort};
-use crate::probe::{COUNTING, board, run_on_board};
+use crate::probe::{COUNTING, board, padded, run_on_board};
 
 pub const CHECK: Check = Check {
     name: "ticks on adversarial frames",
@@ -88,11 +85,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
         script.frame(FrameId { mesh_id, session: 1, epoch }, frame)?;
     }
     script.words.push(END);
-    let answers = run_on_board(&program, &script.bytes(), COUNTING, |file: &Path| {
-        let bytes = fs::read(file)?;
-        let words = bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-        Ok(words.collect::<Vec<_>>())
-    })?;
+    let answers = run_on_board(&program, &script.bytes(), COUNTING)?;
     let (answers, _) = answers.as_chunks::<ANSWER_WORDS>();
     let expected = frames.len() * (1 + TICKS as usize);
     ensure!(answers.len() == expected, "{} ticks answered, not {expected}", answers.len());
@@ -260,12 +253,7 @@ impl Script {
     fn bytes_of(&mut self, lines: &[Vec<u8>]) {
         let bytes = lines.concat();
         self.words.extend([BYTES, bytes.len() as u32]);
-        let word = |part: &[u8]| {
-            let mut bytes = [0; 4];
-            bytes[..part.len()].copy_from_slice(part);
-            u32::from_le_bytes(bytes)
-        };
-        self.words.extend(bytes.chunks(4).map(word));
+        self.words.extend(padded(&bytes));
     }
 
     fn bytes(&self) -> Vec<u8> {

@@ -1,8 +1,5 @@
 //! What a tick of a tracker takes on the board: the paper's moving tool about a heart that moves at every tick.
 
-use std::fs;
-use std::path::Path;
-
 use anyhow::{Result, ensure};
 use dibs_build::{Builder, IndexWidth, generate};
 use dibs_nostd::Tool;
@@ -114,15 +111,11 @@ struct Tick {
     apart: f32,
 }
 
-fn read(file: &Path) -> Result<Vec<Tick>> {
-    let bytes = fs::read(file)?;
-    let (words, rest) = bytes.as_chunks::<4>();
-    ensure!(rest.is_empty(), "{}: not whole words", file.display());
-    let words: Vec<u32> = words.iter().copied().map(u32::from_le_bytes).collect();
+fn read(words: &[u32]) -> Result<Vec<Tick>> {
     // The board's clock counts 1.6 to each instruction.
     let instructions = |clock: u32| (u64::from(clock) * 5 / 8) as u32;
     let (answers, rest) = words.as_chunks::<ANSWER_WORDS>();
-    ensure!(rest.is_empty(), "{}: not whole answers", file.display());
+    ensure!(rest.is_empty(), "an answer is not whole");
     Ok(answers
         .iter()
         .map(|&[took, whole, nodes, triangles, fallback, _, _, apart]| Tick {
@@ -139,7 +132,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let program = build_for_board(&board()?, "track")?;
     let (mut apart, mut fallbacks) = (0.0_f32, 0);
     for (name, surface) in [("", Surface::Interpolated), (".held", Surface::Held)] {
-        let ticks = run_on_board(&program, &script(surface), COUNTING, read)?;
+        let ticks = read(&run_on_board(&program, &script(surface), COUNTING)?)?;
         ensure!(ticks.len() == TICKS as usize, "{} ticks of {TICKS} answered", ticks.len());
         let ticks = &ticks[1..];
         let mut taken: Vec<u32> = ticks.iter().map(|tick| tick.instructions).collect();

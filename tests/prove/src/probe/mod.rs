@@ -49,10 +49,7 @@ pub struct Answers {
 }
 
 impl Answers {
-    fn read(file: &Path, script: &Script) -> Result<Self> {
-        let bytes = fs::read(file).with_context(|| format!("no answers in {}", file.display()))?;
-        let words = bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-        let words: Vec<u32> = words.collect();
+    fn new(words: Vec<u32>, script: &Script) -> Result<Self> {
         let expected: usize = script.records.iter().map(|&record| length(record)).sum();
         ensure!(words.len() == expected, "{} words answered, not {expected}", words.len());
         Ok(Self { words, records: script.records.clone(), counts: None })
@@ -100,24 +97,36 @@ pub fn build_for_board(cross: &Cross, name: &str) -> Result<PathBuf> {
 /// Answers on the emulated board; with `count`, its clock counts instructions.
 pub fn on_board(program: &Path, script: &Script, count: bool) -> Result<Answers> {
     let time = if count { COUNTING } else { Time::Real };
-    run_on_board(program, &script.bytes(), time, |file| Answers::read(file, script))
+    Answers::new(run_on_board(program, &script.bytes(), time)?, script)
 }
 
 /// The board's clock counts 1.6 to each instruction.
 pub const COUNTING: Time = Time::Counted(6);
 
-/// Runs a program on the emulated board that reads a script, and reads its answers.
-pub fn run_on_board<T>(
-    program: &Path,
-    script: &[u8],
-    time: Time,
-    read: impl FnOnce(&Path) -> Result<T>,
-) -> Result<T> {
+/// Runs a program on the emulated board that reads a script, and returns the words that it answers.
+pub fn run_on_board(program: &Path, script: &[u8], time: Time) -> Result<Vec<u32>> {
     let folder = tempfile::tempdir()?;
     fs::write(folder.path().join("script.bin"), script)?;
     let mut qemu = qemu::alone(program, time, &[]);
     run(qemu.current_dir(folder.path()).stdin(Stdio::null()))?;
-    read(&folder.path().join("answers.bin"))
+    words(&folder.path().join("answers.bin"))
+}
+
+/// The little-endian words of a file.
+fn words(file: &Path) -> Result<Vec<u32>> {
+    let bytes = fs::read(file).with_context(|| format!("no answers in {}", file.display()))?;
+    let (words, rest) = bytes.as_chunks();
+    ensure!(rest.is_empty(), "{}: not whole words", file.display());
+    Ok(words.iter().copied().map(u32::from_le_bytes).collect())
+}
+
+/// Bytes as little-endian words, padded with zeros.
+pub fn padded(bytes: &[u8]) -> impl Iterator<Item = u32> {
+    bytes.chunks(4).map(|part| {
+        let mut word = [0; 4];
+        word[..part.len()].copy_from_slice(part);
+        u32::from_le_bytes(word)
+    })
 }
 
 /// How often each instruction of the functions between these addresses is executed while a script is
@@ -244,5 +253,5 @@ fn answer(program: &mut Command, folder: &Path, script: &Script) -> Result<Answe
     let (script_file, answers) = (folder.join("script"), folder.join("answers"));
     fs::write(&script_file, script.bytes())?;
     run(program.arg(&script_file).arg(&answers))?;
-    Answers::read(&answers, script)
+    Answers::new(words(&answers)?, script)
 }

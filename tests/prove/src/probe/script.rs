@@ -276,12 +276,7 @@ impl Script {
     fn tree(&mut self, built: &BuiltTree) {
         let blob = built.blob();
         self.words.extend([command::TREE, blob.len() as u32]);
-        let word = |part: &[u8]| {
-            let mut bytes = [0; 4];
-            bytes[..part.len()].copy_from_slice(part);
-            u32::from_le_bytes(bytes)
-        };
-        self.words.extend(blob.chunks(4).map(word));
+        self.words.extend(super::padded(blob));
     }
 
     fn frame(
