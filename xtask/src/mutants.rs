@@ -15,18 +15,27 @@ use xtask::workspace;
 /// Version that the lists of survivors are written for.
 const VERSION: &str = "27.1.0";
 
-/// Folders of the core, and the tests that a mutant of theirs is tried on: few, so that it takes seconds.
-const AREAS: [(&str, &[&str]); 6] = [
-    ("dibs-nostd/src/tool", &["kernels", "query"]),
-    ("dibs-nostd/src/query", &["query", "slack", "wide", "positions", "tracker", "differential"]),
-    ("dibs-nostd/src/tree", &["format", "query"]),
-    ("dibs-nostd/src/stretch", &["stretch", "plausible"]),
-    ("dibs-nostd/src/modes", &["modes_bound", "modes"]),
+/// Folders of the core, the programs of tests that a mutant of theirs is tried on, and the tests in them: few, so that
+/// it takes seconds.
+const AREAS: [(&str, &[&str], &[&str]); 6] = [
+    ("dibs-nostd/src/tool", &["query"], &["kernels", "refusals"]),
+    (
+        "dibs-nostd/src/query",
+        &["query"],
+        &["refusals", "slack", "wide", "positions", "tracker", "differential"],
+    ),
+    ("dibs-nostd/src/tree", &["tree", "query"], &["format", "refusals"]),
+    ("dibs-nostd/src/stretch", &["surface"], &["stretch", "plausible"]),
+    ("dibs-nostd/src/modes", &["surface"], &["modes_bound", "modes"]),
     (
         "dibs-nostd/src/bus",
-        &["bus", "bus_order", "bus_partial", "bus_causes", "bus_attacks", "bus_authenticity"],
+        &["bus"],
+        &["complete", "order", "partial", "causes", "attacks", "authenticity"],
     ),
 ];
+
+/// In the paths of all unit tests of the core.
+const UNIT_TESTS: &str = "tests::";
 
 /// The exit code of cargo-mutants where mutants survived.
 const SURVIVED: i32 = 2;
@@ -64,17 +73,17 @@ pub fn mutants(options: &Options) -> Result<()> {
 fn whole(options: &Options) -> Result<()> {
     install()?;
     let mut areas = 0;
-    for (folder, tests) in AREAS {
+    for (folder, programs, tests) in AREAS {
         if folder.starts_with(&options.below) || options.below.starts_with(folder) {
             let below = if folder.len() > options.below.len() { folder } else { &options.below };
             let is_file = workspace::root().join(below).is_file();
             let filter = if is_file { below.to_owned() } else { format!("{below}/**") };
-            run(&mut command(&["--file", &filter, "--shard", &options.shard], tests))
+            run(&mut command(&["--file", &filter, "--shard", &options.shard], programs, tests))
                 .with_context(|| format!("mutants of {below} survive: see target/mutants.out"))?;
             areas += 1;
         }
     }
-    let folders = AREAS.map(|(folder, _)| folder).join(", ");
+    let folders = AREAS.map(|(folder, ..)| folder).join(", ");
     ensure!(areas > 0, "no tests are known for {}: only for {folders}", options.below);
     Ok(())
 }
@@ -91,14 +100,15 @@ pub fn sample() -> Result<Outcome> {
     fs::write(&diff, changes).with_context(|| format!("cannot write {}", diff.display()))?;
     let diff = diff.display().to_string();
     let mut tried = 0;
-    for (folder, tests) in AREAS {
+    for (folder, programs, tests) in AREAS {
         let filter = format!("{folder}/**");
         let changed = ["--file", &filter, "--in-diff", &diff];
-        let mut list = command(&[&changed[..], &["--list"]].concat(), &[]);
+        let mut list = command(&[&changed[..], &["--list"]].concat(), &[], &[]);
         let count = quiet(&mut list, Duration::from_secs(120))?.lines().count();
         if count > 0 && tried < SAMPLE {
             let shard = format!("0/{}", count.div_ceil(SAMPLE - tried));
-            let mut trial = command(&[&changed[..], &["--shard", &shard]].concat(), tests);
+            let mut trial =
+                command(&[&changed[..], &["--shard", &shard]].concat(), programs, tests);
             let status = trial.status().context("cannot start cargo-mutants")?;
             match status.code() {
                 Some(0) => (),
@@ -114,17 +124,18 @@ pub fn sample() -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-/// `cargo mutants` on the core, with these tests and the core's own.
-fn command(arguments: &[&str], tests: &[&str]) -> Command {
+/// `cargo mutants` on the core, with these tests of these programs and the core's own.
+fn command(arguments: &[&str], programs: &[&str], tests: &[&str]) -> Command {
     let mut cargo = Command::new("cargo");
     cargo.current_dir(workspace::root());
     // Dependencies that are built already serve the mutants too.
     cargo.env("CARGO_TARGET_DIR", workspace::root().join("target"));
     cargo.args(["mutants", "--package", "dibs-nostd", "--output", "target"]).args(arguments);
     cargo.args(["--", "--package", "dibs-tests", "--package", "dibs-nostd", "--lib"]);
-    for test in tests {
-        cargo.args(["--test", test]);
+    for program in programs {
+        cargo.args(["--test", program]);
     }
+    cargo.args(["--", UNIT_TESTS]).args(tests.iter().map(|test| format!("{test}::")));
     cargo
 }
 

@@ -25,7 +25,7 @@ pub fn command(features: &[&str]) -> Command {
 /// left to build, while alone it would have its dependencies with fewer features, and so anew.
 pub fn with_workspace() -> Result<Command> {
     let mut cargo = Command::new("cargo");
-    cargo.args(["build", "--quiet", "--release", "--workspace", "--all-targets"]);
+    cargo.args(["build", "--quiet", "--release", "--workspace", "--bins", "--tests"]);
     process::run(cargo.current_dir(workspace::root()))?;
     Ok(Command::new(workspace::target().join("release/prove")))
 }

@@ -8,7 +8,7 @@
 //! length. The distance that a tool reports to a triangle differs from the true distance by at most
 //! [`ACCURACY`]` * S`, whatever the triangle's shape, as long as no coordinate exceeds
 //! [`MAX_COORDINATE`]. (Lengths below 1e-15 count as zero: squares of anything smaller underflow.)
-//! The `triangle` module derives the figure; `tests/tests/kernels.rs` in the repository searches for
+//! The `triangle` module derives the figure; `tests/tests/query/kernels.rs` in the repository searches for
 //! a counterexample.
 
 mod axis_point;

@@ -1,23 +1,12 @@
 //! Measures and proves: `cargo xtask demo | guarantees | profile | bench` run this, and `test` its checks.
 //! docs/proofs.md says which file shows which promise.
 
-mod binary;
-mod checks;
-mod data;
-mod demo;
-mod faults;
-mod footprint;
-mod harness;
-#[cfg(feature = "peers")]
-mod paper;
-mod probe;
-mod profile;
-
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use harness::Effort;
+use dibs_prove::harness::{self, Effort};
+use dibs_prove::{demo, profile};
 use xtask::steps::Steps;
 
 /// `cargo xtask` passes its arguments on to this.
@@ -35,7 +24,7 @@ enum Task {
     /// Writes docs/performance.md: where a query's instructions go on the emulated board.
     Profile,
     #[cfg(feature = "peers")]
-    Bench(paper::Options),
+    Bench(dibs_prove::paper::Options),
     /// Runs the checks of `cargo xtask test`.
     #[command(hide = true)]
     Test {
@@ -60,7 +49,7 @@ fn main() -> ExitCode {
         Task::Guarantees(options) => harness::guarantees(&options),
         Task::Profile => profile::run(),
         #[cfg(feature = "peers")]
-        Task::Bench(options) => paper::bench(&options),
+        Task::Bench(options) => dibs_prove::paper::bench(&options),
         Task::Test { demo_seconds, steps: file } => {
             let mut steps = Steps::default();
             harness::test(&Effort { demo_seconds, ..Effort::TEST }, &mut steps);

@@ -6,7 +6,7 @@ mod effort;
 mod faults;
 pub mod figures;
 pub mod lanes;
-mod markdown;
+pub mod markdown;
 pub mod promise;
 pub mod record;
 pub mod run;

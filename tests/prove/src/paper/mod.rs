@@ -9,18 +9,12 @@ mod heart;
 mod markdown;
 mod measure;
 mod names;
-#[cfg(test)]
-mod path_tests;
 mod peers;
-mod plan;
-mod record;
+pub mod plan;
+pub mod record;
 mod search;
-mod statistics;
-#[cfg(test)]
-mod statistics_tests;
+pub mod statistics;
 mod subjects;
-#[cfg(test)]
-mod tests;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -70,7 +64,7 @@ fn board(quick: bool) -> Result<PathBuf> {
 }
 
 /// Runs all experiments of a plan.
-fn run(plan: &Plan, options: &Options) -> Result<Records> {
+pub fn run(plan: &Plan, options: &Options) -> Result<Records> {
     let mut records = Records::default();
     facts::run(plan, options, &mut records);
     brain::run(plan, &mut records)?;
@@ -81,7 +75,7 @@ fn run(plan: &Plan, options: &Options) -> Result<Records> {
 }
 
 /// Everything that is made from the records: file names, below the folder of the records, and contents.
-fn documents(records: &Records) -> Result<Vec<(String, String)>> {
+pub fn documents(records: &Records) -> Result<Vec<(String, String)>> {
     let mut documents = vec![
         ("benchmarks.md".to_owned(), markdown::benchmarks(records)),
         ("paper.md".to_owned(), claims::paper(records)),
@@ -91,7 +85,7 @@ fn documents(records: &Records) -> Result<Vec<(String, String)>> {
 }
 
 /// Writes the records and all that is made from them.
-fn write(records: &Records, folder: &Path) -> Result<()> {
+pub fn write(records: &Records, folder: &Path) -> Result<()> {
     let json = ("benchmarks.json".to_owned(), records.json()?);
     std::fs::create_dir_all(folder.join("figures"))
         .with_context(|| format!("cannot make {}", folder.display()))?;

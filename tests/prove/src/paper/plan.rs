@@ -83,7 +83,6 @@ impl Plan {
     }
 
     /// Seconds: everything runs, nothing is worth quoting.
-    #[cfg(test)]
     pub fn smoke() -> Self {
         Self {
             name: "smoke",

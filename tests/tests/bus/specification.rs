@@ -95,7 +95,7 @@ fn counters() -> Counters {
 
 #[test]
 fn the_specification_shows_what_is_sent() {
-    let document = include_str!("../../docs/wire.md");
+    let document = include_str!("../../../docs/wire.md");
     let shown = document.split("```text\n").nth(1).unwrap().split("```").next().unwrap();
     let mut expected = String::new();
     for (name, bytes) in vectors() {

@@ -1,6 +1,6 @@
 //! A new user: an empty crate outside the repository, and `docs/guide.md`, copied block by block.
 //!
-//! `cargo test --release -p dibs-tests --test new_user -- --ignored --nocapture` shows each command and its output.
+//! `cargo test --release -p dibs-tests --test pages new_user -- --ignored --nocapture` shows each command and its output.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

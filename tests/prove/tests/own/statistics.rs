@@ -1,6 +1,6 @@
 //! The benchmark's statistics, against textbooks.
 
-use super::statistics::{Paired, Summary, crossover, holm, repeatable_worst};
+use dibs_prove::paper::statistics::{Paired, Summary, crossover, holm, repeatable_worst};
 
 #[test]
 fn a_summary_is_that_of_a_textbook() {

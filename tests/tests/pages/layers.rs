@@ -1,7 +1,7 @@
 //! Dependencies between the folders of a crate point one way.
 //!
 //! `docs/dependencies.md` lists them: `DIBS_WRITE=1` writes that list anew. `DIBS_CHECKOUT=FOLDER cargo test -p dibs-tests
-//! --test layers -- --nocapture` prints those of another checkout.
+//! --test pages layers -- --nocapture` prints those of another checkout.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

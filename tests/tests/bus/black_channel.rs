@@ -109,8 +109,8 @@ fn the_checksum_finds_as_many_flips_as_the_page_says() {
 /// The guarantees contain the page, of this one source.
 #[test]
 fn the_guarantees_show_the_black_channel() {
-    let guarantees = include_str!("../../docs/guarantees.md");
-    let page = include_str!("../../docs/black-channel.md");
+    let guarantees = include_str!("../../../docs/guarantees.md");
+    let page = include_str!("../../../docs/black-channel.md");
     let section = guarantees.split("\n## ").find(|section| section.contains("| masquerade |"));
     let section = section.expect("a section with the table");
     for line in page.lines().filter(|line| line.starts_with('|')) {
@@ -121,7 +121,7 @@ fn the_guarantees_show_the_black_channel() {
 
 #[test]
 fn the_black_channel_page_is_true() {
-    let page = include_str!("../../docs/black-channel.md");
+    let page = include_str!("../../../docs/black-channel.md");
     let shown = page.split("```text\n").nth(1).unwrap().split("```").next().unwrap();
     assert!(shown == arithmetic(), "docs/black-channel.md must show\n{}", arithmetic());
     let mut named = 0;

@@ -30,7 +30,7 @@ fn the_example_of_the_specification_is_what_the_builder_writes() {
     let mesh = Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]] };
     let builder = Builder::new().stretch(1.5).with_vertex_order(false).with_rest_shape(false);
     let tree = builder.with_metric(false).with_adjacency(false).build(&mesh).expect("a valid mesh");
-    let text = include_str!("../../docs/format.md");
+    let text = include_str!("../../../docs/format.md");
     let example = text.split("```text").nth(1).and_then(|t| t.split("```").next());
     let digits: String = example.expect("an example").split_whitespace().collect();
     let written: String = tree.blob().iter().map(|b| format!("{b:02x}")).collect();

@@ -278,7 +278,7 @@ fn damage_to_the_stream_is_counted_too() {
 
 #[test]
 fn every_event_has_its_place_and_name() {
-    let document = include_str!("../../docs/wire.md");
+    let document = include_str!("../../../docs/wire.md");
     let list = document.split("number 0 on:\n\n").nth(1).unwrap().split("\n\n").next().unwrap();
     let list = list.replace("> ", "").replace('\n', " ");
     let names: Vec<_> = list.split(", ").collect();

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 const README: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../README.md");
 const BEGIN: &str =
-    "<!-- figures: written by `DIBS_WRITE=1 cargo test -p dibs-tests --test readme` -->\n";
+    "<!-- figures: written by `DIBS_WRITE=1 cargo test -p dibs-tests --test pages readme` -->\n";
 const END: &str = "<!-- end of figures -->\n";
 
 #[test]

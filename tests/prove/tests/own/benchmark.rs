@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
+use dibs_prove::paper::plan::{Options, Plan};
+use dibs_prove::paper::record::Records;
+use dibs_prove::paper::{documents, run, write};
 use xtask::workspace;
-
-use super::plan::{Options, Plan};
-use super::record::Records;
 
 #[test]
 fn every_experiment_runs_and_all_methods_agree() {
-    let records = super::run(&Plan::smoke(), &Options::default()).expect("methods agree");
+    let records = run(&Plan::smoke(), &Options::default()).expect("methods agree");
     for experiment in ["brain", "heart", "ablation", "compare", "crossover", "histogram"] {
         let count = records.0.iter().filter(|r| r.experiment == experiment).count();
         assert!(count > 10, "{experiment}: {count} records");
@@ -18,7 +18,7 @@ fn every_experiment_runs_and_all_methods_agree() {
         serde_json::from_str(&records.json().expect("numbers are finite")).expect("valid JSON");
     assert_eq!(back.as_array().map(Vec::len), Some(records.0.len()));
     let folder = tempfile::tempdir().expect("a folder");
-    super::write(&records, folder.path()).expect("a writable folder");
+    write(&records, folder.path()).expect("a writable folder");
     assert_eq!(Records::read(&folder.path().join("benchmarks.json")).expect("readable"), records);
     check(folder.path());
 }
@@ -31,7 +31,7 @@ fn the_committed_documents_are_what_the_committed_records_say() {
 /// Every document of a folder is the one that its records give.
 fn check(folder: &Path) {
     let records = Records::read(&folder.join("benchmarks.json")).expect("readable");
-    for (name, expected) in super::documents(&records).expect("drawable") {
+    for (name, expected) in documents(&records).expect("drawable") {
         let path = folder.join(&name);
         let found = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert!(found == expected, "{name} is not made from benchmarks.json: run with --render");

@@ -1,13 +1,11 @@
 //! Readers and checks on meshes written here: every format gives the same surface, and numbers stay the file's own.
 
-mod mesh_files;
-
 use std::path::Path;
 
 use dibs_build::{Format, Import, Motion, ReadErrorKind, ReadOptions};
 use glam::Vec3;
 
-use mesh_files::{Folder, corners, obj, octahedron, samples, stl_ascii, stl_binary};
+use crate::mesh_files::{Folder, corners, obj, octahedron, samples, stl_ascii, stl_binary};
 
 impl Folder {
     fn read(&self, name: &str, bytes: impl AsRef<[u8]>) -> Result<Import, ReadErrorKind> {

@@ -1,13 +1,11 @@
 //! No bytes make a reader panic, hang or allocate beyond the file's size.
 
-mod mesh_files;
-
 use std::fmt::Write;
 
 use dibs_build::{Import, ReadErrorKind, ReadOptions};
 use proptest::prelude::*;
 
-use mesh_files::{Folder, samples};
+use crate::mesh_files::{Folder, samples};
 
 /// What every accepted mesh promises.
 fn check_promises(import: &Import) {

@@ -1,0 +1,15 @@
+//! What `main.rs` runs, as a library for that program and for its own tests.
+
+#![allow(missing_docs, reason = "a library of one program")]
+
+pub mod binary;
+pub mod checks;
+pub mod data;
+pub mod demo;
+pub mod faults;
+pub mod footprint;
+pub mod harness;
+#[cfg(feature = "peers")]
+pub mod paper;
+pub mod probe;
+pub mod profile;

@@ -1,0 +1,7 @@
+//! The program's own tests: it is compiled once, for them and for its user.
+
+mod benchmark;
+mod path;
+mod proofs;
+mod records;
+mod statistics;

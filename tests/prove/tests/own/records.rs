@@ -1,0 +1,98 @@
+//! Records say of when they are, and golden figures do not creep.
+
+use std::fs;
+
+use dibs_prove::harness::figures::Figures;
+use dibs_prove::harness::promise::Bound;
+use dibs_prove::harness::record::{Raise, Record, committed, json, merge, promises};
+use dibs_prove::harness::run::{Run, UNKNOWN};
+use dibs_prove::harness::{Measured, markdown};
+
+fn golden() -> &'static str {
+    let golden = promises().find(|(_, promise)| matches!(promise.bound, Bound::Golden));
+    golden.expect("a golden figure").1.id
+}
+
+fn run(commit: &str) -> Run {
+    let [date, compiler, machine, emulator] =
+        ["2026-01-01T00:00Z", "rustc", "a machine", "QEMU"].map(str::to_owned);
+    Run { date, commit: commit.to_owned(), compiler, machine, emulator, size: "full".into() }
+}
+
+fn measured(commit: &str, figures: &[(&str, f64)]) -> Measured {
+    let mut noted = Figures::default();
+    figures.iter().for_each(|&(id, value)| noted.note(id, value));
+    Measured { figures: noted, skipped: Vec::new(), run: run(commit) }
+}
+
+fn value(records: &[Record], id: &str) -> f64 {
+    records.iter().find(|record| record.id == id).expect("a record").figure.as_f64().unwrap()
+}
+
+/// 4 % at every recording: with the figure before it as the measure, all of them would pass.
+#[test]
+fn a_golden_figure_does_not_creep_from_recording_to_recording() {
+    let id = golden();
+    let mut records = Vec::new();
+    let mut refused = 0;
+    for figure in [100.0, 104.0, 108.0, 112.0] {
+        let (after, broken) = merge(&records, &measured("a", &[(id, figure)]), Raise::default());
+        refused += broken.len();
+        records = after;
+    }
+    assert_eq!((refused, value(&records, id)), (2, 104.0));
+    let names = [id.to_owned()];
+    let raise = Raise { names: &names, because: "a defect was mended" };
+    let (after, broken) = merge(&records, &measured("a", &[(id, 112.0)]), raise);
+    assert!(broken.is_empty(), "{broken:?}");
+    assert_eq!(after[0].raised, "raised from 100: a defect was mended");
+    let (_, broken) = merge(&after, &measured("a", &[(id, 116.0)]), Raise::default());
+    assert!(broken.is_empty(), "{broken:?}");
+}
+
+/// All promises of one commit, but for those of one check.
+#[test]
+fn a_partial_recording_does_not_pass_for_a_whole_one() {
+    let all: Vec<(&str, f64)> = promises().map(|(_, promise)| (promise.id, 1.0)).collect();
+    let (whole, _) = merge(&[], &measured("aaaa", &all), Raise::default());
+    let head = |records: &[Record]| {
+        let text = markdown::render(records).expect("text");
+        text.split("\n| promise |").next().expect("a head").to_owned()
+    };
+    assert!(head(&whole).contains("All of it was measured at commit `aaaa`"));
+    assert!(!head(&whole).contains("NOT OF ONE"));
+
+    let (partial, _) = merge(&whole, &measured("bbbb", &all[..3]), Raise::default());
+    assert!(head(&partial).contains("NOT OF ONE"), "{}", head(&partial));
+    for commit in ["aaaa", "bbbb"] {
+        assert!(head(&partial).contains(&format!("`{commit}`")), "{}", head(&partial));
+    }
+    // Rows of the commit that is not the last say so.
+    let text = markdown::render(&partial).expect("text");
+    let of_old = text.matches("(`aaaa`,").count();
+    let rows = partial.iter().filter(|r| r.run.commit == "aaaa" && r.is_shown()).count();
+    assert_eq!(of_old, rows);
+
+    assert!(head(&whole[1..]).contains("NOT OF ONE"), "{}", head(&whole[1..]));
+    for commit in ["aaaa-dirty", UNKNOWN] {
+        let (records, _) = merge(&[], &measured(commit, &all), Raise::default());
+        assert!(head(&records).contains("NOT OF ONE"), "{commit}");
+    }
+}
+
+/// The committed head, read by itself, against the committed rows.
+#[test]
+fn the_committed_head_says_what_the_rows_say() {
+    let records = committed().expect("records");
+    let text = fs::read_to_string(json().with_extension("md")).expect("a document");
+    assert!(text == markdown::render(&records).expect("text"), "run with --render");
+    let says_whole = text.contains("All of it was measured at commit");
+    let mut commits: Vec<&str> = records.iter().map(|r| r.run.commit.as_str()).collect();
+    commits.sort_unstable();
+    commits.dedup();
+    let is_whole = commits.len() == 1
+        && records.iter().all(|r| r.run.size != "test" && !r.run.commit.contains("-dirty"))
+        && promises().all(|(_, promise)| records.iter().any(|r| r.id == promise.id));
+    assert!(!says_whole || is_whole, "the head says more than the rows: {commits:?}");
+    assert!(commits.iter().all(|commit| text.contains(&format!("`{commit}`"))), "{commits:?}");
+}

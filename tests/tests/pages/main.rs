@@ -1,0 +1,7 @@
+//! What the documents say: figures, public items, packages, dependencies, the guide.
+
+mod layers;
+mod new_user;
+mod packages;
+mod public_api;
+mod readme;

@@ -1,0 +1,18 @@
+//! Queries, contacts and forces against exhaustive search.
+
+mod contacts;
+mod differential;
+mod flat;
+mod hand;
+mod interval;
+mod kernels;
+mod paper_search;
+mod positions;
+mod proxy;
+mod refusals;
+mod shown_budgets;
+mod side;
+mod slack;
+mod swept;
+mod tracker;
+mod wide;
