@@ -92,7 +92,7 @@ impl Control {
         surface: surface::Reader,
         bus: &'static BusStatus,
     ) -> Result<Self, SetupError> {
-        let spring = SpringDamper::new(STIFFNESS, DAMPING, MAX_FORCE).map_err(SetupError::Gain)?;
+        let spring = SpringDamper::stiffness(STIFFNESS).damping(DAMPING).max_force(MAX_FORCE);
         Ok(Self {
             query: surface::Query::new(tree).map_err(SetupError::Query)?,
             surface,

@@ -160,7 +160,7 @@ fn found() -> Result<Proximity, Unavailable> {
 #[library_benchmark]
 #[bench::wall(setup = found)]
 fn force(found: Result<Proximity, Unavailable>) -> Vec3 {
-    let spring = SpringDamper::new(1.0, 0.002, 5.0).expect("valid gains");
+    let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
     let wall = ForbiddenRegion::new(spring, 50.0).expect("a valid margin");
     black_box(wall.force(black_box(&found), Vec3::X)).force
 }

@@ -91,7 +91,7 @@ impl Scene {
         let tree = built.tree::<u16>().expect("16-bit indices");
         let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
         let mut contacts = Contacts::<8>::new();
-        let spring = SpringDamper::new(STIFFNESS, DAMPING, MOST).expect("valid gains");
+        let spring = SpringDamper::stiffness(STIFFNESS).damping(DAMPING).max_force(MOST);
         let proxy = Proxy::new(spring, MARGIN).expect("a valid margin");
         let alone = ForbiddenRegion::new(spring, MARGIN).expect("a valid margin");
         let (mut at, mut velocity) = (self.from, Vec3::ZERO);

@@ -260,7 +260,7 @@ fn no_budget_turns_the_force_inwards() {
     let tree = built.tree::<u16>().expect("valid");
     let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
     let mut contacts = Contacts::<8>::new();
-    let spring = SpringDamper::new(1.0, 0.0, 50.0).expect("valid gains");
+    let spring = SpringDamper::stiffness(1.0).max_force(50.0);
     let (wall, proxy) = (ForbiddenRegion::new(spring, 5.0), Proxy::new(spring, 5.0));
     let (wall, proxy) = (wall.expect("a valid margin"), proxy.expect("a valid margin"));
     let out = Vec3::new(0.3, 0.2, 0.9).normalize();
@@ -338,7 +338,7 @@ fn one_wall_is_never_two() {
     let tree = built.tree::<u16>().expect("valid");
     let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
     let mut contacts = Contacts::<8>::new();
-    let spring = SpringDamper::new(1.0, 0.0, 50.0).expect("valid gains");
+    let spring = SpringDamper::stiffness(1.0).max_force(50.0);
     let proxy = Proxy::new(spring, 3.0).expect("a valid margin");
     let tool = Sphere::new(Vec3::new(0.2, 0.1, 2.0), 1.0).expect("valid");
     query
@@ -352,7 +352,7 @@ fn one_wall_is_never_two() {
         assert!((0.99..1.07).contains(&part), "{count}: {part}");
     }
     // A wall that comes at the tool is a tool that comes at the wall, for damper and row alike.
-    let damped = Proxy::new(SpringDamper::new(1.0, 0.01, 50.0).expect("valid gains"), 3.0);
+    let damped = Proxy::new(SpringDamper::stiffness(1.0).damping(0.01).max_force(50.0), 3.0);
     let mut moving = contact;
     moving.velocity = Vec3::Z * 40.0;
     let still = std::iter::once(&contact);
@@ -360,7 +360,7 @@ fn one_wall_is_never_two() {
     let pushed = one.wrench(Ok(still), 0.0, tool.center(), Vec3::Z * -40.0, Vec3::ZERO);
     let met = one.wrench(Ok(std::iter::once(&moving)), 0.0, tool.center(), Vec3::ZERO, Vec3::ZERO);
     assert!(pushed.force.distance(met.force) < 1e-5 && pushed.force.z > 2.3, "{pushed:?} {met:?}");
-    let row = VelocityRow::new(&moving, 0.0, tool.center(), 0.5, 10.0);
+    let row = VelocityRow::new(&moving, 0.0, tool.center()).stand_off(0.5).gain(10.0);
     // 40 mm/s with the wall, and 10 a second of the half mm that is left.
     assert!(row.allows(Vec3::Z * 35.1, Vec3::ZERO) && !row.allows(Vec3::Z * 34.9, Vec3::ZERO));
 }

@@ -44,7 +44,7 @@ struct Wall {
 
 /// Force and torque of a spring of 1 N/mm that never saturates: the displacement, and its moment.
 fn found(template: &Contact, walls: &[Wall]) -> [DVec3; 2] {
-    let spring = SpringDamper::new(1.0, 0.0, 1e9).expect("valid gains");
+    let spring = SpringDamper::stiffness(1.0).max_force(1e9);
     let proxy = Proxy::new(spring, MARGIN).expect("a valid margin");
     let contacts: Vec<Contact> = walls
         .iter()

@@ -21,7 +21,7 @@ use crate::unavailable::Unavailable;
 /// use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
 /// use dibs_nostd::{Unavailable, glam::Vec3};
 ///
-/// let spring = SpringDamper::new(2.0, 0.01, 5.0)?; // N/mm, N s/mm, N
+/// let spring = SpringDamper::stiffness(2.0).damping(0.01).max_force(5.0); // N/mm, N s/mm, N
 /// let wall = ForbiddenRegion::new(spring, 3.0)?; // mm
 ///
 /// // No surface yet: the tool is damped, the state says why.
@@ -41,8 +41,9 @@ impl ForbiddenRegion {
     /// A region that reaches `margin` mm from the surface, above 0.
     ///
     /// # Errors
-    /// [`GainError`] when the margin is not positive or not finite.
+    /// [`GainError`] names the parameter of the spring that is out of range, or the margin.
     pub const fn new(spring: SpringDamper, margin: f32) -> Result<Self, GainError> {
+        let spring = tri!(spring.checked());
         let margin = tri!(positive("margin", margin));
         Ok(Self { spring, margin })
     }

@@ -21,8 +21,8 @@ use crate::unavailable::Unavailable;
 /// use dibs_nostd::constraint::{ConstraintState, Guidance, SpringDamper};
 /// use dibs_nostd::{Unavailable, glam::Vec3};
 ///
-/// let spring = SpringDamper::new(0.5, 0.002, 2.0)?;
-/// let guide = Guidance::new(spring, 10.0, 1.0)?; // 9 to 11 mm from the surface is free
+/// let spring = SpringDamper::stiffness(0.5).damping(0.002).max_force(2.0);
+/// let guide = Guidance::new(spring, 10.0)?.dead_band(1.0)?; // 9 to 11 mm from the surface is free
 /// let safe = guide.force(&Err(Unavailable::Stale { age: 250 }), Vec3::ZERO);
 /// assert_eq!(safe.state, ConstraintState::Safe(Unavailable::Stale { age: 250 }));
 /// # Ok::<(), dibs_nostd::constraint::GainError>(())
@@ -36,18 +36,23 @@ pub struct Guidance {
 }
 
 impl Guidance {
-    /// A guide to `stand_off` mm from the surface, free within `dead_band` mm of it; both at least 0.
+    /// A guide to `stand_off` mm from the surface, at least 0.
     ///
     /// # Errors
-    /// [`GainError`] names the parameter that is negative or not finite.
-    pub const fn new(
-        spring: SpringDamper,
-        stand_off: f32,
-        dead_band: f32,
-    ) -> Result<Self, GainError> {
+    /// [`GainError`] names the parameter of the spring that is out of range, or the stand-off.
+    pub const fn new(spring: SpringDamper, stand_off: f32) -> Result<Self, GainError> {
+        let spring = tri!(spring.checked());
         let stand_off = tri!(not_negative("stand_off", stand_off));
+        Ok(Self { spring, stand_off, dead_band: 0.0 })
+    }
+
+    /// The same, free within `dead_band` mm of the stand-off, at least 0.
+    ///
+    /// # Errors
+    /// [`GainError`] when it is negative or not finite.
+    pub const fn dead_band(self, dead_band: f32) -> Result<Self, GainError> {
         let dead_band = tri!(not_negative("dead_band", dead_band));
-        Ok(Self { spring, stand_off, dead_band })
+        Ok(Self { dead_band, ..self })
     }
 
     /// The force on the tool at this tick; `velocity` as in

@@ -103,36 +103,64 @@ pub enum ConstraintState {
     Safe(Unavailable),
 }
 
-/// A spring and a damper with a largest force: the part that all constraints share.
+/// A spring and a damper with a largest force: the part that all constraints share. The constraint that takes it checks
+/// it.
+///
+/// ```
+/// use dibs_nostd::constraint::SpringDamper;
+///
+/// const SPRING: SpringDamper = SpringDamper::stiffness(2.0).damping(0.01).max_force(5.0); // N/mm, N s/mm, N
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SpringDamper {
     stiffness: f32,
     damping: f32,
-    hold_damping: f32,
+    /// `damping`, unless it is said.
+    hold_damping: Option<f32>,
     max_force: f32,
 }
 
 impl SpringDamper {
-    /// `stiffness` in N/mm, above 0; `damping` in N s/mm, at least 0; `max_force` in N, above 0. The
-    /// hold damps as much as the constraint does.
-    ///
-    /// # Errors
-    /// [`GainError`] names the parameter that is out of range or not finite.
-    pub const fn new(stiffness: f32, damping: f32, max_force: f32) -> Result<Self, GainError> {
-        let stiffness = tri!(positive("stiffness", stiffness));
-        let damping = tri!(not_negative("damping", damping));
-        let max_force = tri!(positive("max_force", max_force));
-        Ok(Self { stiffness, damping, hold_damping: damping, max_force })
+    /// A spring of a stiffness in N/mm, above 0, without damping. It needs its [largest force](Self::max_force) too.
+    #[must_use]
+    pub const fn stiffness(stiffness: f32) -> Self {
+        Self { stiffness, damping: 0.0, hold_damping: None, max_force: f32::INFINITY }
     }
 
-    /// The same with another damping (N s/mm) for the hold; 0 lets go of the tool.
-    ///
-    /// # Errors
-    /// [`GainError`] when it is negative or not finite.
-    pub const fn with_hold_damping(self, hold_damping: f32) -> Result<Self, GainError> {
-        let hold_damping = tri!(not_negative("hold_damping", hold_damping));
-        Ok(Self { hold_damping, ..self })
+    /// The same with a damping in N s/mm, at least 0. The hold damps as much, unless it has a damping of its own.
+    #[must_use]
+    pub const fn damping(self, damping: f32) -> Self {
+        Self { damping, ..self }
+    }
+
+    /// The same with another damping (N s/mm, at least 0) for the hold; 0 lets go of the tool.
+    #[must_use]
+    pub const fn hold_damping(self, damping: f32) -> Self {
+        Self { hold_damping: Some(damping), ..self }
+    }
+
+    /// The same with the largest force in N, above 0 and finite.
+    #[must_use]
+    pub const fn max_force(self, max_force: f32) -> Self {
+        Self { max_force, ..self }
+    }
+
+    /// Itself, where every parameter is in its range and finite; otherwise [`GainError`] names one that is not.
+    const fn checked(self) -> Result<Self, GainError> {
+        tri!(positive("stiffness", self.stiffness));
+        tri!(not_negative("damping", self.damping));
+        tri!(not_negative("hold_damping", self.held()));
+        tri!(positive("max_force", self.max_force));
+        Ok(self)
+    }
+
+    /// The damping of the hold.
+    const fn held(&self) -> f32 {
+        match self.hold_damping {
+            Some(damping) => damping,
+            None => self.damping,
+        }
     }
 
     /// The device's own damping (N s/mm) must be above this for a passive wall at a sampling period
@@ -141,13 +169,13 @@ impl SpringDamper {
     ///
     /// ```
     /// use dibs_nostd::constraint::SpringDamper;
-    /// let wall = SpringDamper::new(2.0, 0.001, 5.0).unwrap();
+    /// let wall = SpringDamper::stiffness(2.0).damping(0.001).max_force(5.0);
     /// assert_eq!(wall.device_damping(0.001), 0.002); // 2 N s/m at 1 kHz
     /// ```
     #[must_use]
     pub fn device_damping(&self, tick: f32) -> f32 {
         let wall = self.stiffness * tick / 2.0 + self.damping;
-        if wall > self.hold_damping { wall } else { self.hold_damping }
+        if wall > self.held() { wall } else { self.held() }
     }
 
     /// Force along the approach's direction of a spring that is `length` mm out of its rest; at least
@@ -181,7 +209,7 @@ impl SpringDamper {
         }
         let scaled = velocity / largest;
         let length = sqrt(scaled.length_squared());
-        let wanted = self.hold_damping * (largest * length);
+        let wanted = self.held() * (largest * length);
         let size = if wanted > self.max_force { self.max_force } else { wanted };
         let force = scaled / length * -size;
         // At rest, or a velocity that is not finite.

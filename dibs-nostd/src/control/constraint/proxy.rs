@@ -81,8 +81,9 @@ impl Proxy {
     /// A region that reaches `margin` mm from the surface, above 0.
     ///
     /// # Errors
-    /// [`GainError`] when the margin is not positive or not finite.
+    /// [`GainError`] names the parameter of the spring that is out of range, or the margin.
     pub const fn new(spring: SpringDamper, margin: f32) -> Result<Self, GainError> {
+        let spring = tri!(spring.checked());
         let margin = tri!(positive("margin", margin));
         Ok(Self { spring, margin })
     }

@@ -8,8 +8,8 @@ use crate::query::Contact;
 /// the tool (mm/s), and `w`, the tool's angular velocity (1/s).
 ///
 /// A vector field inequality (Marinho et al., IEEE T-RO 2019) that also knows the surface's own velocity. With it, a
-/// contact's separation falls towards `stand_off` no faster than exponentially, at a rate of `gain`; below, it has to
-/// grow. Plain arrays, for any solver of quadratic programs.
+/// contact's separation falls towards [`stand_off`](Self::stand_off) no faster than exponentially, at a rate of
+/// [`gain`](Self::gain); below, it has to grow. Plain arrays, for any solver of quadratic programs.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -25,7 +25,7 @@ use crate::query::Contact;
 /// let tool = Sphere::new(Vec3::new(-60.0, 0.0, 20.0), 2.5)?;
 /// query.contacts(rows.as_slice(), &tool, 50.0, &Options::new(), &mut contacts)?;
 /// for contact in contacts.iter() {
-///     let row = VelocityRow::new(contact, contacts.accuracy(), tool.center(), 1.0, 20.0);
+///     let row = VelocityRow::new(contact, contacts.accuracy(), tool.center()).stand_off(1.0).gain(20.0);
 ///     let along = |speed: f32| Vec3::from(row.linear) * speed;
 ///     assert!(row.allows(along(row.least + 0.01), Vec3::ZERO));
 ///     assert!(!row.allows(along(row.least - 0.01), Vec3::ZERO));
@@ -42,23 +42,52 @@ pub struct VelocityRow {
     pub angular: [f32; 3],
     /// The least sum allowed (mm/s).
     pub least: f32,
+    /// The surface's own velocity along the normal (mm/s).
+    surface: f32,
+    /// Separation less what is uncertain of it (mm).
+    separation: f32,
+    /// mm.
+    stand_off: f32,
+    /// 1/s.
+    gain: f32,
 }
 
 impl VelocityRow {
-    /// The row of a contact whose separation is within `accuracy` (mm), for the velocity of the tool at `origin`, a
-    /// `stand_off` (mm) and a `gain` (1/s).
+    /// The row of a contact whose separation is within `accuracy` (mm), for the velocity of the tool at `origin`: the
+    /// tool may not come nearer at all, until there is a [gain](Self::gain).
     ///
     /// Cost: some tens of f32 operations.
     #[must_use]
-    pub fn new(contact: &Contact, accuracy: f32, origin: Vec3, stand_off: f32, gain: f32) -> Self {
+    pub fn new(contact: &Contact, accuracy: f32, origin: Vec3) -> Self {
         let normal = contact.normal;
         let lever = contact.point_on_tool - origin;
-        let left = contact.separation - accuracy - stand_off;
+        let surface = normal.dot(contact.velocity);
         Self {
             linear: normal.to_array(),
             angular: lever.cross(normal).to_array(),
-            least: normal.dot(contact.velocity) - gain * left,
+            least: surface,
+            surface,
+            separation: contact.separation - accuracy,
+            stand_off: 0.0,
+            gain: 0.0,
         }
+    }
+
+    /// The same for a stand-off (mm), 0 unless it is said.
+    #[must_use]
+    pub fn stand_off(self, stand_off: f32) -> Self {
+        Self { stand_off, ..self }.with_least()
+    }
+
+    /// The same for a gain (1/s), at least 0.
+    #[must_use]
+    pub fn gain(self, gain: f32) -> Self {
+        Self { gain, ..self }.with_least()
+    }
+
+    fn with_least(self) -> Self {
+        let left = self.separation - self.stand_off;
+        Self { least: self.surface - self.gain * left, ..self }
     }
 
     /// Whether a velocity keeps to it.

@@ -10,7 +10,7 @@ use crate::{NoSide, Side, TriangleRow};
 
 const QUERY: QueryError = QueryError::Corrupt { row: 7 };
 
-const SPRING: Result<SpringDamper, GainError> = SpringDamper::new(2.0, 0.01, 5.0);
+const SPRING: SpringDamper = SpringDamper::stiffness(2.0).damping(0.01).max_force(5.0);
 const RADIUS: f32 = 2.5;
 
 /// A tool of this radius whose axis is `gap + RADIUS` from a point of the surface.
@@ -35,11 +35,11 @@ fn pair(gap: f32, direction: Vec3) -> Proximity {
 }
 
 fn wall() -> ForbiddenRegion {
-    ForbiddenRegion::new(SPRING.unwrap(), 3.0).unwrap()
+    ForbiddenRegion::new(SPRING, 3.0).unwrap()
 }
 
 fn guide() -> Guidance {
-    Guidance::new(SPRING.unwrap(), 10.0, 1.0).unwrap()
+    Guidance::new(SPRING, 10.0).unwrap().dead_band(1.0).unwrap()
 }
 
 fn close(a: Vec3, b: Vec3) -> bool {
@@ -65,7 +65,7 @@ fn the_wall_is_a_spring_and_a_damper() {
 
 #[test]
 fn the_spring_goes_on_below_the_surface() {
-    let soft = SpringDamper::new(0.5, 0.0, 5.0).unwrap();
+    let soft = SpringDamper::stiffness(0.5).max_force(5.0);
     let wall = ForbiddenRegion::new(soft, 3.0).unwrap();
     for (gap, force) in [(1.0, 1.0), (0.0, 1.5), (-1.0, 2.0), (-2.0, 2.5)] {
         let answer = wall.force(&Ok(pair(gap, Vec3::X)), Vec3::ZERO);
@@ -117,7 +117,7 @@ fn the_hold_damps_and_says_why() {
         assert_eq!(wall().force(&Err(reason), Vec3::ZERO).force, Vec3::ZERO);
         let absurd = wall().force(&Err(reason), Vec3::Y * f32::MAX);
         assert_eq!(absurd.force, Vec3::Y * -5.0);
-        let free = SPRING.unwrap().with_hold_damping(0.0).unwrap();
+        let free = SPRING.hold_damping(0.0);
         let free = ForbiddenRegion::new(free, 3.0).unwrap();
         assert_eq!(free.force(&Err(reason), Vec3::ONE).force, Vec3::ZERO);
     }
@@ -175,28 +175,37 @@ fn what_is_not_finite_is_not_used() {
 
 #[test]
 fn gains_out_of_range_are_named() {
-    let named = |result: Result<SpringDamper, GainError>| result.unwrap_err().parameter;
+    let named = |spring| {
+        let names = [
+            ForbiddenRegion::new(spring, 3.0).unwrap_err().parameter,
+            Guidance::new(spring, 10.0).unwrap_err().parameter,
+            Proxy::new(spring, 3.0).unwrap_err().parameter,
+        ];
+        assert!(names.iter().all(|&name| name == names[0]), "{names:?}");
+        names[0]
+    };
     for bad in [-1.0, f32::NAN, f32::INFINITY] {
-        assert_eq!(named(SpringDamper::new(bad, 0.0, 1.0)), "stiffness");
-        assert_eq!(named(SpringDamper::new(1.0, bad, 1.0)), "damping");
-        assert_eq!(named(SpringDamper::new(1.0, 0.0, bad)), "max_force");
-        assert_eq!(named(SPRING.unwrap().with_hold_damping(bad)), "hold_damping");
-        let spring = SPRING.unwrap();
-        assert_eq!(ForbiddenRegion::new(spring, bad).unwrap_err().parameter, "margin");
-        assert_eq!(Guidance::new(spring, bad, 0.0).unwrap_err().parameter, "stand_off");
-        assert_eq!(Guidance::new(spring, 0.0, bad).unwrap_err().parameter, "dead_band");
+        assert_eq!(named(SpringDamper::stiffness(bad).max_force(1.0)), "stiffness");
+        assert_eq!(named(SPRING.damping(bad)), "damping");
+        assert_eq!(named(SPRING.max_force(bad)), "max_force");
+        assert_eq!(named(SPRING.hold_damping(bad)), "hold_damping");
+        assert_eq!(ForbiddenRegion::new(SPRING, bad).unwrap_err().parameter, "margin");
+        assert_eq!(Proxy::new(SPRING, bad).unwrap_err().parameter, "margin");
+        assert_eq!(Guidance::new(SPRING, bad).unwrap_err().parameter, "stand_off");
+        assert_eq!(guide().dead_band(bad).unwrap_err().parameter, "dead_band");
     }
-    assert_eq!(named(SpringDamper::new(0.0, 0.0, 1.0)), "stiffness");
-    assert_eq!(named(SpringDamper::new(1.0, 0.0, 0.0)), "max_force");
-    assert_eq!(ForbiddenRegion::new(SPRING.unwrap(), 0.0).unwrap_err().parameter, "margin");
+    assert_eq!(named(SpringDamper::stiffness(0.0).max_force(1.0)), "stiffness");
+    assert_eq!(named(SpringDamper::stiffness(1.0).max_force(0.0)), "max_force");
+    // A largest force has to be said.
+    assert_eq!(named(SpringDamper::stiffness(1.0)), "max_force");
+    assert_eq!(ForbiddenRegion::new(SPRING, 0.0).unwrap_err().parameter, "margin");
 }
 
 #[test]
 fn a_passive_wall_asks_for_damping_in_the_device() {
     // K T / 2 + B, and the hold's where that is more.
-    let wall = SpringDamper::new(2.0, 0.01, 5.0).unwrap();
-    assert!((wall.device_damping(0.001) - 0.011).abs() < 1.0e-7);
-    let held = wall.with_hold_damping(0.5).unwrap();
+    assert!((SPRING.device_damping(0.001) - 0.011).abs() < 1.0e-7);
+    let held = SPRING.hold_damping(0.5);
     assert!((held.device_damping(0.001) - 0.5).abs() < 1.0e-7);
 }
 
@@ -230,8 +239,7 @@ proptest! {
         is_proper: bool,
     ) {
         let [stiffness, damping, max_force, hold, a, b] = gains.map(f32::abs);
-        let Ok(spring) = SpringDamper::new(stiffness, damping, max_force)
-            .and_then(|spring| spring.with_hold_damping(hold)) else { return Ok(()) };
+        let spring = SpringDamper::stiffness(stiffness).damping(damping).max_force(max_force).hold_damping(hold);
         let mut any = pair(1.0, if is_proper { proper } else { points[2] });
         [any.separation, any.lower, any.accuracy, any.axis_distance] = fields;
         [any.point_on_surface, any.point_on_tool, _] = points;
@@ -239,7 +247,7 @@ proptest! {
         let largest = f64::from(max_force) * (1.0 + 1.0e-3) + 1.0e-44;
         let forces = [
             ForbiddenRegion::new(spring, a).map(|wall| wall.force(&Ok(any), velocity)),
-            Guidance::new(spring, a, b).map(|guide| guide.force(&Ok(any), velocity)),
+            Guidance::new(spring, a).and_then(|guide| guide.dead_band(b)).map(|guide| guide.force(&Ok(any), velocity)),
             ForbiddenRegion::new(spring, a).map(|wall| wall.force(&Err(Unavailable::Query(QUERY)), velocity)),
         ];
         for answer in forces.into_iter().flatten() {

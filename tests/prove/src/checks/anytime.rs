@@ -217,7 +217,7 @@ fn judge(answer: &Proximity, truth: &OraclePair, tally: &mut Tally) {
     tally.outside += u64::from(!(below <= accuracy && above <= accuracy));
     tally.worst = tally.worst.max(below.max(above) / accuracy);
 
-    let spring = SpringDamper::new(STIFFNESS, 0.0, MAX_FORCE).expect("valid gains");
+    let spring = SpringDamper::stiffness(STIFFNESS).max_force(MAX_FORCE);
     let wall = ForbiddenRegion::new(spring, MARGIN).expect("a valid margin");
     let force = wall.force(&Ok(*answer), Vec3::ZERO);
     let needed = (f64::from(STIFFNESS) * (f64::from(MARGIN) - truth.separation))
