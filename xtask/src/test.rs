@@ -36,7 +36,17 @@ pub fn test(options: &Options) -> Result<()> {
     steps.cargo("tests", &["test", "--release", "--workspace", "--no-fail-fast"], &[]);
     steps.cargo(
         "documentation",
-        &["doc", "--release", "--workspace", "--no-deps"],
+        &[
+            "doc",
+            "--release",
+            "--no-deps",
+            "-p",
+            "dibs-nostd",
+            "-p",
+            "dibs-build",
+            "-p",
+            "firmware-example",
+        ],
         &[("RUSTDOCFLAGS", "-D warnings")],
     );
     let packages = ["-p", "dibs-nostd", "-p", "dibs-build", "--no-verify", "--allow-dirty"];
