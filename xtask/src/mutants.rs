@@ -128,8 +128,9 @@ pub fn sample() -> Result<Outcome> {
 fn command(arguments: &[&str], programs: &[&str], tests: &[&str]) -> Command {
     let mut cargo = Command::new("cargo");
     cargo.current_dir(workspace::root());
-    // Dependencies that are built already serve the mutants too.
-    cargo.env("CARGO_TARGET_DIR", workspace::root().join("target"));
+    // Shared among the mutants, but with nothing else: the next build of the workspace would take a mutant of the core
+    // for the core, which is older.
+    cargo.env("CARGO_TARGET_DIR", workspace::root().join("target/mutants"));
     cargo.args(["mutants", "--package", "dibs-nostd", "--output", "target"]).args(arguments);
     cargo.args(["--", "--package", "dibs-tests", "--package", "dibs-nostd", "--lib"]);
     for program in programs {
