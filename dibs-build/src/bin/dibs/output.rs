@@ -29,6 +29,16 @@ pub fn print(line: fmt::Arguments<'_>) {
     }
 }
 
+/// Prints bytes of results. Returns whether more are wanted: not after a failure.
+pub fn write(bytes: &[u8]) -> bool {
+    if FAILURE.get().is_none()
+        && let Err(error) = io::stdout().write_all(bytes).and_then(|()| io::stdout().flush())
+    {
+        let _ = FAILURE.set(error);
+    }
+    FAILURE.get().is_none()
+}
+
 /// Prints a line on standard error.
 pub fn warn(line: fmt::Arguments<'_>) {
     let _ = writeln!(io::stderr(), "{line}");

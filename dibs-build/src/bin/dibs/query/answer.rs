@@ -1,0 +1,155 @@
+//! An answer, as JSON or for a reader.
+
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::{Contact, MeasuredStretch, Proximity, Side};
+use serde::Serialize;
+
+/// The closest pair of a tool and a surface.
+pub struct Answer<'a> {
+    pub proximity: Proximity,
+    /// Corners of the triangle, numbered as in the mesh file.
+    pub triangle: [u32; 3],
+    pub tree: &'a str,
+    /// The tool's number in its chain, from 0.
+    pub tool: usize,
+    /// `None` where the tree has no rest metric to measure with.
+    pub stretch: Option<MeasuredStretch>,
+    /// All contacts, nearest first, where they were asked for.
+    pub contacts: Option<Vec<Touch<'a>>>,
+    /// Every contact whose separation is below is listed.
+    pub bound: f32,
+}
+
+/// A contact.
+pub struct Touch<'a> {
+    pub contact: Contact,
+    pub triangle: [u32; 3],
+    pub tree: &'a str,
+    pub tool: usize,
+}
+
+/// The side's name, or why there is none.
+pub fn side_name(side: Side) -> (&'static str, Option<String>) {
+    match side {
+        Side::Outside => ("outside", None),
+        Side::Inside => ("inside", None),
+        Side::Crossing => ("crossing", None),
+        Side::Undefined(reason) => ("undefined", Some(reason.to_string())),
+        _ => ("undefined", None),
+    }
+}
+
+/// An answer in JSON. Numbers are f64, which holds every f32: a reader that computes in f64 gets the same bits.
+#[derive(Serialize)]
+pub struct Record<'a> {
+    /// Of a file of poses.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    line: Option<usize>,
+    separation: f64,
+    lower: f64,
+    accuracy: f64,
+    side: &'static str,
+    side_reason: Option<String>,
+    axis_distance: f64,
+    point_on_surface: [f64; 3],
+    point_on_tool: [f64; 3],
+    direction: [f64; 3],
+    axis_parameter: f64,
+    tree: &'a str,
+    tool: usize,
+    triangle: [u32; 3],
+    barycentric: [f64; 3],
+    stretch: Option<f64>,
+    node_tests: u32,
+    triangle_tests: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    contacts: Option<Vec<ContactRecord<'a>>>,
+    /// Every contact whose separation is below is listed: the margin, unless there were too many.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    contacts_bound: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct ContactRecord<'a> {
+    separation: f64,
+    point_on_surface: [f64; 3],
+    point_on_tool: [f64; 3],
+    normal: [f64; 3],
+    triangle: [u32; 3],
+    tree: &'a str,
+    tool: usize,
+}
+
+fn vector(vector: Vec3) -> [f64; 3] {
+    vector.as_dvec3().to_array()
+}
+
+impl<'a> Answer<'a> {
+    pub fn record(&self, line: Option<usize>) -> Record<'a> {
+        let p = &self.proximity;
+        let (side, side_reason) = side_name(p.side);
+        let contacts = self.contacts.as_ref();
+        Record {
+            line,
+            separation: p.separation.into(),
+            lower: p.lower.into(),
+            accuracy: p.accuracy.into(),
+            side,
+            side_reason,
+            axis_distance: p.axis_distance.into(),
+            point_on_surface: vector(p.point_on_surface),
+            point_on_tool: vector(p.point_on_tool),
+            direction: vector(p.direction),
+            axis_parameter: p.axis_parameter.into(),
+            tree: self.tree,
+            tool: self.tool,
+            triangle: self.triangle,
+            barycentric: p.barycentric.map(f64::from),
+            stretch: self.stretch.map(|measured| measured.sigma().into()),
+            node_tests: p.node_tests,
+            triangle_tests: p.triangle_tests,
+            contacts: contacts.map(|contacts| contacts.iter().map(Touch::record).collect()),
+            contacts_bound: contacts.map(|_| self.bound.into()),
+        }
+    }
+
+    pub fn print(&self, surfaces: usize, tools: usize) {
+        let p = &self.proximity;
+        println!("separation        {} (within {:.1e})", p.separation, p.accuracy);
+        match side_name(p.side) {
+            (side, Some(reason)) => println!("side              {side}: {reason}"),
+            (side, None) => println!("side              {side}"),
+        }
+        if surfaces > 1 {
+            println!("surface           {}", self.tree);
+        }
+        if tools > 1 {
+            println!("tool              number {} from 0", self.tool);
+        }
+        println!("point on surface  {}", p.point_on_surface);
+        println!("point on tool     {}", p.point_on_tool);
+        println!("triangle          {:?}, weights {:?}", self.triangle, p.barycentric);
+        if let Some(measured) = self.stretch {
+            println!("stretch           {}", measured.sigma());
+        }
+        println!("tests             {} nodes, {} triangles", p.node_tests, p.triangle_tests);
+        for touch in self.contacts.iter().flatten() {
+            let Contact { separation, point_on_surface, normal, .. } = touch.contact;
+            println!("contact           {separation} at {point_on_surface}, normal {normal}");
+        }
+    }
+}
+
+impl<'a> Touch<'a> {
+    fn record(&self) -> ContactRecord<'a> {
+        ContactRecord {
+            separation: self.contact.separation.into(),
+            point_on_surface: vector(self.contact.point_on_surface),
+            point_on_tool: vector(self.contact.point_on_tool),
+            normal: vector(self.contact.normal),
+            triangle: self.triangle,
+            tree: self.tree,
+            tool: self.tool,
+        }
+    }
+}

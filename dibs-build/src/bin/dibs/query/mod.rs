@@ -1,0 +1,111 @@
+//! `dibs query`: the closest pair between an instrument and one surface or several, and all contacts.
+
+mod answer;
+mod bulk;
+mod pose;
+mod scene;
+mod tool;
+
+pub use answer::side_name;
+pub use scene::{STACK, rows};
+pub use tool::{ToolSpec, parse_tool};
+
+use crate::tree_file;
+use anyhow::{Result, bail};
+use scene::Surface;
+use std::path::PathBuf;
+
+/// Most tools of a chain.
+const MOST_TOOLS: usize = 8;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  dibs query heart.dibs --tool sphere:0,0,150,5
+  dibs query heart.dibs --tool capsule:0,0,60,0,0,200,4 --vertices heart.pc2 --frame 9 --json
+  dibs query heart.dibs --tool sphere:0,0,90,5 --contacts 8
+  dibs query heart.dibs lung.dibs --tool capsule:0,0,60,0,0,90,4 --tool capsule:0,0,90,9,0,120,3
+  dibs query heart.dibs --poses poses.csv -o answers.jsonl
+  produce | dibs query heart.dibs --poses - | consume
+
+A line of poses is one of these, and each gives one JSON object on a line:
+  0,0,150,5                                          a sphere: X,Y,Z,R
+  0,0,60,0,0,200,4                                   a capsule: X1,Y1,Z1,X2,Y2,Z2,R
+  sphere:0,0,150,5 capsule:0,0,150,0,0,200,4         a chain
+  {\"sphere\": [0, 0, 150, 5]}
+  [{\"sphere\": [0, 0, 150, 5]}, {\"capsule\": [0, 0, 150, 0, 0, 200, 4]}]
+A first line of column names is skipped, and so are empty lines.")]
+pub struct Args {
+    /// Tree files that `dibs build` wrote, at most 16: a scene
+    #[arg(required = true, value_name = "TREE", num_args = 1..=16)]
+    trees: Vec<PathBuf>,
+    /// sphere:X,Y,Z,R or capsule:X1,Y1,Z1,X2,Y2,Z2,R; up to eight of them are a chain
+    #[arg(long, value_parser = parse_tool, allow_hyphen_values = true, required_unless_present = "poses")]
+    tool: Vec<ToolSpec>,
+    /// Answer every line of this file, CSV or JSON lines, by a JSON line; `-` is standard input
+    #[arg(long, value_name = "FILE", conflicts_with = "tool")]
+    poses: Option<PathBuf>,
+    /// The file of the answers to --poses, written as a whole or not at all; `-` is standard output
+    #[arg(short, long, value_name = "FILE", default_value = "-", requires = "poses")]
+    output: PathBuf,
+    /// List all locally closest pairs whose separation is at most this, too: at most 64 of each tool and surface
+    #[arg(long, value_name = "MARGIN")]
+    contacts: Option<f32>,
+    /// Current positions, one for each vertex of the built mesh: a mesh file, or a .pc2 file with
+    /// --frame; by default the rest shape. In a scene, once for each tree, in their order
+    #[arg(long)]
+    vertices: Vec<PathBuf>,
+    /// Frame of a .pc2 file, counted from 0
+    #[arg(long, requires = "vertices")]
+    frame: Option<usize>,
+    /// Fail if the surface is stretched by more than this, and search with the stretch that it has
+    /// instead of the tree's limit
+    #[arg(long)]
+    stretch: Option<f32>,
+    /// Print a JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args) -> Result<()> {
+    check_chain(&args.tool)?;
+    let (trees, vertices) = (args.trees.len(), args.vertices.len());
+    if vertices != 0 && vertices != trees {
+        bail!(
+            "--vertices is given {vertices} times for {trees} trees: give it once for each, or never"
+        );
+    }
+    let files = args.trees.iter().map(|path| tree_file::load(path));
+    let files = files.collect::<Result<Vec<_>>>()?;
+    let surfaces: Vec<Surface> = args
+        .trees
+        .iter()
+        .zip(&files)
+        .enumerate()
+        .map(|(number, (path, bytes))| {
+            Surface::new(bytes, path, args.vertices.get(number), args.frame, args.stretch)
+        })
+        .collect::<Result<_>>()?;
+    if let Some(poses) = &args.poses {
+        return bulk::run(&surfaces, args.contacts, poses, &args.output);
+    }
+    let answer = scene::ask(&surfaces, &args.tool, args.contacts)?;
+    if let Some(margin) = args.contacts
+        && answer.bound < margin
+    {
+        eprintln!("warning: only contacts with a separation below {} are all listed", answer.bound);
+    }
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&answer.record(None))?);
+    } else {
+        answer.print(trees, args.tool.len());
+    }
+    Ok(())
+}
+
+fn check_chain(tools: &[ToolSpec]) -> Result<()> {
+    if tools.len() > MOST_TOOLS {
+        bail!("{} tools are no chain of at most {MOST_TOOLS}", tools.len());
+    }
+    Ok(())
+}

@@ -1,0 +1,224 @@
+//! The surfaces of a query, each with its positions, and the closest pair between them and a chain of tools.
+
+use super::ToolSpec;
+use super::answer::{Answer, Touch};
+use crate::tree_file::{self, AnyTree};
+use anyhow::{Result, anyhow, bail};
+use dibs_build::{Import, Motion, ReadOptions};
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::{
+    Contact, Contacts, Index, MeasuredStretch, Options, Proximity, Query, StretchError, Tool, Tree,
+    measure_stretch,
+};
+use std::path::{Path, PathBuf};
+
+/// As much as any tree needs.
+pub const STACK: usize = dibs_nostd::format::MAX_STACK;
+
+/// A tree, and where its vertices are.
+pub struct Surface<'a> {
+    pub name: String,
+    tree: AnyTree<'a>,
+    /// In the order of the tree's rows.
+    positions: Vec<Vec3>,
+    /// `None` where the tree has no rest metric to measure with.
+    stretch: Option<MeasuredStretch>,
+    options: Options,
+}
+
+impl<'a> Surface<'a> {
+    /// A tree file's surface, at rest where no `vertices` are given, stretched by at most `limit`.
+    pub fn new(
+        bytes: &'a [u8],
+        path: &'a Path,
+        vertices: Option<&PathBuf>,
+        frame: Option<usize>,
+        limit: Option<f32>,
+    ) -> Result<Self> {
+        let tree = tree_file::validate(bytes, path)?;
+        let (positions, stretch) = match &tree {
+            AnyTree::Narrow(tree) => measured(tree, path, vertices, frame)?,
+            AnyTree::Wide(tree) => measured(tree, path, vertices, frame)?,
+        };
+        let name = path.display();
+        let mut options = Options::cold();
+        if let Some(limit) = limit {
+            let measured = stretch
+                .ok_or_else(|| anyhow!("{name}: no rest metric to measure a stretch with"))?;
+            let sigma = measured.sigma();
+            if sigma > limit || limit.is_nan() {
+                bail!(
+                    "{name}: the surface is stretched by {sigma}, more than the {limit} of --stretch"
+                );
+            }
+            options = options.stretch(measured);
+        }
+        Ok(Self { name: name.to_string(), tree, positions, stretch, options })
+    }
+
+    fn ask(&self, tool: &ToolSpec, margin: Option<f32>) -> Result<Found> {
+        match &self.tree {
+            AnyTree::Narrow(tree) => self.ask_tree(tree, tool, margin),
+            AnyTree::Wide(tree) => self.ask_tree(tree, tool, margin),
+        }
+        .map_err(|error| anyhow!("{}: {error}", self.name))
+    }
+
+    fn ask_tree<I: Index>(
+        &self,
+        tree: &Tree<'_, I>,
+        tool: &ToolSpec,
+        margin: Option<f32>,
+    ) -> Result<Found> {
+        let mut found = match tool {
+            ToolSpec::Sphere(sphere) => self.closest(tree, sphere, margin)?,
+            ToolSpec::Capsule(capsule) => self.closest(tree, capsule, margin)?,
+        };
+        let vertex = |row| tree.vertex_number(row).map_or(row, |vertex| vertex.0);
+        found.triangle = found.proximity.corners.map(vertex);
+        found.triangles =
+            found.contacts.iter().map(|contact| contact.corners.map(vertex)).collect();
+        Ok(found)
+    }
+
+    fn closest<I: Index>(
+        &self,
+        tree: &Tree<'_, I>,
+        tool: &impl Tool,
+        margin: Option<f32>,
+    ) -> Result<Found> {
+        let positions = self.positions.as_slice();
+        let mut query = Query::<I, STACK>::new(tree)?;
+        let Some(margin) = margin else {
+            return Ok(Found::new(query.closest(positions, tool, &self.options)?));
+        };
+        let mut contacts = Box::new(Contacts::<64, 16_384>::new());
+        let closest = query.contacts(positions, tool, margin, &self.options, &mut contacts)?;
+        let bound = contacts.bound();
+        Ok(Found { contacts: contacts.iter().copied().collect(), bound, ..Found::new(closest) })
+    }
+}
+
+/// What one tool finds on one surface.
+struct Found {
+    proximity: Proximity,
+    /// Corners of its triangle, numbered as in the mesh file.
+    triangle: [u32; 3],
+    contacts: Vec<Contact>,
+    /// The triangle of each contact.
+    triangles: Vec<[u32; 3]>,
+    /// All contacts below are listed.
+    bound: f32,
+}
+
+impl Found {
+    fn new(proximity: Proximity) -> Self {
+        let (contacts, triangles) = (Vec::new(), Vec::new());
+        Self { proximity, triangle: [0; 3], contacts, triangles, bound: f32::INFINITY }
+    }
+}
+
+/// The closest of all pairs of a tool and a surface, and with a margin all contacts, nearest first.
+pub fn ask<'a>(
+    surfaces: &'a [Surface<'a>],
+    tools: &[ToolSpec],
+    margin: Option<f32>,
+) -> Result<Answer<'a>> {
+    let mut best: Option<Answer<'a>> = None;
+    let (mut touches, mut bound) = (Vec::new(), f32::INFINITY);
+    for surface in surfaces {
+        for (number, tool) in tools.iter().enumerate() {
+            let found = surface.ask(tool, margin)?;
+            bound = bound.min(found.bound);
+            let contacts = found.contacts.into_iter().zip(found.triangles);
+            touches.extend(contacts.map(|(contact, triangle)| Touch {
+                contact,
+                triangle,
+                tree: &surface.name,
+                tool: number,
+            }));
+            let separation = found.proximity.separation;
+            if best.as_ref().is_none_or(|best| separation < best.proximity.separation) {
+                best = Some(Answer {
+                    proximity: found.proximity,
+                    triangle: found.triangle,
+                    tree: &surface.name,
+                    tool: number,
+                    stretch: surface.stretch,
+                    contacts: None,
+                    bound,
+                });
+            }
+        }
+    }
+    let mut answer = best.ok_or_else(|| anyhow!("no tool"))?;
+    if margin.is_some() {
+        touches.sort_by(|a, b| a.contact.separation.total_cmp(&b.contact.separation));
+        (answer.contacts, answer.bound) = (Some(touches), bound);
+    }
+    Ok(answer)
+}
+
+/// The positions of a tree's rows, and how far they stretch it.
+fn measured<I: Index>(
+    tree: &Tree<'_, I>,
+    path: &Path,
+    vertices: Option<&PathBuf>,
+    frame: Option<usize>,
+) -> Result<(Vec<Vec3>, Option<MeasuredStretch>)> {
+    let name = path.display();
+    let positions = match vertices {
+        None => (0..tree.vertex_count())
+            .map(|row| tree.rest_position(row))
+            .collect::<Option<Vec<Vec3>>>()
+            .ok_or_else(|| anyhow!("{name}: the tree has no rest shape, give --vertices"))?,
+        Some(path) => rows(tree, path, &current(path, frame)?)?,
+    };
+    // A distance on a surface that is stretched beyond the limit could be wrong: none is given.
+    match measure_stretch(tree, positions.as_slice()) {
+        Ok(measured) => Ok((positions, Some(measured))),
+        Err(StretchError::NoMetric) => Ok((positions, None)),
+        Err(error) => bail!(
+            "{name}: {error}; build the tree with a larger --stretch, or with --limits that allow it"
+        ),
+    }
+}
+
+/// Positions in the order of the mesh file.
+fn current(path: &Path, frame: Option<usize>) -> Result<Vec<Vec3>> {
+    let name = path.display();
+    let is_motion = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("pc2"));
+    match (is_motion, frame) {
+        (true, None) => bail!("{name}: choose a frame of the motion with --frame"),
+        (true, Some(frame)) => {
+            let mut frames = Motion::read_pc2(path)?.frames;
+            if frame >= frames.len() {
+                bail!("{name}: no frame {frame}, the motion has {}", frames.len());
+            }
+            Ok(frames.swap_remove(frame))
+        }
+        (false, Some(_)) => bail!("{name}: --frame needs a .pc2 file"),
+        // The tree is of the largest component: others are no error here.
+        (false, None) => {
+            let options = ReadOptions { largest_component: true, ..Import::options() };
+            Ok(options.read(path)?.mesh.positions)
+        }
+    }
+}
+
+/// Puts positions into the order of the tree's rows.
+pub fn rows<I: Index>(tree: &Tree<'_, I>, path: &Path, of_mesh: &[Vec3]) -> Result<Vec<Vec3>> {
+    (0..tree.vertex_count())
+        .map(|row| {
+            let vertex = tree.vertex_number(row).map_or(row, |number| number.0);
+            of_mesh.get(vertex as usize).copied().ok_or_else(|| {
+                anyhow!(
+                    "{}: has {} vertices and the tree uses vertex {vertex}; give the positions of \
+                     the mesh that the tree was built from",
+                    path.display(),
+                    of_mesh.len()
+                )
+            })
+        })
+        .collect()
+}
