@@ -38,18 +38,24 @@ impl Mesh {
     /// no vertex numbers.
     ///
     /// # Errors
-    /// [`WriteError`]; the file is complete or untouched.
+    /// [`WriteError`], also for a format that is only read; the file is complete or untouched.
     ///
     /// # Panics
     /// As STL, if a triangle names a vertex that the mesh does not have.
     pub fn write(&self, path: impl AsRef<Path>, format: Format) -> Result<(), WriteError> {
-        write_atomically(path, |out| match format {
-            Format::Ply => ply(self, out),
-            Format::StlBinary => stl(self, out),
-            Format::StlAscii => ascii_stl(self, out),
-            Format::Obj => obj(self, out),
-            Format::Off => off(self, out),
-        })
+        let path = path.as_ref();
+        let contents: fn(&Self, &mut dyn Write) -> io::Result<()> = match format {
+            Format::Ply => ply,
+            Format::StlBinary => stl,
+            Format::StlAscii => ascii_stl,
+            Format::Obj => obj,
+            Format::Off => off,
+            _ => {
+                let kind = WriteErrorKind::UnknownFormat;
+                return Err(WriteError { path: path.to_path_buf(), kind });
+            }
+        };
+        write_atomically(path, |out| contents(self, out))
     }
 
     /// Writes a binary little-endian PLY file, whatever its name: f32 positions, 32-bit vertex numbers.

@@ -7,8 +7,8 @@
 //! ```
 //!
 //! The program then says `dibs_nostd::include_tree!("heart")`. [`tree`] is made of parts: [`read`]
-//! imports and checks a mesh (OBJ, STL, PLY, OFF), [`Builder`] makes the tree, [`BuiltTree`] is written as a
-//! Rust module or as a blob. [`Motion`] is a recorded deformation (PC2), [`modes`] make a
+//! imports and checks a mesh, [`Builder`] makes the tree, [`BuiltTree`] is written as a
+//! Rust module or as a blob. [`Motion`] is a recorded deformation, [`modes`] make a
 //! few weights of it, and [`generate`] makes procedural hearts and brains. The library prints nothing; the program
 //! `dibs` (feature `cli`, on by default) does.
 
@@ -26,8 +26,8 @@ mod leaf;
 mod mesh;
 #[cfg(feature = "modes")]
 pub mod modes;
+mod motion;
 mod orient;
-mod pc2;
 mod read;
 mod rest;
 mod rounding;
@@ -44,8 +44,8 @@ pub use builder::{Builder, IndexWidth};
 pub use construct::Construction;
 pub use error::BuildError;
 pub use mesh::{Mesh, Motion, RestSurface};
+pub use motion::MotionMismatchError;
 pub use orient::{WindingError, check_winding, orient};
-pub use pc2::MotionMismatchError;
 pub use read::{Format, Import, ReadError, ReadErrorKind, ReadOptions, Report, read};
 pub use rest::Paths;
 pub use script::{MeshSource, TreeScript, tree};

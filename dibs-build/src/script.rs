@@ -30,7 +30,7 @@ pub fn tree(mesh: impl Into<MeshSource>) -> TreeScript {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum MeshSource {
-    /// A file: OBJ, STL, PLY or OFF.
+    /// A file, as [`read`](crate::read()) takes it.
     File(PathBuf),
     /// A mesh that the script has made.
     Mesh(Mesh),
@@ -79,7 +79,7 @@ impl TreeScript {
         self
     }
 
-    /// Adds displacement modes fitted to a recorded motion, a PC2 file.
+    /// Adds displacement modes fitted to a recorded motion, as [`Motion::read`](crate::Motion::read) takes it.
     #[cfg(feature = "modes")]
     pub fn modes(mut self, motion: impl Into<PathBuf>, count: usize) -> Self {
         self.modes = Some((motion.into(), count));
@@ -160,7 +160,7 @@ impl TreeScript {
         warn(label, built.summary().warnings());
         #[cfg(feature = "modes")]
         if let Some((path, count)) = self.modes {
-            let motion = crate::Motion::read_pc2(&path)?;
+            let motion = crate::Motion::read(&path)?;
             let failed = |error| format!("{}: {error}", path.display());
             let fit = crate::modes::ModalFit::new(surface.mesh(), &motion).map_err(failed)?;
             return built.with_modes(&fit, count).map_err(|error| failed(error).into());

@@ -72,7 +72,7 @@ fn vertex_name(vertex: usize, format: Format) -> String {
         Format::StlAscii | Format::StlBinary => {
             format!("corner {} of triangle {}", vertex % 3 + 1, vertex / 3 + 1)
         }
-        Format::Ply | Format::Off => format!("vertex {vertex} (counted from 0)"),
+        _ => format!("vertex {vertex} (counted from 0)"),
     }
 }
 

@@ -26,11 +26,63 @@ pub enum ReadErrorKind {
     #[error("the file is empty; export the mesh again")]
     Empty,
     /// Its content is none of the formats.
-    #[error("neither content nor extension is OBJ, STL, PLY or OFF; convert it to one of them")]
+    #[error(
+        "neither content nor extension is that of a format that is read (OBJ, STL, PLY, OFF, VTK, glTF, Gmsh, 3MF); convert it to one of them"
+    )]
     UnknownFormat,
+    /// A known kind of file that is not read.
+    #[error("this is {what}; {remedy}")]
+    Foreign {
+        /// The kind of file.
+        what: String,
+        /// How it becomes one that is read.
+        remedy: String,
+    },
+    /// A format whose reader was left out of this program.
+    #[error(
+        "this is {format}, whose reader was left out: build dibs-build with its feature `formats`, or convert the mesh to PLY"
+    )]
+    LeftOut {
+        /// The format.
+        format: Format,
+    },
     /// A motion file that is not PC2.
     #[error("not a PC2 file of version 1 with at least one frame; export the motion as PC2")]
     NotPc2,
+    /// A motion file of another kind.
+    #[error(
+        "neither PC2 nor a NumPy array (.npy), nor a series of meshes (heart_%03d.ply); export the motion as one of them"
+    )]
+    UnknownMotion,
+    /// A NumPy array that is no motion.
+    #[error("no motion: {what}; save it by `numpy.save(name, frames)`, of frames x vertices x 3")]
+    NumPy {
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A series without a file.
+    #[error(
+        "no file has this name with a number in the place of %d; give the series as heart_%03d.ply"
+    )]
+    NoSeries,
+    /// A number is missing in a series.
+    #[error(
+        "missing in its series, which goes on with number {next}; add it, or number the files anew"
+    )]
+    Gap {
+        /// The next number that is there.
+        next: u64,
+    },
+    /// A frame of a series is STL.
+    #[error(
+        "STL has no vertex numbers, so its vertices are not those of other frames; export the series as PLY"
+    )]
+    UnnumberedFrame,
+    /// A frame of a series has other triangles than the first.
+    #[error(
+        "its triangles are not those of the series' first file; export every frame of one mesh, with vertices in the same order"
+    )]
+    OtherTriangles,
     /// It does not follow its format.
     #[error("not valid {format}{}: {what}; repair it or export the mesh again", at(*.line))]
     Malformed {

@@ -1,15 +1,30 @@
-//! Mesh files: OBJ, STL, PLY and OFF, recognised by their contents.
+//! Mesh files, recognised by their contents.
 
+#[cfg(feature = "formats")]
+mod base64;
 mod check;
+mod cursor;
 mod error;
+mod foreign;
+#[cfg(feature = "formats")]
+mod gltf;
+mod gmsh;
+#[cfg(feature = "formats")]
+mod inflate;
 mod obj;
 mod off;
 mod ply;
 mod polygon;
 mod raw;
 mod report;
+mod scalar;
 mod sniff;
 mod stl;
+#[cfg(feature = "formats")]
+mod three_mf;
+mod vtk;
+#[cfg(feature = "formats")]
+mod vtp;
 mod weld;
 
 pub use error::{ReadError, ReadErrorKind};
@@ -17,6 +32,9 @@ pub use report::{Format, Report};
 
 use crate::mesh::{Mesh, RestSurface};
 use crate::rounding::round_up;
+use raw::Raw;
+pub(crate) use raw::excerpt;
+pub(crate) use scalar::{Endian, Scalar};
 use std::path::Path;
 
 /// A mesh that passed every check, and the report of findings and repairs.
@@ -72,32 +90,49 @@ impl ReadOptions {
         let path = path.as_ref();
         let fail = |kind| ReadError { path: path.to_path_buf(), kind };
         let bytes = std::fs::read(path).map_err(|error| fail(error.into()))?;
-        self.read_bytes(bytes, path.extension().and_then(|e| e.to_str())).map_err(fail)
+        self.read_bytes(bytes, path).map_err(fail)
     }
 
-    fn read_bytes(&self, bytes: Vec<u8>, extension: Option<&str>) -> Result<Import, ReadErrorKind> {
+    fn read_bytes(&self, bytes: Vec<u8>, path: &Path) -> Result<Import, ReadErrorKind> {
         if let Some(tolerance) = self.weld_tolerance
             && !(tolerance.is_finite() && tolerance >= 0.0)
         {
             return Err(ReadErrorKind::Tolerance { tolerance });
         }
-        let format = sniff::format(&bytes, extension)?;
-        let raw = match format {
-            Format::Obj => obj::read(&bytes)?,
-            Format::StlAscii => stl::read_ascii(&bytes)?,
-            Format::StlBinary => stl::read_binary(&bytes)?,
-            Format::Ply => ply::read(bytes)?,
-            Format::Off => off::read(&bytes)?,
-        };
+        let (format, raw) = elements(bytes, path)?;
         let mut import = check::import(&raw, format, self)?;
-        import.report.extension_disagrees =
-            extension.is_some_and(|e| !format.extension().eq_ignore_ascii_case(e));
+        let extension = path.extension().and_then(|extension| extension.to_str());
+        import.report.extension_disagrees = extension.is_some_and(|e| !format.has_extension(e));
         Ok(import)
     }
 }
 
-/// Reads and checks a mesh file in OBJ, STL (ASCII or binary), PLY (ASCII, little- or big-endian)
-/// or OFF, told apart by content. Polygons are triangulated, soup is welded, degenerate and
+/// The format of a file, and its vertices and polygons.
+pub(crate) fn elements(bytes: Vec<u8>, path: &Path) -> Result<(Format, Raw), ReadErrorKind> {
+    let format = sniff::format(&bytes, path)?;
+    let raw = match format {
+        Format::Obj => obj::read(&bytes),
+        Format::StlAscii => stl::read_ascii(&bytes),
+        Format::StlBinary => stl::read_binary(&bytes),
+        Format::Ply => ply::read(bytes),
+        Format::Off => off::read(&bytes),
+        Format::Vtk => vtk::read(&bytes),
+        Format::Gmsh => gmsh::read(&bytes),
+        #[cfg(feature = "formats")]
+        Format::Vtp => vtp::read(&bytes),
+        #[cfg(feature = "formats")]
+        Format::Gltf => gltf::read(&bytes, path.parent().unwrap_or(Path::new(""))),
+        #[cfg(feature = "formats")]
+        Format::ThreeMf => three_mf::read(&bytes),
+        #[cfg(not(feature = "formats"))]
+        Format::Vtp | Format::Gltf | Format::ThreeMf => Err(ReadErrorKind::LeftOut { format }),
+    }?;
+    Ok((format, raw))
+}
+
+/// Reads and checks a mesh file in OBJ, STL (ASCII or binary), PLY (ASCII, little- or big-endian),
+/// OFF, legacy VTK or Gmsh's format, with the feature `formats` also in VTK's XML, glTF or 3MF, told apart by content.
+/// Polygons are triangulated, soup is welded, degenerate and
 /// duplicate triangles are dropped and counted.
 ///
 /// Vertex numbers are those of the file, whatever is welded or dropped: a vertex that no triangle

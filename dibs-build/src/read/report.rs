@@ -18,9 +18,25 @@ pub enum Format {
     Ply,
     /// Object File Format, as text.
     Off,
+    /// VTK's legacy format: PolyData, or flat cells of an unstructured grid.
+    Vtk,
+    /// VTK's XML PolyData.
+    Vtp,
+    /// glTF 2.0, as JSON or as GLB.
+    Gltf,
+    /// Gmsh's mesh, version 2.2 or 4.1.
+    Gmsh,
+    /// 3D Manufacturing Format.
+    ThreeMf,
 }
 
 impl Format {
+    /// Whether an extension, in any case, is one of the format's.
+    pub(super) fn has_extension(self, extension: &str) -> bool {
+        let other = matches!(self, Self::Gltf) && extension.eq_ignore_ascii_case("glb");
+        other || extension.eq_ignore_ascii_case(self.extension())
+    }
+
     /// The usual file name extension, in lower case.
     #[must_use]
     pub fn extension(self) -> &'static str {
@@ -29,6 +45,11 @@ impl Format {
             Self::StlAscii | Self::StlBinary => "stl",
             Self::Ply => "ply",
             Self::Off => "off",
+            Self::Vtk => "vtk",
+            Self::Vtp => "vtp",
+            Self::Gltf => "gltf",
+            Self::Gmsh => "msh",
+            Self::ThreeMf => "3mf",
         }
     }
 }
@@ -41,6 +62,11 @@ impl fmt::Display for Format {
             Self::StlBinary => "binary STL",
             Self::Ply => "PLY",
             Self::Off => "OFF",
+            Self::Vtk => "legacy VTK",
+            Self::Vtp => "VTK XML",
+            Self::Gltf => "glTF",
+            Self::Gmsh => "Gmsh",
+            Self::ThreeMf => "3MF",
         })
     }
 }
@@ -156,7 +182,7 @@ impl Report {
         match self.format {
             // Their rows are gone.
             Format::StlAscii | Format::StlBinary => 0,
-            Format::Obj | Format::Ply | Format::Off => self.welded.min(self.unreferenced_vertices),
+            _ => self.welded.min(self.unreferenced_vertices),
         }
     }
 }

@@ -1,11 +1,15 @@
 //! Which format a file has, by its content; the extension decides only where content does not.
 
 use super::raw::{coordinate, lines};
-use super::{Format, ReadErrorKind, stl};
+use super::{Format, ReadErrorKind, foreign, stl};
+use std::path::Path;
 
-pub(super) fn format(bytes: &[u8], extension: Option<&str>) -> Result<Format, ReadErrorKind> {
+pub(super) fn format(bytes: &[u8], path: &Path) -> Result<Format, ReadErrorKind> {
     if bytes.is_empty() {
         return Err(ReadErrorKind::Empty);
+    }
+    if let Some(format) = marked(bytes) {
+        return Ok(format);
     }
     let first_line = lines(bytes)
         .map(|(_, line)| line.trim().to_ascii_lowercase())
@@ -29,10 +33,32 @@ pub(super) fn format(bytes: &[u8], extension: Option<&str>) -> Result<Format, Re
     if is_text && lines(bytes).any(|(_, line)| is_obj_line(&line)) {
         return Ok(Format::Obj);
     }
+    if let Some(foreign) = foreign::named(bytes, path) {
+        return Err(foreign);
+    }
+    let extension = path.extension().and_then(|extension| extension.to_str());
     match extension.map(str::to_ascii_lowercase).as_deref() {
         Some("obj") if is_text => Ok(Format::Obj),
         Some("stl") => Ok(Format::StlBinary),
         _ => Err(ReadErrorKind::UnknownFormat),
+    }
+}
+
+/// A format that begins with a mark of its own.
+fn marked(bytes: &[u8]) -> Option<Format> {
+    let beginning = &bytes[..bytes.len().min(1024)];
+    let has = |bytes: &[u8], mark: &[u8]| bytes.windows(mark.len()).any(|window| window == mark);
+    match beginning.trim_ascii_start() {
+        [b'#', ..] if bytes.starts_with(b"# vtk DataFile") => Some(Format::Vtk),
+        [b'<', ..] if has(beginning, b"<VTKFile") => Some(Format::Vtp),
+        [b'g', b'l', b'T', b'F', ..] => Some(Format::Gltf),
+        [b'{', ..] if has(bytes, b"\"asset\"") => Some(Format::Gltf),
+        [b'$', ..] if has(beginning, b"$MeshFormat") => Some(Format::Gmsh),
+        // Names of files stand in a package as they are.
+        [b'P', b'K', 3, 4, ..] if has(bytes, b"3D/") && has(bytes, b".model") => {
+            Some(Format::ThreeMf)
+        }
+        _ => None,
     }
 }
 

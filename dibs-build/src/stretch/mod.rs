@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 pub use file::{LimitsError, LimitsErrorKind, read_limits, write_limits};
 
-use crate::pc2::MotionMismatchError;
+use crate::motion::MotionMismatchError;
 use crate::rest::RestShape;
 use crate::{Mesh, Motion, Paths};
 

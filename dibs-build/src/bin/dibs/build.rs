@@ -20,7 +20,7 @@ Examples:
   dibs build scan.obj -o scan.dibs --orient
   dibs build heart.ply -o heart.dibs --motion heart.pc2 --modes 16")]
 pub struct Args {
-    /// The rest shape: OBJ, STL, PLY or OFF, told apart by content
+    /// The rest shape: OBJ, STL, PLY, OFF, VTK (.vtk, .vtp), glTF (.gltf, .glb), Gmsh (.msh) or 3MF, told apart by content
     mesh: PathBuf,
     /// What to write: NAME.dibs, a blob, or NAME.rs, a Rust module that includes NAME.dibs beside it
     #[arg(short, long)]
@@ -48,7 +48,7 @@ pub struct Args {
     /// Add displacement modes fitted to the motion, so that as many weights drive the surface
     #[arg(long, value_name = "COUNT", requires = "motion")]
     modes: Option<usize>,
-    /// A recorded motion of the mesh, a .pc2 file: fail if it stretches the surface beyond the limits
+    /// A recorded motion of the mesh (.pc2, .npy or a series heart_%03d.vtp): fail if it stretches the surface beyond the limits
     #[arg(long)]
     motion: Option<PathBuf>,
     /// Print a JSON object
@@ -139,7 +139,7 @@ pub fn run(args: &Args) -> Result<()> {
 
 /// An error unless the limits cover a recorded motion: the controller would reject its frames.
 fn check_covered(args: &Args, mesh: &Mesh, path: &Path, limits: &[f32]) -> Result<()> {
-    let motion = Motion::read_pc2(path)?;
+    let motion = Motion::read(path)?;
     let paths = match args.construction {
         ConstructionName::Default => Paths::default(),
         ConstructionName::Paper => Paths::Edges,

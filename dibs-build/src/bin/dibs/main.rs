@@ -27,7 +27,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Build a tree from a mesh file (OBJ, STL, PLY or OFF)
+    /// Build a tree from a mesh file
     Build(build::Args),
     /// Find the stretch limits that a recorded motion needs
     Stretch(stretch::Args),

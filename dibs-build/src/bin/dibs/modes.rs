@@ -18,7 +18,7 @@ pub struct Fit {
 
 /// Fits modes to a motion file.
 pub fn fit(mesh: &Mesh, path: &Path) -> Result<Fit> {
-    let motion = Motion::read_pc2(path)?;
+    let motion = Motion::read(path)?;
     let spinner = ProgressBar::new_spinner().with_message("fitting modes to the motion");
     spinner.enable_steady_tick(Duration::from_millis(100));
     let fit = ModalFit::new(mesh, &motion);

@@ -17,9 +17,9 @@ A triangle's stretch is the largest singular value of its deformation gradient a
 with --edges the longest of its edges over that edge's length there. Give the same options for reading
 the mesh as to `dibs build`.")]
 pub struct Args {
-    /// The rest shape: OBJ, STL, PLY or OFF, told apart by content
+    /// The rest shape, a mesh file as for `dibs build`
     mesh: PathBuf,
-    /// The recorded motion of the mesh, a .pc2 file
+    /// The recorded motion of the mesh: .pc2, .npy or a series (heart_%03d.vtp)
     motion: PathBuf,
     /// What limits leave above the recorded stretch (0.1: a tenth of it)
     #[arg(long, default_value_t = 0.1)]
@@ -55,7 +55,7 @@ pub fn run(args: &Args) -> Result<()> {
     }
     let import = mesh_file::read(&args.mesh, &args.reading)?;
     let mesh = &import.mesh;
-    let motion = Motion::read_pc2(&args.motion)?;
+    let motion = Motion::read(&args.motion)?;
     let paths = if args.edges { Paths::Edges } else { Paths::default() };
     let needed = measure(mesh, &motion, &args.motion, paths)?;
     let ranked = needed.ranked();

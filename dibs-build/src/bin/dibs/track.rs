@@ -27,9 +27,12 @@ it moved before (extrapolated). One line a tick on standard output, and what it 
 pub struct Args {
     /// A tree file that `dibs build` wrote
     tree: PathBuf,
-    /// The surface's motion, a .pc2 file of the built mesh
+    /// The surface's motion: .pc2, .npy or a series (heart_%03d.vtp) of the built mesh
     #[arg(long)]
     motion: PathBuf,
+    /// Frames of the motion a second; by default what its file says
+    #[arg(long, value_name = "HZ")]
+    motion_rate: Option<f32>,
     /// Ticks a second
     #[arg(long, default_value_t = 1_000.0)]
     rate: f64,
@@ -81,13 +84,18 @@ fn tools(path: &Path) -> Result<Vec<ToolSpec>> {
 
 fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
     let tools = tools(&args.path)?;
-    let motion = Motion::read_pc2(&args.motion)?;
+    let mut motion = Motion::read(&args.motion)?;
+    motion.rate = args.motion_rate.unwrap_or(motion.rate);
     let name = args.motion.display();
     if !(args.rate > 0.0 && args.rate.is_finite()) {
         bail!("--rate is {}: give the ticks of a second", args.rate);
     }
     if !(motion.rate > 0.0) || motion.frames.is_empty() {
-        bail!("{name}: has {} frames at {} a second", motion.frames.len(), motion.rate);
+        bail!(
+            "{name}: has {} frames at {} a second; give --motion-rate",
+            motion.frames.len(),
+            motion.rate
+        );
     }
     let frames: Vec<Vec<Vec3>> =
         motion.frames.iter().map(|frame| rows(tree, &args.motion, frame)).collect::<Result<_>>()?;

@@ -51,11 +51,11 @@ pub struct Args {
     /// List all locally closest pairs whose separation is at most this, too: at most 64 of each tool and surface
     #[arg(long, value_name = "MARGIN")]
     contacts: Option<f32>,
-    /// Current positions, one for each vertex of the built mesh: a mesh file, or a .pc2 file with
+    /// Current positions, one for each vertex of the built mesh: a mesh file, or a motion with
     /// --frame; by default the rest shape. In a scene, once for each tree, in their order
     #[arg(long)]
     vertices: Vec<PathBuf>,
-    /// Frame of a .pc2 file, counted from 0
+    /// Frame of a motion, counted from 0
     #[arg(long, requires = "vertices")]
     frame: Option<usize>,
     /// Fail if the surface is stretched by more than this, and search with the stretch that it has

@@ -187,17 +187,22 @@ fn measured<I: Index>(
 /// Positions in the order of the mesh file.
 fn current(path: &Path, frame: Option<usize>) -> Result<Vec<Vec3>> {
     let name = path.display();
-    let is_motion = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("pc2"));
+    let is_motion = name.to_string().contains('%')
+        || path
+            .extension()
+            .is_some_and(|e| ["pc2", "npy"].iter().any(|m| e.eq_ignore_ascii_case(m)));
     match (is_motion, frame) {
         (true, None) => bail!("{name}: choose a frame of the motion with --frame"),
         (true, Some(frame)) => {
-            let mut frames = Motion::read_pc2(path)?.frames;
+            let mut frames = Motion::read(path)?.frames;
             if frame >= frames.len() {
                 bail!("{name}: no frame {frame}, the motion has {}", frames.len());
             }
             Ok(frames.swap_remove(frame))
         }
-        (false, Some(_)) => bail!("{name}: --frame needs a .pc2 file"),
+        (false, Some(_)) => {
+            bail!("{name}: --frame needs a motion: .pc2, .npy or a series heart_%03d.ply")
+        }
         // The tree is of the largest component: others are no error here.
         (false, None) => {
             let options = ReadOptions { largest_component: true, ..Import::options() };

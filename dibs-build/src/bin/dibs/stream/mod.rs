@@ -32,7 +32,7 @@ pub struct Args {
     /// The tree that the receiver has (NAME.dibs), or its mesh, of which `dibs build` with default
     /// options makes the same tree
     surface: PathBuf,
-    /// The motion: a PC2 file with a position for each of the mesh's vertices in every frame
+    /// The motion, with a position for each of the mesh's vertices in every frame: .pc2, .npy or a series (heart_%03d.vtp)
     motion: PathBuf,
     /// Where to: `serial:PORT` or `serial:PORT@BAUD`, `tcp:HOST:PORT`, `udp:HOST:PORT` or
     /// `udp:HOST:PORT@LOCAL_PORT`, `unix:PATH`
@@ -83,7 +83,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<()> {
     let key = args.key.as_deref().map(key::read).transpose()?;
     let order = order(&args.surface)?;
-    let motion = Motion::read_pc2(&args.motion)?;
+    let motion = Motion::read(&args.motion)?;
     let name = args.motion.display();
     if motion.frames.is_empty() {
         bail!("{name}: the motion has no frame");

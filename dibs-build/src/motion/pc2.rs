@@ -1,4 +1,4 @@
-//! Recorded motions: PC2 point cache files, as animation tools write them.
+//! PC2 point cache files, as animation tools write them.
 //!
 //! Layout, little-endian: `POINTCACHE2\0`, i32 version 1, i32 points, f32 start frame, f32 sample
 //! rate (frames per sample; used here as samples a second, as the field's files do), i32 samples,
@@ -11,7 +11,7 @@ use glam::Vec3;
 use std::path::Path;
 use thiserror::Error;
 
-const MAGIC: &[u8; 12] = b"POINTCACHE2\0";
+pub(super) const MAGIC: &[u8; 12] = b"POINTCACHE2\0";
 const HEADER: usize = 32;
 const POINT: usize = 12;
 
@@ -89,7 +89,7 @@ impl Motion {
     }
 }
 
-fn parse(bytes: &[u8]) -> Result<Motion, ReadErrorKind> {
+pub(super) fn parse(bytes: &[u8]) -> Result<Motion, ReadErrorKind> {
     if bytes.is_empty() {
         return Err(ReadErrorKind::Empty);
     }
@@ -120,13 +120,7 @@ fn parse(bytes: &[u8]) -> Result<Motion, ReadErrorKind> {
         let (points, _) = coordinates.as_chunks::<3>();
         let points: Vec<Vec3> =
             points.iter().map(|p| Vec3::from_array(p.map(f32::from_le_bytes))).collect();
-        if let Some(vertex) = points.iter().position(|p| !p.is_finite()) {
-            let value = points[vertex].to_array().into_iter().find(|c| !c.is_finite());
-            return Err(ReadErrorKind::NonFinite {
-                vertex: format!("vertex {vertex} (counted from 0) in frame {number}"),
-                value: f64::from(value.unwrap_or(f32::NAN)),
-            });
-        }
+        super::check_finite(&points, number)?;
         frames.push(points);
     }
     let rate = f32::from_le_bytes(word(3));

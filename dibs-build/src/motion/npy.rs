@@ -1,0 +1,89 @@
+//! NumPy arrays of frames x vertices x 3, as `numpy.save` writes them.
+//!
+//! Our own reader, although `npyz` and `ndarray-npy` exist: both bring a grammar's compiler and numbers of any length
+//! to read one line of three keys.
+
+use crate::Motion;
+use crate::read::{Endian, ReadErrorKind, Scalar, excerpt};
+use glam::Vec3;
+
+pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
+
+fn wrong(what: String) -> ReadErrorKind {
+    ReadErrorKind::NumPy { what }
+}
+
+pub(super) fn parse(bytes: &[u8]) -> Result<Motion, ReadErrorKind> {
+    let cut_off = || wrong("its header is cut off".to_owned());
+    let version = *bytes.get(MAGIC.len()).ok_or_else(cut_off)?;
+    // From the second version on the header may be long.
+    let width = if version == 1 { 2 } else { 4 };
+    let start = MAGIC.len() + 2;
+    let length = bytes.get(start..start + width).ok_or_else(cut_off)?;
+    let length = length.iter().rev().fold(0, |length, &byte| length << 8 | usize::from(byte));
+    let (header, data) = bytes[start + width..].split_at_checked(length).ok_or_else(cut_off)?;
+    let header = String::from_utf8_lossy(header);
+    let (scalar, order) = kind(value(&header, "descr")?)?;
+    let is_fortran = value(&header, "fortran_order")?.starts_with("True");
+    let [frames, vertices] = shape(value(&header, "shape")?)?;
+    let size = frames.checked_mul(vertices).and_then(|size| size.checked_mul(3));
+    let claimed = size.and_then(|size| size.checked_mul(scalar.bytes()));
+    if frames == 0 || vertices == 0 || claimed != Some(data.len()) {
+        return Err(wrong(format!(
+            "{frames} x {vertices} x 3 numbers of {} bytes, and {} bytes of data",
+            scalar.bytes(),
+            data.len()
+        )));
+    }
+    let numbers = scalar.read_all(data, order);
+    // In Fortran's order the first index runs fastest.
+    let place = |frame: usize, vertex: usize, axis: usize| {
+        if is_fortran {
+            frame + frames * (vertex + vertices * axis)
+        } else {
+            (frame * vertices + vertex) * 3 + axis
+        }
+    };
+    let point = |frame, vertex| {
+        Vec3::from([0, 1, 2].map(|axis| numbers[place(frame, vertex, axis)] as f32))
+    };
+    let frame = |frame| {
+        let points: Vec<Vec3> = (0..vertices).map(|vertex| point(frame, vertex)).collect();
+        super::check_finite(&points, frame).map(|()| points)
+    };
+    Ok(Motion { frames: (0..frames).map(frame).collect::<Result<_, _>>()?, rate: 0.0 })
+}
+
+/// What follows a key of the header, which is a Python dictionary.
+fn value<'a>(header: &'a str, key: &str) -> Result<&'a str, ReadErrorKind> {
+    let after = header.split_once(&format!("'{key}'")).map(|(_, after)| after.trim_start());
+    let value = after.and_then(|after| after.strip_prefix(':')).map(str::trim_start);
+    value.ok_or_else(|| wrong(format!("its header has no '{key}'")))
+}
+
+/// `'<f8'`: the order of the bytes, the kind of number, and its bytes.
+fn kind(value: &str) -> Result<(Scalar, Endian), ReadErrorKind> {
+    let descr = value.trim_start_matches('\'').split('\'').next().unwrap_or_default();
+    let order = if descr.starts_with('>') { Endian::Big } else { Endian::Little };
+    let scalar = match descr.trim_start_matches(['<', '>', '|', '=']) {
+        "f4" => Scalar::F32,
+        "f8" => Scalar::F64,
+        "i2" => Scalar::I16,
+        "i4" => Scalar::I32,
+        "i8" => Scalar::I64,
+        _ => return Err(wrong(format!("numbers of the type '{}'", excerpt(descr)))),
+    };
+    Ok((scalar, order))
+}
+
+/// `(25, 5138, 3)`: the frames, and the vertices of each.
+fn shape(value: &str) -> Result<[usize; 2], ReadErrorKind> {
+    let inner = value.strip_prefix('(').and_then(|value| value.split_once(')'));
+    let (inner, _) = inner.ok_or_else(|| wrong("its header has no shape".to_owned()))?;
+    let numbers: Option<Vec<usize>> =
+        inner.split(',').map(str::trim).filter(|n| !n.is_empty()).map(|n| n.parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[frames, vertices, 3]) => Ok([frames, vertices]),
+        _ => Err(wrong(format!("an array of the shape ({})", excerpt(inner)))),
+    }
+}

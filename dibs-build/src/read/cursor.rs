@@ -1,0 +1,123 @@
+//! A place in a file that is text, or text with binary numbers between its words.
+
+use super::raw::{coordinate, excerpt};
+use super::scalar::{Endian, Scalar, index};
+use super::{Format, ReadErrorKind};
+
+type Result<T> = std::result::Result<T, ReadErrorKind>;
+
+pub(super) struct Cursor<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    format: Format,
+    /// The order of binary numbers; `None` where numbers are text.
+    pub binary: Option<Endian>,
+}
+
+impl<'a> Cursor<'a> {
+    pub fn new(bytes: &'a [u8], format: Format) -> Self {
+        Self { bytes, at: 0, format, binary: None }
+    }
+
+    pub fn malformed(&self, what: String) -> ReadErrorKind {
+        let line = || 1 + self.bytes[..self.at].iter().filter(|&&byte| byte == b'\n').count();
+        ReadErrorKind::Malformed {
+            format: self.format,
+            line: self.binary.is_none().then(line),
+            what,
+        }
+    }
+
+    pub fn truncated(&self, missing: String) -> ReadErrorKind {
+        ReadErrorKind::Truncated { format: self.format, missing }
+    }
+
+    fn rest(&self) -> &'a [u8] {
+        &self.bytes[self.at..]
+    }
+
+    /// The next word, `None` at the end.
+    pub fn word(&mut self) -> Option<&'a str> {
+        self.at += self.rest().iter().take_while(|byte| byte.is_ascii_whitespace()).count();
+        let length = self.rest().iter().take_while(|byte| !byte.is_ascii_whitespace()).count();
+        let word = &self.rest()[..length];
+        self.at += length;
+        // Names in another encoding than UTF-8 are no keyword: what is read of them does not matter.
+        (length > 0).then(|| std::str::from_utf8(word).unwrap_or("?"))
+    }
+
+    /// The next word, which must be there.
+    pub fn needed(&mut self, what: &str) -> Result<&'a str> {
+        self.word().ok_or_else(|| self.truncated(format!("no {what}")))
+    }
+
+    /// Leaves the line, and returns the rest of it.
+    pub fn line(&mut self) -> String {
+        let length = self.rest().iter().take_while(|&&byte| byte != b'\n').count();
+        let line = String::from_utf8_lossy(&self.rest()[..length]).trim().to_owned();
+        self.at = (self.at + length + 1).min(self.bytes.len());
+        line
+    }
+
+    /// Leaves a section that nothing is needed of, with the word that ends it.
+    pub fn skip_to(&mut self, end: &str) -> Result<()> {
+        let found = self.rest().windows(end.len()).position(|window| window == end.as_bytes());
+        let found = found.ok_or_else(|| self.truncated(format!("no '{end}'")))?;
+        self.at += found + end.len();
+        Ok(())
+    }
+
+    /// The next number, text or binary.
+    pub fn number(&mut self, scalar: Scalar) -> Result<f64> {
+        let Some(order) = self.binary else { return self.text_number() };
+        let Some(bytes) = self.rest().get(..scalar.bytes()) else {
+            return Err(self.truncated("numbers are missing".to_owned()));
+        };
+        self.at += bytes.len();
+        Ok(scalar.read(bytes, order))
+    }
+
+    /// The next number, which is text whatever the others are.
+    pub fn text_number(&mut self) -> Result<f64> {
+        let word = self.needed("number where one must be")?;
+        coordinate(word)
+            .ok_or_else(|| self.malformed(format!("'{}' is not a number", excerpt(word))))
+    }
+
+    /// A number that counts or numbers something.
+    pub fn index(&mut self, scalar: Scalar) -> Result<u64> {
+        let number = self.number(scalar)?;
+        self.whole(number)
+    }
+
+    pub fn text_index(&mut self) -> Result<u64> {
+        let number = self.text_number()?;
+        self.whole(number)
+    }
+
+    pub fn whole(&self, number: f64) -> Result<u64> {
+        index(number).ok_or_else(|| self.malformed(format!("{number} is no number of a thing")))
+    }
+
+    /// Fails where so many elements, of at least so many bytes each, cannot follow: before memory is taken for them.
+    pub fn check_room(&self, count: u64, bytes: usize, element: &str) -> Result<usize> {
+        let most = self.rest().len() as u64 / bytes as u64 + 1;
+        if count > most {
+            return Err(ReadErrorKind::Count {
+                element: element.to_owned(),
+                claimed: count,
+                found: most,
+                at_most: true,
+            });
+        }
+        Ok(count as usize)
+    }
+
+    /// The next numbers.
+    pub fn numbers(&mut self, count: u64, scalar: Scalar, element: &str) -> Result<Vec<f64>> {
+        // In a text a digit and a space each.
+        let bytes = if self.binary.is_some() { scalar.bytes() } else { 2 };
+        let count = self.check_room(count, bytes, element)?;
+        (0..count).map(|_| self.number(scalar)).collect()
+    }
+}

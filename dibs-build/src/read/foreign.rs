@@ -1,0 +1,103 @@
+//! Files that are something else than a mesh that is read: each by its name, with the command that converts it.
+
+use super::ReadErrorKind;
+use std::path::Path;
+
+/// How a file becomes a mesh that is read.
+enum Remedy {
+    Meshio,
+    Assimp,
+    Gmsh,
+    FreeSurfer,
+    Blender,
+    Unpack,
+    Segment,
+    Motion,
+}
+
+/// Where in a file its mark stands, the mark, the file's kind, and the remedy.
+const MARKS: &[(usize, &[u8], &str, Remedy)] = &[
+    (0, b"ISO-10303-21", "a STEP file", Remedy::Gmsh),
+    (0, b"DBRep_DrawableShape", "an Open CASCADE model", Remedy::Gmsh),
+    (0, b"MeshVersionFormatted", "a Medit mesh", Remedy::Meshio),
+    (0, b"*heading", "an Abaqus input file", Remedy::Meshio),
+    (0, b"*node", "an Abaqus input file", Remedy::Meshio),
+    (0, b"*part", "an Abaqus input file", Remedy::Meshio),
+    (0, b"** ", "an Abaqus input file", Remedy::Meshio),
+    (0, b"begin bulk", "a Nastran input file", Remedy::Meshio),
+    (0, b"sol ", "a Nastran input file", Remedy::Meshio),
+    (0, b"/prep7", "an Ansys input file", Remedy::Meshio),
+    (0, b"\x89HDF", "an HDF5 file (MED, XDMF, CGNS)", Remedy::Meshio),
+    (0, b"Kaydara FBX Binary", "an FBX scene", Remedy::Assimp),
+    (0, b"; FBX", "an FBX scene", Remedy::Assimp),
+    (0, b"BLENDER", "a Blender file", Remedy::Blender),
+    (0, b"PXR-USDC", "a USD scene", Remedy::Blender),
+    (0, b"#usda", "a USD scene", Remedy::Blender),
+    (0, b"Ogawa", "an Alembic scene", Remedy::Blender),
+    (0, b"xof ", "a DirectX mesh", Remedy::Assimp),
+    (0, b"#VRML", "a VRML scene", Remedy::Assimp),
+    (0, b"\xff\xff\xfe", "a FreeSurfer surface", Remedy::FreeSurfer),
+    (0, b"NRRD000", "a volume image (NRRD)", Remedy::Segment),
+    (0, b"ObjectType = Image", "a volume image (MetaImage)", Remedy::Segment),
+    (128, b"DICM", "a DICOM image", Remedy::Segment),
+    (344, b"n+1\0", "a volume image (NIfTI)", Remedy::Segment),
+    (0, b"POINTCACHE2\0", "a motion (PC2)", Remedy::Motion),
+    (0, b"\x93NUMPY", "a motion (NumPy)", Remedy::Motion),
+    (0, b"\x1f\x8b", "a compressed file (gzip)", Remedy::Unpack),
+    (0, b"PK\x03\x04", "a compressed file (ZIP)", Remedy::Unpack),
+];
+
+/// Elements of XML, and the same.
+const ELEMENTS: &[(&[u8], &str, Remedy)] = &[
+    (b"<COLLADA", "a COLLADA scene", Remedy::Assimp),
+    (b"<X3D", "an X3D scene", Remedy::Assimp),
+    (b"<GIFTI", "a GIFTI surface", Remedy::FreeSurfer),
+    (b"<Xdmf", "an XDMF file", Remedy::Meshio),
+    (b"<amf", "an AMF file", Remedy::Assimp),
+];
+
+/// Bytes in which the first element of an XML file stands.
+const BEGINNING: usize = 1024;
+
+/// What a file is, if it is known and not read.
+pub(super) fn named(bytes: &[u8], path: &Path) -> Option<ReadErrorKind> {
+    let starts = |at: usize, mark: &[u8]| {
+        let found = bytes.get(at..).and_then(|bytes| bytes.get(..mark.len()));
+        found.is_some_and(|found| found.eq_ignore_ascii_case(mark))
+    };
+    let beginning = &bytes[..bytes.len().min(BEGINNING)];
+    let has = |mark: &[u8]| beginning.windows(mark.len()).any(|window| window == mark);
+    let mark = MARKS.iter().find(|(at, mark, ..)| starts(*at, mark));
+    let mark = mark.map(|(_, _, what, remedy)| (what, remedy));
+    let element = || {
+        let found = ELEMENTS.iter().find(|(mark, ..)| starts(0, b"<") && has(mark));
+        found.map(|(_, what, remedy)| (what, remedy))
+    };
+    let (what, remedy) = mark.or_else(element)?;
+    Some(ReadErrorKind::Foreign { what: (*what).to_owned(), remedy: remedy.text(path) })
+}
+
+impl Remedy {
+    fn text(&self, path: &Path) -> String {
+        let old = path.display();
+        let new = path.with_extension("ply");
+        let new = new.display();
+        match self {
+            Self::Meshio => format!("convert it: `meshio convert {old} {new}` (pip install meshio)"),
+            Self::Assimp => format!("convert it: `assimp export {old} {new}`"),
+            Self::Gmsh => {
+                format!("mesh its surface: `gmsh {old} -2 -o {}`", path.with_extension("msh").display())
+            }
+            Self::FreeSurfer => {
+                format!("convert it: `mris_convert {old} {}`", path.with_extension("stl").display())
+            }
+            Self::Blender => "open it in Blender and export the mesh as PLY".to_owned(),
+            Self::Unpack => "unpack it, and give the mesh that is in it".to_owned(),
+            Self::Segment => {
+                "it has no surface yet: segment it, in 3D Slicer for example, and export that as PLY"
+                    .to_owned()
+            }
+            Self::Motion => "give the mesh here, and this file where a motion is asked for".to_owned(),
+        }
+    }
+}

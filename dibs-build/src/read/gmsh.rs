@@ -1,0 +1,209 @@
+//! Gmsh's meshes, versions 2.2, 4.0 and 4.1, text or binary: their triangles and quads.
+//!
+//! Our own reader, although `mshio` exists: that is of 2020, knows version 4.1 alone, and panics on numbers of other
+//! widths than it expects.
+
+use super::cursor::Cursor;
+use super::raw::{Raw, excerpt};
+use super::scalar::{Endian, Scalar};
+use super::{Format, ReadErrorKind};
+use std::collections::HashMap;
+
+type Result<T> = std::result::Result<T, ReadErrorKind>;
+
+pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
+    let mut file = Cursor::new(bytes, Format::Gmsh);
+    file.skip_to("$MeshFormat")?;
+    let version = file.needed("version")?;
+    let is_binary = file.text_index()? == 1;
+    let size = file.text_index()?;
+    let is_known = matches!(version, "2" | "2.1" | "2.2" | "4.1");
+    if !is_known || size != 8 {
+        return Err(ReadErrorKind::Foreign {
+            what: format!("a Gmsh mesh of version {}", excerpt(version)),
+            remedy: "save it as version 4.1: `gmsh OLD.msh -save -format msh41 -o NEW.msh`"
+                .to_owned(),
+        });
+    }
+    let is_old = version.starts_with('2');
+    if is_binary {
+        file.line();
+        // The number 1, in the order of the bytes.
+        file.binary = Some(Endian::Little);
+        if file.number(Scalar::I32)? != 1.0 {
+            file.binary = Some(Endian::Big);
+        }
+    }
+    file.skip_to("$EndMeshFormat")?;
+    let mut mesh = Mesh { raw: Raw::new(0), row: HashMap::new() };
+    let (mut has_nodes, mut has_elements) = (false, false);
+    while let Some(section) = file.word() {
+        let Some(name) = section.strip_prefix('$') else {
+            return Err(file.malformed(format!("'{}' is no section", excerpt(section))));
+        };
+        match (name, is_old) {
+            ("Nodes", true) => mesh.old_nodes(&mut file)?,
+            ("Nodes", false) => mesh.nodes(&mut file)?,
+            ("Elements", true) => mesh.old_elements(&mut file)?,
+            ("Elements", false) => mesh.elements(&mut file)?,
+            _ => {}
+        }
+        has_nodes |= name == "Nodes";
+        has_elements |= name == "Elements";
+        file.skip_to(&format!("$End{name}"))?;
+    }
+    if !(has_nodes && has_elements) {
+        return Err(file.truncated("no '$Nodes' or no '$Elements'".to_owned()));
+    }
+    Ok(mesh.raw)
+}
+
+struct Mesh {
+    raw: Raw,
+    /// The row of each node's number.
+    row: HashMap<u64, u32>,
+}
+
+impl Mesh {
+    fn nodes(&mut self, file: &mut Cursor<'_>) -> Result<()> {
+        skip_line(file);
+        let blocks = file.index(Scalar::U64)?;
+        // Nodes in all, their smallest and largest number.
+        file.numbers(3, Scalar::U64, "numbers")?;
+        for _ in 0..blocks {
+            let dimension = file.index(Scalar::I32)?;
+            let _entity = file.number(Scalar::I32)?;
+            let is_parametric = file.index(Scalar::I32)? == 1;
+            let count = file.index(Scalar::U64)?;
+            let tags = file.numbers(count, Scalar::U64, "nodes")?;
+            // A place on its curve or surface stands beside a node's coordinates.
+            let more = if is_parametric { dimension.min(3) } else { 0 };
+            for tag in tags {
+                let tag = file.whole(tag)?;
+                self.node(file, tag)?;
+                file.numbers(more, Scalar::F64, "parameters")?;
+            }
+        }
+        Ok(())
+    }
+
+    fn old_nodes(&mut self, file: &mut Cursor<'_>) -> Result<()> {
+        let count = file.text_index()?;
+        skip_line(file);
+        for _ in 0..count {
+            let tag = file.index(Scalar::I32)?;
+            self.node(file, tag)?;
+        }
+        Ok(())
+    }
+
+    fn node(&mut self, file: &mut Cursor<'_>, tag: u64) -> Result<()> {
+        let mut position = [0.0; 3];
+        for value in &mut position {
+            *value = file.number(Scalar::F64)?;
+        }
+        if self.row.insert(tag, self.raw.positions.len() as u32).is_some() {
+            return Err(file.malformed(format!("node {tag} stands there twice")));
+        }
+        self.raw.positions.push(position);
+        Ok(())
+    }
+
+    fn elements(&mut self, file: &mut Cursor<'_>) -> Result<()> {
+        skip_line(file);
+        let blocks = file.index(Scalar::U64)?;
+        file.numbers(3, Scalar::U64, "numbers")?;
+        for _ in 0..blocks {
+            let (_dimension, _entity) = (file.number(Scalar::I32)?, file.number(Scalar::I32)?);
+            let kind = file.index(Scalar::I32)?;
+            let nodes = nodes_of(kind, file)?;
+            for _ in 0..file.index(Scalar::U64)? {
+                let tag = file.index(Scalar::U64)?;
+                let nodes = file.numbers(nodes, Scalar::U64, "nodes")?;
+                self.element(file, kind, tag, &nodes)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn old_elements(&mut self, file: &mut Cursor<'_>) -> Result<()> {
+        let count = file.text_index()?;
+        skip_line(file);
+        let mut done = 0;
+        while done < count {
+            // Binary elements of one type stand together, below one header.
+            let (tag, kind, block, tags);
+            if file.binary.is_some() {
+                kind = file.index(Scalar::I32)?;
+                (tag, block, tags) = (None, file.index(Scalar::I32)?, file.index(Scalar::I32)?);
+            } else {
+                tag = Some(file.index(Scalar::I32)?);
+                kind = file.index(Scalar::I32)?;
+                (block, tags) = (1, file.index(Scalar::I32)?);
+            }
+            let nodes = nodes_of(kind, file)?;
+            for _ in 0..block {
+                let tag = tag.map_or_else(|| file.index(Scalar::I32), Ok)?;
+                file.numbers(tags, Scalar::I32, "tags")?;
+                let nodes = file.numbers(nodes, Scalar::I32, "nodes")?;
+                self.element(file, kind, tag, &nodes)?;
+            }
+            done += block.max(1);
+        }
+        Ok(())
+    }
+
+    /// Triangles and quads are kept.
+    fn element(&mut self, file: &Cursor<'_>, kind: u64, tag: u64, nodes: &[f64]) -> Result<()> {
+        if !matches!(kind, 2 | 3) {
+            return Ok(());
+        }
+        for &node in nodes {
+            let row = self.row.get(&file.whole(node)?).copied();
+            let missing =
+                || file.malformed(format!("element {tag} has node {node}, which is not there"));
+            self.raw.corners.push(row.ok_or_else(missing)?);
+        }
+        self.raw.end_face();
+        Ok(())
+    }
+}
+
+/// Binary numbers begin on the next line.
+fn skip_line(file: &mut Cursor<'_>) {
+    if file.binary.is_some() {
+        file.line();
+    }
+}
+
+/// The nodes of an element of this type.
+fn nodes_of(kind: u64, file: &Cursor<'_>) -> Result<u64> {
+    // Points, lines and volumes, also of higher orders, are passed over.
+    Ok(match kind {
+        15 => 1,
+        1 => 2,
+        2 | 8 => 3,
+        3 | 4 | 26 => 4,
+        7 | 27 => 5,
+        6 | 28 => 6,
+        5 => 8,
+        11 => 10,
+        14 => 14,
+        13 => 18,
+        12 => 27,
+        17 => 20,
+        18 => 15,
+        19 => 13,
+        29 => 20,
+        30 => 35,
+        31 => 56,
+        9 | 10 | 16 | 20..=25 => {
+            return Err(ReadErrorKind::Foreign {
+                what: "a Gmsh mesh of curved triangles".to_owned(),
+                remedy: "mesh it again with flat ones: `gmsh MODEL.geo -2 -order 1 -o NEW.msh`"
+                    .to_owned(),
+            });
+        }
+        _ => return Err(file.malformed(format!("an element of the unknown type {kind}"))),
+    })
+}

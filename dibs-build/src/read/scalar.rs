@@ -1,0 +1,68 @@
+//! Numbers as files hold them: text, or bytes of a type and an order.
+
+/// The type of an array's numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F32,
+    F64,
+}
+
+/// The order of a number's bytes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Endian {
+    Little,
+    Big,
+}
+
+impl Scalar {
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+
+    /// The number in these bytes, 8 at most. An integer beyond 2^53, of which no file has so many things, is rounded.
+    pub fn read(self, bytes: &[u8], order: Endian) -> f64 {
+        let mut little = [0; 8];
+        for (place, byte) in little.iter_mut().zip(bytes) {
+            *place = *byte;
+        }
+        if order == Endian::Big {
+            little[..self.bytes()].reverse();
+        }
+        let word = u64::from_le_bytes(little);
+        match self {
+            Self::I8 => f64::from(word as i8),
+            Self::U8 => f64::from(word as u8),
+            Self::I16 => f64::from(word as i16),
+            Self::U16 => f64::from(word as u16),
+            Self::I32 => f64::from(word as i32),
+            Self::U32 => f64::from(word as u32),
+            Self::I64 => word as i64 as f64,
+            Self::U64 => word as f64,
+            Self::F32 => f64::from(f32::from_bits(word as u32)),
+            Self::F64 => f64::from_bits(word),
+        }
+    }
+
+    /// All whole numbers in these bytes.
+    pub fn read_all(self, bytes: &[u8], order: Endian) -> Vec<f64> {
+        bytes.chunks_exact(self.bytes()).map(|bytes| self.read(bytes, order)).collect()
+    }
+}
+
+/// A number that counts or numbers something.
+pub(crate) fn index(number: f64) -> Option<u64> {
+    (number >= 0.0 && number < 2_f64.powi(53) && number.trunc() == number).then_some(number as u64)
+}

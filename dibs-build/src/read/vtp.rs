@@ -1,0 +1,267 @@
+//! VTK's XML PolyData: text, inline binary and appended data, compressed by zlib or not.
+//!
+//! Our own reader of what `quick-xml` finds; `vtk.rs` says why not `vtkio`.
+
+use super::raw::{Raw, coordinate, excerpt};
+use super::scalar::{Endian, Scalar, index};
+use super::vtk::{faces, not_a_surface, split, strips};
+use super::{Format, ReadErrorKind, base64, inflate};
+use flate2::read::ZlibDecoder;
+use quick_xml::Reader;
+use quick_xml::events::{BytesStart, Event};
+
+type Result<T> = std::result::Result<T, ReadErrorKind>;
+
+/// The element whose content may be no XML.
+const APPENDED: &[u8] = b"<AppendedData";
+
+pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
+    let end = bytes.windows(APPENDED.len()).position(|window| window == APPENDED);
+    let (head, appended) = bytes.split_at(end.unwrap_or(bytes.len()));
+    let head = String::from_utf8_lossy(head);
+    let mut file = File { appended, ..File::default() };
+    let mut xml = Reader::from_str(&head);
+    // Only the end of the whole is cut off.
+    xml.config_mut().check_end_names = false;
+    let mut raw = Raw::new(0);
+    loop {
+        match xml.read_event().map_err(|error| malformed(error.to_string()))? {
+            Event::Start(tag) => file.enter(&tag, &raw)?,
+            Event::Empty(tag) => {
+                file.enter(&tag, &raw)?;
+                file.leave(tag.name().0, &mut raw)?;
+            }
+            Event::Text(text) => file.text(&text.xml10_content()),
+            Event::End(tag) => file.leave(tag.name().0, &mut raw)?,
+            Event::Eof => break,
+            _ => {}
+        }
+    }
+    if !file.is_complete {
+        return Err(truncated("no </PolyData>"));
+    }
+    Ok(raw)
+}
+
+fn malformed(what: String) -> ReadErrorKind {
+    ReadErrorKind::Malformed { format: Format::Vtp, line: None, what }
+}
+
+fn truncated(missing: &str) -> ReadErrorKind {
+    ReadErrorKind::Truncated { format: Format::Vtp, missing: missing.to_owned() }
+}
+
+/// The numbers of an element that is being read.
+struct Array {
+    name: String,
+    scalar: Scalar,
+    format: String,
+    offset: usize,
+    text: String,
+    /// Elements inside, whose text is not the array's.
+    depth: usize,
+}
+
+#[derive(Default)]
+struct File<'a> {
+    order: Option<Endian>,
+    has_long_headers: bool,
+    is_compressed: bool,
+    /// From the element `AppendedData` on.
+    appended: &'a [u8],
+    /// Points, Polys, Strips, or others.
+    section: String,
+    array: Option<Array>,
+    connectivity: Vec<u64>,
+    offsets: Vec<u64>,
+    /// Vertices of the pieces before.
+    first: u32,
+    is_complete: bool,
+}
+
+impl File<'_> {
+    fn enter(&mut self, tag: &BytesStart<'_>, raw: &Raw) -> Result<()> {
+        let attribute = |name: &str| match tag.try_get_attribute(name) {
+            Ok(found) => Ok(found.map(|attribute| attribute.value.into_owned())),
+            Err(error) => Err(malformed(error.to_string())),
+        };
+        if let Some(array) = &mut self.array {
+            array.depth += 1;
+            return Ok(());
+        }
+        match tag.name().0 {
+            "VTKFile" => {
+                let kind = attribute("type")?.unwrap_or_default();
+                if kind != "PolyData" {
+                    return Err(not_a_surface(&kind));
+                }
+                let is_big = attribute("byte_order")?.is_some_and(|order| order == "BigEndian");
+                self.order = Some(if is_big { Endian::Big } else { Endian::Little });
+                self.has_long_headers = attribute("header_type")?.is_some_and(|t| t == "UInt64");
+                self.is_compressed = match attribute("compressor")?.as_deref() {
+                    None | Some("") => false,
+                    Some("vtkZLibDataCompressor") => true,
+                    Some(other) => {
+                        return Err(ReadErrorKind::Foreign {
+                            what: format!("VTK data compressed by {}", excerpt(other)),
+                            remedy: "save it with ZLib or without compression".to_owned(),
+                        });
+                    }
+                };
+            }
+            "Piece" => self.first = raw.positions.len() as u32,
+            "DataArray" if self.section == "Points" || self.is_surface() => {
+                let kind = attribute("type")?.unwrap_or_default();
+                let offset = attribute("offset")?.and_then(|offset| offset.trim().parse().ok());
+                self.array = Some(Array {
+                    name: attribute("Name")?.unwrap_or_default(),
+                    scalar: scalar(&kind)?,
+                    format: attribute("format")?.unwrap_or_default(),
+                    offset: offset.unwrap_or(0),
+                    text: String::new(),
+                    depth: 0,
+                });
+            }
+            "DataArray" => {}
+            name => name.clone_into(&mut self.section),
+        }
+        Ok(())
+    }
+
+    fn is_surface(&self) -> bool {
+        self.section == "Polys" || self.section == "Strips"
+    }
+
+    fn text(&mut self, text: &str) {
+        if let Some(array) = self.array.as_mut().filter(|array| array.depth == 0) {
+            array.text += text;
+        }
+    }
+
+    fn leave(&mut self, tag: &str, raw: &mut Raw) -> Result<()> {
+        if let Some(mut array) = self.array.take() {
+            if array.depth > 0 {
+                array.depth -= 1;
+                self.array = Some(array);
+                return Ok(());
+            }
+            let numbers = self.numbers(&array)?;
+            let indices = || {
+                let not_one = |number: &f64| malformed(format!("{number} is no number of a point"));
+                numbers.iter().map(|n| index(*n).ok_or_else(|| not_one(n))).collect::<Result<_>>()
+            };
+            match array.name.as_str() {
+                _ if self.section == "Points" => {
+                    let (points, rest) = numbers.as_chunks::<3>();
+                    if !rest.is_empty() {
+                        return Err(malformed("points that have not three coordinates".to_owned()));
+                    }
+                    raw.positions.extend(points);
+                }
+                "connectivity" => self.connectivity = indices()?,
+                "offsets" => self.offsets = indices()?,
+                _ => {}
+            }
+            return Ok(());
+        }
+        match tag {
+            "Polys" | "Strips" => {
+                let points = std::mem::take(&mut self.connectivity);
+                let mut cells =
+                    split(&std::mem::take(&mut self.offsets), &points).map_err(malformed)?;
+                for point in cells.iter_mut().flatten() {
+                    *point = point.saturating_add(self.first);
+                }
+                if tag == "Polys" { faces(&cells, raw) } else { strips(&cells, raw) }
+            }
+            "PolyData" => self.is_complete = true,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn numbers(&self, array: &Array) -> Result<Vec<f64>> {
+        let order = self.order.ok_or_else(|| malformed("no VTKFile around its data".to_owned()))?;
+        let bytes = match array.format.as_str() {
+            "ascii" => {
+                let not_one = |word| malformed(format!("'{}' is not a number", excerpt(word)));
+                return words(&array.text).map_err(not_one);
+            }
+            "binary" => self.payload(&decoded(array.text.as_bytes())?, order)?,
+            "appended" => {
+                let (is_raw, data) = self.appended()?;
+                let data = data.get(array.offset..).ok_or_else(|| truncated("appended data"))?;
+                if is_raw {
+                    self.payload(data, order)?
+                } else {
+                    self.payload(&decoded(data)?, order)?
+                }
+            }
+            other => return Err(malformed(format!("data as '{}'", excerpt(other)))),
+        };
+        Ok(array.scalar.read_all(&bytes, order))
+    }
+
+    /// Whether appended data is raw bytes, and the data, after an underscore.
+    fn appended(&self) -> Result<(bool, &[u8])> {
+        let end = self.appended.iter().position(|&byte| byte == b'>');
+        let (tag, content) = self.appended.split_at(end.ok_or_else(|| truncated("appended data"))?);
+        let start = content.iter().position(|&byte| byte == b'_');
+        let start = start.ok_or_else(|| malformed("appended data without '_'".to_owned()))?;
+        Ok((tag.windows(5).any(|window| window == b"\"raw\""), &content[start + 1..]))
+    }
+
+    /// What a header announces: one run of bytes, or compressed blocks.
+    fn payload(&self, data: &[u8], order: Endian) -> Result<Vec<u8>> {
+        let scalar = if self.has_long_headers { Scalar::U64 } else { Scalar::U32 };
+        let cut_off = || truncated("an array of numbers is shorter than its header says");
+        let mut rest = data;
+        let mut take = |length: u64| -> Result<&[u8]> {
+            let length = usize::try_from(length).unwrap_or(usize::MAX);
+            let (taken, after) = rest.split_at_checked(length).ok_or_else(cut_off)?;
+            rest = after;
+            Ok(taken)
+        };
+        let word = |bytes: &[u8]| index(scalar.read(bytes, order)).ok_or_else(cut_off);
+        let size = scalar.bytes() as u64;
+        let first = word(take(size)?)?;
+        if !self.is_compressed {
+            return Ok(take(first)?.to_vec());
+        }
+        // The number of blocks, their size, that of the last one, and then the compressed size of each.
+        let _sizes = take(2 * size)?;
+        let sizes = take(first.saturating_mul(size))?;
+        let mut bytes = Vec::new();
+        for length in sizes.chunks_exact(size as usize) {
+            let block = take(word(length)?)?;
+            let block = inflate::read(ZlibDecoder::new(block), block.len());
+            bytes.extend(block.map_err(|error| malformed(format!("compressed data: {error}")))?);
+        }
+        Ok(bytes)
+    }
+}
+
+fn decoded(text: &[u8]) -> Result<Vec<u8>> {
+    base64::decode(text).ok_or_else(|| malformed("binary data that is no base64".to_owned()))
+}
+
+fn scalar(name: &str) -> Result<Scalar> {
+    Ok(match name {
+        "Int8" => Scalar::I8,
+        "UInt8" => Scalar::U8,
+        "Int16" => Scalar::I16,
+        "UInt16" => Scalar::U16,
+        "Int32" => Scalar::I32,
+        "UInt32" => Scalar::U32,
+        "Int64" => Scalar::I64,
+        "UInt64" => Scalar::U64,
+        "Float32" => Scalar::F32,
+        "Float64" => Scalar::F64,
+        _ => return Err(malformed(format!("'{}' is no type of numbers", excerpt(name)))),
+    })
+}
+
+/// All numbers of a text, or the first word that is none.
+fn words(text: &str) -> std::result::Result<Vec<f64>, &str> {
+    text.split_ascii_whitespace().map(|word| coordinate(word).ok_or(word)).collect()
+}
