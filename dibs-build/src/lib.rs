@@ -37,6 +37,7 @@ pub mod stream;
 mod stretch;
 #[cfg(feature = "stream")]
 pub mod transport;
+mod unit;
 mod write;
 
 pub use array::{BuiltTree, ModesSummary, Summary, summarise};
@@ -52,6 +53,7 @@ pub use script::{MeshSource, TreeScript, tree};
 pub use stretch::{
     Beyond, LimitsError, LimitsErrorKind, MotionStretch, Needed, read_limits, write_limits,
 };
+pub use unit::Unit;
 pub use write::{WriteError, WriteErrorKind, write_atomically};
 
 /// The vectors of this interface.

@@ -160,7 +160,7 @@ impl TreeScript {
         warn(label, built.summary().warnings());
         #[cfg(feature = "modes")]
         if let Some((path, count)) = self.modes {
-            let motion = crate::Motion::read(&path)?;
+            let motion = crate::Motion::read(&path)?.in_millimetres(self.reading.unit);
             let failed = |error| format!("{}: {error}", path.display());
             let fit = crate::modes::ModalFit::new(surface.mesh(), &motion).map_err(failed)?;
             return built.with_modes(&fit, count).map_err(|error| failed(error).into());

@@ -3,8 +3,8 @@
 mod program;
 
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use dibs_build::glam::Vec3;
 use dibs_build::{Format, Import, Motion, ReadError, ReadErrorKind, ReadOptions};
@@ -244,15 +244,62 @@ fn the_program_takes_them() {
     assert!(error.contains("this is an Abaqus input file"), "{error}");
 }
 
-/// The largest piece of memory that was asked for.
-static LARGEST: AtomicUsize = AtomicUsize::new(0);
+/// A mesh and a motion in metres are those in millimetres, a thousand times smaller.
+#[test]
+fn units_scale_and_are_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let mesh = dibs_build::read(fixture("vtk_ascii.vtp")).unwrap().mesh;
+    let write = |name: &str, factor: f32| {
+        let positions = mesh.positions.iter().map(|&p| p * factor).collect::<Vec<_>>();
+        let moved =
+            Motion { frames: vec![positions.iter().map(|&p| 1.1 * p).collect()], rate: 30.0 };
+        moved.write_pc2(folder.join(format!("{name}.pc2"))).unwrap();
+        let scaled = dibs_build::Mesh { positions, ..mesh.clone() };
+        scaled.write_ply(folder.join(format!("{name}.ply"))).unwrap();
+    };
+    for (unit, factor) in [("mm", 1.0), ("cm", 0.1), ("m", 1e-3), ("in", 1.0 / 25.4)] {
+        write(unit, factor);
+        let line = format!("--unit {unit} --stretch 1.2 --motion {unit}.pc2 --json");
+        let built = json(folder, &format!("build {unit}.ply -o {unit}.dibs {line}"));
+        let inspected = json(folder, &format!("inspect {unit}.dibs --json"));
+        assert_eq!(built["tree"], inspected);
+        let bounds: [[f64; 3]; 2] =
+            serde_json::from_value(inspected["bounding_box"].clone()).unwrap();
+        for (bound, expected) in
+            bounds.as_flattened().iter().zip([-10.0, -20.0, -31.0, 10.5, 20.0, 30.0])
+        {
+            assert!((bound - expected).abs() < 1e-4, "{unit}: {bounds:?}");
+        }
+        let sides = mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
+        let lengths =
+            sides.map(|(a, b)| mesh.positions[a as usize].distance(mesh.positions[b as usize]));
+        let mean = f64::from(lengths.sum::<f32>()) / 24.0;
+        assert!((inspected["mean_edge"].as_f64().unwrap() - mean).abs() < 1e-4, "{unit}");
+        let text = succeeds(folder, &format!("inspect {unit}.dibs"));
+        let shown = format!("61.0000]; mean edge {:.2}", (mean * 100.0).floor() / 100.0);
+        assert!(text.contains(&shown), "{text}");
+        let ask =
+            format!("query {unit}.dibs --tool sphere:0,0,60,1 --vertices {unit}.pc2 --frame 0");
+        let separation =
+            json(folder, &format!("{ask} --unit {unit} --json"))["separation"].as_f64();
+        assert!((separation.unwrap() - 26.0).abs() < 1e-3, "{unit}: {separation:?}");
+        let measured = json(folder, &format!("stretch {unit}.ply {unit}.pc2 --unit {unit} --json"));
+        assert!((measured["uniform_limit"].as_f64().unwrap() - 1.21).abs() < 1e-3, "{measured}");
+    }
+}
+
+thread_local! {
+    /// The largest piece of memory that this thread has asked for.
+    static LARGEST: Cell<usize> = const { Cell::new(0) };
+}
 
 struct Watched;
 
 // SAFETY: the system's allocator does the work.
 unsafe impl GlobalAlloc for Watched {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        LARGEST.fetch_max(layout.size(), Relaxed);
+        LARGEST.set(LARGEST.get().max(layout.size()));
         // SAFETY: as the caller promises.
         unsafe { System.alloc(layout) }
     }
@@ -303,6 +350,6 @@ fn damaged_files_end_in_one_sentence() {
     }
     // Damage in a value is no error, and a change that changes nothing.
     assert!(errors > 10_000 && meshes > 5_000, "{errors} {meshes}");
-    let largest = LARGEST.load(Relaxed);
+    let largest = LARGEST.get();
     assert!(largest < 4 << 20, "{largest} bytes at once");
 }

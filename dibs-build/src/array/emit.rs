@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use dibs_nostd::format::PathKind;
+use dibs_nostd::glam::Vec3;
 use dibs_nostd::modes::Modes;
 use dibs_nostd::{FormatError, Index, Tree, TriangleRow};
 
@@ -46,6 +47,10 @@ pub struct Summary {
     pub surface_paths: bool,
     /// Radius of the root at rest, in the mesh's unit.
     pub root_radius: f32,
+    /// The corners of the box around the vertices at rest, least and largest; `None` without the rest shape.
+    pub bounding_box: Option<[[f32; 3]; 2]>,
+    /// Mean length of the triangles' sides at rest.
+    pub mean_edge: Option<f64>,
     /// Identity of the mesh, as vertex packets carry it.
     pub mesh_id: u32,
     /// Flash that a query reads: nodes and triangles.
@@ -207,6 +212,8 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
         first_unmeasurable: unmeasurable().next().and_then(in_mesh),
         surface_paths: tree.paths() == PathKind::Surface,
         root_radius: tree.node(0).map_or(0.0, |(_, radius, _)| radius),
+        bounding_box: bounding_box(tree),
+        mean_edge: mean_edge(tree),
         mesh_id: tree.mesh_id(),
         query_bytes: tree.query_bytes(),
         query_bytes_per_triangle: tree.query_bytes() as f64 / f64::from(tree.triangle_count()),
@@ -224,6 +231,25 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
             flash_bytes_per_vertex: modes.flash_bytes() as f64 / f64::from(vertices),
         }),
     }
+}
+
+fn bounding_box<I: Index>(tree: &Tree<'_, I>) -> Option<[[f32; 3]; 2]> {
+    let mut bounds = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+    for row in 0..tree.vertex_count() {
+        let position = tree.rest_position(row)?;
+        bounds = [bounds[0].min(position), bounds[1].max(position)];
+    }
+    Some(bounds.map(|bound| bound.to_array()))
+}
+
+fn mean_edge<I: Index>(tree: &Tree<'_, I>) -> Option<f64> {
+    let mut sum = 0.0;
+    for row in 0..tree.triangle_count() {
+        let corners = tree.corners(TriangleRow(row))?;
+        let [a, b, c] = row_of(corners, |v| tree.rest_position(v))?.map(Vec3::as_dvec3);
+        sum += a.distance(b) + b.distance(c) + c.distance(a);
+    }
+    Some(sum / (3.0 * f64::from(tree.triangle_count())))
 }
 
 /// Whether the stretch check can pass a triangle at rest; true where there is nothing to check with.

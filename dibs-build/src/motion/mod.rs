@@ -6,8 +6,8 @@ mod series;
 
 pub use pc2::MotionMismatchError;
 
-use crate::Motion;
 use crate::read::{ReadError, ReadErrorKind};
+use crate::{Motion, Unit};
 use std::path::Path;
 
 impl Motion {
@@ -32,6 +32,16 @@ impl Motion {
             .map_err(ReadErrorKind::from)
             .and_then(parse)
             .map_err(|kind| ReadError { path: path.to_path_buf(), kind })
+    }
+
+    /// The same motion in millimetres, its lengths being in `unit`.
+    #[must_use]
+    pub fn in_millimetres(mut self, unit: Unit) -> Self {
+        let factor = unit.millimetres();
+        for point in self.frames.iter_mut().flatten() {
+            *point = (point.as_dvec3() * factor).as_vec3();
+        }
+        self
     }
 }
 

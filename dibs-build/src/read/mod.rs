@@ -32,6 +32,7 @@ pub use report::{Format, Report};
 
 use crate::mesh::{Mesh, RestSurface};
 use crate::rounding::round_up;
+use crate::unit::Unit;
 use raw::Raw;
 pub(crate) use raw::excerpt;
 pub(crate) use scalar::{Endian, Scalar};
@@ -61,6 +62,8 @@ pub struct ReadOptions {
     pub strict: bool,
     /// Keep the component with the most triangles, instead of failing when there are several.
     pub largest_component: bool,
+    /// What the file's lengths are: they become millimetres.
+    pub unit: Unit,
 }
 
 impl RestSurface for Import {
@@ -99,7 +102,10 @@ impl ReadOptions {
         {
             return Err(ReadErrorKind::Tolerance { tolerance });
         }
-        let (format, raw) = elements(bytes, path)?;
+        let (format, mut raw) = elements(bytes, path)?;
+        for value in raw.positions.as_flattened_mut() {
+            *value *= self.unit.millimetres();
+        }
         let mut import = check::import(&raw, format, self)?;
         let extension = path.extension().and_then(|extension| extension.to_str());
         import.report.extension_disagrees = extension.is_some_and(|e| !format.has_extension(e));

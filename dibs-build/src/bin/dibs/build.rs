@@ -5,7 +5,7 @@ use crate::{modes, stretch, tree_file};
 use anyhow::{Result, anyhow, bail};
 use clap::ValueEnum;
 use dibs_build::{
-    Beyond, Builder, BuiltTree, Construction, Import, IndexWidth, Mesh, Motion, Needed, Paths,
+    Beyond, Builder, BuiltTree, Construction, Import, IndexWidth, Mesh, Needed, Paths,
     check_winding, orient, read_limits,
 };
 use std::path::{Path, PathBuf};
@@ -95,7 +95,7 @@ pub fn run(args: &Args) -> Result<()> {
     }
     // A motion that does not fit is found before the work, too.
     let fit = match (&args.motion, args.modes) {
-        (Some(path), Some(_)) => Some(modes::fit(mesh, path)?),
+        (Some(path), Some(_)) => Some(modes::fit(mesh, path, &args.reading.lengths)?),
         _ => None,
     };
     let mut tree = build(args, &import, limits)
@@ -139,7 +139,7 @@ pub fn run(args: &Args) -> Result<()> {
 
 /// An error unless the limits cover a recorded motion: the controller would reject its frames.
 fn check_covered(args: &Args, mesh: &Mesh, path: &Path, limits: &[f32]) -> Result<()> {
-    let motion = Motion::read(path)?;
+    let motion = args.reading.lengths.motion(path)?;
     let paths = match args.construction {
         ConstructionName::Default => Paths::default(),
         ConstructionName::Paper => Paths::Edges,

@@ -1,7 +1,7 @@
 //! Reading a mesh file on the command line.
 
 use anyhow::Result;
-use dibs_build::{Import, ReadOptions};
+use dibs_build::{Import, Motion, ReadOptions, Unit};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::Path;
 
@@ -17,6 +17,40 @@ pub struct MeshArgs {
     /// Keep the largest of several separate surfaces
     #[arg(long)]
     largest_component: bool,
+    #[command(flatten)]
+    pub lengths: Lengths,
+}
+
+/// The unit of files.
+#[derive(clap::Args)]
+pub struct Lengths {
+    /// What the lengths in files of meshes and motions are: they are read as millimetres
+    #[arg(long, value_enum, default_value = "mm")]
+    unit: UnitName,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum UnitName {
+    Mm,
+    Cm,
+    M,
+    In,
+}
+
+impl Lengths {
+    pub fn unit(&self) -> Unit {
+        match self.unit {
+            UnitName::Mm => Unit::Millimetre,
+            UnitName::Cm => Unit::Centimetre,
+            UnitName::M => Unit::Metre,
+            UnitName::In => Unit::Inch,
+        }
+    }
+
+    /// Reads a motion in this unit.
+    pub fn motion(&self, path: &Path) -> Result<Motion> {
+        Ok(Motion::read(path)?.in_millimetres(self.unit()))
+    }
 }
 
 /// Reads a mesh, and prints its warnings on standard error.
@@ -25,6 +59,7 @@ pub fn read(path: &Path, args: &MeshArgs) -> Result<Import> {
         weld_tolerance: args.weld,
         strict: args.strict,
         largest_component: args.largest_component,
+        unit: args.lengths.unit(),
     };
     let import = options.read(path)?;
     for warning in import.report.warnings() {

@@ -1,5 +1,6 @@
 //! Displacement modes for `dibs build` and `dibs stream`.
 
+use crate::mesh_file::Lengths;
 use crate::tree_file::{self, AnyTree};
 use anyhow::{Result, anyhow};
 use dibs_build::modes::{ModalError, ModalFit, Projector};
@@ -17,8 +18,8 @@ pub struct Fit {
 }
 
 /// Fits modes to a motion file.
-pub fn fit(mesh: &Mesh, path: &Path) -> Result<Fit> {
-    let motion = Motion::read(path)?;
+pub fn fit(mesh: &Mesh, path: &Path, lengths: &Lengths) -> Result<Fit> {
+    let motion = lengths.motion(path)?;
     let spinner = ProgressBar::new_spinner().with_message("fitting modes to the motion");
     spinner.enable_steady_tick(Duration::from_millis(100));
     let fit = ModalFit::new(mesh, &motion);

@@ -1,9 +1,9 @@
 //! `dibs track`: a tool on its path about a moving surface, tick by tick.
 
+use crate::mesh_file::Lengths;
 use crate::query::{STACK, ToolSpec, parse_tool, rows, side_name};
 use crate::tree_file::{self, AnyTree};
 use anyhow::{Context, Result, anyhow, bail};
-use dibs_build::Motion;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
     Fallback, Index, MeasuredStretch, MovingSurface, Odometer, Options, Proximity, Query, Step,
@@ -45,6 +45,8 @@ pub struct Args {
     /// Ask every tick anew, remembering nothing
     #[arg(long)]
     full: bool,
+    #[command(flatten)]
+    lengths: Lengths,
     /// Print a JSON object a line
     #[arg(long)]
     json: bool,
@@ -84,7 +86,7 @@ fn tools(path: &Path) -> Result<Vec<ToolSpec>> {
 
 fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
     let tools = tools(&args.path)?;
-    let mut motion = Motion::read(&args.motion)?;
+    let mut motion = args.lengths.motion(&args.motion)?;
     motion.rate = args.motion_rate.unwrap_or(motion.rate);
     let name = args.motion.display();
     if !(args.rate > 0.0 && args.rate.is_finite()) {

@@ -36,6 +36,10 @@ pub fn print(summary: &Summary) {
         format!("limit {}", s.stretch)
     };
     println!("stretch  {limit} {paths}, root radius {}", s.root_radius);
+    if let (Some([low, high]), Some(edge)) = (s.bounding_box, s.mean_edge) {
+        let size: [f32; 3] = std::array::from_fn(|axis| high[axis] - low[axis]);
+        println!("box      {low:.4?} to {high:.4?}: {size:.4?}; mean edge {edge:.4}");
+    }
     println!("mesh id  {:08x}", s.mesh_id);
     println!(
         "flash    {} bytes; of these a query reads {} ({:.1} a triangle)",

@@ -10,6 +10,7 @@ pub use answer::side_name;
 pub use scene::{STACK, rows};
 pub use tool::{ToolSpec, parse_tool};
 
+use crate::mesh_file::Lengths;
 use crate::tree_file;
 use anyhow::{Result, bail};
 use scene::Surface;
@@ -62,6 +63,8 @@ pub struct Args {
     /// instead of the tree's limit
     #[arg(long)]
     stretch: Option<f32>,
+    #[command(flatten)]
+    lengths: Lengths,
     /// Print a JSON object
     #[arg(long)]
     json: bool,
@@ -83,7 +86,8 @@ pub fn run(args: &Args) -> Result<()> {
         .zip(&files)
         .enumerate()
         .map(|(number, (path, bytes))| {
-            Surface::new(bytes, path, args.vertices.get(number), args.frame, args.stretch)
+            let vertices = args.vertices.get(number);
+            Surface::new(bytes, path, vertices, args.frame, &args.lengths, args.stretch)
         })
         .collect::<Result<_>>()?;
     if let Some(poses) = &args.poses {

@@ -2,9 +2,10 @@
 
 use super::ToolSpec;
 use super::answer::{Answer, Touch};
+use crate::mesh_file::Lengths;
 use crate::tree_file::{self, AnyTree};
 use anyhow::{Result, anyhow, bail};
-use dibs_build::{Import, Motion, ReadOptions};
+use dibs_build::{Import, ReadOptions};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
     Contact, Contacts, Index, MeasuredStretch, Options, Proximity, Query, StretchError, Tool, Tree,
@@ -33,12 +34,13 @@ impl<'a> Surface<'a> {
         path: &'a Path,
         vertices: Option<&PathBuf>,
         frame: Option<usize>,
+        lengths: &Lengths,
         limit: Option<f32>,
     ) -> Result<Self> {
         let tree = tree_file::validate(bytes, path)?;
         let (positions, stretch) = match &tree {
-            AnyTree::Narrow(tree) => measured(tree, path, vertices, frame)?,
-            AnyTree::Wide(tree) => measured(tree, path, vertices, frame)?,
+            AnyTree::Narrow(tree) => measured(tree, path, vertices, frame, lengths)?,
+            AnyTree::Wide(tree) => measured(tree, path, vertices, frame, lengths)?,
         };
         let name = path.display();
         let mut options = Options::cold();
@@ -165,6 +167,7 @@ fn measured<I: Index>(
     path: &Path,
     vertices: Option<&PathBuf>,
     frame: Option<usize>,
+    lengths: &Lengths,
 ) -> Result<(Vec<Vec3>, Option<MeasuredStretch>)> {
     let name = path.display();
     let positions = match vertices {
@@ -172,7 +175,7 @@ fn measured<I: Index>(
             .map(|row| tree.rest_position(row))
             .collect::<Option<Vec<Vec3>>>()
             .ok_or_else(|| anyhow!("{name}: the tree has no rest shape, give --vertices"))?,
-        Some(path) => rows(tree, path, &current(path, frame)?)?,
+        Some(path) => rows(tree, path, &current(path, frame, lengths)?)?,
     };
     // A distance on a surface that is stretched beyond the limit could be wrong: none is given.
     match measure_stretch(tree, positions.as_slice()) {
@@ -185,7 +188,7 @@ fn measured<I: Index>(
 }
 
 /// Positions in the order of the mesh file.
-fn current(path: &Path, frame: Option<usize>) -> Result<Vec<Vec3>> {
+fn current(path: &Path, frame: Option<usize>, lengths: &Lengths) -> Result<Vec<Vec3>> {
     let name = path.display();
     let is_motion = name.to_string().contains('%')
         || path
@@ -194,7 +197,7 @@ fn current(path: &Path, frame: Option<usize>) -> Result<Vec<Vec3>> {
     match (is_motion, frame) {
         (true, None) => bail!("{name}: choose a frame of the motion with --frame"),
         (true, Some(frame)) => {
-            let mut frames = Motion::read(path)?.frames;
+            let mut frames = lengths.motion(path)?.frames;
             if frame >= frames.len() {
                 bail!("{name}: no frame {frame}, the motion has {}", frames.len());
             }
@@ -205,7 +208,8 @@ fn current(path: &Path, frame: Option<usize>) -> Result<Vec<Vec3>> {
         }
         // The tree is of the largest component: others are no error here.
         (false, None) => {
-            let options = ReadOptions { largest_component: true, ..Import::options() };
+            let unit = lengths.unit();
+            let options = ReadOptions { largest_component: true, unit, ..Import::options() };
             Ok(options.read(path)?.mesh.positions)
         }
     }

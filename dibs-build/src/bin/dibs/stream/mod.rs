@@ -5,12 +5,13 @@ mod key;
 mod player;
 mod report;
 
+use crate::mesh_file::Lengths;
 use crate::modes;
 use crate::tree_file::{self, AnyTree};
 use anyhow::{Context, Result, anyhow, bail};
 use dibs_build::stream::{Sender, Settings, SurfaceOrder};
 use dibs_build::transport::Target;
-use dibs_build::{Builder, Motion};
+use dibs_build::{Builder, Import, ReadOptions};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::AesCmac;
 use interrupt::Interrupt;
@@ -75,6 +76,8 @@ pub struct Args {
     /// How long to try to connect again after the connection broke; 0 gives up at once
     #[arg(long, value_name = "SECONDS", default_value_t = 10)]
     retry: u64,
+    #[command(flatten)]
+    lengths: Lengths,
     /// Print the totals as a JSON object
     #[arg(long)]
     json: bool,
@@ -82,8 +85,8 @@ pub struct Args {
 
 pub fn run(args: &Args) -> Result<()> {
     let key = args.key.as_deref().map(key::read).transpose()?;
-    let order = order(&args.surface)?;
-    let motion = Motion::read(&args.motion)?;
+    let order = order(&args.surface, &args.lengths)?;
+    let motion = args.lengths.motion(&args.motion)?;
     let name = args.motion.display();
     if motion.frames.is_empty() {
         bail!("{name}: the motion has no frame");
@@ -144,7 +147,7 @@ fn connect<const MTU: usize>(
 }
 
 /// The order of the vertices: the tree's, or that of the tree that the mesh gives.
-fn order(path: &Path) -> Result<SurfaceOrder> {
+fn order(path: &Path, lengths: &Lengths) -> Result<SurfaceOrder> {
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("dibs")) {
         let bytes = tree_file::load(path)?;
         return Ok(match tree_file::validate(&bytes, path)? {
@@ -152,7 +155,8 @@ fn order(path: &Path) -> Result<SurfaceOrder> {
             AnyTree::Wide(tree) => SurfaceOrder::of(&tree),
         });
     }
-    let mesh = dibs_build::read(path)?.mesh;
+    let options = ReadOptions { unit: lengths.unit(), ..Import::options() };
+    let mesh = options.read(path)?.mesh;
     let name = path.display();
     let built = Builder::new()
         .build(&mesh)
