@@ -3,6 +3,7 @@
 use anyhow::Result;
 use clap::Subcommand;
 use dibs_build::{Format, generate};
+use serde_json::json;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -13,6 +14,9 @@ Examples:
 pub struct Args {
     #[command(subcommand)]
     surface: Surface,
+    /// Print a JSON object
+    #[arg(long, global = true)]
+    json: bool,
 }
 
 #[derive(Subcommand)]
@@ -44,12 +48,13 @@ pub fn run(args: &Args) -> Result<()> {
     let (Surface::Heart { output, .. } | Surface::Brain { output, .. }) = &args.surface;
     // Before the work, not after it.
     let format = Format::from_name(output)?;
+    let mut moved = None;
     let mesh = match &args.surface {
         Surface::Heart { triangles, motion, .. } => {
             let generate::MovingMesh { mesh, motion: beat } = generate::heart(*triangles)?;
             if let Some(path) = motion {
                 beat.write_pc2(path)?;
-                println!("written  {}: {} frames", path.display(), beat.frames.len());
+                moved = Some((path, beat.frames.len()));
             }
             mesh
         }
@@ -57,6 +62,17 @@ pub fn run(args: &Args) -> Result<()> {
     };
     mesh.write(output, format)?;
     let (vertices, triangles) = (mesh.positions.len(), mesh.triangles.len());
+    if args.json {
+        let motion = moved.map(|(path, frames)| json!({ "output": path, "frames": frames }));
+        let written = json!({
+            "output": output, "vertices": vertices, "triangles": triangles, "motion": motion,
+        });
+        println!("{written:#}");
+        return Ok(());
+    }
+    if let Some((path, frames)) = moved {
+        println!("written  {}: {frames} frames", path.display());
+    }
     println!("written  {}: {vertices} vertices, {triangles} triangles", output.display());
     Ok(())
 }

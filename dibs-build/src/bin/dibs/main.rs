@@ -6,6 +6,7 @@ mod output;
 mod build;
 mod generate;
 mod inspect;
+mod manual;
 mod mesh_file;
 mod modes;
 mod query;
@@ -41,6 +42,10 @@ enum Command {
     Stream(stream::Args),
     /// Generate a procedural heart or brain
     Generate(generate::Args),
+    /// Print what a shell needs to complete this program's arguments
+    Completions(manual::Completions),
+    /// Print or write the manual page
+    Man(manual::Man),
 }
 
 const EXAMPLES: &str = "\
@@ -52,7 +57,7 @@ Examples:
   dibs query heart.dibs --tool capsule:0,0,60,0,0,200,4 --vertices heart.pc2 --frame 9
   dibs stream heart.dibs heart.pc2 --to serial:/dev/ttyUSB0@921600 --quantise --loop
 
-Lengths are in the mesh's own unit. Warnings and progress go to standard error, results to
+Lengths are in millimetres, or whatever the mesh is in. Warnings and progress go to standard error, results to
 standard output; --json makes them one JSON object. Bad input ends with exit code 1.";
 
 fn main() -> ExitCode {
@@ -64,6 +69,8 @@ fn main() -> ExitCode {
         Command::Track(args) => track::run(&args),
         Command::Stream(args) => stream::run(&args),
         Command::Generate(args) => generate::run(&args),
+        Command::Completions(args) => manual::complete(&args),
+        Command::Man(args) => manual::write(&args),
     };
     match outcome.and_then(|()| output::finish()) {
         Ok(()) => ExitCode::SUCCESS,
