@@ -7,10 +7,10 @@ use super::Budget;
 /// test are measured, not proved.
 ///
 /// The constants are the plane above some hundred thousand adversarial queries about four small surfaces, on an
-/// emulated Cortex-M7 and on x86-64, plus a margin of 20 %. They are checked on surfaces and poses that the fit has
-/// not seen: the repository's `docs/guarantees.md` says on which, how many were above, how tight the bound is, and how
-/// instructions relate to cycles. They are for [`Query::closest`](crate::Query::closest), vertex
-/// tables that are slices of `Vec3`, and the firmware's profile or an optimised build.
+/// emulated Cortex-M7 and on x86-64, plus a margin of 20 %. They are checked on surfaces and poses that the fit has not
+/// seen: the repository's `docs/guarantees.md` lists these, the queries above the bound, its tightness, and the cycles
+/// of an instruction. They are for [`Query::closest`](crate::Query::closest), vertex tables that are slices of `Vec3`,
+/// and the firmware's profile or an optimised build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Cost {
@@ -23,7 +23,7 @@ pub struct Cost {
 }
 
 impl Cost {
-    /// The instructions within which a query that does no more than `budget` is expected to end, by the fit.
+    /// The most instructions, by the fit, of a query within `budget`.
     ///
     /// ```
     /// use dibs_nostd::{Budget, Cost};
@@ -40,9 +40,9 @@ impl Cost {
 }
 
 impl Budget {
-    /// The budget of a query that is to end within this many instructions, by the fit: half of them for each kind of
-    /// test, which is about how an ordinary query spends them. A deadline shorter than [`Cost::base`]
-    /// gives an empty budget, which still costs the base.
+    /// The budget of a query that ends within this many instructions, by the fit. Each kind of test gets half of them,
+    /// about as an ordinary query spends them. A deadline shorter than [`Cost::base`] gives an empty budget, which
+    /// still costs the base.
     ///
     /// ```
     /// use dibs_nostd::{Budget, Cost, Options};
@@ -62,7 +62,7 @@ impl Budget {
     }
 }
 
-/// How many at `each` there are in `all`; without limit where they cost nothing.
+/// `all / each`; no limit where `each` is 0.
 const fn share(all: u32, each: u32) -> u32 {
     match all.checked_div(each) {
         Some(number) => number,

@@ -1,10 +1,10 @@
 //! How deep a capsule's axis reaches below the surface that it crosses.
 //!
-//! The depth along the axis, positive inside and negative outside, changes by at most the way along it, and is at most
-//! the distance to any one triangle of the surface. That distance is convex along the axis, so the triangles that are
-//! closest to two points bound the depth between them. The part of the axis with the highest bound is divided next
-//! (Piyavskii and Shubert, with the second bound besides) until no part can be deeper than the deepest point found by
-//! more than the tolerance.
+//! The depth along the axis, positive inside and negative outside, changes by at most the length moved, and is at most
+//! the distance to any one triangle of the surface. That distance is convex along the axis, so the triangles closest to
+//! two points bound the depth between them. The search divides the part of the axis with the highest bound (Piyavskii
+//! and Shubert, with this second bound added) until no part can be deeper than the deepest point found by more than the
+//! tolerance.
 
 use glam::Vec3;
 
@@ -16,25 +16,25 @@ use crate::tool::{AxisPoint, Tool};
 use crate::unavailable::QueryError;
 use crate::{Index, Tree, TriangleRow, VertexTable};
 
-/// Most points of the axis that are looked at, its ends and the point where it meets the surface among them.
+/// Most points of the axis that are searched, including its ends and the point where it meets the surface.
 const POINTS: usize = 28;
 
-/// The tolerance, unless it is chosen: this part of the axis' length.
+/// The default tolerance, as a part of the axis' length.
 const TOLERANCE: f32 = 1.0 / 512.0;
 
-/// How near to an end a part is divided, as a part of its length.
+/// Least distance of a split from an end of its part, as a share of the part's length.
 const NEAREST_SPLIT: f32 = 0.125;
 
-/// Most places that are tried for where two triangles are equally far.
+/// Most steps towards the point at which two triangles are equally far.
 const ROUNDS: u32 = 3;
 
-/// A point of the axis, and the triangle that was found closest to it: a pin three times where the budget ended.
+/// A point of the axis and the triangle found closest to it; where the budget ended, one pin as all three corners.
 #[derive(Clone, Copy)]
 struct Sample {
-    /// Where it is on the axis, as a length from its start.
+    /// Length along the axis from its start.
     along: f32,
     on_axis: Vec3,
-    /// It is at most as deep as this.
+    /// Upper bound on its depth.
     depth: f32,
     triangle: Option<TriangleRow>,
     corners: [Vec3; 3],
@@ -56,12 +56,12 @@ struct Part {
     next: usize,
     /// No point of the part is deeper.
     bound: f32,
-    /// Where it is divided next.
+    /// Length along the axis at which it is divided next.
     split: f32,
 }
 
 impl Part {
-    /// Of the axis' end.
+    /// The empty part at the axis' end.
     fn none(from: Sample) -> Self {
         Self { from, next: 0, bound: 0.0, split: 0.0 }
     }
@@ -69,7 +69,7 @@ impl Part {
     /// The part up to `to`. A bound that is no higher than `enough` is not lowered further.
     fn new(from: Sample, to: &Sample, next: usize, enough: f32) -> Self {
         let length = to.along - from.along;
-        // The rest is surely outside.
+        // Points nearer to an outside sample than its distance are outside too.
         let first = from.along + above_zero(-from.depth);
         let last = to.along - above_zero(-to.depth);
         if !(first < last) {
@@ -91,7 +91,7 @@ impl Part {
             [from.square(point), to.square(point)]
         };
         let (at_first, at_last) = (squares(first), squares(last));
-        // By how much the triangle of the first sample is nearer: linear along the axis where both are points.
+        // The first triangle's lead over the second: linear along the axis where both are points.
         let lead = |[one, other]: [f32; 2]| other - one;
         let (mut low, mut high) = ((first, lead(at_first)), (last, lead(at_last)));
         let (mut least, mut peak) = (f32::INFINITY, middle);
@@ -127,7 +127,7 @@ impl Part {
     }
 }
 
-/// The most that the lesser of two convex functions can be between two places, from their values there.
+/// Upper bound, between two places, on the smaller of two convex functions, from their values there.
 fn convex([one, other]: [f32; 2], [one_next, other_next]: [f32; 2]) -> f32 {
     let (most, other_most) = (larger(one, one_next), larger(other, other_next));
     if most < other_most { most } else { other_most }
@@ -147,7 +147,7 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
     stack: &'s mut [Waiting],
     vertices: &'s V,
     tool: &'s T,
-    /// Its budget is the rest of the query's.
+    /// With the rest of the query's budget.
     options: Options,
     /// The deepest point so far.
     answer: Proximity,
@@ -155,7 +155,7 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> {
-    /// A search for a tool whose axis meets the surface as `meeting` says.
+    /// A search for a tool whose axis meets the surface in the pair `meeting`.
     pub fn new(
         tree: &'s Tree<'t, I>,
         stack: &'s mut [Waiting],
@@ -213,7 +213,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         self.finish(&meeting, bound)
     }
 
-    /// Looks at one point of the axis, near a sample; out of budget, says what that sample says of it.
+    /// Samples one point of the axis, near another sample. Out of budget, derives its bound from that sample.
     fn look(&mut self, along: f32, length: f32, near: &Sample) -> Result<Sample, QueryError> {
         let parameter = along / length;
         let on_axis = self.tool.axis_point(parameter);
@@ -268,7 +268,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         self.sample(along, parameter, depth, &found)
     }
 
-    /// What a pair says of the axis' point at a parameter.
+    /// The sample of the axis' point at a parameter, from its closest pair.
     fn sample(
         &self,
         along: f32,

@@ -37,7 +37,7 @@ use search::{Search, Waiting, WideSearch};
 pub struct Query<'t, I, const STACK: usize> {
     tree: Tree<'t, I>,
     stack: [Waiting; STACK],
-    /// Of the last answer.
+    /// The last answer's triangle.
     triangle: Option<TriangleRow>,
 }
 
@@ -64,19 +64,18 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     ///
     /// Signed, if the tree has adjacency: [`Proximity::side`] says on which side of the surface the tool is.
     ///
-    /// Exact within [`Proximity::accuracy`], the surface's own position error in it, as long as the surface keeps to
-    /// the stretch limit (or to the stretch that it carries, or that is in `options`). Starts from the last answer's
-    /// triangle, unless `options` say otherwise. Pins are vertices of the surface, so their distances are
-    /// upper bounds from the first node on. Near children first; squares are compared, and a root is
-    /// taken only where an order is needed. A leaf is rejected by one plane, a triangle by another.
+    /// Exact within [`Proximity::accuracy`], which includes the surface's position error, as long as the surface keeps
+    /// to the stretch limit (or to the stretch that it carries, or that `options` give). Starts from the last answer's
+    /// triangle, unless `options` say otherwise. Pins are vertices of the surface, so their distances are upper bounds
+    /// from the first node on.
     ///
-    /// Where a capsule's axis crosses the surface, up to 27 searches more, for points of the axis, find how deep.
+    /// Where a capsule's axis crosses the surface, up to 27 more searches find the depth.
     ///
     /// Cost: the budget at most; typical counts are in the repository's `docs/benchmarks.md`.
     ///
     /// # Errors
-    /// [`QueryError`]: a table of the wrong size, a root pin that is not finite, a measurement of
-    /// another mesh, or bytes that changed under the query. Never because the budget ran out.
+    /// [`QueryError`]: a table of the wrong size, a root pin that is not finite, a measurement of another mesh, or
+    /// bytes that changed under the query. A budget that ran out is no error.
     pub fn closest<V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         vertices: &V,
@@ -94,10 +93,9 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     /// As [`closest`](Self::closest), in batches of up to seven subtrees: for processors that overlap instructions
     /// and have vector registers.
     ///
-    /// The same promises, errors and answers (where several triangles are equally close, perhaps another of
-    /// them) and mostly fewer tests, but more memory: 2 KiB on the call stack, and it pays only if `STACK`
-    /// is 128 more than [`Tree::stack`]. With less, batches are smaller. A microcontroller is better off with
-    /// `closest`.
+    /// It has the same promises, errors and answers (of several triangles equally close it may name another) and mostly
+    /// needs fewer tests. It takes 2 KiB of the call stack, and pays only if `STACK` is 128 more than [`Tree::stack`];
+    /// with less, batches are smaller. A microcontroller is better off with `closest`.
     ///
     /// # Errors
     /// Those of [`closest`](Self::closest).
@@ -116,8 +114,8 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     }
 }
 
-/// Adds the side, and the signed separation that follows from it. Both are decided on the positions in the table;
-/// `error`, the table's position error, is added to the accuracy last.
+/// Adds the side, and the signed separation that follows from it. Both take the table's positions as exact; `error`,
+/// their position error, is added to the accuracy last.
 #[inline(never)]
 fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     tree: &Tree<'_, I>,
@@ -128,7 +126,7 @@ fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     mut found: Proximity,
     error: f32,
 ) -> Result<Proximity, QueryError> {
-    // Nothing is closer than a triangle that is touched, wherever the budget ended.
+    // No triangle is closer than one that is touched, so its side is certain without the rest of the budget.
     let touches = found.triangle.is_some() && found.axis_distance <= found.accuracy;
     let reason = if !options.is_signed {
         Some(NoSide::NotAsked)

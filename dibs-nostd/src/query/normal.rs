@@ -1,4 +1,4 @@
-//! Normals of the surface as it is now, at a face, an edge or a vertex: where a closest point may be.
+//! Normals of the surface as it is now, at a face, an edge or a vertex.
 //!
 //! The sign of `(p - c) . n` tells the side of a point `p` whose closest point is `c`, if `n` is the angle-weighted
 //! pseudonormal there (Bærentzen & Aanæs, "Signed distance computation using the angle weighted pseudonormal",
@@ -14,7 +14,7 @@ use crate::{Index, Tree, VertexTable};
 /// Most triangles around a vertex.
 const MAX_RING: u32 = 256;
 
-/// Square of the sine below which two edges span no clear plane in f32.
+/// Square of the sine below which two edges span no plane in f32.
 const FLAT: f32 = 1.0 / 1_048_576.0;
 
 /// The same in f64.
@@ -23,7 +23,7 @@ const FLAT_DOUBLE: f64 = 1e-18;
 /// Squares of lengths below this lose their digits.
 const TINY: f32 = 1e-30;
 
-/// Where on a triangle a point is. Edge `e` leads from corner `e` to the next one.
+/// The feature of a triangle that a point is on. Edge `e` leads from corner `e` to the next one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Feature {
     Face,
@@ -35,7 +35,7 @@ pub(super) enum Feature {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pseudonormal {
     pub vector: Vec3,
-    /// Sum of the weights of the unit normals that were added up: what rounding is relative to.
+    /// Sum of the weights of the unit normals; rounding is relative to it.
     pub weight: f32,
 }
 
@@ -44,7 +44,7 @@ pub(super) struct Pseudonormal {
 pub(super) enum NoNormal {
     /// The feature is on an open boundary.
     Open,
-    /// A triangle there has no area, or too many meet.
+    /// A triangle there has no area, or more than [`MAX_RING`] meet.
     Unclear,
     /// A row outside its table.
     Corrupt(u32),
@@ -146,7 +146,7 @@ fn normal(corners: &[Vec3; 3]) -> Result<(Vec3, f32), NoNormal> {
     flat_normal(corners)
 }
 
-/// [`normal`] of a triangle so flat or small that f32 would not do.
+/// [`normal`] in f64, for a triangle too flat or small for f32.
 #[cold]
 #[inline(never)]
 fn flat_normal(corners: &[Vec3; 3]) -> Result<(Vec3, f32), NoNormal> {
@@ -191,7 +191,7 @@ fn angle(sine: f32, cosine: f32) -> f32 {
     if cosine < 0.0 { PI - acute } else { acute }
 }
 
-/// The arctangent of 0 to 1: Abramowitz & Stegun 4.4.49, within 2e-8 but for rounding.
+/// Arctangent on 0 to 1: Abramowitz & Stegun 4.4.49, within 2e-8 before rounding.
 fn arctangent(x: f32) -> f32 {
     const TERMS: [f32; 8] = [
         0.002_866_225_7,

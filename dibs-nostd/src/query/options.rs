@@ -2,14 +2,14 @@
 
 use crate::{MeasuredStretch, TriangleRow};
 
-/// The most work that one query may do. It bounds its time; an answer that was cut short is still
-/// valid, with a wider interval.
+/// The most work of one query. It bounds the query's time; an answer that was cut short is still valid, with a wider
+/// interval.
 ///
-/// Every answer's own interval holds the true separation. To the same question a larger budget gives an interval that
-/// is nowhere wider: the lower end never falls, and the upper end rises by no more than the accuracy. From tick to tick
-/// that holds for the upper end alone, if the answer's triangle is the next warm start and nothing has moved: a warm
-/// start spends a test elsewhere, and the lower end of an answer that is cut short again may fall, by centimetres. Take
-/// the larger of two lower ends only for one and the same frame and pose.
+/// Every answer's interval holds the true separation. For the same query a larger budget never lowers the lower end,
+/// and raises the upper end by no more than the accuracy. From tick to tick that holds for the upper end alone, if the
+/// answer's triangle is the next warm start and nothing has moved: the warm start uses up a test, so the lower end of
+/// an answer that is cut short again may fall, by centimetres. Take the larger of two lower ends only for the same
+/// frame and pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Budget {
@@ -20,7 +20,7 @@ pub struct Budget {
 }
 
 impl Budget {
-    /// As much as it takes.
+    /// No limit.
     pub const UNLIMITED: Self = Self { node_tests: u32::MAX, triangle_tests: u32::MAX };
 }
 
@@ -38,7 +38,7 @@ pub struct Options {
 /// The triangle that a query tests first.
 #[derive(Clone, Copy, Debug)]
 enum First {
-    /// That of its last answer.
+    /// The last answer's.
     Last,
     /// None.
     Cold,
@@ -53,8 +53,7 @@ impl Default for Options {
 }
 
 impl Options {
-    /// No budget; from the query's last answer on; with the stretch that the surface carries, else the limit that the
-    /// tree was built for.
+    /// No budget; a start from the query's last answer; the stretch that the surface carries, or else the tree's limit.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -99,15 +98,15 @@ impl Options {
         }
     }
 
-    /// Leaves the side out: the separation is that of a tool outside, at the cost of the distance alone.
+    /// Leaves the side out: the separation is that of a tool outside, and costs no more than the distance.
     #[must_use]
     pub const fn unsigned(mut self) -> Self {
         self.is_signed = false;
         self
     }
 
-    /// How far (mm) the certified interval of a depth may reach where the tool's axis crosses the surface; by
-    /// default a 512th of the axis' length. Less takes more tests.
+    /// Largest width (mm) of the certified interval where the tool's axis crosses the surface; by default a 512th of
+    /// the axis' length. Less takes more tests.
     #[must_use]
     pub const fn depth_tolerance(mut self, tolerance: f32) -> Self {
         self.depth_tolerance = Some(tolerance);

@@ -1,4 +1,4 @@
-//! Planes that reject leaves and triangles without a root of theirs.
+//! Planes that reject leaves and triangles without a square root.
 
 use glam::Vec3;
 
@@ -6,26 +6,25 @@ use crate::{Index, Tree, VertexTable};
 
 /// A plane: points beyond it are farther from the tool's axis than the cutoff.
 ///
-/// For any vector `n` from the axis' nearest point `q` to some point, the axis lies where
-/// `n . (x - q) <= 0`: it is convex. So all points of a patch with `n . (x - q) > cutoff |n|` at its
-/// vertices are farther than the cutoff. No root is taken of what it rejects, and it is tighter than
-/// any sphere around the patch: a sphere's lower bound is that of its farthest tangent plane.
+/// For any vector `n` from the axis' nearest point `q` to some point, the axis lies where `n . (x - q) <= 0`: it is
+/// convex. So all points of a patch with `n . (x - q) > cutoff |n|` at its vertices are farther than the cutoff. The
+/// plane is tighter than any sphere around the patch: a sphere's lower bound is that of its farthest tangent plane.
 pub(super) struct Plane {
     pub normal: Vec3,
     pub limit: f32,
 }
 
 impl Plane {
-    /// Written so that not a number is not beyond.
+    /// Written so that a NaN is not beyond.
     #[inline(always)]
     pub fn has_beyond(&self, point: Vec3) -> bool {
         self.normal.dot(point) > self.limit
     }
 
-    /// How many of a leaf's triangles are beyond it, one after the other; `None` if its bytes are bad.
+    /// The number of a leaf's leading triangles that are beyond the plane; `None` if the leaf's bytes are bad.
     ///
-    /// Only the third corner of a triangle may be new to the leaf, but for the first triangle: the builder
-    /// sees to it, the checker checks it. (A function of its own, so that the plane stays in registers.)
+    /// After the first triangle only a triangle's third corner may be new to the leaf: the builder orders them so, and
+    /// the checker checks it. (A separate function, so that the plane stays in registers.)
     #[inline(never)]
     pub fn beyond<I: Index, V: VertexTable + ?Sized>(
         &self,

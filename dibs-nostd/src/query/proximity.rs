@@ -12,7 +12,7 @@ use crate::TriangleRow;
 /// short by its budget.
 ///
 /// Where [`side`](Self::side) is undefined, the tool is taken to be outside: the interval is that of the unsigned
-/// distance less the radius, and a tool that is inside is deeper than it says.
+/// distance less the radius, and too high for a tool that is inside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -23,9 +23,8 @@ pub struct Proximity {
     /// inside.
     pub separation: f32,
     /// Lower end of the certified interval. Equals `separation` unless the budget ran out, or the axis crosses the
-    /// surface: then it is lower by at most the tolerance of the depth, see
-    /// [`Options::depth_tolerance`](crate::Options::depth_tolerance), or more if the budget or 28 points of the axis
-    /// did not do.
+    /// surface: then it is lower by at most [`Options::depth_tolerance`](crate::Options::depth_tolerance), or by more
+    /// if the budget or 28 points of the axis were not enough.
     pub lower: f32,
     /// No separation above is off by more than this: the f32 rounding of coordinates this large.
     pub accuracy: f32,
@@ -66,9 +65,9 @@ impl Proximity {
         self.triangle.is_none() || self.lower < self.separation
     }
 
-    /// The same pair, its accuracy widened by `error` (mm, not negative): how far a vertex may be from
-    /// where the table has it besides its own position error, say the age of the surface times the tissue's greatest
-    /// speed. A distance changes by at most as much as its points move.
+    /// The same pair, its accuracy widened by `error` (mm, not negative): an error of the vertices besides the table's
+    /// position error, say the surface's age times the tissue's greatest speed. A distance changes by at most as much
+    /// as its points move.
     #[must_use]
     pub fn widened(mut self, error: f32) -> Self {
         self.accuracy += error;

@@ -24,18 +24,18 @@ use crate::{Index, MeasuredStretch, Proximity, Tree, TriangleRow, VertexTable};
 /// A subtree that waits for its turn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Waiting {
-    /// No point of the subtree is closer to the tool's axis than this.
+    /// Lower bound on its distance from the tool's axis.
     pub lower: f32,
     /// Link of its node.
     pub link: u32,
 }
 
-/// The direction that a triangle's plane is taken in is that of its corners' mean.
+/// Weight of each corner in the mean that a triangle's plane faces.
 const THIRD: f32 = 1.0 / 3.0;
 
-/// How a look at a subtree ended.
+/// The outcome of a visit to a subtree.
 enum Step {
-    /// The rest waits on the stack.
+    /// Finished; any children that remain wait on the stack.
     Done,
     /// Unfinished: the budget ran out.
     OutOfBudget,
@@ -122,8 +122,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         if !(coordinates < 1e18) {
             return Err(QueryError::Position { vertex: root.pin });
         }
-        // A sound tree tests each node's sphere once, each leaf's plane twice and each triangle once. If its
-        // bytes rot into a loop, this ends the search with an interval that is still right.
+        // A sound tree tests each node's sphere once, each leaf's plane twice and each triangle once. If corrupt bytes
+        // form a loop, this budget ends the search.
         let most = header.nodes.saturating_mul(3).saturating_add(header.triangles);
         let budget = Budget {
             node_tests: if options.budget.node_tests < most {
@@ -167,7 +167,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         Ok(search)
     }
 
-    /// Looks at subtrees, near ones first, until none below the cutoff is left or the budget runs out.
+    /// Visits subtrees, near ones first, until none below the cutoff is left or the budget runs out.
     pub fn run(mut self) -> Result<Proximity, QueryError> {
         while let Some(top) = self.waiting.checked_sub(1) {
             self.waiting = top;
@@ -191,13 +191,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     #[inline(always)]
     fn least_waiting(&self, lower: f32) -> f32 {
         let waiting = self.stack.iter().take(self.waiting).map(|left| left.lower);
-        // A pin that is not a number bounds nothing.
+        // The distance of a pin that is not a number gives no bound.
         let known = |lower: f32| if lower.is_nan() { 0.0 } else { lower };
         let least = |least, lower| if known(lower) < least { known(lower) } else { least };
         waiting.fold(known(lower), least)
     }
 
-    /// A pin at this distance is a point of the surface: nothing farther can win.
+    /// Lowers the cutoff to a pin's distance: a pin is a point of the surface.
     #[inline(always)]
     fn lower_cutoff_to_pin(&mut self, row: u32, distance: f32) {
         if distance < self.nearest_pin.distance {
@@ -215,7 +215,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         }
     }
 
-    /// Lets a subtree wait above those from `base` on that are nearer; `None` if the stack is full.
+    /// Inserts a subtree into the part of the stack from `base` on, nearest on top; `None` if the stack is full.
     #[inline(always)]
     fn push(&mut self, base: usize, subtree: Waiting) -> Option<()> {
         let mut at = self.waiting;
@@ -231,8 +231,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         Some(())
     }
 
-    /// Tests the spheres of a node's children, and the planes of those that are leaves; pushes the rest. A
-    /// parent's bound holds for its children too, so that the certified bound never falls.
+    /// Tests the spheres of a node's children, and the planes of those that are leaves; pushes the rest. Each child's
+    /// bound is at least its parent's, so the certified bound never falls.
     #[inline(always)]
     fn expand(&mut self, parent: f32, first: u32, count: u32) -> Result<Step, QueryError> {
         let corrupt = QueryError::Corrupt { row: first };
@@ -254,7 +254,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             }
             let distance = sqrt(squared);
             self.lower_cutoff_to_pin(node.pin, distance);
-            // At once, while the vector to its pin is at hand.
+            // The plane test needs the vector to the leaf's pin, which is at hand here.
             if let Link::Leaf { first, count } = Link::decode(node.link)
                 && let Some(left) = self.left.node_tests.checked_sub(1)
             {
@@ -272,8 +272,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         Ok(Step::Done)
     }
 
-    /// Tests a leaf, now that nothing nearer waits: its vertices against one plane; then, from the first
-    /// triangle on that the plane does not reject, each against the same plane and its own.
+    /// Tests a leaf that no waiting subtree is nearer than: its vertices against one plane; then each triangle, from
+    /// the first that the plane does not reject, against the same plane and a plane of its own.
     #[inline(always)]
     fn leaf(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
         let Some(left) = self.left.node_tests.checked_sub(1) else {
@@ -309,7 +309,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             if plane.has_beyond(a) && plane.has_beyond(b) && plane.has_beyond(c) {
                 continue;
             }
-            // One corner that is not finite makes the limit no number.
+            // A corner that is not finite makes the limit NaN.
             if plane.limit.is_nan() {
                 return Err(QueryError::Position { vertex: self.not_finite(triangle) });
             }
@@ -325,7 +325,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         self.plane_across(normal, point, sqrt(normal.dot(normal)))
     }
 
-    /// The plane across the shortest vector from the axis to a point, this long.
+    /// The plane perpendicular to the shortest vector from the axis to a point, of this length.
     #[inline(always)]
     fn plane_across(&self, normal: Vec3, point: Vec3, length: f32) -> Plane {
         let on_axis = point - normal;
@@ -345,7 +345,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         Ok([self.position(a)?, self.position(b)?, self.position(c)?])
     }
 
-    /// The exact test, which the caller has taken off the budget.
+    /// The exact test; the caller has counted it.
     #[inline(always)]
     fn test_triangle(&mut self, triangle: u32, corners: &[Vec3; 3]) {
         if let Some(pair) = self.tool.closest_on_triangle(corners, self.cutoff_squared)
@@ -358,7 +358,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         }
     }
 
-    /// Which corner of a triangle is not finite; the first where all are.
+    /// The corner of a triangle that is not finite; the first where all are finite.
     #[cold]
     fn not_finite(&self, triangle: u32) -> u32 {
         let rows = self.tree.triangle(triangle).unwrap_or_default();

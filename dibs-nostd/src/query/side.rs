@@ -22,7 +22,7 @@ pub enum Side {
     Inside,
     /// The axis crosses the surface.
     Crossing,
-    /// There is no answer. Separations are then those of a tool outside.
+    /// Not known. Separations are then those of a tool outside.
     Undefined(NoSide),
 }
 
@@ -31,7 +31,7 @@ pub enum Side {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum NoSide {
-    /// [`Options::unsigned`](crate::Options::unsigned): nobody asked.
+    /// [`Options::unsigned`](crate::Options::unsigned): the query left it out.
     NotAsked,
     /// The tree has no adjacency: it was built without, or from a surface that has no sides.
     NoAdjacency,
@@ -64,7 +64,7 @@ const COORDINATES: f32 = 4.0 / 16_777_216.0;
 /// Rounding of a pseudonormal, relative to the sum of its weights.
 const NORMAL: f32 = 1e-5;
 
-/// Within this many accuracies the difference of two points tells their direction badly: the pseudonormal does.
+/// Within this many accuracies the difference of two points gives a poor direction, so the pseudonormal is used.
 const NEAR: f32 = 8.0;
 
 /// A point's side, and the unit vector that leads out; zero where no normal is known.
@@ -77,11 +77,11 @@ pub(super) struct PointSide {
 /// The side of an axis' point whose closest point of the surface is known.
 ///
 /// # Why a near tie is no wrong side
-/// Say the distance `d` is within `e` of the truth. A ball of radius `d - e` around the point holds no point of
-/// the surface, so along any straight line of the surface from the closest point found, the direction to the
-/// point is within an angle of `sqrt(2 e / d)` of the normal cone, whichever of several features that are equally
-/// close up to `e` was found. A pseudonormal has no negative product with any direction of its feature's normal
-/// cone. So a product farther from zero than that angle's has the right sign, and any other has none.
+/// Let the distance `d` be within `e` of the truth. A ball of radius `d - e` around the point holds no point of the
+/// surface, so along any straight line of the surface from the closest point found, the direction to the point is
+/// within an angle of `sqrt(2 e / d)` of the normal cone, whichever of several features within `e` of equally close was
+/// found. A pseudonormal has no negative product with any direction of its feature's normal cone. So a product farther
+/// from zero than that angle's has the right sign; any other leaves the side undefined.
 pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     vertices: &V,

@@ -1,4 +1,4 @@
-//! Between ticks: whether tool and surface, both on their way, come closer than a margin, and when first.
+//! Between ticks: the first time at which a moving tool and surface come closer than a margin.
 
 use super::tracker::Tracker;
 use super::{Options, Proximity, Side};
@@ -6,20 +6,20 @@ use crate::math::sqrt::sqrt;
 use crate::unavailable::QueryError;
 use crate::{Index, Step, Tool, VertexTable};
 
-/// What a sweep found. Times are shares of the way: 0 at its start, 1 at its end.
+/// The result of a sweep. Times are shares of the way: 0 at its start, 1 at its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct Swept {
-    /// Before this time they are certainly not closer than the margin. 1 or more: they never are.
+    /// Before this time they are certainly not closer than the margin; 1 or more means on the whole way.
     pub clear_until: f32,
-    /// The first time at which they were seen within the margin, or farther by no more than the
-    /// [accuracy](Proximity::accuracy) and the rounding of positions on the way. `None` where they never were; then, if
-    /// `clear_until` is less than 1, the looks were too few to tell.
+    /// The first time at which they were found within the margin, or farther by no more than the
+    /// [accuracy](Proximity::accuracy) and the rounding of positions on the way. If this is `None` and `clear_until` is
+    /// less than 1, the looks were too few to decide.
     pub contact: Option<f32>,
     /// The closest pair at the end of the way.
     pub at_end: Proximity,
-    /// How often the tracker was asked.
+    /// Queries made.
     pub looks: u32,
 }
 
@@ -37,7 +37,7 @@ pub struct Sweep<'s, 'v, W: ?Sized, V: ?Sized, T> {
 
 impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized, T: Tool> Sweep<'_, '_, W, V, T> {
     fn check(&self, margin: f32) -> Result<(), QueryError> {
-        // No range contains what is not a number.
+        // No range contains a NaN.
         if !(0.0..f32::INFINITY).contains(&margin) {
             return Err(QueryError::Margin { bits: margin.to_bits() });
         }
@@ -60,7 +60,7 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized, T: Tool> Sweep<'_, '_, W,
         (tool + (last - first).abs() * self.step.length()) * (1.0 + 16.0 * U) + 8.0 * U * lengths
     }
 
-    /// How large the numbers are that an instant of the way is computed from.
+    /// The size of the coordinates that an instant of the way is computed from.
     fn size(&self) -> f32 {
         let of = |tool: &T| tool.axis_start().abs().max_element() + tool.axis_length();
         let [from, to] = &self.tools;
@@ -71,19 +71,19 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized, T: Tool> Sweep<'_, '_, W,
 impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OPENED> {
     /// Whether tool and surface come closer than `margin` (mm, not negative) on their way, and when first.
     ///
-    /// By conservative advancement (Mirtich 1996): a distance changes by no more than tool and surface
-    /// move, so a pair at one instant clears the time before and after in which its distance cannot be used up. As
-    /// a rule the pair at the end, which a tick asks for anyway, clears the whole way. If not, it goes on from the
-    /// start, at most `looks` times in all. Nothing is jumped over at any speed: time that is not cleared is
-    /// stated as such. The distance is that to the surface itself, from either side.
+    /// By conservative advancement (Mirtich 1996): a distance changes by no more than tool and surface move, so a pair
+    /// at one instant clears the time before and after in which the motion cannot use up its distance. As a rule the
+    /// pair at the end, which a tick needs anyway, clears the whole way. If not, the sweep advances from the start,
+    /// with at most `looks` queries in all. No time is skipped at any speed: `clear_until` ends where the proof does.
+    /// The distance is that to the surface itself, from either side.
     ///
     /// The stretch in the options must hold on the whole way: that of both frames, by
-    /// [`MeasuredStretch::or_larger`](crate::MeasuredStretch::or_larger). Their budget is that of each look.
+    /// [`MeasuredStretch::or_larger`](crate::MeasuredStretch::or_larger). Their budget is for each look.
     ///
     /// Cost: `looks` times that of [`closest`](Self::closest), and once at least.
     ///
     /// # Errors
-    /// [`QueryError::Margin`] and [`QueryError::Share`] for what is not in range, and those of
+    /// [`QueryError::Margin`] and [`QueryError::Share`] for arguments out of range, and those of
     /// [`closest`](Self::closest).
     pub fn sweep<W: VertexTable + ?Sized, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
@@ -103,7 +103,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
         };
         let at_end = look(1.0, options)?;
         let mut swept = Swept { clear_until: 0.0, contact: None, at_end: at_end.found, looks: 1 };
-        // Cleared from here on.
+        // The pair at the end clears the way from here on.
         let end = 1.0 - at_end.spare / most * ROUND_DOWN;
         if at_end.touches {
             swept.contact = Some(1.0);
@@ -118,7 +118,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
                 break;
             }
             let next = time + now.spare / most * ROUND_DOWN;
-            // So little to spare that time stands still.
+            // The step rounds to nothing.
             if !(next > time) {
                 break;
             }
@@ -132,9 +132,9 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
 /// An instant of the way.
 struct Look {
     found: Proximity,
-    /// How much closer they may come before the margin is reached; 0 if they might be there.
+    /// Certified distance left above the margin; 0 if there is none.
     spare: f32,
-    /// Whether they are within the margin, as far as can be told.
+    /// Whether they are within the margin, up to the errors.
     touches: bool,
 }
 
@@ -147,7 +147,7 @@ impl Look {
             _ => separation,
         };
         let error = found.accuracy + rounding;
-        // Written so that nothing is spared that is not a number.
+        // Written so that a NaN gives 0.
         let spare = if lower > margin + error { lower - margin - error } else { 0.0 };
         Self { found, spare, touches: spare <= 0.0 && separation <= margin + error }
     }
@@ -155,7 +155,7 @@ impl Look {
 
 /// After the end of the way.
 const ALWAYS: f32 = 2.0;
-/// Taken off a time, for the rounding of its quotient.
+/// Factor on a time, for the rounding of its quotient.
 const ROUND_DOWN: f32 = 1.0 - 8.0 / 16_777_216.0;
-/// Both tool and surface are rounded at an instant, and the instant itself: this much of their size.
+/// Rounding of tool, surface and time at an instant, relative to [`Sweep::size`].
 const ROUNDING: f32 = 48.0 / 16_777_216.0;

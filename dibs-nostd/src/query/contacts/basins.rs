@@ -1,8 +1,8 @@
-//! Which of the triangles near a tool are closest among their surroundings.
+//! Selects the triangles near a tool that are closer than their surroundings.
 //!
-//! The triangles within the margin are a landscape over the surface, as high as they are far from the tool. Filled
-//! with water from the lowest on, each valley is a contact, unless the ridge to a lower one is next to nothing: a flat
-//! wall along a capsule is one valley, however many triangles are equally far.
+//! The distance from the tool is a height over the surface, and each valley of it is a contact. A watershed fills the
+//! valleys from the lowest triangle on and merges two that only a low ridge parts: a flat wall along a capsule is one
+//! valley, however many triangles are equally far.
 
 use crate::{Index, Tree};
 
@@ -20,9 +20,9 @@ const NONE: u16 = u16::MAX;
 #[derive(Clone, Debug)]
 pub(super) struct Basins<const N: usize> {
     near: [Near; N],
-    /// Of each entry one that is not higher, at last the lowest of its valley.
+    /// For each entry one that is not higher: a chain that ends at the lowest of its valley.
     lower: [u16; N],
-    /// First entry of each remainder of rows by `N`, and the next one with the same.
+    /// Hash table of the flooded entries: the first for each remainder of rows by `N`, and the next with the same one.
     heads: [u16; N],
     next: [u16; N],
     is_contact: [bool; N],
@@ -45,8 +45,7 @@ impl<const N: usize> Basins<N> {
         self.count = 0;
     }
 
-    /// Keeps a triangle; if there is no room, the farthest of all gives way. Returns the square from which on there is
-    /// no room, if that is so.
+    /// Keeps a triangle, and drops the farthest if there is no room. Returns the largest square kept, once full.
     pub fn push(&mut self, near: Near) -> Option<f32> {
         if let Some(place) = self.near.get_mut(self.count) {
             *place = near;
@@ -138,7 +137,7 @@ impl<const N: usize> Basins<N> {
         None
     }
 
-    /// The lowest entry of an entry's valley. Halves the way there for the next time.
+    /// The lowest entry of an entry's valley. Halves the chain to it on the way.
     fn bottom(&mut self, mut entry: u16) -> u16 {
         for _ in 0..N {
             let Some(&lower) = self.lower.get(usize::from(entry)) else { return entry };
@@ -187,7 +186,7 @@ impl<const N: usize> Basins<N> {
         }
     }
 
-    /// Lets the first of `end` entries of a heap find its place.
+    /// Restores the heap of `end` entries after a change of the first.
     fn sink(&mut self, end: usize) {
         let mut entry = 0;
         loop {

@@ -75,8 +75,8 @@ impl Contact {
     }
 }
 
-/// Up to `N` contacts, deepest first, and what is certain about the others. `NEAR` triangles at most are looked at
-/// together: 15 bytes each.
+/// Up to `N` contacts, deepest first, and a bound on the others. A query compares up to `NEAR` triangles: 15 bytes
+/// each.
 ///
 /// Make it once, in a `static` or at start-up, and use it at every tick.
 ///
@@ -103,7 +103,7 @@ pub struct Contacts<const N: usize, const NEAR: usize = 512> {
     basins: Basins<NEAR>,
 }
 
-/// The contacts found, and what is certain about the others.
+/// The contacts found, and a bound on the others.
 #[derive(Clone, Debug)]
 struct List<const N: usize> {
     list: [Contact; N],
@@ -159,8 +159,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     /// deepest.
     ///
     /// # Errors
-    /// [`Unavailable::CutShort`] if the budget ended before all within the margin were known, or no query filled the
-    /// list; [`QueryError::Margin`] if the query's margin was less.
+    /// [`Unavailable::CutShort`] if the budget ended before all contacts within the margin were known, or no query
+    /// filled the list; [`QueryError::Margin`] if the query's margin was less.
     pub fn within(
         &self,
         margin: f32,
@@ -175,8 +175,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         Ok(self.iter())
     }
 
-    /// Every contact whose separation is below this (mm) is in the list: the margin, unless the list or `NEAR` was too
-    /// short, or the budget ran out. Where it ran out before the side was known, no number is below.
+    /// Every contact whose separation is below this (mm) is in the list. It is the margin, unless the list or `NEAR`
+    /// was too short or the budget ran out; negative infinity if it ran out before the side was known.
     #[must_use]
     pub const fn bound(&self) -> f32 {
         self.found.bound
@@ -188,7 +188,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         self.found.accuracy
     }
 
-    /// Whether contacts within the margin were left out because the list is full: the farthest ones.
+    /// Whether the list is full, so that the farthest contacts within the margin were left out.
     #[must_use]
     pub const fn is_full(&self) -> bool {
         self.found.is_full
@@ -197,7 +197,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     /// Sets each contact's velocity to that of the surface there, from a table of the vertices' velocities (mm/s).
     ///
     /// # Errors
-    /// [`QueryError::VertexCount`] if the table has not a row for each vertex named.
+    /// [`QueryError::VertexCount`] if a contact's corner has no row in the table.
     pub fn move_with<V: VertexTable + ?Sized>(&mut self, velocities: &V) -> Result<(), QueryError> {
         for contact in self.found.list.iter_mut().take(self.found.count) {
             let mut velocity = Vec3::ZERO;
@@ -222,7 +222,7 @@ impl<const N: usize> List<N> {
         self.is_cut_short = true;
     }
 
-    /// Takes a contact to its place; if there is no room, the farthest gives way.
+    /// Inserts a contact in order, and drops the farthest if there is no room.
     fn insert(&mut self, contact: Contact) {
         let mut at = self.count;
         if at < N {
@@ -256,15 +256,16 @@ impl<const N: usize> List<N> {
 
 impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// Finds all locally closest pairs of the tool and the outer side of the surface whose separation is at most
-    /// `margin` (mm). A tool that is inside, or crosses the surface, has its deepest pair first, which may be all.
+    /// `margin` (mm). For a tool that is inside the only contact is its deepest pair; for one that crosses the surface
+    /// that pair is the first.
     ///
     /// Two valleys of the distance are one contact unless a ridge of more than a 64th of the margin parts them, so a
-    /// flat wall along a capsule is one. Pairs with the inner side of a sheet, say the far side of an organ, are
-    /// none. Where the side is undefined the tool is taken to be outside. If that is because the budget ended, contacts
-    /// may be missing at any distance: see [`Contacts::within`].
+    /// flat wall along a capsule is one. Pairs with the inner side of a sheet, say the far side of an organ, are not
+    /// contacts. Where the side is undefined the tool is taken to be outside. If that is because the budget ended,
+    /// contacts may be missing at any distance: see [`Contacts::within`].
     ///
-    /// Cost: that of [`closest`](Self::closest), a range search, and some hundred instructions a triangle within the
-    /// margin.
+    /// Cost: that of [`closest`](Self::closest), a range search, and some hundred instructions for each triangle within
+    /// the margin.
     ///
     /// # Errors
     /// [`QueryError`]: those of [`closest`](Self::closest); [`QueryError::NoAdjacency`] for a tree without;
@@ -294,7 +295,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         }
         let closest = self.closest(vertices, tool, options)?;
         (found.accuracy, found.margin) = (closest.accuracy, margin);
-        // From here on the positions decide, as they are.
+        // The search below takes the positions as exact; the answer's accuracy has their error already.
         let accuracy = closest.accuracy - vertices.position_error();
         let has_side = closest.side != Side::Undefined(NoSide::CutShort);
         if closest.side == Side::Inside || (closest.lower > margin && has_side) {
@@ -321,7 +322,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         })?;
         let least = if left < complete { left } else { complete };
         found.is_cut_short = !has_side || left < limit;
-        // Inside, and deeper than all that was seen, its contact would be the deepest.
+        // Without a side the tool may be inside, deeper than every pair seen.
         found.bound = if has_side { least - tool.radius() } else { f32::NEG_INFINITY };
         let is_crossing = closest.side == Side::Crossing;
         if is_crossing && let Some(contact) = Contact::at(&closest) {
@@ -332,7 +333,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         let mut failed = None;
         basins.each_valley(&tree, ridge, |near| {
             let is_on = sqrt(near.square) <= accuracy;
-            // Those of a crossing axis are part of its depth.
+            // The crossing pair, inserted above, stands for these triangles.
             if is_crossing && is_on {
                 return;
             }
@@ -356,7 +357,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     }
 }
 
-/// The pair of a tool and a triangle that is closest among its surroundings.
+/// The pair of a tool and the lowest triangle of a valley.
 fn pair_at<I: Index, V: VertexTable + ?Sized, T: Tool>(
     tree: &crate::Tree<'_, I>,
     vertices: &V,

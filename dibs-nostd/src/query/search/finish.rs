@@ -32,7 +32,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         let above_zero = |x: f32| if x > 0.0 { x } else { 0.0 };
         let separation = axis_distance - radius;
         let left = above_zero(lower) - radius;
-        // By its own length: next to contact the points' rounding is not that of the distance.
+        // Divided by the vector's own length: next to contact the points' rounding differs from the distance's.
         let towards = pair.on_axis - pair.on_surface;
         let length = sqrt(towards.length_squared());
         let touches = axis_distance <= 0.0 || length <= 0.0;

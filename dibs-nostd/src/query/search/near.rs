@@ -8,8 +8,8 @@ use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// Visits every triangle within `limit` of the axis, with the square of its distance. A visit returns the limit
-    /// from then on. The unvisited rest is at least as far as the distance returned.
+    /// Visits every triangle within `limit` of the axis, with the square of its distance. A visit returns the next
+    /// limit. Unvisited triangles are at least as far as the distance returned.
     pub fn each_within(
         mut self,
         limit: f32,
@@ -77,7 +77,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(())
     }
 
-    /// Whether the budget lasted.
+    /// Visits a leaf's triangles. Returns whether the budget was enough.
     fn visit_leaf(
         &mut self,
         first: u32,

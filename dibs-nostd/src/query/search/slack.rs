@@ -1,9 +1,8 @@
 //! The slacks of a search: bounds on the f32 rounding of both sides of every comparison.
 //!
-//! With `u = 2^-24`, all lengths in a query are at most the *scale* `S`: the distance to the farthest point of
-//! the root sphere, plus twice the axis and the tool's radius. The errors below are proven, not measured: the
-//! largest that hill climbing finds in an answer is 4 `u S`, so that no test tells a smaller slack from a
-//! sufficient one. The sums are asserted instead.
+//! With `u = 2^-24`, all lengths in a query are at most the *scale* `S`: the distance to the farthest point of the root
+//! sphere, plus twice the axis and the tool's radius. The errors below are proven, not measured: hill climbing finds
+//! errors of at most 4 `u S`, so no test could tell a slack that is too small. The sums are asserted instead.
 
 use crate::tool::ACCURACY as KERNEL;
 
@@ -48,6 +47,5 @@ pub(super) const TILT: f32 = 16.0 * U;
 
 const _: () = assert!(COORDINATES >= 2.0 * DOT + ON_AXIS && TILT >= 0.5 * PERPENDICULAR);
 
-/// Lengths that the kernels count as zero, times a few: what is left of slack and accuracy where tool and
-/// surface are one point.
+/// A few times the length that the kernels count as zero: the slack and accuracy where tool and surface are one point.
 pub(super) const FLOOR: f32 = 1e-14;

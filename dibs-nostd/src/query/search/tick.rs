@@ -1,13 +1,13 @@
-//! A search that begins with the front of the one before: it tests the bounds that have run out, and no others.
+//! A search that begins with the front of the one before, and tests only the bounds that have run out.
 //!
-//! The odometer counts how far tool and surface have moved, rounded up. A bound found at reading `now` is kept as
-//! the reading `now + bound`, at which it has run out. Until then the difference of the readings is still a bound. So a
-//! child has to be tested again once its reading is not beyond `now` plus the cutoff. That number never falls while
-//! answers are exact, since a distance shrinks by no more than the odometer counts.
+//! The odometer counts how far tool and surface have moved, rounded up. A bound found at reading `now` is stored as the
+//! reading `now + bound`, at which it runs out. Until then the difference of the readings is a bound. So a child is due
+//! again once its reading is not beyond `now` plus the cutoff. That sum never falls while answers are exact, since a
+//! distance shrinks by no more than the odometer counts.
 //!
-//! Rounding. A bound is stored less the slack of its own search, and compared with the cutoff, which has the
-//! slack of this one: so the errors of both are covered, whatever their scales. Positions may be rounded
-//! anew in each frame, by at most 16 * 2^-24 of their coordinates: both sides spare that.
+//! Rounding. A bound is stored less the slack of its own search, and compared with the cutoff, which has the slack of
+//! this one: so both errors are covered, whatever their scales. Both slacks include 16 * 2^-24 of the coordinates,
+//! since each frame may round positions anew.
 
 use glam::Vec3;
 
@@ -25,11 +25,11 @@ use crate::{Index, Proximity, Tool, Tree, VertexTable};
 /// A motion of this many units, a 64th of the root sphere's radius, may be too much for the front.
 const LARGE_STEP: u32 = 1 << 18;
 
-/// How a tick ended.
+/// The outcome of a tick.
 pub(in crate::query) enum Outcome {
-    /// With an answer; whether everything due was looked at; whether the front had to start anew.
+    /// An answer; whether every bound due was tested; whether the front started anew.
     Answer { closest: Proximity, is_complete: bool, restarted: bool },
-    /// The front has no free place; how many tests it took to find out.
+    /// The front has no free place; the tests made until then.
     Full { tests: Budget },
 }
 
@@ -45,8 +45,8 @@ pub(in crate::query) struct Tick<'s, 't, 'f, I, V: ?Sized, T> {
     facing: Facing,
 }
 
-/// The plane across the closest pair, which most triangles about it are beyond, and those that share the closest
-/// point are not nearer than: so that they need no exact test.
+/// The plane across the closest pair. Most triangles around the pair are beyond it, and triangles that share the
+/// closest point are not nearer; neither need an exact test.
 struct Facing {
     start: Vec3,
     /// From the axis to the closest triangle, of length 1; zero where there is none, or they touch.
@@ -102,7 +102,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         Self { search, front, unit, now, margin, facing }
     }
 
-    /// Tests the bounds that a motion of `moved` units makes run out. Returns the closest triangle too, where one was
+    /// Tests the bounds that run out with a motion of `moved` units. Returns the closest triangle too, where one was
     /// tested.
     pub fn run(mut self, moved: u32) -> Result<(Outcome, Option<u32>), QueryError> {
         let outcome = self.test_what_is_due(moved)?;
@@ -156,7 +156,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         Ok(Outcome::Answer { closest, is_complete: true, restarted })
     }
 
-    /// A bound whose key is not beyond this has to be tested.
+    /// A bound whose key is not beyond this is due.
     #[inline(always)]
     fn threshold(&self) -> u32 {
         self.now.wrapping_add(self.unit.up(self.search.cutoff + self.search.coordinate_slack))
@@ -236,7 +236,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         let threshold = self.threshold();
         let opened = self.front.node(at).ok_or(corrupt)?;
         let (step, count) = match Link::decode(opened.link) {
-            // Its time has come, as long as the odometer can count: it starts again.
+            // A free place falls due once the odometer has counted `FAR` units; it is scheduled anew.
             _ if opened.link == UNUSED => (Step::Done, 0),
             Link::Children { first, count } => {
                 let due = opened.due(count, threshold);
@@ -330,8 +330,8 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         Ok(Step::Done)
     }
 
-    /// Tests a triangle against its own plane, then exactly, which leaves `left` triangle tests of the budget.
-    /// Returns a bound, unless it is the closest so far.
+    /// Tests a triangle against its own plane, then exactly, after which `left` triangle tests remain. Returns a bound,
+    /// unless it is the closest so far.
     fn test_closely(
         &mut self,
         triangle: u32,
@@ -356,8 +356,8 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         self.test_exactly(triangle, corners, place)
     }
 
-    /// The exact test, which the caller has taken off the budget. Returns the triangle's distance, unless it is
-    /// the closest so far, which is then apart.
+    /// The exact test; the caller has counted it. Returns the triangle's distance, unless it is the closest so far,
+    /// which has no bound.
     #[inline(always)]
     fn test_exactly(
         &mut self,
@@ -386,8 +386,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         Ok(None)
     }
 
-    /// Looks at some opened nodes, one after the other from tick to tick, and closes those that are as well
-    /// bounded by their own spheres.
+    /// Tests some opened nodes, in turn from tick to tick, and closes those whose own spheres bound them as well.
     #[inline(always)]
     fn close_some(&mut self, number: u32) -> Result<(), QueryError> {
         let corrupt = QueryError::Corrupt { row: 0 };
@@ -414,7 +413,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
     }
 }
 
-/// How looking at an opened node ended.
+/// The outcome of a visit to an opened node.
 enum Visit {
     Done,
     OutOfBudget,
@@ -422,8 +421,8 @@ enum Visit {
 }
 
 impl Plane {
-    /// How far all vertices of a leaf are beyond it, in units of the normal's length; not above zero if one is
-    /// not. `None` if the leaf's bytes are bad.
+    /// The least distance of a leaf's vertices beyond the plane, in units of the normal's length; not above zero if a
+    /// vertex is not beyond. `None` if the leaf's bytes are bad.
     #[inline(never)]
     fn excess<I: Index, V: VertexTable + ?Sized>(
         &self,

@@ -1,9 +1,9 @@
 //! The wide search: batches of up to seven subtrees.
 //!
-//! One subtree at a time is a chain of dependences: its distances decide which is next, and each child costs a
-//! branch that no processor predicts. Half of a query's time on a large processor goes there. A batch overlaps
-//! the loads and roots of all its children, compares four children by one instruction, and sorts the rest
-//! without branches.
+//! A search of one subtree at a time is a chain of dependences: its distances decide which is next, and each child
+//! costs a branch that no processor predicts. This takes half of a query's time on a large processor. A batch overlaps
+//! the loads and roots of all its children, compares four children by one instruction, and sorts the rest without
+//! branches.
 //!
 //! Batching wastes few tests: most queued subtrees would be visited anyway. It often saves some, because the
 //! pins of seven subtrees lower the cutoff before a child is compared with it.
@@ -21,8 +21,8 @@ use crate::tree::format::{Link, MAX_CHILDREN, node_bytes};
 use crate::unavailable::QueryError;
 use crate::{Index, Proximity, Tool, VertexTable};
 
-/// Most subtrees in a batch. A larger batch hides more latency but prunes with an older bound; and the set of its
-/// children must fit in a word of 64 bits.
+/// Most subtrees in a batch. A larger batch hides more latency but prunes with an older bound. The set of its children
+/// must fit in a word of 64 bits.
 const SUBTREES: usize = 7;
 const MOST: usize = SUBTREES * MAX_CHILDREN as usize;
 const BLOCKS: usize = MOST / 4;
@@ -34,11 +34,11 @@ const MOST_WAITING: usize = 128;
 /// A search by batches.
 pub(in crate::query) struct WideSearch<'s, 't, I, V: ?Sized, T> {
     search: Search<'s, 't, I, V, T>,
-    /// How many entries a batch of several subtrees may leave: the rest of the stack is enough for one subtree at
-    /// a time.
+    /// Most entries that a batch of several subtrees may leave: the rest of the stack is enough for one subtree at a
+    /// time.
     room: usize,
-    /// Records of the batch's children. Other nodes fill the last block of four: their pins may lower the cutoff
-    /// too, and then they are left out.
+    /// Records of the batch's children. Other nodes fill the last block of four: their pins may lower the cutoff, but
+    /// they are not compared with it.
     records: [u8; (MOST + MAX_CHILDREN as usize) * MOST_NODE_BYTES],
     /// Lower bounds of the children's parents.
     parents: [f32; MOST + MAX_CHILDREN as usize],
@@ -63,7 +63,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
         }
     }
 
-    /// Looks at subtrees, near ones first, until none below the cutoff is left or the budget runs out.
+    /// Visits subtrees, near ones first, until none below the cutoff is left or the budget runs out.
     pub fn run(mut self) -> Result<Proximity, QueryError> {
         while let Some(top) = self.search.waiting.checked_sub(1) {
             let corrupt = QueryError::Corrupt { row: top as u32 };
@@ -91,7 +91,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
     fn expand_batch(&mut self) -> Result<Step, QueryError> {
         let corrupt = QueryError::Corrupt { row: self.search.waiting as u32 };
         let (subtrees, children) = self.take().ok_or(corrupt)?;
-        // All of the batch or nothing: with more budget a query takes the same steps, and more of them.
+        // A batch is never split, so that a query with more budget takes the same steps, then more.
         let Some(left) = self.search.left.node_tests.checked_sub(children as u32) else {
             return Ok(Step::OutOfBudget);
         };
@@ -104,8 +104,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
         Ok(Step::Done)
     }
 
-    /// Copies the children of the nearest subtrees, as many as the stack has room for. Returns the number of
-    /// subtrees and of children; a subtree that is above the cutoff by now has none.
+    /// Copies the children of the nearest subtrees, as many as the stack has room for. Returns the numbers of subtrees
+    /// and children; a subtree that is above the cutoff by now adds no children.
     #[inline(always)]
     fn take(&mut self) -> Option<(usize, usize)> {
         let Self { search, room, records, parents, .. } = self;
@@ -154,8 +154,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
         Some(())
     }
 
-    /// Compares the children's spheres with the cutoff. Returns the set of those below, and of the leaves among
-    /// them.
+    /// Compares the children's spheres with the cutoff. Returns the set of the children below it, and of the leaves
+    /// among them.
     #[inline(always)]
     fn judge(&mut self, children: usize) -> Option<(u64, u64)> {
         let Self { search, records, parents, squares, lowers, .. } = self;

@@ -18,16 +18,15 @@ pub(in crate::query) struct Opened {
     pub link: u32,
     /// Place of the node above; of a free place, the next free one.
     pub parent: u16,
-    /// Which of the parent's children this is.
+    /// Index among the parent's children.
     pub slot: u8,
-    /// The children that are not waiting for their bounds to run out, one bit each: they are opened, on the
-    /// search's stack, or the closest triangle.
+    /// The children without a bound, one bit each: they are opened, on the search's stack, or the closest triangle.
     pub apart: u8,
     /// The odometer's reading at which each child's bound has come down to zero. Of an opened child, its place.
     pub keys: [u32; MAX_CHILDREN as usize],
 }
 
-/// No node has this link: it is that of eight children in rows that no tree has.
+/// A link that no node has: eight children in rows beyond every tree.
 pub(in crate::query) const UNUSED: u32 = u32::MAX >> 1;
 /// No place: one more than the largest.
 pub(in crate::query) const NOWHERE: u16 = u16::MAX;
@@ -55,7 +54,7 @@ pub(in crate::query) struct Place {
 }
 
 impl Place {
-    /// As a word for the search's stack.
+    /// The place as a word for the search's stack.
     #[inline(always)]
     pub fn to_word(self) -> u32 {
         u32::from(self.node) << 3 | u32::from(self.slot)
@@ -67,18 +66,18 @@ impl Place {
     }
 }
 
-/// The opened nodes, each in a place of its own. A node's children are tested together, so that a tick looks at
-/// one number for each opened node, not for each child.
+/// The opened nodes, one to a place. A tick reads one key for each opened node, not for each child.
 #[derive(Clone, Debug)]
 pub(in crate::query) struct Front<const OPENED: usize> {
-    /// When the first of each node's bounds runs out. (A table of its own, since all of it is read at each tick.)
+    /// The reading at which the first of each node's bounds runs out. (A separate table, since each tick reads all of
+    /// it.)
     due: [u32; OPENED],
     nodes: [Opened; OPENED],
     /// Places from here on were never used.
     end: usize,
     /// The first free place below.
     free: u16,
-    /// Where the closest triangle stands.
+    /// The closest triangle's place.
     pub best: Option<Place>,
     /// The place to look at next for a node to close.
     hand: usize,
@@ -119,7 +118,7 @@ impl<const OPENED: usize> Front<OPENED> {
 }
 
 impl FrontMut<'_> {
-    /// Forgets everything.
+    /// Frees all places.
     pub fn clear(&mut self) {
         (*self.end, *self.free, *self.best, *self.hand) = (0, NOWHERE, None, 0);
     }
@@ -138,12 +137,12 @@ impl FrontMut<'_> {
         self.nodes.get_mut(usize::from(at))
     }
 
-    /// The first of these places whose node is due.
+    /// The first place in a range whose node is due.
     #[inline(always)]
     pub fn next_due(&self, places: Range<usize>, threshold: u32) -> Option<usize> {
         let from = places.start;
         let due = self.due.get(places)?;
-        // Eight at a time: as a rule none is.
+        // Eight at a time: as a rule none of them is due.
         let (eights, _) = due.as_chunks::<8>();
         let waits = |eight: &&[u32; 8]| {
             let before = eight.map(|due| threshold.wrapping_sub(due));
@@ -160,7 +159,7 @@ impl FrontMut<'_> {
         due.iter().filter(|&&due| !is_before(threshold, due)).count()
     }
 
-    /// The least that is left of any bound, in units.
+    /// The least remainder of any bound, in units.
     pub fn least(&self, now: u32) -> i32 {
         let due = self.due.get(..*self.end).unwrap_or_default();
         let left = due.iter().map(|due| due.wrapping_sub(now) as i32);
@@ -183,7 +182,7 @@ impl FrontMut<'_> {
         Some(at as u16)
     }
 
-    /// Frees a place, and lets its parent wait in its stead.
+    /// Frees a place, and gives its parent a bound for it.
     pub fn close(&mut self, at: u16, key: u32, now: u32) -> Option<()> {
         let free = *self.free;
         let node = self.node(at)?;
@@ -195,7 +194,7 @@ impl FrontMut<'_> {
         self.put_back(place)
     }
 
-    /// Lets a child wait for its bound to run out.
+    /// Returns a child to its node's bounds.
     #[inline(always)]
     pub fn put_back(&mut self, Place { node, slot }: Place) -> Option<()> {
         let due = self.due.get_mut(usize::from(node))?;
@@ -208,7 +207,7 @@ impl FrontMut<'_> {
         Some(())
     }
 
-    /// Finds when the first of a node's bounds runs out.
+    /// Sets the reading at which the first of a node's bounds runs out.
     #[inline(always)]
     pub fn schedule(&mut self, at: usize, count: u32, now: u32) -> Option<()> {
         let node = self.nodes.get(at)?;
@@ -224,7 +223,7 @@ impl FrontMut<'_> {
         Some(())
     }
 
-    /// The next place, in turn, of a node below the root that none of its own children are apart from.
+    /// The next place, in turn, of a node below the root whose children all have bounds.
     pub fn next_closable(&mut self) -> Option<(u16, u32)> {
         *self.hand = if *self.hand + 1 < *self.end { *self.hand + 1 } else { 0 };
         let node = self.nodes.get(*self.hand)?;

@@ -14,27 +14,27 @@ use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Tool, Travel, Tree, TriangleRow};
 use front::Front;
 
-/// Units that the odometer may count between two looks at a bound: half of what it can tell apart.
+/// Most units that the odometer may count between two tests of a bound: half of the range that it can tell apart.
 const FARTHEST: u32 = 1 << 29;
 
 /// A query that remembers its last answer's proof.
 ///
-/// A search leaves a *front*: subtrees that were rejected by a lower bound, triangles that were tested. When
-/// the tool moves by at most `a` (the larger of its ends' steps) and the surface by at most `b`, each of these
-/// bounds still holds, less `a + b`. So a tracker keeps the front from tick to tick, and tests the bounds that have
-/// run out: as a rule some ten of a thousand. The answers are those of [`Query::closest`](crate::Query::closest),
-/// within their accuracy. (Fronts of bounding volume trees: Klosowski et al. 1998, Tang et al. 2010. Bounds that
-/// expire: kinetic data structures; Barbič & James 2010.)
+/// A search leaves a *front*: the subtrees rejected by a lower bound and the triangles tested. When the tool moves by
+/// at most `a` (the larger of its ends' steps) and the surface by at most `b`, each of these bounds still holds, less
+/// `a + b`. So a tracker keeps the front from tick to tick, and tests only the bounds that have run out: as a rule some
+/// ten of a thousand. The answers are those of [`Query::closest`](crate::Query::closest), within their accuracy.
+/// (Fronts of bounding volume trees: Klosowski et al. 1998, Tang et al. 2010. Bounds that expire: kinetic data
+/// structures; Barbič & James 2010.)
 ///
 /// The surface carries its motion, as [`MovingSurface::travel`]; where it was not measured, the tick is a whole query.
-/// Another tool counts as a step to its place. The stretch in the options may change from tick to tick: remembered
+/// Another tool counts as a step to its position. The stretch in the options may change from tick to tick: remembered
 /// bounds hold for any.
 ///
 /// `STACK` must be at least [`Tree::stack`]. `OPENED` nodes of the tree are remembered with their children: a generated
-/// heart of 10,272 triangles opened 180 at most in 7 s. With fewer than it takes, ticks are whole queries. Meant for a
-/// `static`: by value it can be larger than a controller's stack.
+/// heart of 10,272 triangles opened 180 at most in 7 s. If `OPENED` is too small, ticks are whole queries. Keep it in a
+/// `static`: it can be larger than a controller's stack.
 ///
-/// RAM: 8 bytes an entry of the stack, 44 an opened node, which are about 8 for each of its children.
+/// RAM: 8 bytes for each entry of the stack, 44 for each opened node.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -64,14 +64,14 @@ pub struct Tracker<'t, I, const STACK: usize, const OPENED: usize> {
     stack: [Waiting; STACK],
     front: Front<OPENED>,
     last: Option<Last>,
-    /// Units that tool and surface have moved; wraps.
+    /// The odometer: units that tool and surface have moved; wraps.
     now: u32,
-    /// Units since everything due was looked at.
+    /// Units since every bound due was tested.
     behind: u32,
     triangle: Option<TriangleRow>,
 }
 
-/// Where tool and surface were.
+/// Tool and surface at the last tick.
 #[derive(Clone, Copy, Debug)]
 struct Last {
     start: Vec3,
@@ -87,9 +87,9 @@ struct Last {
 pub struct Tracked {
     /// The closest pair; its counts of tests are this tick's.
     pub closest: Proximity,
-    /// Why this tick was a whole query, if it was.
+    /// The reason, if this tick was a whole query.
     pub fallback: Option<Fallback>,
-    /// Places of opened nodes that have been needed so far, of the tracker's `OPENED`.
+    /// Places of the tracker's `OPENED` used since the front last started.
     pub opened: u32,
 }
 
@@ -143,8 +143,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
 
     /// The closest pair between `tool` and the surface as it is now.
     ///
-    /// As [`Query::closest`](crate::Query::closest), warm start included. Under a budget the interval is as
-    /// certain as there, and the next tick continues where this one ended.
+    /// As [`Query::closest`](crate::Query::closest), warm start included. A budget widens the interval as there, and
+    /// the next tick continues where this one ended.
     ///
     /// Cost: the budget at most, and one number for each opened node.
     ///
@@ -193,7 +193,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         Ok(Tracked { closest, fallback, opened: self.front.borrow().used() as u32 })
     }
 
-    /// A whole query, with the budget that so many tests have left.
+    /// A whole query, with the budget less the `tests` already made.
     #[cold]
     fn whole<S: MovingSurface + ?Sized, T: Tool>(
         &mut self,
@@ -235,8 +235,8 @@ impl Last {
         Self { start, span, length: tool.axis_length(), travel }
     }
 
-    /// The farthest that a point of the axis is from where it was, or a point of another tool's axis from this
-    /// one's, in units: the larger of the ends' steps.
+    /// Most that a point of the axis has moved, in units: the larger of the ends' steps. For another tool, the distance
+    /// between the axes' points.
     #[inline(always)]
     fn step(&self, tool: &impl Tool, unit: Unit) -> u32 {
         const U: f32 = 1.0 / 16_777_216.0;

@@ -1,4 +1,4 @@
-//! Every bound in the front, after every tick, against the distances of all vertices below it.
+//! Compares every bound in the front, after every tick, with the distances of all vertices below it.
 
 extern crate std;
 
@@ -38,12 +38,12 @@ fn least(tree: &Tree<'_, u16>, link: Link, far: &impl Fn(u32) -> f64) -> f64 {
 
 /// A bound in the front.
 struct Bound {
-    /// Where it stands: the opened node's place, and the child.
+    /// The opened node's place, and the child.
     place: (u16, u32),
-    /// When it runs out, by which it is told from a bound that was found later.
+    /// The reading at which it runs out; tells it from a bound found later.
     key: u32,
     bound: f64,
-    /// The distance of the nearest vertex that it is a bound of.
+    /// The distance of the nearest vertex below it.
     distance: f64,
 }
 
@@ -136,8 +136,8 @@ fn band(squares: u32) -> Mesh {
     }
 }
 
-/// A sphere above one end of a band, and either of them goes straight along the band so that sphere and other end
-/// approach. Returns how much a bound that was found at the start has to spare, as a part of the way since.
+/// Puts a sphere above one end of a band and moves either of them straight along the band, so that the sphere and the
+/// other end approach. Returns the slack left of a bound found at the start, as a share of the way since.
 fn approach(built: &BuiltTree, moves_tool: bool) -> f64 {
     let tree = Tree::<u16>::from_bytes(built.blob()).expect("valid");
     let mut tracker = Tracker::<_, 128, 128>::new(&tree).expect("enough");
@@ -169,8 +169,7 @@ fn approach(built: &BuiltTree, moves_tool: bool) -> f64 {
     spare
 }
 
-/// Along a straight way towards what they bound, bounds have nothing to spare but rounding: motions understated by
-/// a thousandth would show.
+/// On a straight way bounds are used up but for rounding, so a motion understated by a thousandth would show.
 #[test]
 fn bounds_are_used_up_as_fast_as_tool_and_surface_move() {
     let built = Builder::new().stretch(1.5).build(&band(160)).expect("builds");

@@ -32,8 +32,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
 }
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// As [`Search::leaf`], but from the first triangle on that the plane does not reject, four at a time, each
-    /// against its own plane only.
+    /// As [`Search::leaf`], but tests the triangles, from the first that the plane does not reject, four at a time and
+    /// each against its own plane only.
     #[inline(always)]
     pub(super) fn leaf_at_once(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
         let Some(left) = self.left.node_tests.checked_sub(1) else {
@@ -48,7 +48,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         if within == 0 {
             return Ok(Step::Done);
         }
-        // From the third on, each vertex is the last of a triangle: those before it are beyond as a whole.
+        // From the third on, each vertex is the last corner of a triangle, and the triangles before it are beyond the
+        // plane.
         let beyond = within.trailing_zeros().saturating_sub(2);
         let (mut first, mut count) = (first + beyond, count.saturating_sub(beyond));
         let Some(left) = self.left.node_tests.checked_sub(count) else {
@@ -82,7 +83,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         };
         let corners = self.corners(triangle)?;
         let [a, b, c] = corners;
-        // Nor is the sum where one corner is not finite.
+        // A corner that is not finite makes the sum not finite.
         if !(a + b + c).is_finite() {
             return Err(QueryError::Position { vertex: self.not_finite(triangle) });
         }
@@ -91,8 +92,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(Step::Done)
     }
 
-    /// Which of four triangles, by their corners, are not beyond the plane in the direction of their own corners'
-    /// mean.
+    /// The set of those of four triangles that are not beyond the plane towards their corners' mean.
     #[inline(always)]
     fn within_own_planes(&self, a: Vec3x4, b: Vec3x4, c: Vec3x4) -> u32 {
         let mean = a.plus(b).plus(c).times(Vec4::splat(THIRD));
@@ -104,7 +104,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
 }
 
 impl Plane {
-    /// Which of a leaf's vertices are not beyond it, in the order in which its triangles bring them.
+    /// The set of a leaf's vertices that are not beyond the plane, in the order in which its triangles name them.
     #[inline(always)]
     fn vertices_within<I: Index, V: VertexTable + ?Sized>(
         &self,
@@ -128,7 +128,7 @@ impl Plane {
     }
 }
 
-/// Which of four points are not beyond a plane, or one each. A NaN is not beyond.
+/// The set of those of four points that are not beyond a plane, or each its own. A NaN is not beyond.
 #[inline(always)]
 fn within(normal: Vec3x4, limit: Vec4, points: Vec3x4) -> u32 {
     !normal.dot(points).cmpgt(limit).bitmask() & 0xF

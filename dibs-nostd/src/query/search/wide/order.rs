@@ -32,11 +32,10 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
                 && let Link::Children { first, .. } =
                     Link::decode(whole_node::<I>(records, at as u32)?.link)
             {
-                // A prefetch: on a large mesh the memory takes longer than all the arithmetic.
+                // A prefetch: on a large mesh loads take longer than the arithmetic.
                 black_box(search.tree.whole_record(first)?.pin);
             }
-            // Positive numbers are ordered as their bits are. The low six bits hold the child's index; ties go to
-            // the later child.
+            // Positive numbers sort as their bits. The low six bits hold the child's index; ties go to the later child.
             let distance = (lowers.get(at)? + search.scale).to_bits() & !(1 << 31);
             *keys.as_flattened_mut().get_mut(count)? =
                 (distance & !INDEX | (INDEX - at as u32)) as i32;
@@ -50,7 +49,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
         }
         for own in keys.get(..count.div_ceil(4))? {
             let mut farther = [0; 4];
-            // Not flattened: the compiler would count along the keys instead.
+            // Not flattened, or the compiler would vectorise along the keys instead.
             for keys in all {
                 for key in keys {
                     farther = array::from_fn(|i| farther[i] + u32::from(*key > own[i]));
@@ -58,7 +57,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
             }
             for (key, place) in own.iter().zip(farther) {
                 let at = INDEX - (*key as u32 & INDEX);
-                // None where the block is longer than the stack.
+                // No place where the block is longer than the stack.
                 if let Some(place) = stack.get_mut(place as usize) {
                     let link = whole_node::<I>(records, at)?.link;
                     *place = Waiting { lower: *lowers.get(at as usize)?, link };
