@@ -1,9 +1,8 @@
-//! Which packets of a frame have arrived, without a mark for each.
+//! The packets of a frame that have arrived, as ranges instead of a mark for each.
 
 use core::ops::Range;
 
-/// Contiguous ranges of sequence numbers that can be noted besides the first: a frame can have so many gaps
-/// at once.
+/// Contiguous ranges of sequence numbers noted besides the first: the most gaps that a frame can have at once.
 pub(super) const GAPS: usize = 7;
 
 /// Packets of consecutive sequence numbers, and their rows.
@@ -25,11 +24,10 @@ impl Contig {
 ///
 /// # Why this proves completeness
 ///
-/// Rows are in the order of the sequence. Each range holds consecutive sequence numbers, and a packet's rows
-/// were compared with its neighbours' when it joined the range: in an exact frame they follow each other
-/// without a gap, in any frame without an overlap. So once the first range, which begins at sequence 1 and
-/// row 0, reaches the commit, and its rows the last row, every row was in exactly one packet. No sender can
-/// have skipped one, whatever it makes up.
+/// Rows are in the order of the sequence. Each range holds consecutive sequence numbers, and a packet's rows were
+/// compared with its neighbours' when it joined the range: in an exact frame they follow each other without a gap, in
+/// any frame without an overlap. So once the first range, which begins at sequence 1 and row 0, reaches the commit, and
+/// its rows the last row, every row was in exactly one packet, whatever the sender claims.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Arrivals {
     /// From the frame's first packet on.
@@ -49,11 +47,11 @@ pub(super) enum Misplaced {
     Duplicate,
     /// Its rows do not fit between those of the packets before and after it.
     Order,
-    /// There is no room to note another gap.
+    /// There are [`GAPS`] gaps already.
     Gaps,
 }
 
-/// Where a packet belongs.
+/// The place of a packet among the ranges.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     sequence: u16,
@@ -75,7 +73,7 @@ struct Range32 {
 const PREFIX: usize = GAPS;
 
 impl Arrivals {
-    /// Nothing has arrived. In an exact frame every row must.
+    /// No packet yet. An exact frame needs every row.
     pub const fn new(is_exact: bool) -> Self {
         let prefix = Contig { from: 1, to: 1, first: 0, end: 0 };
         Self { prefix, others: [Contig::FREE; GAPS], used: 0, is_exact }
@@ -86,7 +84,7 @@ impl Arrivals {
         self.prefix.to
     }
 
-    /// Rows below this one are final: the first range's, and those that it leaves out.
+    /// Rows below this one are final: the first range's, and the rows between them that a partial frame leaves out.
     pub const fn ready(&self) -> u32 {
         self.prefix.end
     }
@@ -96,7 +94,7 @@ impl Arrivals {
         self.prefix.to > sequence || self.others.iter().any(|range| range.to > sequence)
     }
 
-    /// Where a packet belongs, if it does. O(1) in order, O([`GAPS`]) otherwise.
+    /// The place of a packet. O(1) in order, O([`GAPS`]) otherwise.
     #[inline]
     pub fn locate(&self, sequence: u16, rows: Range<u32>) -> Result<Place, Misplaced> {
         let rows = Range32 { first: rows.start, end: rows.end };
@@ -142,7 +140,7 @@ impl Arrivals {
         if fits { Ok(()) } else { Err(Misplaced::Order) }
     }
 
-    /// Notes a packet where it was found to belong.
+    /// Notes a packet at its place.
     #[inline]
     pub fn insert(&mut self, place: Place) {
         let Place { sequence, rows, before, after, free } = place;

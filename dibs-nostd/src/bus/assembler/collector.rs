@@ -1,6 +1,6 @@
-//! The order of frames and packets: which are new, which are old, and when a frame is complete.
+//! The order of frames and packets: new or old, and the moment at which a frame is complete.
 //!
-//! Nothing here knows what a frame holds: vertices or weights, and where they are stored.
+//! It does not depend on a frame's content (vertices or weights) or its storage.
 
 use super::ReceiveError;
 use super::arrivals::{Arrivals, Misplaced, Place};
@@ -26,7 +26,7 @@ pub(super) struct Frame {
     pub arrivals: Arrivals,
     /// The commit's sequence number and digest, once it has come.
     commit: Option<(u16, u32)>,
-    /// All packets have come, and the digest is right.
+    /// All packets have come, and the digest matches.
     pub is_complete: bool,
 }
 
@@ -55,7 +55,7 @@ pub struct LastHeartbeat {
     pub received: u32,
 }
 
-/// Keeps order.
+/// Decides which packets and frames to take, and counts them.
 #[derive(Debug)]
 pub(super) struct Collector {
     mesh_id: u32,
@@ -75,7 +75,7 @@ pub(super) struct Collector {
     pub counters: Counters,
 }
 
-/// How long (ms) a frame must have stood still before an earlier one may take its place.
+/// Time (ms) without a packet after which an earlier frame may replace the one in work.
 const PATIENCE: u32 = 100;
 
 impl Collector {
@@ -114,7 +114,7 @@ impl Collector {
         self.trouble.note(name, in_work, rejection);
     }
 
-    /// Counts bytes that were no packet.
+    /// Counts bytes that were not a packet.
     pub fn refuse_bytes(&mut self, _: &StreamError) {
         self.counters.count(Event::Framing);
         self.trouble.note_damage();
@@ -149,8 +149,7 @@ impl Collector {
         Err(ReceiveError::WrongMesh { mesh_id: packet.mesh_id })
     }
 
-    /// Whether a genuine begin may start a frame: `None` for one that is repeated. Checks what only this
-    /// receiver can with `is_acceptable`.
+    /// Starts a frame from a genuine begin; `None` for a repeated one. `is_acceptable` has the checks of this receiver.
     pub fn begin(
         &mut self,
         packet: &Packet<'_>,
@@ -228,7 +227,7 @@ impl Collector {
         }
     }
 
-    /// Notes rows that were stored where `place` says. `Ok(true)` once the frame is complete.
+    /// Notes stored rows. `Ok(true)` once the frame is complete.
     #[inline]
     pub fn take_rows(&mut self, share: u32, place: Place) -> Result<bool, ReceiveError> {
         let Some(frame) = &mut self.frame else { return Ok(false) };
@@ -260,7 +259,7 @@ impl Collector {
         self.finish().map(Some)
     }
 
-    /// Whether the frame is complete; where it is and cannot be right, it is dropped.
+    /// Whether the frame is complete. Drops a complete frame whose rows or digest are wrong.
     #[inline]
     fn finish(&mut self) -> Result<bool, ReceiveError> {
         let Some(frame) = &mut self.frame else { return Ok(false) };
@@ -321,12 +320,12 @@ impl Collector {
             id: frame.id,
             captured: frame.captured(),
             source_age: u32::from(freshness.age_ms),
-            // An echo from the future is of another run of this receiver.
+            // An echo from the future comes from another run of this receiver.
             transit: transit.filter(|&transit| transit <= i32::MAX as u32).unwrap_or(u32::MAX),
             oldest: 0,
         });
         self.trouble = Trouble::new();
-        // A session that published is the sender's, whatever a stray heartbeat said.
+        // The published session is the sender's: a heartbeat of another one was stray.
         self.heartbeat = self.heartbeat.filter(|last| last.session == frame.id.session);
         self.counters.count(Event::Published);
     }
@@ -373,12 +372,12 @@ impl Misplaced {
 }
 
 impl Frame {
-    /// The receiver's clock when the surface was captured, had the begin taken no time.
+    /// The receiver's clock at the surface's capture, if the begin took no time on its way.
     pub fn captured(&self) -> u32 {
         self.received.wrapping_sub(u32::from(self.begin.freshness.age_ms))
     }
 
-    /// Where rows belong; `None` for a packet that came before.
+    /// The place of rows; `None` for a repeated packet.
     #[inline]
     pub fn locate(
         &self,

@@ -1,4 +1,4 @@
-//! Why something was not published.
+//! Why a packet or frame was rejected.
 
 use core::fmt;
 
@@ -18,13 +18,13 @@ pub enum ReceiveError {
         /// The mesh id in the packet.
         mesh_id: u32,
     },
-    /// The tag is wrong, or missing where one is asked for.
+    /// The tag is wrong, or missing where one is required.
     Forged {
         /// The packet's epoch.
         epoch: u32,
     },
-    /// The frame is not later than the published one, or earlier than that in work; or the heartbeat
-    /// not later than the last.
+    /// The frame is not later than the published one, or earlier than the one in work; or the heartbeat is not later
+    /// than the last.
     Stale {
         /// The packet's epoch.
         epoch: u32,
@@ -35,7 +35,7 @@ pub enum ReceiveError {
         /// The packet's epoch.
         epoch: u32,
     },
-    /// The frame before is complete and still being checked.
+    /// The previous frame is complete and still being checked.
     Busy {
         /// The packet's epoch.
         epoch: u32,
@@ -45,7 +45,7 @@ pub enum ReceiveError {
         /// The base that it changes.
         epoch: u32,
     },
-    /// Rows of a partial frame came before the published frame was copied that far.
+    /// Rows of a partial frame came before the published frame's rows were copied.
     NotReady {
         /// The first row of the packet.
         first: u32,
@@ -55,8 +55,7 @@ pub enum ReceiveError {
         /// Rows that the begin packet announces, or that the frame came to.
         rows: u32,
     },
-    /// A frame of another content than this receiver takes, or rows in another encoding than their
-    /// frame's.
+    /// A frame with a content that this receiver does not take, or rows in another encoding than their frame's.
     Encoding,
     /// Rows outside the surface.
     OutOfRange {
@@ -65,12 +64,12 @@ pub enum ReceiveError {
         /// Rows in the packet.
         count: u32,
     },
-    /// Rows that do not follow those before in sequence, or a sequence beyond the commit's.
+    /// Rows out of the order of their sequence numbers, or a sequence number beyond the commit's.
     Order {
         /// The packet's sequence number.
         sequence: u16,
     },
-    /// More packets are missing in between than the receiver can note.
+    /// More gaps in the sequence than the receiver can note.
     Gaps {
         /// The packet's sequence number.
         sequence: u16,
@@ -85,7 +84,7 @@ pub enum ReceiveError {
         /// The first such row, 0 for a quantisation box that reaches too far.
         row: u32,
     },
-    /// The packets are not all of the frame that the commit confirms. The frame is abandoned.
+    /// The packets do not add up to the commit's digest. The frame is abandoned.
     Digest {
         /// In the commit.
         stated: u32,

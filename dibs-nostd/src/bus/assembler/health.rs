@@ -3,30 +3,29 @@
 use super::ReceiveError;
 use crate::bus::wire::{FrameId, Packet, is_newer};
 
-/// The health of the bus, as the receiver sees it: what
-/// [`LinkStatus::set`](crate::failsafe::LinkStatus::set) takes. Times are on the receiver's clock, in ms.
+/// The health of the bus, as the receiver sees it, for [`LinkStatus::set`](crate::failsafe::LinkStatus::set). Times are
+/// on the receiver's clock, in ms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct BusHealth {
-    /// When the last packet was taken: a repeated packet or a hello is none.
+    /// Time of the last packet taken; repeated packets and hellos do not count.
     pub packet: Option<u32>,
-    /// When the last heartbeat was taken.
+    /// Time of the last heartbeat taken.
     pub heartbeat: Option<u32>,
-    /// Frames that were refused or damaged since the last one was published, each counted once, however
-    /// many of its packets were rejected. Packets of other meshes, forged ones, and those of frames that
-    /// are over do not count.
+    /// Frames refused or damaged since the last publication, each counted once, however many of its packets were
+    /// rejected. Forged packets, packets of other meshes, and packets of frames that are over do not count.
     pub rejections: u32,
     /// Packets without a genuine tag since the last frame was published.
     pub forgeries: u32,
-    /// Of the published frame: from the status that it echoes to its begin packet's arrival. Neither the
-    /// frame nor that status was longer on its way. `u32::MAX` where it echoes none.
+    /// Time from the status that the published frame echoes to the arrival of its begin packet: an upper bound on the
+    /// way of each. `u32::MAX` where it echoes none.
     pub transit: u32,
-    /// Of the published frame: its age when it was sent, as the sender stated it.
+    /// Age of the published frame when it was sent, as the sender stated it.
     pub source_age: u32,
 }
 
-/// As much of a frame's name as each of its packets has.
+/// The part of a frame's name that every packet carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct FrameName {
     session_low: u16,
@@ -62,9 +61,9 @@ pub(super) struct Trouble {
 /// The frame that was counted last.
 #[derive(Clone, Copy, Debug)]
 enum Last {
-    /// None since the last begin.
+    /// No frame since the last begin.
     None,
-    /// One of which only damage is known.
+    /// A frame without a name: its bytes were damaged.
     Unnamed,
     Named(FrameName),
 }
@@ -92,7 +91,7 @@ impl Trouble {
         }
     }
 
-    /// A packet or frame was rejected while another was in work.
+    /// A packet or frame was rejected; `in_work` names the frame in work.
     pub fn note(
         &mut self,
         name: Option<FrameName>,
@@ -108,13 +107,13 @@ impl Trouble {
             (_, None) => return self.note_damage(),
             (_, Some(name)) => name,
         };
-        // Packets of a frame that was given up.
+        // The packet is of a frame that was abandoned.
         if in_work.is_some_and(|in_work| in_work.is_after(name)) {
             return;
         }
         match self.last {
             Last::Named(last) if !name.is_after(last) => return,
-            // The damage is likely to have been this frame's.
+            // The damage counted already was probably this frame's.
             Last::Unnamed => (),
             _ => self.rejections = self.rejections.saturating_add(1),
         }

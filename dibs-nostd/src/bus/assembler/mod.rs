@@ -20,24 +20,24 @@ pub use error::ReceiveError;
 pub use health::BusHealth;
 use health::FrameName;
 
-/// Assembles frames of `N` vertices from packets, and publishes those that are complete and right.
+/// Assembles frames of `N` vertices from packets, and publishes the complete and admitted ones.
 ///
-/// [`accept`](Self::accept) takes packets, in the bus interrupt. [`advance`](Self::advance) does the
-/// longer work, in slices: it checks the surface ([`Gate`]), publishes it, and copies the rows that partial
-/// frames build on. The two must not interrupt each other: call both in the bus interrupt, or `advance`
-/// elsewhere below the control tick's priority with the bus interrupt masked, for as short as its work.
+/// [`accept`](Self::accept) takes packets, in the bus interrupt. [`advance`](Self::advance) does the longer work, in
+/// slices: it checks the surface ([`Gate`]), publishes it, and copies the rows that partial frames build on. The two
+/// must not interrupt each other: call both in the bus interrupt, or call `advance` at another priority below the
+/// control tick's with the bus interrupt masked.
 ///
-/// A frame is published when every row has come in a packet of its own place in the sequence, the
-/// commit's digest confirms that all packets were of one frame, and the gate admits the surface. Until
-/// then, and after any rejection, the frame published last stays. `docs/wire.md` has the whole table of
-/// packets and outcomes. With a [`Mac`], a packet without a genuine tag is dropped first.
+/// A frame is published when every row has come in its place in the sequence, the commit's digest confirms that all
+/// packets were of one frame, and the gate admits the surface. Until then, and after any rejection, the frame published
+/// last stays. `docs/wire.md` has the whole table of packets and outcomes. With a [`Mac`], a packet without a genuine
+/// tag is dropped first.
 ///
 /// With a gate of modes, `N` is their number, and frames hold weights instead: see
 /// [`Gate::weight_range`].
 ///
-/// RAM: less than half a kilobyte besides [`Frames`](crate::Frames) and gate, for any `N`. A surface's buffers,
-/// both ends of them, assembler and [`StretchMonitor`](crate::StretchMonitor) together take 24 bytes a vertex
-/// and at most 1,024 bytes.
+/// RAM: less than half a kilobyte besides [`Frames`](crate::Frames) and gate, for any `N`. A surface's buffers with
+/// both ends, the assembler and the [`StretchMonitor`](crate::StretchMonitor) together take 24 bytes a vertex and at
+/// most 1,024 bytes.
 ///
 /// ```
 /// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
@@ -66,14 +66,14 @@ pub struct Assembler<'f, G, const N: usize, M = NoMac> {
     collector: Collector,
     /// The frame in work has been admitted and labelled: only its publication is left.
     is_admitted: bool,
-    /// Rows of the back buffer, from the first on, that are as published but for what the partial
-    /// frame in work has changed.
+    /// Leading rows of the back buffer that equal the published ones, except where the partial frame in work has
+    /// changed them.
     copied: u32,
-    /// Rows were stored since the copying began: of a frame that was not published, they must go.
+    /// Rows were stored since the copying began. If their frame is not published, the copy starts again.
     is_dirty: bool,
-    /// A partial frame has come: from then on the published rows are copied in time for the next.
+    /// A partial frame has come, so each published frame is copied for the next one.
     takes_partial: bool,
-    /// No row of the quantisation box of the frame in work is beyond the limit.
+    /// The quantisation box of the frame in work is within the limit.
     is_box_inside: bool,
 }
 
@@ -91,14 +91,14 @@ pub enum Progress {
     Stored,
     /// The packet had come before, and was ignored.
     Duplicate,
-    /// The frame is complete: it is up to [`Assembler::advance`] now.
+    /// The frame is complete: [`Assembler::advance`] checks and publishes it.
     Complete {
         /// Its number.
         epoch: u32,
     },
-    /// The sender lives: [`Assembler::last_heartbeat`].
+    /// A heartbeat: [`Assembler::last_heartbeat`].
     Heartbeat,
-    /// The sender asks for a status: it is due now.
+    /// The sender asks for a status: send one now.
     Hello,
 }
 
@@ -107,7 +107,7 @@ pub enum Progress {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Advance {
-    /// No complete frame waits to be checked; rows may be left to copy or to check ahead.
+    /// No complete frame waits; rows may be left to copy or to check ahead.
     Idle,
     /// More work is left.
     Pending,
@@ -125,10 +125,9 @@ pub enum Advance {
 }
 
 impl<'f, G: Gate, const N: usize> Assembler<'f, G, N> {
-    /// An assembler for the mesh with this id, whose vertices keep within `max_coordinate` (mm) of
-    /// the origin on each axis, at most [`MAX_COORDINATE`]. The smaller that is, the more damage it
-    /// tells from a surface, and it bounds the accuracy of every query. If it is not a number, nothing
-    /// is ever published.
+    /// An assembler for the mesh with this id, whose vertices keep within `max_coordinate` (mm) of the origin on each
+    /// axis, at most [`MAX_COORDINATE`]. A smaller limit detects more damage, and bounds the accuracy of every query.
+    /// With NaN nothing is ever published.
     #[must_use]
     pub fn new(writer: FrameWriter<'f, N>, gate: G, mesh_id: u32, max_coordinate: f32) -> Self {
         Assembler::with_mac(writer, gate, mesh_id, max_coordinate, NoMac)
@@ -136,11 +135,11 @@ impl<'f, G: Gate, const N: usize> Assembler<'f, G, N> {
 }
 
 impl<'f, 't, I: Index, const N: usize> Assembler<'f, StretchMonitor<'t, I>, N> {
-    /// An assembler for surfaces of this tree, which publishes those that keep to its stretch limit and to these
-    /// limits, and checks them in slices.
+    /// An assembler for surfaces of this tree. It checks them in slices, and publishes those within the tree's stretch
+    /// limit and these limits.
     ///
     /// # Errors
-    /// [`StretchError::NoMetric`] where the tree was emitted without the section that stretch is measured with.
+    /// [`StretchError::NoMetric`] where the tree was emitted without its metric section.
     pub fn for_tree(
         writer: FrameWriter<'f, N>,
         tree: &'t Tree<'t, I>,
@@ -152,7 +151,7 @@ impl<'f, 't, I: Index, const N: usize> Assembler<'f, StretchMonitor<'t, I>, N> {
 }
 
 impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
-    /// The same, of packets with tags.
+    /// The same, for packets with tags.
     #[must_use]
     pub fn with_mac(
         writer: FrameWriter<'f, N>,
@@ -177,14 +176,13 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
         }
     }
 
-    /// Takes one packet, whole. `now` is the receiver's clock in ms (wraps). The frame's label keeps its
-    /// value at the begin packet, less the age that the frame had when it was sent: the surface is at
-    /// least that old.
+    /// Takes one packet, whole. `now` is the receiver's clock in ms (wraps). The frame's label keeps its value at the
+    /// begin packet, less the age that the frame had when it was sent.
     ///
     /// Cost: O(bytes).
     ///
     /// # Errors
-    /// [`ReceiveError`] says why the packet or its frame was not taken; it has been counted.
+    /// [`ReceiveError`] names why the packet or its frame was not taken; the event has been counted.
     #[inline]
     pub fn accept(&mut self, packet: &[u8], now: u32) -> Result<Progress, ReceiveError> {
         self.collector.set_now(now);
@@ -213,11 +211,11 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
         outcome
     }
 
-    /// Does some of the work that is due: checks at most `work` triangles or copies at most `work`
-    /// rows, and publishes a frame that has been admitted.
+    /// Does a slice of work: checks at most `work` triangles or copies at most `work` rows, and publishes an admitted
+    /// frame.
     ///
-    /// Worth calling after each packet, so that the check runs along with the frame, and from time to
-    /// time when the bus is quiet. Cost: O(`work`), with a gate that is sliced.
+    /// Call it after each packet, so that the check keeps up with the frame, and from time to time when the bus is
+    /// quiet. Cost: O(`work`), with a gate that is sliced.
     ///
     /// # Errors
     /// [`ReceiveError::Stretch`] when the gate refuses the surface; it has been counted.
@@ -296,13 +294,13 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
         &self.gate
     }
 
-    /// The authenticator, which makes the tags.
+    /// The authenticator.
     #[must_use]
     pub const fn mac(&self) -> &M {
         &self.mac
     }
 
-    /// Forgets what was copied, if rows of a frame that was not published have been stored over it.
+    /// Forgets the copied rows, if rows of an unpublished frame have been stored over them.
     fn clean(&mut self) {
         if self.is_dirty {
             self.is_dirty = false;
@@ -318,7 +316,7 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
         self.copied = end;
     }
 
-    /// Has the gate check some more of the frame in work.
+    /// Lets the gate check a slice of the frame in work.
     fn check(&mut self, ready: u32, work: u32) -> Result<Advance, ReceiveError> {
         let Some(frame) = &self.collector.frame else { return Ok(Advance::Idle) };
         let (back, front) = (self.writer.back(), self.writer.front());
@@ -347,7 +345,7 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
         }
     }
 
-    /// Publishes the frame in work, which is admitted.
+    /// Publishes the frame in work, once admitted.
     fn publish(&mut self) -> Advance {
         let Some(frame) = self.collector.frame else { return Advance::Idle };
         let epoch = frame.id.epoch;

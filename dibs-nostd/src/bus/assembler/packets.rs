@@ -37,7 +37,7 @@ impl<G: Gate, M: Mac, const N: usize> Assembler<'_, G, N, M> {
     }
 
     fn begin(&mut self, packet: &Packet<'_>, begin: Begin) -> Result<Progress, ReceiveError> {
-        // A frame that only waits for a reader is better published than in the way.
+        // An admitted frame that waits for a reader would block this one: try to publish it first.
         if self.is_admitted {
             self.publish();
         }
@@ -54,7 +54,7 @@ impl<G: Gate, M: Mac, const N: usize> Assembler<'_, G, N, M> {
         let is_partial = matches!(begin.content, Content::Partial { .. });
         let share = packet.verify(&self.mac, begin.session);
         let share = share.ok_or(ReceiveError::Forged { epoch: packet.epoch })?;
-        // Whatever comes of this one: the next is to find the published rows copied.
+        // Even if this frame is refused, the next one must find the published rows copied.
         self.takes_partial |= is_partial;
         let begun = self.collector.begin(packet, begin, share, is_acceptable)?;
         let Some(frame) = begun else { return Ok(Progress::Duplicate) };
@@ -173,11 +173,11 @@ const fn stored(is_complete: bool, epoch: u32) -> Progress {
 #[inline(always)]
 fn is_within(position: Vec3, limit: f32) -> bool {
     let Vec3 { x, y, z } = position.abs();
-    // No short cut: three comparisons cost less than branches.
+    // `&`, not `&&`: three comparisons cost less than branches.
     (x <= limit) & (y <= limit) & (z <= limit)
 }
 
-/// An error unless every position is finite and within the limit. It names the first that is not.
+/// An error that names the first position that is not finite or beyond the limit.
 #[inline]
 fn check(
     positions: impl Iterator<Item = Vec3> + Clone,

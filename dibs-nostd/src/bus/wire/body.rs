@@ -14,13 +14,13 @@ pub enum Body<'a> {
     Vertices(Vertices<'a>),
     /// Some of its mode weights.
     Weights(Weights<'a>),
-    /// The sender has sent all of it.
+    /// A frame ends: all of it was sent.
     Commit(Commit),
-    /// The sender lives.
+    /// A sign of life from the sender.
     Heartbeat(Heartbeat),
     /// The receiver's state: the only packet on the way back.
     Status(StatusReport<'a>),
-    /// The sender asks for a status.
+    /// The sender's request for a status.
     Hello(Hello),
 }
 
@@ -45,9 +45,9 @@ pub struct Begin {
 pub struct Freshness {
     /// Time since the surface was captured, in ms; 65,535 stands for that or more.
     pub age_ms: u16,
-    /// [`Status::clock`](super::Status::clock) of the newest status that the sender had taken; `None`
-    /// before the first. The packet was made after that status, so the receiver knows how long both were
-    /// on their way, at most, by its own clock alone.
+    /// [`Status::clock`](super::Status::clock) of the newest status that the sender had taken; `None` before the first.
+    /// The packet was made after that status, so the receiver's clock alone bounds the time that both were on their
+    /// way.
     pub echo: Option<u32>,
 }
 
@@ -58,7 +58,7 @@ pub struct Freshness {
 pub enum Content {
     /// Every vertex.
     Whole,
-    /// The vertices that are not, within the encoding's error, where they were in a published frame.
+    /// The vertices that moved by more than the encoding's error since a published frame.
     Partial {
         /// That frame, of the same session.
         base_epoch: u32,
@@ -78,7 +78,7 @@ pub enum Encoding {
 }
 
 impl Encoding {
-    /// No decoded position is farther than this from the sender's, in mm.
+    /// Largest distance of a decoded position from the sender's, in mm.
     #[must_use]
     pub fn error(&self) -> f32 {
         match self {
@@ -97,11 +97,11 @@ pub struct Vertices<'a> {
     pub rows: Rows<'a>,
 }
 
-/// Positions as they stand in the packet: 1 to 255 of them.
+/// Undecoded positions, 1 to 255.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Rows<'a> {
-    /// Little-endian `f32`, not checked: any bits may come.
+    /// Little-endian `f32`, not checked: any bits are possible.
     Float(&'a [[u8; 12]]),
     /// Little-endian `u16`.
     Quantised(&'a [[u8; 6]]),
@@ -147,7 +147,7 @@ pub(crate) const fn quantised_row(row: &[u8; 6]) -> [u16; 3] {
 pub struct Weights<'a> {
     /// Number of the first mode.
     pub first: u32,
-    /// Little-endian `f32`, 1 to 64 of them, not checked: any bits may come.
+    /// Little-endian `f32`, 1 to 64 of them, not checked: any bits are possible.
     pub values: &'a [[u8; 4]],
 }
 
@@ -155,9 +155,9 @@ pub struct Weights<'a> {
 /// of content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Commit {
-    /// Wrapping sum over the frame's begin packet and all its packets of content: with tags of their
-    /// [`Code::share`](super::Code::share), else of their checksums, scrambled. Packets of two frames that
-    /// happen to share session and epoch do not add up.
+    /// Wrapping sum over the frame's begin packet and all its packets of content: of their
+    /// [`Code::share`](super::Code::share) if tagged, else of their scrambled checksums. It detects a mix of two frames
+    /// that happen to share session and epoch.
     pub digest: u32,
 }
 
@@ -171,13 +171,13 @@ pub struct Heartbeat {
     pub beat: u32,
 }
 
-/// The sender asks who is there: the receiver's next status answers. Never tagged, because a sender that
-/// does not know the challenge yet must be able to ask; it changes nothing but the answer.
+/// The sender's request for a status. Never tagged, because a sender that does not know the challenge yet must be able
+/// to ask; it changes only the status' nonce.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Hello {
     /// The sender's session, all of it.
     pub session: u32,
-    /// A random number, not 0, that the answer repeats: a recorded status does not know it.
+    /// A random number, not 0, that the status repeats, which a recorded status cannot.
     pub nonce: u32,
 }

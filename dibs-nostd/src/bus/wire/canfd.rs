@@ -1,7 +1,7 @@
 //! Packets as CAN-FD messages: data length codes and identifiers, for any driver.
 //!
-//! A packet of at most 64 bytes has one of CAN-FD's lengths already, so a message's data is the
-//! packet. `embedded-can`'s frames hold 8 bytes, hence this mapping onto plain numbers and slices.
+//! A packet of at most 64 bytes has one of CAN-FD's lengths, so a message's data is the packet. This maps onto plain
+//! numbers and slices, because `embedded-can`'s frames hold only 8 bytes.
 //!
 //! ```
 //! use dibs_nostd::wire::canfd::{Identifiers, dlc_of, length_of};
@@ -47,7 +47,7 @@ pub const fn length_of(dlc: u8) -> usize {
     }
 }
 
-/// The three identifiers of one surface: the lower wins the bus.
+/// The three identifiers of one surface; the lowest has priority on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Identifiers {

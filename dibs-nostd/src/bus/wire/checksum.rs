@@ -1,11 +1,10 @@
 //! The packets' CRC-32, four bytes at a time.
 //!
-//! Byte by byte, as the `crc` crate computes it with its small table, the checksum is the largest part of
-//! what a packet costs a receiver. With that crate's large table (16 KiB) a panic branch survives. So this
-//! is the same remainder with four tables of 1 KiB, made from the crate's; a test holds one against the
-//! other.
+//! The `crc` crate with its small table goes byte by byte, which would be most of a packet's cost to a receiver. With
+//! its large table (16 KiB) a panic branch survives. So this computes the same remainder with four tables of 1 KiB,
+//! made from the crate's; a test compares the two.
 
-/// `TABLES[k][byte]`: what a byte does to the remainder when `k` zero bytes follow it.
+/// `TABLES[k][byte]`: the remainder of a byte followed by `k` zero bytes.
 static TABLES: [[u32; 256]; 4] = tables();
 
 const fn tables() -> [[u32; 256]; 4] {
@@ -29,7 +28,7 @@ const fn tables() -> [[u32; 256]; 4] {
 #[inline]
 pub(super) fn checksum(bytes: &[u8]) -> u32 {
     let [t0, t1, t2, t3] = &TABLES;
-    // An index of 8 bits into 256 entries: the check is removed.
+    // The compiler removes the check: an 8-bit index into 256 entries.
     let at = |table: &[u32; 256], byte: u8| table.get(usize::from(byte)).copied().unwrap_or(0);
     let (words, rest) = bytes.as_chunks::<4>();
     let mut remainder = u32::MAX;
@@ -44,8 +43,8 @@ pub(super) fn checksum(bytes: &[u8]) -> u32 {
     !remainder
 }
 
-/// A packet's share of its frame's digest where there are no tags: its checksum through a bijection whose
-/// sums have nothing to do with the checksum's linearity (the last step of `MurmurHash3`).
+/// An untagged packet's share of its frame's digest: its checksum through a bijection that breaks the checksum's
+/// linearity (the last step of `MurmurHash3`).
 #[inline]
 pub(super) const fn scrambled(checksum: u32) -> u32 {
     let mixed = (checksum ^ (checksum >> 16)).wrapping_mul(0x85EB_CA6B);

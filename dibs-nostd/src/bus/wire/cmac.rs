@@ -1,4 +1,4 @@
-//! AES-128-CMAC, as AUTOSAR takes it for secure onboard communication.
+//! AES-128-CMAC, AUTOSAR's choice for secure onboard communication.
 
 use core::fmt;
 
@@ -9,15 +9,14 @@ use super::{Code, Direction, Mac};
 
 /// Tags by AES-128-CMAC (RFC 4493, NIST SP 800-38B), cut to 48 bits.
 ///
-/// Each direction has a key of its own, derived from the shared key and the receiver's id (NIST SP
-/// 800-108, counter mode): a packet for one receiver is a forgery to another, and so is one that comes
-/// back the wrong way.
+/// Each direction has a key of its own, derived from the shared key and the receiver's id (NIST SP 800-108, counter
+/// mode): a packet for one receiver is a forgery to another, and so is a packet returned to its sender.
 ///
-/// The cipher is the crate `aes`'s, in constant time, without tables. A board with a hardware cipher
-/// implements [`Mac`] with that.
+/// The cipher is that of the crate `aes`, in constant time, without tables. A board with a hardware cipher implements
+/// [`Mac`] with it.
 ///
-/// RAM: two expanded keys, some 800 bytes, and half of that again while a code is made. The keys are not
-/// erased when this is dropped.
+/// RAM: two expanded keys, some 800 bytes, and half as much again while a code is computed. The keys are not erased on
+/// drop.
 ///
 /// ```
 /// use dibs_nostd::wire::{AesCmac, Encoding, FrameEncoder, FrameId};
@@ -55,11 +54,11 @@ pub struct AesCmac {
 }
 
 impl AesCmac {
-    /// Codes under a key that both sides have, for the receiver of this id, bound to its challenge.
+    /// Codes under a shared key, for the receiver with this id, bound to its challenge.
     ///
-    /// The id is any number that no other receiver under the same key has. The receiver draws the
-    /// challenge when it starts: a random number, or a counter that survives a restart; with 0, recordings
-    /// of an earlier run are believed until a later session has published.
+    /// No two receivers under one key may have the same id. The receiver draws the challenge when it starts: a random
+    /// number, or a counter that survives a restart. With 0, recordings of an earlier run are believed until a later
+    /// session has published.
     #[must_use]
     pub fn new(key: &[u8; 16], receiver: u32, challenge: u32) -> Self {
         Self {
@@ -77,7 +76,7 @@ impl AesCmac {
     }
 }
 
-/// A key of its own for a purpose: SP 800-108 in counter mode with CMAC, one block.
+/// Derives the key of one direction: SP 800-108 in counter mode with CMAC, one block.
 fn derived(key: &[u8; 16], label: &[u8], receiver: u32) -> Cmac<Aes128> {
     let (counter, end, bits) = ([1], [0], 128_u32.to_be_bytes());
     let key =
@@ -85,7 +84,7 @@ fn derived(key: &[u8; 16], label: &[u8], receiver: u32) -> Cmac<Aes128> {
     Cmac::new(&key.into())
 }
 
-/// The code of a message in parts.
+/// The code of the concatenated parts.
 fn code(mac: &Cmac<Aes128>, parts: &[&[u8]]) -> [u8; 16] {
     let mut mac = mac.clone();
     for part in parts {

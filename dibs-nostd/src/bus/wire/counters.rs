@@ -4,41 +4,40 @@ use core::fmt;
 
 use super::StatusReport;
 
-/// Events at a receiver, of packets and of frames. Each has a counter; its number on the wire is
-/// its place here.
+/// Events of packets and frames at a receiver, in the order of their counters on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum Event {
     /// A frame was published.
     Published,
-    /// A frame was given up because another began first.
+    /// A frame was abandoned because another began.
     Abandoned,
     /// A packet had come before, and was ignored.
     Duplicate,
     /// A heartbeat was taken.
     Heartbeat,
-    /// Bytes between two zeros of a stream were no packet.
+    /// Bytes between two zeros of a stream were not a packet.
     Framing,
-    /// The checksum is wrong, or there is no room for one.
+    /// The checksum is wrong, or the packet is too short for one.
     Damaged,
     /// Another protocol version.
     Version,
-    /// The checksum is right and the form is not: the sender is at fault.
+    /// The checksum is right but the form is wrong: the sender's fault.
     Malformed,
     /// A packet of another mesh.
     WrongMesh,
-    /// The tag is wrong, or missing where one is asked for.
+    /// The tag is wrong, or missing where one is required.
     Forged,
     /// Session or epoch not later than the published frame's.
     Stale,
     /// A packet of a frame that is not being received.
     Unexpected,
-    /// A frame began while the one before was still being checked.
+    /// A frame began while the previous one was still being checked.
     Busy,
     /// A partial frame on another base than the published frame.
     Base,
-    /// Rows of a partial frame came before the rest of the published frame was copied.
+    /// Rows of a partial frame came before the published frame's rows were copied.
     NotReady,
     /// Another number of rows than this receiver's.
     RowCount,
@@ -48,13 +47,13 @@ pub enum Event {
     OutOfRange,
     /// Rows not in the order of the packets' sequence.
     Order,
-    /// Too many packets missing in between.
+    /// Too many gaps in the sequence.
     Gaps,
     /// A coordinate that is infinite or not a number.
     NotFinite,
     /// A coordinate larger than the receiver allows.
     TooFar,
-    /// The packets are not all of the frame that the commit confirms.
+    /// The packets do not add up to the commit's digest.
     Digest,
     /// The gate refused the surface: stretched too far, or not measured.
     Stretch,
@@ -141,8 +140,7 @@ impl fmt::Display for Event {
     }
 }
 
-/// The events since the receiver's start: one counter an [`Event`], each stops at its largest
-/// value.
+/// One saturating counter for each [`Event`], since the receiver's start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counters([u32; Event::ALL.len()]);
@@ -154,7 +152,7 @@ impl Counters {
         Self([0; Event::ALL.len()])
     }
 
-    /// How often this has happened.
+    /// The count of an event.
     #[must_use]
     pub fn of(&self, event: Event) -> u32 {
         self.0.get(event as usize).copied().unwrap_or(0)
@@ -167,8 +165,8 @@ impl Counters {
         rejections.fold(0, |sum, event| sum.saturating_add(self.of(event)))
     }
 
-    /// Takes over the counters that a status reports: the sender's copy, which is complete after a few
-    /// statuses. Counters of later protocol versions are skipped.
+    /// Copies the counters in a status: a sender's copy is complete after a few statuses. Counters of later protocol
+    /// versions are skipped.
     pub fn update(&mut self, report: &StatusReport<'_>) {
         let places = self.0.iter_mut().skip(usize::from(report.first_counter));
         for (place, counter) in places.zip(report.counters) {
@@ -182,7 +180,7 @@ impl Counters {
         }
     }
 
-    /// The counters from this place on.
+    /// The counters from this index on.
     pub(super) fn from(&self, first: usize) -> &[u32] {
         self.0.get(first..).unwrap_or_default()
     }

@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-/// Why bytes are not a packet of this protocol. Named by the first check that failed; the checksum
-/// comes before everything that it covers.
+/// Why bytes are not a packet of this protocol. Names the first check that failed; the checksum is compared before
+/// anything that it covers is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -35,7 +35,7 @@ pub enum PacketError {
         /// Offset of the field's first byte.
         offset: usize,
     },
-    /// A begin, heartbeat or status with a place in a frame, or anything else without one.
+    /// A begin, heartbeat, status or hello with a place in a frame, or another packet without one.
     Sequence {
         /// In the packet.
         sequence: u16,

@@ -1,6 +1,6 @@
 //! Little-endian fields of a packet, read and written one after the other.
 
-/// Reads fields from bytes whose length has been checked: past the end, zeros.
+/// Reads fields from bytes whose length has been checked; zeros past the end.
 pub(super) struct Fields<'a>(pub &'a [u8]);
 
 impl Fields<'_> {
@@ -34,7 +34,7 @@ impl Fields<'_> {
     }
 }
 
-/// Appends to a buffer that is known to be large enough.
+/// Appends fields to a buffer that is large enough.
 pub(super) struct Bytes<'b> {
     pub buffer: &'b mut [u8],
     pub used: usize,

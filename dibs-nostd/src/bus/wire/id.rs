@@ -1,9 +1,9 @@
-//! Which frame: mesh, session, epoch, and their order.
+//! A frame's name: mesh, session and epoch, and their order.
 
-/// The name of a frame: whose surface, which run of its sender, and the number within that run.
+/// The name of a frame: its mesh, the run of its sender, and its number within that run.
 ///
-/// Order is that of (session, epoch): a sender that starts again takes a later session, and may then
-/// number its frames from anywhere.
+/// Frames are ordered by (session, epoch): a sender that starts again takes a later session, and may number its frames
+/// from any epoch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FrameId {

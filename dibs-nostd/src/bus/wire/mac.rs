@@ -1,4 +1,4 @@
-//! Message authentication: how the tag of a packet is made.
+//! Message authentication of packets.
 
 /// Bytes of a tag: the first 48 bits of a message authentication code.
 ///
@@ -6,13 +6,12 @@
 /// right once in 2^48. AUTOSAR's `SecOC` takes 24 to 64 bits.
 pub const TAG_BYTES: usize = 6;
 
-/// Makes the codes of packets, and so decides which are genuine.
+/// Makes the authentication codes of packets.
 ///
-/// Sender and receiver hold the same key, the same receiver id and the same *challenge*: a number that
-/// the receiver draws when it starts and reports in its status, so that recordings from before are worth
-/// nothing.
+/// Sender and receiver hold the same key, the same receiver id and the same *challenge*: a number that the receiver
+/// draws when it starts and reports in its status, so that earlier recordings are not genuine.
 pub trait Mac {
-    /// Whether packets carry a tag. A receiver takes only packets with, or only packets without.
+    /// Whether packets carry a tag. A receiver takes only tagged packets (and hellos), or only packets without a tag.
     const TAGGED: bool;
 
     /// The code over challenge, session and packet (all bytes before the tag), under the key of this
@@ -25,7 +24,7 @@ pub trait Mac {
     }
 }
 
-/// The way a packet goes. Each has a key of its own, so that nothing can be sent back as an answer.
+/// A packet's direction. Each has its own key, so that a packet cannot be returned as an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// Frames and heartbeats.
@@ -39,12 +38,12 @@ pub enum Direction {
 pub struct Code {
     /// The part that travels with the packet.
     pub tag: [u8; TAG_BYTES],
-    /// A part that never travels: [`Commit::digest`](super::Commit::digest) sums it over the frame, so
-    /// that nobody without the key can tell which packets of two frames add up.
+    /// A part that never travels: [`Commit::digest`](super::Commit::digest) sums it over the frame, so that only a
+    /// holder of the key can tell which packets of two frames add up.
     pub share: u32,
 }
 
-/// No authentication: whoever can write to the bus is believed.
+/// No authentication: a receiver believes everyone who can write to the bus.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoMac;
 

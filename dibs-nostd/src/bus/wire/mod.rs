@@ -1,15 +1,15 @@
-//! The wire protocol: surfaces as packets of at most one transport unit, and the way back.
+//! The wire protocol: surfaces as packets of at most one transport unit, and statuses on the way back.
 //!
-//! The byte layout is specified in `docs/wire.md`. A frame is one [`Begin`] packet, packets of
-//! [`Vertices`] or [`Weights`], and one [`Commit`]. [`FrameEncoder`] and [`WeightsEncoder`] make the
-//! packets on the sender's side, [`Packet::decode`] reads one in place on the receiver's, and the
-//! [`Assembler`](crate::Assembler) makes frames of them. A [`Heartbeat`] tells the receiver that the
-//! sender lives, a [`Status`] reports to the sender which frames were published, a [`Hello`] asks for one.
+//! The byte layout is specified in `docs/wire.md`. A frame is one [`Begin`] packet, packets of [`Vertices`] or
+//! [`Weights`], and one [`Commit`]. [`FrameEncoder`] and [`WeightsEncoder`] make the packets on the sender's side,
+//! [`Packet::decode`] reads one in place on the receiver's, and the [`Assembler`](crate::Assembler) makes frames of
+//! them. A [`Heartbeat`] is the sender's sign of life, a [`Status`] reports the published frame to the sender, a
+//! [`Hello`] asks for a status.
 //!
 //! On a byte stream each packet is framed with COBS: [`enframe`] and [`Deframer`]. On UDP a packet is
 //! one datagram, on CAN-FD one message: [`canfd`].
 //!
-//! Everything is bounded by the packet's length, and nothing is copied but positions.
+//! Work is bounded by the packet's length, and only positions are copied.
 
 mod body;
 pub mod canfd;
@@ -96,7 +96,7 @@ mod kind {
     pub const TAGGED: u8 = 0x80;
 }
 
-/// Length of a packet whose content takes this many bytes: up to 64, the next length that CAN-FD has.
+/// Length of a packet with this many bytes of content: up to 64, rounded up to a length of CAN-FD.
 const fn padded(bytes: usize) -> usize {
     match canfd::dlc_of(bytes) {
         Some(dlc) => canfd::length_of(dlc),

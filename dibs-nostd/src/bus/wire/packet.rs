@@ -12,13 +12,13 @@ use super::{
 /// A packet whose checksum and form are right. It borrows the bytes that it was decoded from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Packet<'a> {
-    /// Identity of the mesh whose surface this is about: `Tree::mesh_id`.
+    /// Identity of the surface's mesh: `Tree::mesh_id`.
     pub mesh_id: u32,
     /// The lower half of the session; [`Begin`], [`Heartbeat`], [`Status`] and [`Hello`] have all of it.
     pub session_low: u16,
     /// Number of the frame; wraps.
     pub epoch: u32,
-    /// Place of the packet in its frame: 0 for a begin, from 1 for what follows.
+    /// Place of the packet in its frame: 0 for a begin, from 1 for the packets after it.
     pub sequence: u16,
     /// The packet's CRC-32.
     pub checksum: u32,
@@ -29,8 +29,7 @@ pub struct Packet<'a> {
 }
 
 impl<'a> Packet<'a> {
-    /// Decodes one packet, whole and nothing else. Cost: O(bytes), for the checksum; the positions
-    /// stay where they are.
+    /// Decodes exactly one packet. Cost: O(bytes), for the checksum; the positions stay where they are.
     ///
     /// ```
     /// use dibs_nostd::wire::{Packet, PacketError};
@@ -100,7 +99,7 @@ impl<'a> Packet<'a> {
                 zero(&[u8::from(first != 0)], 15)?;
             }
         }
-        // Only what comes after a frame's begin has a place in it.
+        // Only the packets after a frame's begin have a place in it.
         let is_placed = !matches!(kind, kind::BEGIN | kind::HEARTBEAT | kind::STATUS | kind::HELLO);
         if is_placed != (sequence != 0) {
             return Err(PacketError::Sequence { sequence });
@@ -131,8 +130,8 @@ impl<'a> Packet<'a> {
         Ok(Self { mesh_id, session_low, epoch, sequence, checksum: stated, body, tag })
     }
 
-    /// The packet's share of its frame's digest, if the packet is genuine as one of this session: its tag
-    /// is the one that `mac` makes, or it carries none and `mac` asks for none. Compares in constant time.
+    /// The packet's share of its frame's digest, if the packet is genuine in this session: its tag is that of `mac`, or
+    /// it carries none and `mac` requires none. Compares in constant time.
     #[must_use]
     #[inline]
     pub fn verify<M: Mac>(&self, mac: &M, session: u32) -> Option<u32> {
@@ -162,7 +161,7 @@ impl<'a> Packet<'a> {
 /// Bit of a begin's form: the word before the body is an echo.
 pub(super) const HAS_ECHO: u8 = 0x80;
 
-/// A session of which the header has the lower half.
+/// The session, whose lower half is in the header.
 fn session_of(high: u16, low: u16) -> u32 {
     u32::from(high) << 16 | u32::from(low)
 }

@@ -6,14 +6,13 @@ use glam::Vec3;
 
 use crate::math::sqrt::sqrt;
 
-/// The box that 16-bit positions live in: `position = origin + step * row`, each axis on its own.
+/// The box of 16-bit positions: `position = origin + step * row` on each axis.
 ///
-/// It travels in every frame's begin packet, not in a configuration: the sender can fit it to each
-/// frame as the surface breathes, sender and receiver cannot disagree about it, and it costs 24
-/// bytes a frame.
+/// It travels in every frame's begin packet and costs 24 bytes: so the sender can fit it to each frame, and sender and
+/// receiver cannot disagree about it.
 ///
-/// Against the position that was quantised, each axis of the result is off by at most `step / 2`
-/// plus 2^-22 of the largest coordinate involved (f32 rounding): see [`error`](Self::error).
+/// Against the position that was quantised, each axis of the result is off by at most `step / 2` plus f32 rounding of
+/// 2^-22 of the largest coordinate: see [`error`](Self::error).
 ///
 /// ```
 /// use dibs_nostd::{wire::QuantisedBox, glam::Vec3};
@@ -47,8 +46,8 @@ impl QuantisedBox {
         }
     }
 
-    /// The smallest cube-stepped box over all positions, with one step to spare on each side; `None`
-    /// when there is none: no position, or coordinates that are not finite or overflow.
+    /// The smallest cube-stepped box over all positions, with one step to spare on each side; `None` without positions,
+    /// or for coordinates that are not finite or overflow.
     #[must_use]
     pub fn covering(positions: &[Vec3]) -> Option<Self> {
         let (&first, rest) = positions.split_first()?;
@@ -101,7 +100,7 @@ impl QuantisedBox {
 
     /// The row nearest to a position, `None` outside the box (by more than half a step).
     ///
-    /// Computed in f64, so that the error is half a step and not a rounding more: meant for senders.
+    /// Computed in f64 for an error of exactly half a step: meant for senders.
     #[must_use]
     pub fn quantise(&self, position: Vec3) -> Option<[u16; 3]> {
         let axis = |position: f32, origin: f32, step: f32| {
@@ -115,7 +114,7 @@ impl QuantisedBox {
         ])
     }
 
-    /// No decoded position is farther than this from the one that was quantised, in mm.
+    /// Largest distance of a decoded position from the one that was quantised, in mm.
     ///
     /// Half a step along each axis, plus the f32 rounding of product and sum: at most 2^-24 of the
     /// product, whose size is at most `|position| + |origin|`, and 2^-24 of the position; together

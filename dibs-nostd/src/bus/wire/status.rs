@@ -6,15 +6,15 @@
 pub struct Status {
     /// The frame published last; `None` before the first.
     pub published: Option<PublishedStatus>,
-    /// Partial frames were refused for their base: only a whole frame helps.
+    /// Partial frames were refused for their base: send a whole frame.
     pub wants_whole: bool,
     /// The controller's safety state: 0 not reported, 1 nominal, 2 degraded, 3 safe.
     pub safety: u8,
-    /// One more in each status of a receiver's run; wraps.
+    /// Number of the status in the receiver's run; wraps.
     pub number: u32,
     /// The receiver's clock when it made this status, in ms: the sender's next frames echo it.
     pub clock: u32,
-    /// The nonce of the last [`Hello`](super::Hello) that came; 0 before the first.
+    /// The nonce of the last [`Hello`](super::Hello); 0 before the first.
     pub answer: u32,
     /// The number to which the receiver's tags are bound: [`Mac::challenge`](super::Mac::challenge).
     pub challenge: u32,
@@ -28,20 +28,19 @@ pub struct PublishedStatus {
     pub session: u32,
     /// Its number.
     pub epoch: u32,
-    /// Time since its first packet arrived and the age that it then had, in ms.
+    /// Time since its first packet arrived, plus the age that it then had, in ms.
     pub age_ms: u32,
     /// Its measured stretch, `None` where the receiver does not measure.
     pub stretch: Option<f32>,
 }
 
-/// A status with its share of the receiver's counters. [`Counters::update`](super::Counters::update)
-/// collects them.
+/// A status with some of the receiver's counters. [`Counters::update`](super::Counters::update) collects them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StatusReport<'a> {
     /// The status.
     pub status: Status,
-    /// Place of the first counter in the packet.
+    /// Index of the packet's first counter.
     pub first_counter: u8,
-    /// The counters as they stand in the packet.
+    /// The counters, not decoded.
     pub counters: &'a [[u8; 4]],
 }

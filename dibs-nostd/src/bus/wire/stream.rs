@@ -1,9 +1,9 @@
 //! Packets on a byte stream: COBS frames, each ended by a zero byte.
 //!
-//! The coding is the `cobs` crate's, and a test holds the decoder here against that crate's. Its buffered
-//! decoder reports a packet that overran the buffer as complete, cut short, and its state machine takes
-//! some thirty instructions a byte on a Cortex-M7, more than everything else that a packet costs; this
-//! one takes a third of that, and less where bytes come in slices.
+//! The coding is that of the `cobs` crate, and a test compares this decoder with that crate's. The crate's buffered
+//! decoder reports a packet that overran the buffer as complete but cut short. Its state machine takes some thirty
+//! instructions a byte on a Cortex-M7, more than the rest of a packet's cost; this one takes a third of that, and less
+//! where bytes come in slices.
 
 use core::fmt;
 
@@ -14,8 +14,8 @@ pub const fn framed_bytes(bytes: usize) -> usize {
     bytes.saturating_add(bytes / 254).saturating_add(2)
 }
 
-/// Writes a packet to `out` as one COBS frame with the zero that ends it; `None` where `out` is too
-/// small: [`framed_bytes`] tells.
+/// Writes a packet to `out` as one COBS frame with the zero that ends it; `None` where `out` is shorter than
+/// [`framed_bytes`].
 ///
 /// ```
 /// use dibs_nostd::wire::{enframe, framed_bytes};
@@ -30,7 +30,7 @@ pub fn enframe<'b>(packet: &[u8], out: &'b mut [u8]) -> Option<&'b [u8]> {
 
 /// Takes packets of at most `MTU` bytes out of a byte stream, one byte at a time.
 ///
-/// After any damage it is in step again at the next zero byte. O(1) a byte.
+/// After damage it resynchronises at the next zero byte. O(1) for each byte.
 ///
 /// ```
 /// use dibs_nostd::wire::Deframer;
@@ -58,8 +58,7 @@ impl<const MTU: usize> Deframer<MTU> {
         Self { packet: [0; MTU], bytes: 0, left: 0, is_zero_due: false }
     }
 
-    /// Takes one byte; the packet that it completes, if it does. The packet stands until the next
-    /// call.
+    /// Takes one byte, and returns the packet that it completes, if any. The packet is valid until the next call.
     ///
     /// # Errors
     /// [`StreamError`] at the end of a packet that is too long, or of one that was cut or damaged.
@@ -77,8 +76,8 @@ impl<const MTU: usize> Deframer<MTU> {
         None
     }
 
-    /// Takes bytes up to the end of the first packet among them: how many were taken, and the packet.
-    /// Call again with the rest. Costs less than byte by byte.
+    /// Takes bytes up to the end of the first packet among them. Returns the number taken, and the packet. Call it
+    /// again with the rest. It costs less than [`push`](Self::push) for each byte.
     ///
     /// ```
     /// use dibs_nostd::wire::Deframer;
@@ -112,14 +111,14 @@ impl<const MTU: usize> Deframer<MTU> {
                 }
                 None => self.bytes = MTU.saturating_add(1),
             }
-            // A run is no longer than what is left of the block.
+            // A run is no longer than the rest of the block.
             self.left = self.left.wrapping_sub(run.len() as u8);
             rest = rest.get(run.len()..).unwrap_or_default();
         }
         (bytes.len(), None)
     }
 
-    /// A code byte: how many bytes come before the next, which replaces a zero unless it is 255.
+    /// A code byte: the number of bytes before the next one, which stands for a zero unless this is 255.
     #[inline]
     fn code(&mut self, byte: u8) {
         if self.is_zero_due {
@@ -146,7 +145,7 @@ impl<const MTU: usize> Deframer<MTU> {
         if left != 0 {
             Some(Err(StreamError::Cut { bytes }))
         } else if bytes == 0 && !is_zero_due {
-            // Nothing came since the last zero.
+            // No byte since the last zero.
             None
         } else {
             Some(self.packet.get(..bytes).ok_or(StreamError::TooLong { bytes, limit: MTU }))
@@ -180,7 +179,7 @@ impl<const MTU: usize> Default for Deframer<MTU> {
 pub enum StreamError {
     /// More bytes than a packet may have.
     TooLong {
-        /// Bytes that it has at least.
+        /// Bytes of the packet, at least.
         bytes: usize,
         /// The largest packet.
         limit: usize,
@@ -217,7 +216,7 @@ mod tests {
     const MTU: usize = 300;
     type Outcome = Result<Vec<u8>, StreamError>;
 
-    /// The crate's state machine, on a stream.
+    /// The `cobs` crate's state machine, on a stream.
     fn reference(stream: &[u8]) -> Vec<Outcome> {
         let mut state = DecoderState::Idle;
         let (mut packet, mut outcomes) = (Vec::new(), Vec::new());

@@ -44,7 +44,7 @@ pub struct FrameEncoder<'a, T: ?Sized, const MTU: usize, M = NoMac> {
     id: FrameId,
     begin: Begin,
     positions: &'a T,
-    /// Of a partial frame: where the receiver has the vertices.
+    /// For a partial frame, the receiver's positions.
     held: Option<&'a T>,
     mac: M,
     next: Next,
@@ -61,7 +61,7 @@ enum Next {
 }
 
 impl<'a, T: VertexTable + ?Sized, const MTU: usize> FrameEncoder<'a, T, MTU> {
-    /// A whole frame. Checks that all of it can be sent: linear in the vertices.
+    /// A whole frame. Checks that it can be sent. Cost: linear in the vertices.
     ///
     /// # Errors
     /// [`EncodeError`] names the first vertex that is not finite or outside the quantisation box.
@@ -85,11 +85,10 @@ impl<'a, T: VertexTable + ?Sized, const MTU: usize> FrameEncoder<'a, T, MTU> {
         frame.fits()
     }
 
-    /// A partial frame: the vertices that are not, within the encoding's error, where the receiver has
-    /// them, which is as `held` in the frame `base_epoch` of the same session. With a few others in
-    /// between, where that saves packets.
+    /// A partial frame: the vertices farther than the encoding's error from the receiver's, which are `held`, in the
+    /// frame `base_epoch` of the same session. It includes a few others in between, where that saves packets.
     ///
-    /// `held` must be the positions that the receiver decoded: for a quantised base, not those before quantising.
+    /// `held` must be the positions that the receiver decoded, not those before quantising.
     ///
     /// # Errors
     /// As [`new`](Self::new), and [`EncodeError::Base`].
@@ -109,7 +108,7 @@ impl<'a, T: VertexTable + ?Sized, const MTU: usize> FrameEncoder<'a, T, MTU> {
         Ok(frame)
     }
 
-    /// The same frame, as fresh as this.
+    /// The same frame, with this freshness.
     #[must_use]
     pub fn with_freshness(mut self, freshness: Freshness) -> Self {
         self.begin.freshness = freshness;
@@ -206,7 +205,7 @@ impl<T: VertexTable + ?Sized, M: Mac, const MTU: usize> FrameEncoder<'_, T, MTU,
         PacketWriter::new(buffer, kind, &self.id, self.sequence, count, first)
     }
 
-    /// The next packet of vertices starts at the first row from here on that must be sent.
+    /// The next packet: vertices from the first row, from here on, that must be sent, or the commit.
     fn vertices_from(&self, row: u32) -> Next {
         match (row..self.begin.rows).find(|&row| self.must_be_sent(row)) {
             Some(first) => Next::Vertices { first },
@@ -225,7 +224,7 @@ impl<T: VertexTable + ?Sized, M: Mac, const MTU: usize> FrameEncoder<'_, T, MTU,
         let Some(held) = self.held else { return true };
         let (now, held) = (self.positions.position(row), held.position(row));
         let (Some(now), Some(held)) = (now, held) else { return true };
-        // Written so that NaN is sent. The difference is rounded, the limit is lowered by as much.
+        // Written so that NaN is sent. The limit is lowered by the rounding of the difference.
         let limit = self.begin.encoding.error() * (1.0 - 4.0 * f32::EPSILON);
         !(now == held || (now - held).length() <= limit)
     }

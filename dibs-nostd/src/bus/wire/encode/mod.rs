@@ -17,8 +17,8 @@ use super::{
     kind, padded,
 };
 
-/// Writes a heartbeat to the buffer. `id` has the newest epoch that the sender has begun; before the
-/// first frame, one less than the first will have. `beat` is one more in each.
+/// Writes a heartbeat to the buffer. `id` has the newest epoch that the sender has begun, or one less than the first
+/// frame's before that. `beat` counts up by one.
 pub fn encode_heartbeat<'b, M: Mac>(
     id: &FrameId,
     beat: u32,
@@ -49,8 +49,8 @@ fn words<'b, M: Mac>(
     packet.finish(mac, id.session).0
 }
 
-/// Writes a status to the buffer, with as many counters as fit: which ones follows from the status's
-/// number, so that all of them have come after a few.
+/// Writes a status to the buffer, with as many counters as fit. The status' number selects them, so that a few statuses
+/// carry all.
 pub fn encode_status<'b, M: Mac, const MTU: usize>(
     mesh_id: u32,
     status: &Status,
@@ -88,13 +88,13 @@ pub fn encode_status<'b, M: Mac, const MTU: usize>(
     packet.finish(mac, session).0
 }
 
-/// A begin packet, complete but for its end.
+/// A begin packet without its end.
 fn begin_packet<'b, M: Mac>(
     buffer: &'b mut [u8],
     id: &FrameId,
     begin: &Begin,
 ) -> PacketWriter<'b, M> {
-    // The echo stands where packets of rows have their count and first row.
+    // The echo takes the place of count and first row.
     let [count, first @ ..] = begin.freshness.echo.unwrap_or(0).to_le_bytes();
     let [f0, f1, f2] = first;
     let first = u32::from_le_bytes([f0, f1, f2, 0]);
@@ -111,7 +111,7 @@ const fn capacity<M: Mac>(mtu: usize, fixed: usize, row: usize) -> u32 {
     if rows > 255 { 255 } else { rows as u32 }
 }
 
-/// One packet being written. The buffer is known to be large enough: `MTU` and the counts see to it.
+/// One packet being written. `MTU` and the counts ensure that the buffer is large enough.
 struct PacketWriter<'b, M> {
     bytes: Bytes<'b>,
     direction: Direction,
@@ -170,7 +170,7 @@ impl<'b, M: Mac> PacketWriter<'b, M> {
         }
     }
 
-    /// Adds padding, tag and checksum; the packet, and its share of the frame's digest.
+    /// Adds padding, tag and checksum. Returns the packet, and its share of the frame's digest.
     fn finish(mut self, mac: &M, session: u32) -> (&'b [u8], u32) {
         let tag_bytes = if M::TAGGED { TAG_BYTES } else { 0 };
         let end = padded(self.bytes.used + tag_bytes + CHECKSUM_BYTES) - tag_bytes - CHECKSUM_BYTES;
@@ -193,19 +193,19 @@ impl<'b, M: Mac> PacketWriter<'b, M> {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum EncodeError {
-    /// No row, or more than a frame can have.
+    /// No rows, or more than a frame can have.
     Rows {
-        /// How many.
+        /// Rows given.
         rows: usize,
     },
-    /// More packets than a frame can have: take a larger transport unit.
+    /// More packets than a frame can have: use a larger transport unit.
     Packets {
-        /// How many it would take.
+        /// Packets needed.
         packets: u32,
     },
     /// The base of a partial frame has another number of vertices.
     Base {
-        /// How many it has.
+        /// Vertices of the base.
         rows: usize,
     },
     /// A position or weight is not finite.

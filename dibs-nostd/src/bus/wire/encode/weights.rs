@@ -26,7 +26,7 @@ pub struct WeightsEncoder<'a, const MTU: usize, M = NoMac> {
     weights: &'a [f32],
     freshness: Freshness,
     mac: M,
-    /// Weights that were sent; `None` before the begin.
+    /// Weights sent; `None` before the begin.
     sent: Option<u32>,
     is_done: bool,
     sequence: u16,
@@ -68,7 +68,7 @@ impl<'a, const MTU: usize> WeightsEncoder<'a, MTU> {
 impl<M: Mac, const MTU: usize> WeightsEncoder<'_, MTU, M> {
     const CAPACITY: u32 = capacity::<M>(MTU, HEADER_BYTES, 4);
 
-    /// The same frame, as fresh as this.
+    /// The same frame, with this freshness.
     #[must_use]
     pub fn with_freshness(self, freshness: Freshness) -> Self {
         Self { freshness, ..self }
