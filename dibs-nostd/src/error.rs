@@ -1,4 +1,4 @@
-//! One error type that every error of this crate becomes by `?`.
+//! One error type for all errors of this crate, by `?`.
 
 use core::fmt;
 
@@ -45,7 +45,7 @@ macro_rules! errors {
 }
 
 errors! {
-    /// The tree's bytes are no tree of this version.
+    /// The bytes are not a tree of this version.
     Format(crate::FormatError),
     /// The tree's bytes changed.
     CorruptTree(crate::CorruptTreeError),
@@ -57,7 +57,7 @@ errors! {
     Publish(crate::PublishError),
     /// A stretch is beyond its limit, or was not measured.
     Stretch(crate::StretchError),
-    /// There is no such tool.
+    /// A tool's coordinate or radius is out of range.
     Tool(crate::ToolError),
     /// A query gave no answer.
     Query(crate::QueryError),
@@ -66,7 +66,7 @@ errors! {
     /// A packet, or the frame that it would have finished, was rejected.
     #[cfg(feature = "bus")]
     Receive(crate::ReceiveError),
-    /// Bytes are no packet.
+    /// The bytes are not a packet.
     #[cfg(feature = "bus")]
     Packet(crate::wire::PacketError),
     /// A frame cannot be encoded.
@@ -75,22 +75,22 @@ errors! {
     /// A byte stream lost a packet.
     #[cfg(feature = "bus")]
     Stream(crate::wire::StreamError),
-    /// There is no such quantisation box.
+    /// A quantisation box's corner or step is out of range.
     #[cfg(feature = "bus")]
     Box(crate::wire::BoxError),
-    /// A gain that no constraint can have.
+    /// A constraint's gain is out of range.
     #[cfg(feature = "control")]
     Gain(crate::constraint::GainError),
-    /// A limit that the fail-safe machine cannot have.
+    /// A fail-safe limit is out of range.
     #[cfg(feature = "control")]
     Limit(crate::failsafe::LimitError),
     /// An acknowledgement came too early.
     #[cfg(feature = "control")]
     Acknowledge(crate::failsafe::AcknowledgeError),
-    /// A tree carries no modes, or damaged ones.
+    /// The tree carries no modes, or damaged ones.
     #[cfg(feature = "modes")]
     Modes(crate::modes::ModesError),
-    /// Weights that no surface has.
+    /// The weights are not a surface's.
     #[cfg(feature = "modes")]
     Weights(crate::modes::WeightsError),
 }

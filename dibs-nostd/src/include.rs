@@ -1,8 +1,8 @@
-//! Including the module that `dibs-build` generates for a tree.
+//! Includes the module that `dibs-build` generates for a tree.
 
 /// Includes the module of a tree that a build script emitted: `include_tree!("heart")` gives `mod heart`.
 ///
-/// The module has all that follows from the tree, so that a program states none of it:
+/// The module has every item that follows from the tree:
 ///
 /// | item | is |
 /// |---|---|
@@ -14,7 +14,8 @@
 /// | `VERTICES`, `STACK`, `Index` | the sizes, for types of your own |
 /// | `CENTRE`, `REACH` | the rest shape's bounding box, where the tree carries its rest shape |
 ///
-/// A tree with modes brings `MODES` and, with the feature `modes`, a module `modal` with the types for surfaces of so many weights.
+/// A tree with modes adds `MODES`, their number, and with the feature `modes` a module `modal` with the types for
+/// surfaces of that many weights.
 ///
 /// The build script is `fn main() { dibs_build::tree("heart.ply").stretch(1.5).emit("heart") }`.
 #[macro_export]
@@ -32,7 +33,7 @@ macro_rules! if_bus {
     ($($item:item)*) => { $($item)* };
 }
 
-/// The same without it.
+/// Nothing: the feature is off.
 #[cfg(not(feature = "bus"))]
 #[doc(hidden)]
 #[macro_export]
@@ -48,7 +49,7 @@ macro_rules! if_modes {
     ($($item:item)*) => { $($item)* };
 }
 
-/// The same without it.
+/// Nothing: the feature is off.
 #[cfg(not(feature = "modes"))]
 #[doc(hidden)]
 #[macro_export]

@@ -1,10 +1,10 @@
 //! The closest pair of points between an instrument and a deforming mesh, for hard real-time
 //! controllers.
 //!
-//! Deformation invariant bounding spheres (Bowyer & Rodriguez y Baena, Proc IMechE Part H 228(4),
-//! 2014): each sphere of a [`Tree`] is pinned to a mesh vertex, and its radius is the largest distance
-//! along the surface to the vertices below it, times a limit on stretch. When the vertices move, the
-//! tree is right again without being touched, so it can lie in flash.
+//! Deformation invariant bounding spheres (Bowyer & Rodriguez y Baena, Proc IMechE Part H 228(4), 2014): each sphere of
+//! a [`Tree`] is pinned to a mesh vertex, and its radius is the largest distance along the surface to the vertices
+//! below it, times a limit on stretch. When the vertices move, the tree still holds without a change, so it can lie in
+//! flash.
 //!
 //! `no_std`, no allocation, no panic, no recursion, no unbounded loop. `unsafe` only for the hardware
 //! square root. The same bits on host and target.
@@ -27,7 +27,7 @@
 //! use dibs_build::{Builder, generate};
 //! use dibs_nostd::{Capsule, Options, Query, Tree, measure_stretch, glam::Vec3};
 //!
-//! // On a host: a tree, as a build script would write it into a static.
+//! // On a host: a tree, as a build script writes it into a static.
 //! let generate::MovingMesh { mesh: heart, motion } = generate::heart(1_000)?;
 //! let built = Builder::new().stretch(1.5).build(&heart)?;
 //!
@@ -48,7 +48,7 @@
 //!
 //! - `bus`, `control`, `modes`, on by default: packets and the [`Assembler`]; [`constraint`] and [`failsafe`]; [`modes`].
 //! - `defmt`: `defmt::Format` for every public value and error.
-//! - `authenticity`: [`wire`]'s `AesCmac`, by which a receiver believes only packets with a genuine tag.
+//! - `authenticity`: [`wire`]'s `AesCmac`, with which a receiver takes only packets with a genuine tag.
 #![no_std]
 #![deny(unsafe_code)]
 

@@ -13,10 +13,9 @@ pub(crate) fn sqrt(x: f32) -> f32 {
 
 /// A hard-float ABI promises the FPU's single-precision square root.
 ///
-/// The compiler knows what C's function by this name computes. Where it optimises, the instruction stands in
-/// place of a call, on the FPU's own registers, which inline assembly cannot name in stable Rust; the function
-/// is left for a negative number. Rust's own runtime brings it on targets without a C library: portable, and
-/// correctly rounded too.
+/// The compiler knows C's function by this name. When it optimises, it replaces the call by the instruction, on FPU
+/// registers, which inline assembly cannot name in stable Rust; only a negative number still calls the function. On
+/// targets without a C library Rust's runtime provides it, portable and correctly rounded too.
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
 mod imp {
     // SAFETY: this is the C standard's `float sqrtf(float)`. It touches no memory but, at most, `errno`.

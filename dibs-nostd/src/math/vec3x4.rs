@@ -18,14 +18,14 @@ impl Vec3x4 {
     pub fn of(table: impl Fn(u32) -> Option<Vec3>, [a, b, c, d]: [u32; 4]) -> Option<Self> {
         let (a, b) = (table(a)?, table(b)?);
         let (c, d) = (table(c)?, table(d)?);
-        // By fewer loads than coordinate by coordinate.
+        // A transpose takes fewer loads than gathering each coordinate.
         let columns = [a, b, c, d].map(|position| position.extend(0.0));
         let [a, b, c, d] = columns;
         let rows = Mat4::from_cols(a, b, c, d).transpose();
         Some(Self { x: rows.x_axis, y: rows.y_axis, z: rows.z_axis })
     }
 
-    /// The same four times.
+    /// One point four times.
     #[inline(always)]
     pub fn splat(point: Vec3) -> Self {
         Self { x: Vec4::splat(point.x), y: Vec4::splat(point.y), z: Vec4::splat(point.z) }
@@ -52,7 +52,7 @@ impl Vec3x4 {
     }
 }
 
-/// Vec3x4 square roots, correctly rounded.
+/// Four square roots, correctly rounded.
 #[inline(always)]
 pub fn roots(squares: Vec4) -> Vec4 {
     Vec4::from_array(squares.to_array().map(sqrt))

@@ -19,8 +19,8 @@ pub struct Capsule {
     radius: f32,
 }
 
-/// A segment, as its start, unit direction and length: the form in which a projection onto it takes
-/// one dot product and no division.
+/// A segment, as its start, unit direction and length, so that a projection onto it takes one dot product and no
+/// division.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Axis {
@@ -80,7 +80,7 @@ impl Capsule {
         self.axis.start
     }
 
-    /// The segment's second end, within rounding as given.
+    /// The segment's second end, as given within rounding.
     pub fn end(&self) -> Vec3 {
         self.axis.start + self.axis.length * self.axis.direction
     }

@@ -5,7 +5,7 @@ use super::clamp;
 use super::triangle::{Candidate, SLIVER, TINY};
 use glam::Vec3;
 
-/// A pair on an edge: where on the axis, and where on the edge (0 to 1).
+/// A pair of an edge and an axis: the length along the axis, and the share of the edge (0 to 1).
 #[derive(Clone, Copy)]
 pub(super) struct OnEdge {
     pub distance_squared: f32,
@@ -35,8 +35,7 @@ impl OnEdge {
     }
 }
 
-/// The closest pair between the edge from `corner` along `edge` and the origin, which is the point
-/// `along` the axis.
+/// The closest pair between the edge from `corner` along `edge` and the origin, which is the axis' point at `along`.
 #[inline(always)]
 pub(super) fn edge_to_point(corner: Vec3, edge: Vec3, along: f32) -> OnEdge {
     let squared = edge.dot(edge);
@@ -49,7 +48,7 @@ pub(super) fn edge_to_point(corner: Vec3, edge: Vec3, along: f32) -> OnEdge {
 /// axis.
 pub(super) fn edge_to_segment(axis: &Axis, corner: Vec3, edge: Vec3) -> OnEdge {
     let (corner_along, edge_along) = (corner.dot(axis.direction), edge.dot(axis.direction));
-    // Seen along the axis: the edge without its part along the axis.
+    // The edge projected along the axis.
     let corner_across = corner - corner_along * axis.direction;
     let edge_across = edge - edge_along * axis.direction;
     let across_squared = edge_across.dot(edge_across);
@@ -70,11 +69,11 @@ pub(super) fn edge_to_segment(axis: &Axis, corner: Vec3, edge: Vec3) -> OnEdge {
     nearly_parallel(axis, corner, edge, along)
 }
 
-/// [`edge_to_segment`] where the edge's direction across the axis, and so `along`, is as good as unknown;
-/// but then the ends are nearly as good.
+/// [`edge_to_segment`] for an edge whose direction across the axis is lost in rounding, and so `along`; the ends are
+/// then nearly as close.
 ///
-/// No test tells each of the candidates from none: as long as the direction is unknown by `u` times the edge, the
-/// distance along the edge varies by as little. They are kept because the module's bound counts on them.
+/// No test shows that each candidate is needed: if the direction is off by `u` times the edge, the distance along the
+/// edge varies by as little. They are kept because the module's bound relies on them.
 #[cold]
 #[inline(never)]
 fn nearly_parallel(axis: &Axis, corner: Vec3, edge: Vec3, along: f32) -> OnEdge {

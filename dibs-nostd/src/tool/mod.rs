@@ -1,7 +1,7 @@
 //! The tools: a rigid instrument is an *axis* (a point or a segment) with a radius around it.
 //!
-//! Queries measure from the axis; the radius is subtracted once, at the end. So a sphere costs what a
-//! point costs, and a radius of zero is an ordinary tool.
+//! Queries measure from the axis, and subtract the radius once, at the end. So a sphere costs as much as a point, and a
+//! radius of zero is an ordinary tool.
 //!
 //! # Accuracy
 //! Let `S` be the largest distance from the axis' start to a corner of the triangle, plus the axis'
@@ -32,14 +32,14 @@ pub const ACCURACY: f32 = 16.0 / 16_777_216.0;
 /// accuracy holds: fourth powers of distances must stay finite in f32.
 pub const MAX_COORDINATE: f32 = 536_870_912.0;
 
-/// A rigid instrument, from which a query measures. [`Sphere`] and [`Capsule`] implement it.
+/// A rigid instrument. [`Sphere`] and [`Capsule`] implement it.
 ///
 /// All lengths are in the mesh's own unit (mm in the examples), all points in the mesh's frame.
 pub trait Tool: Copy + sealed::Sealed {
     /// Radius of the tool around its axis: finite, not negative.
     fn radius(&self) -> f32;
 
-    /// Where the axis starts: a sphere's centre, a capsule's first end.
+    /// Start of the axis: a sphere's centre, a capsule's first end.
     fn axis_start(&self) -> Vec3;
 
     /// Length of the axis, rounded up: 0 for a sphere.
@@ -68,13 +68,12 @@ pub trait Tool: Copy + sealed::Sealed {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct AxisPair {
-    /// Square of the distance. Computed from differences to the axis' start, and so more accurate
-    /// than the difference of the two points below where coordinates are large. Exactly 0 where the
-    /// axis pierces a triangle that is not a sliver.
+    /// Square of the distance. Computed from differences to the axis' start; at large coordinates it is more accurate
+    /// than the difference of the two points below. Exactly 0 where the axis pierces a triangle that is not a sliver.
     pub distance_squared: f32,
     /// The axis' point of the pair.
     pub on_axis: Vec3,
-    /// Where `on_axis` sits: 0 at the axis' start, 1 at its end; 0 for a sphere.
+    /// Parameter of `on_axis`: 0 at the axis' start, 1 at its end; 0 for a sphere.
     pub axis_parameter: f32,
     /// The triangle's point of the pair.
     pub on_surface: Vec3,
@@ -120,7 +119,7 @@ mod sealed {
     use crate::math::vec3x4::Vec3x4;
 
     pub trait Sealed: Sized {
-        /// The shortest vectors from the axis to four points, bit by bit those of one after the other.
+        /// The shortest vectors from the axis to four points, with the same bits as [`Tool::axis_to`] gives for each.
         fn axis_to_four(&self, points: &Vec3x4) -> Vec3x4;
 
         /// From the axis' start to its end, each component within 2^-23 of the axis' length.
@@ -163,12 +162,12 @@ fn clamp(x: f32, high: f32) -> f32 {
     }
 }
 
-/// [`clamp`] without a branch, where nothing is known of `x`. NaN becomes a number, which one differs: what it
-/// was computed from is not a number either.
+/// [`clamp`] without a branch, for an `x` that no branch predicts. NaN becomes an arbitrary number; the caller's
+/// `offset` keeps the NaN.
 #[inline(always)]
 fn clamp_any(x: f32, high: f32) -> f32 {
     if cfg!(target_arch = "arm") {
-        // Positive numbers are ordered as their bits are, and integers are compared at less cost.
+        // Positive numbers sort as their bits, and integers are cheaper to compare.
         let (bits, most) = (x.to_bits() as i32, high.to_bits() as i32);
         let positive = bits & !(bits >> 31);
         f32::from_bits(if positive < most { positive } else { most } as u32)

@@ -1,17 +1,17 @@
-//! Which triangle is across an edge: three neighbours a triangle.
+//! Adjacency: the three neighbours of each triangle.
 //!
-//! A row of 16-bit codes holds the low 16 bits of its neighbours' rows. An orientable surface has every directed
-//! edge once, so of the few rows with those bits the neighbour is the one that has the edge the other way round.
-//! A border edge has the largest code, and no such row.
+//! A row of 16-bit codes holds the low 16 bits of its neighbours' rows. An orientable surface has every directed edge
+//! once, so among the few rows with those bits the neighbour is the one with the reversed edge. A border edge has the
+//! largest code, and no such row.
 
 use super::{FormatError, Tree, TriangleRow, format};
 use crate::Index;
 
-/// Most triangles of a 16-bit tree with adjacency: rows that share their low 16 bits are then at most four.
+/// Most triangles of a 16-bit tree with adjacency: then at most four rows share their low 16 bits.
 pub(crate) const MAX_NARROW_TRIANGLES: u32 = 1 << 18;
 
 impl<I: Index> Tree<'_, I> {
-    /// Whether the tree knows its triangles' neighbours, so that its surface has sides.
+    /// Whether the tree holds its triangles' neighbours, so that its surface has sides.
     #[must_use]
     pub const fn has_adjacency(&self) -> bool {
         !self.sections.adjacency.is_empty()
@@ -29,7 +29,7 @@ impl<I: Index> Tree<'_, I> {
         }
     }
 
-    /// The triangle across an edge, and which of its edges that is.
+    /// The triangle across an edge, and the number of that edge in it.
     #[inline]
     pub(crate) const fn across(&self, triangle: u32, edge: u32) -> Option<(u32, u32)> {
         let Some(code) = format::neighbour_code::<I>(self.sections.adjacency, triangle, edge)
@@ -64,7 +64,7 @@ const fn edge_of([a, b, c]: [u32; 3], edge: u32) -> (u32, u32) {
     }
 }
 
-/// Which edge of a triangle leads from one vertex to another.
+/// The edge of a triangle that leads from one vertex to another.
 const fn edge_between([a, b, c]: [u32; 3], from: u32, to: u32) -> Option<u32> {
     if a == from && b == to {
         Some(0)
@@ -77,8 +77,8 @@ const fn edge_between([a, b, c]: [u32; 3], from: u32, to: u32) -> Option<u32> {
     }
 }
 
-/// Whether every neighbour is there, and has this triangle for its own: turning around a vertex then comes back
-/// to where it began, or ends at a border.
+/// Checks that every neighbour exists and has this triangle as its neighbour. A turn around a vertex then closes, or
+/// ends at a border.
 pub(super) const fn check<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatError> {
     let triangles = tree.header.triangles;
     if !tree.has_adjacency() {

@@ -95,7 +95,7 @@ pub enum FormatError {
         /// Row of the vertex order.
         row: u32,
     },
-    /// A triangle's rest metric is not finite, is negative, or continues an edge that is not there.
+    /// A triangle's rest metric is not finite, is negative, or continues an edge that the row before does not have.
     Metric {
         /// Row of the triangle.
         triangle: u32,
@@ -105,18 +105,18 @@ pub enum FormatError {
         /// Row of the triangle.
         triangle: u32,
     },
-    /// A triangle's neighbour across an edge is not there, or has another one there.
+    /// A triangle's neighbour across an edge does not exist, or has another neighbour there.
     Neighbour {
         /// Row of the triangle.
         triangle: u32,
         /// The edge: 0 from the first corner to the second, 1 to the third, 2 back to the first.
         edge: u32,
     },
-    /// A traversal's stack needs more or fewer entries than the header states.
+    /// A traversal needs more or fewer stack entries than the header states.
     Stack {
         /// Entries in the header.
         stated: u32,
-        /// Entries found.
+        /// Entries needed.
         found: u32,
     },
 }

@@ -22,7 +22,7 @@ pub(crate) struct Header {
 }
 
 impl Header {
-    /// Checks that these values are still those of the bytes that they were read from.
+    /// Checks that these values still equal those in the bytes.
     pub fn check(&self, bytes: &[u8]) -> Result<(), FormatError> {
         for (offset, value) in [
             (at::MESH_ID, self.mesh_id),
@@ -48,7 +48,7 @@ impl Header {
     }
 }
 
-/// A header field that every builder writes and this read cannot miss, since the length was checked.
+/// A header field. The length was checked, so it exists.
 const fn field(bytes: &[u8], offset: usize) -> Result<u32, FormatError> {
     match u32_at(bytes, offset) {
         Some(value) => Ok(value),

@@ -1,6 +1,6 @@
 //! The tree: a validated view of bytes that stay where they are, in flash or in a file.
 
-/// The operator `?`, for functions that the compiler runs.
+/// The operator `?`, for `const` functions.
 macro_rules! tri {
     ($result:expr) => {
         match $result {
@@ -39,8 +39,8 @@ use sections::Sections;
 
 /// A deformation invariant bounding sphere tree with its triangles.
 ///
-/// `I` is the index width, `u16` for up to 65,536 vertices or `u32`. The tree borrows its bytes, holds
-/// no position (only which vertex each sphere is pinned to) and never changes: see `docs/format.md`.
+/// `I` is the index width, `u16` for up to 65,536 vertices or `u32`. The tree borrows its bytes, holds no position
+/// (only the vertex that each sphere is pinned to) and never changes: see `docs/format.md`.
 #[derive(Clone, Copy, Debug)]
 pub struct Tree<'a, I> {
     sections: Sections<'a>,
@@ -49,17 +49,17 @@ pub struct Tree<'a, I> {
 }
 
 impl<'a, I: Index> Tree<'a, I> {
-    /// Validates the bytes of a tree, and gives a view of them.
+    /// Validates the bytes of a tree, and returns a view of them.
     ///
     /// Call it once, at start-up; for a generated tree [`TreeBytes::validate`] does. Checks the layout, the CRC-32, and
-    /// that the tree is well formed: children after parents, every index inside its table, every triangle in exactly one
-    /// leaf, depth as stated. It cannot check that the radii cover this mesh: that is the builder's promise, tied to the
-    /// mesh id. (It is `const`, but slow in a constant: the compiler takes a second or two for every thousand triangles.)
+    /// that the tree is well formed: children after parents, every index inside its table, every triangle in exactly
+    /// one leaf, depth as stated. It cannot check that the radii cover this mesh: the builder proves that. (It is
+    /// `const`, but slow in a constant: the compiler takes a second or two for every thousand triangles.)
     ///
     /// Cost: linear in the bytes, no memory beyond a fixed stack of [`format::MAX_STACK`] words.
     ///
     /// # Errors
-    /// [`FormatError`] names the first thing that is wrong and its value.
+    /// [`FormatError`] names the first defect and its value.
     pub const fn from_bytes(bytes: &'a [u8]) -> Result<Self, FormatError> {
         let header = tri!(header::read::<I>(bytes));
         let sections = tri!(sections::find::<I>(bytes, &header));
@@ -69,9 +69,9 @@ impl<'a, I: Index> Tree<'a, I> {
         Ok(tree)
     }
 
-    /// Checks this view itself, the decoded header and the places of the sections, against the bytes. The view lies in
-    /// RAM, which a [`Scrub`] does not read: check that of a [`Query`](crate::Query), `query.tree()`, once a tick or as
-    /// often as the scrub makes a round.
+    /// Checks this view (the decoded header and the places of the sections) against the bytes. The view lies in RAM,
+    /// which a [`Scrub`] does not read: check that of a [`Query`](crate::Query), `query.tree()`, once a tick or once a
+    /// round of the scrub.
     ///
     /// Cost: some hundred instructions, whatever the size of the tree.
     ///
@@ -82,8 +82,8 @@ impl<'a, I: Index> Tree<'a, I> {
         self.sections.check::<I>(bytes, &self.header)
     }
 
-    /// The same tree on a copy of its bytes, say in tightly coupled memory, without validating them
-    /// again. The header's values stay those that were validated.
+    /// The same tree on a copy of its bytes, say in tightly coupled memory, without another validation. The header's
+    /// values stay the validated ones.
     ///
     /// # Errors
     /// [`FormatError`] if the copy's sections are not where this tree's layout has them.
@@ -103,8 +103,8 @@ impl<'a, I: Index> Tree<'a, I> {
         self.header.checksum
     }
 
-    /// Identity of the mesh: CRC-32 of its triangles and rest positions. Vertex packets carry it, so
-    /// that a frame of another mesh is never taken for one of this.
+    /// Identity of the mesh: CRC-32 of its triangles and rest positions. Every packet carries it, so that a frame of
+    /// another mesh is refused.
     #[must_use]
     pub const fn mesh_id(&self) -> u32 {
         self.header.mesh_id
@@ -128,15 +128,15 @@ impl<'a, I: Index> Tree<'a, I> {
         self.header.nodes
     }
 
-    /// Entries that a traversal's stack must hold: one, and on every level of the tree all siblings
-    /// but one, where there are most.
+    /// Entries that a traversal's stack must hold: one, and for every level of the tree one less than the most siblings
+    /// there.
     #[must_use]
     pub const fn stack(&self) -> u32 {
         self.header.stack
     }
 
-    /// How far a vertex may be from where the file of the mesh has it, because positions are f32: 0 where the file
-    /// holds f32, too. Part of the accuracy of every answer.
+    /// Largest distance of a vertex from its position in the mesh's file, by rounding to f32; 0 if the file holds f32.
+    /// Part of the accuracy of every answer.
     #[must_use]
     pub const fn position_error(&self) -> f32 {
         self.header.position_error
@@ -148,7 +148,7 @@ impl<'a, I: Index> Tree<'a, I> {
         self.header.stretch
     }
 
-    /// Which deformations the stretch limit is about.
+    /// The measure of stretch that the limit bounds.
     #[must_use]
     pub const fn paths(&self) -> PathKind {
         self.header.paths
@@ -177,8 +177,8 @@ impl<'a, I: Index> Tree<'a, I> {
         format::triangle::<I>(self.sections.triangles, row)
     }
 
-    /// The mesh's own number of the vertex in `row`; `None` outside the table or where the tree was
-    /// emitted without its vertex order.
+    /// The mesh's number of the vertex in `row`; `None` outside the table or where the tree was emitted without its
+    /// vertex order.
     #[must_use]
     pub const fn vertex_number(&self, row: u32) -> Option<VertexNumber> {
         match format::vertex_number::<I>(self.sections.order, row) {
@@ -234,7 +234,7 @@ impl<'a, I: Index> Tree<'a, I> {
         format::node::<I>(self.sections.nodes, row)
     }
 
-    /// As [`Self::record`], for many of them at run time.
+    /// As [`Self::record`], faster at run time.
     #[inline(always)]
     pub(crate) fn whole_record(&self, row: u32) -> Option<Node> {
         format::whole_node::<I>(self.sections.nodes, row)
@@ -258,7 +258,7 @@ impl<'a, I: Index> Tree<'a, I> {
         several::four_triangles::<I>(self.sections.triangles, first, count)
     }
 
-    /// The nodes of a run of rows; `None` unless all of them are there.
+    /// The nodes of a run of rows; `None` unless all exist.
     #[inline(always)]
     pub(crate) fn records(&self, first: u32, count: u32) -> Option<impl Iterator<Item = Node>> {
         let mut rows = format::run(self.sections.nodes, first, count, format::node_bytes::<I>())?;
@@ -269,7 +269,7 @@ impl<'a, I: Index> Tree<'a, I> {
         }))
     }
 
-    /// The corners of a run of triangles; `None` unless all of them are there.
+    /// The corners of a run of triangles; `None` unless all exist.
     #[inline(always)]
     pub(crate) fn triangles(
         &self,

@@ -1,8 +1,8 @@
-//! Two kinds of numbers that are easily taken for one another, and for rows of a vertex table.
+//! Types for two kinds of numbers that are easily confused with each other, and with rows of a vertex table.
 
 use core::fmt;
 
-/// A triangle, by its row in the tree's table. Not its number in the mesh's file: the tree has an order of its own.
+/// A triangle, by its row in the tree's table, not its number in the mesh's file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TriangleRow(pub u32);
@@ -13,8 +13,8 @@ impl fmt::Display for TriangleRow {
     }
 }
 
-/// A vertex, by the mesh's own number, counted from 0: for reports to people, and for data in the mesh's order. Not its
-/// row in a vertex table: [`Tree::vertex_number`](crate::Tree::vertex_number) leads from one to the other.
+/// A vertex, by its number in the mesh, from 0: for reports to people, and for data in the mesh's order.
+/// [`Tree::vertex_number`](crate::Tree::vertex_number) finds it from the row in a vertex table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VertexNumber(pub u32);

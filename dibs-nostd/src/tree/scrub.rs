@@ -1,4 +1,4 @@
-//! Finding rot in a tree's bytes while the controller runs: the checksum, a few bytes at a time.
+//! Finds changed bytes of a tree while the controller runs: the checksum, a few bytes at a time.
 
 use core::fmt;
 
@@ -7,12 +7,12 @@ use crate::tree::format::{CRC, HEADER_BYTES, u32_at};
 
 /// An endless background check of a tree's bytes against their checksum.
 ///
-/// Validation at start-up says nothing about flash that rots later, and a query cannot see every flipped
-/// bit: a radius or an index that is wrong but possible gives a wrong answer. This finds it, a bounded
-/// number of bytes a call, at most two rounds after it happened: one may have passed the place already.
+/// Validation at start-up does not see later changes of the flash, and a query does not detect every flipped bit: a
+/// radius or an index that is wrong but possible gives a wrong answer. A scrub detects it within two rounds, with a
+/// bounded number of bytes in each call: the present round may have passed the place already.
 ///
-/// With 64 bytes a tick at 1 kHz, a tree of 100 kB takes 1.6 s a round. What the checksum detects for
-/// certain stands at [`CRC`]; of other damage one pattern in 2^32 passes.
+/// With 64 bytes a tick at 1 kHz, a tree of 100 kB takes 1.6 s a round. [`CRC`] lists the damage that the checksum
+/// detects for certain; of other damage one pattern in 2^32 passes.
 ///
 /// ```
 /// use dibs_nostd::{CorruptTreeError, Scrub};
@@ -39,8 +39,7 @@ pub struct Scrub<'a> {
     rounds: u32,
 }
 
-/// A tree's bytes changed after they were written: distances may be wrong, and nothing but a sound copy
-/// makes them right.
+/// A tree's bytes changed after they were written: distances may be wrong until a sound copy replaces them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -70,8 +69,8 @@ impl<'a> Scrub<'a> {
         Self { bytes, at: 0, digest: CRC.digest(), rounds: 0 }
     }
 
-    /// Checks the next `most` bytes, and at the end of a round compares the checksum. Call it again after
-    /// an error: the next round tells whether the bytes are still wrong.
+    /// Checks the next `most` bytes, and at the end of a round compares the checksum. After an error, the next round
+    /// shows whether the bytes are still wrong.
     ///
     /// Cost: linear in `most`, about ten instructions a byte on a Cortex-M7.
     ///
@@ -80,7 +79,7 @@ impl<'a> Scrub<'a> {
     pub fn step(&mut self, most: usize) -> Result<(), CorruptTreeError> {
         let rest = self.bytes.get(self.at..).unwrap_or_default();
         let part = rest.get(..most).unwrap_or(rest);
-        // The checksum covers everything but itself.
+        // The checksum does not cover itself.
         let skipped = CHECKSUM.saturating_sub(self.at);
         let before = part.get(..skipped).unwrap_or(part);
         let after = part.get(HEADER_BYTES.saturating_sub(self.at)..).unwrap_or_default();
@@ -193,7 +192,7 @@ mod tests {
             }
             assert!(tree.check(bytes).is_err(), "section {section}");
         }
-        // The same bytes elsewhere are another place.
+        // Equal bytes at another address are a misplaced section.
         let copy: Vec<u8> = bytes.into();
         assert!(sound.check(&copy).is_err());
     }

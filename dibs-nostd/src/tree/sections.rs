@@ -1,4 +1,4 @@
-//! The sections of a tree: which there are, how long each must be, and where they stand.
+//! The sections of a tree: their kinds, lengths and places.
 //!
 //! To add one: its kind in [`section`], a row in [`rules`], a field of [`Sections`] and of its `all`.
 
@@ -22,11 +22,11 @@ pub(crate) struct Sections<'a> {
     pub adjacency: &'a [u8],
 }
 
-/// The length that a section must have, and whether it must be there.
+/// A section's length, and whether it is required.
 #[derive(Clone, Copy)]
 struct Rule {
     kind: u32,
-    /// Bytes that it must have; `None` where a later check decides.
+    /// Its bytes; `None` where a later check decides.
     length: Option<u64>,
     required: bool,
 }
@@ -122,7 +122,7 @@ impl<'a> Sections<'a> {
         [nodes, triangles, order, rest, metric, limits, modes, adjacency]
     }
 
-    /// Checks that each section is still where the bytes have it.
+    /// Checks that each section is still at its place in the bytes.
     pub fn check<I: Index>(&self, bytes: &[u8], header: &Header) -> Result<(), FormatError> {
         let found = find::<I>(bytes, header)?;
         let places = self.all().into_iter().zip(found.all());

@@ -7,12 +7,10 @@ use crate::{FormatError, Index, Scrub, Tree};
 
 /// The bytes of a tree in flash, not validated yet.
 ///
-/// No query takes these bytes: [`validate`](Self::validate) is the only way from them to a [`Tree`].
-/// Call it once, at start-up. The sizes of buffers and stacks are constants all the same, so that a
-/// `static` can be declared with them.
+/// No query takes these bytes: [`validate`](Self::validate), called once at start-up, makes a [`Tree`] of them. The
+/// sizes of buffers and stacks are constants before that, so that a `static` can be declared with them.
 ///
-/// `dibs_build` generates one for each tree, as `TREE` of the module that
-/// [`include_tree!`](crate::include_tree) includes.
+/// The module that [`include_tree!`](crate::include_tree) includes has one as `TREE`.
 ///
 /// ```
 /// use dibs_nostd::{Query, TreeBytes};
@@ -31,7 +29,7 @@ pub struct TreeBytes<'a, I> {
 }
 
 impl<'a, I: Index> TreeBytes<'a, I> {
-    /// Bytes that are to be a tree with indices of type `I`.
+    /// The bytes of a tree with indices of type `I`.
     #[must_use]
     pub const fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, width: PhantomData }
@@ -42,12 +40,12 @@ impl<'a, I: Index> TreeBytes<'a, I> {
     /// Cost: linear in the bytes, some ten instructions each on a Cortex-M7.
     ///
     /// # Errors
-    /// [`FormatError`] names the first thing that is wrong and its value.
+    /// [`FormatError`] names the first defect and its value.
     pub const fn validate(&self) -> Result<Tree<'a, I>, FormatError> {
         Tree::from_bytes(self.bytes)
     }
 
-    /// A background check of these bytes, for as long as the program runs.
+    /// A background check of these bytes.
     #[must_use]
     pub fn scrub(&self) -> Scrub<'a> {
         Scrub::new(self.bytes)

@@ -1,4 +1,4 @@
-//! Whether header and sections are a tree: the well-formedness checker, below everything that uses trees.
+//! The well-formedness checker: whether header and sections are a tree.
 
 use core::marker::PhantomData;
 
@@ -9,7 +9,7 @@ use crate::tree::header::Header;
 use crate::tree::sections::Sections;
 use crate::tree::{FormatError, Index};
 
-/// Everything that is checked: the tree's parts before they are one.
+/// The parts of a tree, not yet checked.
 struct Parts<'a, I> {
     header: &'a Header,
     sections: &'a Sections<'a>,
@@ -40,11 +40,11 @@ pub(super) const fn well_formed<I: Index>(
     leaves(&parts)
 }
 
-/// Reads every node once, in order. Since they stand breadth first, each link to children must point
-/// to exactly the rows that no link before it has: that proves a tree, with nothing left over.
+/// Reads every node once, in order. Nodes are in breadth-first order, so each link to children must point to the first
+/// rows that no earlier link has. This proves a tree that includes every node.
 const fn nodes<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
     let header = parts.header;
-    // The root is a level of its own.
+    // The first level is the root alone.
     let (mut level_end, mut next_node) = (1, 1);
     let (mut stack, mut most_siblings) = (1, 1);
     let mut row = 0;
@@ -85,11 +85,11 @@ const fn nodes<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
     }
 }
 
-/// Walks the tree once, depth first: the leaves' triangles must come as 0, 1, 2, ..., so that every
-/// triangle is in one leaf. `nodes` has proven that it is a tree and how many entries may wait.
+/// Walks the tree once, depth first: the leaves' triangles must come as 0, 1, 2, ..., so that every triangle is in one
+/// leaf. `nodes` has proven that it is a tree, and the entries that may wait.
 const fn leaves<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
     let header = parts.header;
-    // The mask is there so that no index can panic.
+    // The mask keeps the index from panicking.
     const MASK: usize = MAX_STACK - 1;
     let mut stack = [0u32; MAX_STACK];
     let mut waiting = 1;
@@ -127,10 +127,10 @@ const fn leaves<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
 
 const _: () = assert!(MAX_STACK.is_power_of_two() && MAX_LEAF_TRIANGLES.is_power_of_two());
 
-/// Whether only the third corner of a leaf's triangle is new to the leaf, but for its first triangle: a
-/// query looks at no others to reject the triangles up to there.
+/// Checks that, after a leaf's first triangle, only a triangle's third corner is new to the leaf: a query tests only
+/// those to reject a leaf.
 const fn patch<I: Index>(parts: &Parts<'_, I>, first: u32, count: u32) -> Result<(), FormatError> {
-    // Third corners of the leaf's triangles; the mask is there so that no index can panic.
+    // Third corners of the leaf's triangles; the mask keeps the index from panicking.
     const MASK: usize = MAX_LEAF_TRIANGLES as usize - 1;
     let mut thirds = [u32::MAX; MASK + 1];
     let [a, b, third] = corners(parts, first);
@@ -165,7 +165,7 @@ const fn corners<I: Index>(parts: &Parts<'_, I>, triangle: u32) -> [u32; 3] {
     }
 }
 
-/// Whether every index in the triangle and vertex order tables is a vertex.
+/// Checks that every index in the triangle and vertex order tables is a vertex.
 const fn tables<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
     let header = parts.header;
     let mut row = 0;
@@ -207,7 +207,7 @@ const fn tables<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
     Ok(())
 }
 
-/// Whether a triangle's metric is one, and the edge that it continues is there.
+/// Whether a triangle's metric is valid, and the row before has the edge that it continues.
 const fn is_metric<I: Index>(parts: &Parts<'_, I>, row: u32) -> bool {
     let Some(metric) = parts.metric(row) else { return false };
     let [first, second, third] = metric.squares;
@@ -219,7 +219,7 @@ const fn is_metric<I: Index>(parts: &Parts<'_, I>, row: u32) -> bool {
         },
         _ => false,
     };
-    // A value that is not a number is in no range.
+    // A NaN is in no range.
     first < f32::INFINITY
         && second.abs() < f32::INFINITY
         && third >= 0.0

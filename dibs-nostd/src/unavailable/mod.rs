@@ -1,4 +1,4 @@
-//! Why there is no answer: the causes that surface, query and fail-safe machine share.
+//! Causes of a missing answer, shared by surface, query and fail-safe machine.
 
 mod query;
 
@@ -22,22 +22,22 @@ pub enum Unavailable {
     Query(QueryError),
     /// The tree's bytes changed since they were validated: [`Scrub`](crate::Scrub).
     CorruptTree,
-    /// No good packet came for longer than allowed.
+    /// No good packet came within the time allowed.
     LinkLost {
         /// Time since the last one, on the receiver's clock.
         silence: u32,
     },
-    /// No heartbeat came for longer than allowed.
+    /// No heartbeat came within the time allowed.
     HeartbeatLost {
         /// Time since the last one, on the receiver's clock.
         silence: u32,
     },
-    /// More was rejected than allowed since the last frame was published.
+    /// More frames were refused or damaged than allowed since the last publication.
     Rejections {
-        /// Frames refused or damaged.
+        /// Their number.
         streak: u32,
     },
-    /// The surface was longer on its way than allowed, or for an unknown time.
+    /// The surface was on its way for longer than allowed, or for an unknown time.
     Delayed {
         /// From the status that it echoes to its arrival, on the receiver's clock.
         transit: u32,
@@ -47,14 +47,14 @@ pub enum Unavailable {
         /// Its age then.
         age: u32,
     },
-    /// More packets were forged than allowed since the last frame was published.
+    /// More packets were forged than allowed since the last publication.
     Forgeries {
         /// Packets without a genuine tag.
         count: u32,
     },
     /// The tool's axis touches the surface: no direction leads out.
     NoDirection,
-    /// The budget ended before it was known on which side of the surface the tool is, or which contacts it has.
+    /// The budget ended before the tool's side or its contacts were known.
     CutShort,
     /// A number is not finite, or the direction is not a unit vector.
     NotFinite,

@@ -40,19 +40,19 @@ pub enum QueryError {
         /// Number of the frame that was measured.
         found: u32,
     },
-    /// No triangle was found within reach of the nearest pin: the surface is stretched beyond what the
-    /// query was told, or the tree's bytes changed after they were validated.
+    /// No triangle was found as close as the nearest pin: the surface is stretched beyond the query's limit, or the
+    /// tree's bytes changed after they were validated.
     Uncovered {
         /// Row of the nearest pin.
         pin: u32,
     },
-    /// The tree has no adjacency, so that nothing is known of a triangle's surroundings.
+    /// The tree has no adjacency, so a triangle's neighbours are unknown.
     NoAdjacency,
-    /// A list of contacts without room, or with too much.
+    /// A list of contacts with no room, or too much.
     Contacts {
         /// Contacts that the list holds.
         capacity: u32,
-        /// Triangles that it can look at together, at most 65,534.
+        /// Triangles that it can compare, at most 65,534.
         near: u32,
     },
     /// A margin that is not a number of at least 0.

@@ -2,12 +2,12 @@
 
 use super::{METRIC_BYTES, rows_from};
 
-/// How a triangle's stretch is measured: along which of its edges, and by what they are at rest.
+/// The rest shape of a triangle, as its stretch is measured against it.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Metric {
-    /// Of the edge from the centre to the other of the first two corners; of both edges; and of the edge from
-    /// the centre to the third corner: see `docs/format.md`.
+    /// The Gram matrix of the edges from the centre to the other of the first two corners and to the third corner, or
+    /// the three squared lengths: see `docs/format.md`.
     pub squares: [f32; 3],
     /// How the triangle continues the one in the row before.
     pub join: Join,
@@ -16,7 +16,7 @@ pub struct Metric {
 }
 
 impl Metric {
-    /// The metric in one row. (Each number is read whole, so that it takes one load.)
+    /// The metric in one row.
     #[inline(always)]
     pub(crate) const fn new([first, between, second]: [f32; 3]) -> Self {
         Self {
@@ -33,22 +33,21 @@ impl Metric {
     }
 }
 
-/// What a triangle's first edge, from its centre to the other of its first two corners, is to the triangle in the
-/// row before.
+/// The role, in the triangle of the row before, of a triangle's first edge, which leads from its centre to the other of
+/// its first two corners.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Join {
-    /// Nothing that a reader may count on. The centre is the first corner.
+    /// No known role. The centre is the first corner.
     Start,
     /// The edge from the centre to the third corner.
     Fan,
-    /// The same, the other way round: what was the third corner is the centre.
+    /// The same edge reversed: the third corner there is the centre here.
     Flip,
 }
 
 impl Join {
-    /// As the first number of a row has it: the sign marks a fan, and the lowest bit, where the sign is clear, a
-    /// flip.
+    /// Decodes the first number of a row: the sign marks a fan; without it, the lowest bit marks a flip.
     #[inline(always)]
     pub(crate) const fn marked(first: f32) -> Self {
         let bits = first.to_bits();
@@ -61,7 +60,7 @@ impl Join {
         }
     }
 
-    /// Whether a triangle continues the one before in this way; both by their corners, the centre first.
+    /// Whether a triangle continues the one before in this way, by the corners of both, the centre first.
     #[must_use]
     pub const fn is_between(self, [a, _, c]: [u32; 3], [centre, other, _]: [u32; 3]) -> bool {
         match self {

@@ -1,8 +1,7 @@
 //! The tree's bytes: little-endian records at fixed places, read from flash without a parsing pass.
 //!
-//! `docs/format.md` is the specification; this module is its only reader, [`field`] the table of the header.
-//! Everything here is `const` so that a tree may be validated in a constant too; a generated one is validated when
-//! it boots.
+//! `docs/format.md` is the specification, this module its only reader, and [`field`] the table of the header. Most
+//! functions are `const`, so that a tree may be validated in a constant; a generated one is validated at start-up.
 
 mod metric;
 pub(crate) mod several;
@@ -26,7 +25,7 @@ pub const SECTION_BYTES: usize = 12;
 /// Every section starts at a multiple of this.
 #[doc(hidden)]
 pub const SECTION_ALIGN: usize = 16;
-/// Most entries that a traversal's stack may need, whatever the tree.
+/// Most stack entries that a traversal of any tree may need.
 pub const MAX_STACK: usize = 512;
 /// Most children of one node.
 pub const MAX_CHILDREN: u32 = 8;
@@ -43,8 +42,7 @@ pub const LIMIT_BYTES: usize = 2;
 #[doc(hidden)]
 pub const MAX_LIMIT_CODE: u32 = 0xFFFF;
 
-/// Where the header's fields stand: offsets in bytes. Numbers are little-endian, of four bytes unless it says
-/// otherwise.
+/// Byte offsets of the header's fields. Numbers are little-endian, of four bytes unless stated otherwise.
 #[doc(hidden)]
 pub mod field {
     use core::ops::Range;
@@ -69,7 +67,7 @@ pub mod field {
     pub const STRETCH: usize = 28;
     /// The length of one radius code, `f32`.
     pub const RADIUS_UNIT: usize = 32;
-    /// How far a vertex may be from the place that the mesh's file has, `f32`.
+    /// Largest distance of a vertex from its position in the mesh's file, `f32`.
     pub const POSITION_ERROR: usize = 36;
     /// Zeros.
     pub const RESERVED: Range<usize> = 40..48;
@@ -89,7 +87,7 @@ pub mod field {
 /// 3 in up to 91,607, any 2 in a tree (Koopman, "32-bit cyclic redundancy codes for internet
 /// applications", DSN 2002). Of other damage one pattern in 2^32 passes.
 ///
-/// A `static`, not a constant: every use of a constant would bring its own table.
+/// A `static`, because every use of a constant would add another table.
 #[doc(hidden)]
 pub static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
@@ -100,14 +98,14 @@ pub mod section {
     pub const NODES: u32 = 1;
     /// Three vertex rows a triangle, leaf by leaf, depth first.
     pub const TRIANGLES: u32 = 2;
-    /// The mesh's own vertex number of every row (optional: hosts need it, a controller does not).
+    /// The mesh's vertex number of every row (optional: hosts need it, a controller does not).
     pub const VERTEX_ORDER: u32 = 3;
     /// Rest position of every row, three `f32` (optional).
     pub const REST: u32 = 4;
     /// Rest metric of every triangle, three `f32` (optional: the stretch measurement needs it).
     pub const METRIC: u32 = 5;
-    /// Stretch limit of every triangle, a 16-bit part of the tree's (optional: where it is absent, the
-    /// tree's limit is each triangle's).
+    /// Stretch limit of every triangle, a 16-bit part of the tree's (optional: without it the tree's limit holds for
+    /// each).
     pub const LIMITS: u32 = 6;
     /// Displacement modes (optional).
     pub const MODES: u32 = 7;
@@ -115,7 +113,7 @@ pub mod section {
     pub const ADJACENCY: u32 = 8;
 }
 
-/// How geodesic radii were measured, which decides which measured stretch limits their growth.
+/// How geodesic radii were measured, and so which stretch bounds their growth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -147,7 +145,7 @@ impl PathKind {
     }
 }
 
-/// A node's children, or a leaf's triangles. Both are one run of rows.
+/// A node's children, or a leaf's triangles, as a run of rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Link {
     /// Rows `first..first + count` of the node table.
@@ -235,8 +233,7 @@ pub(crate) fn run(bytes: &[u8], first: u32, count: u32, stride: usize) -> Option
     bytes.get(start..end)
 }
 
-/// The node at the start of these bytes, and the bytes after it. (Each field is read whole, so that it
-/// takes one load.)
+/// The node at the start of these bytes, and the bytes after it. (Each field is read in one load.)
 #[inline(always)]
 pub(crate) const fn split_node<I: Index>(rows: &[u8]) -> Option<(Node, &[u8])> {
     if I::BYTES == 2 {
@@ -264,8 +261,8 @@ pub(crate) const fn node<I: Index>(nodes: &[u8], row: u32) -> Option<Node> {
     }
 }
 
-/// As [`node`], found among whole records: one comparison instead of one a field. (Compile-time validation
-/// would take longer with it.)
+/// As [`node`], but with one bounds check for the record instead of one for each field. (Compile-time validation would
+/// take longer with it.)
 #[inline(always)]
 pub(crate) fn whole_node<I: Index>(nodes: &[u8], row: u32) -> Option<Node> {
     let record: &[u8] = if I::BYTES == 2 {
@@ -325,7 +322,7 @@ pub(crate) const fn neighbour_code<I: Index>(adjacency: &[u8], row: u32, edge: u
     }
 }
 
-/// The code of an edge that no other triangle has.
+/// The code of a border edge.
 #[must_use]
 pub const fn no_neighbour<I: Index>() -> u32 {
     if I::BYTES == 2 { 0xFFFF } else { u32::MAX }

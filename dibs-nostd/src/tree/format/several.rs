@@ -1,12 +1,12 @@
-//! Several rows of a table by one comparison, for searches that look at several things at once.
+//! Several rows of a table by one bounds check, for the wide search.
 //!
-//! So that no loop depends on how many there are, what is read has one size, and may reach into the rows
-//! after those that were asked for. At the end of a table zeros take their place.
+//! Reads have one size, so that no loop depends on a count. They may include rows after the requested ones, and zeros
+//! past the end of the table.
 
 use super::{Node, node_bytes};
 use crate::Index;
 
-/// Copies eight node records: a run of `count`, and the bytes after it.
+/// Copies eight node records: a run of `count`, and the records after it.
 #[inline(always)]
 pub(crate) fn copy_nodes<I: Index>(
     nodes: &[u8],
@@ -45,7 +45,7 @@ pub(crate) fn four_nodes<I: Index>(rows: &[u8]) -> Option<[Node; 4]> {
 }
 
 /// Twelve vertices, of which the first `count + 2` are those of a leaf of `count` triangles: the first triangle's
-/// corners, and of each of the others the third, since only that may be new to the leaf.
+/// corners, and the third corner of each other, since only that may be new to the leaf.
 #[inline(always)]
 pub(crate) fn leaf_vertices<I: Index>(
     triangles: &[u8],
@@ -57,7 +57,7 @@ pub(crate) fn leaf_vertices<I: Index>(
     Some([a, b, c, d, e, f, g, h, i, j, j, j])
 }
 
-/// Four triangles: those of a run of `count`, if not more, and what follows them. All the first corners, all the
+/// Four triangles: the first of a run of `count`, and any rows after a shorter run. All the first corners, all the
 /// second and all the third.
 #[inline(always)]
 pub(crate) fn four_triangles<I: Index>(
@@ -71,7 +71,7 @@ pub(crate) fn four_triangles<I: Index>(
     Some([[a, d, g, j], [b, e, h, k], [c, f, i, l]])
 }
 
-/// `N` indices from index `at` on, of which the first `needed` must be there.
+/// `N` indices from index `at` on, of which the first `needed` must exist.
 #[inline(always)]
 fn indices<I: Index, const N: usize>(bytes: &[u8], at: usize, needed: usize) -> Option<[u32; N]> {
     if I::BYTES == 2 {
@@ -85,7 +85,8 @@ fn indices<I: Index, const N: usize>(bytes: &[u8], at: usize, needed: usize) -> 
     }
 }
 
-/// The first `N` rows, of which `needed` must be there; in `last` if there are not as many.
+/// The first `N` rows, of which `needed` must exist. If there are fewer than `N`, `last` holds them with zeros
+/// appended.
 #[inline(always)]
 fn chunk<'r, T: Copy + Default, const N: usize>(
     rows: &'r [T],
