@@ -1,17 +1,16 @@
-//! How far a modal surface is stretched, at most, from its weights alone.
+//! An upper bound on a modal surface's stretch, from its weights alone.
 //!
-//! Positions are linear in the weights, so each triangle's deformation gradient is too, and its largest
-//! singular value, a norm, is convex; so is the length of an edge, and the largest over all triangles.
-//! Two things follow for the stretch `sigma(w)`, with `g_k` the largest norm of any triangle's gradient
-//! of mode `k`:
+//! Positions are linear in the weights, and so is each triangle's deformation gradient. Its largest singular value, a
+//! norm, is therefore convex, as are an edge's length and the largest over all triangles. Two bounds follow for the
+//! stretch `sigma(w)`, with `g_k` the largest norm of any triangle's gradient of mode `k`:
 //!
 //! - `sigma(w) <= sigma(a) + sum of g_k |w_k - a_k|`, from any shape `a`;
 //! - `sigma(a + t (b - a)) <= (1 - t) sigma(a) + t sigma(b)`, between any two.
 //!
-//! The builder stores the weights of recorded shapes with their measured stretch, the *anchors*. The
-//! bound is the least of: from each anchor; from the nearest point of the two segments that join the
-//! nearest recorded anchor to its neighbours in time, the last to the first. At a recorded frame it is
-//! that frame's stretch, between two of them hardly more, and away from them it grows with the distance.
+//! The builder stores the weights of recorded shapes with their measured stretch, the *anchors*. The bound is the least
+//! of: from each anchor; from the nearest point of the two segments that join the nearest recorded anchor to its
+//! neighbours in time, the last to the first. At a recorded frame the bound is that frame's stretch, between two of
+//! them it is hardly more, and away from them it grows with the distance.
 //!
 //! Rounding. The arithmetic here is some tens of roundings deep: a relative 2^-16 covers it. The slack
 //! that the builder stores covers the positions' (a rounded vertex moves the gradient by its error over
@@ -25,12 +24,11 @@ use crate::surface::MeasuredStretch;
 const ROUNDING: f32 = 1.0 + 1.0 / 65_536.0;
 
 impl Modes<'_> {
-    /// An upper bound of the stretch of the surface at these weights: never below the true one, and at
-    /// the recorded frames what [`measure_stretch`](crate::measure_stretch) measures, but for rounding.
-    /// Its [`triangle`](MeasuredStretch::triangle) is the one
-    /// stretched most in the nearest of them.
+    /// An upper bound of the stretch of the surface at these weights: never below the true one, and at the recorded
+    /// frames what [`measure_stretch`](crate::measure_stretch) measures, but for rounding. Its
+    /// [`triangle`](MeasuredStretch::triangle) is the one stretched most in the nearest recorded frame.
     ///
-    /// Cost: O(modes times anchors), whatever the number of triangles.
+    /// Cost: O(modes times anchors).
     ///
     /// # Errors
     /// [`WeightsError`] for weights that [`check`](Self::check) refuses.
@@ -39,10 +37,10 @@ impl Modes<'_> {
         Ok(self.bound(weights))
     }
 
-    /// The same, of weights that were checked.
+    /// The same, for checked weights.
     pub(super) fn bound(&self, weights: &[f32]) -> MeasuredStretch {
         let mut sigma = f32::INFINITY;
-        // Among the recorded shapes, which stand in a ring: a beat ends where the next begins.
+        // The recorded shapes form a ring, because a beat ends where the next begins.
         let (mut nearest, mut shortest) = (1, f32::INFINITY);
         for row in 0..self.anchor_count() {
             let Some(anchor) = self.anchor(row) else { break };
@@ -75,7 +73,7 @@ impl Modes<'_> {
         layout::anchor(self.anchors, row, self.count())
     }
 
-    /// Most that the way from an anchor's shape to these weights adds to the stretch.
+    /// Most that the difference between an anchor's shape and these weights adds to the stretch.
     fn growth_from(&self, weights: &[f32], anchor: Anchor<'_>) -> f32 {
         let mut sum = 0.0;
         for ((weight, from), mode) in weights.iter().zip(anchor.weights).zip(self.modes()) {
@@ -84,7 +82,7 @@ impl Modes<'_> {
         sum
     }
 
-    /// The bound from the point between two anchors that is nearest, in a sense: any would do.
+    /// The bound from a point between two anchors, near these weights. Any point gives a valid bound.
     fn between(&self, weights: &[f32], a: Anchor<'_>, b: Anchor<'_>) -> f32 {
         let ends = || a.weights.iter().zip(b.weights).zip(self.modes());
         let (mut along, mut length) = (0.0, 0.0);
@@ -95,7 +93,7 @@ impl Modes<'_> {
             length += square * (b - a) * (b - a);
         }
         let t = along / length;
-        // Also where two anchors are one, and `t` is no number.
+        // Also if two anchors are equal, and `t` is NaN.
         if !(t > 0.0 && t < 1.0) {
             return f32::INFINITY;
         }

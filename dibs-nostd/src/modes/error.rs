@@ -56,7 +56,7 @@ impl fmt::Display for ModesError {
 
 impl core::error::Error for ModesError {}
 
-/// Why weights do not make a surface.
+/// Why weights are refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -84,7 +84,7 @@ pub enum WeightsError {
     Capacity {
         /// Modes of the surface.
         needed: u32,
-        /// Weights that there is room for.
+        /// Weights that the buffer holds.
         available: u32,
     },
 }

@@ -7,25 +7,25 @@ use crate::surface::VertexTable;
 /// Admits weights within their ranges whose surface keeps to the stretch limit, and to a speed limit: the
 /// [`Gate`] of an [`Assembler`](crate::Assembler) of modal frames.
 ///
-/// [`Modes::stretch_bound`] and a bound on the vertices' motion decide in O(modes), whatever the number of
-/// triangles. Only where one of them is beyond its limit, and so cannot tell, is the surface measured by another
-/// gate `G`, in slices if that is a [`StretchMonitor`](crate::StretchMonitor): between the two nothing is refused
-/// that is within the limits, and no frame admitted that is stretched or moved beyond them.
+/// [`Modes::stretch_bound`] and a bound on the vertices' motion decide in O(modes), whatever the number of triangles.
+/// If a bound exceeds its limit, another gate `G` measures the surface, in slices if that is a
+/// [`StretchMonitor`](crate::StretchMonitor). So no frame within the limits is refused, and no frame stretched or moved
+/// beyond them is admitted.
 ///
-/// The limit on speed is `G`'s: [`StretchMonitor::limits`](crate::StretchMonitor::limits). Its limit on size holds
-/// for frames that are measured; the others are as small as weights in their ranges make them.
+/// The limit on speed is `G`'s: [`StretchMonitor::limits`](crate::StretchMonitor::limits). Its limit on size holds only
+/// for frames that it measures.
 #[derive(Clone, Debug)]
 pub struct ModalGate<'a, G, const K: usize> {
     modes: Modes<'a>,
     exact: G,
-    /// The surface that is being measured, where a bound could not tell.
+    /// The surface that `exact` measures, where a bound exceeded its limit.
     surface: Option<ModalSurface<'a, K>>,
     measured: u32,
 }
 
 impl<'a, G, const K: usize> ModalGate<'a, G, K> {
     /// A gate for surfaces of exactly `K` modes. `exact`, the tree or a monitor of it, measures the surfaces that the
-    /// bounds do not decide. Only a monitor limits the speed.
+    /// bounds cannot admit. Only a monitor limits the speed.
     ///
     /// # Errors
     /// [`WeightsError::Count`] for another number of modes.
@@ -37,13 +37,13 @@ impl<'a, G, const K: usize> ModalGate<'a, G, K> {
         Ok(Self { modes: *modes, exact, surface: None, measured: 0 })
     }
 
-    /// Frames that had to be measured since the start; stops at its largest value.
+    /// Frames measured by the inner gate since the start; saturates.
     #[must_use]
     pub const fn measured(&self) -> u32 {
         self.measured
     }
 
-    /// The weights that these rows hold.
+    /// The weights in these rows.
     fn weights<V: VertexTable + ?Sized>(rows: &V) -> Result<[f32; K], StretchError> {
         let mut weights = [0.0; K];
         for (row, weight) in (0..).zip(&mut weights) {
@@ -71,7 +71,7 @@ impl<G: Gate, const K: usize> Gate for ModalGate<'_, G, K> {
         self.modes.position_error()
     }
 
-    /// The rows hold weights, as an assembler stores them, of this frame and of the published one.
+    /// The rows hold the weights of this frame and of the published one, as an assembler stores them.
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
         Arriving { surface: rows, ready, before }: Arriving<'_, V>,

@@ -35,11 +35,11 @@ pub(super) struct Mode {
     pub high: f32,
     /// Units of a displacement sum, times 2^16, for one step of a displacement at weight 1.
     pub gain: f32,
-    /// Most that a weight of 1 adds to any triangle's stretch.
+    /// Most that a weight of 1 can add to a triangle's stretch.
     pub growth: f32,
 }
 
-/// Header, and the parts: mode records, anchors, rows.
+/// The header, the mode records, the anchors and the rows.
 pub(super) const fn parts(
     bytes: &[u8],
     vertices: u32,
@@ -108,7 +108,7 @@ pub(super) const fn parts(
     }
 }
 
-/// A number of at least 0 with which lengths do not overflow.
+/// Whether it is a number of at least 0 with which lengths do not overflow.
 const fn is_length(x: f32) -> bool {
     x >= 0.0 && x <= 1e18
 }
@@ -160,7 +160,7 @@ pub(super) const fn anchor_bytes(modes: usize) -> usize {
     4 * modes + ANCHOR_TAIL_BYTES
 }
 
-/// Not a number outside the bytes, which no check lets pass.
+/// The `f32` at an offset; outside the bytes NaN, which every check refuses.
 const fn f32_at(bytes: &[u8], at: usize) -> f32 {
     match u32_at(bytes, at) {
         Some(bits) => f32::from_bits(bits),

@@ -1,4 +1,4 @@
-//! Positions that were computed before.
+//! A cache of computed positions.
 
 use core::cell::Cell;
 
@@ -6,13 +6,11 @@ use glam::Vec3;
 
 use crate::surface::{MeasuredStretch, VertexTable};
 
-/// A vertex table that remembers some positions of another one: for a
-/// [`ModalSurface`](super::ModalSurface), of which a query asks for the same vertices a few times, as
-/// pins and as corners of several triangles.
+/// A vertex table that caches positions of another one, such as a [`ModalSurface`](super::ModalSurface): a query reads
+/// the same vertices a few times, as pins and as corners of several triangles.
 ///
-/// `N` slots of 16 bytes, a power of two for speed, each for every `N`th row: rows that are near each
-/// other, and so are vertices on the surface, do not displace each other. Make one for each query, on
-/// the stack; it does not change any bit of the answer.
+/// `N` slots of 16 bytes, a power of two for speed. A slot serves every `N`th row, so neighbouring rows, which are
+/// close on the surface, do not evict each other. Make one for each query, on the stack; it does not change the answer.
 ///
 /// ```
 /// use dibs_nostd::{VertexTable, glam::Vec3, modes::Memo};
@@ -34,11 +32,11 @@ struct Slot {
     position: Vec3,
 }
 
-/// No row has this number: a table's length is at most that.
+/// No row has this number, since a table's length is at most this.
 const NOBODY: u32 = u32::MAX;
 
 impl<'t, T: VertexTable + ?Sized, const N: usize> Memo<'t, T, N> {
-    /// A memory of this table, empty. Cost: `N` slots are written.
+    /// An empty cache of this table. Cost: `N` slots are written.
     #[must_use]
     pub const fn new(table: &'t T) -> Self {
         const EMPTY: Slot = Slot { vertex: NOBODY, position: Vec3::ZERO };

@@ -1,15 +1,14 @@
 //! Surfaces that a few weights move: a rest shape plus displacement modes, in flash.
 //!
-//! A vertex is at `rest + sum of weight_k * mode_k`, and is computed when a query asks for it, never
-//! before (Bowyer & Rodriguez y Baena 2014 name this "lazy evaluation" as future work). So a frame is
-//! as large as its weights, at most [`MAX_MODES`] numbers, and nothing has to be done to thousands of
-//! vertices at each tick.
+//! A vertex is at `rest + sum of weight_k * mode_k`, computed only when a query reads it (Bowyer & Rodriguez y Baena
+//! 2014 name this "lazy evaluation" as future work). So a frame is at most [`MAX_MODES`] weights, and no tick touches
+//! all vertices.
 //!
 //! | | |
 //! |---|---|
 //! | [`Modes`] | the builder's fit, read from the tree's bytes and validated once |
 //! | [`ModalSurface`] | the surface at some weights: a [`VertexTable`](crate::VertexTable) |
-//! | [`Modes::stretch_bound`] | how far it is stretched, in time that does not depend on the vertices |
+//! | [`Modes::stretch_bound`] | a bound on its stretch, in time that does not depend on the vertices |
 //! | [`ModalGate`], [`ModalReader`] | both ends of a bus that carries weights |
 //! | [`Memo`] | remembers positions, for the length of a query |
 
@@ -25,7 +24,7 @@ use layout::Header;
 
 pub use error::{ModesError, WeightsError};
 pub use gate::ModalGate;
-/// The bytes of the modes, for their builder.
+/// The layout of the modes' bytes, for their builder.
 #[doc(hidden)]
 pub use layout::{ANCHOR_TAIL_BYTES, HEADER_BYTES, MAX_ANCHORS, MODE_BYTES, VERTEX_MODE_BYTES};
 pub use memo::Memo;
@@ -93,13 +92,12 @@ pub struct Modes<'a> {
 }
 
 impl<'a> Modes<'a> {
-    /// Validates the modes that a tree carries (section 7 of `docs/format.md`). `const`: for a
-    /// generated `static` the compiler does it.
+    /// Validates the modes that a tree carries (section 7 of `docs/format.md`).
     ///
-    /// Cost: O(modes times anchors). The rows need no check, any bits are displacements.
+    /// Cost: O(modes times anchors). The rows need no check, since any bits are displacements.
     ///
     /// # Errors
-    /// [`ModesError`] names the first thing that is wrong and its value.
+    /// [`ModesError`] names the first defect and its value.
     pub const fn of<I: Index>(tree: &Tree<'a, I>) -> Result<Self, ModesError> {
         let sections = tree.sections();
         if sections.modes.is_empty() {
@@ -156,9 +154,9 @@ impl<'a> Modes<'a> {
         self.limit
     }
 
-    /// Largest distance between a recorded vertex and the modal surface's, over the motion that the
-    /// modes were fitted to, everything included: modes left out, quantisation, arithmetic (mm). For
-    /// the answer's accuracy: [`Proximity::widened`](crate::Proximity::widened).
+    /// Largest distance (mm) between a recorded vertex and the modal surface's, over the motion that the modes were
+    /// fitted to: from modes left out, quantisation and arithmetic. For the answer's accuracy:
+    /// [`Proximity::widened`](crate::Proximity::widened).
     ///
     /// It says nothing about motions other than the recorded one.
     #[must_use]
@@ -172,7 +170,7 @@ impl<'a> Modes<'a> {
         self.header.rms_error
     }
 
-    /// How far [`range`](Self::range) goes beyond the recorded range, as a part of it.
+    /// Part of the recorded range by which [`range`](Self::range) exceeds it.
     #[must_use]
     pub const fn margin(&self) -> f32 {
         self.header.margin
@@ -184,8 +182,7 @@ impl<'a> Modes<'a> {
         HEADER_BYTES + self.records.len() + self.anchors.len() + self.rows.len()
     }
 
-    /// Smallest and largest weight of a mode that [`check`](Self::check) admits; `None` for a mode
-    /// that is not there.
+    /// Smallest and largest weight of a mode that [`check`](Self::check) admits; `None` for a mode that does not exist.
     #[must_use]
     pub const fn range(&self, mode: usize) -> Option<[f32; 2]> {
         match layout::mode(self.records, mode) {
@@ -194,14 +191,13 @@ impl<'a> Modes<'a> {
         }
     }
 
-    /// Position of a vertex at rest (mm): where all weights are 0. `None` outside the table.
+    /// Position of a vertex at rest (mm), with all weights 0. `None` outside the table.
     #[must_use]
     pub const fn rest_position(&self, vertex: u32) -> Option<Vec3> {
         format::rest_position(self.rest, vertex)
     }
 
-    /// Size of one step of a mode's displacements at weight 1 (mm); `None` for a mode that is not
-    /// there.
+    /// Size of one step of a mode's displacements at weight 1 (mm); `None` for a mode that does not exist.
     #[must_use]
     pub const fn step(&self, mode: usize) -> Option<f32> {
         match layout::mode(self.records, mode) {
@@ -219,10 +215,10 @@ impl<'a> Modes<'a> {
         Some([[x0, x1], [y0, y1], [z0, z1]].map(i16::from_le_bytes))
     }
 
-    /// Whether there is one weight for each mode, finite and in the mode's range. O(modes).
+    /// Checks that there is one weight for each mode, finite and in the mode's range. O(modes).
     ///
     /// # Errors
-    /// [`WeightsError`] names the first weight that is not right.
+    /// [`WeightsError`] names the first weight that is not.
     pub fn check(&self, weights: &[f32]) -> Result<(), WeightsError> {
         if weights.len() != self.count() {
             return Err(WeightsError::Count {

@@ -5,8 +5,8 @@ use glam::Vec3;
 use super::{ModalSurface, Modes, WeightsError};
 use crate::surface::{FrameGuard, FrameLabel, FrameReader, Latest, MeasuredStretch, VertexTable};
 
-/// Reads published weights as surfaces. The double buffer is [`Frames`](crate::Frames) of `K` rows, of
-/// which each holds one weight.
+/// Reads published weights as surfaces. The double buffer is [`Frames`](crate::Frames) of `K` rows, with one weight in
+/// each.
 #[derive(Debug)]
 pub struct ModalReader<'f, 'a, const K: usize> {
     frames: FrameReader<'f, K>,
@@ -28,15 +28,14 @@ impl<'f, 'a, const K: usize> ModalReader<'f, 'a, K> {
 
     /// The published surface and its age at `now`, on the receiver's clock. O(modes).
     ///
-    /// The weights are copied: unlike with [`FrameReader::latest`], frames are published meanwhile, for
-    /// as long as this one is kept.
+    /// The weights are copied, so frames can be published while this one is kept, unlike with [`FrameReader::latest`].
     #[inline]
     pub fn latest(&mut self, now: u32) -> Latest<ModalFrame<'a, K>> {
         let modes = &self.modes;
         self.frames.latest(now).map(|frame| ModalFrame::new(modes, &frame))
     }
 
-    /// The same without a look at its age; `None` before the first.
+    /// The published surface, without its age; `None` before the first.
     #[inline]
     pub fn read(&mut self) -> Option<ModalFrame<'a, K>> {
         let frame = self.frames.read()?;
@@ -44,7 +43,7 @@ impl<'f, 'a, const K: usize> ModalReader<'f, 'a, K> {
     }
 }
 
-/// A published modal surface: a [`VertexTable`] that carries the bound of its stretch and its position error.
+/// A published modal surface: a [`VertexTable`] that carries a bound on its stretch and its position error.
 #[derive(Clone, Copy, Debug)]
 pub struct ModalFrame<'a, const K: usize> {
     surface: ModalSurface<'a, K>,
@@ -57,8 +56,7 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         Self { surface: ModalSurface::new(modes, weights), label: frame.label() }
     }
 
-    /// The facts about this frame. Its position error is that of the modes, against the motion that
-    /// they were fitted to.
+    /// The facts about this frame. Its position error is that of the modes for the motion that they were fitted to.
     #[must_use]
     pub const fn label(&self) -> FrameLabel {
         self.label

@@ -1,4 +1,4 @@
-//! Keep out: a margin around the surface that pushes the tool back.
+//! Keeps the tool out of a margin around the surface.
 
 use glam::Vec3;
 
@@ -6,16 +6,16 @@ use super::{Approach, ConstraintForce, GainError, SpringDamper, positive};
 use crate::query::Proximity;
 use crate::unavailable::Unavailable;
 
-/// Pushes the tool away from the surface within a margin, and only ever away.
+/// Pushes the tool away from the surface within a margin; never pulls.
 ///
 /// Force along the closest pair's direction, with `d = lower - accuracy`:
 ///
 /// `F = min(max_force, max(0, K (margin - d) - B v))` for `d < margin`, else 0,
 ///
 /// where `v` is the tool's speed out of the surface, negative on approach. Inside, `d` is below zero, and the spring
-/// grows with the depth up to saturation. Where a budget cut the query short, the side is unknown, and the output is the
-/// hold. Of a query without sides ([`Options::unsigned`](crate::Options::unsigned)), `lower` stands for the nearest place
-/// where the surface could be, and the direction is that of the best pair found.
+/// grows with the depth up to saturation. If the budget ended before the side was known, the output is the hold. For a
+/// query without sides ([`Options::unsigned`](crate::Options::unsigned)), `lower` is the least possible separation, and
+/// the direction is that of the best pair found.
 ///
 /// ```
 /// use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
@@ -24,7 +24,7 @@ use crate::unavailable::Unavailable;
 /// let spring = SpringDamper::stiffness(2.0).damping(0.01).max_force(5.0); // N/mm, N s/mm, N
 /// let wall = ForbiddenRegion::new(spring, 3.0)?; // mm
 ///
-/// // No surface yet: the tool is damped, the state says why.
+/// // No surface yet: the tool is damped, and the state gives the reason.
 /// let safe = wall.force(&Err(Unavailable::NoSurface), Vec3::new(100.0, 0.0, 0.0));
 /// assert_eq!(safe.state, ConstraintState::Safe(Unavailable::NoSurface));
 /// assert_eq!(safe.force, Vec3::new(-1.0, 0.0, 0.0));
@@ -50,8 +50,8 @@ impl ForbiddenRegion {
 
     /// The force on the tool at this tick.
     ///
-    /// `velocity` (mm/s) is that of the tool's closest point against the surface; the tool's own
-    /// velocity takes the surface as standing still.
+    /// `velocity` (mm/s) is that of the tool's closest point relative to the surface; the tool's absolute velocity
+    /// takes the surface as standing still.
     #[must_use]
     pub fn force(
         &self,

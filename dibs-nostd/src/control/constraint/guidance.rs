@@ -1,4 +1,4 @@
-//! Stay near: a spring to a stand-off from the surface.
+//! Keeps the tool near: a spring to a stand-off from the surface.
 
 use glam::Vec3;
 
@@ -6,16 +6,15 @@ use super::{Approach, ConstraintForce, GainError, SpringDamper, not_negative};
 use crate::query::Proximity;
 use crate::unavailable::Unavailable;
 
-/// Draws the tool to a stand-off from the surface, from either side, with a dead band in which it is
-/// free.
+/// Draws the tool to a stand-off from the surface, with a dead band in which it is free.
 ///
 /// Force along the closest pair's direction, with `d = lower - accuracy` and `e = d - stand_off`:
 ///
 /// `F = -K (e -/+ dead_band) - B v` for `e` above / below the dead band, else 0, saturated at
 /// `max_force` both ways.
 ///
-/// The lower end of the interval is the conservative one here too: it pulls towards the surface
-/// least, and pushes away from it most.
+/// The lower end of the interval is conservative here too: it gives the least pull towards the surface, and the largest
+/// push away from it.
 ///
 /// ```
 /// use dibs_nostd::constraint::{ConstraintState, Guidance, SpringDamper};

@@ -1,39 +1,38 @@
 //! From the closest pair to the force of a dynamic active constraint.
 //!
 //! Two constraints, both a spring and a damper along the closest pair's direction: [`ForbiddenRegion`] keeps the tool
-//! out of a margin around the surface, [`Guidance`] keeps it at a stand-off. With all contacts of a tool instead of
-//! one, [`Proxy`] keeps it out with force and torque, and [`VelocityRow`] is what a controller's own quadratic program
-//! takes. Units: mm, mm/s, N, N mm, N/mm, N s/mm, s. A force of one pair costs some tens of f32 operations and one
-//! root, without a loop.
+//! out of a margin around the surface, [`Guidance`] keeps it at a stand-off. From all contacts of a tool, [`Proxy`]
+//! makes a force and a torque that keep it out, and [`VelocityRow`] a constraint for a controller's quadratic program.
+//! Units: mm, mm/s, N, N mm, N/mm, N s/mm, s. A force of one pair costs some tens of f32 operations and one root,
+//! without a loop.
 //!
 //! # Promises
 //!
-//! - A force is finite and never larger than `max_force` (up to the direction's rounding), whatever
-//!   comes in.
+//! - For any input a force is finite and never larger than `max_force` (up to the direction's rounding).
 //! - It is computed from the conservative end of the certified interval, `lower - accuracy`.
 //! - Where the surface has sides (a tree with adjacency, see [`Side`](crate::Side)), it leads outwards from first
 //!   contact to any depth, and its size is continuous through contact and through the surface. Where it has none, or
 //!   the query was [`unsigned`](crate::Options::unsigned), the tool is taken to be outside, and a query that its budget
-//!   cut short never lets it closer.
-//! - When the proximity is unknown, the surface stale, a number not finite, or the budget ended before the side was
-//!   known, the output is the *hold*: pure damping against the tool's velocity, saturated the same way, and the state says
-//!   why. With a velocity that is not finite it is zero.
+//!   cut short never weakens the force.
+//! - If the proximity is unknown, the surface stale, a number not finite, or the budget ended before the side was
+//!   known, the output is the *hold*: pure damping against the tool's velocity, saturated the same way, and the state
+//!   gives the reason. For a velocity that is not finite it is zero.
 //!
 //! # No promise: passivity
 //!
-//! A sampled virtual wall puts out energy. Colgate and Schenkel ("Passivity of a class of sampled-data
-//! systems", J. Robotic Systems 14, 1997; ACC 1994) show that with sampling period `T`, stiffness `K`
-//! and damping `B` it is passive exactly if the device's own physical damping `b` satisfies
-//! `b > K T / 2 + |B|`, for velocities by backward difference; a velocity filter and delays ask for
-//! more. [`SpringDamper::device_damping`] computes that figure. Beyond it:
+//! A sampled virtual wall generates energy. Colgate and Schenkel ("Passivity of a class of sampled-data systems", J.
+//! Robotic Systems 14, 1997; ACC 1994) show that with sampling period `T`, stiffness `K` and damping `B` it is passive
+//! exactly if the device's own physical damping `b` satisfies `b > K T / 2 + |B|`, for velocities by backward
+//! difference; a velocity filter and delays need more. [`SpringDamper::device_damping`] computes that figure. Beyond
+//! it:
 //!
 //! - On entering a margin the damper acts at once: the force jumps by `B` times the approach speed.
-//! - Where two parts of the surface are equally near (the medial axis), the closest point and with it
-//!   the direction jump from one tick to the next. The size of the force does not, its direction
-//!   does. A narrow gap whose margins overlap is such a place: choose the margin below half the gap.
+//! - Where two parts of the surface are equally near (the medial axis), the closest point jumps from one tick to the
+//!   next, and with it the force's direction, but not its size. A narrow gap whose margins overlap is such a place:
+//!   choose the margin below half the gap.
 //! - A moving surface moves the wall: it does work on the tool, as a beating heart would.
-//! - Where a capsule's second end passes through the surface, the size falls back too: of a crossing tool it is that
-//!   of the deepest point, of one that is wholly inside that of the nearest.
+//! - Where a capsule's second end passes through the surface, the size falls: the depth of a crossing tool is its
+//!   deepest point's, that of a tool wholly inside its shallowest point's.
 //! - Saturation: a hand that pushes harder than `max_force` gets through.
 
 /// `?` in a `const fn`.
@@ -67,12 +66,12 @@ pub use guidance::Guidance;
 pub use proxy::{Proxy, Wrench};
 pub use rows::VelocityRow;
 
-/// A force on the tool, and how it came about.
+/// A force on the tool, and the constraint's state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConstraintForce {
     /// The force on the tool, at its point of the closest pair, in N. Always finite.
     pub force: Vec3,
-    /// How it came about.
+    /// The constraint's state.
     pub state: ConstraintState,
 }
 
@@ -88,7 +87,7 @@ impl defmt::Format for ConstraintForce {
     }
 }
 
-/// How a force came about.
+/// The state of a constraint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -103,8 +102,7 @@ pub enum ConstraintState {
     Safe(Unavailable),
 }
 
-/// A spring and a damper with a largest force: the part that all constraints share. The constraint that takes it checks
-/// it.
+/// A spring and a damper with a largest force, which every constraint has. The constraint's constructor checks it.
 ///
 /// ```
 /// use dibs_nostd::constraint::SpringDamper;
@@ -116,7 +114,7 @@ pub enum ConstraintState {
 pub struct SpringDamper {
     stiffness: f32,
     damping: f32,
-    /// `damping`, unless it is said.
+    /// `None` for that of `damping`.
     hold_damping: Option<f32>,
     max_force: f32,
 }
@@ -128,7 +126,8 @@ impl SpringDamper {
         Self { stiffness, damping: 0.0, hold_damping: None, max_force: f32::INFINITY }
     }
 
-    /// The same with a damping in N s/mm, at least 0. The hold damps as much, unless it has a damping of its own.
+    /// The same with a damping in N s/mm, at least 0. The hold damps as much, unless
+    /// [`hold_damping`](Self::hold_damping) is set.
     #[must_use]
     pub const fn damping(self, damping: f32) -> Self {
         Self { damping, ..self }
@@ -146,7 +145,7 @@ impl SpringDamper {
         Self { max_force, ..self }
     }
 
-    /// Itself, where every parameter is in its range and finite; otherwise [`GainError`] names one that is not.
+    /// Itself if every parameter is in its range and finite; otherwise [`GainError`] names one that is not.
     const fn checked(self) -> Result<Self, GainError> {
         tri!(positive("stiffness", self.stiffness));
         tri!(not_negative("damping", self.damping));
@@ -178,8 +177,8 @@ impl SpringDamper {
         if wall > self.held() { wall } else { self.held() }
     }
 
-    /// Force along the approach's direction of a spring that is `length` mm out of its rest; at least
-    /// `least` N: 0 for a force that only ever pushes.
+    /// Force along the approach's direction of a spring displaced by `length` mm; at least `least` N: 0 for a force
+    /// that never pulls.
     fn along(&self, approach: &Approach, length: f32, least: f32) -> ConstraintForce {
         let force = self.stiffness * length - self.damping * approach.speed;
         let (force, state) = if force >= self.max_force {
@@ -212,7 +211,7 @@ impl SpringDamper {
         let wanted = self.held() * (largest * length);
         let size = if wanted > self.max_force { self.max_force } else { wanted };
         let force = scaled / length * -size;
-        // At rest, or a velocity that is not finite.
+        // Not finite at rest, or from a velocity that is not finite.
         let force = if force.is_finite() { force } else { Vec3::ZERO };
         ConstraintForce { force, state: ConstraintState::Safe(reason) }
     }
@@ -238,7 +237,7 @@ impl Approach {
         let proximity = proximity.as_ref().map_err(|unavailable| *unavailable)?;
         let direction = proximity.direction;
         match proximity.side {
-            // Inside, that direction would lead in.
+            // If the tool is inside, the direction leads in.
             Side::Undefined(NoSide::CutShort) => return Err(Unavailable::CutShort),
             Side::Undefined(NoSide::Degenerate) => return Err(Unavailable::NoDirection),
             _ if direction == Vec3::ZERO => return Err(Unavailable::NoDirection),
@@ -260,7 +259,7 @@ impl Approach {
     }
 }
 
-/// A gain that no constraint can have.
+/// A constraint's gain is out of range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]

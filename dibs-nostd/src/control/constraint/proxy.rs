@@ -1,4 +1,4 @@
-//! Keep out by all contacts together: the force and the torque of a proxy that is held outside.
+//! Keeps the tool out by all its contacts: the force and the torque from a proxy that is held outside.
 
 use glam::Vec3;
 
@@ -8,14 +8,14 @@ use crate::math::sqrt::sqrt;
 use crate::query::Contact;
 use crate::unavailable::Unavailable;
 
-/// A force and a torque on the tool, and how they came about.
+/// A force and a torque on the tool, and the constraint's state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wrench {
     /// The force on the tool (N). Always finite.
     pub force: Vec3,
-    /// The torque on the tool (N mm) about the point that was asked for. Always finite.
+    /// The torque on the tool (N mm) about the given origin. Always finite.
     pub torque: Vec3,
-    /// How they came about.
+    /// The constraint's state.
     pub state: ConstraintState,
 }
 
@@ -35,18 +35,17 @@ impl defmt::Format for Wrench {
 
 /// Keeps the tool out of a margin around the surface, by all its contacts.
 ///
-/// A proxy (god object: Zilles & Salisbury 1995; Ruspini et al. 1997) is where the tool would be if no contact were
-/// within the margin: the nearest such place. A spring draws the tool there. Where one contact is within the margin,
-/// that is a [`ForbiddenRegion`](super::ForbiddenRegion); in a corner it is what holds both walls, and two contacts
-/// with one wall are one wall, up to 6 %. The force of each contact acts at its own point of the tool, which gives the
-/// torque.
+/// A proxy (god object: Zilles & Salisbury 1995; Ruspini et al. 1997) is the place nearest to the tool at which no
+/// contact would be within the margin. A spring draws the tool there. With one contact this is a
+/// [`ForbiddenRegion`](super::ForbiddenRegion); in a corner it holds against both walls, and two contacts with one wall
+/// count as one, up to 6 %. The force of each contact acts at its point of the tool, which gives the torque.
 ///
-/// What it solves is the least `|t|^2` under `n . t >= margin - d` for each of the eight deepest contacts, each of
-/// which yields by a 16th, exactly but for rounding, by an active set. So the displacement is continuous in depths and
-/// normals, and a contact that appears at the margin's edge begins with nothing. Where no two contacts face each other,
-/// each is pushed out of by at least its own depth.
+/// The displacement `t` has the least `|t|^2` under `n . t >= margin - d` for each of the eight deepest contacts, each
+/// of which yields by a 16th. An active set finds it exactly but for rounding. So it is continuous in depths and
+/// normals, and a contact that appears at the margin's edge begins with zero force. If no two contacts face each other,
+/// `t` clears each contact by at least its depth.
 ///
-/// The damper acts against the tool's speed into the surface, relative to the surface where it moves.
+/// The damper acts against the tool's speed into the surface, relative to the surface's velocity.
 ///
 /// Cost: about 30 f32 operations a step for each contact within the margin; at most 32 steps, about as many as there
 /// are contacts.
@@ -64,7 +63,7 @@ struct Held {
     lever: Vec3,
     /// Speed of the tool out of the surface (mm/s).
     speed: f32,
-    /// How far it moves the proxy (mm).
+    /// Its share of the proxy's displacement (mm).
     push: f32,
 }
 
@@ -91,8 +90,8 @@ impl Proxy {
     /// The force on the tool at this tick, and its torque about `origin`.
     ///
     /// `contacts` are those of [`Contacts::within`](crate::Contacts::within) this margin or more, deepest first, each
-    /// within `accuracy` (mm); `velocity` (mm/s) is the tool's at `origin`, `angular` (1/s) its angular velocity. Where there is
-    /// no answer, or the budget ended before all contacts were known, the hold.
+    /// within `accuracy` (mm); `velocity` (mm/s) is the tool's at `origin`, `angular` (1/s) its angular velocity. An
+    /// error instead of contacts gives the hold.
     #[must_use]
     pub fn wrench<'c>(
         &self,
@@ -143,7 +142,7 @@ impl Proxy {
         let is_finite = wanted.is_finite() && turned.is_finite();
         if !is_finite {
             return if pushes > 0.0 && length <= 0.0 {
-                // Walls that balance each other.
+                // The walls balance each other.
                 Wrench { state: ConstraintState::Active, ..Wrench::NONE }
             } else {
                 self.hold(velocity, Unavailable::NotFinite)
@@ -157,7 +156,7 @@ impl Proxy {
         } else {
             (0.0, ConstraintState::Active)
         };
-        // Force and torque keep their proportion.
+        // One scale for both keeps the proportion of force and torque.
         let scale = if length > 0.0 { size / length } else { 0.0 };
         let (force, torque) = (moved * scale, turned * scale);
         if force.is_finite() && torque.is_finite() {

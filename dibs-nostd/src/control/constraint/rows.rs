@@ -7,9 +7,9 @@ use crate::query::Contact;
 /// One inequality on the tool's velocity: `linear . v + angular . w >= least`, with `v`, the velocity of a point of
 /// the tool (mm/s), and `w`, the tool's angular velocity (1/s).
 ///
-/// A vector field inequality (Marinho et al., IEEE T-RO 2019) that also knows the surface's own velocity. With it, a
+/// A vector field inequality (Marinho et al., IEEE T-RO 2019) that includes the surface's velocity. Under it a
 /// contact's separation falls towards [`stand_off`](Self::stand_off) no faster than exponentially, at a rate of
-/// [`gain`](Self::gain); below, it has to grow. Plain arrays, for any solver of quadratic programs.
+/// [`gain`](Self::gain); below the stand-off it must grow. Plain arrays, for any solver of quadratic programs.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -42,9 +42,9 @@ pub struct VelocityRow {
     pub angular: [f32; 3],
     /// The least sum allowed (mm/s).
     pub least: f32,
-    /// The surface's own velocity along the normal (mm/s).
+    /// The surface's velocity along the normal (mm/s).
     surface: f32,
-    /// Separation less what is uncertain of it (mm).
+    /// Separation less its accuracy (mm).
     separation: f32,
     /// mm.
     stand_off: f32,
@@ -53,8 +53,8 @@ pub struct VelocityRow {
 }
 
 impl VelocityRow {
-    /// The row of a contact whose separation is within `accuracy` (mm), for the velocity of the tool at `origin`: the
-    /// tool may not come nearer at all, until there is a [gain](Self::gain).
+    /// The row of a contact whose separation is within `accuracy` (mm), for the velocity of the tool at `origin`:
+    /// without a [gain](Self::gain) the tool may not come nearer at all.
     ///
     /// Cost: some tens of f32 operations.
     #[must_use]
@@ -73,7 +73,7 @@ impl VelocityRow {
         }
     }
 
-    /// The same for a stand-off (mm), 0 unless it is said.
+    /// The same for a stand-off (mm); 0 by default.
     #[must_use]
     pub fn stand_off(self, stand_off: f32) -> Self {
         Self { stand_off, ..self }.with_least()
@@ -90,7 +90,7 @@ impl VelocityRow {
         Self { least: self.surface - self.gain * left, ..self }
     }
 
-    /// Whether a velocity keeps to it.
+    /// Whether a velocity satisfies it.
     #[must_use]
     pub fn allows(&self, linear: Vec3, angular: Vec3) -> bool {
         Vec3::from_array(self.linear).dot(linear) + Vec3::from_array(self.angular).dot(angular)

@@ -1,4 +1,4 @@
-//! The forces: their laws, their bounds, and what they do with nonsense.
+//! The forces: their laws, their bounds, and their output for invalid input.
 
 extern crate std;
 
@@ -126,7 +126,7 @@ fn the_hold_damps_and_says_why() {
     assert_eq!(touching.state, ConstraintState::Safe(Unavailable::NoDirection));
 }
 
-/// Where the budget left the side open, the direction may lead in.
+/// If the budget ended before the side was known, the direction may lead in.
 #[test]
 fn a_side_that_is_not_known_is_held() {
     for (reason, held) in [
@@ -209,7 +209,7 @@ fn a_passive_wall_asks_for_damping_in_the_device() {
     assert!((held.device_damping(0.001) - 0.5).abs() < 1.0e-7);
 }
 
-/// Any `f32`, most of them not sensible.
+/// Any `f32`, most of them implausible.
 fn any_bits() -> impl Strategy<Value = f32> {
     prop_oneof![any::<u32>().prop_map(f32::from_bits), -100.0_f32..100.0, Just(0.0)]
 }
@@ -228,7 +228,7 @@ fn unit() -> impl Strategy<Value = Vec3> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever comes in, what goes out is finite and no more than the largest force.
+    /// For any input the force is finite and at most the largest force.
     #[test]
     fn every_force_is_finite_and_bounded(
         gains in prop::array::uniform6(any_bits()),
@@ -276,7 +276,7 @@ proptest! {
         cut.lower = exact.lower - slack;
         cut.accuracy = accuracy;
         prop_assert!(push(&cut) >= push(&exact));
-        // As much as an exact answer at the lower end would, or more.
+        // The push is at least that of an exact answer at the lower end.
         let nearest = pair(cut.lower - accuracy, direction);
         prop_assert!(push(&cut) >= push(&nearest) - 1.0e-4);
     }

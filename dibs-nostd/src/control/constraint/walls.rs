@@ -1,33 +1,33 @@
-//! The least displacement that a few walls ask for.
+//! The least displacement that satisfies a few walls.
 //!
-//! Each wall asks that `normal . t` be at least its depth, and yields in proportion to the force on it. With the
-//! compliance `c`, that is the least of the convex function
+//! Each wall requires that `normal . t` be at least its depth, and yields in proportion to the force on it. With the
+//! compliance `c`, `t` minimises the convex function
 //!
 //! `c |t|^2 + sum of max(0, wanted - normal . t)^2`, `wanted = (1 + c) depth`, or the depth itself below 0,
 //!
-//! of three unknowns. A wall *acts* where its term is not 0, and while the same walls act, the function is quadratic. The
-//! search starts without displacement, where every wall acts whose depth is above 0. A step leads towards the least of
-//! the present quadratic, as far as the first place where a wall ceases to act or begins. The next step goes on to the same side of that place, for the one
-//! wall does not turn it (Sherman & Morrison), so every step lowers the function, and one that meets no such place
-//! ends at its least.
+//! of three unknowns. A wall *acts* where its term is not 0; while the same walls act, the function is quadratic. The
+//! search starts at `t = 0`, where every wall with a depth above 0 acts. A step leads towards the minimum of the
+//! present quadratic, up to the first place where a wall begins or ceases to act. One wall does not reverse the next
+//! step (Sherman & Morrison), so every step lowers the function, and a step that meets no such place ends at its
+//! minimum.
 
 use glam::Vec3;
 
 /// Most walls.
 pub(super) const MOST: usize = 8;
 
-/// How much of its depth a wall yields under its own force: so that two contacts with one wall share it.
+/// Share of its depth by which a wall yields under its force, so that two contacts with one wall share the force.
 pub(super) const COMPLIANCE: f32 = 1.0 / 16.0;
 
 /// Most steps.
 const STEPS: u32 = 32;
 
-/// One wall, and how deep the tool is in it.
+/// One wall, and the tool's depth in it.
 #[derive(Clone, Copy)]
 pub(super) struct Wall {
     /// Unit vector that leads out.
     pub normal: Vec3,
-    /// The depth (mm), and as much more as the wall yields if nothing else holds it.
+    /// The depth (mm), plus the yield of the wall where it holds alone.
     wanted: f32,
     acts: bool,
 }
@@ -36,7 +36,7 @@ impl Wall {
     /// None.
     pub const NONE: Self = Self { normal: Vec3::ZERO, wanted: 0.0, acts: false };
 
-    /// A wall that the tool is `depth` mm in, or as much below 0 away from.
+    /// A wall with the tool `depth` mm in it; a negative depth is a distance.
     pub fn new(normal: Vec3, depth: f32) -> Self {
         let wanted = if depth < 0.0 { depth } else { depth * (1.0 + COMPLIANCE) };
         Self { normal, wanted, acts: depth > 0.0 }
@@ -74,14 +74,14 @@ pub(super) fn displacement(mut walls: [Wall; MOST]) -> Vec3 {
         match first {
             Some(wall) => wall.acts = !wall.acts,
             None if is_refined => break,
-            // Once more, from there: rounding is relative to the step.
+            // One more step, from there: rounding is relative to the step.
             None => is_refined = true,
         }
     }
     at
 }
 
-/// The way to where the function of those walls that act is least, by Cramer's rule.
+/// The step to the minimum of the acting walls' quadratic, by Cramer's rule.
 fn to_least(walls: &[Wall; MOST], at: Vec3) -> Vec3 {
     let (mut x, mut y, mut z) = (Vec3::X * COMPLIANCE, Vec3::Y * COMPLIANCE, Vec3::Z * COMPLIANCE);
     let mut right = at * -COMPLIANCE;

@@ -1,9 +1,9 @@
-//! Limits on what the age alone does not show: delay on the way, a source that stands still, forgeries.
+//! Limits on faults that the age alone does not show: delay on the way, a source that stands still, forgeries.
 
 use super::{Limits, Link, State, Watch};
 use crate::unavailable::Unavailable;
 
-/// The limits; off until they are given.
+/// The limits, off by default.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Freshness {
@@ -16,7 +16,7 @@ impl Freshness {
     pub const OFF: Self =
         Self { transit: Watch::OFF, source_age: Watch::OFF, forgeries: Watch::OFF };
 
-    /// The level that each input asks for, and its cause.
+    /// The level that each input requires, and its cause.
     pub fn levels(&self, link: &Link) -> [(State, Unavailable); 3] {
         let Link { transit, source_age, forgeries, .. } = *link;
         [
@@ -28,9 +28,9 @@ impl Freshness {
 }
 
 impl Limits {
-    /// Limits on the time that the published frame was on its way, measured from the status that it
-    /// echoes: no clock of the sender is needed. In good order it is the time between two statuses and the
-    /// way there and back. A sender that echoes none is beyond every limit.
+    /// Limits on the time that the published frame was on its way, measured from the status that it echoes: no clock of
+    /// the sender is needed. Normally it is the time between two statuses plus the way there and back. A frame without
+    /// an echo is beyond every limit.
     #[must_use]
     pub const fn transit(mut self, watch: Watch) -> Self {
         self.freshness.transit = watch;

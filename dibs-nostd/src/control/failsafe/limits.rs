@@ -13,15 +13,15 @@ pub struct Watch {
     safe: u32,
 }
 
-/// Times are compared over half the clock's range.
+/// A time of half the clock's range or more is ambiguous.
 const LONGEST: u32 = i32::MAX as u32;
 
 impl Watch {
     /// An input that is not watched.
     pub const OFF: Self = Self { degraded: u32::MAX, safe: u32::MAX };
 
-    /// Values above `degraded` degrade, values above `safe` make safe. In the clock's unit, or a
-    /// number of rejections.
+    /// Values above `degraded` lead to the degraded state, values above `safe` to the safe state. In the clock's unit,
+    /// or a number of rejections.
     ///
     /// # Errors
     /// [`LimitError`] when `safe` is below `degraded`, or not below 2^31.
@@ -60,8 +60,8 @@ impl Watch {
 
 /// The machine's limits, and its conditions for recovery.
 ///
-/// Only the age must be watched; every other input is off until its limits are given. One
-/// good frame and an acknowledgement recover, until more frames are asked for, or no acknowledgement.
+/// Only the age must be watched; every other input is off by default. By default one good frame and an acknowledgement
+/// recover.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Limits {
@@ -76,11 +76,11 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Limits on the surface's age, and the largest speed of any of its points, in mm per unit of the
-    /// clock (for a clock of milliseconds: in m/s). 0 takes an old surface for the present one.
+    /// Limits on the surface's age, and the largest speed of any of its points, in mm per unit of the clock (for a
+    /// clock of milliseconds: in m/s). 0 adds no margin for age.
     ///
     /// # Errors
-    /// [`LimitError`] when the age is not watched, or the speed is negative or not finite.
+    /// [`LimitError`] if the age is not watched, or the speed is negative or not finite.
     pub const fn new(age: Watch, tissue_speed: f32) -> Result<Self, LimitError> {
         if age.safe == u32::MAX {
             return Err(LimitError::TooLong { safe: age.safe });
@@ -100,7 +100,7 @@ impl Limits {
         })
     }
 
-    /// Limits on the time since any good packet.
+    /// Limits on the time since the last good packet.
     #[must_use]
     pub const fn silence(self, watch: Watch) -> Self {
         Self { silence: watch, ..self }
@@ -112,7 +112,7 @@ impl Limits {
         Self { heartbeat: watch, ..self }
     }
 
-    /// Limits on the frames refused or damaged since the last one was published, each counted once.
+    /// Limits on the frames refused or damaged since the last publication, each counted once.
     #[must_use]
     pub const fn rejections(self, watch: Watch) -> Self {
         Self { rejections: watch, ..self }
@@ -121,7 +121,7 @@ impl Limits {
     /// Frames that must be published in a row, with every input within its first limit, to recover.
     ///
     /// # Errors
-    /// [`LimitError`] for none: a fault would recover without a new surface.
+    /// [`LimitError`] for 0, with which a fault would recover without a new surface.
     pub const fn recovery(self, frames: u16) -> Result<Self, LimitError> {
         if frames == 0 {
             return Err(LimitError::Recovery { frames });
@@ -161,7 +161,7 @@ impl Limits {
     }
 }
 
-/// Limits that no machine can have.
+/// A fail-safe limit is out of range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -173,7 +173,7 @@ pub enum LimitError {
         /// The second limit.
         safe: u32,
     },
-    /// A limit of 2^31 or more: a wrapped clock could not be told from it.
+    /// A limit of 2^31 or more, which a wrapped clock could hide.
     TooLong {
         /// The second limit.
         safe: u32,
@@ -183,7 +183,7 @@ pub enum LimitError {
         /// The speed.
         tissue_speed: f32,
     },
-    /// Recovery without a new frame.
+    /// Recovery with 0 new frames.
     Recovery {
         /// The frames asked for.
         frames: u16,

@@ -8,7 +8,7 @@ pub struct Link {
     pub silence: u32,
     /// Time since the last heartbeat; `u32::MAX` before the first.
     pub heartbeat: u32,
-    /// Frames refused or damaged since the last one was published: [`BusHealth::rejections`](crate::BusHealth::rejections).
+    /// Frames refused or damaged since the last publication: [`BusHealth::rejections`](crate::BusHealth::rejections).
     pub rejections: u32,
     /// Forged packets since then.
     pub forgeries: u32,
@@ -19,7 +19,7 @@ pub struct Link {
 }
 
 impl Link {
-    /// Nothing is wrong.
+    /// No fault.
     pub const CLEAR: Self =
         Self { silence: 0, heartbeat: 0, rejections: 0, forgeries: 0, transit: 0, source_age: 0 };
 }

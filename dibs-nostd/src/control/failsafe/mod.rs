@@ -1,12 +1,11 @@
-//! When to stop trusting the surface: from age, silence, lost heartbeats and rejections to a defined
-//! output.
+//! A state machine that decides whether the surface may be trusted, from age, silence, lost heartbeats and rejections.
 //!
-//! [`FailSafe`] is a state machine that the control tick steps once. It owns no clock and no memory
-//! but its own few words; each step is a handful of integer comparisons, whatever happened.
+//! The control tick steps a [`FailSafe`] once. It owns no clock and a few words of memory; each step is a handful of
+//! integer comparisons.
 //!
 //! # States
 //!
-//! | state | what the constraint gets | meaning |
+//! | state | the constraint's input | meaning |
 //! |---|---|---|
 //! | [`State::Nominal`] | the answer, widened by age x tissue speed | every input is within its limits |
 //! | [`State::Degraded`] | the same, and the margin grows with the age | an input is beyond its first limit, or was: tell the operator |
@@ -29,18 +28,18 @@
 //! | degraded | nominal | the run reaches [`Limits::recovery`]'s frames |
 //! | safe | nominal | the same, and [`FailSafe::acknowledge`] was accepted since; or alone, with [`Limits::automatic`] |
 //!
-//! From safe there is no way to degraded, and from a fault no way back without new frames: a surface
-//! that only looks fresh, because a clock wrapped, recovers nothing. An acknowledgement is accepted
-//! only once the run is complete, and void as soon as a step is not clear: nobody can acknowledge in
-//! advance. That there is no automatic recovery unless asked for is the da Vinci Research Kit's rule.
+//! From safe there is no way to degraded, and no fault recovers without new frames, so a surface that only looks fresh,
+//! because a clock wrapped, does not help. An acknowledgement is accepted only once the run is complete, and void as
+//! soon as a step is not clear, so nobody can acknowledge in advance. Recovery is manual by default, as in the da Vinci
+//! Research Kit.
 //!
 //! # Time
 //!
-//! Any unit, wrapping: the control tick's number does. With a surface received at tick `r`
-//! and nothing after it, the first safe step is that of tick `r + safe + 1`, where `safe` is the
-//! second limit on age: never later, and exactly then unless another input comes first. Ages of surface,
-//! packets and heartbeats follow one rule, that of [`FrameAge`]: a stamp up to 16 units ahead of the clock
-//! is new, one farther ahead is old, and what was found old stays old when the clock comes around.
+//! Times are in any unit, and may wrap: the control tick's number will do. With a surface received at tick `r` and
+//! nothing after it, the first safe step is that of tick `r + safe + 1`, where `safe` is the second limit on age: never
+//! later, and exactly then unless another input comes first. Ages of surface, packets and heartbeats follow one rule,
+//! that of [`FrameAge`]: a stamp up to 16 units ahead of the clock is new, one farther ahead is old, and what was found
+//! old stays old when the clock comes around.
 
 mod freshness;
 mod limits;
@@ -71,12 +70,12 @@ pub struct Observation {
     pub link: Link,
     /// The error of the query on that frame, if it returned one.
     pub query_error: Option<QueryError>,
-    /// Whether the tree's bytes were found changed: [`Scrub`](crate::Scrub). Leave it set for the rest
-    /// of the run, unless what is wrong with the memory is known and gone.
+    /// Whether the tree's bytes were found changed: [`Scrub`](crate::Scrub). Leave it set for the rest of the run,
+    /// unless the memory's defect is known and repaired.
     pub has_rotted: bool,
 }
 
-/// How far the surface may be trusted, from the best on.
+/// The trust in the surface, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum State {
@@ -94,10 +93,10 @@ pub enum State {
 pub struct Verdict {
     /// The state after the step.
     pub state: State,
-    /// Why it is not nominal: the first input, in the order of [`Observation`], that asks for the
-    /// state; where none does any more, the last one that did.
+    /// Why it is not nominal: the first input that requires the state, in the order missing surface, query, tree, age,
+    /// link. If none requires it any more, the last cause remains.
     pub cause: Option<Unavailable>,
-    /// How far the tissue may have moved since the surface was received, in mm: age times speed.
+    /// Most that the tissue may have moved since the surface was received, in mm: age times speed.
     pub margin: f32,
     /// Whether only an acknowledgement is missing to leave the safe state.
     pub waits_for_acknowledgement: bool,
@@ -175,7 +174,7 @@ impl FailSafe {
         self.state
     }
 
-    /// One control tick. O(1): ten comparisons of two limits.
+    /// One control tick. Cost: O(1), two comparisons for each input.
     pub fn step(&mut self, seen: &Observation) -> Verdict {
         let age = seen.frame.map_or(u32::MAX, |frame| frame.age);
         let (level, cause) = self.worst(seen, age);
@@ -224,7 +223,7 @@ impl FailSafe {
     /// An operator's acknowledgement: the next step leaves the safe state if it is clear.
     ///
     /// # Errors
-    /// [`AcknowledgeError`] unless the last step waited for it; nothing is remembered then.
+    /// [`AcknowledgeError`] unless the last step waited for it; it has no effect then.
     pub fn acknowledge(&mut self) -> Result<(), AcknowledgeError> {
         let frames = self.limits.recovery_frames().saturating_sub(self.run);
         if self.state == State::Safe && frames == 0 {
@@ -235,7 +234,7 @@ impl FailSafe {
         }
     }
 
-    /// The level that the inputs of this step ask for, and the first cause of it.
+    /// The level that the inputs of this step require, and its first cause.
     fn worst(&self, seen: &Observation, age: u32) -> (State, Option<Unavailable>) {
         let (link, limits) = (seen.link, &self.limits);
         let mut worst = (State::Nominal, None);

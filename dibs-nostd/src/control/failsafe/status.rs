@@ -1,4 +1,4 @@
-//! The bus side's own view of its health, for the control tick.
+//! The health of the bus, passed to the control tick.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -8,7 +8,7 @@ use crate::surface::Ageing;
 
 /// The bus interrupt's notes for the control tick. Meant for a `static`.
 ///
-/// Neither waits for the other; each number is exact, together they may be of two moments.
+/// Neither waits for the other. Each number is exact, but two of them may be of different moments.
 ///
 /// ```
 /// use dibs_nostd::wire::{FrameId, NoMac, encode_heartbeat};
@@ -39,10 +39,10 @@ pub struct LinkStatus {
     source_age: AtomicU32,
 }
 
-/// When something came last, and the greatest age that it was found to have.
+/// The time of the last packet or heartbeat, and the greatest age that it was found to have.
 #[derive(Debug)]
 struct Stamp {
-    /// 1 once something came.
+    /// 1 once one came.
     came: AtomicU32,
     at: AtomicU32,
     /// The reader's: the stamp that it looked at last, and its age.
@@ -84,7 +84,7 @@ impl Stamp {
 }
 
 impl LinkStatus {
-    /// Nothing came yet.
+    /// No packet or heartbeat yet.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -107,8 +107,8 @@ impl LinkStatus {
         self.source_age.store(health.source_age, Ordering::Relaxed);
     }
 
-    /// The health of the bus at `now`. One reader, which asks at least once in 2^31 units of the clock: then what
-    /// was lost once stays lost when the clock comes around.
+    /// The health of the bus at `now`. One reader, which calls it at least once in 2^31 units of the clock: then a lost
+    /// link stays lost when the clock wraps.
     #[must_use]
     pub fn read(&self, now: u32) -> Link {
         Link {

@@ -1,4 +1,4 @@
-//! The machine against its table, and against a second one that remembers everything.
+//! Compares the machine with its table, and with a second one that remembers all steps.
 
 extern crate std;
 
@@ -71,7 +71,7 @@ fn machine(state: State, limits: Limits) -> FailSafe {
     machine
 }
 
-/// Every way in which an input can ask for a level, with the cause that is named.
+/// Every way in which an input can require a level, with its cause.
 fn requests() -> Vec<(State, Observation, Option<Unavailable>)> {
     use State::{Degraded, Nominal, Safe};
     let with = |link: Link| Observation { link, ..seen(2000, 100, 0) };
@@ -130,7 +130,7 @@ fn every_input_at_each_limit_leads_from_each_state_to_the_state_of_the_table() {
             for automatic in [false, true] {
                 let mut machine = machine(before, limits(3, automatic));
                 let verdict = machine.step(&observation);
-                // Without new frames nothing gets better.
+                // Without new frames no state improves.
                 assert_eq!(verdict.state, before.max(level), "{before:?}, {observation:?}");
                 if level == verdict.state {
                     assert_eq!(verdict.cause, cause, "{before:?}, {observation:?}");
@@ -149,7 +149,7 @@ fn recovery_takes_its_frames_in_a_row_and_from_safe_an_acknowledgement() {
             for automatic in [false, true] {
                 let mut machine = machine(before, limits(frames, automatic));
                 let mut now = 3000;
-                // One frame short of it, then a step that is not clear: all over again.
+                // One frame short, then a step that is not clear: the run starts again.
                 for epoch in 1..frames {
                     now += 1;
                     assert_eq!(machine.step(&seen(now, 100 + u32::from(epoch), 0)).state, before);
@@ -204,7 +204,7 @@ fn safe_comes_exactly_one_tick_after_the_limit_whatever_the_clock_shows() {
         assert_eq!(first(State::Degraded), Some(AGE.degraded() as usize + 1));
         assert_eq!(first(State::Safe), Some(AGE.safe() as usize + 1));
         assert!(states[AGE.safe() as usize + 1..].iter().all(|&s| s == State::Safe));
-        // A surface that looked fresh again would bring nothing back.
+        // A surface that looks fresh again recovers nothing.
         assert_eq!(machine.step(&seen(start, 1, 0)).state, State::Safe);
     }
 }
@@ -334,7 +334,7 @@ proptest! {
     ) {
         let (seen, verdicts, acknowledged) = run(&steps, limits(frames, automatic), start);
         for (at, verdict) in verdicts.iter().enumerate() {
-            // What is beyond a limit is never acted on as if it were not.
+            // An observation beyond a limit always has the state that the limit requires.
             prop_assert!(!is_beyond(&seen[at], true) || verdict.state == State::Safe);
             prop_assert!(!is_beyond(&seen[at], false) || verdict.state != State::Nominal);
             prop_assert_eq!(verdict.cause.is_none(), verdict.state == State::Nominal);
@@ -343,7 +343,7 @@ proptest! {
             if verdict.state >= before {
                 continue;
             }
-            // Better only by the whole way back: frames in a row, all clear, acknowledged.
+            // The state improves only after enough new frames, all clear, and an acknowledgement.
             prop_assert_eq!(verdict.state, State::Nominal);
             let clear: Vec<usize> =
                 (0..=at).rev().take_while(|&i| !is_beyond(&seen[i], false)).collect();
@@ -375,8 +375,8 @@ proptest! {
     }
 }
 
-/// Heartbeats were lost while good frames go on: whatever the clock shows from then on, and over more than its
-/// whole range, the machine stays safe, and a single flipped bit of what was received is no way back.
+/// Heartbeats were lost while good frames go on: over more than the clock's whole range the machine stays safe, and a
+/// single flipped bit of a stamp does not recover it.
 #[test]
 fn lost_heartbeats_stay_lost_over_the_whole_range_of_the_clock() {
     for (start, step) in [(0_u32, 0x0FFF_FFFF_u32), (77, 0x7FFF_FFF0), (u32::MAX - 3, 0x1234_5678)]
@@ -391,13 +391,13 @@ fn lost_heartbeats_stay_lost_over_the_whole_range_of_the_clock() {
             link.set(&health(now, start));
             let verdict = machine.step(&observe(now, epoch, link.read(now)));
             assert_eq!(verdict.state, State::Safe, "{start}: {epoch} steps of {step}");
-            // The ticks in which the clock comes around to the last heartbeat, too.
+            // Includes the ticks in which the clock comes around to the last heartbeat.
             let again = link.read(start.wrapping_add(epoch % 40).wrapping_sub(20));
             if u64::from(epoch) * u64::from(step) > 1 << 32 {
                 assert_eq!(again.heartbeat, u32::MAX, "{start}: {epoch} steps of {step}");
             }
         }
-        // A heartbeat makes an end of it.
+        // A heartbeat ends it.
         now = now.wrapping_add(1);
         link.set(&health(now, now));
         assert_eq!(machine.step(&observe(now, 1000, link.read(now))).state, State::Nominal);

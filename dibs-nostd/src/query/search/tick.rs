@@ -22,7 +22,7 @@ use crate::tree::format::{Link, Node};
 use crate::unavailable::QueryError;
 use crate::{Index, Proximity, Tool, Tree, VertexTable};
 
-/// A motion of this many units, a 64th of the root sphere's radius, may be too much for the front.
+/// A motion of this many units, at most a 64th of the root sphere's radius, may be too much for the front.
 const LARGE_STEP: u32 = 1 << 18;
 
 /// The outcome of a tick.
