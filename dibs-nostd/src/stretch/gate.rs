@@ -1,4 +1,4 @@
-//! The last check of a frame before it is published: a trait, so that a user can choose the check.
+//! The last check of a frame before it is published, as a trait, so that a user can choose the check.
 
 use core::ops::Range;
 
@@ -16,29 +16,29 @@ pub enum Changed {
     Partial,
 }
 
-/// How far a check has come.
+/// The state of a check.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Verdict {
-    /// Not finished, for want of work or of rows.
+    /// Not finished: more work or rows are needed.
     Pending,
-    /// The whole surface may be published; with its stretch, where that was measured.
+    /// The whole surface may be published; with its stretch, if measured.
     Admitted(Option<MeasuredStretch>),
 }
 
 /// A surface that is being received.
 #[derive(Clone, Copy, Debug)]
 pub struct Arriving<'a, V: ?Sized> {
-    /// Its rows: those below `ready` have their final values, the others may hold anything.
+    /// Its rows: those below `ready` have their final values, the others are arbitrary.
     pub surface: &'a V,
-    /// Only grows within a frame, and is the number of rows once the frame is complete.
+    /// Number of final rows. It only grows within a frame, and is the number of all rows once the frame is complete.
     pub ready: u32,
     /// The published surface, and the time from its capture to this one's; `None` before the first.
     pub before: Option<(&'a V, u32)>,
 }
 
 impl<'a, V: ?Sized> Arriving<'a, V> {
-    /// A first surface, of which the rows below `ready` have come.
+    /// A first surface, with the rows below `ready`.
     #[must_use]
     pub const fn new(surface: &'a V, ready: u32) -> Self {
         Self { surface, ready, before: None }
@@ -48,9 +48,8 @@ impl<'a, V: ?Sized> Arriving<'a, V> {
 /// Checks the surface that is being received, in slices of bounded work.
 ///
 /// For each frame: [`begin`](Self::begin) once, then [`moved`](Self::moved) for each packet and
-/// [`advance`](Self::advance) as often as there is time, until it admits or refuses the frame. A frame
-/// may be abandoned at any moment; the next `begin` says so. [`published`](Self::published) follows
-/// once an admitted frame has become the one that is read.
+/// [`advance`](Self::advance) as often as there is time, until it admits or refuses the frame. A frame may be abandoned
+/// at any moment, and another begun. [`published`](Self::published) follows once an admitted frame is published.
 pub trait Gate {
     /// A frame begins, and the one before is forgotten unless it was published. O(1).
     fn begin(&mut self, changed: Changed);
@@ -60,8 +59,8 @@ pub trait Gate {
         let _ = rows;
     }
 
-    /// Checks at most `work` rows and triangles of those that have come. Admission before the frame is complete
-    /// has no effect.
+    /// Checks at most `work` rows and triangles that have arrived. Admission before the frame is complete has no
+    /// effect.
     ///
     /// # Errors
     /// [`StretchError`] when the surface must not be published; it names the triangle or vertex.
@@ -71,19 +70,19 @@ pub trait Gate {
         work: u32,
     ) -> Result<Verdict, StretchError>;
 
-    /// The frame that was admitted is the published one now.
+    /// The admitted frame is now the published one.
     fn published(&mut self) {}
 
-    /// Smallest and largest weight of a mode that may be published. A gate that has none, as most, is
-    /// one of vertices: the receiver then takes no modal frames, and only them where there is one. The
-    /// rows of a modal frame are [`Vec3`](crate::glam::Vec3)s with a weight each, as `x`.
+    /// Smallest and largest weight of a mode that may be published. With `None`, as for most gates, the receiver takes
+    /// frames of vertices; with a range it takes only modal frames. The rows of a modal frame are
+    /// [`Vec3`](crate::glam::Vec3)s with a weight each, as `x`.
     fn weight_range(&self, mode: u32) -> Option<[f32; 2]> {
         let _ = mode;
         None
     }
 
-    /// The largest speed of any vertex that the gate admits, in mm per unit of the receiver's clock:
-    /// see [`SurfaceLimits::speed`](crate::SurfaceLimits::speed). Infinite for one that compares no frames.
+    /// The largest speed of any vertex that the gate admits, in mm per unit of the receiver's clock: see
+    /// [`SurfaceLimits::speed`](crate::SurfaceLimits::speed). Infinite for a gate that compares no frames.
     fn speed_limit(&self) -> f32 {
         f32::INFINITY
     }
@@ -94,8 +93,8 @@ pub trait Gate {
     }
 }
 
-/// Admits every surface, unmeasured: coverage then rests on the assumption that the tissue keeps
-/// within the tree's stretch limit, as in the paper.
+/// Admits every surface, unmeasured. Answers then rely on the paper's assumption that the tissue keeps within the
+/// tree's stretch limit.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Unchecked;
 
@@ -111,8 +110,8 @@ impl Gate for Unchecked {
     }
 }
 
-/// A tree admits what lies within its stretch limit, by one [`measure_stretch`] once the frame is
-/// complete. Not sliced: the cost of that call is linear in the triangles, whatever `work` says.
+/// A tree admits surfaces within its stretch limit, by one [`measure_stretch`] once the frame is complete. Not sliced:
+/// that call's cost is linear in the triangles, whatever `work` is.
 impl<I: Index> Gate for &Tree<'_, I> {
     fn begin(&mut self, _: Changed) {}
 

@@ -1,25 +1,25 @@
 //! The check of one triangle.
 //!
-//! Let `f1` and `f2` lead from a triangle's centre to the other of its first two corners and to the third, as
-//! they are now, and `G` be their Gram matrix, `[f1.f1, f1.f2; f1.f2, f2.f2]`; `M` is the same at rest, from the tree's
-//! metric section. The triangle's largest singular value is at most `sigma` exactly if `L M - G` is
-//! positive semidefinite for `L = sigma^2`: if its diagonal and its determinant are not negative. So
-//! against the largest `L` so far a triangle takes neither a root nor a division. Only one that
-//! fails has its own value worked out, and whatever that gives counts only once it passes the same check.
+//! Let `f1` and `f2` lead from a triangle's centre to the other of its first two corners and to the third, as they are
+//! now, and `G` be their Gram matrix, `[f1.f1, f1.f2; f1.f2, f2.f2]`; `M` is the same at rest, from the tree's metric
+//! section. The triangle's largest singular value is at most `sigma` exactly if `L M - G` is positive semidefinite for
+//! `L = sigma^2`: if its diagonal and its determinant are not negative. So the comparison with the largest `L` so far
+//! takes neither a root nor a division. Only a triangle that fails it has its value computed, and that value counts
+//! only once it passes the same check.
 //!
 //! # Rounding
 //!
-//! Let `u = 2^-24`. The entries of `G` come from differences of coordinates: the diagonal's are off by
-//! at most `5 u` of themselves, the other by `5 u |f1| |f2|`. A difference `x = L a - g` takes two more
-//! roundings, the comparison of the products two. If it holds, then, with `a` and `d` the diagonal of
-//! `M`, `G` is below `L (M + E)` with `|E11| <= 6.1 u a`, `|E22| <= 6.1 u d` and `|E12| <= 12.1 u sqrt(a d)`,
-//! so below `L (M + 18.2 u diag(a, d))`. Storing the off-diagonal entry of `M`, its lowest bit a mark, takes
-//! `2 u sqrt(a d)`. And `diag(a, d)` is below `M / (1 - |cos|)`, `cos` that of the angle at the centre. So the builder
-//! divides `M` by `1 + 21 u / (1 - |cos|)`, rounding down, and what passes is not stretched beyond
-//! `sqrt(L)`. It chooses the centre so that this is little. For edges 6.1 u is all.
+//! Let `u = 2^-24`. The entries of `G` come from differences of coordinates: the diagonal's are off by at most `5 u` of
+//! themselves, the other by `5 u |f1| |f2|`. A difference `x = L a - g` adds two roundings, the comparison of the
+//! products two. If it holds, then, with `a` and `d` the diagonal of `M`, `G` is below `L (M + E)` with `|E11| <= 6.1 u
+//! a`, `|E22| <= 6.1 u d` and `|E12| <= 12.1 u sqrt(a d)`, so below `L (M + 18.2 u diag(a, d))`. Storing the
+//! off-diagonal entry of `M`, whose lowest bit is a mark, adds `2 u sqrt(a d)`. And `diag(a, d)` is below `M / (1 -
+//! |cos|)`, `cos` that of the angle at the centre. So the builder divides `M` by `1 + 21 u / (1 - |cos|)`, rounding
+//! down, and a triangle that passes is not stretched beyond `sqrt(L)`. It chooses the centre that makes this small. For
+//! edges 6.1 u is all.
 //!
-//! The builder keeps products away from overflow and from underflow; where it cannot it stores a
-//! metric of zeros, which nothing passes.
+//! The builder avoids products that overflow or underflow; where it cannot, it stores a metric of zeros, which no
+//! triangle passes.
 
 use glam::Vec3;
 
@@ -28,11 +28,11 @@ use crate::math::sqrt::sqrt;
 /// Half a unit in the last place of 1.
 pub(super) const U: f32 = 1.0 / 16_777_216.0;
 
-/// The least square that is measured, that of a half. A surface that shrank more than that is
-/// searched no faster, and products stay away from underflow.
+/// The least square that is measured, that of a half: more shrinking makes no search faster, and products do not
+/// underflow.
 pub(super) const LEAST: f32 = 0.25;
 
-/// The largest squared stretch so far, as a part of each triangle's own limit, and whose it is.
+/// The largest squared stretch so far, relative to each triangle's limit, and its triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Worst {
     pub squared: f32,
@@ -45,7 +45,7 @@ impl Worst {
     }
 }
 
-/// Squares that a triangle is judged by: now, or at rest.
+/// The squares that a triangle's measure compares, now or at rest.
 pub(super) type Squares = [f32; 3];
 
 /// A triangle as it is now: the edges from its centre to the other of its first two corners, and to the third.
@@ -63,12 +63,12 @@ pub(super) trait Measure {
     /// Whether the stretch is certainly at most `sqrt(limit)`. False for NaN.
     fn within(rest: &Squares, now: &Squares, limit: f32) -> bool;
 
-    /// About the square of the stretch.
+    /// The square of the stretch, approximately.
     fn estimate(rest: &Squares, now: &Squares) -> f32;
 
-    /// The same as [`within`](Self::within), from the slack of two edges: `first` by the first edge, which is
-    /// known to be within it, and `second` by the second one; `between` is the limit times the rest square.
-    /// `first` is not negative; if it is 0, false is right, too. Where it is true, `second` is positive.
+    /// The same as [`within`](Self::within), from the slack of the first edge (`first`, not negative) and of the second
+    /// (`second`); `between` is the limit times the rest square. It may be false if `first` is 0. If it is true,
+    /// `second` is positive.
     fn is_within(first: f32, second: f32, between: f32, now: Edges) -> bool;
 }
 
@@ -84,7 +84,7 @@ impl Measure for SingularValue {
     #[inline(always)]
     fn within(&[a, h, d]: &Squares, &[g11, g12, g22]: &Squares, limit: f32) -> bool {
         let (x, y, z) = (limit * a - g11, limit * h - g12, limit * d - g22);
-        // Both are needed: a determinant is positive, too, where both eigenvalues are negative.
+        // Both are needed: a determinant is positive if both eigenvalues are negative, too.
         x * z >= y * y && x > 0.0
     }
 
@@ -99,7 +99,7 @@ impl Measure for SingularValue {
         mean + sqrt(half * half + pq * pq)
     }
 
-    /// A number above a square is positive, and with `first` so is `second`.
+    /// A product above a square is positive, and so is `second`, since `first` is not negative.
     #[inline(always)]
     fn is_within(first: f32, second: f32, between: f32, now: Edges) -> bool {
         let between = between - now.first.dot(now.second);
@@ -107,7 +107,7 @@ impl Measure for SingularValue {
     }
 }
 
-/// The longest of the three edges, each against its rest length.
+/// The largest ratio of an edge to its rest length.
 pub(super) struct LongestEdge;
 
 impl Measure for LongestEdge {
@@ -125,7 +125,7 @@ impl Measure for LongestEdge {
         let mut worst = 0.0;
         for (rest, now) in rest.iter().zip(now) {
             let ratio = now / rest;
-            // Written so that a NaN stays.
+            // Written so that a NaN is kept.
             if !(ratio <= worst) {
                 worst = ratio;
             }
@@ -139,19 +139,19 @@ impl Measure for LongestEdge {
     }
 }
 
-/// How far the squared stretch of a triangle is rounded up at least, as a part of itself. More than rounding asks
-/// for: triangles that are stretched all but as much then pass, and one that does not takes several times as long.
+/// Least relative rounding up of a triangle's squared stretch. It is more than rounding requires, so that triangles
+/// stretched nearly as much pass the quick check: failing it takes several times as long.
 const HEADROOM: f32 = 256.0 * U;
 
-/// The squared stretch of a triangle, rounded up, but not above the limit. If the triangle is not certainly
-/// within the limit, it is above that or not a number.
+/// The squared stretch of a triangle, rounded up, but not above the limit. If the triangle is not certainly within the
+/// limit, the result is above the limit or NaN.
 #[cold]
 #[inline(never)]
 pub(super) fn squared_stretch<M: Measure>(rest: &Squares, now: Edges, limit: f32) -> f32 {
     let now = M::squares(now);
     let estimate = M::estimate(rest, &now);
     let mut squared = if estimate.is_nan() { estimate } else { f32::INFINITY };
-    // The estimate may be too low by its rounding: twice as much headroom then, until it passes.
+    // The estimate may be too low by its rounding: double the headroom until it passes.
     let mut step = HEADROOM;
     for _ in 0..24 {
         let candidate = estimate * (1.0 + step);
@@ -181,14 +181,14 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// The square that is compared with the limit's is never above it, and hardly below.
+        /// The limit's square is never above the exact one, and hardly below.
         #[test]
         fn a_limit_is_squared_downwards(limit in 1.0_f32..1e6) {
             let (exact, squared) = (f64::from(limit).powi(2), f64::from(squared_limit(limit)));
             prop_assert!(squared <= exact && squared >= exact * (1.0 - 5.0 * f64::from(U)));
         }
 
-        /// A root is never below the true one, and hardly above.
+        /// A root is never below the exact one, and hardly above.
         #[test]
         fn a_root_is_taken_upwards(squared in LEAST..1e12) {
             let (exact, root) = (f64::from(squared).sqrt(), f64::from(root_up(squared)));

@@ -1,4 +1,4 @@
-//! Measured stretch: how far the surface as it is now departs from its rest shape.
+//! Measured stretch: the deformation of the current surface from its rest shape.
 
 mod gate;
 mod kernel;
@@ -21,7 +21,7 @@ pub use monitor::StretchMonitor;
 pub(crate) use motion::farthest;
 use regions::{of_regions, region_rows};
 
-/// Why a stretch could not be measured, or what it is beyond.
+/// Why a stretch could not be measured, or the limit that it exceeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -39,8 +39,7 @@ pub enum StretchError {
     Exceeded {
         /// The triangle.
         triangle: TriangleRow,
-        /// Its stretch; not a number or infinite where a position is, or where the triangle is too
-        /// small at rest to be measured.
+        /// Its stretch; NaN or infinite if a position is, or if the triangle is too small at rest to be measured.
         stretch: f32,
         /// Its limit.
         limit: f32,
@@ -52,13 +51,13 @@ pub enum StretchError {
         /// The least size allowed.
         limit: f32,
     },
-    /// A vertex moved farther since the published frame than its speed limit allows.
+    /// A vertex moved farther since the published frame than the speed limit allows.
     TooFast {
         /// Row of the vertex.
         vertex: u32,
-        /// How far it moved (mm).
+        /// The distance moved (mm).
         step: f32,
-        /// How far it might have, in the time between the two frames (mm).
+        /// The distance allowed in the time between the two frames (mm).
         limit: f32,
     },
     /// A row outside its table: the tree's bytes changed after they were validated.
@@ -94,17 +93,15 @@ impl fmt::Display for StretchError {
 
 impl core::error::Error for StretchError {}
 
-/// Measures the stretch of a whole frame at once: of every triangle what the tree's
-/// [`PathKind`](crate::PathKind) asks for, rounded up by the error of the f32 arithmetic
-/// and 2^-17 of itself. [`StretchMonitor`] measures the same in slices.
+/// Measures the stretch of a whole frame at once: the tree's [`PathKind`](crate::PathKind) of every triangle, rounded
+/// up by the error of the f32 arithmetic and 2^-17 of itself. [`StretchMonitor`] measures the same in slices.
 ///
-/// Never below the true stretch of any triangle; above the largest by some ten parts in a million, more
-/// only where a triangle is nearly flat at rest (twice as much where its largest angle is 120
-/// degrees, a thousandth at most). The rest shape of a triangle lower than 1/64 of its longest edge counts as
-/// that high, here and in the tree's radii.
+/// The result is never below the true stretch of a triangle. It is above the largest by some ten parts in a million,
+/// and by more only for triangles nearly flat at rest (twice as much at an angle of 120 degrees, a thousandth at most).
+/// The rest shape of a triangle lower than 1/64 of its longest edge counts as that high, here and in the tree's radii.
 ///
-/// Cost: linear in the triangles, about 35 floating point operations each, without root or division
-/// but for those beyond all before them.
+/// Cost: linear in the triangles, about 35 floating point operations each, without root or division except for a
+/// triangle stretched more than all before it.
 ///
 /// # Errors
 /// [`StretchError::Exceeded`] names the first triangle beyond its limit; the others say why nothing
@@ -126,7 +123,7 @@ pub fn measure_stretch<I: Index, V: VertexTable + ?Sized>(
     Ok(of_regions(tree, &regions, vertices.epoch()))
 }
 
-/// Whether the tree can be measured with, on a table of this size.
+/// Checks that the tree has a metric, and the table the right size.
 fn check_tables<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     vertices: &V,

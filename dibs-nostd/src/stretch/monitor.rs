@@ -20,22 +20,20 @@ const NONE: u32 = u32::MAX;
 const ALL: u32 = u32::MAX;
 const _: () = assert!(REGIONS == u32::BITS as usize);
 
-/// Measures every frame before it is published, a few triangles at a time: the [`Gate`] that keeps what
-/// is stretched, shrunk or moved beyond its limits from the controller, and gives the query the measured stretch.
+/// Measures every frame before it is published, a few triangles at a time. This [`Gate`] refuses surfaces stretched,
+/// shrunk or moved beyond their limits, and gives the query the measured stretch.
 ///
-/// A whole frame is measured as it arrives: a triangle can be checked as soon as its corners are there,
-/// and rows are numbered so that corners come about when their triangles do. Of a partial frame only
-/// the [`REGIONS`] with a moved corner are measured, once it is complete; the others' stretch
-/// stays. A region begins with the triangle that was its worst the last time: as a rule few come near it
-/// then, and only they take more than a glance. Either way the result is that of
-/// [`measure_stretch`](super::measure_stretch) on the whole surface, but for the few parts in a million that are
-/// added for rounding, which depend on where a region began; from the same frames always the same bits.
+/// A whole frame is measured as it arrives: a triangle is checked once its corners have come, and rows are ordered so
+/// that corners arrive along with their triangles. Of a partial frame only the [`REGIONS`] with a moved corner are
+/// measured, once it is complete; the other regions keep their stretch. A region begins with its worst triangle of the
+/// last time, so that few others fail the quick check. The result is that of
+/// [`measure_stretch`](super::measure_stretch) on the whole surface, but for a few parts in a million of rounding,
+/// which depend on the triangle that a region began with. The same frames always give the same bits.
 ///
 /// The rows that a frame brings are compared with the published ones; [`SurfaceLimits`] lists the refusals.
 ///
-/// Cost: [`advance`](Gate::advance) checks at most as many rows and triangles as it is told, and takes
-/// O([`REGIONS`]) besides. RAM: half a kilobyte at most, whatever the surface. Making one takes one pass over
-/// the triangles.
+/// Cost: [`advance`](Gate::advance) checks at most `work` rows and triangles, plus O([`REGIONS`]). RAM: half a kilobyte
+/// at most, whatever the surface. [`new`](Self::new) makes one pass over the triangles.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -74,8 +72,8 @@ pub struct StretchMonitor<'t, I> {
     changed: Changed,
     /// Regions still to be measured.
     left: u32,
-    /// Regions whose entry below is not that of the published surface: of a frame that was abandoned, or in
-    /// work. The next partial frame measures them, whether it changes them or not.
+    /// Regions whose entry below is that of an abandoned frame or the one in work. The next partial frame measures
+    /// them, changed or not.
     unpublished: u32,
     /// The next triangle of the region that is being measured.
     next: u32,
@@ -131,7 +129,7 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
         })
     }
 
-    /// The same with these limits on speed and size. Reach is the assembler's to limit:
+    /// The same with these limits on speed and size. The assembler limits the reach:
     /// [`Assembler::for_tree`](crate::Assembler::for_tree).
     #[must_use]
     pub const fn limits(mut self, limits: SurfaceLimits) -> Self {
@@ -146,14 +144,14 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
         self.tree
     }
 
-    /// Rows and triangles that a frame of which every row moved takes, at most: the sum of its slices' work.
+    /// Most rows and triangles checked for one frame: the sum of its slices' work.
     #[must_use]
     pub const fn whole_work(&self) -> u32 {
         let rows = self.tree.vertex_count().saturating_add(self.tree.triangle_count());
         rows.saturating_add(REGIONS as u32)
     }
 
-    /// Compares rows that have come with the published ones. Returns the work left, and whether all rows are done.
+    /// Compares arrived rows with the published ones. Returns the work left, and whether all rows are done.
     fn compare<V: VertexTable + ?Sized>(
         &mut self,
         Arriving { surface, ready, before }: Arriving<'_, V>,
@@ -194,7 +192,7 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
         Ok((work, true))
     }
 
-    /// Checks that the region that was measured, from this triangle on, has not shrunk.
+    /// Checks that the measured region, which begins with this triangle, has not shrunk.
     const fn check_room(&self, triangle: u32) -> Result<(), StretchError> {
         if self.room >= 0.0 {
             return Ok(());

@@ -1,4 +1,4 @@
-//! How far vertices have moved since the published frame.
+//! The motion of vertices since the published frame.
 
 use core::ops::Range;
 
@@ -6,14 +6,14 @@ use super::StretchError;
 use crate::math::sqrt::sqrt;
 use crate::surface::VertexTable;
 
-/// How far a vertex may move in this time (mm); infinite without a limit.
+/// Most that a vertex may move in this time (mm); infinite without a limit.
 pub(crate) const fn farthest(speed: f32, elapsed: u32) -> f32 {
-    // More than the time between, for the clock counts whole units.
+    // One unit more than the time, because the clock counts whole units.
     speed * (elapsed as f32 + 1.0)
 }
 
-/// The largest squared distance of these rows from where they were before, and of `largest`. Not below it where a
-/// position is not a number.
+/// The largest squared distance of these rows from their previous positions, or `largest` if that is larger. NaN where
+/// a position is NaN.
 #[inline(never)]
 pub(super) fn largest_step<V: VertexTable + ?Sized>(
     now: &V,
@@ -24,7 +24,7 @@ pub(super) fn largest_step<V: VertexTable + ?Sized>(
     for row in rows {
         let (Some(now), Some(before)) = (now.position(row), before.position(row)) else { break };
         let squared = (now - before).length_squared();
-        // A NaN counts, too, and stays.
+        // Written so that a NaN is kept.
         if !(squared <= largest) {
             largest = squared;
         }

@@ -21,7 +21,7 @@ pub(super) fn of_regions<I: Index>(
             worst = *region;
         }
     }
-    // A square that passed at the limit is within it, whatever the root's rounding says.
+    // A square that passed at the limit is within it; only the root's rounding may exceed it.
     let within = |squared: f32| {
         let sigma = root_up(squared);
         if sigma > tree.stretch() { tree.stretch() } else { sigma }
@@ -30,7 +30,7 @@ pub(super) fn of_regions<I: Index>(
     let mut codes = [0; REGIONS];
     for (code, region) in codes.iter_mut().zip(regions) {
         let own = within(region.squared);
-        // The least code that stands for enough, whichever way the division rounds.
+        // The least code whose share is at least `own`, whichever way the division rounds.
         let mut part = ((own / sigma * 256.0) as u8).saturating_sub(1);
         for _ in 0..2 {
             if share(sigma, part) < own {

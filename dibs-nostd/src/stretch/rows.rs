@@ -1,8 +1,8 @@
-//! The check of many triangles, row by row: where the time of a measurement goes.
+//! The check of many triangles, row by row: the hot loop of a measurement.
 //!
 //! Corners shared with the triangle before are carried over ([`Join`]). So is an edge's slack under the largest square
-//! `L` so far: `L r - g`, with its squares `r` at rest and `g` now. Both of its triangles have the same `r`, except in a
-//! tree that is not `UNIFORM`, whose triangles have limits of their own.
+//! `L` so far: `L r - g`, with its squares `r` at rest and `g` now. Both triangles of the edge have the same `r`,
+//! unless each triangle has its own limit (a tree that is not `UNIFORM`).
 
 use core::ops::Range;
 
@@ -16,8 +16,8 @@ use crate::surface::VertexTable;
 use crate::tree::format::{Join, METRIC_BYTES, Metric, PathKind, metric_row};
 use crate::tree::{Index, Tree, TriangleRow, format};
 
-/// How far a region is from having shrunk too much: the sum, over its triangles, of an edge's square now less
-/// `least` times that at rest (where triangles have limits of their own, times the square of their share).
+/// A region's room to shrink: the sum, over its triangles, of an edge's square now less `least` times that at rest (if
+/// each triangle has its own limit, times the square of its share).
 #[derive(Clone, Copy)]
 pub(super) struct Room {
     pub least: f32,
@@ -25,14 +25,14 @@ pub(super) struct Room {
 }
 
 impl Room {
-    /// For a region that may shrink to nothing.
+    /// Room without a limit.
     pub const fn any() -> Self {
         Self { least: 0.0, sum: 0.0 }
     }
 }
 
-/// Checks the triangles of `rows`, as far as all their corners are below row `ready`, and raises `worst`
-/// where one is stretched more, and adds up `room`. Returns the row to go on with.
+/// Checks the triangles of `rows` up to the first with a corner at row `ready` or beyond. Raises `worst` where one is
+/// stretched more, and adds up `room`. Returns the next row to check.
 pub(super) fn scan<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     surface: &V,
@@ -57,8 +57,8 @@ pub(super) fn scan<I: Index, V: VertexTable + ?Sized>(
     }
 }
 
-/// Raises `worst` where one triangle is stretched more, if all its corners are below row `ready`. Returns whether
-/// they are. Triangles beyond their limit are left to [`scan`].
+/// Raises `worst` if one triangle is stretched more and all its corners are below row `ready`. Returns whether they
+/// are. Triangles beyond their limit are left to [`scan`].
 pub(super) fn look<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     surface: &V,
@@ -83,8 +83,7 @@ pub(super) fn look<I: Index, V: VertexTable + ?Sized>(
     true
 }
 
-/// The run for one measure and `CORNERS` bytes a triangle: as far as [`measure`] comes, and why it comes no
-/// farther.
+/// [`scan`] for one measure and `CORNERS` bytes a triangle: [`measure`], then the reason if it stopped early.
 fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
     tree: &Tree<'_, I>,
     surface: &V,
@@ -95,7 +94,7 @@ fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
 ) -> Result<u32, StretchError> {
     let (triangles, _) = tree.sections().triangles.as_chunks::<CORNERS>();
     let bytes = tree.sections().metric;
-    // Words take fewer instructions than bytes, which may stand anywhere.
+    // Aligned words take fewer instructions than bytes.
     let row = match bytemuck::try_cast_slice::<u8, u32>(bytes) {
         Ok(words) => {
             let (metrics, _) = words.as_chunks();
@@ -134,7 +133,7 @@ fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
     Err(exceeded(tree, row, squared_stretch::<M>(&metric.squares, now, limit)))
 }
 
-/// The same on rows of the metric section as they stand in memory; `None` where there are none.
+/// [`measure`] on rows of the metric section, undecoded; `None` where there are none.
 #[expect(
     clippy::too_many_arguments,
     reason = "arguments stay in registers, fields of a struct do not"
@@ -166,7 +165,7 @@ fn run_on<I: Index, V: VertexTable + ?Sized, M: Measure, R: MetricBits, const CO
     Some(row)
 }
 
-/// A row of the metric section as it stands in memory.
+/// An undecoded row of the metric section.
 trait MetricBits {
     /// The bits of its numbers.
     fn bits(&self) -> [u32; 3];
@@ -188,7 +187,7 @@ impl MetricBits for [u8; METRIC_BYTES] {
     }
 }
 
-/// The state that a triangle leaves to the next.
+/// The state passed from a triangle to the next.
 #[derive(Clone, Copy)]
 struct Before {
     centre: Vec3,
@@ -225,7 +224,7 @@ fn measure<
     mut worst: Worst,
     mut room: Room,
 ) -> (u32, Worst, f32) {
-    // One comparison does for both.
+    // One comparison checks both bounds.
     let vertices = surface.len() as u32;
     let ready = if ready < vertices { ready } else { vertices };
     let table = Table { surface, ready, limit, least: room.least };
@@ -236,7 +235,7 @@ fn measure<
     let Some(mut before) = table.before::<I, CORNERS>(metric, corners, worst.squared) else {
         return (row, worst, room.sum);
     };
-    // Two at a time, so that the state between them takes no moves.
+    // Two at a time, which saves moves of the state between them.
     let (pairs, last_metric) = metrics.as_chunks::<2>();
     let (pairs_of_corners, last_corners) = triangles.as_chunks::<2>();
     for ([m0, m1], [t0, t1]) in pairs.iter().zip(pairs_of_corners) {
@@ -270,7 +269,7 @@ struct Table<'a, V: ?Sized> {
 }
 
 impl<V: VertexTable + ?Sized> Table<'_, V> {
-    /// The state that the first triangle of a run needs of the one before it, from its own first two corners.
+    /// The state before the first triangle of a run, from that triangle's first two corners.
     #[inline(always)]
     fn before<I: Index, const CORNERS: usize>(
         &self,
@@ -285,7 +284,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let edge = if metric.join == Join::Flip { centre - other } else { other - centre };
         let [rest, ..] = metric.squares;
         let left = largest * rest - edge.length_squared();
-        // Not within the largest so far, or NaN, which passes nothing: a closer look is taken.
+        // A NaN fails the quick check, so that `look_closer` measures the triangle.
         let edge = if left > 0.0 { edge } else { Vec3::NAN };
         Some(Before { centre, third: centre, edge, left, room: 0.0 })
     }
@@ -311,8 +310,8 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         }
     }
 
-    /// Checks that a triangle is certainly not stretched beyond `sqrt(largest)`. What is not likely is left to
-    /// others.
+    /// Checks that a triangle is certainly not stretched beyond `sqrt(largest)`. Rare cases fall through to
+    /// `look_closer`.
     #[inline(always)]
     fn pass<I: Index, M: Measure, const CORNERS: usize, const UNIFORM: bool>(
         &self,
@@ -334,8 +333,8 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
                     return None;
                 }
             } else {
-                // Both lines say that it is this way on which positions are moved, not that of a fan. (A zero may
-                // lose its sign, which no square shows.)
+                // `cold_path` and `+ ZERO` make the compiler move positions on the flip path, not the fan path. (A zero
+                // may lose its sign, which does not change its square.)
                 core::hint::cold_path();
                 centre = third + Vec3::ZERO;
                 first = -first;
@@ -384,12 +383,12 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let square = now.second.length_squared();
         let (left, room) =
             (worst.squared * rest_second - square, square - self.least * rest_second);
-        // It is within the largest now: below 0 is rounding.
+        // The triangle is within the largest now, so a value below 0 is rounding.
         let left = if left > 0.0 { left } else { 0.0 };
         Some((Before { centre, third, edge: now.second, left, room }, worst))
     }
 
-    /// Positions of a triangle's first two corners, if they are there.
+    /// Positions of a triangle's first two corners; `None` unless both rows are below `ready`.
     #[inline(always)]
     fn first_two<I: Index, const CORNERS: usize>(
         &self,
@@ -397,7 +396,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
     ) -> Option<[Vec3; 2]> {
         let a = format::vertex_number::<I>(corners, 0)?;
         let b = format::vertex_number::<I>(corners, 1)?;
-        // One branch for both.
+        // `&`, not `&&`: one branch for both.
         if (a < self.ready) & (b < self.ready) {
             Some([self.surface.position(a)?, self.surface.position(b)?])
         } else {
@@ -405,7 +404,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         }
     }
 
-    /// Position of a triangle's corner, if it is there.
+    /// Position of a triangle's corner; `None` unless its row is below `ready`.
     #[inline(always)]
     fn corner<I: Index, const CORNERS: usize>(
         &self,
@@ -437,7 +436,7 @@ fn edges<I: Index, V: VertexTable + ?Sized>(
     Ok(Some(Edges { first: first - centre, second: second - centre }))
 }
 
-/// Names a triangle beyond its limit, both in terms of its rest shape.
+/// The error for a triangle beyond its limit, with its stretch and limit relative to its rest shape.
 #[cold]
 fn exceeded<I: Index>(tree: &Tree<'_, I>, row: u32, squared: f32) -> StretchError {
     let triangle = TriangleRow(row);

@@ -1,15 +1,14 @@
-//! Age on a clock that wraps: the one rule for frames, heartbeats and packets.
+//! Age on a clock that wraps: one rule for frames, heartbeats and packets.
 //!
-//! A stamp is the clock's value when something came. Its age is `now - stamp`, wrapping, with two exceptions:
+//! A stamp is the clock's value at an arrival. Its age is `now - stamp`, wrapping, with two exceptions:
 //!
-//! - A stamp up to [`AHEAD`] in the future has age 0: the core that wrote it may have read its clock a little
-//!   later. A stamp farther ahead is not young: its age is the whole way around the clock, at least 2^31 for
-//!   half of all values and never below any limit that a [`Watch`](crate::failsafe::Watch) may have. So a flipped
-//!   bit does not keep an old surface alive.
-//! - A stamp never grows younger, also when the clock comes around: then its age is `u32::MAX` for good. For that
-//!   its age must be asked for at least once in 2^31 units.
+//! - A stamp up to [`AHEAD`] in the future has age 0: the core that wrote it may have read its clock a little later. A
+//!   stamp up to half the clock's range ahead has an age of at least 2^31, beyond any limit that a
+//!   [`Watch`](crate::failsafe::Watch) may have. So a flipped bit does not keep an old surface alive.
+//! - A stamp never grows younger: when the clock comes around, its age stays `u32::MAX`. This requires a reading of its
+//!   age at least once in 2^31 units.
 
-/// How far a stamp may lie ahead of the clock, in the clock's unit.
+/// Most that a stamp may lie ahead of the clock, in the clock's unit.
 pub(crate) const AHEAD: u32 = 16;
 
 /// Time from `stamp` to `now`; 0 for a stamp at most [`AHEAD`] in the future.
@@ -26,10 +25,10 @@ pub(crate) struct Ageing {
 }
 
 impl Ageing {
-    /// The same after a look at `stamp` at the time `now`: `oldest` is its age.
+    /// The state after a reading of `stamp` at the time `now`: `oldest` is the stamp's age.
     #[must_use]
     pub const fn at(self, now: u32, stamp: u32) -> Self {
-        // A stamp that was found old lies in the past, also just before the clock comes around to it.
+        // A stamp that was found old lies in the past, even just before the clock comes around to it.
         let is_past = stamp == self.stamp && self.oldest > i32::MAX as u32;
         let age = if is_past { now.wrapping_sub(stamp) } else { elapsed(now, stamp) };
         let fall = if stamp == self.stamp { self.oldest.saturating_sub(age) } else { 0 };
@@ -47,7 +46,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Distances around the places where the rule changes, and any other.
+    /// Distances near the values at which the rule changes, and others.
     fn distance() -> impl Strategy<Value = u32> {
         let near = |at: u32| (0_u32..40).prop_map(move |by| at.wrapping_sub(20).wrapping_add(by));
         prop_oneof![near(0), near(1 << 31), near(0_u32.wrapping_sub(AHEAD)), any::<u32>()]
@@ -64,7 +63,7 @@ mod tests {
             let age = elapsed(now, now.wrapping_add(ahead));
             let expected = if ahead <= AHEAD { 0 } else { ahead.wrapping_neg() };
             prop_assert_eq!(age, expected);
-            // Whatever lies ahead by up to half the clock's range is older than any limit that a watch may have.
+            // A stamp ahead by up to half the clock's range is older than any limit of a watch.
             prop_assert!(ahead <= AHEAD || ahead > 1 << 31 || age >= 1 << 31);
         }
 
@@ -76,7 +75,7 @@ mod tests {
         ) {
             let found = elapsed(now, now.wrapping_sub(age) ^ (1 << bit));
             prop_assert!(found >= age.saturating_sub(1 << bit), "{age}, bit {bit}: {found}");
-            // A bit above the age's puts the stamp into the future or far into the past: both are old.
+            // A flipped bit above the age's bits puts the stamp into the future or far into the past: both are old.
             prop_assert!(1 << bit <= age + AHEAD || found >= (1 << bit) - AHEAD, "bit {bit}: {found}");
         }
 

@@ -1,5 +1,5 @@
-//! Atomics: the processor's, or, built with `--cfg loom`, those of a model checker that tries every order
-//! in which two threads may see them (`tests/soundness`).
+//! Atomics: the processor's, or with `--cfg loom` those of a model checker that tries every order in which two threads
+//! may see them (`tests/soundness`).
 
 #[cfg(not(loom))]
 pub(crate) use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};

@@ -11,13 +11,12 @@ use super::atomic::{AtomicU32, Ordering};
 pub struct FrameLabel {
     /// Number of the frame, given by the sender; wraps.
     pub epoch: u32,
-    /// When the first packet of the frame arrived, less the age that the surface then had, on the
-    /// receiver's clock (wraps).
+    /// Arrival of the frame's first packet, less the age that the surface then had, on the receiver's clock (wraps).
     pub received: u32,
-    /// No vertex is farther than this from the position that the sender had, in mm: the
-    /// quantisation on the wire. A separation is off by at most as much.
+    /// Largest distance of a vertex from the sender's position, in mm: the quantisation on the wire. A separation is
+    /// off by at most as much.
     pub position_error: f32,
-    /// Measured stretch of the frame against the rest shape; `None` where it was not measured.
+    /// Measured stretch of the frame against the rest shape; `None` if not measured.
     pub stretch: Option<MeasuredStretch>,
 }
 
@@ -57,7 +56,7 @@ pub(super) struct Buffer<const N: usize> {
     pub epoch: AtomicU32,
     pub received: AtomicU32,
     position_error: AtomicU32,
-    /// Measured stretch; the first word is not a number where there is none.
+    /// Measured stretch; the first word is a NaN if there is none.
     stretch: [AtomicU32; MeasuredStretch::WORDS],
 }
 

@@ -1,4 +1,4 @@
-//! Why buffers were not split, filled or published.
+//! Errors of splitting, filling and publishing buffers.
 
 use core::fmt;
 
@@ -20,9 +20,9 @@ impl core::error::Error for SplitError {}
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct OutOfTableError {
-    /// The vertex asked for.
+    /// The vertex.
     pub vertex: u32,
-    /// How many there are.
+    /// Vertices of the table.
     pub vertices: u32,
 }
 
@@ -41,7 +41,7 @@ impl core::error::Error for OutOfTableError {}
 pub enum PublishError {
     /// Vertices of this frame were never written.
     Incomplete {
-        /// How many.
+        /// Vertices missing.
         missing: u32,
     },
     /// A read is in progress.

@@ -1,33 +1,32 @@
 //! The double buffer between the bus and the control tick: complete frames only, never torn.
 //!
-//! One side writes vertices into the back buffer, the other reads the front buffer, and one atomic
-//! word says which is which. The whole module is safe code: positions are stored as the bits of
-//! `f32` in relaxed atomics, which compile to plain loads and stores.
+//! One side writes vertices into the back buffer, the other reads the front buffer, and one atomic word states which
+//! buffer is in front. The whole module is safe code: positions are stored as the bits of `f32` in relaxed atomics,
+//! which compile to plain loads and stores.
 //!
 //! # Why no read is torn
 //!
-//! The state word holds three bits: which buffer is in front, whether a read is in progress, and
-//! whether anything was published.
+//! The state word holds three bits: the index of the front buffer, whether a read is in progress, and whether a frame
+//! was published.
 //!
-//! - A read begins with one `fetch_or` that sets READING and, in the same operation, learns the
-//!   front buffer. It ends with one `fetch_and` that clears READING.
+//! - A read begins with one `fetch_or` that sets READING and returns the index of the front buffer. It ends with one
+//!   `fetch_and` that clears READING.
 //! - A publication is one compare-exchange that flips the front buffer and expects READING to be
 //!   clear. So the front buffer never changes while a read is in progress, and the writer writes
 //!   to the back buffer only.
 //!
-//! Ordering: the compare-exchange releases the writer's stores, and the `fetch_or` acquires them, so
-//! a read sees the whole frame. The `fetch_and` releases the reader's loads, and the next
-//! compare-exchange acquires them, so the writer's next stores, which go to what was the front
-//! buffer, come after every load of the last read. Both hold on any number of cores.
+//! Ordering: the compare-exchange releases the writer's stores, and the `fetch_or` acquires them, so a read sees the
+//! whole frame. The `fetch_and` releases the reader's loads, and the next compare-exchange acquires them, so the
+//! writer's next stores, which go to the former front buffer, come after every load of the last read. Both hold on any
+//! number of cores.
 //!
 //! # Who waits
 //!
-//! Nobody. The reader takes two atomic operations a read, whatever the writer does. The writer is
-//! told [`PublishError::Busy`] when a read is in progress, keeps its frame, and publishes it at a
-//! later call. On one core where the control tick preempts the writer and finishes its read before
-//! it returns, that never happens. (On ARMv7-M an atomic operation repeats when an exception comes
-//! between its load and its store: at most once an exception, and never in the handler of highest
-//! priority.)
+//! Nobody. The reader takes two atomic operations a read, whatever the writer does. During a read the writer gets
+//! [`PublishError::Busy`], keeps its frame, and publishes it at a later call. This never happens on one core where the
+//! control tick preempts the writer and finishes its read before it returns. (On ARMv7-M an atomic operation repeats
+//! when an exception comes between its load and its store: at most once an exception, and never in the handler of
+//! highest priority.)
 
 use core::ops::Range;
 
@@ -49,8 +48,7 @@ const PUBLISHED: u32 = 4;
 
 /// A double buffer of `N` vertex positions, meant for a `static`.
 ///
-/// RAM: 24 bytes a vertex, two positions, and a little over a hundred more. All zero at start, so it
-/// lives in `.bss`.
+/// RAM: 24 bytes a vertex (two positions), plus a little over a hundred. All zero at start, so it lies in `.bss`.
 ///
 /// ```
 /// use dibs_nostd::{FrameLabel, Frames, VertexTable, glam::Vec3};
@@ -92,7 +90,7 @@ impl<const N: usize> Frames<N> {
         }
     }
 
-    /// An empty double buffer, of atomics whose order a model checker decides.
+    /// An empty double buffer, for a model checker.
     #[cfg(loom)]
     #[must_use]
     pub fn new() -> Self {
@@ -125,14 +123,14 @@ impl<const N: usize> Default for Frames<N> {
 
 /// The end that writes: owned by the receiver of vertices.
 ///
-/// A frame is [`begin`](Self::begin), one [`push`](Self::push) for every vertex in the order of the
-/// rows, and [`publish`](Self::publish). An [`Assembler`](crate::Assembler) takes rows in the order in
-/// which they come, and proves by itself that all of them have.
+/// A frame is [`begin`](Self::begin), one [`push`](Self::push) for every vertex in the order of the rows, and
+/// [`publish`](Self::publish). An [`Assembler`](crate::Assembler) takes rows in any order, and proves that all have
+/// come.
 #[derive(Debug)]
 pub struct FrameWriter<'f, const N: usize> {
     frames: &'f Frames<N>,
     back: &'f Buffer<N>,
-    /// The state word as the last publication left it: only the writer changes these bits.
+    /// The state word after the last publication; only the writer changes these bits.
     state: u32,
     /// Rows pushed since the last `begin`.
     filled: u32,
@@ -159,13 +157,13 @@ impl<const N: usize> FrameWriter<'_, N> {
         Ok(())
     }
 
-    /// Vertices that this frame still lacks.
+    /// Vertices not yet pushed.
     #[must_use]
     pub const fn missing(&self) -> u32 {
         (N as u32).saturating_sub(self.filled)
     }
 
-    /// Rows of the back buffer; `None` unless all of them are in it.
+    /// Rows of the back buffer; `None` outside it.
     #[inline]
     pub(crate) fn rows(&self, rows: Range<u32>) -> Option<&[Position]> {
         self.back.positions.get(rows.start as usize..rows.end as usize)
@@ -199,8 +197,7 @@ impl<const N: usize> FrameWriter<'_, N> {
         if self.state & FRONT == 0 { first } else { second }
     }
 
-    /// Makes the frame the published one, by one compare-exchange. The next frame begins with
-    /// [`begin`](Self::begin).
+    /// Publishes the frame, by one compare-exchange. The next frame begins with [`begin`](Self::begin).
     ///
     /// # Errors
     /// [`PublishError::Incomplete`] while vertices are missing. [`PublishError::Busy`] while a read is
@@ -218,7 +215,7 @@ impl<const N: usize> FrameWriter<'_, N> {
         self.back.set_label(label);
     }
 
-    /// Publishes a frame that is labelled, and whose completeness the caller has proved.
+    /// Publishes a labelled frame that the caller has proven complete.
     pub(crate) fn publish_complete(&mut self) -> Result<(), PublishError> {
         let next = (self.state ^ FRONT) | PUBLISHED;
         self.frames
@@ -238,13 +235,13 @@ impl<const N: usize> FrameWriter<'_, N> {
 #[derive(Debug)]
 pub struct FrameReader<'f, const N: usize> {
     frames: &'f Frames<N>,
-    /// Epoch and age of the frame asked for last.
+    /// Epoch and age of the frame read last.
     ageing: (u32, Ageing),
 }
 
 impl<const N: usize> FrameReader<'_, N> {
-    /// The published frame and its age at `now`, on the receiver's clock: [`Latest::within`] a limit it is given
-    /// out, as [`read`](Self::read) does.
+    /// The published frame and its age at `now`, on the receiver's clock. [`Latest::within`] a limit gives the frame,
+    /// held as by [`read`](Self::read).
     #[inline]
     pub fn latest(&mut self, now: u32) -> Latest<FrameGuard<'_, N>> {
         let (epoch_before, before) = self.ageing;
@@ -256,11 +253,10 @@ impl<const N: usize> FrameReader<'_, N> {
         Latest::new(Some((guard, FrameAge { epoch, received, age: ageing.oldest })))
     }
 
-    /// Holds the published frame for as long as the guard lives; `None` before the first.
+    /// The published frame, held for as long as the guard lives; `None` before the first.
     ///
-    /// Keep the guard for one query, not longer: no frame is published meanwhile. A guard that is
-    /// leaked keeps the surface at its present frame, which its age then tells. The age is not looked at here:
-    /// [`latest`](Self::latest).
+    /// Keep the guard for one query, not longer: no frame is published meanwhile. A leaked guard keeps the surface at
+    /// its present frame, whose age then grows. This does not check the age: use [`latest`](Self::latest).
     #[inline]
     pub fn read(&mut self) -> Option<FrameGuard<'_, N>> {
         read(self.frames)
@@ -272,7 +268,7 @@ fn read<const N: usize>(frames: &Frames<N>) -> Option<FrameGuard<'_, N>> {
     let state = frames.state.fetch_or(READING, Ordering::Acquire);
     let [first, second] = &frames.buffers;
     let buffer = if state & FRONT == 0 { first } else { second };
-    // Made before the check, so that it clears READING on both ways out.
+    // Created before the check, so that it clears READING on both paths.
     let guard = FrameGuard { state: &frames.state, view: FrameView { buffer } };
     (state & PUBLISHED != 0).then_some(guard)
 }
@@ -329,7 +325,7 @@ pub struct FrameView<'f, const N: usize> {
 
 #[cfg(feature = "bus")]
 impl<const N: usize> FrameView<'_, N> {
-    /// The facts about the frame; of one being written, nothing certain before it is labelled.
+    /// The facts about the frame; arbitrary for a frame not yet labelled.
     pub(crate) fn label(&self) -> FrameLabel {
         self.buffer.label()
     }

@@ -1,24 +1,24 @@
-//! The newest surface with its age: how a control tick asks for it.
+//! The newest surface with its age, for a control tick.
 
 use crate::unavailable::Unavailable;
 
-/// Which frame was published last, and how old it is: one notion of age for surfaces of vertices and of modes.
+/// The frame published last and its age, for surfaces of vertices and of modes.
 ///
-/// A frame received up to 16 units ahead of the clock has age 0, another core may have stamped it. One farther ahead
-/// is old, and no frame grows younger, whatever the clock does, if its age is asked for at least once in 2^31 units.
+/// A frame received up to 16 units ahead of the clock has age 0: another core may have stamped it. A frame farther
+/// ahead is old. No frame grows younger, if its age is read at least once in 2^31 units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FrameAge {
     /// Number of the frame; wraps.
     pub epoch: u32,
-    /// When its first packet arrived, on the receiver's clock; wraps.
+    /// Arrival of its first packet, on the receiver's clock, less the age that it then had; wraps.
     pub received: u32,
     /// Time since then, in the clock's unit.
     pub age: u32,
 }
 
-/// The surface that was published last, if any was: [`FrameReader::latest`](crate::FrameReader::latest) and
-/// [`ModalReader::latest`](crate::modes::ModalReader::latest) give one.
+/// The surface published last, if any, from [`FrameReader::latest`](crate::FrameReader::latest) or
+/// [`ModalReader::latest`](crate::modes::ModalReader::latest).
 #[derive(Debug)]
 #[must_use]
 pub struct Latest<S> {
@@ -58,7 +58,7 @@ impl<S> Latest<S> {
         self.within(u32::MAX)
     }
 
-    /// Which frame it is and how old; `None` before the first was published.
+    /// Its frame and age; `None` before the first was published.
     #[must_use]
     pub fn frame(&self) -> Option<FrameAge> {
         self.surface.as_ref().map(|(_, frame)| *frame)

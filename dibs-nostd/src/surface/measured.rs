@@ -1,4 +1,4 @@
-//! The measured stretch of one frame, as it travels with the frame.
+//! The measured stretch of one frame.
 
 use crate::tree::TriangleRow;
 
@@ -6,14 +6,13 @@ use crate::tree::TriangleRow;
 /// are patches of the surface because rows stand leaf by leaf.
 pub const REGIONS: usize = 32;
 
-/// The stretch `sigma` of one frame, measured on every triangle: the largest, and that of each region.
+/// The largest stretch `sigma` of one frame, over all triangles, and that of each region.
 ///
-/// Only a measurement makes one, so a query cannot be given a stretch below the true one by mistake.
-/// It belongs to the tree and, where that is known, to the frame that it was measured on; a query
-/// refuses another's.
+/// Only a measurement makes one, so a query cannot be given a stretch below the true one by mistake. A query refuses a
+/// measurement of another tree or, where that is known, of another frame.
 ///
-/// Where triangles have limits of their own, a stretch counts as the part of its limit that it takes,
-/// times the tree's limit: the tree's radii grow with that.
+/// Where triangles have their own limits, a triangle's stretch is divided by its limit and multiplied by the tree's, as
+/// the tree's radii are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MeasuredStretch {
@@ -26,8 +25,7 @@ pub struct MeasuredStretch {
 }
 
 impl MeasuredStretch {
-    /// A measurement of the frame `epoch` with the tree of this checksum: of each region the code of its
-    /// [`share`].
+    /// A measurement of the frame `epoch` with the tree of this checksum: with the code of each region's [`share`].
     pub(crate) const fn new(
         sigma: f32,
         tree: u32,
@@ -38,7 +36,7 @@ impl MeasuredStretch {
         Self { sigma, tree, triangle, epoch, regions }
     }
 
-    /// One bound for the whole surface, by other means than measuring every triangle.
+    /// One bound for the whole surface, not from a measurement of every triangle.
     #[cfg(feature = "modes")]
     pub(crate) const fn everywhere(sigma: f32, tree: u32, triangle: u32) -> Self {
         Self { sigma, tree, triangle, epoch: None, regions: [u8::MAX; REGIONS] }
@@ -78,13 +76,13 @@ impl MeasuredStretch {
         self.tree
     }
 
-    /// Number of the frame that it was measured on, where the frame has one.
+    /// Number of the frame that it was measured on, if the frame has one.
     #[must_use]
     pub const fn epoch(&self) -> Option<u32> {
         self.epoch
     }
 
-    /// The measurement as words, without its epoch: for the frame that it is kept with.
+    /// The measurement as words, without its epoch, for the frame's label.
     pub(crate) fn to_words(self) -> [u32; MeasuredStretch::WORDS] {
         let mut words = [0; Self::WORDS];
         let [sigma, tree, triangle, regions @ ..] = &mut words;

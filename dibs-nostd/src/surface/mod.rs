@@ -1,4 +1,4 @@
-//! The surface as it is now: vertex tables, and the double buffer that frames arrive in.
+//! The current surface: vertex tables, and the double buffer that frames arrive in.
 
 mod age;
 mod atomic;

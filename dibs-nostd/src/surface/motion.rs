@@ -1,9 +1,8 @@
-//! How far a surface has moved: the odometer by which a tracker's bounds run out.
+//! The motion of a surface: the odometer by which a tracker's bounds run out.
 //!
-//! A bound of a distance holds for as long as nothing has moved by more than it has to spare. So all that
-//! has to be known of a moving surface is a number that grows, from frame to frame, by at least the
-//! distance that any vertex moved. Two readings of it, however many frames apart, bound the motion between
-//! them: frames that were not looked at add up by themselves.
+//! A bound on a distance holds until tool and surface have moved by more than its slack. An odometer is a number that
+//! grows, from frame to frame, by at least the distance that any vertex moved. Two readings of it, however many frames
+//! apart, bound the motion between them.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -15,9 +14,9 @@ use crate::{Index, MeasuredStretch, Tree, VertexTable};
 
 /// A surface whose motion is known: a table of positions, and the reading of its odometer.
 ///
-/// Sealed: only a measurement may state a motion.
+/// Sealed, so that only a measurement states a motion.
 pub trait MovingSurface: VertexTable + sealed::Sealed {
-    /// The odometer's reading at this frame; `None` where the motion is not measured.
+    /// The odometer's reading at this frame; `None` if the motion is not measured.
     fn travel(&self) -> Option<Travel>;
 }
 
@@ -46,11 +45,11 @@ impl<S: MovingSurface + ?Sized> MovingSurface for &S {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Travel {
     tree: u32,
-    /// An unbroken run of measurements: no two have the same number.
+    /// Number of an unbroken run of measurements; no two runs share one.
     chain: u32,
-    /// In the tree's units: how far along the path that leads through all frames.
+    /// Length along the path through all frames, in the tree's units.
     reading: u64,
-    /// How far from that path: an extrapolated surface is on a way of its own, which goes no farther.
+    /// Distance from that path, of an extrapolated surface; 0 for a frame.
     aside: i64,
 }
 
@@ -70,16 +69,16 @@ impl Travel {
         Some(along.saturating_add(aside))
     }
 
-    /// This reading, so many units farther along the path, or on a way of its own.
+    /// This reading, `along` units farther on the path and `aside` units off it.
     pub(super) fn beyond(self, along: u64, aside: i64) -> Self {
         let reading = self.reading.saturating_add(along);
         Self { reading, aside: self.aside.saturating_add(aside), ..self }
     }
 }
 
-/// The unit in which lengths are added up: a power of two, 2^-24 of the tree's root sphere or less.
+/// The unit of the odometer: a power of two times 2^-24, at most 2^-24 of the root sphere's radius.
 ///
-/// Integers add without rounding, and wrap without a seam.
+/// Integers add without rounding, and wrap.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Unit {
     length: f32,
@@ -93,7 +92,7 @@ impl Unit {
             Some((_, radius, _)) => radius,
             None => 0.0,
         };
-        // Far from where a product underflows or overflows. Written so that NaN becomes a number.
+        // Clamped, so that no product underflows or overflows. Written so that NaN becomes a number.
         let radius = if radius > 1e-20 { radius } else { 1e-20 };
         let radius = if radius < 1e20 { radius } else { 1e20 };
         let power = f32::from_bits(radius.to_bits() & EXPONENT);
@@ -121,12 +120,12 @@ impl Unit {
     }
 }
 
-/// The largest number of units that a length is counted as: 64 times the root sphere's radius or more.
+/// Largest number of units counted for a length: more than 32 times the root sphere's radius.
 pub(crate) const FAR: i32 = 1 << 30;
 
 /// A table of positions, with the reading of its surface's [`Odometer`].
 ///
-/// It borrows the table: measured positions cannot change while it lives.
+/// It borrows the table, so that measured positions cannot change.
 #[derive(Debug)]
 pub struct Moved<'v, V: ?Sized> {
     pub(super) table: &'v V,
@@ -172,9 +171,8 @@ impl<V: VertexTable + ?Sized> MovingSurface for Moved<'_, V> {
 
 /// Measures how far a surface moves from one frame to the next.
 ///
-/// Only a measurement makes a [`Travel`], and only of frames that follow one another: a frame that is not
-/// the one measured last, by a digest of all its positions, starts anew, and so does whatever was tracked
-/// on it.
+/// Only a measurement of consecutive frames makes a [`Travel`]. If `before` is not the frame measured last, by a digest
+/// of all its positions, the odometer starts anew, and trackers do too.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -197,7 +195,7 @@ pub struct Odometer {
     tree: u32,
     vertices: usize,
     travel: Option<Travel>,
-    /// Of the frame measured last.
+    /// Digest of the frame measured last.
     digest: u32,
 }
 
@@ -214,7 +212,7 @@ impl Odometer {
         }
     }
 
-    /// A frame of whose past nothing is known.
+    /// Starts anew with a frame.
     ///
     /// Cost: one pass over the vertices.
     pub fn start<'v, V: VertexTable + ?Sized>(&mut self, surface: &'v V) -> Moved<'v, V> {
@@ -222,7 +220,7 @@ impl Odometer {
         self.step(surface, surface).after()
     }
 
-    /// The frame `after` that follows `before`, which must be the one measured last: else whatever is tracked
+    /// Measures the step from `before`, which must be the frame measured last, to `after`. Otherwise the odometer
     /// starts anew.
     ///
     /// Cost: one pass over the vertices of both, some 15 floating point operations each.
@@ -245,7 +243,7 @@ impl Odometer {
             if squared > largest {
                 largest = squared;
             }
-            // A NaN is not below infinity either.
+            // False for NaN too.
             is_measured &= squared < f32::INFINITY;
         }
         // Differences and squares are rounded by a few parts in 2^24, and underflow below 1e-22.
@@ -261,13 +259,13 @@ impl Odometer {
     }
 }
 
-/// A number that no other run of measurements has.
+/// A new number for a run of measurements.
 fn next_chain() -> u32 {
     static NEXT: AtomicU32 = AtomicU32::new(0);
     NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
-/// Tells one frame from another: FNV-1a of the positions' bits, word by word.
+/// Digest of a frame: FNV-1a of the positions' bits, word by word.
 struct Digest(u32);
 
 impl Digest {

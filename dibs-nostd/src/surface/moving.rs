@@ -1,9 +1,8 @@
-//! The surface between two frames and after the last: positions computed for the vertices that are read, no
-//! others.
+//! The surface between two frames and after the last, computed only for the vertices that are read.
 //!
-//! Imaging gives some tens of frames a second, a control loop asks a thousand times: a surface that is held
-//! from frame to frame jumps. A tree needs no refitting, so a surface that moves at every tick costs it only the
-//! sums below, at the vertices that a query reads.
+//! Imaging gives some tens of frames a second, a control loop ticks a thousand times, so a surface held from frame to
+//! frame jumps. A tree needs no refitting, so a surface that moves at every tick costs only the sums below, at the
+//! vertices that a query reads.
 
 use glam::Vec3;
 
@@ -12,7 +11,7 @@ use crate::{MeasuredStretch, VertexTable};
 
 /// Two frames that follow one another, as [`Odometer::step`](crate::Odometer::step) measured them.
 ///
-/// It borrows both: measured positions cannot change while it lives.
+/// It borrows both, so that measured positions cannot change.
 #[derive(Debug)]
 pub struct Step<'v, W: ?Sized, V: ?Sized> {
     pub(super) before: &'v W,
@@ -31,7 +30,7 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
         Moved { table: self.before, travel: self.from }
     }
 
-    /// The later frame: the surface held.
+    /// The later frame.
     #[must_use]
     pub const fn after(&self) -> Moved<'v, V> {
         Moved { table: self.after, travel: self.travel }
@@ -43,27 +42,26 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
         if self.is_measured { self.length } else { f32::INFINITY }
     }
 
-    /// The surface between the two: `share` 0 is the earlier frame and 1 the later. Certain, and late by a frame.
+    /// The surface between the two: `share` 0 is the earlier frame and 1 the later. It is exact, but late by a frame.
     ///
     /// Its stretch is at most the larger of the two frames' (gradients are linear in positions, and the largest
-    /// singular value is convex): see [`MeasuredStretch::or_larger`](crate::MeasuredStretch::or_larger).
-    /// A number outside 0..=1 becomes the nearer of the two.
+    /// singular value is convex): see [`MeasuredStretch::or_larger`](crate::MeasuredStretch::or_larger). `share` is
+    /// clamped to 0..=1.
     #[must_use]
     pub fn at(&self, share: f32) -> Between<'v, W, V> {
-        // Written so that a NaN becomes a frame.
+        // Written so that a NaN becomes 0.
         let share = if share > 0.0 { share } else { 0.0 };
         let share = if share < 1.0 { share } else { 1.0 };
-        // Off by less than a few units; a tracker spares more.
+        // Off by less than a few units, within a tracker's slack.
         let along = (share * self.units as f32) as u64;
         self.moved_by(share, self.from.beyond(along, 0))
     }
 
-    /// The surface after the later frame, if every vertex keeps the velocity that it had between the two: `share` 1 is
-    /// as long after as the earlier frame was before, 0 the later frame itself. It is on time, and wrong by as much as
-    /// the motion changes.
+    /// The surface after the later frame, if every vertex keeps its velocity between the two: `share` 0 is the later
+    /// frame, 1 as long after it as the earlier frame was before. It is on time, and wrong by the change of the motion.
     ///
-    /// Its stretch is at most the later frame's plus `share` times that of the difference of the two:
-    /// see `measure_stretch` of it. Held to 0..=`FARTHEST_SHARE`.
+    /// Its stretch is at most the later frame's plus `share` times that of the difference of the two. `share` is
+    /// clamped to 0..=`FARTHEST_SHARE`.
     #[must_use]
     pub fn beyond(&self, share: f32) -> Between<'v, W, V> {
         let share = if share > 0.0 { share } else { 0.0 };
@@ -78,8 +76,7 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
     }
 }
 
-/// The farthest that a surface is extrapolated, in units of the time between its frames: beyond that the guess is
-/// worth less than the last frame.
+/// Longest extrapolation, in units of the time between the frames: a longer one is worse than the last frame.
 pub const FARTHEST_SHARE: f32 = 1.0;
 
 /// A surface on its way from one frame to another, or beyond: `before + share * (after - before)`.
@@ -105,7 +102,7 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> VertexTable for Between<'
         Some(before + (after - before) * self.share)
     }
 
-    /// Between the two frames a bound of both is one of all; beyond them there is no measurement.
+    /// Between the two frames a bound on both holds; beyond them there is no measurement.
     fn stretch(&self) -> Option<MeasuredStretch> {
         let (before, after) = (self.before.stretch()?, self.after.stretch()?);
         if self.share <= 1.0 { before.or_larger(after) } else { None }

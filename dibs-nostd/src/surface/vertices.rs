@@ -1,4 +1,4 @@
-//! Where the vertices' current positions come from: the traversal is generic over this.
+//! Tables of the vertices' current positions, over which a query is generic.
 
 use glam::Vec3;
 
@@ -14,20 +14,18 @@ pub trait VertexTable {
     /// Position of one vertex in the mesh's unit (mm), or `None` outside the table.
     fn position(&self, vertex: u32) -> Option<Vec3>;
 
-    /// Number of the frame that these positions are of, where they have one: keeps what was measured on
-    /// one frame from being used on another.
+    /// Number of these positions' frame, if it has one, so that a measurement on another frame is refused.
     fn epoch(&self) -> Option<u32> {
         None
     }
 
-    /// The stretch measured on these positions, where somebody did: a query then searches smaller spheres than those
-    /// of the tree's limit.
+    /// The stretch measured on these positions, if any: a query then searches smaller spheres than the tree's limit
+    /// gives.
     fn stretch(&self) -> Option<MeasuredStretch> {
         None
     }
 
-    /// No vertex is farther (mm) than this from where the table has it, say by quantisation: every answer's accuracy
-    /// says so.
+    /// Largest error (mm) of a position in the table, say by quantisation. Every answer's accuracy includes it.
     fn position_error(&self) -> f32 {
         0.0
     }
@@ -85,9 +83,8 @@ impl<T: VertexTable + ?Sized> VertexTable for &T {
 
 /// A table of 16-bit positions, 6 bytes a vertex: `position = origin + step * row`.
 ///
-/// Against the position that was quantised, each axis is off by at most `step / 2` plus the f32
-/// rounding of the result; that much adds to the accuracy of a separation (in length:
-/// `step.length() / 2`).
+/// Against the position that was quantised, each axis is off by at most `step / 2` plus the f32 rounding of the result;
+/// a separation's accuracy grows by as much (in length: `step.length() / 2`).
 ///
 /// ```
 /// use dibs_nostd::{QuantisedVertices, VertexTable, glam::Vec3};
