@@ -58,7 +58,7 @@ pub struct Tick {
     pub point_on_surface: [f32; 3],
     /// Its triangle's row in the tree; `u32::MAX` where there is none.
     pub triangle: u32,
-    /// Sphere bounds evaluated.
+    /// Tests of spheres and planes.
     pub node_tests: u32,
     /// Triangles tested.
     pub triangle_tests: u32,

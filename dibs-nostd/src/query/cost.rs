@@ -16,9 +16,9 @@ use super::Budget;
 pub struct Cost {
     /// The cost of every query: setting it up, the root, a warm start's bookkeeping, and the answer.
     pub base: u32,
-    /// The cost of a node test, be its sphere stored or elastic.
+    /// The cost of a node test: of a sphere, or of a leaf's or triangle's plane.
     pub node_test: u32,
-    /// The cost of an exact triangle test, on top of the elastic test before it.
+    /// The cost of an exact triangle test, on top of the plane test before it.
     pub triangle_test: u32,
 }
 

@@ -53,7 +53,7 @@ pub struct Proximity {
     pub corners: [u32; 3],
     /// Weights of the three corners at `point_on_surface`: not negative, sum 1.
     pub barycentric: [f32; 3],
-    /// Sphere bounds evaluated: stored spheres and elastic ones.
+    /// Tests of spheres, and of leaves' and triangles' planes.
     pub node_tests: u32,
     /// Exact tool-triangle tests evaluated.
     pub triangle_tests: u32,
