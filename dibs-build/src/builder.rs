@@ -92,9 +92,9 @@ impl<'p> Builder<'p> {
 
     /// A stretch limit for each of the mesh's triangles, each at least 1, instead of one for all.
     ///
-    /// Tissue stretches much in few places: a tree that knows where has smaller spheres everywhere else.
-    /// [`MotionStretch::limits`](crate::MotionStretch::limits) learns them from a recorded motion.
-    /// Along-surface distances are weighted by the limits, and the tree's own limit is the largest.
+    /// Tissue stretches much in few places, so limits for each triangle make spheres smaller everywhere else.
+    /// [`MotionStretch::limits`](crate::MotionStretch::limits) derives them from a recorded motion. Along-surface
+    /// distances are weighted by the limits, and the tree's own limit is the largest.
     #[must_use]
     pub fn limits(mut self, limits: Vec<f32>) -> Self {
         self.limits = Some(limits);
@@ -108,7 +108,7 @@ impl<'p> Builder<'p> {
         self
     }
 
-    /// How along-surface distances are measured, and so which stretch the limit is about.
+    /// How along-surface distances are measured, and so which stretch is limited.
     #[must_use]
     pub fn paths(mut self, paths: Paths) -> Self {
         self.paths = Some(paths);
@@ -129,7 +129,7 @@ impl<'p> Builder<'p> {
         self
     }
 
-    /// Whether the tree carries the mesh's own vertex numbers (2 or 4 bytes a vertex).
+    /// Whether the tree carries the mesh's vertex numbers (2 or 4 bytes a vertex).
     #[must_use]
     pub fn with_vertex_order(mut self, with: bool) -> Self {
         self.with_order = with;
@@ -151,16 +151,16 @@ impl<'p> Builder<'p> {
         self
     }
 
-    /// Whether the tree knows its triangles' neighbours (6 or 12 bytes a triangle), which a query needs to tell on
-    /// which side of the surface a tool is. A surface without sides (an edge of more than two triangles, or of two
-    /// that are wound against each other) has none in any case.
+    /// Whether the tree carries its triangles' neighbours (6 or 12 bytes a triangle), from which a query finds a tool's
+    /// side. A surface without sides (with an edge of more than two triangles, or of two that are wound against each
+    /// other) has none in any case.
     #[must_use]
     pub fn with_adjacency(mut self, with: bool) -> Self {
         self.with_adjacency = with;
         self
     }
 
-    /// Calls back with the number of triangles done, from whichever thread did them.
+    /// Calls back with the number of triangles done, from any thread.
     #[must_use]
     pub fn progress<'q>(self, report: &'q (dyn Fn(usize) + Sync)) -> Builder<'q>
     where

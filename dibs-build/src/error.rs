@@ -1,6 +1,6 @@
 //! Why a tree cannot be built or written.
 
-/// Why a tree cannot be built from a mesh, or not be written.
+/// Why a tree cannot be built or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BuildError {
@@ -17,7 +17,7 @@ pub enum BuildError {
         /// Vertices of the mesh.
         vertices: usize,
     },
-    /// A triangle without area: its corners lie in a line or in one place.
+    /// A triangle without area: its corners are collinear or coincide.
     #[error(
         "triangle {triangle}, with the vertices {corners:?}, has no area: remove it, or weld its \
          corners (`dibs_build::read` drops such triangles)"
@@ -52,10 +52,10 @@ pub enum BuildError {
         "a stretch limit of {stretch} makes no sense: it is a factor of at least 1 (at most 1e6)"
     )]
     Stretch {
-        /// The limit asked for.
+        /// The limit given.
         stretch: f32,
     },
-    /// Not as many limits as triangles.
+    /// The number of limits differs from that of triangles.
     #[error(
         "{limits} stretch limits for a mesh of {triangles} triangles: there must be one for each"
     )]
@@ -81,13 +81,13 @@ pub enum BuildError {
         /// The size asked for.
         triangles: usize,
     },
-    /// The mesh falls into several surfaces.
+    /// The mesh has several components.
     #[error(
         "no path over the surface reaches vertex {vertex}: the mesh has several components, \
          build a tree for each"
     )]
     NotConnected {
-        /// A vertex that some other vertex cannot reach.
+        /// A vertex without a path to another one.
         vertex: u32,
     },
     /// The tree does not pass its own validation: a defect of the builder.

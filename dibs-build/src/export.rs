@@ -1,4 +1,4 @@
-//! Meshes written to files: PLY, STL, OBJ and OFF, each in a few lines.
+//! Writes meshes to files: PLY, STL, OBJ and OFF.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -9,10 +9,10 @@ use crate::write::{WriteError, WriteErrorKind, write_atomically};
 use crate::{Format, Mesh};
 
 impl Format {
-    /// The format that a file's name ends in, in capitals or not; binary for STL.
+    /// The format of a file name's extension, in either case; binary for STL.
     ///
     /// # Errors
-    /// [`WriteErrorKind::UnknownFormat`] for any other ending than those of the formats.
+    /// [`WriteErrorKind::UnknownFormat`] for another extension.
     ///
     /// ```
     /// # use dibs_build::Format;
@@ -34,14 +34,14 @@ impl Format {
 }
 
 impl Mesh {
-    /// Writes the mesh. Text holds the shortest digits that give the same f32 numbers back; STL holds positions and
-    /// no vertex numbers.
+    /// Writes the mesh. Text holds the shortest digits that give the same f32 numbers back; STL holds positions but no
+    /// vertex numbers.
     ///
     /// # Errors
     /// [`WriteError`], also for a format that is only read; the file is complete or untouched.
     ///
     /// # Panics
-    /// As STL, if a triangle names a vertex that the mesh does not have.
+    /// For STL, if a triangle names a vertex that the mesh does not have.
     pub fn write(&self, path: impl AsRef<Path>, format: Format) -> Result<(), WriteError> {
         let path = path.as_ref();
         let contents: fn(&Self, &mut dyn Write) -> io::Result<()> = match format {
@@ -88,7 +88,7 @@ fn ply(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
 
 fn stl(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     let count = u32::try_from(mesh.triangles.len()).map_err(io::Error::other)?;
-    // Not "solid", with which text begins.
+    // A header that does not begin with "solid", as text does.
     out.write_all(&[0; 80])?;
     out.write_all(&count.to_le_bytes())?;
     for &triangle in &mesh.triangles {

@@ -56,5 +56,5 @@ pub use stretch::{
 pub use unit::Unit;
 pub use write::{WriteError, WriteErrorKind, write_atomically};
 
-/// The vectors of this interface.
+/// The vectors in this interface.
 pub use glam;

@@ -4,8 +4,8 @@ use glam::Vec3;
 
 /// A triangle mesh: fixed connectivity, and the positions of one frame.
 ///
-/// Coordinates are in the mesh's own unit (mm in the examples) and f32, because that is what the
-/// controller sees: geodesics measured on anything else would not bound what it computes with.
+/// Coordinates are in the mesh's own unit (mm in the examples), and f32 as on the controller: geodesics on other
+/// numbers would not bound its distances.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// One position a vertex.
@@ -21,12 +21,12 @@ impl Mesh {
     }
 }
 
-/// Anything that a tree is built on: a [`Mesh`], or an [`Import`](crate::Import).
+/// A surface that a tree can be built on: a [`Mesh`], or an [`Import`](crate::Import).
 pub trait RestSurface {
     /// Its positions and triangles.
     fn mesh(&self) -> &Mesh;
 
-    /// How far a vertex may be from where it should be (in the mesh's unit, not negative).
+    /// Largest error of a vertex (in the mesh's unit, not negative).
     fn position_error(&self) -> f32;
 }
 
@@ -55,6 +55,6 @@ impl<S: RestSurface> RestSurface for &S {
 pub struct Motion {
     /// The frames, in order of time.
     pub frames: Vec<Vec<Vec3>>,
-    /// Frames a second; 0 where the file does not say.
+    /// Frames a second; 0 if the file does not state it.
     pub rate: f32,
 }

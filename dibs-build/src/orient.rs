@@ -1,4 +1,4 @@
-//! Winding: whether a surface has an outer side, and turning its triangles until it has.
+//! Winding: checks that a surface has an outer side, and turns triangles until it has.
 
 use std::collections::HashMap;
 
@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use crate::Mesh;
 
-/// Why a surface has no outer side, or one that is not where it should be.
+/// Why a surface has no outer side, or the wrong one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WindingError {
@@ -20,7 +20,7 @@ pub enum WindingError {
         triangle: usize,
         /// The other one.
         other: usize,
-        /// How many more such pairs there are.
+        /// Number of other such pairs.
         others: usize,
     },
     /// More than two triangles share an edge.
@@ -29,14 +29,14 @@ pub enum WindingError {
          distances to it no sign: cut it open there in a mesh editor"
     )]
     NonManifold {
-        /// How many.
+        /// Number of triangles at the edge.
         triangles: usize,
         /// One end of the edge.
         from: u32,
         /// The other end.
         to: u32,
     },
-    /// Two of its triangles disagree whichever way they are turned.
+    /// Two triangles disagree whichever way they are turned.
     #[error(
         "the surface has only one side, like a Moebius strip: triangles {triangle} and {other} disagree however they \
          are turned, so distances to it have no sign"
@@ -55,12 +55,12 @@ pub enum WindingError {
     Inward,
 }
 
-/// Checks that a surface has an outer side, and that it is the outside of what it encloses, if it is closed.
+/// Checks that a surface has an outer side, and that a closed surface faces outwards.
 ///
 /// Cost: linear in the triangles.
 ///
 /// # Errors
-/// [`WindingError`] names the first triangles that are in the way.
+/// [`WindingError`] names the first conflicting triangles.
 pub fn check_winding(mesh: &Mesh) -> Result<(), WindingError> {
     let edges = Edges::of(mesh)?;
     let against = edges.pairs.iter().filter(|pair| !pair.agrees);
@@ -78,13 +78,13 @@ pub fn check_winding(mesh: &Mesh) -> Result<(), WindingError> {
     Ok(())
 }
 
-/// Turns triangles until the surface has an outer side: as few as possible where it is open; outwards, or inwards for
-/// a hole in what another part encloses, where it is closed. Returns how many were turned.
+/// Turns triangles until the surface has an outer side. Open parts turn as few triangles as possible; closed parts face
+/// outwards, or inwards for a cavity in another part. Returns the number of turned triangles.
 ///
 /// Cost: linear in the triangles, times the closed parts of the surface.
 ///
 /// # Errors
-/// [`WindingError`] where no turning helps; the mesh is then as it was.
+/// [`WindingError`] if no turning helps; the mesh is then unchanged.
 pub fn orient(mesh: &mut Mesh) -> Result<usize, WindingError> {
     let edges = Edges::of(mesh)?;
     let count = mesh.triangles.len();
@@ -93,7 +93,7 @@ pub fn orient(mesh: &mut Mesh) -> Result<usize, WindingError> {
         around[pair.triangle].push((pair.other, pair.agrees));
         around[pair.other].push((pair.triangle, pair.agrees));
     }
-    // Whether each triangle is to be turned, for the first of its part to stay.
+    // Whether to turn each triangle, if the first of its part stays.
     let mut turned: Vec<Option<bool>> = vec![None; count];
     let mut parts: Vec<Vec<usize>> = Vec::new();
     for first in 0..count {
@@ -202,13 +202,13 @@ impl Edges {
         if let Some(((from, to), triangles)) = crowded {
             return Err(WindingError::NonManifold { triangles, from, to });
         }
-        // The map has no order of its own.
+        // The map's order is not deterministic.
         edges.pairs.sort_unstable_by_key(|pair| (pair.triangle, pair.other));
         Ok(edges)
     }
 }
 
-/// The volume that triangles enclose, negative if they face inwards. Relative to a vertex of theirs.
+/// The volume that triangles enclose, negative if they face inwards. Computed relative to one of their vertices.
 fn volume(mesh: &Mesh, triangles: impl IntoIterator<Item = usize>) -> f64 {
     let origin = mesh.positions.first().copied().unwrap_or_default().as_dvec3();
     let of = |triangle: usize| {

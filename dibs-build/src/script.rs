@@ -1,11 +1,11 @@
-//! A build script in one line.
+//! A tree in one line of a build script.
 
 use std::env;
 use std::path::{Path, PathBuf};
 
 use crate::{Builder, BuiltTree, Mesh, ReadOptions, RestSurface, read_limits};
 
-/// Begins the tree of a build script, from a mesh file or a [`Mesh`]: [`TreeScript::emit`] ends it.
+/// Begins the tree of a build script, from a mesh file or a [`Mesh`]; [`TreeScript::emit`] builds it.
 ///
 /// The `main` of a `build.rs`:
 ///
@@ -26,13 +26,13 @@ pub fn tree(mesh: impl Into<MeshSource>) -> TreeScript {
     }
 }
 
-/// Where a build script's mesh comes from.
+/// The source of a build script's mesh.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum MeshSource {
     /// A file, as [`read`](crate::read()) takes it.
     File(PathBuf),
-    /// A mesh that the script has made.
+    /// A mesh made by the script.
     Mesh(Mesh),
 }
 
@@ -54,7 +54,7 @@ impl From<Mesh> for MeshSource {
     }
 }
 
-/// The tree of a build script, as [`tree`] begins it.
+/// The tree of a build script, from [`tree`].
 #[derive(Clone, Debug)]
 #[must_use = "nothing is built before `emit`"]
 pub struct TreeScript {
@@ -67,7 +67,7 @@ pub struct TreeScript {
 }
 
 impl TreeScript {
-    /// The largest stretch that the tree must cover: a factor of at least 1, 1.5 unless it is said.
+    /// The largest stretch that the tree must cover: a factor of at least 1; by default 1.5.
     pub fn stretch(mut self, limit: f32) -> Self {
         self.builder = self.builder.stretch(limit);
         self
@@ -100,9 +100,9 @@ impl TreeScript {
 
     /// Builds the tree and writes it where `dibs_nostd::include_tree!(name)` finds it.
     ///
-    /// Tells cargo to run the script again when a file that was read, or the script, has changed, and only
-    /// then; shows the import's warnings as cargo's. If anything fails, the script ends
-    /// with one sentence as cargo's error: the file, the element, the remedy.
+    /// Cargo then runs the script again only when the script or a file that it read has changed. The import's warnings
+    /// become cargo's. If anything fails, the script ends with one sentence as cargo's error: the file, the element,
+    /// the remedy.
     pub fn emit(self, name: &str) {
         if let Err(error) = self.try_emit(name) {
             println!("cargo::error={error}");
@@ -110,10 +110,10 @@ impl TreeScript {
         }
     }
 
-    /// The same for a script that continues after an error.
+    /// As [`emit`](Self::emit), for a script that continues after an error.
     ///
     /// # Errors
-    /// Whatever reading, building or writing returns.
+    /// Errors of reading, building or writing.
     pub fn try_emit(self, name: &str) -> Result<BuiltTree, Box<dyn std::error::Error>> {
         println!("cargo::rerun-if-changed=build.rs");
         for file in self.files() {

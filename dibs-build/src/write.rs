@@ -19,7 +19,7 @@ pub struct WriteError {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum WriteErrorKind {
-    /// The operating system refused.
+    /// The operating system's error.
     #[error("cannot be written ({0}); check that the folder exists and has room")]
     Io(#[from] io::Error),
     /// The frames of a motion differ in length.
@@ -32,26 +32,25 @@ pub enum WriteErrorKind {
         /// Vertices of this one.
         found: usize,
     },
-    /// A name whose end is no format that can be written.
+    /// A name without the extension of a format that can be written.
     #[error("a mesh is written as what its name ends in: .ply, .stl, .obj or .off")]
     UnknownFormat,
     /// More elements than the format can count.
     #[error("{count} {element} are more than the format can count")]
     TooMany {
-        /// What is counted.
+        /// The counted element.
         element: &'static str,
-        /// How many there are.
+        /// Their number.
         count: usize,
     },
 }
 
-/// Writes a file through `contents` into a temporary file beside it, which is renamed once it is complete and
-/// the disk has it: no half-written output is left behind where the program fails, and none under the file's
-/// name where the power does, as far as disk and file system keep `fsync`'s word. A path that is no regular file
-/// (`/dev/stdout`) is written directly.
+/// Writes a file through `contents` into a temporary file beside it, which is renamed once it is complete and synced.
+/// So a failure of the program leaves no half-written output, and a power failure none under the file's name, if disk
+/// and file system honour `fsync`. A path that is not a regular file (`/dev/stdout`) is written directly.
 ///
 /// # Errors
-/// [`WriteErrorKind::Io`], also for whatever `contents` returns.
+/// [`WriteErrorKind::Io`], also for an error of `contents`.
 pub fn write_atomically(
     path: impl AsRef<Path>,
     contents: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -73,7 +72,7 @@ fn write(path: &Path, contents: impl FnOnce(&mut dyn Write) -> io::Result<()>) -
     let mut builder = tempfile::Builder::new();
     #[cfg(unix)]
     {
-        // As any new file: the process's umask takes away from it.
+        // The mode of any new file, less the process's umask.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
@@ -81,7 +80,7 @@ fn write(path: &Path, contents: impl FnOnce(&mut dyn Write) -> io::Result<()>) -
     fill(temporary.as_file(), contents)?;
     temporary.as_file().sync_all()?;
     temporary.persist(&target)?;
-    // The name is the folder's: without this the old file may come back. Not every system opens a folder.
+    // The folder holds the name: without this sync the old file may come back. Not every system can open a folder.
     #[cfg(unix)]
     File::open(folder)?.sync_all()?;
     Ok(())

@@ -8,8 +8,8 @@ use dibs_nostd::format::no_neighbour;
 use super::flatten::put;
 use crate::leaf::StoredTriangle;
 
-/// The adjacency section, or nothing where the surface has no sides: an edge of more than two triangles, or of
-/// two that run along it in the same direction.
+/// The adjacency section; `None` for a surface without sides, with an edge of more than two triangles, or of two that
+/// run along it in the same direction.
 pub(super) fn adjacency<I: Index>(triangles: &[StoredTriangle]) -> Option<Vec<u8>> {
     let mut row_of = HashMap::with_capacity(3 * triangles.len());
     for (row, placed) in (0..).zip(triangles) {

@@ -1,4 +1,4 @@
-//! The built tree, and the two ways out: a blob, and a Rust module around it.
+//! The built tree, and its two outputs: a blob, and a Rust module around it.
 
 use std::path::Path;
 
@@ -39,7 +39,7 @@ pub struct Summary {
     /// The least stretch limit of any triangle.
     pub least_stretch_limit: f32,
     /// Triangles that the controller's stretch check refuses even at rest, because they are too small for its
-    /// arithmetic: with them no frame is ever published.
+    /// arithmetic. With any, no frame is ever published.
     pub unmeasurable: u32,
     /// The vertices of the first of them, by the mesh's numbers.
     pub first_unmeasurable: Option<[u32; 3]>,
@@ -57,7 +57,7 @@ pub struct Summary {
     pub query_bytes: usize,
     /// The same, for each triangle.
     pub query_bytes_per_triangle: f64,
-    /// Flash of the adjacency, which tells the sides; 0 where the surface has none.
+    /// Flash of the adjacency, from which sides are found; 0 if the surface has none.
     pub adjacency_bytes: usize,
     /// Flash of the whole tree with all its optional sections.
     pub flash_bytes: usize,
@@ -65,7 +65,7 @@ pub struct Summary {
     pub ram_bytes: usize,
     /// RAM of one query's stack.
     pub stack_bytes: usize,
-    /// Its displacement modes, where it has some.
+    /// Its displacement modes, if any.
     pub modes: Option<ModesSummary>,
 }
 
@@ -79,7 +79,7 @@ pub struct ModesSummary {
     pub position_error: f32,
     /// Root mean square of that distance.
     pub rms_error: f32,
-    /// Part of the recorded range that a weight may go beyond it, at either end.
+    /// Part of the recorded range by which a weight may exceed it, at either end.
     pub margin: f32,
     /// Recorded shapes that the stretch bound starts from.
     pub anchors: usize,
@@ -90,7 +90,7 @@ pub struct ModesSummary {
 }
 
 impl Summary {
-    /// Warnings for a user, a sentence each.
+    /// Warnings for a user, one sentence each.
     pub fn warnings(&self) -> impl Iterator<Item = String> + use<> {
         let unmeasurable = self.unmeasurable;
         let sentence = self.first_unmeasurable.map(|[a, b, c]| {
@@ -172,8 +172,8 @@ impl BuiltTree {
     /// [`include_tree!`](dibs_nostd::include_tree), and beside it the blob that the module includes: of
     /// `heart.rs`, `heart.dibs`.
     ///
-    /// The builder validated the blob; the program validates it again when it starts. The compiler only
-    /// copies it, so that a large tree takes it no longer than a small one.
+    /// The builder validated the blob, and the program validates it again when it starts. The compiler only copies it,
+    /// so a large tree compiles as fast as a small one.
     ///
     /// # Errors
     /// [`BuildError::Name`] if `name` cannot name a module, or [`BuildError::Write`]. A file that cannot be
@@ -260,7 +260,7 @@ fn is_measurable<I: Index>(tree: &Tree<'_, I>, row: u32) -> bool {
     let Some(corners) = corners else { return first > 0.0 };
     let [a, b, c] = metric.centre_first(corners);
     let (e1, e2) = ((b - a).as_dvec3(), (c - a).as_dvec3());
-    // The builder has made the metric smaller by the check's largest rounding.
+    // The builder has lowered the metric by the check's largest rounding.
     let limit = f64::from(tree.stretch()).powi(2);
     let left = |rest: f32, now: f64| limit * f64::from(rest) - now;
     let (x, z) = (left(first, e1.length_squared()), left(second, e2.length_squared()));
@@ -272,7 +272,7 @@ fn is_measurable<I: Index>(tree: &Tree<'_, I>, row: u32) -> bool {
     }
 }
 
-/// Something of each corner, if all have it.
+/// A value for each corner; `None` if one has none.
 fn row_of<T>(corners: [u32; 3], of: impl Fn(u32) -> Option<T>) -> Option<[T; 3]> {
     let [a, b, c] = corners.map(of);
     Some([a?, b?, c?])

@@ -1,4 +1,4 @@
-//! From a tree of sections to the flat array: order, round up, write.
+//! From a tree of sections to the flat array: ordered, rounded up, written.
 
 use dibs_nostd::format::{CRC, HEADER_BYTES, Join, Link, MAGIC, PathKind, VERSION, field, section};
 use dibs_nostd::{Index, Tree};
@@ -193,7 +193,7 @@ fn metrics(mesh: &Mesh, triangles: &[StoredTriangle], facts: Facts<'_>) -> Vec<u
 }
 
 /// Whether a triangle can join the previous one. The shared edge takes the lower of its two roundings, which is safe
-/// for both, but makes the stretch of a nearly flat triangle too large: then the join is refused.
+/// for both. If that makes the stretch of a nearly flat triangle too large, the join is refused.
 fn share_edge(before: &mut [f32; 3], row: &mut [f32; 3], join: Join, shares: &Shares) -> bool {
     if row[0] == 0.0 || before[2] == 0.0 {
         return false;
@@ -213,7 +213,7 @@ fn share_edge(before: &mut [f32; 3], row: &mut [f32; 3], join: Join, shares: &Sh
     true
 }
 
-/// By how much a join may make a squared stretch too large, as a part of it.
+/// Largest relative error of a squared stretch that a join may cause.
 const MOST_SPOILT: f32 = 5e-4;
 
 /// `1 - |cos|` of the corner that a metric is measured from.

@@ -1,5 +1,4 @@
-//! The metric section: what the controller needs to measure a triangle's stretch without its rest
-//! shape.
+//! The metric section: it lets the controller measure a triangle's stretch without the rest shape.
 
 use dibs_nostd::format::PathKind;
 use glam::{DVec3, Vec3};
@@ -22,8 +21,8 @@ const LARGEST_SQUARED: f64 = 1e18;
 /// The metric of one triangle with these corners at rest, the centre first. The lowest bit of its second number is
 /// `is_reversed`.
 ///
-/// `share` is its stretch limit as a part of the tree's, which is `stretch`. Never too large: roundings
-/// are downwards. Zeros, which no triangle passes, where no f32 arithmetic could tell.
+/// `share` is its stretch limit as a part of the tree's, which is `stretch`. Roundings are downwards, so the metric is
+/// never too large. It is zeros, which no triangle passes, if f32 arithmetic cannot measure the triangle.
 pub(crate) fn metric(
     corners: [Vec3; 3],
     is_reversed: bool,
@@ -53,12 +52,12 @@ pub(crate) fn metric(
     }
 }
 
-/// The largest number with this lowest bit that is not above `x`, which is positive; but 0 for 0.
+/// The largest number with this lowest bit that is not above `x`, which is not negative; 0 for 0.
 pub(crate) fn with_lowest_bit(x: f32, bit: bool) -> f32 {
     if x == 0.0 || has_lowest_bit(x) == bit { x } else { x.next_down() }
 }
 
-/// The nearest f32 to `x` with this lowest bit: no farther than 2^-23 of it.
+/// The nearest f32 to `x` with this lowest bit, within 2^-23 of it.
 fn near(x: f64, bit: bool) -> f32 {
     let near = x as f32;
     if has_lowest_bit(near) == bit {

@@ -11,15 +11,14 @@ use crate::modes::{self, ModalFit, ModalMotion, ModesError};
 impl BuiltTree {
     /// The same tree with the first `count` modes of a fitted motion: `dibs-nostd`'s `docs/format.md`, section 7.
     ///
-    /// Errors and stretch are those of the surface as the controller will compute it, at every
-    /// recorded frame. A weight may go a quarter of its recorded range beyond it
-    /// ([`modes::MARGIN`](crate::modes::MARGIN)).
+    /// Errors and stretch are those of the surface as the controller computes it, at every recorded frame. A weight may
+    /// exceed its recorded range by a quarter of it ([`modes::MARGIN`](crate::modes::MARGIN)).
     ///
     /// Cost: linear in modes, frames and vertices; seconds at most.
     ///
     /// # Errors
-    /// [`ModesError`] for a number of modes that cannot be had, a fit on another mesh, or a tree
-    /// without a rest shape.
+    /// [`ModesError`] for a number of modes that the motion does not have, a fit on another mesh, or a tree without a
+    /// rest shape.
     pub fn with_modes(&self, fit: &ModalFit, count: usize) -> Result<Self, ModesError> {
         match self.index_bytes {
             2 => self.with_modes_in::<u16>(fit, count),

@@ -85,7 +85,7 @@ pub mod {name} {{
     ))
 }
 
-/// Whether this names a module: lower case, and no keyword.
+/// Whether this can name a module: lower case, and not a keyword.
 fn is_module_name(name: &str) -> bool {
     let is_legal = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
     name.starts_with(|c: char| c.is_ascii_lowercase())

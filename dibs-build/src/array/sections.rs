@@ -4,7 +4,8 @@ use dibs_nostd::format::{CRC, HEADER_BYTES, SECTION_ALIGN, SECTION_BYTES, field}
 
 use crate::error::BuildError;
 
-/// The bytes of a tree of these sections, each with its kind. Counts, length and checksum of the header are filled in.
+/// The bytes of a tree with these sections, each with its kind. This fills in the header's count of sections, length
+/// and checksum.
 pub(super) fn write(
     mut header: [u8; HEADER_BYTES],
     sections: &[(u32, &[u8])],

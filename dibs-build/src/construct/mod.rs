@@ -1,4 +1,4 @@
-//! Top-down construction: from one section of all triangles to the tree of sections.
+//! Top-down construction: one section of all triangles becomes the tree of sections.
 
 mod paper;
 mod pin;
@@ -20,7 +20,7 @@ pub(crate) use widen::widen;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Construction {
-    /// Geodesic centre, paths over edges and chords in the section around the measured one, split by two far seeds.
+    /// Pin at the geodesic centre, paths over edges and chords inside the parent section, split by two far seeds.
     #[default]
     Geodesic,
     /// The paper's: mid-range pin, edge paths inside the section, split by a plane, orphans swapped,
@@ -58,7 +58,7 @@ pub(crate) enum Content {
     Leaf(Vec<u32>),
 }
 
-/// Shared by every step of one construction.
+/// The state shared by all steps of one construction.
 pub(crate) struct Constructor<'a> {
     pub surface: Surface<'a>,
     pub construction: Construction,
@@ -70,10 +70,10 @@ pub(crate) struct Constructor<'a> {
     idle: Mutex<Vec<Searches>>,
 }
 
-/// Sections at this depth are halved, so that depth is bounded.
+/// Sections at this depth are halved, which bounds the depth.
 const MAX_DEPTH: u32 = 64;
 
-/// Sections of fewer triangles are built by the thread that has them.
+/// Sections of fewer triangles stay on one thread.
 const PARALLEL_ABOVE: usize = 512;
 
 impl<'a> Constructor<'a> {
@@ -95,7 +95,7 @@ impl<'a> Constructor<'a> {
         self.cluster(&section, None, start, 0)
     }
 
-    /// The tree of a section, which is a part of the one `around` it.
+    /// The tree of a section, which is part of the section `around` it.
     fn cluster(
         &self,
         section: &Section,
@@ -133,8 +133,8 @@ impl<'a> Constructor<'a> {
         Ok(Cluster { pin: pin.vertex, radius: pin.radius, content })
     }
 
-    /// One leaf; or one for each part that is connected by edges, and one for each triangle whose stretch would be
-    /// measured badly among the others.
+    /// One leaf; or one for each part that edges connect, and one for each triangle whose stretch measurement would be
+    /// ill-conditioned in a common leaf.
     fn leaves(&self, section: &Section, pin: Pin, depth: u32) -> Result<Cluster, BuildError> {
         let mesh = self.surface.mesh;
         let mut parts = leaf::connected_by_edges(&mesh.triangles, &section.triangles);
@@ -164,7 +164,7 @@ impl<'a> Constructor<'a> {
         match self.construction {
             Construction::Paper => paper::mid_range_pin(&self.surface, section, searches),
             construction => {
-                // Also leaves the seeds of the split.
+                // This also leaves the distances from the split's seeds in `searches`.
                 let centre = pin::geodesic_centre(&self.surface, section, searches, start);
                 match construction {
                     Construction::MidRangePin => {

@@ -1,9 +1,8 @@
-//! The paper's own construction, kept beside the default for comparison.
+//! The paper's construction, kept beside the default for comparison.
 //!
-//! Bowyer & Rodriguez y Baena 2014, "construction": the pin is the vertex nearest to the middle of the
-//! section's coordinate ranges; the section is cut by a plane normal to the eigenvector of its
-//! vertices' covariance with the largest eigenvalue, through the middle of their projections; a part
-//! that is not contiguous with the rest of its side is an orphan and goes to the sibling.
+//! Bowyer & Rodriguez y Baena 2014, "construction": the pin is the vertex nearest to the middle of the section's
+//! coordinate ranges; a plane normal to the main axis of its vertices' covariance cuts the section, through the middle
+//! of their projections; a part that is not contiguous with the rest of its side is an orphan and goes to the sibling.
 
 use glam::{DMat3, DVec3};
 
@@ -28,7 +27,7 @@ pub(crate) fn mid_range_pin(
     pin::evaluate(surface, section, searches, vertex)
 }
 
-/// The plane split, with orphans handed to the sibling.
+/// The plane split, with orphans moved to the sibling.
 pub(crate) fn split(surface: &Surface<'_>, section: &Section, even: bool) -> [Vec<u32>; 2] {
     let mesh = surface.mesh;
     let at = |v: u32| mesh.positions[v as usize].as_dvec3();
@@ -54,13 +53,13 @@ pub(crate) fn split(surface: &Surface<'_>, section: &Section, even: bool) -> [Ve
     if sides.iter().all(|side| contiguous_parts(surface, side).len() == 1) {
         sides
     } else {
-        // Orphans on both sides whose swap cut the sibling: halves need no contiguity to be right,
-        // but section-restricted paths do, so peel one triangle off instead.
+        // Moved orphans left a half not contiguous, which section-restricted paths require: peel one triangle off
+        // instead.
         peel(surface, section)
     }
 }
 
-/// One border triangle against the rest, such that the rest stays contiguous.
+/// Splits off one border triangle whose removal leaves the rest contiguous.
 fn peel(surface: &Surface<'_>, section: &Section) -> [Vec<u32>; 2] {
     let without =
         |t: u32| section.triangles.iter().copied().filter(|&o| o != t).collect::<Vec<_>>();

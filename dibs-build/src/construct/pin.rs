@@ -1,4 +1,4 @@
-//! Where a section's sphere is pinned: the vertex whose farthest vertex of the section is nearest.
+//! The pin of a section's sphere: the vertex with the smallest radius around the section.
 
 use super::section::{Searches, Section, Surface};
 
@@ -9,15 +9,15 @@ pub(crate) struct Pin {
     pub radius: f64,
 }
 
-/// Sections of at most this many vertices try each of them.
+/// In sections of at most this many vertices each is tried.
 const TRY_ALL: usize = 12;
 
-/// Times that the centre is moved away from its farthest vertex, at most.
+/// Most times that the centre is improved.
 const ROUNDS: usize = 4;
 
-/// The geodesic centre, approximately: far seeds first (two sweeps), then the vertex that minimises
-/// the larger distance to them, then again with whatever is farthest from that vertex. Any vertex of
-/// the mesh may be the pin. `start` is a vertex of the section, best one at its border.
+/// The geodesic centre, approximately: two sweeps find far seeds; the centre is the vertex with the least larger
+/// distance to them; then it is improved with the vertices farthest from it. Any vertex of the mesh may be the pin.
+/// `start` is a vertex of the section, preferably at its border.
 ///
 /// Leaves the distances from the two seeds in `searches.seeds`.
 pub(crate) fn geodesic_centre(

@@ -20,7 +20,7 @@ impl Section {
     }
 }
 
-/// Shared by all sections of one build.
+/// The surface, shared by all sections of one build.
 #[derive(Debug)]
 pub(crate) struct Surface<'a> {
     pub mesh: &'a Mesh,
@@ -35,17 +35,17 @@ pub(crate) struct Searches {
     members: Members,
     /// Distances from the two far seeds.
     pub seeds: [Distances; 2],
-    /// Distances from whatever else is asked.
+    /// Distances from any other source.
     pub other: Distances,
 }
 
 /// The section that is searched, and the section around it.
 #[derive(Debug)]
 struct Members {
-    /// Of each vertex the latest section or surroundings that it was found in.
+    /// The latest section, or section around it, in which each vertex was found.
     latest: Vec<u32>,
     section: u32,
-    /// The number before the section's; zero if all of the mesh is around it.
+    /// The number of the section around it; zero for the whole mesh.
     around: u32,
 }
 
@@ -58,8 +58,8 @@ impl Searches {
         }
     }
 
-    /// Makes `section` the one that searches are for. Paths stay in the section `around` it if that is connected:
-    /// paths outside are hardly ever shorter, and take more than half of a search's time.
+    /// Makes `section` the target of searches. Paths stay in the section `around` it if that is connected: paths
+    /// outside are hardly ever shorter, and take more than half of a search's time.
     pub fn enter(&mut self, section: &Section, around: Option<&Section>) {
         let members = &mut self.members;
         members.section += 2;
@@ -72,7 +72,7 @@ impl Searches {
         }
     }
 
-    /// Distances from `source` to every vertex of the section that was entered, into one of `seeds`.
+    /// Writes the distances from `source` to every vertex of the entered section to one of `seeds`.
     pub fn search_seed(
         &mut self,
         seed: usize,
@@ -83,7 +83,7 @@ impl Searches {
         self.members.search(&mut self.seeds[seed], surface, section, source)
     }
 
-    /// Distances from `source` to every vertex of the section that was entered, into `other`.
+    /// Writes the distances from `source` to every vertex of the entered section to `other`.
     pub fn search_other(
         &mut self,
         surface: &Surface<'_>,

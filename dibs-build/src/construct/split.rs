@@ -1,19 +1,18 @@
-//! Dividing a section in two by distance along the surface.
+//! Divides a section in two by distance along the surface.
 
 use super::section::{Searches, Section, Surface};
 use crate::leaf::connected_by_edges;
 
-/// No side of a split gets less than this share of the triangles: it bounds the depth.
+/// Each side of a split gets at least this share of the triangles, which bounds the depth.
 const LEAST_SHARE: f64 = 0.05;
 
-/// Sections up to this size are mended after their split. The borders of larger ones are mended further down the
-/// tree, in less time.
+/// Sections up to this size are mended after their split. Larger ones are mended further down the tree, in less time.
 const MEND_BELOW: usize = 64;
 
 /// Each triangle goes to the nearer of the two far seeds that the pin's search left in `searches`.
 ///
-/// Seeds that are far along the surface keep the two walls of a fold apart, which a plane does not:
-/// they are near in space and far along the surface. `even` forces halves.
+/// Unlike a plane, this separates the two walls of a fold, which are near in space and far along the surface. `even`
+/// forces halves.
 pub(crate) fn by_geodesic(
     surface: &Surface<'_>,
     section: &Section,
@@ -39,8 +38,8 @@ pub(crate) fn by_geodesic(
     }
 }
 
-/// The largest part that is connected by edges, and the rest: border triangles that touch their side only at a
-/// corner. They go to the other side, or each would become a leaf of its own.
+/// The largest part that edges connect, and the rest: border triangles that touch their side only at a corner. They go
+/// to the other side, or each would become a separate leaf.
 fn mainland(mesh: &[[u32; 3]], side: &[u32]) -> (Vec<u32>, Vec<u32>) {
     let mut parts = connected_by_edges(mesh, side);
     let sizes = parts.iter().map(Vec::len).enumerate();
@@ -49,7 +48,7 @@ fn mainland(mesh: &[[u32; 3]], side: &[u32]) -> (Vec<u32>, Vec<u32>) {
     (mainland, parts.concat())
 }
 
-/// Divides by the sign of the key, but gives either side at least `least_share` of the triangles.
+/// Divides by the sign of the key, and gives either side at least `least_share` of the triangles.
 pub(crate) fn at_zero(mut keyed: Vec<(f64, u32)>, least_share: f64) -> [Vec<u32>; 2] {
     keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let count = keyed.len();

@@ -1,10 +1,10 @@
-//! From two children a node to up to eight.
+//! Collapses a binary tree into one of up to eight children.
 //!
-//! A query that expands a node tests all of its children. The test of a child that mostly passes is wasted: its own
-//! children should be tested at once. How often it passes goes with its radius
-//! as a share of its parent's (about 0.4 of the time at a share of 0.5, 0.6 at 0.7, 0.85 at 0.9 on
-//! brains and hearts). With two children the break-even is one half, and less as looking at a node costs
-//! as much again as testing one child: fewest tests take a share of 0.7, fewest instructions one of 0.6.
+//! A query that expands a node tests all of its children. If a child's test mostly passes, it is wasted: test its
+//! children at once instead. It passes more often the larger the child's radius is as a share of its parent's (on
+//! brains and hearts 0.4 of the time at a share of 0.5, 0.6 at 0.7, 0.85 at 0.9). With two children the break-even is
+//! one half, and lower since a visit to a node costs as much as the test of one child. A share of 0.7 takes the fewest
+//! tests, one of 0.6 the fewest instructions.
 
 use super::{Cluster, Content};
 
@@ -25,7 +25,7 @@ pub(crate) fn widen(cluster: Cluster, most: usize) -> Cluster {
             let (radius, own) = gives_way(child)?;
             (children.len() - 1 + own <= most).then_some((radius, at))
         });
-        // The largest first; of equals the last.
+        // The largest first; of equal ones the last.
         let Some((_, at)) = fitting.max_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))) else {
             break;
         };

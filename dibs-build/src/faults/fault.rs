@@ -18,11 +18,11 @@ pub enum Fault {
     Reorder,
     /// The end of the packet is missing.
     Truncate,
-    /// Bytes in the middle are missing; on a stream, the mark between two packets too.
+    /// Bytes in the middle are missing; on a stream possibly the mark between two packets too.
     Overrun,
     /// The packet has an earlier epoch. Sealed.
     StaleEpoch,
-    /// A packet, or all packets, of an earlier frame come again, as they were.
+    /// One packet or all packets of an earlier frame come again, unchanged.
     Replay,
     /// The packet has another mesh id. Sealed.
     WrongMesh,
@@ -32,9 +32,9 @@ pub enum Fault {
     NotFinite,
     /// A position, or the quantisation box, is farther out than any surface. Sealed.
     TooFar,
-    /// A vertex is far from its neighbours, and the frame's digest is made to confirm it. Sealed.
+    /// A vertex is far from its neighbours, and the frame's digest confirms it. Sealed.
     Stretch,
-    /// The tag or a byte under it is changed. Sealed. Only where packets carry tags.
+    /// The tag or a byte that it covers is changed. Sealed. Only for packets with tags.
     Forgery,
     /// The sender starts anew in the middle of a frame.
     SenderRestart,
@@ -90,14 +90,14 @@ impl Fault {
         }
     }
 
-    /// Whether the fault is damage to bytes, which a line can also do to what is around the packet:
+    /// Whether the fault damages bytes, as a line can also do to a packet's framing:
     /// [`Injector::damage`](super::Injector::damage).
     #[must_use]
     pub const fn is_damage(self) -> bool {
         matches!(self, Self::FlipOne | Self::FlipTwo | Self::Burst | Self::Truncate | Self::Overrun)
     }
 
-    /// Whether a program starts anew: not for an injector to do.
+    /// Whether a program starts anew, which an injector cannot do.
     #[must_use]
     pub const fn is_restart(self) -> bool {
         matches!(self, Self::SenderRestart | Self::ReceiverRestart)

@@ -19,11 +19,11 @@ pub struct Injector {
     rng: Rng,
     /// Packets of the last frames, the present one last.
     frames: VecDeque<Vec<Vec<u8>>>,
-    /// Packets that come later, and after how many others.
+    /// Delayed packets, each with the number of packets that go before it.
     late: Vec<(usize, Vec<u8>)>,
     /// Rows of the surface, from the last begin.
     rows: u32,
-    /// The sum to add to the frame's digest.
+    /// The correction of the frame's digest.
     digest: u32,
 }
 
@@ -40,17 +40,15 @@ impl Injector {
         }
     }
 
-    /// A packet passes as it is: what the receiver gets, which is that packet and those that were
-    /// held back until now.
+    /// Passes a packet unchanged. Returns the packets that the receiver gets: this one, and delayed ones that are due.
     pub fn pass(&mut self, packet: &[u8]) -> Vec<Vec<u8>> {
         self.watch(packet);
         let packet = self.corrected(packet);
         self.with_late(vec![packet])
     }
 
-    /// A fault happens to a packet: what the receiver gets. `None` if the fault cannot happen to this
-    /// packet (say, a position that is not a number to a packet without positions): nothing has
-    /// happened then, and it has not passed.
+    /// Applies a fault to a packet. Returns the packets that the receiver gets, or `None`, without effect, if the fault
+    /// does not apply to this packet (say, a NaN position to a packet without positions).
     pub fn inject(&mut self, fault: Fault, packet: &[u8]) -> Option<Vec<Vec<u8>>> {
         let faulty = match fault {
             Fault::Drop => Vec::new(),
@@ -73,7 +71,7 @@ impl Injector {
         Some(self.with_late(faulty))
     }
 
-    /// Damages bytes in place, at least one: a packet, or what it became on the line.
+    /// Damages at least one of a packet's bytes in place, framed or not.
     ///
     /// Truncation and overrun shorten; an empty slice stays as it is.
     pub fn damage(&mut self, fault: Fault, bytes: &mut Vec<u8>) {
@@ -94,7 +92,7 @@ impl Injector {
             Fault::Burst => {
                 let length = rng.usize(2..=64.min(bits));
                 let first = rng.usize(..=bits - length);
-                // Its ends are flipped for certain, what is between them at random.
+                // A burst's ends are always flipped, the bits between them at random.
                 for bit in 0..length {
                     if bit == 0 || bit + 1 == length || rng.bool() {
                         flip(bytes, first + bit);
@@ -128,7 +126,7 @@ impl Injector {
         }
     }
 
-    /// Adds the packets that have been held back for long enough.
+    /// Adds the delayed packets that are due.
     fn with_late(&mut self, mut packets: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
         for (after, _) in &mut self.late {
             *after -= 1;
@@ -138,7 +136,7 @@ impl Injector {
         packets
     }
 
-    /// A commit that confirms what was altered in its frame; any other packet as it is.
+    /// A commit that confirms its altered frame; any other packet unchanged.
     fn corrected(&mut self, packet: &[u8]) -> Vec<u8> {
         let mut packet = packet.to_vec();
         let commit = match Packet::decode(&packet) {
@@ -228,7 +226,7 @@ impl Injector {
             (Fault::Forgery, _) if is_tagged => {
                 let tag = packet.len() - CHECKSUM_BYTES - TAG_BYTES;
                 let at = match decoded.body {
-                    // What it says, under the same tag; padding would be malformed.
+                    // The content under the same tag; changed padding would be malformed.
                     Body::Vertices(_) | Body::Commit(_) if rng.bool() => HEADER_BYTES,
                     _ => tag + rng.usize(..TAG_BYTES),
                 };
@@ -245,8 +243,8 @@ impl Injector {
     }
 }
 
-/// How far a vertex of float positions is moved to violate the stretch, in mm: farther than any
-/// triangle is long, not as far as any limit on coordinates.
+/// Distance that a float position is moved to violate the stretch, in mm: longer than any triangle, shorter than any
+/// limit on coordinates.
 const FAR: f32 = 100.0;
 
 fn bad_number(fault: Fault, rng: &mut Rng) -> f32 {
@@ -265,7 +263,7 @@ fn seal(packet: &mut [u8]) {
     }
 }
 
-/// What a packet without a tag adds to its frame's digest.
+/// The share of an untagged packet in its frame's digest.
 fn share(packet: &[u8]) -> u32 {
     Packet::decode(packet).ok().and_then(|packet| packet.verify(&NoMac, 0)).unwrap_or(0)
 }

@@ -16,15 +16,15 @@ pub struct FaultyLine {
     rng: Rng,
     faults: Vec<Fault>,
     rate: f64,
-    /// How often each fault has happened.
+    /// Count of each fault.
     counts: Vec<(Fault, u64)>,
-    /// Set while nothing is sent at all.
+    /// Set while the line is cut.
     is_cut: bool,
 }
 
 impl FaultyLine {
-    /// A line on which each packet meets one of these faults with this probability. Restarts, which no
-    /// line can do, never happen.
+    /// A line on which each packet meets one of these faults with this probability. Restarts, which are not faults of a
+    /// line, never happen.
     #[must_use]
     pub fn new(line: Line, seed: u64, faults: &[Fault], rate: f64) -> Self {
         let faults: Vec<Fault> = faults.iter().copied().filter(|f| !f.is_restart()).collect();
@@ -39,7 +39,7 @@ impl FaultyLine {
         }
     }
 
-    /// How often each fault has happened.
+    /// Count of each fault.
     #[must_use]
     pub fn counts(&self) -> &[(Fault, u64)] {
         &self.counts

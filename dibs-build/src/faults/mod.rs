@@ -1,11 +1,10 @@
 //! Faults on the way from sender to receiver: seeded, reproducible.
 //!
-//! [`Injector`] turns packets into what a bad line, a bad sender or an attacker would make of them.
-//! Put it between any sender and any receiver; [`FaultyLine`] does so for a [`Line`](crate::transport::Line).
+//! [`Injector`] changes packets as a bad line, a bad sender or an attacker would. Put it between any sender and any
+//! receiver; [`FaultyLine`] does so for a [`Line`](crate::transport::Line).
 //!
-//! Faults that a checksum would catch at once, though another layer is meant to, are *sealed*: the
-//! checksum is made right again, as if the sender itself had made the mistake. Tags cannot be made
-//! right without the key.
+//! Faults meant for a layer behind the checksum are *sealed*: their checksum is corrected, as if the sender had made
+//! the mistake. Tags cannot be corrected without the key.
 //!
 //! ```
 //! use dibs_build::faults::{Fault, Injector};

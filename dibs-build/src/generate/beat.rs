@@ -1,4 +1,4 @@
-//! The heart's motion: three control frames, and the way between them.
+//! The heart's motion: three control frames, and the path between them.
 
 use glam::{DVec2, DVec3, Vec3};
 
@@ -9,7 +9,7 @@ use crate::Motion;
 const FRAMES: usize = 25;
 const RATE: f64 = 1.2;
 
-/// One control frame, as what it does to the shape at end diastole.
+/// One control frame, as a deformation of the shape at end diastole.
 struct Control {
     /// Share of the radius that the left ventricle's inside loses.
     contraction: f64,
@@ -42,7 +42,7 @@ pub(super) fn beat(rest: &[Vec3]) -> Motion {
         .map(|frame| {
             let turn = std::f64::consts::TAU * frame as f64 / FRAMES as f64;
             let phase = (1.0 - libm::cos(turn)) / 2.0;
-            // Lagrange's weights of the nodes 1/2 and 1; that of 0 is what they leave.
+            // Lagrange's weights of the nodes 1/2 and 1; that of 0 is the rest to 1.
             let middle = 4.0 * phase * (1.0 - phase);
             let end = phase * (2.0 * phase - 1.0);
             controls
@@ -65,7 +65,7 @@ impl Control {
         let right = smooth_step(point.x / 60.0);
         let radius = 1.0 - self.contraction * inward - self.right_contraction * right;
         let height = point.z / BASE;
-        // Seen from the apex the apex turns one way, the base a little the other way.
+        // Apex and base turn in opposite directions, the base less.
         let angle = self.twist * (0.75 - height);
         let (sin, cos) = (libm::sin(angle), libm::cos(angle));
         let flat = DVec2::new(cos, sin).rotate(point.truncate()) * radius;

@@ -44,8 +44,8 @@ pub fn brain(triangles: u32) -> Result<Mesh, GenerateError> {
                 GenerateError::Stuck { surface: "brain", asked: triangles, reached }
             })
         };
-    // An octahedron becomes a smooth brain; the folds then stretch its few triangles, which leaves
-    // mostly splitting to be done.
+    // An octahedron becomes a smooth brain with few triangles; the folds then stretch them, so that remeshing mostly
+    // splits.
     let corners = DVec3::AXES.into_iter().chain(DVec3::AXES.map(|axis| -axis)).collect();
     let faces = (0..8u32).map(|octant| {
         let [x, y, z] = [0, 1, 2].map(|axis| axis + 3 * ((octant >> axis) & 1));
@@ -124,15 +124,14 @@ impl Cortex {
 }
 
 impl Surface for Cortex {
-    /// Along the direction from the centre, so that triangles that do not overlap seen from there
-    /// never do afterwards.
+    /// Projects along the direction from the centre, so that triangles that do not overlap as seen from there never do.
     fn project(&self, point: DVec3) -> (DVec3, DVec3) {
         let direction = point.normalize();
         (direction * self.radius(direction), direction)
     }
 
-    /// Against the direction from the centre, not the normals: as long as it is positive
-    /// everywhere, the surface cannot cut itself.
+    /// Aligns with the direction from the centre, not the normals: if it is positive everywhere, the surface cannot cut
+    /// itself.
     fn alignment(&self, corners: [DVec3; 3], directions: [DVec3; 3]) -> f64 {
         area_vector(corners).normalize_or_zero().dot(directions[0])
     }

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use glam::{DVec3, IVec3};
 
-/// Triangulates the zero set of `field` (negative inside) within the box from `low` to `high`, which
-/// must hold all of it, on a grid of about the given `step`. Triangles face outwards.
+/// Triangulates the zero set of `field` (negative inside) within the box from `low` to `high`, which must contain it,
+/// on a grid of about the given `step`. Triangles face outwards.
 pub(super) fn contour(
     field: impl Fn(DVec3) -> f64,
     low: DVec3,
@@ -43,7 +43,7 @@ pub(super) fn contour(
                     let (a, b) = (base + offset(a), base + offset(b));
                     let (a, b) = (a.min(b), a.max(b));
                     *crossings.entry((a, b)).or_insert_with(|| {
-                        // Kept off the grid's nodes, so that no triangle has zero area.
+                        // Clamped off the grid's nodes, so that no triangle has zero area.
                         let t = (values[a] / (values[a] - values[b])).clamp(0.05, 0.95);
                         points.push(at(a).lerp(at(b), t));
                         points.len() as u32 - 1

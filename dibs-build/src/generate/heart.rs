@@ -47,11 +47,11 @@ const RIGHT_CAVITY: Ellipsoid =
 /// ```
 pub fn heart(triangles: u32) -> Result<MovingMesh, GenerateError> {
     check("heart", triangles, TRIANGLES)?;
-    // The surface measures about 43,000 mm^2; the rough start has a few times the triangles asked.
+    // The surface measures about 43,000 mm^2; the rough start has a few times the requested triangles.
     let step = (43_000.0 / f64::from(triangles)).sqrt().clamp(0.8, 3.0);
     let (low, high) = (DVec3::new(-38.0, -47.0, -14.0), DVec3::new(63.0, 38.0, 90.0));
     let mut mesh = contour(wall, low, high, step);
-    // A coarse mesh comes from one that is fine enough to lie well on the rims of the walls.
+    // A coarse mesh is made from a finer one that lies well on the rims of the walls.
     for count in [triangles.max(4000), triangles] {
         mesh = remesh(mesh.0, &mesh.1, &Wall, count as usize).map_err(|reached| {
             GenerateError::Stuck { surface: "heart", asked: triangles, reached }
@@ -77,7 +77,7 @@ impl Ellipsoid {
         ((point - self.centre) / self.axes).length()
     }
 
-    /// About the signed distance in mm, negative inside.
+    /// The signed distance in mm, approximately; negative inside.
     fn distance(&self, point: DVec3) -> f64 {
         let level = self.level(point);
         let slope = ((point - self.centre) / (self.axes * self.axes)).length();
@@ -120,7 +120,7 @@ impl Surface for Wall {
 
     const PROJECTS_TO_NORMALS: bool = true;
 
-    /// A triangle bridges the rim of a thin wall at right angles to the surface on both sides.
+    /// 0, because a triangle may bridge the rim of a thin wall at right angles to the surface on both sides.
     const LEAST_ALIGNMENT: f64 = 0.0;
 }
 

@@ -1,9 +1,9 @@
-//! Procedural test surfaces with the shape that makes proximity queries hard on anatomy: walls that
-//! are close in space and far apart along the surface.
+//! Procedural test surfaces with the shape that makes proximity queries hard: walls that are close in space and far
+//! apart along the surface.
 //!
-//! [`heart`] and [`brain`] have exactly the asked number of triangles, are closed, manifold, of
-//! genus 0 and face outwards, and are the same to the last bit on every machine: they use nothing
-//! but IEEE arithmetic, square roots and the `libm` crate.
+//! [`heart`] and [`brain`] have exactly the requested number of triangles, are closed, manifold, of genus 0 and face
+//! outwards. They have the same bits on every machine, because they use only IEEE arithmetic, square roots and the
+//! `libm` crate.
 
 mod beat;
 mod brain;
@@ -22,7 +22,7 @@ use crate::{Mesh, Motion};
 pub use brain::brain;
 pub use heart::heart;
 
-/// A surface and how it moves.
+/// A surface and its motion.
 #[derive(Clone, Debug)]
 pub struct MovingMesh {
     /// The surface at rest.
@@ -44,16 +44,16 @@ pub enum GenerateError {
     TriangleCount {
         /// "heart" or "brain".
         surface: &'static str,
-        /// The number asked for.
+        /// The number requested.
         asked: u32,
-        /// The valid number next to it (the smaller of two).
+        /// The nearest valid number (the smaller of two).
         nearest: u32,
         /// The smallest valid number.
         least: u32,
         /// The largest valid number.
         most: u32,
     },
-    /// The mesh could not be brought to the asked number without folding it over.
+    /// The mesh could not be brought to the requested number without folding it over.
     #[error(
         "the generated {surface} got stuck at {reached} triangles instead of {asked}: \
          ask for a slightly different number"
@@ -61,7 +61,7 @@ pub enum GenerateError {
     Stuck {
         /// "heart" or "brain".
         surface: &'static str,
-        /// The number asked for.
+        /// The number requested.
         asked: u32,
         /// The number reached.
         reached: usize,

@@ -1,22 +1,21 @@
-//! Isotropic remeshing to an exact number of triangles: split long edges, collapse short ones, flip
-//! for the best smallest angle, relax along the surface (Botsch and Kobbelt, "A remeshing approach
-//! to multiresolution modeling", 2004). Each split adds two triangles and each collapse takes two, so every even count can be met.
+//! Isotropic remeshing to an exact number of triangles: split long edges, collapse short ones, flip for the best
+//! smallest angle, relax along the surface (Botsch and Kobbelt, "A remeshing approach to multiresolution modeling",
+//! 2004). Each split adds two triangles and each collapse removes two, so every even count can be reached.
 
 use glam::DVec3;
 
 use super::half_edge::HalfEdges;
 
-/// The smooth surface that a mesh is spread over.
+/// The smooth surface that a mesh approximates.
 pub(super) trait Surface {
     /// The point of the surface near `point`, and a unit vector for [`Self::alignment`].
     fn project(&self, point: DVec3) -> (DVec3, DVec3);
 
-    /// Whether those vectors are the surface's outward normals. Where they are not, the mesh's own
-    /// normals tell what is along the surface.
+    /// Whether those vectors are the surface's outward normals. If not, the mesh's normals define the tangent planes.
     const PROJECTS_TO_NORMALS: bool;
 
-    /// How well a triangle lies on the surface, given those vectors at its corners: 1 where
-    /// it does, 0 where it stands at right angles, negative where it is turned over.
+    /// Alignment of a triangle with the surface, given those vectors at its corners: 1 if it lies on the surface, 0 at
+    /// right angles to it, negative if turned over.
     fn alignment(&self, corners: [DVec3; 3], normals: [DVec3; 3]) -> f64;
 
     /// The alignment below which no triangle is made worse.
@@ -27,8 +26,8 @@ pub(super) trait Surface {
 const ROUNDS: usize = 6;
 const POLISH: usize = 4;
 
-/// Spreads exactly `triangles` (even) over `surface`, starting from any closed mesh of it. Returns
-/// the count that could be reached where the surface does not admit so few.
+/// Spreads exactly `triangles` (even) over `surface`, starting from any closed mesh of it. The error is the count
+/// reached, if the surface does not admit so few.
 pub(super) fn remesh(
     points: Vec<DVec3>,
     triangles: &[[u32; 3]],
@@ -106,7 +105,7 @@ impl<S: Surface> Remesher<'_, S> {
                 cosine = cosine.max(smallest_angle_cosine([point, p, q]));
             }
         }
-        // What was there is looked at only where it matters: this is the inner loop.
+        // The previous state is examined only if needed: this is the inner loop.
         let aligned = alignment >= S::LEAST_ALIGNMENT
             || fan().any(|triangle| self.alignment(triangle) <= alignment);
         aligned
@@ -123,7 +122,7 @@ impl<S: Surface> Remesher<'_, S> {
                 break;
             }
             for (length, h) in edges.into_iter().rev() {
-                // Half-edges change hands in a split: what is not the same edge waits for its turn.
+                // A split may reuse half-edges: an edge whose length changed waits for the next pass.
                 if self.mesh.length(h) == length {
                     self.split(h);
                 }
@@ -193,7 +192,7 @@ impl<S: Surface> Remesher<'_, S> {
                     if excess == 0 {
                         break;
                     }
-                    // An earlier collapse may have taken this edge, or made it long.
+                    // An earlier collapse may have removed this edge, or made it longer.
                     if self.mesh.stands_for_edge(h) && self.try_collapse(h, f64::INFINITY) {
                         excess -= 1;
                     }
@@ -214,7 +213,7 @@ impl<S: Surface> Remesher<'_, S> {
                     flips += 1;
                 }
             }
-            // The last few can wait for the next round.
+            // The last few are left to the next round.
             if flips * 1000 <= self.mesh.triangle_count() {
                 break;
             }
@@ -276,7 +275,7 @@ impl<S: Surface> Remesher<'_, S> {
     }
 }
 
-/// Normal to the triangle, as long as its area.
+/// Normal to the triangle, with its area as length.
 pub(super) fn area_vector([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a) * 0.5
 }

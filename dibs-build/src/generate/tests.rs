@@ -1,4 +1,4 @@
-//! What every generated surface must be, whatever its number of triangles.
+//! Properties of every generated surface, for any number of triangles.
 
 use std::collections::HashMap;
 
@@ -105,7 +105,7 @@ fn stretches(rest: &[Vec3], now: &[Vec3], triangles: &[[u32; 3]]) -> (f64, f64, 
     (edge, largest, smallest)
 }
 
-/// Pairs of triangles without a common vertex of which an edge of one pierces the other.
+/// Pairs of triangles without a common vertex, where an edge of one pierces the other.
 fn self_intersections(positions: &[Vec3], triangles: &[[u32; 3]]) -> usize {
     let boxed: Vec<_> = triangles
         .iter()
@@ -257,7 +257,7 @@ fn invalid_counts_name_the_nearest_valid_one() {
     );
 }
 
-/// Fixed, so that a change of the shapes, or a machine that gives other bits, is noticed.
+/// Fixed, to detect a change of the shapes, or a machine that gives other bits.
 #[test]
 fn the_shapes_are_these_to_the_last_bit() {
     let MovingMesh { mesh, motion } = heart(1000).unwrap();

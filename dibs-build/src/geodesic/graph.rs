@@ -1,14 +1,13 @@
 //! The graph whose shortest paths bound the distance along the surface from above.
 //!
-//! Its arcs are the mesh's edges and, for [`Paths::Surface`], *chords*: straight lines across a strip
-//! of triangles that is unfolded into a plane. Both are paths on the surface, so no distance is ever
-//! under-estimated.
+//! Its arcs are the mesh's edges and, for [`Paths::Surface`], *chords*: straight lines across a strip of triangles that
+//! is unfolded into a plane. Both are paths on the surface, so no distance is under-estimated.
 //!
-//! Where triangles have stretch limits of their own, lengths are weighted by each limit's share of the
-//! largest: a path grows to at most the largest limit times its weighted length. An edge stretches no
-//! more than any of its triangles does, so the least that it is in any of them is its; a chord is the sum of
-//! its parts in each triangle. Lengths are those of the triangles' [rest shapes](RestShape), so that the stretch
-//! check is about the same lengths; no chord crosses a flat triangle, whose shape does not fit its neighbours'.
+//! If triangles have their own stretch limits, lengths are weighted by each limit's share of the largest, so a path
+//! grows to at most the largest limit times its weighted length. An edge stretches no more than any of its triangles,
+//! so its weighted length is the least in any of them; a chord's is the sum of its parts in each triangle. Lengths are
+//! those of the triangles' [rest shapes](RestShape), which the stretch check measures too; no chord crosses a flat
+//! triangle, whose rest shape does not fit its neighbours'.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -18,7 +17,7 @@ use crate::Mesh;
 use crate::rest::{Paths, RestShape, Shares};
 use crate::rounding::round_up;
 
-/// Arcs from each vertex, in compressed rows. Lengths are weighted ones at rest, rounded up.
+/// Arcs from each vertex, in compressed rows. Lengths are weighted, at rest, and rounded up.
 #[derive(Debug)]
 pub(crate) struct Graph {
     start: Vec<u32>,
@@ -75,24 +74,23 @@ impl Graph {
 /// Allowance for the f64 rounding of a strip's unfolding, as a part of a length.
 const UNFOLDING: f64 = 1e-12;
 
-/// Sine of the angle between a chord and an edge below which it is not certain where they cross.
+/// Sine of the angle between a chord and an edge below which their crossing point is uncertain.
 const GRAZING: f64 = 1e-5;
 
 /// Allowance for the rounding of the crossing point otherwise, as a part of the chord: some 10 units of
 /// 2^-53, over [`GRAZING`].
 const CROSSING: f64 = 1e-9;
 
-/// All vertices that one vertex sees across a strip of unfolded triangles.
+/// The search for all vertices that one vertex sees across a strip of unfolded triangles.
 struct Unfolding<'a> {
     mesh: &'a Mesh,
     topology: &'a Topology,
     paths: Paths,
     shares: &'a Shares,
-    /// Which triangles have a rest shape that does not fit their neighbours.
+    /// Whether each triangle's rest shape does not fit its neighbours'.
     flat: &'a [bool],
     source: u32,
-    /// The edges between the source and the triangle that was unfolded last, each with the share of the
-    /// triangle before it.
+    /// The edges between the source and the last unfolded triangle, each with the share of the triangle before it.
     crossed: Vec<([DVec2; 2], f64)>,
     found: &'a mut Vec<(u32, f64)>,
 }
@@ -142,7 +140,7 @@ impl Unfolding<'_> {
         for &([a, b], before) in self.crossed.iter().rev() {
             let across = end.perp_dot(b - a);
             if across.abs() <= GRAZING * length * (b - a).length() {
-                // Rounding decides where it crosses: every part may lie in the triangle of the largest share.
+                // The crossing point is uncertain, so count all of the chord at the largest share.
                 return length * self.crossed.iter().map(|&(_, share)| share).fold(last, f64::max);
             }
             let at = (a.perp_dot(b - a) / across).clamp(0.0, from);
@@ -174,7 +172,7 @@ impl Unfolding<'_> {
             let length = along.length();
             let (x, y) = (to_apex.dot(along) / length, to_apex.cross(along).length() / length);
             let axis = (at_b - at_a) / (at_b - at_a).length();
-            // The source lies to the left of a -> b seen from outside: the apex goes to the right.
+            // Seen from outside, the source lies to the left of a -> b, so the apex lies to the right.
             let at_apex = at_a + axis * x - axis.perp() * y;
             let (after_low, before_high) =
                 (window.low.perp_dot(at_apex), at_apex.perp_dot(window.high));

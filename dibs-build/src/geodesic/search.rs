@@ -8,10 +8,10 @@ use super::Graph;
 /// Distances of one search, kept until the next one with the same memory.
 #[derive(Debug)]
 pub(crate) struct Distances {
-    /// Distance and the run it belongs to, a vertex.
+    /// For each vertex its distance, and the run that it is from.
     rows: Vec<(f64, u32)>,
     run: u32,
-    /// Distance and vertex of each in one number, so that one comparison orders them.
+    /// Distance and vertex in one number, so that one comparison orders them.
     heap: BinaryHeap<Reverse<u128>>,
     /// Vertices in the order in which they were settled.
     settled: Vec<u32>,
@@ -27,7 +27,7 @@ impl Distances {
         }
     }
 
-    /// Distance of a vertex from the source, infinite where the search did not come.
+    /// Distance of a vertex from the source, infinite if the search did not reach it.
     pub fn get(&self, vertex: u32) -> f64 {
         match self.rows[vertex as usize] {
             (distance, run) if run == self.run => distance,
@@ -40,10 +40,10 @@ impl Distances {
         &self.settled
     }
 
-    /// Searches from `source` until `wanted` vertices for which `is_wanted` holds are settled, or all
-    /// that can be reached; `allowed` limits the vertices that paths may use.
+    /// Searches from `source` until `wanted` vertices that satisfy `is_wanted` are settled, or all reachable ones;
+    /// `allowed` limits the vertices on paths.
     ///
-    /// Returns the last of the wanted vertices, the farthest, and its distance.
+    /// Returns the farthest of the wanted vertices, and its distance.
     pub fn search(
         &mut self,
         graph: &Graph,
@@ -92,7 +92,7 @@ fn key(distance: f64, vertex: u32) -> Reverse<u128> {
     Reverse(u128::from(distance.to_bits()) << 32 | u128::from(vertex))
 }
 
-/// Where a search ended.
+/// The last vertex of a search.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Farthest {
     pub vertex: u32,

@@ -1,4 +1,4 @@
-//! Which triangles meet at a vertex and across an edge. Non-manifold edges are allowed.
+//! The triangles at each vertex and across each edge. Non-manifold edges are allowed.
 
 use crate::Mesh;
 

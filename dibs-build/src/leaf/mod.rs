@@ -1,4 +1,4 @@
-//! Leaves: which triangles make one, and the order in which it stores them.
+//! Leaves: the sets of triangles that form them, and their order.
 
 mod order;
 mod patch;

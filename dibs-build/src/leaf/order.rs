@@ -1,8 +1,8 @@
 //! The order of a leaf's triangles and of their corners, for the controller's stretch check.
 //!
-//! A triangle is measured along two of its edges, from one of its first two corners, its centre. If the first
-//! of these edges is the second edge of the previous triangle, in either direction ([`Join`]), the controller still
-//! holds two corners and one edge. The order with the fewest starts is chosen.
+//! A triangle is measured along two of its edges, from one of its first two corners, its centre. If the first of these
+//! edges is the second edge of the previous triangle, in either direction ([`Join`]), the controller holds two corners
+//! and one edge already. The order with the fewest starts is chosen.
 //!
 //! The first triangle's corners and the others' third corners are all of the leaf's vertices: a query tests only
 //! these to reject the leaf.
@@ -13,13 +13,12 @@ use glam::DVec3;
 use crate::Mesh;
 use crate::rest::RestShape;
 
-/// A triangle of the mesh, and its corners in the order in which they are stored: rotated, so that the
-/// orientation stays.
+/// A triangle of the mesh, and its corners in stored order: rotated, which keeps the orientation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StoredTriangle {
     pub triangle: u32,
     pub corners: [u32; 3],
-    /// The centre is the second corner, not the first. Never so where it starts.
+    /// The centre is the second corner, not the first. Never so for a start.
     pub is_reversed: bool,
 }
 
@@ -40,7 +39,7 @@ impl StoredTriangle {
     }
 }
 
-/// Orders the triangles of each leaf, the first of which may go on from the last one of the leaf before.
+/// Orders the triangles of each leaf. The first one may join the last one of the leaf before.
 pub(crate) fn order<'a>(
     mesh: &Mesh,
     leaves: impl IntoIterator<Item = &'a [u32]>,
@@ -58,8 +57,8 @@ pub(crate) fn order<'a>(
     stored
 }
 
-/// The triangles of a leaf that even its best order measures from a corner below 3 degrees, although they have a
-/// wider one. Alone in a leaf they are measured from that.
+/// The triangles of a leaf that even its best order measures from a corner below 3 degrees, although they have a wider
+/// one. Alone in a leaf they are measured from the wider corner.
 pub(crate) fn ill_conditioned(mesh: &Mesh, leaf: &[u32]) -> Vec<u32> {
     let choices = choices(mesh, leaf);
     if !choices.iter().any(Choice::is_ill_conditioned) {
@@ -70,19 +69,19 @@ pub(crate) fn ill_conditioned(mesh: &Mesh, leaf: &[u32]) -> Vec<u32> {
     bad.map(|choice| choice.stored.triangle).collect()
 }
 
-/// The cost of storing a triangle in one way; that of an order is their sum.
+/// The cost of storing a triangle in one way; an order costs their sum.
 type Cost = u32;
 
-/// A triangle that starts anew, and one that flips: about the instructions that the check takes beyond those for a
-/// triangle in a fan.
+/// The costs of a start and of a flip: the instructions that the check takes beyond those for a triangle in a fan,
+/// approximately.
 const START: Cost = 4 << 8;
 const FLIP: Cost = 1 << 8;
-/// A triangle measured from a corner without any openness. Eight of them cost less than a flip, so that openness
-/// decides only between orders of equal joins.
+/// Most that a pointed corner costs. Eight of them cost less than a flip, so that openness decides only between orders
+/// of equal joins.
 const POINTED_MOST: f64 = 31.0;
-/// A triangle measured from a corner below 18 degrees, although it has a wider one. It outweighs all joins.
+/// The cost of a measurement from a corner below 18 degrees, if the triangle has a wider one. It outweighs all joins.
 const UNFIT: Cost = 1 << 16;
-/// A triangle measured from a corner below 3 degrees: its stretch is off by a thousandth.
+/// The cost of a measurement from a corner below 3 degrees: the stretch is off by a thousandth.
 const ILL_CONDITIONED: Cost = 1 << 24;
 
 /// A way to store one of a leaf's triangles.
@@ -93,7 +92,7 @@ struct Choice {
     cost: Cost,
     /// The triangle's bit among the leaf's.
     bit: usize,
-    /// Bits of the triangles that have its first corner, and of those that have its second.
+    /// Bits of the triangles that have its first corner, and of the triangles that have its second.
     with_first: usize,
     with_second: usize,
 }
@@ -103,7 +102,7 @@ impl Choice {
         self.cost >= ILL_CONDITIONED
     }
 
-    /// Its cost after that triangle; `None` if it cannot follow it.
+    /// Its cost after the triangle `before`; `None` if it cannot follow that.
     fn after(&self, before: Option<StoredTriangle>) -> Option<Cost> {
         Some(match self.stored.join(before)? {
             Join::Fan => self.cost,
@@ -140,7 +139,7 @@ fn choices(mesh: &Mesh, leaf: &[u32]) -> Vec<Choice> {
         for (first, corners) in rotations.into_iter().enumerate() {
             let second = (first + 1) % 3;
             for (is_reversed, centre) in [(false, first), (true, second)] {
-                // Where `share_edge` refuses the join, the first corner is the centre: it must be fit for that.
+                // `share_edge` may refuse the join; the first corner, its fallback, must then be fit.
                 if is_reversed && costs[first] >= UNFIT {
                     continue;
                 }
@@ -157,7 +156,7 @@ fn choices(mesh: &Mesh, leaf: &[u32]) -> Vec<Choice> {
     choices
 }
 
-/// Ways to store a leaf's triangles, at most.
+/// Most ways to store a leaf's triangles.
 const CHOICES: usize = 6 * MAX_LEAF_TRIANGLES as usize;
 
 /// The cheapest order of a set of triangles that ends with a given choice: its cost, and the choice before the last.
@@ -167,11 +166,11 @@ struct Best {
     before: u32,
 }
 
-/// There is no such order.
+/// No such order.
 const NONE: Best = Best { cost: Cost::MAX, before: 0 };
 
-/// The best orders of all sets of a leaf's triangles, by the bits of the set and the last choice: each made of one
-/// of a triangle less (Held and Karp's way to the shortest tour).
+/// The best order of every set of a leaf's triangles, by the bits of the set and the last choice, by Held and Karp's
+/// dynamic programming: each extends an order of one triangle less.
 struct Orders(Vec<[Best; CHOICES]>);
 
 impl Orders {
@@ -193,7 +192,7 @@ impl Orders {
                 self.offer(choice.bit, at, cost, at);
             }
         }
-        // Which choice may come right after which, and at what cost, but for starts.
+        // Pairs of choices that may follow each other, other than by a start, with their cost.
         let mut joins = Vec::new();
         for (last, before) in leaf.iter().enumerate() {
             for (at, choice) in leaf.iter().enumerate() {
@@ -206,7 +205,7 @@ impl Orders {
         for set in 1..all {
             let lasts = self.0[set];
             let Some((last, cheapest)) = cheapest(&lasts, |_| 0) else { continue };
-            // Only the third corner of a leaf's triangle, but for its first, may be new to the leaf.
+            // After a leaf's first triangle, only a third corner may be new to the leaf.
             for (at, choice) in leaf.iter().enumerate() {
                 let is_known = set & choice.with_first != 0 && set & choice.with_second != 0;
                 if set & choice.bit == 0 && is_known && !choice.stored.is_reversed {
@@ -236,7 +235,7 @@ impl Orders {
         order
     }
 
-    /// An order of this set that ends with the choice `at`, and comes to it from `before`.
+    /// Offers an order of this set that ends with the choice `at`, after `before`.
     fn offer(&mut self, set: usize, at: usize, cost: Cost, before: usize) {
         let best = &mut self.0[set][at];
         if cost < best.cost {
@@ -245,19 +244,19 @@ impl Orders {
     }
 }
 
-/// The last choice of the cheapest order, the cost to come included.
+/// The last choice of the cheapest order, including the cost `to_come`.
 fn cheapest(lasts: &[Best], to_come: impl Fn(usize) -> Cost) -> Option<(usize, Cost)> {
     let possible = lasts.iter().enumerate().filter(|(_, best)| best.cost != Cost::MAX);
     possible.map(|(at, best)| (at, best.cost + to_come(at))).min_by_key(|&(_, cost)| cost)
 }
 
-/// Openness of a corner of 18 degrees, which is wide enough.
+/// Openness of a corner of 18 degrees.
 const OPEN: f64 = 0.05;
 
-/// Openness of a corner of 3 degrees, which is far too pointed.
+/// Openness of a corner of 3 degrees.
 const POINTED: f64 = 0.0014;
 
-/// `1 - |cos|` of the angle between two edges, without its cancellation: the check's rounding grows with its
+/// `1 - |cos|` of the angle between two edges, computed without cancellation. The check's rounding grows with its
 /// inverse.
 pub(crate) fn openness(e1: DVec3, e2: DVec3) -> f64 {
     let lengths = e1.length() * e2.length();

@@ -1,8 +1,8 @@
-//! Patches: triangles that are connected by edges.
+//! Patches: triangles that edges connect.
 
-/// The parts of a set of triangles that are connected by edges, in the order of their first triangles.
+/// The parts of a set of triangles that edges connect, in the order of their first triangles.
 ///
-/// Cost: quadratic in the set, which is a leaf or little more.
+/// Cost: quadratic in the set, which is hardly larger than a leaf.
 pub(crate) fn connected_by_edges(mesh: &[[u32; 3]], triangles: &[u32]) -> Vec<Vec<u32>> {
     let mut left = triangles.to_vec();
     let mut parts = Vec::new();

@@ -12,7 +12,7 @@ use crate::rounding::round_up;
 
 /// Adds the first `count` modes of a fit to a tree, whose rows hold the mesh vertices `order`.
 ///
-/// `append` puts a section of modes into the tree's bytes.
+/// `append` adds a section of modes to the tree's bytes.
 pub(crate) fn encode<I: Index>(
     fit: &ModalFit,
     count: usize,
@@ -48,7 +48,7 @@ pub(crate) fn encode<I: Index>(
     let mut section = Section::new(modes, growths, &weights);
     section.allow_for_rounding(&rest, &triangles);
 
-    // Errors and anchors are measured on the surface as the controller will compute it.
+    // Errors and anchors are measured on the surface as the controller computes it.
     let probe = append(&section.bytes())?;
     let tree = Tree::<I>::from_bytes(&probe).map_err(BuildError::from)?;
     let shapes = Shapes { modes: Modes::of(&tree)?, tree };
@@ -94,8 +94,8 @@ impl<'a, I: Index> Shapes<'a, I> {
         Ok((round_up(largest.sqrt()), round_up((sum / points as f64).sqrt())))
     }
 
-    /// The rest shape and recorded frames with their stretch, evenly spaced where they are too many;
-    /// and the frames beyond the limit.
+    /// The rest shape and recorded frames with their stretch, evenly sampled if there are too many; and the frames
+    /// beyond the limit.
     fn anchors(&self, recorded: &[Vec<f32>]) -> Result<(Vec<Anchor>, Vec<usize>), ModesError> {
         let anchor = |weights: &[f32]| match measure_stretch(&self.tree, &self.at(weights)?) {
             Ok(measured) => Ok(Some(Anchor {
@@ -121,7 +121,7 @@ impl<'a, I: Index> Shapes<'a, I> {
     }
 }
 
-/// A tree's section of modes, from what it holds.
+/// The contents of a tree's section of modes.
 struct Section {
     modes: Vec<QuantisedMode>,
     /// Smallest and largest weight, a mode.
@@ -135,7 +135,7 @@ struct Section {
 }
 
 impl Section {
-    /// All but what has to be measured; the rest shape's is the only anchor.
+    /// The section before any measurement, with the rest shape as its only anchor.
     fn new(modes: Vec<QuantisedMode>, growths: Vec<f64>, weights: &[Vec<f32>]) -> Self {
         let ranges: Vec<[f32; 2]> = (0..modes.len()).map(|mode| range(weights, mode)).collect();
         let at_rest = Anchor { weights: vec![0.0; modes.len()], sigma: 1.0, triangle: 0 };
@@ -145,8 +145,7 @@ impl Section {
         Self { modes, ranges, growths, unit, slack: 0.0, position_error, rms_error, anchors }
     }
 
-    /// The slack of the stretch bound: positions are rounded, those of the anchors too, and
-    /// so is a point between two anchors.
+    /// The slack of the stretch bound, for the rounding of positions, anchors and points between two anchors.
     fn allow_for_rounding(&mut self, rest: &[Vec3], triangles: &Triangles) {
         let weights = || self.ranges.iter().map(largest);
         let axis = evaluation_error(rest, &self.modes, self.unit, weights());
@@ -204,9 +203,8 @@ fn largest([low, high]: &[f32; 2]) -> f64 {
     f64::from(high.max(-low))
 }
 
-/// How far an axis of a computed position is, at most, from the sum that it stands for: gains are
-/// rounded and cut to integers, each mode's share is cut to the unit of the sum, and that is converted
-/// and added to the rest position.
+/// Largest error of a computed position on one axis: gains are rounded and truncated to integers, each mode's share is
+/// truncated to the unit of the sum, and the sum is converted and added to the rest position.
 fn evaluation_error(
     rest: &[Vec3],
     modes: &[QuantisedMode],

@@ -1,4 +1,4 @@
-//! Proper orthogonal decomposition: the few displacement fields that a recorded motion is made of.
+//! Proper orthogonal decomposition of a recorded motion into a few displacement fields.
 
 use dibs_nostd::modes::MAX_MODES;
 use glam::{DVec3, Vec3};
@@ -8,16 +8,16 @@ use rayon::prelude::*;
 use super::{MAX_FRAMES, ModalError, ModesError};
 use crate::{Mesh, Motion};
 
-/// A direction whose share of the motion's energy is below this is rounding: one millionth of the
-/// motion's size, squared.
+/// A direction with less than this share of the motion's energy counts as rounding: one millionth of the motion's size,
+/// squared.
 const NOISE: f64 = 1e-12;
 
 /// The displacement modes of a recorded motion, largest share first.
 ///
-/// The displacements of all frames from the rest shape are decomposed (proper orthogonal
-/// decomposition, by the snapshots' small Gram matrix: Sirovich, Quart. Appl. Math. 45, 1987), each
-/// vertex counting alike: no other `k` fields leave a smaller RMS error. A weight of 1 is a mode's
-/// largest share of any frame. The same input gives the same modes.
+/// The displacements of all frames from the rest shape are decomposed (proper orthogonal decomposition, by the
+/// snapshots' small Gram matrix: Sirovich, Quart. Appl. Math. 45, 1987), with equal weight for each vertex: no other
+/// `k` fields leave a smaller RMS error. A weight of 1 is a mode's largest share of any frame. The same input gives the
+/// same modes.
 ///
 /// ```
 /// use dibs_build::{generate, modes::ModalFit};
@@ -74,14 +74,13 @@ impl ModalFit {
         Ok(Self { modes, rest, frames, errors })
     }
 
-    /// Error of the first `k` modes over all frames and vertices, for `k` from 1 to all that there
-    /// are, before anything is rounded.
+    /// Error of the first `k` modes over all frames and vertices, for each `k` from 1 on, before rounding.
     #[must_use]
     pub fn errors(&self) -> &[ModalError] {
         &self.errors
     }
 
-    /// Modes that the motion has: as many as it has independent frames, at most 64.
+    /// Number of modes: one for each independent frame, at most 64.
     #[must_use]
     pub fn available(&self) -> usize {
         self.modes.len()

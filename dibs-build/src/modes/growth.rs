@@ -1,4 +1,4 @@
-//! Growth of the triangles' stretch by the modes: the constants of the run-time bound, in f64, rounded up.
+//! The constants of the run-time stretch bound: each mode's largest growth of a triangle's stretch, in f64, rounded up.
 
 use dibs_nostd::format::PathKind;
 use dibs_nostd::{Index, Tree, TriangleRow};
@@ -14,7 +14,7 @@ pub struct Triangles {
 
 /// One triangle at rest.
 struct Shape {
-    /// The tree's stretch limit over the triangle's: its stretch counts as so many times more.
+    /// The tree's stretch limit over the triangle's: the factor by which its stretch counts more.
     strictness: f64,
     measure: Measure,
 }
@@ -85,8 +85,8 @@ impl Measure {
         }
     }
 
-    /// The same where both ends of every edge move by at most `error`: `|p| <= 2 e / x1`, and
-    /// `|q| <= (2 e + |p| |x2|) / y2`; the norm is at most that of both together.
+    /// The same if both ends of every edge move by at most `error`: `|p| <= 2 e / x1`, and `|q| <= (2 e + |p| |x2|) /
+    /// y2`; the norm is at most that of both together.
     fn of_error(&self, error: f64) -> f64 {
         match *self {
             Self::Surface { x1, x2, y2 } => {

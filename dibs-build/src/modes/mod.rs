@@ -1,4 +1,4 @@
-//! Displacement modes of a recorded motion, for surfaces that a few weights drive.
+//! Displacement modes of a recorded motion, for surfaces driven by a few weights.
 //!
 //! [`ModalFit`] decomposes a motion, [`BuiltTree::with_modes`](crate::BuiltTree::with_modes) adds the
 //! first of its modes to a tree, and a sender turns positions into weights with a [`Projector`].
@@ -16,10 +16,10 @@ pub use project::Projector;
 use crate::{BuildError, MotionMismatchError};
 use dibs_nostd::modes::MAX_MODES;
 
-/// Most frames of a motion that modes are fitted to: the decomposition takes the cube of their number.
+/// Most frames of a motion that modes are fitted to: the decomposition's cost is cubic in their number.
 pub const MAX_FRAMES: usize = 1_000;
 
-/// How far a number of modes is from the motion that they were fitted to.
+/// The error of a number of modes for the motion that they were fitted to.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[non_exhaustive]
 pub struct ModalError {
@@ -31,7 +31,7 @@ pub struct ModalError {
     pub rms: f64,
 }
 
-/// A recorded motion as weights of the modes in a tree.
+/// A recorded motion as weights of a tree's modes.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ModalMotion {
@@ -41,14 +41,14 @@ pub struct ModalMotion {
     pub beyond_limit: Vec<usize>,
 }
 
-/// Part of the recorded range that a mode's weight may go beyond it, at either end.
+/// Part of the recorded range by which a mode's weight may exceed it, at either end.
 pub const MARGIN: f32 = 0.25;
 
-/// Why modes cannot be fitted to a motion, or not be added to a tree.
+/// Why modes cannot be fitted to a motion or added to a tree.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ModesError {
-    /// The motion is one of another mesh.
+    /// The motion is of another mesh.
     #[error(transparent)]
     Mismatch(#[from] MotionMismatchError),
     /// No frame, or too many.
@@ -68,7 +68,7 @@ pub enum ModesError {
     /// Every frame is the rest shape.
     #[error("no vertex of the motion leaves the rest shape: there is no mode to fit")]
     Still,
-    /// No mode, or more than there are.
+    /// No mode, or more than the motion has.
     #[error(
         "{asked} modes cannot be had: the motion has {available}, and a tree holds 1 to {MAX_MODES}"
     )]
@@ -78,7 +78,7 @@ pub enum ModesError {
         /// Modes that the motion has.
         available: usize,
     },
-    /// The tree is one of another mesh than the motion, or has modes already.
+    /// The tree is of another mesh than the motion, or has modes already.
     #[error("the tree is not one of the mesh that the modes were fitted on")]
     OtherMesh,
     /// The tree was built without its rest shape.
@@ -87,7 +87,7 @@ pub enum ModesError {
     /// The stretch of the rest shape or of a frame cannot be measured.
     #[error("the stretch of the modal surface cannot be measured: {0}")]
     Stretch(dibs_nostd::StretchError),
-    /// Modes so large or so small that they cannot be told from each other in 16 bits.
+    /// Modes so large or so small that 16 bits do not distinguish them.
     #[error("the modes of this motion cannot be told apart: ask for fewer")]
     Degenerate,
     /// The modes do not pass their own validation: a defect of the builder.

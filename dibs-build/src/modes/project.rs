@@ -6,8 +6,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::ModesError;
 
-/// Finds the weights with which a modal surface comes nearest to given positions, in the sense of
-/// least squares over all vertices.
+/// Finds the weights of the modal surface nearest to given positions, by least squares over all vertices.
 ///
 /// ```
 /// use dibs_build::{Builder, generate, modes::{ModalFit, Projector}};
@@ -59,8 +58,8 @@ impl Projector {
         Ok(Self { modes, rest, normal })
     }
 
-    /// The weights for these positions (mm), in the tree's vertex order. They need not be in the modes'
-    /// range: `dibs_nostd::modes::Modes::check` tells.
+    /// The weights for these positions (mm), in the tree's vertex order. They may be out of the modes' range: check
+    /// them with `dibs_nostd::modes::Modes::check`.
     ///
     /// # Panics
     /// If there is not one position for each of the tree's vertices.

@@ -7,7 +7,7 @@ use glam::DVec3;
 #[derive(Clone, Debug)]
 pub struct QuantisedMode {
     pub rows: Vec<[i16; 3]>,
-    /// Size of one step, in mm: a value that f32 holds.
+    /// Size of one step, in mm, exact in f32.
     pub step: f64,
 }
 
@@ -18,7 +18,7 @@ impl QuantisedMode {
     }
 }
 
-/// Rounds a mode to 16 bits; `None` where that leaves nothing, or f32 cannot hold its scale.
+/// Rounds a mode to 16 bits; `None` if that leaves zeros only, or f32 cannot hold its scale.
 pub fn quantise(mode: &[DVec3]) -> Option<QuantisedMode> {
     let largest = mode.iter().map(|d| d.abs().max_element()).fold(0.0, f64::max);
     let step = f64::from((largest / f64::from(i16::MAX)) as f32);

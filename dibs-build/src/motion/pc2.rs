@@ -33,8 +33,7 @@ impl Motion {
     /// Reads a PC2 file.
     ///
     /// # Errors
-    /// [`ReadError`] for a file that is no PC2 file, is shorter than it claims, or has a coordinate
-    /// that is not finite.
+    /// [`ReadError`] for a file that is not PC2, is shorter than it claims, or has a coordinate that is not finite.
     pub fn read_pc2(path: impl AsRef<Path>) -> Result<Self, ReadError> {
         let path = path.as_ref();
         std::fs::read(path)
@@ -105,7 +104,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Motion, ReadErrorKind> {
     if version != 1 || points == 0 || samples == 0 {
         return Err(ReadErrorKind::NotPc2);
     }
-    // A product of counts that the file claims: compared with its size before it is used.
+    // The product of the counts is compared with the file's size before it is used.
     if frame_bytes.saturating_mul(samples) != data.len() as u64 {
         return Err(ReadErrorKind::Count {
             element: format!("frames of {points} vertices"),

@@ -1,4 +1,4 @@
-//! From a file's elements to a mesh that a tree can be built on: every check, in order.
+//! Makes a checked mesh of a file's elements: every check, in order.
 
 use super::polygon::Triangulator;
 use super::raw::Raw;
@@ -13,14 +13,14 @@ use std::collections::HashSet;
 /// thousandth of it, the product of two squared edges is still a normal f32.
 const LEAST_EXTENT: f64 = 1e-6;
 
-/// Above, fourth powers of distances overflow f32.
+/// Above this, fourth powers of distances overflow f32.
 const MOST_COORDINATE: f64 = dibs_nostd::MAX_COORDINATE as f64;
 
 /// The distance between neighbouring f32 numbers of the largest coordinate's size, as a part of the mesh's
 /// extent: a mesh of 100 mm may lie 80 m from the origin.
 const MOST_RESOLUTION: f64 = 1e-4;
 
-/// Ear clipping takes quadratic time at worst: below this, a second for one face.
+/// Ear clipping takes quadratic time at worst: up to a second for a face below this size.
 const MOST_CORNERS: usize = 10_000;
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
@@ -106,14 +106,14 @@ fn check_scale(raw: &Raw, format: Format) -> Result<()> {
         }
     }
     let extent = low.iter().zip(&high).map(|(l, h)| (h - l) * (h - l)).sum::<f64>().sqrt();
-    // Where all vertices are one point, the triangles are found degenerate, which says more.
+    // If all vertices coincide, the error for degenerate triangles says more.
     if extent > 0.0 && extent < LEAST_EXTENT {
         return Err(ReadErrorKind::TooSmall { extent, least: LEAST_EXTENT });
     }
     Ok(())
 }
 
-/// How far f32 coordinates are from those of the file, at most.
+/// Largest distance of f32 coordinates from those of the file.
 fn position_error(raw: &Raw) -> f64 {
     let rounding = |value: f64| value - f64::from(value as f32);
     let errors = raw.positions.iter().map(|position| position.map(rounding));
@@ -131,7 +131,7 @@ fn check_distance(raw: &Raw) -> Result<f64> {
     };
     let extent = (0..3).map(size).fold(0.0, f64::max);
     let resolution = largest * f64::from(f32::EPSILON);
-    // Where all vertices are one point, the triangles are found degenerate, which says more.
+    // If all vertices coincide, the error for degenerate triangles says more.
     if extent > 0.0 && resolution > MOST_RESOLUTION * extent {
         return Err(ReadErrorKind::TooFar { largest, resolution, extent });
     }
@@ -187,8 +187,8 @@ impl Surface {
         let first = first_coincident(&self.positions, tolerance.unwrap_or(0.0));
         let mut referenced = self.referenced();
         if is_stl {
-            // Every record repeats its corners: only here, where the file has no vertex numbers,
-            // do the distinct positions get new ones.
+            // Every record repeats its corners, and the file has no vertex numbers, so the distinct positions get new
+            // ones.
             referenced.fill(true);
         }
         let coincident = (0..)
@@ -224,7 +224,7 @@ impl Surface {
         self.positions = kept;
     }
 
-    /// Whether no two faces share a vertex, so that the file says nothing about connectivity.
+    /// Whether no two faces share a vertex, so that the file has no connectivity.
     fn is_soup(&self) -> bool {
         let mut user = vec![0; self.positions.len()];
         self.faces.iter().all(|triangle| {
@@ -271,7 +271,7 @@ impl Surface {
         Ok(())
     }
 
-    /// Triangles that share a vertex are connected.
+    /// Keeps one component; triangles that share a vertex are connected.
     fn keep_one_component(&mut self, largest: bool, report: &mut Report) -> Result<()> {
         let corners: Vec<[u32; 3]> = self.faces.iter().map(|face| face.corners).collect();
         let components = connected_by_vertices(&corners);
@@ -324,9 +324,8 @@ impl Surface {
     }
 }
 
-/// Whether a triangle repeats a vertex, or is so thin that rounding its corners to f32 could have
-/// made it out of a line segment: its height over its longest side is less than the distance
-/// between neighbouring f32 numbers of its coordinates' size.
+/// Whether a triangle repeats a vertex, or could be a line segment rounded to f32: its height over its longest side is
+/// less than the distance between neighbouring f32 numbers of its coordinates' size.
 fn is_degenerate([a, b, c]: [u32; 3], positions: &[Vec3]) -> bool {
     if a == b || b == c || c == a {
         return true;

@@ -1,10 +1,10 @@
-//! Why a file gives no mesh: one sentence that names the file, the element and the remedy.
+//! Errors of reading a file: one sentence that names the file, the element and the remedy.
 
 use super::Format;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// A file that gives no mesh (or no motion), and why.
+/// A file without a valid mesh or motion, and its defect.
 #[derive(Debug, Error)]
 #[error("{}: {kind}", path.display())]
 pub struct ReadError {
@@ -22,7 +22,7 @@ pub enum ReadErrorKind {
     /// The operating system could not read it.
     #[error("cannot be read ({0}); check the path and its permissions")]
     Io(#[from] std::io::Error),
-    /// It has no content at all.
+    /// It is empty.
     #[error("the file is empty; export the mesh again")]
     Empty,
     /// Its content is none of the formats.
@@ -111,17 +111,17 @@ pub enum ReadErrorKind {
     Count {
         /// The counted element.
         element: String,
-        /// How many the file claims.
+        /// The claimed number.
         claimed: u64,
-        /// How many there are.
+        /// The number in the file.
         found: u64,
         /// Whether `found` is an upper bound taken from the file's size.
         at_most: bool,
     },
-    /// There is no surface in it.
+    /// It has no surface.
     #[error("no triangles{}; export the mesh with its faces", dropped(*.degenerate))]
     NoTriangles {
-        /// Triangles that were there, but degenerate.
+        /// Degenerate triangles in it.
         degenerate: usize,
     },
     /// A face refers to a vertex that does not exist.
@@ -133,7 +133,7 @@ pub enum ReadErrorKind {
         face: usize,
         /// The vertex number as the file writes it.
         index: i64,
-        /// How many vertices the file has.
+        /// Vertices in the file.
         vertices: usize,
         /// The number of the file's first vertex.
         first: u32,
@@ -207,7 +207,7 @@ pub enum ReadErrorKind {
         "{count} degenerate triangles, the first in face {face}; repair the mesh, or read it without --strict to drop them"
     )]
     Degenerate {
-        /// How many.
+        /// Their number.
         count: usize,
         /// The face of the first, counted from 1.
         face: usize,
@@ -217,7 +217,7 @@ pub enum ReadErrorKind {
         "{count} duplicate triangles, the first in face {face}; repair the mesh, or read it without --strict to drop them"
     )]
     Duplicate {
-        /// How many.
+        /// Their number.
         count: usize,
         /// The face of the first, counted from 1.
         face: usize,
@@ -236,7 +236,7 @@ pub enum ReadErrorKind {
     /// The weld tolerance is not a length.
     #[error("the weld tolerance is {tolerance}; give a finite length of at least 0")]
     Tolerance {
-        /// The tolerance that was asked for.
+        /// The tolerance given.
         tolerance: f32,
     },
 }
@@ -249,7 +249,7 @@ fn dropped(degenerate: usize) -> String {
     if degenerate == 0 { String::new() } else { format!(" but {degenerate} degenerate ones") }
 }
 
-/// The largest few sizes, and how many more there are.
+/// The largest few sizes, and the number of others.
 fn list(sizes: &[usize]) -> String {
     const SHOWN: usize = 8;
     let mut text = sizes.iter().take(SHOWN).map(usize::to_string).collect::<Vec<_>>().join(", ");

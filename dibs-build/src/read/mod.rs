@@ -41,7 +41,7 @@ use std::path::Path;
 /// A mesh that passed every check, and the report of findings and repairs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Import {
-    /// The surface: one connected component, no degenerate and no duplicate triangle.
+    /// The surface: one connected component without degenerate or duplicate triangles.
     pub mesh: Mesh,
     /// Counts of the elements read, welded, dropped and found.
     pub report: Report,
@@ -53,10 +53,9 @@ pub struct ReadOptions {
     /// Weld vertices that are at most this far apart, in the mesh's unit; 0 welds those with
     /// exactly equal f32 coordinates (`-0.0` equals `0.0`).
     ///
-    /// `None` decides by the file: triangle soup (STL, and an indexed file in which no two faces
-    /// share a vertex) is welded exactly; an indexed file that does share vertices is believed,
-    /// because two sheets of tissue that touch in the rest shape may part later. The
-    /// [`Report`] counts the coincident vertices that were left apart.
+    /// `None` decides by the file: triangle soup (STL, and an indexed file in which no two faces share a vertex) is
+    /// welded exactly; other indexed files are not welded, because two sheets of tissue that touch in the rest shape
+    /// may part later. The [`Report`] counts the coincident vertices that were left apart.
     pub weld_tolerance: Option<f32>,
     /// Make degenerate and duplicate triangles an error, instead of dropping and counting them.
     pub strict: bool,
@@ -77,7 +76,7 @@ impl RestSurface for Import {
 }
 
 impl Import {
-    /// The default options, to be changed and then used with [`ReadOptions::read`].
+    /// The default options, for [`ReadOptions::read`].
     #[must_use]
     pub fn options() -> ReadOptions {
         ReadOptions::default()
@@ -141,13 +140,11 @@ pub(crate) fn elements(bytes: Vec<u8>, path: &Path) -> Result<(Format, Raw), Rea
 /// Polygons are triangulated, soup is welded, degenerate and
 /// duplicate triangles are dropped and counted.
 ///
-/// Vertex numbers are those of the file, whatever is welded or dropped: a vertex that no triangle
-/// uses any more keeps its row in [`Mesh::positions`], so a recorded [`Motion`](crate::Motion)
-/// still fits. STL has no vertex numbers: there, distinct positions are numbered in the order in
-/// which they first appear.
+/// Vertex numbers are those of the file, even after welding and dropping: an unused vertex keeps its row in
+/// [`Mesh::positions`], so a recorded [`Motion`](crate::Motion) still fits. STL has no vertex numbers: distinct
+/// positions are numbered in order of first appearance.
 ///
-/// The whole file is held in memory, and memory is bounded by the file's size, never by a count
-/// that the file claims.
+/// The whole file is held in memory. Memory is bounded by the file's size, not by a count that the file claims.
 ///
 /// # Errors
 /// [`ReadError`], one sentence that names the file, the offending element and the remedy.

@@ -1,8 +1,8 @@
 //! Wavefront OBJ: its vertices and faces.
 //!
-//! Our own reader, although `tobj` exists: that renumbers vertices by first use and splits them by
-//! group and normal, so a recorded motion would no longer fit; and it knows no continued lines,
-//! stops at names that are not UTF-8, and reports no line. Tests compare the two.
+//! Our own reader, because `tobj` renumbers vertices by first use and splits them by group and normal, so a recorded
+//! motion would no longer fit. It also has no continued lines, stops at names that are not UTF-8, and reports no line.
+//! Tests compare the two.
 
 use super::raw::{Raw, excerpt, lines, position};
 use super::{Format, ReadErrorKind};
@@ -12,7 +12,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
     let mut continued = String::new();
     for (number, line) in lines(bytes) {
         let line = line.trim();
-        // A comment is never continued: it may end in a path's backslash.
+        // A comment is not continued, since it may end in a path's backslash.
         if continued.is_empty() && line.starts_with('#') {
             continue;
         }
@@ -54,7 +54,7 @@ fn statement(line: &str, number: usize, raw: &mut Raw) -> Result<(), ReadErrorKi
                 )));
             }
         }
-        // "fo" is how the first version of the format wrote a face.
+        // The format's first version wrote a face as "fo".
         Some("f" | "fo") => {
             let start = raw.corners.len();
             for word in words {

@@ -1,7 +1,7 @@
 //! OFF: a stream of numbers after the word OFF.
 //!
-//! Our own reader, although `off-rs` exists: that accepts one spelling of the header and one
-//! colour format announced in advance, where files in the wild mix them.
+//! Our own reader, because `off-rs` accepts one spelling of the header and one colour format announced in advance, and
+//! real files mix them.
 
 use super::raw::{Raw, excerpt, lines, position};
 use super::{Format, ReadErrorKind};
@@ -24,8 +24,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
     if !keyword.to_ascii_uppercase().ends_with("OFF") {
         return Err(malformed(number, "no OFF header".to_owned()));
     }
-    // The counts may stand on the header's line. What the prefixes of OFF announce (normals,
-    // colours, texture) follows the position on a vertex's line.
+    // The counts may be on the header's line. Normals, colours and texture, which prefixes of OFF announce, follow the
+    // position on a vertex's line.
     let (number, counts) = match rest.trim() {
         "" => lines.next().ok_or_else(|| truncated("counts"))?,
         rest => (number, rest.to_owned()),

@@ -60,7 +60,7 @@ fn read_faces<T: BufRead>(
     Ok(())
 }
 
-/// Comments come in any encoding, and the parser wants UTF-8.
+/// Comments come in any encoding, but the parser requires UTF-8.
 fn make_header_ascii(bytes: &mut [u8]) {
     const END: &[u8] = b"end_header";
     let end = bytes.windows(END.len()).position(|window| window == END).unwrap_or(0);
@@ -79,7 +79,7 @@ fn check_count(
     remaining: usize,
 ) -> Result<(), ReadErrorKind> {
     let least_bytes: usize = match encoding {
-        // A digit and a separator each, the last line perhaps without its end.
+        // A digit and a separator each; the last line may lack its end.
         Encoding::Ascii => 2 * element.properties.len(),
         _ => element
             .properties
@@ -117,7 +117,7 @@ fn malformed(error: &ParseError) -> ReadErrorKind {
             missing: "there are fewer elements than its header says".to_owned(),
         };
     }
-    // The first line says what, the others repeat the input.
+    // The first line has the message, the others repeat the input.
     let text = error.to_string();
     let first = text.lines().next().unwrap_or_default();
     let what = first.split_once(": ").map_or(first, |(_, what)| what).trim_end_matches('.');
@@ -147,7 +147,7 @@ impl Vertex {
 
 impl PropertyAccess for Vertex {
     fn new() -> Self {
-        // A coordinate that is not a scalar is never set, and NaN is refused later.
+        // A coordinate that is not a scalar stays NaN, which is refused later.
         Self { position: [f64::NAN; 3] }
     }
 
@@ -175,7 +175,7 @@ impl PropertyAccess for Vertex {
     }
 }
 
-/// A face fills one of the two lists, by the type that the file gives to its vertex numbers.
+/// A face fills one of the two lists, by the file's type of vertex numbers.
 #[derive(Default)]
 struct Face {
     signed: Vec<i32>,
@@ -214,7 +214,7 @@ impl PropertyAccess for Face {
     }
 }
 
-/// Elements that are of no use here.
+/// Elements that are not used.
 struct Other;
 
 impl PropertyAccess for Other {

@@ -1,4 +1,4 @@
-//! Polygons to triangles: ear clipping in the polygon's own plane, keeping every corner.
+//! Cuts polygons into triangles by ear clipping in the polygon's plane, keeping every corner.
 
 use earcut::Earcut;
 
@@ -14,8 +14,8 @@ impl Triangulator {
         Self { earcut: Earcut::new(), flat: Vec::new(), ears: Vec::new() }
     }
 
-    /// Appends the triangles of a polygon of at least three corners to `out`. A polygon that is
-    /// not simple (it touches or crosses itself in its plane, or has no area) is cut into a fan, and `false` returned.
+    /// Appends the triangles of a polygon of at least three corners to `out`. A polygon that is not simple (it touches
+    /// or crosses itself in its plane, or has no area) is cut into a fan, and the result is `false`.
     pub fn cut(
         &mut self,
         corners: &[u32],
@@ -88,7 +88,7 @@ impl Triangulator {
                 ear.swap(1, 2);
             }
         }
-        // Last the area: what was restored may also be the tip of a spike, outside the polygon.
+        // The area is compared last: a restored corner may be the tip of a spike, outside the polygon.
         let restored = restore_straight_corners(corners.len() as u32, &mut self.ears);
         let (ears, _) = self.ears.as_chunks::<3>();
         let covered: f64 = ears.iter().map(|&ear| doubled(ear).abs() / 2.0).sum();
@@ -96,9 +96,9 @@ impl Triangulator {
     }
 }
 
-/// Ear clipping may leave out corners on a straight stretch. A neighbouring face uses them, and once
-/// the surface deforms the stretch bends: so each goes back into the one triangle that has the
-/// stretch for an edge. False if there is no such triangle.
+/// Ear clipping may leave out corners on a straight stretch. A neighbouring face uses them, and a deformed surface
+/// bends there. So each is restored in the one triangle that has the stretch as an edge. False if there is no such
+/// triangle.
 fn restore_straight_corners(count: u32, ears: &mut Vec<u32>) -> bool {
     let mut used = vec![false; count as usize];
     for &ear in &*ears {
@@ -187,7 +187,7 @@ mod tests {
 
     #[test]
     fn corners_that_ear_clipping_left_out_are_restored() {
-        // A square with three corners on its first side, as if they had been left out.
+        // A square that lacks the three corners on its first side.
         let mut ears = vec![0, 4, 5, 0, 5, 6];
         assert!(restore_straight_corners(7, &mut ears));
         let (ears, _) = ears.as_chunks::<3>();
@@ -204,8 +204,8 @@ mod tests {
         assert_eq!(triangles.len(), 2);
     }
 
-    /// Whatever the polygon, simple or not, its triangles have its area and orientation; and those
-    /// of a simple one do not overlap and use every corner.
+    /// The triangles of any polygon have its area and orientation; those of a simple one do not overlap and use every
+    /// corner.
     #[test]
     fn random_polygons_keep_their_area() {
         let mut state = 1_u32;

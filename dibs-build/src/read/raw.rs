@@ -3,14 +3,13 @@
 use super::{Format, ReadErrorKind};
 use std::borrow::Cow;
 
-/// The contents of a file, before any check that needs the whole of it.
+/// The contents of a file, before the checks that need all of it.
 pub(crate) struct Raw {
-    /// f64, so that the loss by rounding to f32 is known, and a coordinate too large for f32 can be told from
-    /// an infinite one.
+    /// f64, so that the rounding to f32 is known, and a coordinate too large for f32 differs from an infinite one.
     pub positions: Vec<[f64; 3]>,
     /// The corners of all polygons, one after the other.
     pub corners: Vec<u32>,
-    /// Where each polygon ends in `corners`.
+    /// End of each polygon in `corners`.
     pub ends: Vec<usize>,
     /// The number that the file gives to its first vertex.
     pub first_vertex: u32,
@@ -26,7 +25,7 @@ impl Raw {
         self.ends.push(self.corners.len());
     }
 
-    /// A face's vertex number that cannot even be represented.
+    /// The error for a face's vertex number out of range.
     pub fn bad_index(&self, index: i64) -> ReadErrorKind {
         ReadErrorKind::IndexOutOfRange {
             face: self.ends.len() + 1,
@@ -57,18 +56,18 @@ pub(crate) fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, str>)>
         .map(|(i, line)| (i + 1, line))
 }
 
-/// A coordinate in a text. Rounded to f32 it is the f32 that is nearest to what the text says.
+/// A coordinate in a text. It rounds to the f32 nearest to the text's number.
 pub(crate) fn coordinate(token: &str) -> Option<f64> {
     let (narrow, wide) = (token.parse::<f32>().ok()?, token.parse::<f64>().ok()?);
     if narrow.is_finite() {
-        // Rounding twice could give another f32, where the first time ends in the middle of two.
+        // Rounding twice could give another f32, if the f64 lies midway between two.
         return Some(match f64::from(narrow) {
             _ if wide as f32 == narrow => wide,
             nearest if nearest > wide => wide.next_up(),
             _ => wide.next_down(),
         });
     }
-    // "1e400" is a number too large even for f64: keep it apart from "inf".
+    // "1e400" overflows even f64, and is not "inf".
     let overflow = wide.is_infinite() && token.contains(|c: char| c.is_ascii_digit());
     Some(if overflow { f64::MAX.copysign(wide) } else { wide })
 }

@@ -74,20 +74,19 @@ impl fmt::Display for Format {
 /// Counts of the elements read, welded, dropped and found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
-    /// The format that the content has.
+    /// The content's format.
     pub format: Format,
-    /// Whether the file name's extension says otherwise.
+    /// Whether the file name's extension disagrees.
     pub extension_disagrees: bool,
     /// Rows of the mesh's vertex table.
     pub vertices: usize,
-    /// Rows that no triangle uses: never used in the file, or not any more.
+    /// Rows that no triangle uses, in the file or after repairs.
     pub unreferenced_vertices: usize,
     /// Triangles of the mesh.
     pub triangles: usize,
     /// Faces with more than three corners, cut into triangles.
     pub polygons_triangulated: usize,
-    /// Of these, those that touch or cross themselves in their own plane, or have no area:
-    /// cut into a plain fan.
+    /// Of these, faces that touch or cross themselves in their plane, or have no area: cut into a fan.
     pub polygons_not_simple: usize,
     /// Vertices merged into another one.
     pub welded: usize,
@@ -107,17 +106,16 @@ pub struct Report {
     pub inconsistent_edges: usize,
     /// The surface's largest extent along an axis, in the mesh's unit.
     pub extent: f64,
-    /// Largest distance of a vertex from where the file has it: coordinates are rounded to f32. In the mesh's unit;
-    /// 0 for files that hold f32. The tree adds it to the accuracy of every answer.
+    /// Largest distance of a vertex from its position in the file, by rounding to f32; in the mesh's unit, 0 for files
+    /// that hold f32. The tree adds it to the accuracy of every answer.
     pub position_error: f64,
 }
 
-/// Rounding that is no more than this part of the extent needs no mention: that of a mesh around the origin is a
-/// fourth of it.
+/// Rounding of at most this part of the extent is not reported; for a mesh around the origin it is a fourth of this.
 const MOST_SILENT: f64 = 1.0 / 4_194_304.0;
 
 impl Report {
-    /// Warnings for a user, a sentence for each change and each oddity.
+    /// Warnings for a user, one sentence for each change and each oddity.
     pub fn warnings(&self) -> impl Iterator<Item = String> + use<> {
         let mut warnings = Vec::new();
         let mut warn = |count: usize, one: &str, several: &str| match count {
@@ -180,7 +178,7 @@ impl Report {
     /// Rows of the vertex table that belong to no triangle because their vertex was welded to another.
     fn welded_rows(&self) -> usize {
         match self.format {
-            // Their rows are gone.
+            // Their rows were removed.
             Format::StlAscii | Format::StlBinary => 0,
             _ => self.welded.min(self.unreferenced_vertices),
         }

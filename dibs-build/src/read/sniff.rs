@@ -1,4 +1,4 @@
-//! Which format a file has, by its content; the extension decides only where content does not.
+//! Finds a file's format by its content, and by its extension only if the content does not decide.
 
 use super::raw::{coordinate, lines};
 use super::{Format, ReadErrorKind, foreign, stl};
@@ -22,7 +22,7 @@ pub(super) fn format(bytes: &[u8], path: &Path) -> Result<Format, ReadErrorKind>
     if matches!(first_word, "off" | "coff" | "noff" | "cnoff" | "stoff") {
         return Ok(Format::Off);
     }
-    // Before "solid": many binary files begin with that word.
+    // Checked before "solid", because many binary files begin with that word.
     if stl::size_fits_count(bytes) {
         return Ok(Format::StlBinary);
     }

@@ -1,9 +1,8 @@
 //! STL, ASCII and binary: soups of triangles.
 //!
-//! Our own reader, although `stl_io` exists: that takes a file for ASCII by the word "solid" alone,
-//! trusts the triangle count, stops after the first solid, knows keywords in lower case only,
-//! rejects normals that are not finite (which are never used here) and reports no line. With
-//! all of that done before it, nothing would be left for it to do. Tests compare the two.
+//! Our own reader, because `stl_io` takes a file for ASCII by the word "solid" alone, trusts the triangle count, stops
+//! after the first solid, knows keywords in lower case only, rejects normals that are not finite (which are not used
+//! here) and reports no line. Tests compare the two.
 
 use super::raw::{Raw, excerpt, lines, position};
 use super::{Format, ReadErrorKind};
@@ -17,16 +16,15 @@ fn counts(bytes: &[u8]) -> Option<(u64, u64)> {
     Some((u64::from(claimed), ((bytes.len() - HEADER) / RECORD) as u64))
 }
 
-/// Whether this is binary STL beyond doubt: exactly as long as its triangle count says.
+/// Whether this is certainly binary STL: its length is exactly that of its triangle count.
 pub(super) fn size_fits_count(bytes: &[u8]) -> bool {
     counts(bytes).is_some_and(|(claimed, found)| {
         claimed == found && (bytes.len() - HEADER).is_multiple_of(RECORD)
     })
 }
 
-/// A count that contradicts the size is an error either way: too large means that the file was cut
-/// off; too small (a writer that never went back to fill it in, or data appended) leaves open which
-/// of the two is the surface. A few bytes after the last triangle are ignored.
+/// A count that contradicts the size is an error: if it is too large, the file was cut off; if it is too small (never
+/// filled in, or data appended), the surface is ambiguous. A few bytes after the last triangle are ignored.
 pub(super) fn read_binary(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
     let Some((claimed, found)) = counts(bytes) else {
         return Err(ReadErrorKind::Truncated {
@@ -55,7 +53,7 @@ pub(super) fn read_binary(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
     Ok(raw)
 }
 
-/// Any number of solids, in upper or lower case; each must be ended, or the file was cut off.
+/// Reads any number of solids, in upper or lower case; without the end of one, the file was cut off.
 pub(super) fn read_ascii(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
     let format = Format::StlAscii;
     let mut raw = Raw::new(0);

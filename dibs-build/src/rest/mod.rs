@@ -1,5 +1,5 @@
-//! The rest shape of each triangle, and its stretch limit: along-surface distances, stretch, the stored metric and
-//! the growth of modes all take both from here.
+//! The rest shape of each triangle, and its stretch limit, for along-surface distances, stretch, the stored metric and
+//! the growth of modes.
 
 mod paths;
 mod shape;

@@ -1,14 +1,14 @@
-//! Which lines on the surface count as paths.
+//! The lines on the surface that count as paths.
 
 use dibs_nostd::format::PathKind;
 
-/// How far along-surface distances look beyond the mesh's edges.
+/// The paths that along-surface distances are measured on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Paths {
     /// Mesh edges only, as in the paper. The tree's limit is on the stretch of each edge.
     Edges,
-    /// Mesh edges and chords across up to this many edges (1: pairs of triangles). The largest
-    /// singular value of each triangle: the tree's limit is on that.
+    /// Mesh edges and chords across up to this many edges (1: pairs of triangles). The tree's limit is on the largest
+    /// singular value of each triangle.
     Surface {
         /// Most edges that a chord crosses.
         crossings: u32,
@@ -26,7 +26,7 @@ impl Paths {
 }
 
 impl Default for Paths {
-    /// Those of the default construction.
+    /// The paths of the default construction.
     fn default() -> Self {
         Self::Surface { crossings: 3 }
     }

@@ -1,14 +1,14 @@
 //! The rest shape of one triangle.
 //!
-//! Let a triangle be a thousand times longer than it is high. A vertex that moves by a thousandth of its
-//! length, or that a bus quantises, doubles its height and so its stretch: one such triangle among a million
-//! would have every sphere grow, or every frame refused. So where paths cross triangles, a triangle lower than
-//! 1/64 of its longest edge, a *flat* one, has a rest shape of that height.
+//! Consider a triangle a thousand times longer than high. A vertex that moves by a thousandth of that length, or that a
+//! bus quantises, doubles the height and so the stretch: one such triangle among a million would make every sphere
+//! grow, or every frame be refused. So where paths cross triangles, a triangle lower than 1/64 of its longest edge, a
+//! *flat* one, has a rest shape of that height.
 //!
-//! Coverage needs no more than that all sides use the same shape: an arc along an edge is as long as the edge
-//! in the rest shape of one of its triangles, and the stretch check bounds how much longer that edge is now.
-//! The rest shapes of neighbours need not fit together; a flat one does not fit, so no chord crosses it.
-//! That the fattened shape is nowhere shorter than the true one keeps the rest shape itself within its spheres.
+//! Coverage only requires that builder, tree and stretch check use the same shape: an arc along an edge is as long as
+//! the edge in the rest shape of one of its triangles, and the stretch check bounds how much longer that edge is now.
+//! The rest shapes of neighbours need not fit together; a flat one does not fit, so no chord crosses it. The fattened
+//! shape is nowhere shorter than the true one, so the true rest shape stays within its spheres.
 
 use dibs_nostd::format::PathKind;
 use glam::{DVec3, Vec3};
@@ -19,21 +19,21 @@ const FLAT: f64 = 1.0 / 64.0;
 /// The shape that a triangle's stretch is measured against.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RestShape {
-    /// Where its corners are, in the order in which they were given.
+    /// Its corners, in the given order.
     pub corners: [DVec3; 3],
-    /// Whether it is higher than the triangle that it stands for, and so does not fit its neighbours.
+    /// Whether it is higher than the true triangle, and so does not fit its neighbours.
     pub is_flat: bool,
 }
 
 impl RestShape {
-    /// The rest shape of a triangle with these corners, for paths of this kind. The same corners in another order
-    /// have the same shape, bit for bit: the builder sees them in the mesh's order, the tree stores another.
+    /// The rest shape of a triangle with these corners, for paths of this kind. The same corners in another order have
+    /// the same shape, bit for bit, because the tree stores them in another order than the mesh.
     pub fn new(corners: [Vec3; 3], kind: PathKind) -> Self {
         let mut shape = Self { corners: corners.map(Vec3::as_dvec3), is_flat: false };
         if kind == PathKind::EdgePath {
             return shape;
         }
-        // Of equally long edges, and in all roundings, the order of the positions decides.
+        // The order of the positions decides between equal edges, and the rounding.
         let mut order = [0, 1, 2];
         order.sort_unstable_by(|&i, &j| by_position(corners[i], corners[j]));
         if let Some(fattened) = fattened(order.map(|i| shape.corners[i])) {
@@ -55,7 +55,8 @@ pub(crate) fn has_area(corners: [Vec3; 3]) -> bool {
     (b - a).cross(c - a).length() > 1e-12 * longest
 }
 
-/// If the triangle is flat, its corners, of which the apex is moved away from the longest edge until it is not.
+/// The corners of a flat triangle, with the apex moved away from the longest edge until it is not flat; `None` for
+/// others.
 fn fattened(mut corners: [DVec3; 3]) -> Option<[DVec3; 3]> {
     let Apex { corner, edge, height } = apex(corners);
     if height >= FLAT * edge {
@@ -64,7 +65,7 @@ fn fattened(mut corners: [DVec3; 3]) -> Option<[DVec3; 3]> {
     let [start, end] = [corners[(corner + 1) % 3], corners[(corner + 2) % 3]];
     let along = (end - start) / edge;
     let across = (corners[corner] - start).reject_from_normalized(along);
-    // Twice, since of a very short vector rounding leaves a part along the edge, which would shorten another.
+    // Twice, since rounding leaves a very short vector a part along the edge, which would shorten another edge.
     let up = across.try_normalize().map(|up| up.reject_from_normalized(along));
     let up = up.and_then(DVec3::try_normalize).unwrap_or_else(|| along.any_orthonormal_vector());
     corners[corner] += up * (FLAT * edge - height);
@@ -86,7 +87,7 @@ fn apex(corners: [DVec3; 3]) -> Apex {
     let corner = if squared(2) > squared(longest) { 2 } else { longest };
     let edge = squared(corner).sqrt();
     let [a, b, c] = corners;
-    // All corners in one place: there is no triangle to be flat.
+    // If all corners coincide, the height is 0.
     let height = if edge > 0.0 { (b - a).cross(c - a).length() / edge } else { 0.0 };
     Apex { corner, edge, height }
 }
@@ -111,7 +112,7 @@ mod tests {
         [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
 
     proptest! {
-        /// It is no longer flat, no direction in it has become shorter, and what is not flat stays.
+        /// A flat triangle grows until it is not flat, no direction in it becomes shorter, and other triangles stay.
         #[test]
         fn only_flat_triangles_grow(a in point(), b in point(), at in -0.2_f32..1.2, off in point(),
                                     power in -6.0_f32..0.0, turn in 0..3_usize) {
@@ -136,7 +137,7 @@ mod tests {
             prop_assert!(least >= -1e-12 * edge * edge, "{}", least);
         }
 
-        /// The order of the corners changes no bit, of equal edges and of corners in a line neither.
+        /// The order of the corners changes no bit, even with equal edges or collinear corners.
         #[test]
         fn the_order_of_the_corners_does_not_matter(
             corners in prop::array::uniform3(prop_oneof![lattice_point(), point()]), scale in 1e-3_f32..1e3,
@@ -146,7 +147,7 @@ mod tests {
             for order in ORDERS {
                 let other = RestShape::new(order.map(|i| corners[i]), PathKind::Surface);
                 prop_assert_eq!(other.is_flat, shape.is_flat);
-                // Corners in one place are interchangeable.
+                // Coinciding corners are interchangeable.
                 let distinct = corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0];
                 prop_assert!(!distinct || other.corners == order.map(|i| shape.corners[i]));
             }

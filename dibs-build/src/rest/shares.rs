@@ -2,11 +2,11 @@
 
 use dibs_nostd::format::MAX_LIMIT_CODE;
 
-/// Each triangle's limit as a part of the largest, rounded up to a 16-bit code. Everything
-/// that is built uses these, so that the controller enforces the limits for which the radii are made.
+/// Each triangle's limit as a part of the largest, rounded up to a 16-bit code. The whole build uses these codes, so
+/// that the controller enforces the limits that the radii are made for.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Shares {
-    /// One a triangle; empty where all have the same limit.
+    /// One for each triangle; empty if all have the same limit.
     codes: Vec<u16>,
 }
 

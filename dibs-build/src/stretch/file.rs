@@ -24,10 +24,10 @@ pub struct LimitsError {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LimitsErrorKind {
-    /// The operating system refused.
+    /// The operating system's error.
     #[error("cannot be read ({0})")]
     Io(#[from] std::io::Error),
-    /// It does not start as such a file does.
+    /// It does not start as a file of limits.
     #[error("is no file of stretch limits: `dibs stretch MESH MOTION --limits FILE` writes one")]
     NotLimits,
     /// The limits are of another mesh.
@@ -41,7 +41,7 @@ pub enum LimitsErrorKind {
         /// Checksum in the file.
         found: u32,
     },
-    /// There are not as many limits as triangles.
+    /// The number of limits differs from that of triangles.
     #[error("has {found} limits for {expected} triangles: it is cut off or was edited")]
     Count {
         /// Triangles of the mesh.
@@ -65,7 +65,7 @@ pub enum LimitsErrorKind {
 /// [`WriteError`]; the file is complete or untouched.
 ///
 /// # Panics
-/// If there is not a limit for each triangle.
+/// If the number of limits differs from that of triangles.
 pub fn write_limits(
     path: impl AsRef<Path>,
     mesh: &Mesh,
@@ -86,7 +86,7 @@ pub fn write_limits(
 /// Reads the limits of a mesh's triangles.
 ///
 /// # Errors
-/// [`LimitsError`] names the file and its defect; limits of another mesh are one.
+/// [`LimitsError`] names the file and its defect, such as limits of another mesh.
 pub fn read_limits(path: impl AsRef<Path>, mesh: &Mesh) -> Result<Vec<f32>, LimitsError> {
     let path = path.as_ref();
     let text = std::fs::read_to_string(path).map_err(LimitsErrorKind::from);
@@ -125,7 +125,7 @@ fn parse(text: &str, mesh: &Mesh) -> Result<Vec<f32>, LimitsErrorKind> {
     Ok(limits)
 }
 
-/// Tells one mesh from another: CRC-32 of its positions and triangles.
+/// CRC-32 of a mesh's positions and triangles.
 fn checksum(mesh: &Mesh) -> u32 {
     let mut digest = CRC.digest();
     for position in &mesh.positions {

@@ -1,4 +1,4 @@
-//! The stretch limits that a recorded motion needs, for all triangles alike or for each.
+//! The stretch limits that a recorded motion needs, for all triangles or for each.
 
 mod file;
 
@@ -11,12 +11,11 @@ use crate::motion::MotionMismatchError;
 use crate::rest::RestShape;
 use crate::{Mesh, Motion, Paths};
 
-/// How far a recorded motion stretches each triangle of its mesh.
+/// The stretch of each triangle of a mesh in a recorded motion.
 ///
-/// The measure is the one that the paths of the tree ask for: a triangle's largest singular value (of one
-/// lower than 1/64 of its longest edge, as if it were that high), or for [`Paths::Edges`] its longest edge
-/// over that edge's rest length. Between two frames, on straight
-/// lines, neither is larger than in both: they are convex.
+/// The tree's paths decide the measure: a triangle's largest singular value (a triangle lower than 1/64 of its longest
+/// edge counts as that high), or for [`Paths::Edges`] the largest ratio of an edge to its rest length. Both are convex,
+/// so on straight lines between two frames neither exceeds the larger of its values there.
 ///
 /// ```
 /// use dibs_build::{Builder, MotionStretch, Paths, generate};
@@ -38,7 +37,7 @@ pub struct Needed {
     pub triangle: usize,
     /// Its largest stretch.
     pub stretch: f64,
-    /// The first frame in which it is that large.
+    /// The first frame with that stretch.
     pub frame: usize,
 }
 
@@ -60,8 +59,7 @@ impl Beyond {
 }
 
 impl MotionStretch {
-    /// Measures a motion, in f64. `progress` is called with the number of triangles done, from whichever
-    /// thread did them.
+    /// Measures a motion, in f64. `progress` is called with the number of triangles done, from any thread.
     ///
     /// # Errors
     /// [`MotionMismatchError`] where a frame does not fit the mesh.
@@ -83,7 +81,7 @@ impl MotionStretch {
             let mut worst = Needed { triangle, stretch: 0.0, frame: 0 };
             for (frame, positions) in motion.frames.iter().enumerate() {
                 let stretch = stretch(rest, at(positions), paths);
-                // NaN, of a triangle without area, stays.
+                // Written so that the NaN of a triangle without area is kept.
                 if !(stretch <= worst.stretch) {
                     worst = Needed { stretch, frame, ..worst };
                 }
@@ -112,7 +110,7 @@ impl MotionStretch {
         ranked
     }
 
-    /// The triangle that needs most.
+    /// The triangle that is stretched most.
     ///
     /// # Panics
     /// If the mesh has no triangle.
@@ -121,8 +119,8 @@ impl MotionStretch {
         self.ranked()[0]
     }
 
-    /// Limits for the builder: each triangle's largest stretch, at least 1, and `margin` more (0.1: a
-    /// tenth); besides, a ten-thousandth for the rounding of the controller's measurement.
+    /// Limits for the builder: each triangle's largest stretch, at least 1, plus `margin` (0.1: a tenth), plus a
+    /// ten-thousandth for the rounding of the controller's measurement.
     #[must_use]
     pub fn limits(&self, margin: f32) -> Vec<f32> {
         let limit = |needed: &Needed| {
@@ -131,7 +129,7 @@ impl MotionStretch {
         self.triangles.iter().map(limit).collect()
     }
 
-    /// The triangle that is stretched farthest beyond its limit; `None` where all keep within.
+    /// The triangle that is stretched farthest beyond its limit; `None` if none is.
     ///
     /// # Panics
     /// If there is not a limit for each triangle.

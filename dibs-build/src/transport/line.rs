@@ -17,14 +17,13 @@ use serial2::SerialPort;
 
 use super::Transport;
 
-/// A line that takes nothing for this long is stuck: a packet is about a second on a slow one.
+/// A line that takes no byte for this long is stuck: on a slow line a packet takes about a second.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// How long the reading thread waits before it looks whether it is still wanted.
+/// Time after which the reading thread checks whether its owner still exists.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// A serial line or a socket. What comes back is read by a thread of its own, so that neither
-/// direction waits for the other.
+/// A serial line or a socket. A separate thread reads, so that neither direction waits for the other.
 pub struct Line {
     writer: Box<dyn Write + Send>,
     is_stream: bool,
@@ -46,7 +45,7 @@ impl Line {
     /// A serial port: 8 data bits, no parity, 1 stop bit, no flow control.
     ///
     /// # Errors
-    /// When the port cannot be shared with the reading thread.
+    /// If the port cannot be shared with the reading thread.
     pub fn serial(mut port: SerialPort) -> io::Result<Self> {
         port.set_read_timeout(PATIENCE)?;
         port.set_write_timeout(WRITE_TIMEOUT)?;
@@ -93,7 +92,7 @@ impl Line {
             move |packets| {
                 match reader.recv(&mut buffer) {
                     Ok(bytes) => packets.push(buffer[..bytes].to_vec()),
-                    // No receiver there, or not yet: the sender continues, as after any lost datagram.
+                    // There is no receiver yet: the sender continues, as after any lost datagram.
                     Err(error) if error.kind() == ErrorKind::ConnectionRefused => (),
                     Err(error) => return Err(error),
                 }
@@ -102,8 +101,8 @@ impl Line {
         ))
     }
 
-    /// Any byte stream with a reading and a writing end. A read that waits for long should time out from
-    /// time to time, or end when `hang_up` is called: the reading thread lives as long as it waits.
+    /// Any byte stream with a reading and a writing end. A long read should time out from time to time, or end when
+    /// `hang_up` is called: the reading thread lives until it returns.
     pub fn stream(
         writer: impl Write + Send + 'static,
         mut reader: impl Read + Send + 'static,
@@ -141,7 +140,7 @@ impl Line {
                     Ok(()) => (),
                     Err(error) if is_patience(&error) => (),
                     Err(error) => {
-                        // The owner may be gone.
+                        // The owner may no longer exist.
                         let _ = to_owner.send(Err(error));
                         return;
                     }
@@ -193,7 +192,7 @@ impl Transport for Line {
         match self.received.try_recv() {
             Ok(packet) => packet.map(Some),
             Err(TryRecvError::Empty) => Ok(None),
-            // The thread ends after an error only, which was handed out before.
+            // The thread ends only after an error, which was returned before.
             Err(TryRecvError::Disconnected) => Err(ErrorKind::UnexpectedEof.into()),
         }
     }
@@ -206,7 +205,7 @@ impl Drop for Line {
     }
 }
 
-/// Writes all of it, or says that the line is stuck.
+/// Writes all bytes; an error if the line is stuck.
 fn write(writer: &mut (impl Write + ?Sized), bytes: &[u8]) -> io::Result<()> {
     writer.write_all(bytes).and_then(|()| writer.flush()).map_err(|error| {
         if !matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) {
@@ -218,13 +217,12 @@ fn write(writer: &mut (impl Write + ?Sized), bytes: &[u8]) -> io::Result<()> {
     })
 }
 
-/// Nothing came in time.
+/// Whether the read timed out.
 fn is_patience(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
 }
 
-/// A serial port whose bytes are sent once the system has taken them: waiting until they have left the wire has
-/// no time limit.
+/// A serial port whose bytes count as sent once the system has taken them: a wait for the wire has no time limit.
 struct Port(SerialPort);
 
 impl Write for Port {
@@ -243,7 +241,7 @@ struct Datagrams(UdpSocket);
 impl Write for Datagrams {
     fn write(&mut self, packet: &[u8]) -> io::Result<usize> {
         match self.0.send(packet) {
-            // The answer to an earlier datagram: there is no receiver yet.
+            // The answer to an earlier datagram: no receiver yet.
             Err(error) if error.kind() == ErrorKind::ConnectionRefused => Ok(packet.len()),
             sent => sent,
         }

@@ -1,4 +1,4 @@
-//! Where to: `serial:…`, `tcp:…`, `udp:…`, `unix:…`.
+//! Addresses of receivers: `serial:…`, `tcp:…`, `udp:…`, `unix:…`.
 
 use std::fmt;
 use std::net::{SocketAddr, TcpStream, ToSocketAddrs, UdpSocket};
@@ -14,7 +14,7 @@ use super::Line;
 /// Bits a second of a serial line that states none.
 const BAUD: u32 = 115_200;
 
-/// How long a connection may take to come about.
+/// Longest time to connect.
 const CONNECT: Duration = Duration::from_secs(5);
 
 /// A receiver's address.
@@ -29,7 +29,7 @@ const CONNECT: Duration = Duration::from_secs(5);
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Target {
-    /// A serial port, `serial:PORT` or `serial:PORT@BAUD`; 115,200 baud where none are given.
+    /// A serial port, `serial:PORT` or `serial:PORT@BAUD`; by default 115,200 baud.
     Serial {
         /// The port: a device file, or `COM3`.
         port: String,
@@ -38,8 +38,8 @@ pub enum Target {
     },
     /// A TCP server, `tcp:HOST:PORT`.
     Tcp(String),
-    /// A UDP receiver, `udp:HOST:PORT`, or `udp:HOST:PORT@LOCAL_PORT` for one that answers to a fixed port;
-    /// any free port where none is given.
+    /// A UDP receiver, `udp:HOST:PORT`, or `udp:HOST:PORT@LOCAL_PORT` for one that answers to a fixed port; by default
+    /// any free port.
     Udp {
         /// Host and port.
         address: String,
@@ -50,7 +50,7 @@ pub enum Target {
     Unix(PathBuf),
 }
 
-/// A target that cannot be understood or reached.
+/// A target that cannot be parsed or reached.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum TargetError {
@@ -62,7 +62,7 @@ pub enum TargetError {
         /// The text given.
         text: String,
     },
-    /// A baud rate that is no positive number.
+    /// A baud rate that is not a positive number.
     #[error("`{text}`: the baud rate `{baud}` is not a positive whole number")]
     Baud {
         /// The text given.
@@ -70,7 +70,7 @@ pub enum TargetError {
         /// The part after the `@`.
         baud: String,
     },
-    /// Nothing answers there.
+    /// The target cannot be opened.
     #[error(
         "{target}: cannot be opened ({source}); is the receiver running, and the address right?"
     )]

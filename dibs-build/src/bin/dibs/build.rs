@@ -73,7 +73,7 @@ enum Bits {
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    // Before the work, not after it.
+    // Checked before the work, not after it.
     let is_source = match args.output.extension().and_then(|e| e.to_str()) {
         Some("rs") => true,
         Some("dibs") => false,
@@ -93,7 +93,7 @@ pub fn run(args: &Args) -> Result<()> {
         let uniform = || vec![args.stretch; mesh.triangles.len()];
         check_covered(args, mesh, path, &limits.clone().unwrap_or_else(uniform))?;
     }
-    // A motion that does not fit is found before the work, too.
+    // A motion that does not fit fails before the work, too.
     let fit = match (&args.motion, args.modes) {
         (Some(path), Some(_)) => Some(modes::fit(mesh, path, &args.reading.lengths)?),
         _ => None,
@@ -188,7 +188,7 @@ fn build(
     tree
 }
 
-/// The name asked for, or the output file's, made fit for a Rust module.
+/// The given name, or the output file's with invalid characters replaced.
 fn module_name(args: &Args) -> String {
     args.name.clone().unwrap_or_else(|| {
         let stem = args.output.file_stem().unwrap_or_else(|| Path::new("tree").as_os_str());

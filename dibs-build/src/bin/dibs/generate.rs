@@ -46,7 +46,7 @@ enum Surface {
 
 pub fn run(args: &Args) -> Result<()> {
     let (Surface::Heart { output, .. } | Surface::Brain { output, .. }) = &args.surface;
-    // Before the work, not after it.
+    // Checked before the work, not after it.
     let format = Format::from_name(output)?;
     let mut moved = None;
     let mesh = match &args.surface {

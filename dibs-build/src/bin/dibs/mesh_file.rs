@@ -68,7 +68,7 @@ pub fn read(path: &Path, args: &MeshArgs) -> Result<Import> {
     Ok(import)
 }
 
-/// A bar for work on so many triangles.
+/// A progress bar for work on this many triangles.
 pub fn progress_bar(doing: &str, triangles: usize) -> ProgressBar {
     let bar = ProgressBar::new(triangles as u64);
     let template = format!("{doing} {{bar:40}} {{percent}}% {{elapsed}}");

@@ -66,7 +66,7 @@ impl Fit {
     }
 }
 
-/// The weights of a motion's frames for the modes of a tree file, all of them such as a receiver takes.
+/// The weights of a motion's frames for the modes of a tree file, all within a receiver's ranges.
 pub fn weights(path: &Path, order: &SurfaceOrder, motion: &Motion) -> Result<Vec<Vec<f32>>> {
     let bytes = tree_file::load(path)?;
     let name = path.display();

@@ -1,4 +1,4 @@
-//! Standard output and standard error, which may be a full disk or a closed pipe.
+//! Printing to standard output and standard error, which may be a full disk or a closed pipe.
 //!
 //! The `println!` and `eprintln!` of this program: unlike the standard ones they do not panic.
 
@@ -6,17 +6,17 @@ use std::fmt;
 use std::io::{self, ErrorKind, Write};
 use std::sync::OnceLock;
 
-/// As the standard one, but a failure is kept for [`finish`].
+/// As the standard macro, but keeps a failure for [`finish`].
 macro_rules! println {
     ($($text:tt)*) => { $crate::output::print(format_args!($($text)*)) };
 }
 
-/// As the standard one, but a failure is ignored: there is nowhere to say it.
+/// As the standard macro, but ignores a failure, which cannot be reported.
 macro_rules! eprintln {
     ($($text:tt)*) => { $crate::output::warn(format_args!($($text)*)) };
 }
 
-/// Why the first line that could not be printed was not.
+/// The error of the first line that could not be printed.
 static FAILURE: OnceLock<io::Error> = OnceLock::new();
 
 /// Prints a line of results. After a failure nothing more is printed, but files are still written.
@@ -24,7 +24,7 @@ pub fn print(line: fmt::Arguments<'_>) {
     if FAILURE.get().is_none()
         && let Err(error) = writeln!(io::stdout(), "{line}")
     {
-        // Set by another thread: that one came first.
+        // An error that another thread has set came first.
         let _ = FAILURE.set(error);
     }
 }
@@ -44,7 +44,8 @@ pub fn warn(line: fmt::Arguments<'_>) {
     let _ = writeln!(io::stderr(), "{line}");
 }
 
-/// Whether all results were printed. A reader that has seen enough (`dibs inspect --json | head -1`) is no error.
+/// An error unless all results were printed. A reader that closes the pipe (`dibs inspect --json | head -1`) is no
+/// error.
 pub fn finish() -> anyhow::Result<()> {
     let flushed = io::stdout().flush();
     let failure = FAILURE.get().or(flushed.as_ref().err());

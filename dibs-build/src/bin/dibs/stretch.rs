@@ -43,7 +43,7 @@ pub struct Args {
 /// Shares of the triangles, in per cent, whose largest stretch is reported.
 const PERCENTILES: [f64; 6] = [50.0, 90.0, 99.0, 99.9, 99.99, 100.0];
 
-/// Stretched most: how many are named.
+/// Most stretched triangles that are listed.
 const NAMED: usize = 5;
 
 pub fn run(args: &Args) -> Result<()> {
@@ -118,7 +118,7 @@ pub fn measure(mesh: &Mesh, motion: &Motion, path: &Path, paths: Paths) -> Resul
     needed.map_err(|error| anyhow!("{}: {error}", path.display()))
 }
 
-/// The least stretch that this share of the triangles, in per cent, keeps within.
+/// The stretch that this share of the triangles, in per cent, does not exceed.
 fn percentile(ranked: &[Needed], share: f64) -> f64 {
     let beyond = ((1.0 - share / 100.0) * ranked.len() as f64).floor() as usize;
     ranked[beyond.min(ranked.len() - 1)].stretch
@@ -154,7 +154,7 @@ fn draw(ranked: &[Needed]) -> Result<String> {
             .draw()?;
         let points = ranked.iter().enumerate().map(|(i, n)| (n.stretch.max(1.0), share(i + 1)));
         let step = ranked.len().div_ceil(1_500);
-        // The tail whole, the rest thinned out.
+        // All points of the tail, and some of the rest.
         let kept = points.enumerate().filter(|(i, _)| i % step == 0 || *i < 100).map(|(_, p)| p);
         chart.draw_series(LineSeries::new(kept, RGBColor(31, 90, 160).stroke_width(2)))?;
         root.present()?;

@@ -147,7 +147,7 @@ fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
 struct Session<'t, I> {
     tree: &'t Tree<'t, I>,
     query: Query<'t, I, STACK>,
-    /// `None` where every tick is asked anew.
+    /// `None` with `--full`.
     tracker: Option<Tracker<'t, I, STACK, OPENED>>,
     out: BufWriter<std::io::StdoutLock<'static>>,
     json: bool,
@@ -169,7 +169,7 @@ impl<I: Index> Session<'_, I> {
         let (proximity, fallback) = match surface {
             Surface::Held => self.ask(&step.after(), stretch, tool)?,
             Surface::Interpolated => self.ask(&step.at(share), stretch, tool)?,
-            // Beyond the stretch that the tree allows a guess is worth nothing: the last frame is held.
+            // An extrapolated surface beyond the tree's stretch limit is not searched: the last frame is held.
             Surface::Extrapolated => match measure_stretch(self.tree, &step.beyond(share)) {
                 Ok(stretch) => self.ask(&step.beyond(share), stretch, tool)?,
                 Err(_) => self.ask(&step.after(), stretch, tool)?,

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-/// Where a sender takes the time from: the system's clock, or in tests another.
+/// The source of a sender's time: the system's clock, or another in tests.
 pub(super) struct Clock(Box<dyn Fn() -> Duration + Send>);
 
 impl Clock {

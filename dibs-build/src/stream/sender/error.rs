@@ -21,10 +21,10 @@ pub enum SendError {
     /// The positions cannot be put into packets.
     #[error("the frame cannot be sent: {0}")]
     Frame(EncodeError),
-    /// Packets are to carry tags, and the receiver's challenge is not known: no status has come.
+    /// Packets must carry tags, but no status has brought the receiver's challenge.
     #[error("no genuine status came from the receiver: is it on, and has it the same key?")]
     NoChallenge,
-    /// Another sender has taken over the receiver: there is one sender a surface.
+    /// Another sender has taken over the receiver: a surface has one sender.
     #[error(
         "another sender has taken over with session {session}: there can be only one; stop it, and start \
          this one again"
@@ -33,7 +33,7 @@ pub enum SendError {
         /// The other sender's session.
         session: u32,
     },
-    /// The connection is gone.
+    /// The connection failed.
     #[error("the connection broke: {0}")]
     Line(std::io::Error),
 }

@@ -14,13 +14,13 @@ pub struct Sent {
     pub rows: usize,
     /// Packets that it took.
     pub packets: usize,
-    /// Bytes of these, without a byte stream's framing.
+    /// Bytes of the packets, without a byte stream's framing.
     pub bytes: usize,
-    /// No vertex is farther than this from where the receiver has it, in mm.
+    /// Largest distance of a vertex from its position at the receiver, in mm.
     pub error: f32,
 }
 
-/// A frame whose packets are made and not sent.
+/// A frame whose packets are made but not sent.
 #[derive(Debug)]
 pub struct Prepared {
     pub(super) sent: Sent,
@@ -83,7 +83,7 @@ pub(super) fn apply(packet: &[u8], encoding: Encoding, held: &mut [Vec3]) -> usi
     vertices.rows.len()
 }
 
-/// The same box in coarser steps, so that its error is nearly `error` (mm), where it is less.
+/// The box with coarser steps, so that its error is nearly `error` (mm), if it was less.
 pub(super) fn coarsened(grid: QuantisedBox, error: f32) -> QuantisedBox {
     // Half a step along each of three axes, and the rounding of the 65,536 steps that the box reaches.
     let step = error * 1.119 - grid.origin().abs().max_element() * 1e-6;

@@ -1,4 +1,4 @@
-//! Asking the receiver who it is.
+//! The question to the receiver for its challenge.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::Duration;
@@ -9,15 +9,15 @@ const INTERVAL: Duration = Duration::from_millis(50);
 /// A question that waits for its answer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Greeting {
-    /// The number that the answer repeats: random, and not 0.
+    /// The number that the answer repeats: random, not 0.
     nonce: u32,
-    /// When it was last asked.
+    /// Time of the last hello.
     sent: Option<Duration>,
 }
 
 impl Greeting {
     pub fn new() -> Self {
-        // Seeded by the operating system, anew for each.
+        // Each `RandomState` is seeded anew by the operating system.
         let random = RandomState::new().build_hasher().finish() as u32;
         Self { nonce: if random == 0 { 1 } else { random }, sent: None }
     }
@@ -27,7 +27,7 @@ impl Greeting {
         self.nonce == answer
     }
 
-    /// The nonce to ask with, if it is time to ask (again).
+    /// The nonce to send, if a hello is due.
     pub fn due(&mut self, now: Duration) -> Option<u32> {
         let is_due = self.sent.is_none_or(|sent| now.saturating_sub(sent) >= INTERVAL);
         is_due.then(|| {

@@ -29,8 +29,7 @@ use clock::Clock;
 use frame::{apply, coarsened, packets_of};
 use greeting::Greeting;
 
-/// Sends the frames of a moving surface, in packets of at most `MTU` bytes, and listens to what the
-/// receiver reports.
+/// Sends the frames of a moving surface, in packets of at most `MTU` bytes, and takes the receiver's statuses.
 ///
 /// ```
 /// use dibs_build::stream::{Sender, Settings, SurfaceOrder};
@@ -64,17 +63,17 @@ pub struct Sender<T, const MTU: usize, M = NoMac> {
     before: u32,
     /// A frame of this session was acknowledged.
     is_established: bool,
-    /// The session of a sender that has taken over.
+    /// The session of another sender that has taken over.
     superseded: Option<u32>,
     beat: u32,
     last_beat: Option<Duration>,
-    /// The positions, or weights, that came last, and when they came first.
+    /// The last positions or weights, and the time when they first came.
     capture: Option<(Vec<f32>, Duration)>,
-    /// The last frame of positions, as the receiver has it if it came through.
+    /// The last frame of positions, as the receiver has it if it arrived.
     held: Option<(u32, Vec<Vec3>)>,
     since_whole: u32,
     whole_wanted: bool,
-    /// The last whole frame: until it is acknowledged, requests for one are about the time before it.
+    /// The last whole frame: until it is acknowledged, requests for a whole frame may be from before it.
     whole: Option<(u32, Duration)>,
     status: Option<Status>,
     counters: Counters,
@@ -100,9 +99,9 @@ impl<T: Transport, const MTU: usize> Sender<T, MTU> {
 }
 
 impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
-    /// A sender of packets with tags. `keyed_mac(challenge)` returns the MAC under the receiver's
-    /// challenge, which that draws when it starts and reports in its status. Until a status has come,
-    /// [`poll`](Self::poll) says hello to the receiver, and nothing else can be sent.
+    /// A sender of packets with tags. `keyed_mac(challenge)` returns the MAC under the receiver's challenge, which the
+    /// receiver draws when it starts and reports in its status. Until a status has come, [`poll`](Self::poll) sends
+    /// hellos, and no frame can be sent.
     ///
     /// For a receiver without a way back, which uses the challenge 0: [`challenge`](Self::challenge).
     #[must_use]
@@ -142,16 +141,16 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.mac = Some((self.keyed_mac)(challenge));
     }
 
-    /// Takes the time from `now`, in place of the system's clock: for tests and simulations. Any start;
-    /// it never goes back.
+    /// Takes the time from `now` instead of the system's clock, for tests and simulations. It may start anywhere, but
+    /// must not go back.
     #[must_use]
     pub fn with_clock(mut self, now: impl Fn() -> Duration + Send + 'static) -> Self {
         self.clock = Clock::of(now);
         self
     }
 
-    /// Goes on through another transport, after the one before broke: with a whole frame, as soon as the
-    /// receiver has answered. The transport that broke.
+    /// Continues on another transport with a whole frame, as soon as the receiver has answered. Returns the broken
+    /// transport.
     pub fn reconnect(&mut self, transport: T) -> T {
         self.whole_wanted = true;
         self.greeting = Some(Greeting::new());
@@ -164,15 +163,15 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.mac.is_some()
     }
 
-    /// Sends a frame: positions (mm) in the mesh's order. Whole, or only what moved, as the settings
-    /// and the receiver ask for; with heartbeats in between, where they are due.
+    /// Sends a frame of positions (mm) in the mesh's order: whole or partial, as settings and receiver require, with
+    /// heartbeats in between when due.
     ///
-    /// The frame counts as captured now, unless its positions are those of the last one to the bit: then it
-    /// is as old as that one. So a source that stands still grows old, although its sender lives. Where the
-    /// time of the capture is known, [`send_captured`](Self::send_captured).
+    /// The frame counts as captured now, unless its positions equal the last frame's in every bit: then it is as old as
+    /// that frame. So a source that stands still grows old, although its sender lives. If the time of capture is known,
+    /// use [`send_captured`](Self::send_captured).
     ///
     /// # Errors
-    /// [`SendError`] names the vertex that cannot be sent, or what the line said.
+    /// [`SendError`] names the vertex that cannot be sent, or the line's error.
     pub fn send(&mut self, positions: &[Vec3]) -> Result<Sent, SendError> {
         let frame = self.prepare(positions)?;
         self.transmit(frame)
@@ -187,8 +186,8 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.transmit(frame)
     }
 
-    /// The first half of [`send`](Self::send): makes the packets. From here on [`held`](Self::held) is
-    /// what the receiver will have. A frame that was prepared must be transmitted next.
+    /// The first half of [`send`](Self::send): makes the packets. From here on [`held`](Self::held) includes this
+    /// frame, which must be transmitted next.
     ///
     /// # Errors
     /// [`SendError`] names the vertex that cannot be sent.
@@ -248,7 +247,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.prepare_weights_captured(weights, ago)
     }
 
-    /// The same of weights that were captured some time ago.
+    /// The same for weights that were captured some time ago.
     ///
     /// # Errors
     /// [`SendError`] names the weight that cannot be sent.
@@ -270,7 +269,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         Ok(Prepared::new(id.epoch, Content::Modal, weights.len(), 0.0, packets))
     }
 
-    /// Sends a frame that was prepared, with heartbeats in between, where they are due.
+    /// Sends a prepared frame, with heartbeats in between when due.
     ///
     /// # Errors
     /// [`SendError::Line`] when the connection is gone.
@@ -288,8 +287,8 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         Ok(sent)
     }
 
-    /// Sends a heartbeat or a hello if one is due, and takes in the statuses that have come. Does not
-    /// block; to be called some times between two heartbeats.
+    /// Sends a heartbeat or a hello if one is due, and takes the statuses that have come. Does not block. Call it a few
+    /// times between two heartbeats.
     ///
     /// # Errors
     /// [`SendError::Line`] when the connection is gone, [`SendError::Superseded`] when another sender has
@@ -309,14 +308,14 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         &self.totals
     }
 
-    /// The last frame of positions as the receiver has it if all of it came through: its number, and
-    /// the positions in the order of its rows.
+    /// The last frame of positions, as the receiver has it if all of it arrived: its number, and the positions in the
+    /// order of the rows.
     #[must_use]
     pub fn held(&self) -> Option<(u32, &[Vec3])> {
         self.held.as_ref().map(|(epoch, held)| (*epoch, held.as_slice()))
     }
 
-    /// The way of the packets.
+    /// The transport.
     pub const fn transport(&mut self) -> &mut T {
         &mut self.transport
     }
@@ -346,7 +345,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         if !self.settings.quantised {
             return Ok(Encoding::Float);
         }
-        // Not the box is wrong but a position that is not finite: the encoder names it.
+        // No box means a position that is not finite, which the encoder names.
         let Some(grid) = QuantisedBox::covering(rows) else { return Ok(Encoding::Float) };
         let tolerance = self.settings.partial.unwrap_or(0.0);
         Ok(Encoding::Quantised(coarsened(grid, tolerance)))
@@ -361,7 +360,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         }
     }
 
-    /// How long these numbers have been the same.
+    /// Time since these numbers last changed.
     fn since_change(&mut self, numbers: impl Iterator<Item = f32> + Clone) -> Duration {
         let now = self.clock.now();
         match &self.capture {

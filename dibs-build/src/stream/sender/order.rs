@@ -1,11 +1,11 @@
-//! Which row of the receiver's table is which vertex of the mesh.
+//! The mesh's vertex of each row of the receiver's table.
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{Index, Tree};
 
 use super::SendError;
 
-/// Which mesh, and in which order its vertices are sent.
+/// A mesh, and the order in which its vertices are sent.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SurfaceOrder {
     pub(super) mesh_id: u32,
@@ -14,7 +14,7 @@ pub struct SurfaceOrder {
 }
 
 impl SurfaceOrder {
-    /// That of a tree: the tree that the receiver has, or one built from the same mesh in the same way.
+    /// The order of a tree: the receiver's, or one built from the same mesh in the same way.
     #[must_use]
     pub fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
         let number = |row| tree.vertex_number(row).map_or(row, |number| number.0);
@@ -22,7 +22,7 @@ impl SurfaceOrder {
         Self { mesh_id: tree.mesh_id(), order: order.collect() }
     }
 
-    /// An order of one's own: `order` has the mesh's vertex for each row of the vertex table.
+    /// An order from the mesh's vertex of each row of the vertex table.
     #[must_use]
     pub const fn new(mesh_id: u32, order: Vec<u32>) -> Self {
         Self { mesh_id, order }
@@ -43,7 +43,7 @@ impl SurfaceOrder {
     /// Puts positions in the mesh's order into that of the tree's rows.
     ///
     /// # Errors
-    /// [`SendError::Vertices`] where a vertex of the tree has none.
+    /// [`SendError::Vertices`] if a vertex of the tree has no position.
     pub fn to_rows(&self, positions: &[Vec3]) -> Result<Vec<Vec3>, SendError> {
         let row = |&vertex: &u32| {
             positions

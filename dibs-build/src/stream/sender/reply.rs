@@ -7,7 +7,7 @@ use super::{SendError, Sender};
 use crate::transport::Transport;
 
 impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
-    /// The frame that the receiver has published, if it has said so in this session.
+    /// The frame of this session that the receiver last reported as published.
     #[must_use]
     pub fn acknowledged(&self) -> Option<u32> {
         let published = self.status?.published?;
@@ -17,7 +17,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         is_own.then_some(published.epoch)
     }
 
-    /// Frames of this session that were sent and not acknowledged yet, nor a later one.
+    /// Frames of this session sent after the last acknowledged one.
     #[must_use]
     pub fn in_flight(&self) -> u32 {
         self.epoch.wrapping_sub(self.acknowledged().unwrap_or(self.before))
@@ -35,14 +35,13 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.status.as_ref()
     }
 
-    /// The receiver's counters, as far as it has reported them.
+    /// The receiver's counters, as last reported.
     #[must_use]
     pub const fn counters(&self) -> &Counters {
         &self.counters
     }
 
-    /// Says hello until the receiver answers, where its challenge is not known, or it is not sure that it
-    /// is still the same receiver.
+    /// Sends hellos until the receiver answers, if its challenge is unknown or it may have started anew.
     pub(super) fn greet(&mut self) -> Result<(), SendError> {
         if !self.is_ready() {
             self.greeting.get_or_insert_with(Greeting::new);
@@ -56,7 +55,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.put(&hello)
     }
 
-    /// Takes in a packet that came back. Only statuses of this mesh are for this sender.
+    /// Takes a packet that came back. Only statuses of this mesh are for this sender.
     pub(super) fn take(&mut self, packet: &[u8]) {
         let Ok(packet) = Packet::decode(packet) else { return };
         let Body::Status(report) = packet.body else { return };
@@ -67,9 +66,8 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         }
     }
 
-    /// Takes in a genuine status, if it is new: the next one of the receiver's run, or the answer to a
-    /// hello. Anything else is a recording, was overtaken, or comes from a receiver that has started
-    /// anew: a hello will tell.
+    /// Takes a genuine status, if it is new: the next one of the receiver's run, or the answer to a hello. Any other is
+    /// a recording, was overtaken, or comes from a receiver that has started anew, which a hello decides.
     fn take_status(&mut self, report: &StatusReport<'_>, mac: M) {
         let status = report.status;
         let is_answer =
@@ -85,7 +83,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
             self.greeting = None;
         }
         if !is_next {
-            // A receiver that has started anew: it has nothing.
+            // A receiver that has started anew has no frame.
             self.mac = Some(mac);
             self.whole_wanted = true;
         }
@@ -103,8 +101,8 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         }
     }
 
-    /// What to do where the receiver has published a frame that this sender has not sent. Its own would be
-    /// refused for ever.
+    /// Reacts to a published frame that this sender has not sent: the receiver would refuse this sender's frames for
+    /// ever.
     fn yield_or_take_over(&mut self) {
         let Some(published) = self.status.and_then(|status| status.published) else { return };
         let own = self.settings.session;
@@ -113,7 +111,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         } else if self.is_established && is_newer(published.session, own) {
             self.superseded = Some(published.session);
         } else if !is_newer(own, published.session) {
-            // From before this sender's start, or under its own number by mistake.
+            // The frame is from before this sender's start, or another sender used the same session number.
             self.settings.session = published.session.wrapping_add(1);
             self.before = self.epoch;
             self.is_established = false;

@@ -1,29 +1,26 @@
-//! How a sender sends.
+//! A sender's settings.
 
 use std::time::{Duration, SystemTime};
 
-/// How a [`Sender`](super::Sender) sends.
+/// The settings of a [`Sender`](super::Sender).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// 6 bytes a vertex instead of 12, in a box that is fitted to each frame.
     pub quantised: bool,
-    /// Sends only the vertices that moved by more than this, in mm. With quantised positions the box
-    /// is as coarse as that, so that the error that it states covers what was not sent; it then
-    /// reaches 73 m a mm of tolerance, and the receiver must allow coordinates that large. With float
-    /// positions there is no error to state: whatever the tolerance, only vertices that did not move
-    /// at all are left out.
+    /// Sends only the vertices that moved by more than this, in mm. With quantised positions the box is made that
+    /// coarse, so that its stated error covers the vertices left out. It then spans 73 m for each mm of tolerance, and
+    /// the receiver must allow coordinates that large. Float positions have no error to state: only vertices that did
+    /// not move at all are left out.
     pub partial: Option<f32>,
-    /// With partial frames: at least every this many frames a whole one. What a receiver that cannot
-    /// answer needs after a loss.
+    /// With partial frames, the most frames from one whole frame to the next. After a loss a receiver that cannot
+    /// answer waits for it.
     pub whole_every: u32,
-    /// Between two heartbeats; `None` sends none.
+    /// Time between two heartbeats; `None` sends none.
     pub heartbeat: Option<Duration>,
-    /// How long a whole frame may be on its way: a status that asks for one before it arrives is not
-    /// heeded.
+    /// Time that a whole frame may be on its way, during which requests for another one are ignored.
     pub patience: Duration,
-    /// Number of this run: later than that of every run before, which the receiver remembers. By
-    /// default the time in tenths of a second, which wraps after 13 years. A sender that finds the number
-    /// taken when it starts takes one more.
+    /// Number of this run, later than that of every previous run. By default the time in tenths of a second, which
+    /// wraps after 13 years. A sender that finds the number taken when it starts takes the next.
     pub session: u32,
 }
 

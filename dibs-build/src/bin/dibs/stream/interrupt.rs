@@ -1,10 +1,10 @@
-//! Ctrl-C ends a stream, and does not lose its totals.
+//! Ctrl-C ends a stream without losing its totals.
 
 use anyhow::{Context, Result};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Whether the user, or the system, asks the program to end.
+/// Whether the user or the system has asked the program to end.
 pub struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {

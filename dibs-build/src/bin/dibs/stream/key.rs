@@ -6,8 +6,8 @@ use std::path::Path;
 /// Digits of a key of 128 bits.
 const DIGITS: usize = 32;
 
-/// Reads a key: 32 hexadecimal digits, whatever white space around them. What the file says is not
-/// repeated in an error: it may be a key after all.
+/// Reads a key: 32 hexadecimal digits, with any white space around them. No error repeats the file's content: it may be
+/// a key.
 pub fn read(path: &Path) -> Result<[u8; 16]> {
     let name = path.display();
     let what = format!(
@@ -30,11 +30,11 @@ pub fn read(path: &Path) -> Result<[u8; 16]> {
     Ok(key)
 }
 
-/// A key that others on this computer may read is none.
+/// Refuses a key file that others on this computer can read.
 #[cfg(unix)]
 fn refuse_if_shared(path: &Path) -> Result<()> {
     use std::os::unix::fs::PermissionsExt;
-    // A file that is not there is the reader's to report.
+    // The caller reports a missing file.
     let Ok(metadata) = std::fs::metadata(path) else { return Ok(()) };
     let mode = metadata.permissions().mode() & 0o777;
     let name = path.display();

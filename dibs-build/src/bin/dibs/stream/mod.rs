@@ -116,7 +116,7 @@ pub fn run(args: &Args) -> Result<()> {
 struct Recording {
     /// Positions, in the mesh's order.
     frames: Vec<Vec<Vec3>>,
-    /// The weights of each frame, where these are sent instead.
+    /// The weights of each frame, if weights are sent.
     weights: Option<Vec<Vec<f32>>>,
     /// Frames a second.
     rate: f64,

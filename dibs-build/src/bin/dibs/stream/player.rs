@@ -1,4 +1,4 @@
-//! Plays a recording to a receiver, at its own speed.
+//! Plays a recording to a receiver, at the recorded speed.
 
 use super::interrupt::Interrupt;
 use super::report::{self, Display, Outcome};
@@ -9,13 +9,13 @@ use dibs_build::transport::Line;
 use dibs_nostd::wire::Mac;
 use std::time::{Duration, Instant};
 
-/// A receiver that reports at all reports this often.
+/// A receiver without a status for this long does not report.
 const SILENT: Duration = Duration::from_secs(2);
 
 /// Between two attempts to connect.
 const ATTEMPT: Duration = Duration::from_millis(200);
 
-/// Time between two looks at the line back.
+/// Time between two polls.
 const GLANCE: Duration = Duration::from_millis(2);
 
 pub struct Player<'a, const MTU: usize, M> {
@@ -38,7 +38,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         Self { args, recording, sender, interrupt, display, outcome }
     }
 
-    /// Sends the frames, and prints the totals: of all of them, or of those before an interrupt.
+    /// Sends the frames, and prints the totals, after an interrupt too.
     pub fn run(mut self) -> Result<()> {
         self.await_challenge()?;
         let played = self.play();
@@ -47,7 +47,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         played
     }
 
-    /// Until the receiver has reported its challenge, where tags need one.
+    /// Waits for the receiver's challenge, if tags need it.
     fn await_challenge(&mut self) -> Result<()> {
         let (start, to) = (Instant::now(), &self.args.to);
         while !self.sender.is_ready() {
@@ -78,14 +78,14 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
             }
             let now = Instant::now();
             if now > due + interval {
-                // The line is slower than the motion: go on from here, do not pile up.
+                // The line is slower than the motion: continue from now instead of catching up.
                 self.outcome.late += 1;
                 due = now;
             }
             due += interval;
             self.send((number % recorded) as usize)?;
         }
-        // Wait for frames on their way to be acknowledged, where the receiver acknowledges any.
+        // Wait for the acknowledgement of frames on their way, if the receiver acknowledges any.
         let end = Instant::now();
         while self.sender.in_flight() > 0
             && self.sender.status().is_some()
@@ -99,7 +99,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
 
     fn send(&mut self, frame: usize) -> Result<()> {
         let (sender, recording) = (&mut self.sender, self.recording);
-        // A recording is as fresh as the moment at which its frame is due, whether anything moves or not.
+        // A recorded frame counts as captured when it is due, even if the surface stands still.
         let sent = match &recording.weights {
             Some(weights) => sender
                 .prepare_weights_captured(&weights[frame], Duration::ZERO)
@@ -121,7 +121,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         }
     }
 
-    /// Connects again, for as long as the user is ready to wait.
+    /// Connects again, within the time that the user allows.
     fn reconnect(&mut self, error: &std::io::Error) -> Result<()> {
         let (start, to) = (Instant::now(), &self.args.to);
         let patience = Duration::from_secs(self.args.retry);
@@ -135,7 +135,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
             }
             std::thread::sleep(ATTEMPT);
         }
-        // The user waits no longer: the totals are due, and no error.
+        // An interrupt while waiting prints the totals and is no error.
         if self.interrupt.is_raised() {
             return Ok(());
         }
@@ -145,7 +145,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         )
     }
 
-    /// Heartbeats and statuses until the next frame is due, and has room.
+    /// Sends heartbeats and takes statuses until the next frame is due and fits the window.
     fn wait(&mut self, due: Instant) -> Result<()> {
         let mut heard = (self.sender.totals().statuses, Instant::now());
         loop {
@@ -161,7 +161,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
                 return Ok(());
             }
             if now >= due + SILENT {
-                // The receiver reports, and acknowledges nothing: say so, and try another frame.
+                // The receiver reports but acknowledges nothing: warn, and try another frame.
                 self.display.warn(&self.sender);
                 return Ok(());
             }

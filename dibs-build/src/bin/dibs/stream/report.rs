@@ -8,20 +8,20 @@ use std::fmt::Write;
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-/// Progress: one line on a terminal, a line a second elsewhere.
+/// Progress: one line on a terminal, one line each second elsewhere.
 pub struct Display {
     bar: ProgressBar,
     last: Instant,
 }
 
-/// How a stream went, besides what the sender knows.
+/// Totals of a stream besides the sender's.
 #[derive(Default)]
 pub struct Outcome {
     /// Frames that were sent later than they were due.
     pub late: u64,
-    /// How often the connection was made again.
+    /// Times that the connection was made again.
     pub reconnections: u64,
-    /// The user ended it.
+    /// Whether the user ended it.
     pub is_interrupted: bool,
 }
 
@@ -49,7 +49,7 @@ impl Display {
         }
     }
 
-    /// Says that frames wait although the receiver reports.
+    /// Warns that frames wait although the receiver reports.
     pub fn warn<M: Mac, const MTU: usize>(&self, sender: &Sender<Line, MTU, M>) {
         let mut text = format!("{} frames are not acknowledged", sender.in_flight());
         text += match sender.status().and_then(|status| status.published) {
