@@ -1,4 +1,4 @@
-//! Builds the surface's tree, and hands the board's memory map to the linker.
+//! Builds the surface's tree, and passes the board's memory map to the linker.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -15,8 +15,8 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The tree in flash: of the generated heart, or of the mesh file in `DIBS_MESH`; for a stretch of
-/// 1.5, or what `DIBS_STRETCH` says.
+/// The tree in flash: of the generated heart, or of the mesh file in `DIBS_MESH`; for a stretch of 1.5, or that in
+/// `DIBS_STRETCH`.
 fn surface() -> Result<()> {
     println!("cargo::rerun-if-env-changed=DIBS_MESH");
     println!("cargo::rerun-if-env-changed=DIBS_STRETCH");
@@ -36,7 +36,7 @@ fn surface() -> Result<()> {
 fn link(out: &Path) -> Result<()> {
     println!("cargo:rerun-if-changed=../memory.x");
     fs::copy("../memory.x", out.join("memory.x")).context("memory.x at the repository's top")?;
-    // The interrupts have no default handlers but those of `vectors.rs`.
+    // The interrupts have only the handlers of `vectors.rs`.
     fs::write(out.join("device.x"), "")?;
     println!("cargo:rustc-link-search={}", out.display());
     for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {

@@ -17,11 +17,10 @@ use crate::{BusStatus, TICK_RATE, instrument};
 /// A surface older than this many ticks is acted on with a warning: the state is degraded.
 pub const SURFACE_AGE_WARNING: u32 = 4 * TICK_RATE;
 
-/// A surface older than this many ticks is not acted on: the output is safe until fresh ones come.
+/// A surface older than this many ticks is not acted on: the output is safe until new ones come.
 ///
-/// Six seconds, because the emulated serial line takes one to three for a whole frame, and a frame is
-/// as old as its first packet. A real bus brings tens of frames a second, and a real limit is a few
-/// tens of milliseconds.
+/// Six seconds, because the emulated serial line takes one to three for a whole frame, and a frame is as old as its
+/// first packet. A real bus brings tens of frames a second, so its limit is a few tens of milliseconds.
 pub const SURFACE_AGE_LIMIT: u32 = 6 * TICK_RATE;
 
 /// Ticks without any good packet after which the state is degraded.
@@ -43,22 +42,21 @@ const TRANSIT: (u32, u32) = (TICK_RATE / 2, TICK_RATE);
 /// Age in ms that a frame may have when its sender sends it: a source that stands still while its sender lives.
 const SOURCE_AGE: (u32, u32) = (TICK_RATE, 2 * TICK_RATE);
 
-/// Forged packets between two published frames. None can be on this bus, which has no tags: a receiver with a key
-/// watches the same counter.
+/// Forged packets between two published frames. This bus has no tags and so no forgeries; a receiver with a key watches
+/// the same counter.
 const FORGERIES: (u32, u32) = (0, 100);
 
-/// No point of the tissue moves faster, in mm a tick. The line above shows a heart slowed down some
-/// fifty times; a real one reaches 0.2 mm a millisecond.
+/// Largest speed of the tissue, in mm a tick. The emulated line brings a heart slowed down some fifty times; a real one
+/// reaches 0.2 mm a millisecond.
 const TISSUE_SPEED: f32 = 0.001;
 
-/// Frames in a row that recover. Nobody is here to acknowledge: a real robot leaves `automatic` out.
+/// Frames in a row that recover. Nobody acknowledges here; a real robot leaves `automatic` out.
 const RECOVERY_FRAMES: u16 = 1;
 
-/// The most that a query may do: more than the heart's takes, and no surface that is admitted makes it take longer than
-/// a tick.
+/// The budget of a query: more than the heart needs, and within a tick on every admitted surface.
 pub const BUDGET: Budget = Budget { node_tests: 1_800, triangle_tests: 150 };
 
-/// Instructions in a tick of 1 ms at 480 MHz, if each takes a cycle: the deadline of a tick.
+/// The deadline of a tick in instructions: 1 ms at 480 MHz, with one cycle for each.
 pub const TICK_INSTRUCTIONS: u64 = 480_000;
 
 // The rest of the tick takes some thousand instructions.
@@ -110,12 +108,12 @@ impl Control {
         self.tick
     }
 
-    /// Leaves out so many ticks, as if they had been run: a test need not wait for the pose that it wants.
+    /// Skips ticks, so that a test reaches a pose at once.
     pub const fn skip(&mut self, ticks: u32) {
         self.tick = self.tick.wrapping_add(ticks);
     }
 
-    /// Runs one tick. `clock` is any free-running counter; it only measures what the query takes.
+    /// Runs one tick. `clock` is any free-running counter; it only measures the query.
     pub fn tick(&mut self, clock: impl Fn() -> u32) -> Tick {
         let mut record = Tick { kind: Tick::KIND, tick: self.tick, ..Tick::zeroed() };
         record.triangle = u32::MAX;
@@ -128,7 +126,7 @@ impl Control {
         self.before = tool;
         let (frame, answer) = match &tool {
             Some(tool) => self.ask(tool, clock, &mut record),
-            // A pose that is not finite: nothing to ask with.
+            // The pose is not finite, so no query is possible.
             None => (None, Err(Unavailable::NotFinite)),
         };
         let link = self.bus.link.read(self.tick);
@@ -147,7 +145,7 @@ impl Control {
         let velocity = match (before, tool) {
             (Some(before), Some(now)) => velocity(&before, &now, along),
             (None, Some(_)) => Vec3::ZERO,
-            // There is no velocity to damp either.
+            // Without a pose there is no velocity to damp.
             (_, None) => Vec3::NAN,
         };
         let force = self.wall.force(&admitted, velocity);
@@ -162,7 +160,7 @@ impl Control {
         record
     }
 
-    /// The closest pair on the frame published last, and which frame.
+    /// The closest pair on the frame published last, and that frame's age.
     fn ask(
         &mut self,
         tool: &Capsule,
@@ -174,7 +172,7 @@ impl Control {
         record.tool_radius = tool.radius();
         let latest = self.surface.latest(self.tick);
         let age = latest.frame();
-        // How old a surface may be is the fail-safe machine's to decide.
+        // The fail-safe machine decides how old a surface may be.
         let frame = match latest.of_any_age() {
             Ok(frame) => frame,
             Err(unavailable) => return (age, Err(unavailable)),
@@ -202,7 +200,7 @@ impl Control {
     }
 }
 
-/// When the surface is no longer trusted.
+/// The limits beyond which the surface is not trusted.
 const fn limits() -> Result<Limits, LimitError> {
     macro_rules! tri {
         ($result:expr) => {

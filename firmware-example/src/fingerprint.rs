@@ -1,4 +1,4 @@
-//! A checksum of the whole published surface, for comparison with the one sent.
+//! A checksum of the whole published surface, to compare it with the one sent.
 
 use dibs_nostd::VertexTable;
 use dibs_nostd::format::CRC;
@@ -19,12 +19,12 @@ impl Fingerprint {
         Self { epoch: 0, digest: CRC.digest(), next: None }
     }
 
-    /// Starts anew, with a frame that has just been published.
+    /// Starts anew with a frame just published.
     pub fn begin(&mut self, epoch: u32) {
         *self = Self { epoch, digest: CRC.digest(), next: Some(0) };
     }
 
-    /// Reads up to `rows` rows, and after the last one tells the checksum.
+    /// Reads up to `rows` rows, and after the last one reports the checksum.
     pub fn step(&mut self, surface: &impl VertexTable, rows: u32, status: &BusStatus) {
         let Some(first) = self.next else { return };
         for row in first..first.saturating_add(rows) {
@@ -46,7 +46,7 @@ fn take(digest: &mut crc::Digest<'_, u32>, position: Vec3) {
     }
 }
 
-/// The checksum that [`BusStatus::fingerprint`] must have of a frame with these positions.
+/// The expected [`BusStatus::fingerprint`] of a frame with these positions.
 #[must_use]
 pub fn fingerprint(positions: &[Vec3]) -> u32 {
     let mut digest = CRC.digest();

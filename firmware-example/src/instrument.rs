@@ -1,4 +1,4 @@
-//! Where the instrument is: on a robot, the kinematics answer this; here, a script.
+//! The instrument's pose: on a robot from the kinematics, here from a script.
 
 use core::f32::consts::TAU;
 
@@ -15,11 +15,11 @@ const RADIUS: f32 = 2.5;
 /// The instrument at a tick: a capsule that enters through a fixed port, as in keyhole surgery,
 /// while its tip sweeps around the surface and, every seven seconds, through the middle of it.
 ///
-/// The sum of a few slow sines, as a surgeon's hand moves, and of a physiological tremor (9 Hz,
-/// 0.1 mm). A function of the tick alone, so that two runs are the same run.
+/// The motion is the sum of a few slow sines, like a surgeon's hand, and of a physiological tremor (9 Hz, 0.1 mm). It
+/// depends on the tick alone, so that runs repeat.
 ///
 /// # Errors
-/// None for a surface of ordinary size: [`ToolError`] names a coordinate that is not finite.
+/// [`ToolError`] names a coordinate out of range, which no surface of ordinary size has.
 pub fn instrument(tick: u32) -> Result<Capsule, ToolError> {
     let wave = |period: u32, phase: f32| {
         libm::sinf(TAU * ((tick % period) as f32 / period as f32 + phase))

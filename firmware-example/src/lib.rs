@@ -1,17 +1,16 @@
 //! The control logic of a robot that keeps its instrument off a beating heart.
 //!
-//! It compiles for the board and for the host alike: `no_std`, no allocation, no panic, and nothing
-//! that belongs to a board. Three contexts share it:
+//! It compiles for board and host: `no_std`, no allocation, no panic, and no access to hardware. Three contexts share
+//! it:
 //!
-//! - the control tick, 1 kHz, highest priority: [`Control::tick`] poses the instrument, asks for the
-//!   closest pair on the frame published last, judges how far that frame may be trusted, and turns
-//!   the answer into a force;
+//! - the control tick, 1 kHz, highest priority: [`Control::tick`] poses the instrument, finds the closest pair on the
+//!   frame published last, judges the trust in that frame, and makes a force of the answer;
 //! - bus reception, any lower priority: [`Receiver::byte`] takes vertices as they come;
-//! - the background: [`Receiver::work`] checks complete frames in slices and publishes them,
-//!   [`Receiver::report`] tells the sender, and [`Upkeep::step`] checks the tree in flash.
+//! - the background: [`Receiver::work`] checks complete frames in slices and publishes them, [`Receiver::report`] makes
+//!   statuses for the sender, and [`Upkeep::step`] checks the tree in flash.
 //!
-//! Between them stand [`Frames`](dibs_nostd::Frames), where a frame is published by one atomic
-//! operation, and [`BusStatus`], plain counters and marks. [`telemetry`] is the tick's record for the host.
+//! They share [`Frames`](dibs_nostd::Frames), where one atomic operation publishes a frame, and [`BusStatus`], counters
+//! and flags. [`telemetry`] is the tick's record for the host.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 

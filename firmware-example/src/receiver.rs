@@ -10,20 +10,20 @@ use crate::{BusStatus, TICK_RATE};
 /// Largest packet on the serial bus, in bytes: 167 quantised vertices.
 pub const MTU: usize = 1024;
 
-/// Largest status, in bytes: ten counters; all of them in three.
+/// Largest status, in bytes: ten counters, so that three statuses carry all.
 const STATUS_MTU: usize = 96;
 
 /// Largest status on the line.
 pub const STATUS_FRAMED: usize = framed_bytes(STATUS_MTU);
 
-/// Ticks between two statuses to the sender, unless there is news before.
+/// Ticks between two statuses to the sender, unless a frame was published or refused before.
 const REPORT_INTERVAL: u32 = TICK_RATE / 10;
 
-/// No vertex may be farther out on any axis than this many times the size of the rest shape.
+/// Limit on the coordinates, as a multiple of the rest shape's size.
 const ROOM: f32 = 4.0;
 
-/// No vertex may move faster, in mm a tick, from one published frame to the next: twice the generated heart's top
-/// speed at its own pace, 1.57 mm in a thirtieth of a second. Over the emulated serial line it beats in slow motion.
+/// Limit on a vertex's speed, in mm a tick: twice the generated heart's top speed in real time, 1.57 mm in a thirtieth
+/// of a second. Over the emulated serial line it beats in slow motion.
 const SPEED: f32 = 0.1;
 
 /// Rows and triangles checked, or rows copied, in one slice.
@@ -34,10 +34,9 @@ const ROWS: u32 = 8;
 
 /// The receiving end of the serial bus.
 ///
-/// Two contexts use it, and keep each other out: the bus interrupt calls [`byte`](Self::byte), which
-/// takes O(1), and O(vertices) for the last byte of a packet; what is left of the processor's time goes
-/// to [`work`](Self::work), which checks and publishes, in slices, and to [`report`](Self::report). All
-/// of it is below the control tick's priority.
+/// Two contexts use it, one at a time. The bus interrupt calls [`byte`](Self::byte), which takes O(1), and O(bytes) for
+/// the last byte of a packet. The idle loop calls [`work`](Self::work), which checks and publishes in slices, and
+/// [`report`](Self::report). Both are below the control tick's priority.
 pub struct Receiver {
     deframer: Deframer<MTU>,
     assembler: surface::Receiver<'static>,
@@ -71,7 +70,7 @@ impl Receiver {
         })
     }
 
-    /// Takes one byte. `tick` is the present control tick: the age of a surface counts from it.
+    /// Takes one byte. `tick` is the present control tick, from which a surface's age counts.
     pub fn byte(&mut self, byte: u8, tick: u32) {
         self.status.count_byte();
         match self.deframer.push(byte) {
@@ -87,9 +86,9 @@ impl Receiver {
         self.status.set(self.assembler.counters());
     }
 
-    /// One slice of checking, copying and publishing; whether more is to be done at once.
-    // As a part of a large loop its branches become jumps through a register, of which nobody can see where
-    // they lead.
+    /// Does one slice of checking, copying and publishing. Returns whether more work is due at once.
+    // Not inlined: in a large loop its branches would become jumps through a register, whose targets the binary check
+    // cannot see.
     #[inline(never)]
     pub fn work(&mut self) -> bool {
         let outcome = self.assembler.advance(WORK);
@@ -97,7 +96,7 @@ impl Receiver {
         match outcome {
             Ok(Advance::Pending) => return true,
             Ok(Advance::Published { epoch }) => self.fingerprint.begin(epoch),
-            // The published frame is read through while the next one comes.
+            // The published frame is read in full while the next one arrives.
             Ok(_) => {
                 if let Some(surface) = self.assembler.surface() {
                     self.fingerprint.step(&surface, ROWS, self.status);
@@ -121,8 +120,7 @@ impl Receiver {
         self.assembler.gate().tree().mesh_id()
     }
 
-    /// The status for the sender, framed for the line: `None` unless a status is due. `tick` is
-    /// the present control tick, 1 ms.
+    /// The status for the sender, framed for the line; `None` unless due. `tick` is the present control tick, 1 ms.
     pub fn report<'b>(&mut self, tick: u32, line: &'b mut [u8; STATUS_FRAMED]) -> Option<&'b [u8]> {
         if !self.has_news && tick.wrapping_sub(self.reported) < REPORT_INTERVAL {
             return None;

@@ -5,8 +5,8 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use dibs_nostd::failsafe::{LinkStatus, State};
 use dibs_nostd::wire::{Counters, Event};
 
-/// Counters since start, written by the bus side and read by anybody, and the controller's state, the
-/// other way. Each is exact; together they may be of two moments.
+/// Counters since the start, written by the bus side, and the controller's state, written by the control tick. Each is
+/// exact, but two of them may be of different moments.
 #[derive(Debug, Default)]
 pub struct BusStatus {
     /// The numbers that the fail-safe machine watches.
@@ -61,8 +61,7 @@ impl BusStatus {
         self.safety.load(Ordering::Relaxed) as u8
     }
 
-    /// Epoch of the frame that was read through last, and the CRC-32 of its positions as they stand in
-    /// memory; epoch 0 while there is none.
+    /// Epoch of the frame last read in full, and the CRC-32 of its positions in memory; epoch 0 while there is none.
     #[must_use]
     pub fn fingerprint(&self) -> (u32, u32) {
         let epoch = self.epoch.load(Ordering::Acquire);
@@ -71,8 +70,7 @@ impl BusStatus {
         if is_one { (epoch, digest) } else { (0, 0) }
     }
 
-    /// Whether the tree was ever found changed. It is not taken back: flash that read wrong once is not
-    /// to be trusted.
+    /// Whether the tree was ever found changed. It is never cleared: flash that read wrong once is not trusted.
     #[must_use]
     pub fn has_rotted(&self) -> bool {
         self.has_rotted.load(Ordering::Relaxed)

@@ -1,7 +1,7 @@
 //! The controller's records for the host: one a tick, and a summary at the end.
 //!
-//! A record is its fields in order, little-endian, 32 bits each, then a CRC-32 (ISO-HDLC) of them,
-//! framed with COBS and a zero byte. The first field tells which record it is.
+//! A record is its fields in order, little-endian, 32 bits each, then a CRC-32 (ISO-HDLC) of them, framed with COBS and
+//! a zero byte. The first field is the kind of record.
 
 use bytemuck::{NoUninit, Pod, Zeroable};
 use dibs_nostd::Unavailable;
@@ -27,22 +27,22 @@ pub struct Tick {
     pub kind: u32,
     /// Number of the tick, from 0.
     pub tick: u32,
-    /// How far the surface is trusted: `dibs_nostd::failsafe::State` as a number.
+    /// The trust in the surface: `dibs_nostd::failsafe::State` as a number.
     pub state: u32,
-    /// Why it is not nominal: [`cause_code`]; 0 where it is.
+    /// Why it is not nominal: [`cause_code`]; 0 if it is.
     pub cause: u32,
     /// 1 if there was an answer, else 0.
     pub answered: u32,
-    /// How far the tissue may have moved since the frame was received, in mm: added to the accuracy
-    /// before the constraint sees the answer.
+    /// Most that the tissue may have moved since the frame was received, in mm. The constraint's answer has it added to
+    /// its accuracy.
     pub margin: f32,
-    /// The frame that was asked, where there was an answer.
+    /// The frame that was searched, if there was an answer.
     pub epoch: u32,
     /// Its age in ticks.
     pub age: u32,
-    /// How far its vertices may be from where the sender had them, in mm: the bus's quantisation.
+    /// Largest distance of its vertices from the sender's, in mm: the bus's quantisation.
     pub position_error: f32,
-    /// The instrument's tip, exactly as the query had it, in mm.
+    /// The instrument's tip, exactly as in the query, in mm.
     pub tool_start: [f32; 3],
     /// Its other end, in mm.
     pub tool_end: [f32; 3],
@@ -64,7 +64,7 @@ pub struct Tick {
     pub triangle_tests: u32,
     /// The force on the instrument, in N.
     pub force: [f32; 3],
-    /// Clock counts that the query took; 0 where there is no clock.
+    /// Clock counts that the query took; 0 without a clock.
     pub query_counts: u32,
     /// Bytes that the bus had brought; wraps.
     pub bytes: u32,
@@ -74,7 +74,7 @@ pub struct Tick {
     pub frames_published: u32,
     /// Packets and frames rejected so far.
     pub rejected: u32,
-    /// Epoch of the frame that the background read through last; 0 while there is none.
+    /// Epoch of the frame that the background last read in full; 0 while there is none.
     pub read_epoch: u32,
     /// The CRC-32 of its positions: [`fingerprint`](crate::fingerprint).
     pub read_digest: u32,
@@ -146,7 +146,7 @@ pub struct Summary {
     pub tick_counts: u32,
     /// Records that found the queue full.
     pub records_dropped: u32,
-    /// 1 if the bus ever lost a byte that was not read in time, else 0.
+    /// 1 if the bus ever lost a byte because it was not read in time, else 0.
     pub bus_overrun: u32,
     /// Largest stack use, in bytes.
     pub stack_bytes: u32,
@@ -166,7 +166,7 @@ impl Summary {
     pub const KIND: u32 = 2;
 }
 
-/// A record as it comes over the line.
+/// A record from the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Record {
     /// One control tick.
@@ -175,8 +175,7 @@ pub enum Record {
     Summary(Summary),
 }
 
-/// Writes a [`Tick`] or a [`Summary`] to `out` as it goes over the line; `None` only where `out` is
-/// too small.
+/// Writes a [`Tick`] or a [`Summary`] to `out`, framed for the line; `None` only if `out` is too small.
 pub fn frame<'b, T: NoUninit>(record: &T, out: &'b mut [u8; MAX_FRAMED]) -> Option<&'b [u8]> {
     const { assert!(cfg!(target_endian = "little"), "records are little-endian") };
     let mut bytes = [0; LARGEST + CHECKSUM];
@@ -190,7 +189,7 @@ pub fn frame<'b, T: NoUninit>(record: &T, out: &'b mut [u8; MAX_FRAMED]) -> Opti
 }
 
 impl Record {
-    /// Reads what [`frame`] wrote, after COBS was taken off; `None` for anything damaged.
+    /// Decodes a record of [`frame`], without its COBS framing; `None` if damaged.
     #[must_use]
     pub fn decode(bytes: &[u8]) -> Option<Self> {
         let (fields, stated) = bytes.split_last_chunk::<CHECKSUM>()?;

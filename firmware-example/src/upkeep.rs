@@ -8,7 +8,7 @@ use crate::surface;
 /// Bytes checked in one slice.
 const SLICE: usize = 256;
 
-/// The background check of the tree. Its finding goes to the control tick, which is safe from then on.
+/// The background check of the tree. A changed tree makes the control tick safe from then on.
 pub struct Upkeep {
     scrub: Scrub<'static>,
     status: &'static BusStatus,

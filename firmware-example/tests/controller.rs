@@ -1,4 +1,4 @@
-//! The control logic on the host, against an in-process bus: what the board does, byte for byte.
+//! The control logic on the host, against an in-process bus: the same bytes as on the board.
 
 use std::collections::HashMap;
 use std::sync::OnceLock;
@@ -39,7 +39,7 @@ fn controller() -> (Receiver, Control, &'static BusStatus) {
 struct Sender {
     frames: Vec<Vec<Vec3>>,
     triangles: Vec<[u32; 3]>,
-    /// What the controller has of each frame sent.
+    /// The controller's positions of each frame sent.
     decoded: HashMap<u32, Vec<Vec3>>,
 }
 
@@ -88,7 +88,7 @@ impl Sender {
         all
     }
 
-    /// Holds an answer against exhaustive search on the frame that it names.
+    /// Compares an answer with exhaustive search on its frame.
     fn check(&self, tick: &Tick) {
         let (start, end) = (Vec3::from(tick.tool_start), Vec3::from(tick.tool_end));
         let tool = Instrument::capsule(start, end, tick.tool_radius);

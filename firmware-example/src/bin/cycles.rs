@@ -1,5 +1,5 @@
-//! A query's cost in cycles, on a board of your own: its `Cost`, from the cycle counter of the debug
-//! watchpoint unit (DWT). Where that stands still, as in an emulator, `SysTick` takes its place, and says so.
+//! Measures a query's `Cost` in cycles on your board, by the cycle counter of the debug watchpoint unit (DWT). Where
+//! that stands still, as in an emulator, it uses `SysTick` and says so.
 //!
 //! Change `memory.x` to your part, raise its clock before the measurement as your product does, and run
 //! this with a debugger that shows semihosting output:
@@ -8,9 +8,8 @@
 //! cargo build -p firmware-example --bin cycles --features cycles --profile firmware --target thumbv7em-none-eabihf
 //! ```
 //!
-//! It searches the heart at rest from many poses, each with caches as the last query left them and with
-//! empty ones, and with three budgets: of nothing, of node tests only, and of all that it takes. The
-//! constants that come out are above every query that was measured. Add a margin for what was not.
+//! It searches the heart at rest from many poses, each with warm and with empty caches, and with three budgets: zero,
+//! node tests only, and unlimited. The resulting constants are above every measured query. Add a margin for others.
 #![no_std]
 #![no_main]
 
@@ -66,7 +65,7 @@ fn measure() -> Result<(), &'static str> {
         let half = random.within().normalize_or(Vec3::X) * HALF_AXIS;
         let Ok(tool) = Capsule::new(centre - half, centre + half, RADIUS) else { continue };
         let mut cycles = |node_tests, triangle_tests| {
-            // Every other pose finds both caches empty: nothing is worse than that.
+            // Every other pose finds both caches empty, the worst case.
             if pose % 2 == 1 {
                 core.SCB.clean_invalidate_dcache(&mut core.CPUID);
                 core.SCB.invalidate_icache();
@@ -96,7 +95,7 @@ fn measure() -> Result<(), &'static str> {
 enum Counter {
     /// The core's cycles, in 32 bits.
     Cycles,
-    /// Counts of `SysTick`, downwards in 24 bits: all that an emulator has.
+    /// Counts of `SysTick`, downwards in 24 bits: the only ones of an emulator.
     SysTick,
 }
 
@@ -140,7 +139,7 @@ impl Counter {
 
 const SYSTICK_BITS: u32 = 0x00FF_FFFF;
 
-/// Raises the constants until none of the three queries costs more than they say.
+/// Raises the constants until they bound the cost of all three queries.
 fn raise(bound: &mut Cost, none: (u32, Proximity), nodes: (u32, Proximity), all: (u32, Proximity)) {
     bound.base = bound.base.max(none.0);
     for (cycles, answer) in [nodes, all] {

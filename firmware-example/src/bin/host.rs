@@ -1,7 +1,7 @@
-//! The controller as a program on this computer: the same logic as on the board, with a thread
-//! for the bus interrupt. Real time as far as the operating system gives it; no deadline is claimed.
+//! The controller as a program on this computer: the same logic as on the board, with a thread for the bus interrupt.
+//! It claims no deadline.
 //!
-//! `host BUS TELEMETRY TICKS`: two Unix sockets to connect to, and how long to run.
+//! `host BUS TELEMETRY TICKS`: two Unix sockets to connect to, and the length of the run.
 
 use std::io::{BufWriter, ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;

@@ -3,8 +3,8 @@
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-/// A value that at most one context uses at a time. A second one is turned away, never kept
-/// waiting: a handler of high priority that waited for a lower one would wait for ever.
+/// A value that at most one context uses at a time. A second one is refused instead of waiting: a handler that waited
+/// for one of lower priority would wait for ever.
 pub struct Exclusive<T> {
     busy: AtomicBool,
     value: UnsafeCell<T>,
@@ -18,7 +18,7 @@ impl<T> Exclusive<T> {
         Self { busy: AtomicBool::new(false), value: UnsafeCell::new(value) }
     }
 
-    /// Runs `work` on the value; `None` when another context is inside.
+    /// Runs `work` on the value; `None` while another context uses it.
     pub fn with<R>(&self, work: impl FnOnce(&mut T) -> R) -> Option<R> {
         if self.busy.swap(true, Ordering::Acquire) {
             return None;

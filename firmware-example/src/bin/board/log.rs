@@ -31,7 +31,7 @@ unsafe impl defmt::Logger for Logger {
 }
 
 fn emit(bytes: &[u8]) {
-    // No debugger attached is no reason to stop a robot.
+    // Without a debugger the log is lost and the robot continues.
     if let Ok(mut out) = hio::hstdout() {
         let _ = out.write_all(bytes);
     }

@@ -1,9 +1,8 @@
 //! The board: MPS2-AN500, a Cortex-M7 that QEMU emulates as `mps2-an500`.
 //!
-//! Three priorities share the core. The control tick (`SysTick`, 1 kHz) is the highest: nothing
-//! delays it but its own last run. Bus reception (UART 0) is one below. What is left, the idle
-//! loop, checks complete frames and the tree in flash a slice at a time, sends statuses back over UART 0
-//! and telemetry over UART 1.
+//! Three priorities share the core. The control tick (`SysTick`, 1 kHz) is the highest: only its previous run delays
+//! it. Bus reception (UART 0) is one below. The idle loop checks complete frames and the tree in flash a slice at a
+//! time, and sends statuses over UART 0 and telemetry over UART 1.
 #![no_std]
 #![no_main]
 
@@ -35,7 +34,7 @@ fn main() -> ! {
     static mut TREE: Option<surface::Tree> = None;
     let (producer, consumer) = RECORDS.split();
 
-    // Once, before anything runs on it; from then on `Upkeep` watches it.
+    // Validated once, before its first use; from then on `Upkeep` checks it.
     let tree = match surface::TREE.validate() {
         Ok(tree) => TREE.insert(tree),
         Err(_) => {
@@ -64,7 +63,7 @@ fn main() -> ! {
     idle(consumer, semihosting::run_length())
 }
 
-/// Sends records until the run is over; a run length of 0 never is.
+/// Sends records until the run is over; with a run length of 0 for ever.
 fn idle(mut records: Consumer<'static, Tick>, ticks: u32) -> ! {
     let mut line = [0; MAX_FRAMED];
     #[cfg(feature = "planted-overflow")]
@@ -74,16 +73,16 @@ fn idle(mut records: Consumer<'static, Tick>, ticks: u32) -> ! {
     #[cfg(feature = "planted-panic")]
     core::hint::black_box([0; 4][core::hint::black_box(0_usize)]);
     loop {
-        // `heapless` divides by the queue's length, which it does not know to be positive: without
-        // this check the panic of that division would survive.
+        // `heapless` divides by the queue's length, which the compiler does not know to be positive: without this check
+        // a panic path would survive.
         let record = if records.capacity() < QUEUE { records.dequeue() } else { None };
         match record {
             Some(record) => send(frame(&record, &mut line)),
             None if ticks != 0 && schedule::ticks() >= ticks => break,
             None => (),
         }
-        // There is always something to check. Where `wfi` is to save power, do without between a round
-        // of `upkeep` and the next tick; an emulated processor that sleeps loses its exact time.
+        // There is always work, so the loop does not sleep. To save power, `wfi` after a round of `upkeep`; but an
+        // emulated processor that sleeps loses its exact time.
         upkeep.step();
         for &byte in schedule::background(&mut status).unwrap_or_default() {
             uart::BUS.write(byte);
@@ -105,7 +104,7 @@ fn idle(mut records: Consumer<'static, Tick>, ticks: u32) -> ! {
     semihosting::exit(summary.deadline_misses == 0)
 }
 
-/// Calls itself until the stack is used up.
+/// Recurses until the stack is used up.
 #[cfg(feature = "planted-overflow")]
 #[inline(never)]
 fn overflow(depth: u8) -> u8 {

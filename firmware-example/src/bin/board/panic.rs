@@ -1,9 +1,9 @@
-//! The panic and fault handlers, which must never run.
+//! The panic and fault handlers, which never run in a sound program.
 
 use cortex_m_rt::exception;
 
-/// Links only if the optimiser has removed every call: a surviving panic path is a link error that
-/// names this symbol. Debug builds keep overflow checks and bounds checks, so they stop instead.
+/// Links only if the optimiser has removed every call: a surviving panic path is a link error that names this symbol.
+/// Debug builds keep overflow and bounds checks, so they stop instead.
 #[panic_handler]
 fn panic(_info: &core::panic::PanicInfo) -> ! {
     #[cfg(not(debug_assertions))]
@@ -23,8 +23,8 @@ unsafe extern "C" {
     static _stack_start: u32;
 }
 
-/// A fault means broken hardware, an unsound `unsafe`, or a stack that ran out of its memory: stop, so
-/// that a test sees it. The stack pointer cannot be trusted any more, and starts anew.
+/// A fault means broken hardware, an unsound `unsafe`, or a stack overflow: stop, so that a test sees it. The stack
+/// pointer cannot be trusted, so it is reset.
 #[exception(trampoline = false)]
 unsafe fn HardFault() -> ! {
     // SAFETY: nothing of the old stack is used again.

@@ -15,7 +15,7 @@ use crate::exclusive::Exclusive;
 use crate::vectors::BusInterrupt;
 use crate::{QUEUE, clock, semihosting, uart};
 
-/// Priorities of the interrupts: the upper bits count, and less is more urgent.
+/// Priorities of the interrupts: only the upper bits count, and a lower value is more urgent.
 const CONTROL_PRIORITY: u8 = 0x00;
 const BUS_PRIORITY: u8 = 0x80;
 
@@ -25,12 +25,12 @@ static RECEIVER: Exclusive<Option<Receiver>> = Exclusive::new(None);
 static TICKS: AtomicU32 = AtomicU32::new(0);
 /// Clock counts that they took.
 static CONTROL_COUNTS: AtomicU32 = AtomicU32::new(0);
-/// Longest section with all interrupts disabled, in clock counts: there is one, at start-up.
+/// Longest section with all interrupts disabled, in clock counts; the only one is at start-up.
 static MASKED: AtomicU32 = AtomicU32::new(0);
 /// Longest section with the bus interrupt disabled, in clock counts.
 static BUS_MASKED: AtomicU32 = AtomicU32::new(0);
 
-/// The control interrupt's own state.
+/// The control interrupt's state.
 struct Timeline {
     control: Control,
     records: Producer<'static, Tick>,
@@ -76,8 +76,8 @@ pub fn start(control: Control, records: Producer<'static, Tick>, receiver: Recei
     core.SYST.enable_interrupt();
 }
 
-/// A slice of the work that complete frames need; what goes back to the sender, if anything does. The bus
-/// interrupt is kept out: for some microseconds no byte is taken.
+/// Does a slice of work on complete frames. Returns the status to send, if one is due. It masks the bus interrupt: for
+/// some microseconds no byte is taken.
 pub fn background(line: &mut [u8; STATUS_FRAMED]) -> Option<&[u8]> {
     NVIC::mask(BusInterrupt);
     let before = own_time();
@@ -94,8 +94,7 @@ pub fn background(line: &mut [u8; STATUS_FRAMED]) -> Option<&[u8]> {
     status.flatten()
 }
 
-/// The clock without the control ticks, which keep the bus waiting anyway; `None` where one came while it
-/// was read.
+/// The clock less the control ticks, which delay the bus anyway; `None` if a tick came during the reading.
 fn own_time() -> Option<u32> {
     let control = CONTROL_COUNTS.load(Ordering::Relaxed);
     let now = clock::now();
@@ -150,7 +149,7 @@ pub fn summary(stack_bytes: u32, scrub_rounds: u32) -> Summary {
 #[exception]
 fn SysTick() {
     let now = clock::now();
-    // Counts since SysTick reached 0, where it asks for this interrupt: how late this is.
+    // This tick's delay: counts since SysTick reached 0 and requested this interrupt.
     let late = clock::TICK.wrapping_sub(SYST::get_current()) % clock::TICK;
     TIMELINE.with(|timeline| {
         if let Some(timeline) = timeline {
@@ -163,7 +162,7 @@ fn SysTick() {
 
 impl Timeline {
     fn run(&mut self, now: u32, late: u32) {
-        // Later ticks follow from the first one: a tick that never ran would leave no other trace.
+        // Later due times follow from the first one, so that a tick that never ran is noticed.
         let due = match self.due {
             None => now.wrapping_sub(late),
             Some(before) => {
@@ -177,8 +176,8 @@ impl Timeline {
         self.latency = self.latency.max(now.wrapping_sub(due));
 
         let record = self.control.tick(clock::now);
-        // The check tells the optimiser that the queue's length, by which `heapless` divides, is
-        // positive: else that division's panic would survive.
+        // The check tells the optimiser that the queue's length, by which `heapless` divides, is positive; otherwise a
+        // panic path would survive.
         if self.records.capacity() >= QUEUE || self.records.enqueue(record).is_err() {
             self.dropped = self.dropped.saturating_add(1);
         }

@@ -1,5 +1,5 @@
-//! The debugger's services: how long a run lasts, and where it ends. Without a debugger a `bkpt` is
-//! a fault: on silicon, leave this module out.
+//! The debugger's services: the length of a run, and its end. Without a debugger a `bkpt` is a fault, so leave this
+//! module out on silicon.
 
 use cortex_m_semihosting::{debug, nr, syscall};
 
@@ -11,8 +11,8 @@ pub fn exit(success: bool) -> ! {
     }
 }
 
-/// Ticks to run: the last word of the command line (`-semihosting-config ...,arg=board,arg=5000`).
-/// 0, which is for ever, where that is not a number.
+/// Ticks to run: the last word of the command line (`-semihosting-config ...,arg=board,arg=5000`). 0, for ever, if that
+/// is not a number.
 pub fn run_length() -> u32 {
     let mut line = [0_u8; 80];
     let place = [line.as_mut_ptr().expose_provenance(), line.len()];

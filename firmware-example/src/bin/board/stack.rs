@@ -1,4 +1,4 @@
-//! The stack's high-water mark: `cortex-m-rt` paints the stack at reset, use scrapes it off.
+//! The stack's high-water mark: `cortex-m-rt` paints the stack at reset, and use overwrites the paint.
 
 use core::ptr::addr_of;
 

@@ -9,7 +9,7 @@ const TRANSMIT_ENABLE: u32 = 1 << 0;
 const RECEIVE_ENABLE: u32 = 1 << 1;
 const RECEIVE_INTERRUPT_ENABLE: u32 = 1 << 3;
 const RECEIVE_INTERRUPT: u32 = 1 << 1;
-/// 25 MHz / 16: the fastest. An emulated UART ignores it.
+/// 25 MHz / 16, the fastest rate. An emulated UART ignores it.
 const DIVISOR: u32 = 16;
 
 /// One of the board's UARTs.
@@ -40,7 +40,7 @@ impl Uart {
         }
     }
 
-    /// Both ways: a byte that arrives asks for an interrupt, sending is polled.
+    /// Enables both directions: an arriving byte requests an interrupt, sending is polled.
     pub fn start_receiving(&self) {
         self.divisor.write(DIVISOR);
         self.control.write(TRANSMIT_ENABLE | RECEIVE_ENABLE | RECEIVE_INTERRUPT_ENABLE);
@@ -51,7 +51,7 @@ impl Uart {
         self.control.write(TRANSMIT_ENABLE);
     }
 
-    /// Acknowledges the receive interrupt. Before `read`: the other order loses interrupts.
+    /// Acknowledges the receive interrupt. Call it before `read`: the other order loses interrupts.
     pub fn acknowledge(&self) {
         self.interrupt.write(RECEIVE_INTERRUPT);
     }
@@ -70,7 +70,7 @@ impl Uart {
         self.state.read() & RECEIVE_OVERRUN != 0
     }
 
-    /// Sends one byte, after the one before has left.
+    /// Sends one byte, after the previous one has left.
     pub fn write(&self, byte: u8) {
         while self.state.read() & TRANSMIT_FULL != 0 {}
         self.data.write(u32::from(byte));
