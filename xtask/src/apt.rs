@@ -1,4 +1,4 @@
-//! Installing Debian packages, where that is possible without asking anybody.
+//! Installs Debian packages, if that needs no password.
 
 use std::path::Path;
 use std::process::Command;
@@ -10,7 +10,7 @@ use crate::process::quiet;
 
 const LIMIT: Duration = Duration::from_secs(600);
 
-/// Installs packages, as root or through a `sudo` that asks no password.
+/// Installs packages, as root or by a `sudo` without a password.
 pub fn install(packages: &[&str]) -> Result<()> {
     if !Path::new("/usr/bin/apt-get").exists() {
         bail!("this system has no apt-get");

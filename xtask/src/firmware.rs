@@ -41,8 +41,8 @@ pub fn command(cross: &Cross, surface: &Surface) -> Command {
 }
 
 impl Surface {
-    /// Tells the build script which surface to build in. Says nothing where that is the one it takes
-    /// anyway: cargo would rebuild for any change of these variables.
+    /// Tells the build script the surface. It sets no variable for the default one, because cargo rebuilds for any
+    /// change of these variables.
     pub fn describe_to(&self, cargo: &mut Command) {
         match &self.mesh {
             Some(mesh) => cargo.env("DIBS_MESH", mesh),
@@ -55,7 +55,7 @@ impl Surface {
         }
     }
 
-    /// Whether this is what the build script takes unless it is told otherwise.
+    /// Whether this is the build script's default.
     pub fn is_default(&self) -> bool {
         self.mesh.is_none() && self.stretch == HEART_STRETCH
     }

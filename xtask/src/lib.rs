@@ -1,5 +1,5 @@
-//! Builds, runs and installs: the toolchain of the board, the emulator, the programs of the nightly compiler.
-//! `cargo xtask` is made of it; so is `tests/prove`, which measures with it.
+//! Builds, runs and installs: the toolchain of the board, the emulator, the programs of the nightly compiler. `cargo
+//! xtask` and `tests/prove` use it.
 
 pub mod apt;
 pub mod firmware;

@@ -63,7 +63,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Runs a task, or says why it cannot run here.
+/// Runs a task, or prints why it cannot run here.
 fn or_say(reason: Option<String>, task: impl FnOnce() -> anyhow::Result<()>) -> anyhow::Result<()> {
     match reason {
         Some(reason) => {

@@ -1,7 +1,6 @@
 //! `cargo xtask mutants`: whether the tests notice a changed operator of the core, by `cargo-mutants`.
 //!
-//! Survivors that are accepted stand in `.cargo/mutants.toml`, each with its reason; `docs/mutants.md` lists what was
-//! tried by hand.
+//! `.cargo/mutants.toml` lists accepted survivors with their reasons, `docs/mutants.md` the mutants tried by hand.
 
 use std::fs;
 use std::process::Command;
@@ -15,8 +14,8 @@ use xtask::workspace;
 /// Version that the lists of survivors are written for.
 const VERSION: &str = "27.1.0";
 
-/// Folders of the core, the programs of tests that a mutant of theirs is tried on, and the tests in them: few, so that
-/// it takes seconds.
+/// Folders of the core, with the test programs and tests that their mutants are tried on: few, so that it takes
+/// seconds.
 const AREAS: [(&str, &[&str], &[&str]); 6] = [
     ("dibs-nostd/src/tool", &["query"], &["kernels", "refusals"]),
     (
@@ -40,7 +39,7 @@ const UNIT_TESTS: &str = "tests::";
 /// The exit code of cargo-mutants where mutants survived.
 const SURVIVED: i32 = 2;
 
-/// Mutants that CI tries of the lines that changed: each takes a build of the core and its tests.
+/// Mutants of changed lines that CI tries: each takes a build of the core and its tests.
 const SAMPLE: usize = 4;
 
 /// Changes operators of the core one by one, and lists the changes that no test notices. The whole core takes

@@ -1,4 +1,4 @@
-//! Fuzzers, sanitizers and Miri, which need the nightly compiler. Without one they say so.
+//! Fuzzers, sanitizers and Miri, which need the nightly compiler.
 
 use std::fs;
 use std::path::PathBuf;
@@ -34,7 +34,7 @@ pub struct Fuzzed {
     pub target: &'static str,
     /// Inputs that it ran.
     pub inputs: u64,
-    /// Its output, where it found something.
+    /// Its output, if it found something.
     pub finding: Option<String>,
 }
 
@@ -46,7 +46,7 @@ pub struct Sanitized {
     pub findings: u64,
 }
 
-/// Why there is nothing to run, or `None`. Tries to install the nightly compiler first.
+/// Why nothing can run, or `None`. Tries to install the nightly compiler first.
 pub fn missing() -> Option<String> {
     let found = || quiet(Command::new("cargo").args(["+nightly", "--version"]), MOMENT).is_ok();
     if found() {
@@ -87,7 +87,7 @@ pub fn fuzz(options: &FuzzOptions) -> Result<Vec<Fuzzed>> {
     let mut fuzzed = Vec::new();
     for pair in targets.chunks(2) {
         let started = pair.iter().map(|&target| {
-            // New inputs go to a folder of their own: the committed corpus stays as it is.
+            // New inputs go to a separate folder, so that the committed corpus does not change.
             let found: PathBuf = built.join("found").join(target);
             let artifacts = built.join("artifacts").join(target);
             fs::create_dir_all(&found)?;
@@ -135,8 +135,8 @@ fn end(text: &str) -> String {
     lines[lines.len().saturating_sub(20)..].join("\n")
 }
 
-/// Runs the tests of frames and bus under a sanitizer, `address` or `thread`, and those of the format under
-/// the address sanitizer. Before that, what it must find: a fault put in on purpose.
+/// Runs the tests of frames and bus under a sanitizer, `address` or `thread`, and those of the format under the address
+/// sanitizer. Before that the sanitizer must find a planted fault.
 pub fn sanitize(sanitizer: &str) -> Result<Sanitized> {
     let (tests, planted) = match sanitizer {
         "address" => (&["frames", "bus", "format"][..], "an_access_out_of_bounds"),
@@ -148,11 +148,11 @@ pub fn sanitize(sanitizer: &str) -> Result<Sanitized> {
             cargo.args(["--test", name]);
         }
         cargo.arg("--target-dir").arg(workspace::target().join(sanitizer));
-        // One test at a time: those with two threads wait for each other long enough.
+        // One test at a time, since tests with two threads wait long for each other.
         cargo.args(["--", "--test-threads=1"]).args(arguments);
         let flags = format!("-Zsanitizer={sanitizer} -Cunsafe-allow-abi-mismatch=sanitizer");
         cargo.env("RUSTFLAGS", flags).env("CARGO_PROFILE_DEV_DEBUG", "line-tables-only");
-        // A test's frames live for ever on purpose.
+        // A test leaks its frames on purpose.
         cargo.env("ASAN_OPTIONS", "detect_leaks=0");
         let suppressions = workspace::root().join("tests/soundness/tsan.txt");
         cargo.env("TSAN_OPTIONS", format!("suppressions={}", suppressions.display()));
@@ -208,7 +208,7 @@ pub fn miri() -> Result<()> {
     run(cargo.arg("--target-dir").arg(workspace::target().join("miri")))
 }
 
-/// Tries every interleaving of the frames' two ends. Returns how many there were.
+/// Tries every interleaving of the frames' two ends. Returns their number.
 pub fn interleavings() -> Result<u64> {
     let mut cargo = Command::new("cargo");
     cargo.args(["test", "--quiet", "--release", "--package", "dibs-soundness", "--test"]);

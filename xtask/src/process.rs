@@ -1,4 +1,4 @@
-//! Running other programs.
+//! Runs other programs.
 
 use std::io::Read;
 use std::process::{Command, ExitStatus, Stdio};
@@ -64,7 +64,7 @@ pub fn shown(command: &Command) -> String {
 
 fn text(mut pipe: impl Read) -> String {
     let mut bytes = Vec::new();
-    // The message needs the output from before an error.
+    // The message needs the output before an error.
     let _ = pipe.read_to_end(&mut bytes);
     String::from_utf8_lossy(&bytes).into_owned()
 }

@@ -12,8 +12,8 @@ pub struct Passed {
     arguments: Vec<String>,
 }
 
-/// `cargo run` of the program, to which arguments are added. Paths among them are the user's, so it runs in
-/// the user's folder.
+/// `cargo run` of the program, to which arguments are added. It runs in the user's folder, since arguments may be
+/// paths.
 pub fn command(features: &[&str]) -> Command {
     let mut cargo = Command::new("cargo");
     cargo.args(["run", "--quiet", "--release", "--package", "dibs-prove", "--manifest-path"]);
@@ -21,8 +21,8 @@ pub fn command(features: &[&str]) -> Command {
     cargo
 }
 
-/// The program, built together with the whole workspace and its tests: after those nothing but the program itself is
-/// left to build, while alone it would have its dependencies with fewer features, and so anew.
+/// The program, built together with the whole workspace and its tests. Alone it would build its dependencies again,
+/// with fewer features.
 pub fn with_workspace() -> Result<Command> {
     let mut cargo = Command::new("cargo");
     cargo.args(["build", "--quiet", "--release", "--workspace", "--bins", "--tests"]);
@@ -40,7 +40,7 @@ pub fn demo(passed: &Passed) -> Result<()> {
     end(command(&["--no-default-features"]).arg("demo").args(&passed.arguments))
 }
 
-/// Runs a program that tells its own error, and ends as it does.
+/// Runs a program that prints its error, and exits with its code.
 fn end(command: &mut Command) -> Result<()> {
     match command.status()?.code() {
         Some(0) => Ok(()),

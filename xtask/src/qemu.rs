@@ -30,7 +30,7 @@ fn version() -> Result<String> {
     Ok(text.lines().next().unwrap_or_default().to_owned())
 }
 
-/// How the emulated processor's time passes.
+/// The emulated processor's time.
 #[derive(Clone, Copy)]
 pub enum Time {
     /// As this computer's.
@@ -39,8 +39,8 @@ pub enum Time {
     Counted(u32),
 }
 
-/// That of a Cortex-M7 at about 480 MHz. While it sleeps, time jumps to the next interrupt: left to run with
-/// this computer's clock, it would overshoot by however late this computer wakes up.
+/// The time of a Cortex-M7 at about 480 MHz. While it sleeps, time jumps to the next interrupt; by this computer's
+/// clock it would overshoot by this computer's wake-up delay.
 pub const BOARD: Time = Time::Counted(SHIFT);
 
 /// The command that boots a program which needs nothing but semihosting, with these arguments.
@@ -53,7 +53,7 @@ pub fn alone(program: &Path, time: Time, arguments: &[&str]) -> Command {
 /// The command that boots `program` for `ticks` control ticks. Its bus is UART 0, connected to the
 /// socket `bus`; its telemetry UART 1, connected to the socket `telemetry`.
 pub fn command(program: &Path, bus: &Path, telemetry: &Path, ticks: u32) -> Command {
-    // The firmware reads its run length where a program reads its arguments.
+    // The firmware reads its run length from the arguments.
     let mut command = boot(program, BOARD, &["board", &ticks.to_string()]);
     for socket in [bus, telemetry] {
         command.arg("-serial").arg(format!("unix:{}", socket.display()));

@@ -1,4 +1,4 @@
-//! Steps that are run one after the other, whatever fails, and listed at the end.
+//! Steps that run in order, even after a failure, and are listed at the end.
 
 use std::fs;
 use std::path::Path;
@@ -18,7 +18,7 @@ const FAILED: &str = "FAILED";
 
 /// The result of a step.
 pub enum Outcome {
-    /// It did what it should.
+    /// It succeeded.
     Passed,
     /// It could not run here; the reason.
     Skipped(String),
@@ -59,19 +59,19 @@ impl Steps {
         self.lines.push(line);
     }
 
-    /// Lists the steps in a file, for the program that has started this one.
+    /// Writes the steps to a file, for the program that has started this one.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// If it cannot be written.
     pub fn write(&self, file: &Path) -> Result<()> {
         fs::write(file, self.lines.join("\n"))
             .with_context(|| format!("cannot write {}", file.display()))
     }
 
-    /// Takes over the steps that another program has listed.
+    /// Adds the steps in another program's file.
     ///
     /// # Errors
-    /// Where there is no such list.
+    /// If there is no such file.
     pub fn read(&mut self, file: &Path) -> Result<()> {
         let list = fs::read_to_string(file)
             .with_context(|| format!("no list of steps in {}", file.display()))?;
@@ -79,12 +79,12 @@ impl Steps {
         Ok(())
     }
 
-    /// Lists the steps; ends the program where one failed.
+    /// Lists the steps; exits if one failed.
     pub fn finish(self) {
         let count = |word| self.lines.iter().filter(|line| line.starts_with(word)).count();
         println!("\n{}", self.lines.join("\n"));
         println!("{} passed, {} failed", count(PASSED), count(FAILED));
-        // The list above names the failures; a message here would no longer leave it the last line.
+        // The list names the failures, and stays the last output.
         if count(FAILED) > 0 {
             std::process::exit(1);
         }

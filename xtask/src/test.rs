@@ -25,14 +25,14 @@ pub struct Options {
     pub whole: bool,
 }
 
-/// Runs all steps, whatever fails, and lists them at the end.
+/// Runs all steps, even after a failure, and lists them at the end.
 pub fn test(options: &Options) -> Result<()> {
     let mut steps = Steps::default();
     steps.cargo("format", &["fmt", "--all", "--check"], &[]);
-    // In the tests' profile, as the documentation below: what all three need is built once.
+    // In the tests' profile, as the documentation below, so that common dependencies are built once.
     let lints = ["clippy", "--release", "--workspace", "--all-targets", "--", "-D", "warnings"];
     steps.cargo("lints", &lints, &[]);
-    // Those of the documentation among them.
+    // Including the examples in the documentation.
     steps.cargo("tests", &["test", "--release", "--workspace", "--no-fail-fast"], &[]);
     steps.cargo(
         "documentation",
@@ -78,7 +78,7 @@ pub fn test(options: &Options) -> Result<()> {
 /// The checks of `tests/prove`, whose steps join those here.
 fn checks(demo_seconds: u32, steps: &mut Steps) -> Result<()> {
     let list = workspace::target().join("steps.txt");
-    // So that the list of an earlier run is not taken for this one's.
+    // Emptied, so that an earlier run's list is not taken for this one's.
     std::fs::write(&list, "")?;
     let mut prove = prove::with_workspace()?;
     prove.args(["test", "--demo-seconds", &demo_seconds.to_string(), "--steps"]).arg(&list);
@@ -115,8 +115,7 @@ fn oldest_compiler() -> Result<Outcome> {
     run(command.current_dir(workspace::root())).map(|()| Outcome::Passed)
 }
 
-/// The core crate compiles for the board, with defmt, and with each of its layers alone or none: `core` is all that it
-/// has there.
+/// The core crate compiles for the board with only `core`: with defmt, and with each of its layers alone or none.
 fn core_crate(cross: &Cross) -> Result<Outcome> {
     let mut check = cross.cargo("check");
     run(check.args(["--quiet", "--package", "dibs-nostd", "--features", "defmt"]))?;
@@ -152,8 +151,8 @@ fn new_user(cross: &Cross) -> Result<Outcome> {
     run(command.args(["--", "--ignored"])).map(|()| Outcome::Passed)
 }
 
-/// Runs the program that measures cycles on silicon. The emulator's counter stands still, so that it counts
-/// something else, but its searches end, and its constants are some.
+/// Runs the program that measures cycles on silicon. In the emulator it counts `SysTick` instead, but must end and
+/// print constants.
 fn cycles(cross: &Cross) -> Result<Outcome> {
     let mut cargo = cross.cargo("build");
     cargo.args(["--quiet", "--package", "firmware-example", "--bin", "cycles"]);

@@ -1,8 +1,8 @@
-//! How to build for the board. This is the only place that decides it.
+//! The only place that decides how to build for the board.
 //!
-//! In this order: the target is installed for the toolchain in use; `rustup target add` can add it;
-//! Debian's own toolchain builds it together with `core`; or a message says what to do by hand.
-//! `DIBS_CROSS=rustup|debian|none` forces one of them.
+//! In this order: the target is installed for the toolchain in use; `rustup target add` can add it; Debian's own
+//! toolchain builds it together with `core`; or a message gives the manual steps. `DIBS_CROSS=rustup|debian|none`
+//! forces one of them.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -47,8 +47,8 @@ impl Cross {
         }
     }
 
-    /// `cargo SUBCOMMAND` for the board. Each route has its own folder, so that two compilers do not
-    /// throw away each other's work.
+    /// `cargo SUBCOMMAND` for the board. Each toolchain has its own folder, so that two compilers do not discard each
+    /// other's output.
     pub fn cargo(&self, subcommand: &str) -> Command {
         let mut command = match self {
             Self::Rustup => {
@@ -63,7 +63,7 @@ impl Cross {
                     .env("RUSTC", DEBIAN_RUSTC)
                     .env("RUSTC_BOOTSTRAP", "1")
                     .env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker)
-                    // The compiler's own account of every function's frame.
+                    // The stack frame of every function.
                     .env("RUSTFLAGS", "-Zemit-stack-sizes")
                     .env_remove("RUSTUP_TOOLCHAIN");
                 command
@@ -74,7 +74,7 @@ impl Cross {
         command
     }
 
-    /// The program that `cargo build --profile PROFILE` leaves.
+    /// The output of `cargo build --profile PROFILE`.
     pub fn program(&self, profile: &str, name: &str) -> PathBuf {
         self.target_dir().join(TARGET).join(profile).join(name)
     }

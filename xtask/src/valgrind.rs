@@ -8,13 +8,13 @@ use anyhow::{Context, Result};
 use crate::apt;
 use crate::process::{quiet, run};
 
-/// Version of the benches' runner, which must be that of the library.
+/// Version of the benches' runner, equal to the library's.
 const RUNNER: &str = "0.20.0";
 
 /// Finds valgrind, or installs it.
 ///
 /// # Errors
-/// Where it can neither be found nor installed.
+/// If it can be neither found nor installed.
 pub fn find() -> Result<()> {
     let version = quiet(Command::new("valgrind").arg("--version"), Duration::from_secs(20));
     if version.is_err() {
@@ -26,7 +26,7 @@ pub fn find() -> Result<()> {
 /// Finds valgrind and the runner of its benches, or installs them.
 ///
 /// # Errors
-/// Where they can neither be found nor installed.
+/// If they can be neither found nor installed.
 pub fn install_runner() -> Result<()> {
     find()?;
     let runner = Command::new("gungraun-runner").stdin(Stdio::null()).output();
