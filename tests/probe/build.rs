@@ -1,4 +1,4 @@
-//! Hands the board's memory map to the linker, as the firmware's build script does.
+//! Passes the board's memory map to the linker, as the firmware's build script does.
 
 use std::path::PathBuf;
 use std::{env, fs, io};

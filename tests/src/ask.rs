@@ -1,10 +1,10 @@
-//! One way to ask a tree, whatever the tool and the index width.
+//! Queries on a tree with any tool and index width.
 
 use dibs_nostd::{Capsule, Index, Options, Proximity, Query, QueryError, Sphere, VertexTable};
 
 use crate::oracle::Instrument;
 
-/// Unsigned queries with the tool that the instrument describes: a sphere where its ends coincide.
+/// An unsigned query with the instrument: a sphere if its ends coincide, else a capsule.
 ///
 /// # Errors
 /// The query's.

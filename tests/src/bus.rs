@@ -85,8 +85,8 @@ pub fn frame(epoch: u32, quantised: bool) -> Vec<Vec<u8>> {
     packets::<64>(epoch, encoding(quantised, &positions), &positions)
 }
 
-/// Gives a packet to the assembler, and has it do all the work that follows, in slices. The epoch that
-/// was published, if any.
+/// Gives a packet to the assembler, and lets it do all the work that follows, in slices. Returns the published epoch,
+/// if any.
 ///
 /// # Errors
 /// The assembler's rejections.
@@ -111,7 +111,7 @@ pub fn give_at<G: Gate, M: Mac, const N: usize>(
         match assembler.advance(7)? {
             Advance::Published { epoch } => return Ok(Some(epoch)),
             Advance::Pending => {}
-            // A little more: rows that are copied ahead.
+            // A few more slices, which copy rows ahead.
             _ => {
                 for _ in 0..N / 7 + 1 {
                     assembler.advance(7)?;
@@ -184,14 +184,14 @@ pub fn share(packet: &[u8]) -> u32 {
     share ^ (share >> 16)
 }
 
-/// CRC-32 by the definition, one bit at a time: the packets' checksum is computed another way.
+/// CRC-32 by its definition, one bit at a time, unlike the packets' checksum.
 pub fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(u32::MAX, |crc, &byte| {
         (0..8).fold(crc ^ u32::from(byte), |crc, _| (crc >> 1) ^ (0xEDB8_8320 * (crc & 1)))
     })
 }
 
-/// Makes the checksum right again, after whatever was done to the packet.
+/// Corrects the checksum of a changed packet.
 pub fn reseal(mut packet: Vec<u8>) -> Vec<u8> {
     packet.truncate(packet.len() - CHECKSUM_BYTES);
     let checksum = crc32(&packet);

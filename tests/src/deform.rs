@@ -1,4 +1,4 @@
-//! Deformations that stay within a stretch limit: smooth ones like tissue's, and ones chosen to hurt.
+//! Deformations within a stretch limit: smooth ones like tissue's, and adversarial ones.
 
 use std::f32::consts::TAU;
 
@@ -12,15 +12,15 @@ use crate::stretch;
 /// The kind of deformation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Deformation {
-    /// Nothing but a rigid motion.
+    /// Only a rigid motion.
     Rigid,
     /// Long waves over the whole surface (the paper's global deformation).
     Waves,
     /// One bump (the paper's local deformation).
     Bump,
-    /// Every axis scaled on its own (the paper's axis scaling).
+    /// Each axis scaled separately (the paper's axis scaling).
     Scale,
-    /// Every vertex on its own.
+    /// Each vertex moved separately.
     Noise,
     /// Mirrored at a plane through the middle: two layers in one place.
     Fold,
@@ -54,7 +54,7 @@ impl Deformation {
         self.apply_while(mesh, |moved| stretch::largest(mesh, moved, paths) <= most, rng)
     }
 
-    /// The same at any strength for which the deformed mesh still fits.
+    /// The same at a random strength for which the deformed mesh satisfies `fits`.
     #[must_use]
     pub fn apply_while(
         self,
@@ -77,7 +77,7 @@ impl Deformation {
         blend(strength)
     }
 
-    /// The deformation at full strength, whatever its stretch.
+    /// The deformation at full strength, with any stretch.
     fn full(self, mesh: &Mesh, middle: Vec3, size: f32, rng: &mut Rng) -> Vec<Vec3> {
         let at = &mesh.positions;
         let [axis, push] = [unit(rng), unit(rng)];
@@ -117,7 +117,7 @@ impl Deformation {
     }
 }
 
-/// The largest strength found that still fits.
+/// The largest strength found that satisfies `fits`.
 fn bisect(fits: impl Fn(f32) -> bool) -> f32 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..12 {
@@ -141,7 +141,7 @@ pub fn unit(rng: &mut Rng) -> Vec3 {
     }
 }
 
-/// A heart, its tree, and some deformations of it with the stretch that each truly has.
+/// A heart, its tree, and some deformations of it.
 ///
 /// # Panics
 /// Never: a heart of this size exists.

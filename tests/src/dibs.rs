@@ -1,4 +1,4 @@
-//! The library under test, as a method of the benchmark: by the wide search, since it runs on a host.
+//! The library under test as a method of the benchmark, by the wide search, since it runs on a host.
 
 use dibs_build::BuiltTree;
 use dibs_nostd::format::MAX_STACK;
@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use crate::method::{Found, Method, Probe};
 
-/// Entries of the traversal's stack: enough for every tree that the builder makes.
+/// Entries of the traversal's stack: enough for every built tree.
 const STACK: usize = MAX_STACK;
 
 /// A query's prior knowledge besides the surface.
@@ -22,7 +22,7 @@ pub struct Knowledge {
     pub warm: bool,
 }
 
-/// Queries on a built tree, whatever the width of its indices.
+/// Queries on a built tree of either index width.
 ///
 /// # Panics
 /// If the bytes are not those of a tree.
@@ -34,8 +34,8 @@ pub fn queries<'t>(built: &'t BuiltTree, knowledge: Knowledge) -> Box<dyn Method
     }
 }
 
-/// The same queries where the vertices stay in the mesh's own order and are looked up through the
-/// tree's table of it, to show the gain of the vertex order.
+/// The same queries with vertices in the mesh's order, looked up through the tree's vertex order, to show the gain of
+/// that order.
 ///
 /// # Panics
 /// If the bytes are not those of a tree.
@@ -47,10 +47,10 @@ pub fn unordered_queries(built: &BuiltTree) -> Box<dyn Method + '_> {
     }
 }
 
-/// Gives the largest stretch of a frame (its positions in the mesh's order), or `None` beyond the limit.
+/// Returns the largest stretch of a frame (its positions in the mesh's order), or `None` beyond the limit.
 pub type StretchOf<'t> = Box<dyn Fn(&[Vec3]) -> Option<f32> + 't>;
 
-/// Measures frames on a built tree, whatever the width of its indices.
+/// Measures frames on a built tree of either index width.
 ///
 /// # Panics
 /// If the bytes are not those of a tree with its rest shape.

@@ -41,14 +41,14 @@ pub struct Scene {
 /// The outcome of a push.
 #[derive(Clone, Copy, Debug)]
 pub struct Pushed {
-    /// Least signed separation (mm): below minus the radius the instrument's centre was through the surface.
+    /// Least signed separation (mm). Below minus the radius the instrument's centre was through the surface.
     pub least: f32,
-    /// The most that the force changed from one tick to the next (N).
+    /// Largest change of the force from one tick to the next (N).
     pub step: f32,
 }
 
 impl Pushed {
-    /// Whether the centre got through.
+    /// Whether the centre went through.
     #[must_use]
     pub fn is_through(&self) -> bool {
         self.least < -RADIUS
@@ -56,7 +56,7 @@ impl Pushed {
 }
 
 /// A flat wall, a corner of four, a gap that is narrower than two margins, a groove whose walls lean 12 degrees from
-/// upright so that one of them alone cannot bear the hand, a ball, and a beating heart.
+/// upright, so that one wall alone cannot bear the hand, a ball, and a beating heart.
 ///
 /// # Panics
 /// Never: the sizes are valid.

@@ -1,4 +1,4 @@
-//! Shared by the tests.
+//! Code shared by the tests.
 
 pub mod ask;
 #[cfg(feature = "builder")]
@@ -35,7 +35,7 @@ pub mod tree_bytes;
 #[doc = include_str!("../../README.md")]
 pub struct Readme;
 
-/// The guide's code for the host: it compiles and runs. `tests/new_user.rs` does the rest.
+/// The guide's code for the host: it compiles and runs. `tests/new_user.rs` runs the code for the board.
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/guide.md")]
 pub struct Guide;

@@ -1,9 +1,9 @@
-//! The benchmark's interface to every method, ours and others'.
+//! The benchmark's interface to all methods, this library's and others'.
 
 use dibs_nostd::{Capsule, Sphere};
 use glam::Vec3;
 
-/// A tool, as every method gets it.
+/// A tool, as passed to every method.
 #[derive(Clone, Copy, Debug)]
 pub enum Probe {
     /// A sphere.
@@ -17,22 +17,22 @@ pub enum Probe {
 pub struct Found {
     /// Distance from the tool's surface to the mesh; 0 where they touch or overlap.
     pub separation: f32,
-    /// Bounding volumes tested, and triangles; `None` where the method does not tell.
+    /// Tests of bounding volumes and of triangles; `None` if the method does not count them.
     pub tests: Option<[u32; 2]>,
 }
 
-/// A way to answer closest-point queries on a surface that deforms.
+/// A method for closest-point queries on a surface that deforms.
 ///
 /// A step is `load`, `update`, then any number of `find`; the same frame may be loaded again before a
 /// `find`. All methods are single-threaded.
 pub trait Method {
-    /// Takes the frame's positions (in the mesh's order) into the method's own order and layout. Not
-    /// timed: every method's vertices are written by somebody.
+    /// Copies the frame's positions (in the mesh's order) to the method's order and layout. Not timed, because every
+    /// method needs its vertices written.
     fn load(&mut self, positions: &[Vec3]);
 
-    /// Everything that must be done once a frame before the first query.
+    /// All work of a frame before its first query.
     fn update(&mut self);
 
-    /// The closest pair between the tool and the surface as it is now.
+    /// The closest pair between the tool and the current surface.
     fn find(&mut self, tool: &Probe) -> Found;
 }

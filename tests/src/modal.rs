@@ -19,7 +19,7 @@ pub fn positions(surface: &impl VertexTable) -> Vec<Vec3> {
     rows.map(|row| surface.position(row).expect("in the table")).collect()
 }
 
-/// Weights anywhere in the admitted ranges.
+/// Random weights in the admitted ranges.
 ///
 /// # Panics
 /// If a mode has no range.
@@ -30,7 +30,7 @@ pub fn anywhere(modes: &Modes<'_>, rng: &mut Rng) -> Vec<f32> {
     (0..modes.count()).map(range).map(within).collect()
 }
 
-/// A small heart's tree with so many modes, and their fit.
+/// A small heart's tree with `count` modes, and their fit.
 ///
 /// # Panics
 /// If it has no such modes.

@@ -1,11 +1,10 @@
-//! The truth to test against: closest pairs in f64, by trying everything.
+//! The reference for tests: closest pairs in f64, by exhaustive search.
 //!
-//! Nothing here is shared with the kernels under test. A pair of convex sets is closest at a pair of
-//! faces of theirs, so all 21 pairs of faces are tried: {two ends, inside} of the segment with {three
-//! corners, three edges, inside} of the triangle. Each is a least-squares problem of at most three
-//! unknowns, solved by orthogonalisation; its solution is moved into the two sets and the distance
-//! evaluated, so that no pair tried can be below the truth. [`ClosestPair::lower`] certifies from the
-//! other side, by duality, that the best one is not above it either.
+//! It shares no code with the kernels under test. Two convex sets are closest at a pair of their faces, so all 21 pairs
+//! of faces are tried: {two ends, inside} of the segment with {three corners, three edges, inside} of the triangle.
+//! Each is a least-squares problem of at most three unknowns, solved by orthogonalisation; its solution is clamped to
+//! the two sets and the distance evaluated, so no pair tried can be below the true distance. [`ClosestPair::lower`]
+//! certifies by duality that the best one is not above it.
 
 use glam::{DVec3, Vec3};
 
@@ -37,8 +36,8 @@ impl Instrument {
 pub struct ClosestPair {
     /// Their distance.
     pub distance: f64,
-    /// A proven lower bound of the distance: along some direction, the axis' and the triangle's extents
-    /// are this far apart. Equal to `distance`, up to rounding, unless that is next to nothing.
+    /// A proven lower bound of the distance: along some direction, the axis' and the triangle's extents are this far
+    /// apart. Equal to `distance` up to rounding, unless that is nearly 0.
     pub lower: f64,
     /// The axis' point.
     pub on_axis: DVec3,
@@ -57,14 +56,14 @@ pub struct OraclePair {
     pub on_axis: DVec3,
     /// The surface's point.
     pub on_surface: DVec3,
-    /// The triangle's number, the lowest of those equally close.
+    /// The triangle's number, the lowest of equally close ones.
     pub triangle: usize,
 }
 
 /// The closest pair of the segment from `start` to `end` and a triangle.
 ///
-/// Computed relative to `start` (differences of f32 coordinates are exact in f64, or as good as), so
-/// that the distance is accurate relative to the problem's size, not to the coordinates'.
+/// Computed relative to `start` (differences of f32 coordinates are nearly exact in f64), so that the distance is
+/// accurate relative to the problem's size, not to the coordinates'.
 pub fn closest_pair(start: DVec3, end: DVec3, corners: [DVec3; 3]) -> ClosestPair {
     let pair = closest_from_origin(end - start, corners.map(|c| c - start));
     ClosestPair { on_axis: pair.on_axis + start, on_surface: pair.on_surface + start, ..pair }
@@ -109,8 +108,8 @@ fn closest_from_origin(end: DVec3, corners: [DVec3; 3]) -> ClosestPair {
     best
 }
 
-/// The `x` that minimises `|sum of x_i column_i - target|`, and what remains of the target, by modified
-/// Gram-Schmidt; 0 for columns that depend on the ones before.
+/// The `x` that minimises `|sum of x_i column_i - target|`, and the residual, by modified Gram-Schmidt; 0 for columns
+/// that depend on earlier ones.
 fn least_squares(columns: [DVec3; 3], target: DVec3) -> ([f64; 3], DVec3) {
     let mut basis = columns;
     let mut upper = [[0.0; 3]; 3];
@@ -153,11 +152,11 @@ fn point_distance(start: DVec3, end: DVec3, point: DVec3) -> f64 {
 
 /// The closest pair of a tool and a surface, over all its triangles; `None` for no triangles.
 ///
-/// Exhaustive in effect: a triangle is passed over only where its first corner is further away than
-/// the best pair by more than the triangle's reach from that corner.
+/// Exhaustive in effect: a triangle is skipped only if its first corner is farther away than the best pair by more than
+/// the triangle's extent from that corner.
 ///
 /// # Panics
-/// If a triangle names a vertex that is not there.
+/// If a triangle names a vertex that does not exist.
 pub fn exhaustive(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
@@ -174,7 +173,7 @@ pub fn exhaustive(
     for (number, triangle) in triangles.iter().enumerate() {
         let [a, b, c] = corners(triangle);
         let reach = a.distance(b).max(a.distance(c));
-        // The margin covers the rounding of this very line.
+        // The margin covers the rounding of this line.
         if first[number] - reach > nearest + 1e-9 * (first[number] + reach) {
             continue;
         }

@@ -1,4 +1,4 @@
-//! Tool poses around a surface: ordinary ones, and ones chosen to hurt.
+//! Tool poses around a surface: ordinary and adversarial ones.
 
 use fastrand::Rng;
 use glam::Vec3;
@@ -22,7 +22,7 @@ pub fn pose(positions: &[Vec3], triangles: &[[u32; 3]], rng: &mut Rng) -> Instru
         0 => corners[0],
         1 => (corners[0] + corners[1]) / 2.0,
         2 => on_surface,
-        // The centre of a round surface and the middle plane are where many distances are equal.
+        // At the centre of a round surface, and on the middle plane, many distances are equal.
         3 => middle,
         4 => middle + (on_surface - middle) * rng.f32(),
         5 => middle + unit(rng) * size * 20.0,

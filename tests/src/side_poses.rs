@@ -1,5 +1,5 @@
-//! Sides and signed separations, judged pose by pose in f64: by generalised winding numbers, by exhaustive search, and
-//! where a surface is shown to cut itself by the pseudonormal of the nearest sheet.
+//! Judges sides and signed separations of poses in f64: by generalised winding numbers, by exhaustive search, and where
+//! a surface is shown to cut itself by the pseudonormal of the nearest sheet.
 
 use std::ops::AddAssign;
 
@@ -26,7 +26,7 @@ pub struct Closed {
     pub share: usize,
 }
 
-/// Generated hearts and brains, a ball, and the real heart and brains where they are.
+/// Generated hearts and brains, a ball, and the real heart and brains if present.
 ///
 /// # Panics
 /// Never: the sizes are valid.
@@ -69,7 +69,7 @@ pub fn bent(mesh: &Mesh, rng: &mut Rng) -> Vec<Vec3> {
     mesh.positions.iter().map(bend).collect()
 }
 
-/// A point next to a vertex, an edge, a face or a sliver, in a fold, or anywhere; and how far off it was put.
+/// A random point: next to a vertex, an edge, a face or a sliver, in a fold, or anywhere.
 ///
 /// # Panics
 /// If there is no triangle.
@@ -90,7 +90,7 @@ pub fn point(rows: &[Vec3], triangles: &[[u32; 3]], rng: &mut Rng) -> Vec3 {
     }
 }
 
-/// How many poses came to which end.
+/// Counts of poses by outcome.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Tally {
     /// Poses.
@@ -99,11 +99,11 @@ pub struct Tally {
     pub inside: usize,
     /// Poses whose side is undefined.
     pub undefined: usize,
-    /// Undefined though at least a hundredth of a mm away.
+    /// Undefined, though at least a hundredth of a mm away.
     pub undefined_away: usize,
     /// At least that far away.
     pub away: usize,
-    /// The surface is shown to cut itself there: the side is that of the nearest sheet.
+    /// Poses where the surface is shown to cut itself: the side is that of the nearest sheet.
     pub self_cut: usize,
     /// Poses whose side or separation is wrong.
     pub wrong: usize,
@@ -121,7 +121,7 @@ impl AddAssign for Tally {
     }
 }
 
-/// Poses that are judged together, on one shape of a surface.
+/// Poses judged together on one shape of a surface.
 pub const POSES_OF_A_FRAME: usize = 100;
 
 /// Judges poses on one shape of a surface; prints those that are wrong.
@@ -136,7 +136,7 @@ pub fn judge(surface: &Closed, seed: u64) -> Tally {
     assert!(tree.has_adjacency(), "{}", surface.name);
     let triangles = surfaces::triangles(&tree);
     let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
-    // As it is at rest, now and then.
+    // Sometimes at rest.
     let moved = if seed.is_multiple_of(8) {
         surface.mesh.positions.clone()
     } else {
@@ -172,7 +172,7 @@ pub fn judge(surface: &Closed, seed: u64) -> Tally {
             Side::Outside => false,
             Side::Inside => true,
             Side::Crossing => {
-                // Depths have a test of their own.
+                // Another test covers depths.
                 tally.wrong += usize::from(pair.axis_distance > f64::from(found.accuracy));
                 continue;
             }

@@ -1,10 +1,10 @@
-//! The truth about sides, in f64: generalised winding numbers, pseudonormals, and signed separations.
+//! The reference for sides, in f64: generalised winding numbers, pseudonormals, and signed separations.
 
 use glam::{DVec3, Vec3};
 
 use crate::oracle::{Instrument, OraclePair, closest_pair, exhaustive};
 
-/// How often a surface winds around a point: 1 inside a closed surface that faces outwards, 0 outside.
+/// The winding number of a surface around a point: 1 inside a closed surface that faces outwards, 0 outside.
 ///
 /// The sum of the triangles' solid angles (van Oosterom & Strackee 1983; Jacobson et al. 2013).
 #[must_use]
@@ -32,7 +32,7 @@ pub fn is_inside(positions: &[Vec3], triangles: &[[u32; 3]], point: DVec3) -> Op
     }
 }
 
-/// How far inside a closed surface a point is, negative outside; `None` where the sides are not clear.
+/// Depth of a point in a closed surface, negative outside; `None` where the winding number is ambiguous.
 #[must_use]
 pub fn depth(positions: &[Vec3], triangles: &[[u32; 3]], point: Vec3) -> Option<f64> {
     let nearest = exhaustive(positions, triangles, &Instrument::sphere(point, 0.0))?;
@@ -40,8 +40,8 @@ pub fn depth(positions: &[Vec3], triangles: &[[u32; 3]], point: Vec3) -> Option<
     Some(if inside { nearest.axis_distance } else { -nearest.axis_distance })
 }
 
-/// The side of the nearest sheet: the sign of the angle-weighted pseudonormal at the closest point, by looking at all
-/// triangles. It differs from [`is_inside`] only where the surface cuts itself.
+/// The side of the nearest sheet: the sign of the angle-weighted pseudonormal at the closest point, over all triangles.
+/// It differs from [`is_inside`] only where the surface cuts itself.
 #[must_use]
 pub fn is_below(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -> bool {
     let corners = |triangle: [u32; 3]| triangle.map(|v| positions[v as usize].as_dvec3());
@@ -73,9 +73,9 @@ pub fn is_below(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -
 
 /// Whether the sheet nearest to a point proves that the surface cuts itself there.
 ///
-/// A triangle parts what the surface winds around `k` times, above it, from what it winds around `k + 1` times. Where a
-/// closed surface that faces outwards does not cut itself, `k` is 0. Looked at are places next to the closest point, on
-/// each triangle that touches it, and as near to that triangle as to be within a fold.
+/// A triangle separates a region of winding number `k` above it from one of `k + 1`. If a closed surface that faces
+/// outwards does not cut itself, `k` is 0. The test points are next to the closest point, on each triangle that touches
+/// it, and near enough to that triangle to be within a fold.
 #[must_use]
 pub fn is_cut(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -> bool {
     let winds = |at: DVec3| winding_number(positions, triangles, at);
@@ -85,10 +85,10 @@ pub fn is_cut(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -> 
         let at = pair.on_surface.lerp((a + b + c) / 3.0, share);
         let across = (b - a).cross(c - a);
         let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-        // A share of how far the place is from the triangle's edges.
+        // A share of the place's distance from the triangle's edges.
         let up = across.normalize_or_zero() * (across.length() / longest * share * height);
         let (above, below) = (winds(at + up), winds(at - up));
-        // Only this sheet parts them so: no other is between the two places.
+        // Only this sheet separates them, and no other is between the two places.
         (below - above - 1.0).abs() < 0.1 && above.abs() > 0.9
     };
     let touches = |triangle: &&[u32; 3]| {
@@ -100,7 +100,7 @@ pub fn is_cut(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -> 
         .any(|place| touching.iter().any(|triangle| proves(triangle, place)))
 }
 
-/// Where a point is nearest to on the segment from `a` (0) to `b` (1).
+/// Parameter of the point on the segment from `a` (0) to `b` (1) nearest to a point.
 fn along(a: DVec3, b: DVec3, point: DVec3) -> f64 {
     ((point - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0)
 }
@@ -119,7 +119,7 @@ pub fn separation(
 }
 
 /// An interval that holds the signed separation of a tool whose axis crosses a closed surface, from the depths of
-/// so many points of it.
+/// `points` points of it.
 #[must_use]
 pub fn crossing_separation(
     positions: &[Vec3],
@@ -131,19 +131,19 @@ pub fn crossing_separation(
     for step in 0..=points {
         let at = tool.start.lerp(tool.end, step as f32 / points as f32);
         let nearest = exhaustive(positions, triangles, &Instrument::sphere(at, 0.0))?;
-        // Only what is deeper than all before needs a side.
+        // Only a point farther from the surface than all before needs a side.
         if nearest.axis_distance > deepest && is_inside(positions, triangles, at.as_dvec3())? {
             deepest = nearest.axis_distance;
         }
     }
-    // Depth changes by at most the way along the axis.
+    // Depth changes by at most the length along the axis.
     let between = f64::from(tool.start.distance(tool.end)) / f64::from(points) / 2.0;
     let radius = f64::from(tool.radius);
     Some((-radius - deepest - between, -radius - deepest))
 }
 
-/// An interval that holds the signed separation of any tool from a closed surface: both that of a tool that crosses
-/// and of one that does not where the axis is within `accuracy` of the surface, both sides where it cuts itself.
+/// An interval that holds the signed separation of any tool from a closed surface: if the axis is within `accuracy` of
+/// the surface, it covers crossing and not crossing; where the surface cuts itself, both sides.
 #[must_use]
 pub fn signed_separation(
     positions: &[Vec3],

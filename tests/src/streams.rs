@@ -1,4 +1,4 @@
-//! The benchmark's seeded streams: deformed surfaces with tools about them, and the beating heart's.
+//! The benchmark's seeded streams: deformed surfaces with tools around them, and the beating heart.
 
 use std::f32::consts::TAU;
 
@@ -19,12 +19,12 @@ pub const CAPSULE_LENGTH: f32 = 60.0;
 
 /// Independent random deformations of one surface, each with a sphere and a capsule near it.
 ///
-/// A deformation is the paper's: every axis scaled on its own, long waves over the whole surface, one
-/// local bump, and a rotation. On the brains its largest stretch is 1.2 to 1.4 of the 2 that the trees
-/// are built for; a frame that goes beyond the limit is not used.
+/// A deformation is the paper's: every axis scaled on its own, long waves over the whole surface, one local bump, and a
+/// rotation. On the brains its largest stretch is 1.2 to 1.4 of the 2 that the trees are built for; a frame beyond the
+/// limit is not used.
 ///
-/// A tool's distance from a random vertex is drawn so that its separation, which the folds around that
-/// vertex only lessen, is about 40 +- 30 mm on a brain: the paper's.
+/// A tool's distance from a random vertex is drawn so that its separation, which folds around that vertex only reduce,
+/// is about 40 +- 30 mm on a brain, as in the paper.
 pub struct Stream<'m> {
     rest: &'m [Vec3],
     middle: Vec3,
@@ -70,7 +70,7 @@ impl<'m> Stream<'m> {
         }));
     }
 
-    /// A sphere and a capsule near the surface as it is.
+    /// A sphere and a capsule near the current surface.
     pub fn tools(&mut self, positions: &[Vec3]) -> [Probe; 2] {
         let rng = &mut self.rng;
         let scale = self.size / 240.0;
@@ -114,7 +114,7 @@ fn smooth_wave(turns: f32) -> f32 {
 /// Ticks a second of a control loop.
 pub const TICK_RATE: f32 = 1_000.0;
 
-/// A recorded motion, played at its own speed and looked at in every tick of a control loop.
+/// A recorded motion, played at its recorded speed and sampled at every tick of a control loop.
 pub struct Beat<'m> {
     motion: &'m Motion,
     middle: Vec3,
@@ -150,9 +150,9 @@ impl<'m> Beat<'m> {
             .extend(frames[first].iter().zip(&frames[second]).map(|(&a, &b)| a + (b - a) * share));
     }
 
-    /// The instrument at a tick: a capsule that enters through a fixed port, as in keyhole surgery,
-    /// while its tip sweeps around the surface and, every seven seconds, through the middle of it. The
-    /// sum of a few slow sines and a physiological tremor; the same script as `firmware-example`'s.
+    /// The instrument at a tick: a capsule that enters through a fixed port, as in keyhole surgery, while its tip
+    /// sweeps around the surface and, every seven seconds, through the middle of it. The motion is the sum of a few
+    /// slow sines and a physiological tremor, the same as in `firmware-example`.
     ///
     /// # Panics
     /// Never for finite frames.

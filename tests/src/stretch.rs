@@ -1,5 +1,5 @@
-//! Stretch in f64, written apart from the measurement under test: per triangle by singular values of
-//! the deformation gradient in an orthonormal frame, per edge by lengths.
+//! Stretch in f64, independent of the measurement under test: per triangle by singular values of the deformation
+//! gradient in an orthonormal frame, per edge by lengths.
 
 use dibs_build::Mesh;
 use dibs_nostd::format::PathKind;
@@ -34,8 +34,8 @@ fn largest_singular_value(rest: [DVec3; 3], now: [DVec3; 3]) -> f64 {
     (trace / 2.0 + root).sqrt()
 }
 
-/// The rest shape of a triangle lower than 1/64 of its longest edge counts as that high: stretched across that
-/// edge, `w` away from it, by what it takes.
+/// The rest shape of a triangle lower than 1/64 of its longest edge counts as that high: it is stretched across that
+/// edge until it is.
 fn higher(edges: DMat2) -> DMat2 {
     let (first, second) = (edges.x_axis, edges.y_axis);
     let longest = [first, second, second - first]

@@ -1,4 +1,4 @@
-//! Small surfaces of every kind, so that exhaustive search is cheap enough for a million cases.
+//! Small surfaces of several kinds, on which exhaustive search is cheap enough for a million cases.
 
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
 use dibs_nostd::{Index, Tree, TriangleRow};
@@ -90,7 +90,7 @@ pub fn slivers(rows: u32) -> Mesh {
     Mesh { positions, triangles }
 }
 
-/// A square grid around the origin, each of its squares cut in two, as high as a function of x and y says.
+/// A square grid around the origin, each of its squares cut in two, with a height function of x and y.
 #[must_use]
 pub fn sheet(cells: u32, size: f32, height: impl Fn(f32, f32) -> f32) -> Mesh {
     let at = |x: u32, y: u32| y * (cells + 1) + x;

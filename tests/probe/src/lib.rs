@@ -1,7 +1,7 @@
-//! Answers a script of queries, wherever it runs: on the board under QEMU, and on the host in any build.
+//! Answers a script of queries, on the board under QEMU and on the host in any build.
 //!
-//! A script is a stream of little-endian 32-bit words, made by `cargo xtask guarantees`; the answers are
-//! another. Both sides run this code, so that a difference is one of compiler and processor.
+//! A script is a stream of little-endian 32-bit words, made by `cargo xtask guarantees`; the answers are another. Both
+//! sides run this code, so that a difference comes from compiler or processor.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
@@ -23,20 +23,20 @@ pub mod command {
     pub const END: u32 = 0;
     /// A tree of 16-bit indices: its length in bytes, then the bytes, padded to a word.
     pub const TREE: u32 = 1;
-    /// A frame: three `f32` for each of the tree's vertices. Answered by the instructions that measuring
-    /// its stretch took, and the stretch's bits.
+    /// A frame: three `f32` for each of the tree's vertices. Answered by the instructions of measuring its stretch, and
+    /// the stretch's bits.
     pub const FRAME: u32 = 2;
     /// A query: [`QUERY_WORDS`](super::QUERY_WORDS). Answered by [`ANSWER_WORDS`](super::ANSWER_WORDS).
     pub const QUERY: u32 = 3;
     /// The same by the wide search, of a frame of rows.
     pub const QUERY_IN_ROUNDS: u32 = 5;
-    /// A modal frame, of a tree with modes: 1 for queries that remember positions and 0 for others, the
-    /// number of weights, then an `f32` each. Answered by what bounding its stretch took and the
-    /// bound's bits; then by what computing every position took, and a hash of their bits.
+    /// A modal frame, of a tree with modes: 1 for queries that remember positions and 0 for others, the number of
+    /// weights, then an `f32` each. Answered by the instructions of bounding its stretch and the bound's bits; then by
+    /// those of computing every position, and a hash of their bits.
     pub const WEIGHTS: u32 = 4;
 }
 
-/// How a query is asked: the bits of one of its words.
+/// A query's options: the bits of one of its words.
 pub mod how {
     /// With the measured stretch.
     pub const MEASURED: u32 = 1;
@@ -46,10 +46,10 @@ pub mod how {
     pub const CONTACTS: u32 = 4;
 }
 
-/// Words of a query: the axis' ends, the radius, 1 for a capsule and 0 for a sphere, [`how`] it is asked, the warm
+/// Words of a query: the axis' ends, the radius, 1 for a capsule and 0 for a sphere, the options ([`how`]), the warm
 /// start or `u32::MAX`, and the budget's node and triangle tests.
 pub const QUERY_WORDS: usize = 12;
-/// Words of an answer: what it took on the clock, then everything in a [`Proximity`].
+/// Words of an answer: its counts on the clock, then all fields of a [`Proximity`].
 pub const ANSWER_WORDS: usize = 24;
 /// Margin of the contacts, in mm.
 pub const MARGIN: f32 = 5.0;
@@ -61,10 +61,10 @@ pub const VERTICES: usize = 1 << 15;
 /// Entries of the query's stack: more than the scripts' trees need.
 const STACK: usize = 128;
 
-/// Positions that a query of a modal frame remembers, if it does.
+/// Slots of the cache of a modal frame's positions.
 const SLOTS: usize = 256;
 
-/// Where positions come from.
+/// The source of positions.
 enum Table<'a> {
     /// From the rows of a frame.
     Rows,
@@ -72,7 +72,7 @@ enum Table<'a> {
     InRounds,
     /// From weights.
     Modal(ModalSurface<'a, MAX_MODES>),
-    /// From weights, and from memory.
+    /// From weights, with a cache.
     Remembered(ModalSurface<'a, MAX_MODES>),
 }
 
@@ -81,24 +81,24 @@ pub trait Machine {
     /// Fills the buffer from the script.
     ///
     /// # Errors
-    /// [`Fault`] where the script ends too early.
+    /// [`Fault`] if the script ends too early.
     fn read(&mut self, buffer: &mut [u8]) -> Result<(), Fault>;
 
     /// Appends to the answers.
     ///
     /// # Errors
-    /// [`Fault`] where nothing can be written.
+    /// [`Fault`] if the write fails.
     fn write(&mut self, bytes: &[u8]) -> Result<(), Fault>;
 
     /// A free-running counter.
     fn clock(&self) -> u32;
 }
 
-/// The script cannot be followed.
+/// The script is invalid, or a query failed.
 #[derive(Clone, Copy, Debug)]
 pub struct Fault;
 
-/// Where a tree and a frame are kept.
+/// Memory for a tree and a frame.
 pub struct Memory {
     tree: [u8; TREE_BYTES],
     rows: [Vec3; VERTICES],
@@ -135,7 +135,7 @@ pub fn run(memory: &mut Memory, machine: &mut impl Machine) -> Result<(), Fault>
     if next == command::END { Ok(()) } else { Err(Fault) }
 }
 
-/// Frames and queries of one tree. Returns the command that is neither.
+/// Answers frames and queries of one tree. Returns the first other command.
 fn queries(
     tree: &Tree<'_, u16>,
     rows: &mut [Vec3],
@@ -239,7 +239,7 @@ fn ask(
     }
 }
 
-/// The contacts have a stack frame of their own: modal surfaces need the room.
+/// A separate function keeps the contacts out of the stack frame of modal surfaces.
 #[inline(never)]
 fn contacts(
     query: &mut Query<'_, u16, STACK>,
@@ -261,7 +261,7 @@ fn timed(
     options: &Options,
     machine: &impl Machine,
 ) -> Result<[u32; ANSWER_WORDS], Fault> {
-    // As a controller has them: behind a pointer that the compiler knows nothing of.
+    // Behind a pointer that is opaque to the compiler, as in a controller.
     let rows = core::hint::black_box(rows);
     match table {
         Table::Rows if how & how::CONTACTS != 0 => contacts(query, rows, tool, options, machine),
@@ -274,7 +274,7 @@ fn timed(
     }
 }
 
-/// The measured function: callgrind looks for it, so it must stay one.
+/// The measured function: not inlined, because callgrind looks for it.
 #[inline(never)]
 fn clocked(
     machine: &impl Machine,

@@ -10,6 +10,6 @@ pub const UNTAGGED: u32 = 1;
 pub const TAGGED: u32 = 2;
 /// The key.
 pub const KEY: [u8; 16] = *b"a key for a test";
-/// Words of an answer: packets; what accepting them took on the clock, and the dearest of them; what
-/// checking and publishing took, and the longest slice of it.
+/// Words of an answer: packets; the counts of accepting them, in all and at most for one; the counts of checking and
+/// publishing, in all and at most for a slice.
 pub const ANSWER_WORDS: usize = 5;

@@ -1,13 +1,13 @@
-//! What the program `tick` and whoever writes its script agree on.
+//! The protocol between the program `tick` and the writer of its script.
 
 /// End of the script.
 pub const END: u32 = 0;
-/// Ticks to leave out: how many.
+/// Ticks to skip: their number.
 pub const SKIP: u32 = 1;
-/// Bytes that come over the bus: how many, and they, padded to a word.
+/// Bytes from the bus: their number, then the bytes, padded to a word.
 pub const BYTES: u32 = 2;
-/// Ticks to run: how many. Each is answered by [`ANSWER_WORDS`].
+/// Ticks to run: their number. Each is answered by [`ANSWER_WORDS`].
 pub const TICK: u32 = 3;
-/// Words of an answer: what the tick took on the clock, its query's node and triangle tests, and the frame that it
-/// was about; 0 where there was no answer.
+/// Words of an answer: the tick's counts on the clock, its query's node and triangle tests, and the frame searched; 0
+/// without an answer.
 pub const ANSWER_WORDS: usize = 4;

@@ -1,4 +1,4 @@
-//! Follows a script of ticks with a tracker, and asks a whole query beside it.
+//! Follows a script of ticks with a tracker, and runs a whole query beside it.
 //!
 //! A script is a tree, then frames and ticks, all little-endian words; `cargo xtask guarantees` makes it.
 
@@ -21,9 +21,9 @@ pub mod command {
     pub const TICK: u32 = 2;
 }
 
-/// Words of an answer: instructions of the tracker and of a whole query (warm, with measured stretch) on the
-/// clock, the tracker's node and triangle tests, its [`Fallback`] (0 for none), the places it has needed, its
-/// separation, and how far that is from the query's, in units of the accuracy of both.
+/// Words of an answer: instructions of the tracker and of a whole query (warm, with measured stretch) on the clock, the
+/// tracker's node and triangle tests, its [`Fallback`] (0 for none), the places it has used, its separation, and the
+/// difference from the query's in units of the accuracy of both.
 pub const ANSWER_WORDS: usize = 8;
 /// Largest tree, in bytes.
 pub const TREE_BYTES: usize = 1 << 20;
@@ -33,7 +33,7 @@ const STACK: usize = 128;
 /// Opened nodes that the tracker remembers.
 pub const OPENED: usize = 184;
 
-/// Where a tree and three frames are kept.
+/// Memory for a tree and three frames.
 pub struct Memory {
     tree: [u8; TREE_BYTES],
     frames: [[Vec3; VERTICES]; 2],
@@ -65,7 +65,7 @@ pub fn run(memory: &mut Memory, machine: &mut impl Machine) -> Result<(), Fault>
     let count = tree.vertex_count() as usize;
     let [before, after] = frames.each_mut().map(|rows| rows.get_mut(..count));
     let (mut before, mut after) = (before.ok_or(Fault)?, after.ok_or(Fault)?);
-    // Where it is made: the board's stack has no room for a second one.
+    // Not moved: the board's stack has no room for a second one.
     let Ok(mut tracker) = Tracker::new(&tree) else { return Err(Fault) };
     let query = Query::new(&tree).map_err(|_| Fault)?;
     let mut session = Session { query, tracker: &mut tracker, last: None };
@@ -94,7 +94,7 @@ struct Session<'s, 't> {
 }
 
 impl Session<'_, '_> {
-    /// The ticks of a frame. Returns the command that is none.
+    /// Runs the ticks of a frame. Returns the first other command.
     fn ticks(
         &mut self,
         step: &Step<'_, [Vec3], [Vec3]>,

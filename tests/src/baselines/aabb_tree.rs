@@ -1,4 +1,4 @@
-//! A tree of axis-aligned boxes: built once by the surface area heuristic, refitted ever after.
+//! A tree of axis-aligned boxes: built once by the surface area heuristic, then refitted.
 
 use std::ops::Range;
 
@@ -14,7 +14,7 @@ const LEAF: usize = 6;
 /// Bins of the surface area heuristic, and the cost of a box test against a triangle test.
 const BINS: usize = 16;
 const BOX_COST: f32 = 1.0;
-/// Enough for trees that halve at least every other level, as checked when they are built.
+/// Enough for trees that halve at least every other level; `new` checks the depth.
 const STACK: usize = 96;
 
 /// A box: its lowest and highest corner.
@@ -32,7 +32,7 @@ pub struct Link {
     pub count: u32,
 }
 
-/// Counts from here on mark an inner node whose descendants may be out of date.
+/// Counts from here on mark an inner node with outdated descendants.
 pub const DEFERRED: u32 = 1 << 31;
 
 /// The tree, its triangles in the order of the leaves, its vertices in the order of the triangles.
@@ -41,16 +41,16 @@ pub struct AabbTree {
     pub(super) boxes: Vec<Bounds>,
     pub(super) links: Vec<Link>,
     pub(super) rows: Rows,
-    /// The leaves' and the inner nodes' numbers, ascending: a loop over either has no branch to guess.
+    /// The numbers of leaves and of inner nodes, ascending, so that a loop over either has no unpredictable branch.
     leaves: Vec<u32>,
     inner: Vec<u32>,
-    /// The vertices of each leaf, each once, and where each leaf's begin.
+    /// The vertices of each leaf, each once, and the start of each leaf's.
     leaf_vertices: Vec<u32>,
     leaf_start: Vec<u32>,
 }
 
 impl AabbTree {
-    /// Builds the tree for the mesh as it is.
+    /// Builds the tree for the mesh at rest.
     ///
     /// # Panics
     /// If the tree is deeper than the traversal's stack.
@@ -91,8 +91,8 @@ impl AabbTree {
         tree
     }
 
-    /// Refits a range of nodes that holds the descendants of its own: first leaves, then inner nodes
-    /// from the last to the first, so that children come before parents.
+    /// Refits a range of nodes that includes all their descendants: first leaves, then inner nodes from the last to the
+    /// first, so that children come before parents.
     pub(super) fn refit(&mut self, nodes: Range<usize>) {
         let leaves = within(&self.leaves, &nodes);
         let mut start = self.leaf_start[leaves.start] as usize;
@@ -140,7 +140,7 @@ impl AabbTree {
     }
 }
 
-/// A tree in the midst of a search.
+/// A tree during a search.
 struct Refreshed<'t, F> {
     tree: &'t mut AabbTree,
     refresh: F,
@@ -167,7 +167,7 @@ impl<F: FnMut(&mut AabbTree, usize) -> u32> BoxTree for Refreshed<'_, F> {
     }
 }
 
-/// Where the ascending numbers of a range are.
+/// The places of a range's numbers in an ascending list.
 fn within(numbers: &[u32], range: &Range<usize>) -> Range<usize> {
     let below = |limit: usize| numbers.partition_point(|&number| (number as usize) < limit);
     below(range.start)..below(range.end)
@@ -197,7 +197,7 @@ struct Builder {
 }
 
 impl Builder {
-    /// Builds the subtree of some items, and returns how deep it is.
+    /// Builds the subtree of some items, and returns its depth.
     fn node(&mut self, node: usize, range: Range<usize>, depth: usize) -> usize {
         let middle = if range.len() > 1 { self.split(range.clone()) } else { None };
         let Some(middle) = middle else {
@@ -243,7 +243,7 @@ impl Builder {
             }
         }
         let Some((cost, axis, cut)) = best else {
-            // All centres in one point.
+            // All centres coincide.
             return (items.len() > LEAF).then_some(range.start + items.len() / 2);
         };
         let leaf_cost = area(whole) * (items.len() as f32 - 2.0 * BOX_COST);

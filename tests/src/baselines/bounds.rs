@@ -3,12 +3,12 @@
 use dibs_nostd::{Capsule, Sphere, Tool};
 use glam::{Vec3, Vec3A};
 
-/// A tool whose axis can be bounded against boxes.
+/// A tool whose axis' distance from boxes can be bounded.
 pub trait Axis: Tool {
-    /// The axis in the form that a bound needs, once a query.
+    /// The axis in the form for bounds, made once for each query.
     type Prepared: Copy;
 
-    /// Works it out.
+    /// Makes that form.
     fn prepare(&self) -> Self::Prepared;
 
     /// A lower bound of the squared distance between the axis and the box: exact for a point; for a
@@ -49,9 +49,8 @@ impl Axis for Capsule {
         Segment { start: start.into(), span, inverse }
     }
 
-    /// The squared distance to the box is a convex function of where on the segment one is, piecewise
-    /// quadratic: Newton's method finds its least value in a few steps, and each step's tangent bounds
-    /// it from below.
+    /// The squared distance to the box is a convex, piecewise quadratic function of the place on the segment: Newton's
+    /// method finds its minimum in a few steps, and each step's tangent bounds it from below.
     #[inline(always)]
     fn bound(axis: &Segment, low: Vec3A, high: Vec3A, limit: f32) -> f32 {
         let Segment { start, span, inverse } = *axis;
@@ -90,7 +89,7 @@ mod tests {
             let high = low + unit(&mut rng).abs() * 20.0 * rng.f32();
             let (start, end) = (unit(&mut rng) * 40.0, unit(&mut rng) * 40.0);
             let distance = |p: Vec3| (p - p.clamp(low, high)).length_squared();
-            // A convex function's least value, by ternary search.
+            // A convex function's minimum, by ternary search.
             let (mut a, mut b) = (0.0_f32, 1.0_f32);
             for _ in 0..100 {
                 let (x, y) = (a + (b - a) / 3.0, b - (b - a) / 3.0);

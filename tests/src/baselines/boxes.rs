@@ -19,7 +19,7 @@ pub enum Node {
 
 /// A tree of boxes.
 pub trait BoxTree {
-    /// A node; whatever is below it is up to date from here on.
+    /// A node, whose subtree is brought up to date.
     fn node(&mut self, node: u32) -> Node;
 
     /// A node's box: its lowest and highest corner.
@@ -82,7 +82,7 @@ pub fn closest<A: Axis, T: BoxTree, const STACK: usize>(tree: &mut T, tool: &A) 
     }
 }
 
-/// Triangles in the order of the leaves, and vertices in the order in which those come to them.
+/// Triangles in the order of the leaves, and vertices in the order of their first use there.
 #[derive(Clone, Debug)]
 pub struct Rows {
     triangles: Vec<[u32; 3]>,
@@ -109,7 +109,7 @@ impl Rows {
         Self { triangles: triangles.collect(), order, positions: Vec::new() }
     }
 
-    /// Takes over positions in the mesh's order.
+    /// Loads positions in the mesh's order.
     pub fn load(&mut self, positions: &[Vec3]) {
         self.positions.clear();
         self.positions.extend(self.order.iter().map(|&v| Vec3A::from(positions[v as usize])));

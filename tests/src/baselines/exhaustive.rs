@@ -1,4 +1,4 @@
-//! No tree at all: every triangle, with the kernels' early rejection.
+//! No tree: every triangle, with the kernels' early rejection.
 
 use dibs_build::Mesh;
 use dibs_nostd::Tool;

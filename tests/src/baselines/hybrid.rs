@@ -1,8 +1,7 @@
 //! The AABB tree refitted partly before and partly during queries (Larsson and Akenine-Moller 2001).
 //!
-//! The boxes of the top levels are refitted bottom-up, starting at a *cut* of the tree where each box
-//! is taken straight from the vertices below it. What is below the cut is refitted, one subtree at a
-//! time, when a query first comes there.
+//! The boxes of the top levels are refitted bottom-up, starting at a *cut* of the tree, where each box is computed from
+//! the vertices below it. Each subtree below the cut is refitted when a query first enters it.
 
 use glam::Vec3;
 
@@ -62,7 +61,7 @@ impl Cut {
         let below = tree.descendants(node);
         let itself = node..node + 1;
         let vertices = tree.vertices_of(if below.is_empty() { &itself } else { &below });
-        // Rows are numbered as leaves need them, so most of them are the subtree's last and in one run.
+        // Rows are numbered in the order of the leaves, so most of a subtree's rows are one run at its end.
         let run = vertices.windows(2).rev().take_while(|pair| pair[0] + 1 == pair[1]).count() + 1;
         let (others, rows) = vertices.split_at(vertices.len() - run);
         Self {

@@ -1,10 +1,9 @@
-//! The paper's own search, for the counts of its tables 1 and 2.
+//! The paper's search, for the counts of its tables 1 and 2.
 //!
-//! Recursive and depth first on a binary tree with one triangle a leaf. A node's bound is the separation
-//! of its pin less its radius; a leaf's radius is elastic, the largest distance now from its pin to its
-//! corners. Of two children the nearer comes first, and a child is entered while its bound is below the
-//! least separation so far. Upper bounds from pins, planes, slack and warm starts are the library's own,
-//! and absent here.
+//! Recursive and depth first on a binary tree with one triangle a leaf. A node's bound is the separation of its pin
+//! less its radius; a leaf's radius is elastic, the largest distance now from its pin to its corners. Of two children
+//! the nearer comes first, and a child is entered while its bound is below the least separation so far. It has no upper
+//! bounds from pins, no planes, slack or warm starts, which are the library's.
 
 use dibs_build::BuiltTree;
 use dibs_nostd::format::Link;
@@ -73,7 +72,7 @@ impl<'t> Paper<'t> {
                 let mut bounds = children.map(|child| (self.bound(child, tool), child));
                 bounds.sort_by(|a, b| a.0.total_cmp(&b.0));
                 for (bound, child) in bounds {
-                    // At contact any intersection is an answer.
+                    // At contact any intersection is a valid answer.
                     if bound < found.separation && found.separation > 0.0 {
                         self.search(child, tool, found, tests);
                     }

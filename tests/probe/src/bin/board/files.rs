@@ -36,7 +36,7 @@ impl Input {
         Some(Self { handle: open(b"script.bin\0", READ)?, buffer: [0; BUFFER], next: 0, end: 0 })
     }
 
-    /// Fills `bytes`, or nothing.
+    /// Fills all of `bytes`; `None` if the file ends before.
     pub fn read(&mut self, bytes: &mut [u8]) -> Option<()> {
         for byte in bytes {
             if self.next == self.end {
@@ -76,7 +76,7 @@ impl Output {
         Some(())
     }
 
-    /// Hands on the buffered bytes.
+    /// Writes the buffered bytes.
     pub fn flush(&mut self) -> Option<()> {
         let arguments = [self.handle, self.buffer.as_ptr().expose_provenance(), self.used];
         // SAFETY: SYS_WRITE takes a handle, and the address and size of a buffer.

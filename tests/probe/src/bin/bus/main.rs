@@ -1,12 +1,11 @@
-//! A receiver of the bus on the emulated board, for the fault matrix: bytes come over UART 0, and what
-//! became of them goes back.
+//! A receiver of the bus on the emulated board, for the fault matrix: bytes come over UART 0, and reports go back.
 //!
-//! Reads from `script.bin` four words and a tree of [`VERTICES`] vertices: whether packets carry tags, the
-//! challenge, the bits of the largest coordinate, the tree's length. Whenever the bytes that have come
-//! are dealt with, it reports, as one COBS frame: bytes, frames published, epoch of the last, the CRC-32 of
-//! all its positions as they stand in memory (a word each), and a status packet with every counter.
+//! Reads from `script.bin` four words and a tree of [`VERTICES`] vertices: whether packets carry tags, the challenge,
+//! the bits of the largest coordinate, the tree's length. After all bytes received it reports, as one COBS frame: the
+//! number of bytes, frames published, epoch of the last, the CRC-32 of its positions in memory (a word each), and a
+//! status packet with every counter.
 //!
-//! UART 0 is polled here; the firmware, which takes it by interrupt, is what the demo runs.
+//! This program polls UART 0; the firmware, which the demo runs, takes it by interrupt.
 #![no_std]
 #![no_main]
 
@@ -85,7 +84,7 @@ impl<'t, M: Mac> Receiver<'t, M> {
         Some(Self { mesh_id, deframer, assembler, reader, received, published, epoch, digest })
     }
 
-    /// Until the emulator is stopped.
+    /// Receives until the emulator is stopped.
     fn receive(&mut self) -> ! {
         let (mut has_work, mut reported) = (false, None);
         loop {
@@ -107,12 +106,12 @@ impl<'t, M: Mac> Receiver<'t, M> {
         }
     }
 
-    /// A clock that goes by the bytes of the line, 16 to a millisecond.
+    /// A clock that counts the line's bytes, 16 to a millisecond.
     const fn now(&self) -> u32 {
         self.received / 16
     }
 
-    /// A slice of checking; whether more is to be done at once.
+    /// Does a slice of checking. Returns whether more work is due.
     fn work(&mut self) -> bool {
         match self.assembler.advance(WORK) {
             Ok(Advance::Pending) => return true,
@@ -179,7 +178,7 @@ mod uart {
         unsafe { write_volatile(with_exposed_provenance_mut::<u32>(register), value) }
     }
 
-    /// Both ways.
+    /// Enables both directions.
     pub fn start() {
         set(DIVISOR, 16);
         set(CONTROL, 0b11);
@@ -190,7 +189,7 @@ mod uart {
         (get(STATE) & RECEIVE_FULL != 0).then(|| get(DATA) as u8)
     }
 
-    /// Sends one byte, after the one before has left.
+    /// Sends one byte, after the previous one has left.
     pub fn write(byte: u8) {
         while get(STATE) & TRANSMIT_FULL != 0 {}
         set(DATA, byte.into());

@@ -1,10 +1,10 @@
-//! Instructions of receiving and checking a frame on the board: with and without tags, packet by packet.
+//! Counts the instructions of receiving and checking a frame on the board, with and without tags, packet by packet.
 //!
-//! Reads from `script.bin`, in little-endian words: the length of a tree of [`VERTICES`] vertices and its
-//! bytes, padded to a word; then frames, each as [`UNTAGGED`] or [`TAGGED`], the number of its packets,
-//! after how many of them the check advances, and each packet's length and bytes, padded; then 0. Writes
-//! [`ANSWER_WORDS`](probe::receive::ANSWER_WORDS) words a frame to `answers.bin`.
-//! With `-icount shift=6` the clock counts 1.6 to an instruction.
+//! Reads from `script.bin`, in little-endian words: the length of a tree of [`VERTICES`] vertices and its bytes, padded
+//! to a word; then frames, each as [`UNTAGGED`] or [`TAGGED`], the number of its packets, the number of packets between
+//! two advances of the check, and each packet's length and bytes, padded; then 0. Writes
+//! [`ANSWER_WORDS`](probe::receive::ANSWER_WORDS) words a frame to `answers.bin`. With `-icount shift=6` the clock
+//! counts 1.6 to an instruction.
 #![no_std]
 #![no_main]
 

@@ -1,5 +1,5 @@
-//! The firmware's own receiver and control tick on the emulated board, fed from a script instead of a line: what a tick
-//! takes on frames that were chosen to make it dear.
+//! The firmware's receiver and control tick on the emulated board, fed from a script instead of a line: the cost of a
+//! tick on adversarial frames.
 //!
 //! Reads commands from `script.bin`, in little-endian words ([`probe::tick`]), and writes an answer for each tick to
 //! `answers.bin`. With `-icount shift=6` the clock counts 1.6 to an instruction.

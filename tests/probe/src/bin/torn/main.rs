@@ -1,9 +1,9 @@
-//! Queries while the bus interrupt fires throughout: does any see vertices of two epochs? In a controller
-//! the query preempts the bus; here it is the other way round, which is worse.
+//! Checks that no query sees vertices of two epochs while the bus interrupt fires throughout. In a controller the query
+//! preempts the bus; the reverse, as here, is worse.
 //!
-//! Reads a tree of [`VERTICES`] vertices with its rest shape from `script.bin` after the number of
-//! queries; writes five words to `answers.bin`: queries, queries that saw two epochs, frames published,
-//! publications put off, and queries that saw two epochs on a table without the protocol.
+//! Reads a tree of [`VERTICES`] vertices with its rest shape from `script.bin` after the number of queries; writes five
+//! words to `answers.bin`: queries, queries that saw two epochs, frames published, publications delayed, and queries
+//! that saw two epochs on a table without the protocol.
 #![no_std]
 #![no_main]
 
@@ -30,14 +30,14 @@ const VERTICES: usize = 258;
 const SHARE: usize = 16;
 
 static FRAMES: Frames<VERTICES> = Frames::new();
-/// The same positions without the protocol: written where they are read.
+/// The same positions without the protocol: one buffer for writes and reads.
 static PLAIN: [[AtomicU32; 3]; VERTICES] = [const { [const { AtomicU32::new(0) }; 3] }; VERTICES];
 static SENDER: Mutex<RefCell<Option<Sender>>> = Mutex::new(RefCell::new(None));
 static BYTES: Mutex<RefCell<[u8; 64 * 1024]>> = Mutex::new(RefCell::new([0; 64 * 1024]));
 static PUBLISHED: AtomicU32 = AtomicU32::new(0);
 static PUT_OFF: AtomicU32 = AtomicU32::new(0);
 
-/// The interrupt's own state.
+/// The interrupt's state.
 struct Sender {
     writer: FrameWriter<'static, VERTICES>,
     rest: [Vec3; VERTICES],
@@ -46,7 +46,7 @@ struct Sender {
     random: u32,
 }
 
-/// Where a vertex is in an epoch.
+/// A vertex's position in an epoch.
 fn placed(rest: Vec3, epoch: u32) -> Vec3 {
     rest + Vec3::X * (epoch % 64) as f32
 }
@@ -95,7 +95,7 @@ fn SysTick() {
     });
 }
 
-/// A table that notices when two vertices are not of one epoch.
+/// A table that detects reads of vertices of two epochs.
 struct Watched<'a, V> {
     table: &'a V,
     rest: &'a [Vec3; VERTICES],
@@ -117,7 +117,7 @@ impl<V: VertexTable> VertexTable for Watched<'_, V> {
     fn position(&self, vertex: u32) -> Option<Vec3> {
         let position = self.table.position(vertex)?;
         let rest = *self.rest.get(vertex as usize)?;
-        // Without a label the first vertex says which epoch it is.
+        // Without a label the first vertex defines the epoch.
         let epoch = self.epoch.get().unwrap_or((position.x - rest.x + 0.5) as u32);
         self.epoch.set(Some(epoch));
         if position != placed(rest, epoch) {
@@ -184,14 +184,14 @@ fn run() -> Option<()> {
             let center = Vec3::new(32.0 + 70.0 * wave(angle), 70.0 * wave(angle + 1.0), 5.0);
             let tool = Sphere::new(center, 2.5).ok()?;
             if let Some(frame) = reader.read() {
-                // Positions come back after 64 epochs, so that this one of the label does.
+                // Positions repeat after 64 epochs, so the label's epoch serves.
                 let watched = Watched::new(&frame, &rest, Some(frame.label().epoch));
                 query.closest(&watched, &tool, &Options::cold()).ok()?;
                 mixed += u32::from(watched.is_mixed.get());
                 done += 1;
             }
             let watched = Watched::new(&Plain, &rest, None);
-            // A surface of two epochs may be stretched beyond what the query allows for.
+            // A surface of two epochs may be stretched beyond the limit, and the query fail.
             let _ = query.closest(&watched, &tool, &Options::cold());
             mixed_plain += u32::from(watched.is_mixed.get());
         }
@@ -206,7 +206,7 @@ fn run() -> Option<()> {
     answers.flush()
 }
 
-/// A wave without a sine: between -1 and 1.
+/// A wave between -1 and 1, without a sine.
 fn wave(x: f32) -> f32 {
     let turns = x - (x as i32) as f32;
     4.0 * if turns < 0.5 { turns } else { 1.0 - turns } - 1.0
