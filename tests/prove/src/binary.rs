@@ -1,9 +1,9 @@
-//! The deepest stack, from the binary alone: every function's frame, and who calls whom.
+//! The deepest stack, from the binary alone: every function's frame, and the call graph.
 //!
-//! Frames come from the compiler's `.stack_sizes` where the build has them, and from the instructions
-//! that move the stack pointer, whichever is more; calls from the branch instructions. Encodings are those
-//! of the ARMv7-M Architecture Reference Manual, A5 and A7. What cannot be followed, a branch to an address
-//! in a register, is listed, and in the control path it is an error; so is recursion anywhere.
+//! Frames come from the compiler's `.stack_sizes` where the build has them, and from the instructions that move the
+//! stack pointer, whichever is more; calls come from the branch instructions. Encodings are those of the ARMv7-M
+//! Architecture Reference Manual, A5 and A7. Branches to an address in a register, which cannot be followed, are
+//! listed; in the control path they are an error, as is recursion anywhere.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -12,7 +12,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail, ensure};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 
-/// Stack that entering an exception takes: 26 words with the FPU's registers, and alignment.
+/// Stack of an exception's entry: 26 words with the FPU's registers, and alignment.
 const EXCEPTION_FRAME: u32 = 26 * 4 + 8;
 
 /// One function of the binary.
@@ -55,7 +55,7 @@ impl Binary {
         let file = object::File::parse(&*bytes)?;
         let mut functions = BTreeMap::new();
         let mut masking = BTreeSet::new();
-        // Where code and where data begins, by the linker's mapping symbols.
+        // The starts of code and of data, by the linker's mapping symbols.
         let marks: BTreeMap<u32, bool> = file
             .symbols()
             .filter_map(|symbol| {
@@ -156,7 +156,7 @@ impl Binary {
     }
 }
 
-/// The compiler's own account: addresses and frame sizes.
+/// Addresses and frame sizes from the compiler.
 fn declared(file: &object::File<'_>) -> Result<Vec<(u32, u32)>> {
     let mut sizes = Vec::new();
     for section in file.sections().filter(|s| s.name() == Ok(".stack_sizes")) {
@@ -178,7 +178,7 @@ fn declared(file: &object::File<'_>) -> Result<Vec<(u32, u32)>> {
     Ok(sizes)
 }
 
-/// Reads a function's instructions for what moves the stack pointer and what leaves the function.
+/// Reads a function's instructions for moves of the stack pointer and branches out of the function.
 fn decode(
     start: u32,
     body: &[u8],

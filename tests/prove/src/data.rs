@@ -1,10 +1,10 @@
-//! The real anatomy, which is beside the repository on some machines.
+//! The real anatomy, beside the repository on some machines.
 
 use std::path::PathBuf;
 
 use xtask::workspace;
 
-/// The folder of the real meshes, where it is.
+/// The folder of the real meshes, if present.
 pub fn real() -> Option<PathBuf> {
     let path = workspace::root().join("../shared/data");
     path.is_dir().then_some(path)

@@ -49,7 +49,7 @@ impl Footprint {
     }
 }
 
-/// `__rust_alloc`, `__rg_dealloc`, `malloc`, `_sbrk`, but not a name that merely contains the word.
+/// True for `__rust_alloc`, `__rg_dealloc`, `malloc`, `_sbrk`, but not for a name that only contains the word.
 fn is_allocator(name: &str, word: &str) -> bool {
     let bare = name.trim_start_matches('_');
     bare == word

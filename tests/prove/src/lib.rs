@@ -1,4 +1,4 @@
-//! What `main.rs` runs, as a library for that program and for its own tests.
+//! The library of the program `main.rs` and of its tests.
 
 #![allow(missing_docs, reason = "a library of one program")]
 

@@ -1,5 +1,5 @@
 //! Measures and proves: `cargo xtask demo | guarantees | profile | bench` run this, and `test` its checks.
-//! docs/proofs.md says which file shows which promise.
+//! docs/proofs.md lists the file for each promise.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

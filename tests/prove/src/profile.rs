@@ -1,7 +1,7 @@
 //! `cargo xtask profile`: where a query's instructions go on the emulated board.
 //!
-//! Every executed instruction of the query is logged, looked up in the program's debug information, and
-//! booked under the innermost of its inlined functions that has a part of its own.
+//! Every executed instruction of the query is logged, looked up in the program's debug information, and counted for the
+//! innermost of its inlined functions that has a separate part.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -19,7 +19,7 @@ use crate::harness::record;
 use crate::probe::script::{Asks, Knows, Script};
 use crate::probe::{build_for_board, executions};
 
-/// Ticks that are looked at, spread over the whole path.
+/// Ticks profiled, spread over the whole path.
 const TICKS: u32 = 100;
 
 /// A part of a query, and the functions that it consists of.
@@ -28,7 +28,7 @@ struct Part {
     functions: &'static [&'static str],
 }
 
-/// The first that names one of an instruction's functions has it.
+/// An instruction belongs to the first part that names one of its functions.
 const PARTS: [Part; 6] = [
     Part {
         name: "exact tests of triangles",
@@ -70,7 +70,7 @@ pub fn run() -> Result<()> {
     Ok(())
 }
 
-/// Addresses of the functions that a query consists of, or that it is inlined into.
+/// Addresses of the functions of a query, or that it is inlined into.
 fn ranges(program: &Path) -> Result<Vec<Range<u64>>> {
     let bytes = fs::read(program)?;
     let file = object::File::parse(&*bytes)?;
@@ -88,7 +88,7 @@ fn ranges(program: &Path) -> Result<Vec<Range<u64>>> {
         .collect())
 }
 
-/// The part that an instruction belongs to; `None` where it is not the query's.
+/// The part of an instruction; `None` if it is not the query's.
 fn part(loader: &Loader, address: u64) -> Result<Option<&'static str>> {
     let frames = loader.find_frames(address).map_err(|error| anyhow!("{error}"))?;
     let mut frames = frames;

@@ -1,5 +1,5 @@
-//! A query cut short by its budget: the interval holds the truth, shrinks as the budget grows, and the
-//! force is that of its cautious end.
+//! A query cut short by its budget: the interval holds the true separation and shrinks as the budget grows, and the
+//! force is that of its conservative end.
 
 use std::ops::AddAssign;
 
@@ -78,7 +78,7 @@ pub const CHECK: Check = Check {
 
 /// Budgets tried on each pose, from none to unlimited.
 const BUDGETS: usize = 10;
-/// Ticks that carry a short budget on by warm start.
+/// Ticks that continue under a short budget by warm start.
 const TICKS: usize = 4;
 const POSES: usize = 25;
 const CASES: usize = POSES * (BUDGETS + TICKS);
@@ -115,7 +115,7 @@ impl AddAssign for Tally {
     }
 }
 
-/// Runs at least as many budgets as are asked.
+/// Runs at least the requested number of budgets.
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let surfaces = surfaces::all(false);
     let frames = effort.cases.div_ceil(CASES);
@@ -192,7 +192,7 @@ fn on_one_frame(surface: &Surface, deformation: Deformation, rng: &mut Rng) -> T
     tally
 }
 
-/// Budgets that grow in both counts, from nothing to everything.
+/// Budgets that grow in both counts, from zero to unlimited.
 fn ladder(triangles: u32, rng: &mut Rng) -> [Budget; BUDGETS] {
     let mut budgets = [Budget { node_tests: 0, triangle_tests: 0 }; BUDGETS];
     for i in 1..BUDGETS {
@@ -207,7 +207,7 @@ fn ladder(triangles: u32, rng: &mut Rng) -> [Budget; BUDGETS] {
     budgets
 }
 
-/// Whether the interval holds the truth, and the force is at least the truth's.
+/// Checks that the interval holds the true separation, and that the force is at least the true one's.
 fn judge(answer: &Proximity, truth: &OraclePair, tally: &mut Tally) {
     let accuracy = f64::from(answer.accuracy);
     let below = f64::from(answer.lower) - truth.separation;

@@ -1,4 +1,4 @@
-//! The same bits, whatever compiled the queries and whatever runs them.
+//! The same bits from every compiler option and processor.
 
 use anyhow::Result;
 use xtask::steps::Outcome;
@@ -26,7 +26,7 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Answers one script everywhere, and compares all bits of all answers.
+/// Answers one script in every build, and compares all bits of all answers.
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let script = Script::adversarial(effort.bits, Draw::EitherWay, 1);
     let release = Build::Release.answers(&script)?;
@@ -43,7 +43,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-/// How many answers differ in any bit.
+/// Number of answers that differ in any bit.
 pub fn differences(ours: &Answers, theirs: &Answers, name: &str) -> usize {
     let pairs = ours.iter().zip(theirs.iter()).enumerate();
     let different: Vec<usize> = pairs
@@ -57,7 +57,7 @@ pub fn differences(ours: &Answers, theirs: &Answers, name: &str) -> usize {
     different.len()
 }
 
-/// FNV-1a over all bits of all answers: a name for them, to compare by eye.
+/// FNV-1a over all bits of all answers, to compare by eye.
 fn hash(answers: &Answers) -> u64 {
     let bytes = answers.iter().flat_map(|answer| {
         answer.bits().iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<_>>()

@@ -69,13 +69,13 @@ struct Tally {
     errors: u64,
     /// The answer was right, within its accuracy.
     right: u64,
-    /// The answer was too near: still on the safe side.
+    /// The answer was too near, which is safe.
     cautious: u64,
-    /// The answer was too far, and the query could not know.
+    /// The answer was too far, and the query could not detect it.
     undetected: u64,
-    /// The search did more than a sound tree ever needs.
+    /// The search made more tests than a sound tree needs.
     endless: u64,
-    /// The scrub did not see it.
+    /// The scrub did not find the damage.
     unscrubbed: u64,
 }
 
@@ -91,7 +91,7 @@ impl AddAssign for Tally {
     }
 }
 
-/// Damages sound trees as often as is asked: one bit, two bits anywhere, or a burst.
+/// Damages sound trees: one bit, two bits anywhere, or a burst.
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let surfaces = surfaces::all(true);
     let tallies: Vec<Tally> = (0..effort.cases.div_ceil(DAMAGES))
@@ -118,7 +118,7 @@ fn on_one_pose(surface: &Surface, rng: &mut Rng) -> Tally {
     let rows = built.to_rows(&surface.mesh.positions);
     let tool = pose(&rows, &triangles, rng);
     let truth = exhaustive(&rows, &triangles, &tool).expect("has triangles").separation;
-    // The most that a sound tree needs, and the root.
+    // Most tests on a sound tree, and the root's.
     let most = 3 * sound.node_count() + sound.triangle_count() + 1;
     let mut bytes = built.blob().to_vec();
     let mut tally = Tally::default();

@@ -128,7 +128,7 @@ pub const HOST: Check = Check {
     ],
 };
 
-/// Added to the fitted constants, in per cent: the fitted queries are a sample, and of other 100,000 about the same
+/// Added to the fitted constants, in per cent: the fitted queries are a sample, and of 100,000 others about the same
 /// surfaces one was 13 per cent above their plane.
 const MARGIN: f64 = 20.0;
 
@@ -139,7 +139,7 @@ struct Sample {
     instructions: u32,
 }
 
-/// Where instructions are counted.
+/// The machine on which instructions are counted.
 pub enum Machine<'a> {
     /// The emulated Cortex-M7.
     M7(&'a Cross),
@@ -193,7 +193,7 @@ fn on_host_check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     check(&Machine::Host, effort.host_costs, figures)
 }
 
-/// Fits the constants of both machines, or of the one that is named.
+/// Fits the constants of both machines, or of the named one.
 pub fn fit(only: Option<&str>) -> Result<()> {
     let wanted = |name: &str| only.is_none_or(|only| name.contains(only));
     if wanted("host") {
@@ -209,7 +209,7 @@ pub fn fit(only: Option<&str>) -> Result<()> {
 fn fit_on(machine: &Machine<'_>, queries: usize) -> Result<()> {
     let mut spheres = Vec::new();
     let mut capsules = Vec::new();
-    // Budgets end a search where its tests may have been dearer than in the mean: the most are of that kind.
+    // Most queries have a budget, which may end a search whose tests cost more than average.
     let deadline = Draw::Deadline(machine.costs());
     let draws = [(Draw::Exhausting, 1), (Draw::Any, 1), (Draw::Short, 8), (deadline, 8)];
     let scripts: Vec<Script> = draws
@@ -299,7 +299,7 @@ fn check(machine: &Machine<'_>, queries: usize, figures: &mut Figures) -> Result
     Ok(Outcome::Passed)
 }
 
-/// Surfaces that the constants are not fitted to: other sizes, shapes and leaves, and real anatomy where it is.
+/// Surfaces that the constants are not fitted to: other sizes, shapes and leaves, and real anatomy if present.
 fn unseen() -> Result<Vec<Subject>> {
     let mut subjects = vec![
         Subject::new("a generated heart of 2,562 triangles", generate::heart(2_562)?.mesh, 8),
@@ -345,8 +345,8 @@ fn samples(answers: &Answers, capsules: bool) -> Vec<Sample> {
         .collect()
 }
 
-/// The lowest plane, on average, that no sample is above: a linear programme, of which only the constraints
-/// that turn out to matter are handed to the solver.
+/// The lowest plane, on average, that no sample is above: a linear programme, in which the solver gets only the binding
+/// constraints.
 fn plane_above(samples: &[Sample]) -> Result<Cost> {
     let count = samples.len() as f64;
     let mean =

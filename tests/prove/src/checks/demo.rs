@@ -92,7 +92,7 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Takes over the demo's report.
+/// Notes the figures of the demo's report.
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let report = report_of(effort.demo_seconds, false)?;
     for (name, field) in [

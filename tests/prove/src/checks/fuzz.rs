@@ -1,4 +1,4 @@
-//! The fuzz targets, where there is a nightly compiler.
+//! The fuzz targets, if there is a nightly compiler.
 
 use anyhow::{Result, ensure};
 use xtask::nightly::{self, FuzzOptions, Fuzzed};

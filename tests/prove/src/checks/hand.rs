@@ -1,4 +1,4 @@
-//! A simulated hand that leans on the constraint: held by all contacts, not always by the closest pair alone.
+//! A simulated hand that pushes against the constraint: all contacts hold it, the closest pair alone not always.
 
 use anyhow::Result;
 use dibs_tests::hand::{PUSH, Pushed, scenes};

@@ -1,4 +1,4 @@
-//! The firmware links, and so has no panic path; and it has no allocator.
+//! The firmware links, so it has no panic path; and it has no allocator.
 
 use anyhow::{Context, Result, ensure};
 use xtask::firmware::{self, Surface};
@@ -36,7 +36,7 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// A panic path put in on purpose must break the link, so that a link is known to show something.
+/// A planted panic path must break the link, which shows that the link is a check.
 fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let (cross, surface) = (board()?, Surface::default());
     let footprint = Footprint::read(&firmware::build(&cross, &surface)?)?;

@@ -1,4 +1,4 @@
-//! One file, one check, with the promises that it shows. A new row is a new file, and a line here.
+//! Each file has one check, with its promises. A new check is a new file, and a line here.
 
 mod anytime;
 pub mod bits;
@@ -59,7 +59,7 @@ pub const CHECKS: &[Check] = &[
     instructions::CHECK,
 ];
 
-/// Names of the checks that build and run programs of their own, and take the other core.
+/// Names of the checks that build and run other programs, on the other core.
 pub const BESIDE: [&str; 5] = [
     sanitizers::ADDRESS.name,
     sanitizers::THREAD.name,

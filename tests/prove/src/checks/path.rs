@@ -1,4 +1,4 @@
-//! A query's instructions on the board: the paper's moving tool about a beating heart, and adversarial poses.
+//! A query's instructions on the board: the paper's moving tool around a beating heart, and adversarial poses.
 
 use anyhow::Result;
 use xtask::steps::Outcome;
@@ -61,8 +61,8 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Notes the instructions of queries on the generated heart (table 3's path and limit, every tick's
-/// surface another), warm with measured stretch and cold with the limit alone, and of poses.
+/// Notes the instructions of queries on the generated heart (table 3's path and limit, another surface at every tick),
+/// warm with measured stretch and cold with the limit alone, and of poses.
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let program = build_for_board(&board()?, "probe")?;
     let ask = |script: Script| on_board(&program, &script, true);

@@ -1,4 +1,4 @@
-//! Instructions of receiving a frame and checking its stretch on the board, a vertex and a packet.
+//! Instructions of receiving a frame and checking its stretch on the board, for each vertex and packet.
 
 use anyhow::{Result, ensure};
 use dibs_build::stream::{Sender, Settings, SurfaceOrder};
@@ -49,7 +49,7 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Frames of each kind, from all over the beat.
+/// Frames of each kind, spread over the beat.
 const FRAMES: usize = 6;
 
 /// A way to send frames.
@@ -59,7 +59,7 @@ struct Way {
     mtu: usize,
     quantised: bool,
     is_tagged: bool,
-    /// Packets from slice to slice of the check: some hundred vertices.
+    /// Packets between two slices of the check: some hundred vertices.
     every: u32,
 }
 
@@ -98,7 +98,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
         note("sum", receive + check);
         a_packet.push(instructions(1) / sum(0));
     }
-    // Of the last two ways, which differ by the tags alone.
+    // The last two ways differ only by the tags.
     if let [.., untagged, tagged] = a_packet[..] {
         figures.note("receive.tag", (tagged - untagged).round());
     }
@@ -117,9 +117,9 @@ impl Script {
         self.words.extend(padded(bytes));
     }
 
-    /// Frames of one way, in a session of their own.
+    /// Frames of one way, in a separate session.
     fn frames(&mut self, way: Way, built: &BuiltTree, motion: &Motion) -> Result<()> {
-        // Later than those before: the receivers see all of them.
+        // A later session than those before, since the receivers see all of them.
         let session = WAYS.iter().position(|other| other.name == way.name).unwrap_or(0) as u32 + 1;
         let step = motion.frames.len() / FRAMES;
         for (number, positions) in motion.frames.iter().step_by(step).take(FRAMES).enumerate() {

@@ -1,4 +1,4 @@
-//! A tree that has rotted in flash, and a controller that finds out.
+//! A controller finds a tree that has changed in flash.
 
 use std::path::Path;
 use std::process::Stdio;
@@ -66,7 +66,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     does_not_start(&image, middle, folder.path()).map(|()| Outcome::Passed)
 }
 
-/// Where the board has what is at this place of the linked program.
+/// The board's address of a place in the linked program.
 fn address(image: &[u8], place: usize) -> Result<u32> {
     let file = object::File::parse(image)?;
     let place = place as u64;

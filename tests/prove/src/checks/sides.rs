@@ -1,4 +1,4 @@
-//! On which side of the surface a tool is, against f64.
+//! The side of a tool, compared with f64.
 
 use anyhow::Result;
 use dibs_tests::side_poses::{POSES_OF_A_FRAME, Tally, closed, judge};

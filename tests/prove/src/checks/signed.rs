@@ -1,4 +1,4 @@
-//! What side, signed separation, depth and contacts take on the board.
+//! Instructions of side, signed separation, depth and contacts on the board.
 
 use anyhow::Result;
 use xtask::steps::Outcome;

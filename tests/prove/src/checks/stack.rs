@@ -1,4 +1,4 @@
-//! The firmware's stack: bounded from the binary, and caught where it overflows.
+//! The firmware's stack: a bound from the binary, and detection of an overflow.
 
 use std::process::Stdio;
 use std::thread;
@@ -112,7 +112,7 @@ fn overflow_is_noticed(cross: &Cross) -> Result<bool> {
             None => thread::sleep(Duration::from_millis(20)),
         }
     };
-    // The program of before, for the next check.
+    // Restores the program for the next check.
     firmware::build(cross, &Surface::default())?;
     Ok(code == Some(1))
 }

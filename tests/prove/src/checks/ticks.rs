@@ -1,5 +1,5 @@
-//! The longest control tick: the firmware's own receiver and tick on the emulated board, on frames that it admits and
-//! that a search chose to make the tick dear.
+//! The longest control tick: the firmware's receiver and tick on the emulated board, on admitted frames that a search
+//! has chosen to make the tick long.
 
 use anyhow::{Context, Result, ensure};
 use controller::surface::{self, CENTRE, REACH};
@@ -50,17 +50,17 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Poses that are tried on each shape, and steps of hill climbing from the dearest of them.
+/// Poses tried on each shape, and steps of hill climbing from the costliest of them.
 const TRIES: usize = 40;
 const STEPS: usize = 40;
 
-/// Ticks between two frames: so many that no limit on speed is in the way, whatever the two are.
+/// Ticks between two frames: enough that no limit on speed refuses any frame.
 const PAUSE: u32 = 1 << 20;
 
-/// Ticks on each frame once it is published, the first with a warm start from the frame before.
+/// Ticks on each published frame, the first with a warm start from the frame before.
 const TICKS: u32 = 3;
 
-/// No coordinate is farther out, in sizes of the rest shape: less than the firmware allows.
+/// Limit on the coordinates, in sizes of the rest shape: less than the firmware allows.
 const ROOM: f32 = 3.5;
 
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
@@ -93,7 +93,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let (mut sum, mut longest, mut cut_short) = (0.0, 0.0_f64, 0);
     for (number, ticks) in answers.chunks(1 + TICKS as usize).enumerate() {
         for (place, &[took, nodes, triangles, epoch]) in ticks.iter().enumerate() {
-            // The first tick comes in the midst of the frame's packets.
+            // The first tick comes between the frame's packets.
             let is_new = place > 0;
             let of = number as u32 + u32::from(is_new);
             ensure!(epoch == of, "a tick about frame {epoch}, not {of}: the firmware refused it");
@@ -111,12 +111,12 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     figures.note("ticks.longest", longest.round());
     figures.note("ticks.cut-short", f64::from(cut_short));
     figures.note("ticks.unlimited", unlimited as f64);
-    // Else the search found nothing that a budget is needed for.
+    // Otherwise the search has found no frame that needs a budget.
     ensure!(cut_short > 0 && unlimited > TICK_INSTRUCTIONS, "no frame is dear: {unlimited}");
     Ok(Outcome::Passed)
 }
 
-/// A frame, and when it is to be there.
+/// A frame, and the tick that it is for.
 struct Frame {
     rows: Vec<Vec3>,
     /// Tick after its publication, from a multiple of [`PAUSE`] on.
@@ -125,7 +125,7 @@ struct Frame {
     cost: u64,
 }
 
-/// The dearest frame of one kind that a search finds.
+/// The costliest frame of one kind that a search finds.
 fn dearest(mesh: &Mesh, built: &BuiltTree, number: usize, rng: &mut Rng) -> Result<Frame> {
     let tree = built.tree::<surface::Index>()?;
     let monitor = StretchMonitor::new(&tree)?.limits(SurfaceLimits::reach_mm(f32::INFINITY));
@@ -154,7 +154,7 @@ fn dearest(mesh: &Mesh, built: &BuiltTree, number: usize, rng: &mut Rng) -> Resu
         if rows.iter().any(|p| p.abs().max_element() > reach) {
             return None;
         }
-        // A shape at its limit may be beyond it once it was turned.
+        // A rotation may take a shape at its limit beyond it.
         let measured = admitted(&rows)?;
         let tool = instrument(base + placed.tick).ok()?;
         let found = query.closest(&rows[..], &tool, &Options::cold().stretch(measured)).ok()?;
@@ -176,7 +176,7 @@ fn dearest(mesh: &Mesh, built: &BuiltTree, number: usize, rng: &mut Rng) -> Resu
     best.map(|(_, frame)| frame).context("no place for a shape")
 }
 
-/// The surface drawn onto a sphere, as far as it is admitted: about its centre all distances are equal.
+/// The surface drawn onto a sphere, as far as it is admitted: distances from its centre are equal.
 fn round(mesh: &Mesh, is_fit: impl Fn(&[Vec3]) -> bool) -> Vec<Vec3> {
     let middle = mesh.positions.iter().sum::<Vec3>() / mesh.positions.len() as f32;
     let at = |share: f32, size: f32| -> Vec<Vec3> {
@@ -184,14 +184,14 @@ fn round(mesh: &Mesh, is_fit: impl Fn(&[Vec3]) -> bool) -> Vec<Vec3> {
         let moved = mesh.positions.iter().map(|&p| (p - middle).lerp(on_sphere(p), share) * size);
         moved.collect()
     };
-    // Of all that is round, the largest; where nothing quite round is admitted, the roundest.
+    // The largest round shape; if none is admitted, the roundest.
     let sizes = || (1..=40).rev().map(|size| size as f32 / 40.0);
     let shares = (0..=20).rev().map(|share| share as f32 / 20.0);
     let mut all = shares.flat_map(|share| sizes().map(move |size| at(share, size)));
     all.find(|moved| is_fit(moved)).unwrap_or_else(|| at(0.0, 1.0))
 }
 
-/// Where a shape is put, and for which tick.
+/// A placed shape, and its tick.
 struct Placed {
     turn: Quat,
     shift: Vec3,
@@ -199,7 +199,7 @@ struct Placed {
 }
 
 impl Placed {
-    /// Somewhere about the instrument of some tick: around it, on it or next to it.
+    /// A random place at a tick's instrument: around it, on it or next to it.
     fn around(shape: &[Vec3], middle: Vec3, base: u32, rng: &mut Rng) -> Result<Self> {
         let tick = rng.u32(..PAUSE / 2);
         let tool = instrument(base + tick)?;
@@ -218,7 +218,7 @@ impl Placed {
     }
 }
 
-/// What the board reads.
+/// The board's input.
 #[derive(Default)]
 struct Script {
     words: Vec<u32>,
@@ -226,7 +226,7 @@ struct Script {
 }
 
 impl Script {
-    /// A frame that is published right before the tick that it was chosen for, and a tick in its midst.
+    /// Adds a frame that is published right before its tick, and a tick between its packets.
     fn frame(&mut self, id: FrameId, frame: &Frame) -> Result<()> {
         let begins = id.epoch * PAUSE + frame.tick - 1;
         self.words.extend([SKIP, begins - self.now]);

@@ -1,4 +1,4 @@
-//! Frames published in the middle of queries, on the emulated board.
+//! Frames published during queries, on the emulated board.
 
 use anyhow::{Result, ensure};
 use dibs_build::{Builder, IndexWidth};
@@ -44,7 +44,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     for (name, count) in names.into_iter().zip(&counts) {
         figures.note(&format!("torn.{name}"), f64::from(*count));
     }
-    // So that the check is known to see it.
+    // The check must detect torn reads without the protocol.
     ensure!(counts[4] > 0, "no query saw two epochs even without the protocol");
     Ok(Outcome::Passed)
 }

@@ -1,4 +1,4 @@
-//! What a tick of a tracker takes on the board: the paper's moving tool about a heart that moves at every tick.
+//! A tracker's instructions on the board: the paper's moving tool around a heart that moves at every tick.
 
 use anyhow::{Result, ensure};
 use dibs_build::{Builder, IndexWidth, generate};
@@ -56,10 +56,10 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// The tool goes once through the middle of the heart and back. As many in every run: golden figures compare.
+/// The tool goes once through the middle of the heart and back. The number is fixed, since golden figures are compared.
 const TICKS: u32 = 7_000;
 
-/// How the surface moves between frames.
+/// The surface between frames.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Surface {
     Held,

@@ -1,4 +1,4 @@
-//! Whether an answer is right: exhaustive search in f64 on the vertices of the same frame.
+//! Checks an answer by exhaustive search in f64 on the vertices of the same frame.
 
 use anyhow::{Context, Result};
 use controller::fingerprint;
@@ -16,12 +16,12 @@ use super::sender::Link;
 pub struct Checked {
     /// The tick.
     pub tick: u32,
-    /// Distance of the answer from the truth, in units of [`accuracy_of`] it: at most 1 is right.
+    /// Error of the answer in units of [`accuracy_of`] it: at most 1 is right.
     pub error: f64,
 }
 
 impl Checked {
-    /// Whether the answer is off by more than it states; also where the error is not a number.
+    /// Whether the answer is off by more than it states, or the error is NaN.
     pub fn is_wrong(&self) -> bool {
         self.error > 1.0 || self.error.is_nan()
     }
@@ -72,7 +72,7 @@ pub struct Compared {
     pub is_same: bool,
 }
 
-/// Compares the frames that the controller has read through: each once.
+/// Compares each frame that the controller has read in full, once.
 pub fn compare(link: &Link, tick: &Tick, compared: &mut Vec<Compared>) {
     let epoch = tick.read_epoch;
     if epoch == 0 || compared.last().is_some_and(|last| last.epoch == epoch) {

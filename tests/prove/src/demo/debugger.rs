@@ -1,5 +1,5 @@
-//! A debugger on the emulated board, which changes one byte of its memory while it runs: the remote protocol of GDB,
-//! as QEMU serves it.
+//! A debugger that changes one byte of the emulated board's memory while it runs, by GDB's remote protocol, which QEMU
+//! serves.
 
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
@@ -14,7 +14,7 @@ pub struct Bits {
     pub mask: u8,
 }
 
-/// Flips bits on the board whose emulator serves the socket; the board stands still meanwhile, and goes on.
+/// Flips bits on the board whose emulator serves the socket; the board pauses meanwhile.
 pub fn flip(socket: &Path, bits: Bits) -> Result<()> {
     let mut board = UnixStream::connect(socket)?;
     let Bits { address, mask } = bits;
@@ -25,7 +25,7 @@ pub fn flip(socket: &Path, bits: Bits) -> Result<()> {
     ensure!(done == "OK", "the emulator does not write to {address:#x}: {done}");
     let now = ask(&mut board, &format!("m{address:x},1"))?;
     ensure!(now == format!("{after:02x}"), "{address:#x} holds {now} after it was written");
-    // Detached, the board runs on.
+    // Detached, the board continues.
     ask(&mut board, "D").map(drop)
 }
 
@@ -35,7 +35,7 @@ fn ask(board: &mut UnixStream, text: &str) -> Result<String> {
     board.write_all(format!("${text}#{sum:02x}").as_bytes())?;
     loop {
         let answer = receive(board)?;
-        // The emulator may tell at any time that the board has stopped.
+        // The emulator may report at any time that the board has stopped.
         if !answer.starts_with('T') {
             return Ok(answer);
         }
@@ -48,7 +48,7 @@ fn receive(board: &mut UnixStream) -> Result<String> {
     loop {
         board.read_exact(&mut byte)?;
         match byte[0] {
-            // Earlier bytes, such as the acknowledgement, are no answer.
+            // Earlier bytes, such as the acknowledgement, are not part of the answer.
             b'$' => answer.clear(),
             b'#' => break,
             byte => answer.push(byte.into()),

@@ -22,7 +22,7 @@ impl Plan {
     /// Probability that a packet meets a fault.
     pub const RATE: f64 = 0.03;
 
-    /// The kinds of faults: all that can happen on a line of packets without tags.
+    /// The kinds of faults: all that a line of packets without tags can have.
     pub const KINDS: &[Fault] = &[
         Fault::FlipOne,
         Fault::FlipTwo,
@@ -41,16 +41,16 @@ impl Plan {
         Fault::Stretch,
     ];
 
-    /// Faults in a run of so many seconds.
+    /// Faults in a run of this many seconds.
     pub const fn new(seed: u64, seconds: u32) -> Self {
         Self { seed, seconds }
     }
 
-    /// Ticks for which the line is cut once: longer than the controller puts up with.
+    /// Ticks for which the line is cut once: longer than the controller's limit.
     pub const SILENCE: u32 = SILENCE_LIMIT + TICK_RATE / 2;
 
-    /// The tick after which that is done, as soon as a frame has come through. Early: the emulated
-    /// line brings a frame in about a second, and what comes after the silence has to fit too.
+    /// The tick after which the line is cut, as soon as a frame has arrived. It is early, because the emulated line
+    /// brings a frame in about a second, and frames after the silence must fit too.
     pub const fn silence_at(&self) -> u32 {
         self.seconds * TICK_RATE / 4
     }
@@ -63,7 +63,7 @@ pub struct Faults {
     seed: u64,
     /// Probability of a fault a packet.
     rate: f64,
-    /// How often each has happened.
+    /// Count of each.
     pub injected: BTreeMap<&'static str, u64>,
 }
 
@@ -81,7 +81,7 @@ impl Faults {
     }
 }
 
-/// The effect of the silent line, by the controller's own records; in ms.
+/// The effect of the silent line, by the controller's records; in ms.
 #[derive(Clone, Serialize)]
 pub struct Silence {
     /// Tick of the first safe output.
@@ -97,7 +97,7 @@ pub struct Silence {
 }
 
 impl Silence {
-    /// The first time that the link was lost.
+    /// The first loss of the link.
     pub fn of(outcome: &Outcome) -> Option<Self> {
         let ticks = &outcome.ticks;
         let safe = State::Safe as u32;

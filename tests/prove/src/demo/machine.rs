@@ -1,4 +1,4 @@
-//! Where the controller runs: on the emulated board, or as a program on this computer.
+//! The controller's machine: the emulated board, or this computer.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -36,7 +36,7 @@ pub enum Machine {
 }
 
 impl Machine {
-    /// Builds the controller: for the board where that is possible and wanted.
+    /// Builds the controller, for the board if possible and wanted.
     pub fn prepare(options: &Options, scene: &Scene) -> Result<Self> {
         if options.host {
             let reason = "as asked by --host".to_owned();
@@ -64,8 +64,8 @@ impl Machine {
     }
 
     fn host(scene: &Scene, reason: String) -> Result<Self> {
-        // This program contains the controller's library too. A folder of its own for another surface, and
-        // the same selection of packages for this one, keep cargo from building anything twice.
+        // This program contains the controller's library too. A separate folder for another surface, and the same
+        // selection of packages for this one, keep cargo from building anything twice.
         let folder = if scene.surface.is_default() {
             workspace::target()
         } else {

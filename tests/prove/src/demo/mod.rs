@@ -77,7 +77,7 @@ pub fn run(options: &Options) -> Result<()> {
         Harm::Nothing
     };
     let outcome = session::run(&scene, &machine, options.seconds, &harm, &folder)?;
-    // Before anything is written: it names the commit, and whether it is clean.
+    // Made before anything is written, since it names the commit, and whether it is clean.
     let report = Report::new(&scene, &machine, &outcome)?;
     plot::draw(&outcome, &folder)?;
     if options.faults {

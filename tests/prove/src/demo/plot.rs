@@ -13,7 +13,7 @@ use xtask::qemu;
 use super::report::force;
 use super::session::Outcome;
 
-/// Points of a curve: more cannot be seen.
+/// Points of a curve; more would not be visible.
 const POINTS: usize = 1_500;
 
 /// Bars of a histogram.
@@ -95,7 +95,7 @@ fn curve(
     Ok(())
 }
 
-/// How often each value occurs, with the worst one marked.
+/// The frequency of each value, with the worst one marked.
 fn histogram(
     area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
     name: &str,

@@ -76,8 +76,7 @@ pub struct Report {
     bus_masked_max_us: Option<f64>,
     /// Rounds of the background check of the tree in flash.
     scrub_rounds: Option<u32>,
-    /// Frames whose vertices were compared, all of them, with what was sent, as they stood in the
-    /// controller's memory after publication.
+    /// Frames whose vertices in the controller's memory were all compared with the sent ones after publication.
     frames_compared: usize,
     /// Of these, the ones that differed.
     frames_published_wrong: usize,
@@ -197,7 +196,7 @@ impl Report {
         );
         let wrong = self.frames_published_wrong;
         promise(wrong == 0, format!("{wrong} published frames differ from what was sent"));
-        // The last frame may have been published too late to be read through.
+        // The last frame may have been published too late to be read in full.
         let (compared, published) = (self.frames_compared, self.frames_published);
         promise(
             compared + 1 >= published as usize,
@@ -218,7 +217,7 @@ impl Report {
             // The last frame may have been on its way when the run ended.
             promise(published + 1 >= sent, format!("{published} of {sent} frames were published"));
         }
-        // How often a frame comes is up to this computer; the behaviour without one is the promise.
+        // The rate of frames depends on this computer; the promise is the behaviour without one.
         let acting = || outcome.ticks.iter().filter(|tick| tick.state != State::Safe as u32);
         let too_old = acting().filter(|tick| tick.age > SURFACE_AGE_LIMIT).count();
         promise(too_old == 0, format!("{too_old} ticks acted on a surface that was too old"));
@@ -244,7 +243,7 @@ impl Report {
         std::fs::write(&path, json).with_context(|| format!("cannot write {}", path.display()))
     }
 
-    /// Shows the run to a person.
+    /// Prints the run.
     pub fn print(&self, folder: &Path) {
         let row = |name: &str, value: String| println!("  {name:<22}{value}");
         println!();
@@ -370,7 +369,7 @@ pub fn force(tick: &Tick) -> f32 {
     glam::Vec3::from(tick.force).length()
 }
 
-/// The command that started this, as one would type it.
+/// The command that started this, as typed in a shell.
 fn command_line() -> String {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
     format!("cargo xtask {}", arguments.join(" "))

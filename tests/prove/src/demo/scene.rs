@@ -1,4 +1,4 @@
-//! The surface, its motion and its tree, as the firmware will have them.
+//! The surface, its motion and its tree, as in the firmware.
 
 use anyhow::{Context, Result, ensure};
 use dibs_build::{Builder, BuiltTree, Mesh, Motion, generate};
@@ -9,9 +9,9 @@ use super::Options;
 
 /// Triangles of the generated heart: those of the paper's.
 const HEART_TRIANGLES: u32 = 10_272;
-/// Spared above the largest stretch of a recorded motion.
+/// Margin above the largest stretch of a recorded motion.
 const MARGIN: f32 = 1.02;
-/// Beyond any motion: the limit of the tree that measures what a motion needs.
+/// A limit beyond any motion, for the tree that measures a motion's stretch.
 const ANY_STRETCH: f32 = 1_000.0;
 
 /// The moving surface, and the firmware's tree of it.
@@ -26,7 +26,7 @@ pub struct Scene {
     pub motion: Motion,
     /// Frames a second at which the motion was recorded.
     pub rate: f32,
-    /// The mesh's triangles by rows of the vertex table, without the tree's help.
+    /// The mesh's triangles by rows of the vertex table, not taken from the tree.
     pub triangles: Vec<[u32; 3]>,
 }
 

@@ -1,4 +1,4 @@
-//! The imaging side: sends one frame after the other over the bus.
+//! The imaging side: sends frames over the bus.
 
 use std::collections::HashMap;
 use std::io::{self, Write};
@@ -19,14 +19,14 @@ use glam::Vec3;
 use super::faults::Plan;
 use super::scene::Scene;
 
-/// Between two looks at the telemetry.
+/// Time between two polls of the telemetry.
 const PAUSE: Duration = Duration::from_micros(300);
 
 /// Real time in which a byte arrives, unless it was lost.
 const ARRIVAL: Duration = Duration::from_millis(500);
 
-/// Ticks in which the controller says what became of a frame. Longer than any check takes: a frame that
-/// is not acknowledged by then was lost.
+/// Ticks in which the controller acknowledges a frame, longer than any check: a frame not acknowledged by then was
+/// lost.
 const ANSWER: u32 = TICK_RATE / 20;
 
 /// Messages between sender and listener.
@@ -38,7 +38,7 @@ pub struct Link {
     pub tick: AtomicU32,
     /// Frames sent to the last byte.
     pub frames_sent: AtomicU32,
-    /// Set when the controller is gone.
+    /// Set when the controller has ended.
     pub over: AtomicBool,
     /// The vertices of every frame, exactly as the controller decodes them.
     frames: Mutex<HashMap<u32, Arc<Vec<Vec3>>>>,
@@ -90,7 +90,7 @@ impl Write for Paced {
             if now != arrived {
                 (arrived, start) = (now, Instant::now());
             } else if start.elapsed() > ARRIVAL {
-                // A frame that has not come by now was lost on the way.
+                // A frame that has not arrived by now was lost.
                 self.sent = arrived;
             }
         }
@@ -99,17 +99,17 @@ impl Write for Paced {
 }
 
 fn paced(socket: UnixStream, link: &Arc<Link>) -> Result<Line> {
-    // So that the reading thread looks from time to time whether it is still wanted.
+    // The timeout lets the reading thread check whether it is still needed.
     socket.set_read_timeout(Some(Duration::from_millis(50)))?;
     let (reader, handle) = (socket.try_clone()?, socket.try_clone()?);
     let writer = Paced { socket, link: Arc::clone(link), sent: 0 };
     Ok(Line::stream(writer, reader, move || drop(handle.shutdown(Shutdown::Both))))
 }
 
-/// Sends the motion, over and over, until the controller is gone: at the recorded rate, or as fast
-/// as the line allows and the controller acknowledges.
+/// Sends the motion repeatedly until the controller ends: at the recorded rate, or as fast as the line allows and the
+/// controller acknowledges.
 ///
-/// Returns how often each fault has happened.
+/// Returns the count of each fault.
 pub fn send(
     scene: &Scene,
     link: &Arc<Link>,
@@ -140,7 +140,7 @@ fn send_all(
     let interval = (TICK_RATE as f32 / scene.rate) as u32;
     let rate = if faults.is_some() { Plan::RATE } else { 0.0 };
     let mut silence = faults.map(Plan::silence_at);
-    // Every frame is to echo a status: the controller does not trust one of which it cannot tell how long it took.
+    // Every frame must echo a status: the controller does not trust a frame of unknown delay.
     while sender.status().is_none() {
         if !rest(link, sender) {
             return Ok(());
@@ -148,8 +148,8 @@ fn send_all(
     }
     for positions in scene.motion.frames.iter().cycle() {
         let start = link.now();
-        // The last frame before the silence comes through, and the first after it: what is measured is the
-        // silence.
+        // The last frame before the silence and the first after it have no faults, so that only the silence is
+        // measured.
         if silence.is_some_and(|at| start >= at) {
             sender.transport().set_rate(0.0);
         }
@@ -159,7 +159,7 @@ fn send_all(
         }
         match sender.transmit(frame) {
             Ok(_) => (),
-            // The controller has ended its run; the listener tells whether it should have.
+            // The controller has ended its run; the listener decides whether rightly.
             Err(SendError::Line(_)) => return Ok(()),
             Err(error) => return Err(error.into()),
         }
@@ -195,7 +195,7 @@ fn send_all(
     Ok(())
 }
 
-/// A pause, in which heartbeats go on; false when the controller is gone.
+/// Pauses with heartbeats; false when the controller has ended.
 fn rest(link: &Link, sender: &mut Sender<FaultyLine, MTU>) -> bool {
     thread::sleep(PAUSE);
     !link.is_over() && sender.poll().is_ok()

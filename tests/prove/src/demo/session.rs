@@ -38,11 +38,11 @@ pub enum Harm {
     Memory(Bits),
 }
 
-/// Everything that a run showed.
+/// The results of a run.
 pub struct Outcome {
     /// The record of every tick.
     pub ticks: Vec<Tick>,
-    /// The controller's own summary.
+    /// The controller's summary.
     pub summary: Summary,
     /// The check of every answer.
     pub checked: Vec<Checked>,
@@ -52,19 +52,19 @@ pub struct Outcome {
     pub faults: Option<Faults>,
     /// The last tick that was known when memory was changed, if it was.
     pub flipped_at: Option<u32>,
-    /// Ticks that were asked for.
+    /// Ticks requested.
     pub ticks_asked: u32,
     /// Frames sent to the last byte.
     pub frames_sent: u32,
-    /// Whether the controller itself ended well.
+    /// Whether the controller ended with success.
     pub exited_well: bool,
-    /// How the controller was started.
+    /// The controller's command.
     pub command: String,
     /// Real time that the run took.
     pub took: Duration,
 }
 
-/// Runs the controller for `seconds` of its own time.
+/// Runs the controller for `seconds` of its time.
 pub fn run(
     scene: &Scene,
     machine: &Machine,
@@ -90,7 +90,7 @@ pub fn run(
     if let Some((socket, _)) = &debugger {
         command.arg("-gdb").arg(format!("unix:{},server=on,wait=off", socket.display()));
     }
-    // As one would type it at the top of the repository.
+    // As typed at the top of the repository.
     let shown = shown(&command)
         .replace(&format!("{}/", workspace::root().display()), "")
         .replace(&format!("{}/", sockets.path().display()), "");
@@ -141,7 +141,7 @@ struct Guard(Child);
 
 impl Drop for Guard {
     fn drop(&mut self) {
-        // Both fail only where the controller has ended by itself.
+        // Both fail only if the controller has ended already.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
@@ -180,7 +180,7 @@ struct Heard {
     flipped_at: Option<u32>,
 }
 
-/// Reads telemetry until the summary, and hands every answer to the checker. With a debugger, flips its bits once a
+/// Reads telemetry until the summary, and passes every answer to the checker. With a debugger, flips its bits once a
 /// frame is published.
 fn listen(
     mut telemetry: UnixStream,

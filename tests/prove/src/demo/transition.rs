@@ -1,4 +1,4 @@
-//! The fail-safe machine's way through a run.
+//! The fail-safe machine's changes of state in a run.
 
 use std::fmt;
 

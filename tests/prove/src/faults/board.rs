@@ -15,7 +15,7 @@ use tempfile::TempDir;
 
 use super::subject::{LIMIT, Log, Receiver, TREE};
 
-/// How long the board may take for anything.
+/// Longest time that the board may take for an operation.
 const PATIENCE: Duration = Duration::from_secs(30);
 
 /// A board that runs the probe `bus`.
@@ -34,7 +34,7 @@ pub struct Board {
 }
 
 impl Board {
-    /// Boots the probe with this tree, and what makes its tags.
+    /// Boots the probe with this MAC.
     pub fn boot<M: Mac>(program: &Path, mac: &M) -> Result<Self> {
         let folder = tempfile::tempdir()?;
         let blob = TREE.blob();
@@ -73,7 +73,7 @@ impl Board {
         Ok(board)
     }
 
-    /// Until all that was sent is dealt with.
+    /// Waits until all bytes sent are processed.
     fn wait(&mut self, log: &Log) -> Result<()> {
         let mut buffer = [0; 512];
         while self.received != Some(self.sent) {
@@ -163,7 +163,7 @@ impl Receiver for Board {
 
 impl Drop for Board {
     fn drop(&mut self) {
-        // Both fail only where the emulator has ended by itself.
+        // Both fail only if the emulator has ended already.
         let _ = self.emulator.kill();
         let _ = self.emulator.wait();
     }

@@ -1,4 +1,4 @@
-//! How old the surface gets, and how many frames get through, on a line that damages packets.
+//! Age of the surface and throughput of frames on a line that damages packets.
 
 use std::fmt;
 use std::mem::take;
@@ -23,7 +23,7 @@ const PROBABILITIES: [f64; 8] = [0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.2, 0.3];
 /// One run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// `whole`, or `partial`: what moved, and a whole frame when the receiver asks for one.
+    /// `whole`, or `partial`: the moved vertices, and a whole frame when the receiver asks for one.
     pub frames: &'static str,
     /// Share of the packets that are damaged.
     pub packets_damaged: f64,
@@ -96,7 +96,7 @@ fn one(partial: bool, probability: f64, frames: u32, seed: u64) -> Result<Row> {
         if controller.published() > published {
             newest = Some(moment);
         }
-        // Before the first frame there is no surface to be old.
+        // Before the first frame there is no surface and no age.
         ages.extend(newest.map(|newest| f64::from(moment - newest) * interval));
     }
     ages.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! One fault at a time, and then as many undisturbed frames as recovery takes.
+//! One fault at a time, followed by undisturbed frames until recovery.
 
 use std::mem::take;
 use std::path::Path;
@@ -23,7 +23,7 @@ const CHUNK: u64 = 500;
 /// Undisturbed frames after which a receiver that still publishes nothing has failed.
 const PATIENCE: u32 = 20;
 
-/// Where the receivers run.
+/// The place of the receivers.
 #[derive(Clone, Copy)]
 pub enum Place<'p> {
     /// In this process.
@@ -33,7 +33,7 @@ pub enum Place<'p> {
 }
 
 impl Place<'_> {
-    /// Starts a receiver, and does something with it.
+    /// Starts a receiver, and runs `work` with it.
     fn with<M: Mac>(self, mac: M, work: impl FnOnce(&mut dyn Receiver)) {
         match self {
             Self::Here => {
@@ -50,7 +50,7 @@ impl Place<'_> {
 pub fn run(per_fault: u64, seed: u64, place: Place<'_>) -> Result<Vec<Row>> {
     let of_one = match place {
         Place::Here => CHUNK,
-        // Every way to send, however few the faults.
+        // Covers every way to send, even with few faults.
         Place::Board(_) => per_fault.div_ceil(8),
     };
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} faults  {msg}")?;
@@ -80,8 +80,8 @@ pub fn run(per_fault: u64, seed: u64, place: Place<'_>) -> Result<Vec<Row>> {
 /// Some faults of one kind: every way to send in turn.
 fn life(fault: Fault, count: u64, chunk: u64, seed: u64, place: Place<'_>) -> Row {
     let case = Case { quantised: chunk & 1 == 0, partial: chunk & 2 == 0 };
-    // Tags would catch what the other layers are meant to: with tags go forgeries, and every second
-    // run of what no checksum was made right for.
+    // Tags would catch sealed faults before the layers that they test. So only forgeries have tags, and every second
+    // run of faults that are not sealed.
     let is_sealed = matches!(
         fault,
         Fault::StaleEpoch
@@ -200,7 +200,7 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
         while since.is_none() {
             (before, published) = (noticed(controller.counters()), controller.published());
             let packets = self.next_frame(controller);
-            // The begin is the only one for some faults.
+            // Some faults apply only to the begin.
             let first = if self.rng.bool() { 0 } else { self.rng.usize(..packets.len()) };
             for (place, packet) in packets.iter().enumerate() {
                 let is_due = since.is_none() && place >= first;
@@ -297,7 +297,7 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
         self.row.recovered_packets_max = self.row.recovered_packets_max.max(packets);
     }
 
-    /// Undisturbed frames until one is published: how many, and in how many packets.
+    /// Sends undisturbed frames until one is published. Returns the numbers of frames and packets.
     fn recover(&mut self, controller: &mut dyn Receiver) -> (u32, u32) {
         let published = controller.published();
         let mut packets = 0;

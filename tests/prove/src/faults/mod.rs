@@ -1,4 +1,4 @@
-//! The fault matrix: the outcomes of faults on the bus, and of frames on a bad one.
+//! The fault matrix: the outcomes of faults on the bus, and of frames on a bad bus.
 
 mod board;
 mod corruption;

@@ -11,7 +11,7 @@ use crate::harness::run::Run;
 /// First of the seeds.
 const SEED: u64 = 20_140_350;
 
-/// Everything that a run measured.
+/// The measurements of a run.
 #[derive(Serialize)]
 pub struct Record {
     pub run: Run,
@@ -35,8 +35,8 @@ pub const UNDETECTABLE: [&str; 4] = [
 ];
 
 impl Record {
-    /// Runs the matrix with this many faults of each kind; on this computer also frames on a bad line, and
-    /// where everything is wanted the bytes that frames take.
+    /// Runs the matrix with this many faults of each kind; on this computer also frames on a bad line, and for a full
+    /// record the sizes of frames.
     pub fn measure(
         per_fault: u64,
         place: Place<'_>,
@@ -96,7 +96,7 @@ impl Record {
         std::fs::create_dir_all(&figures)
             .with_context(|| format!("cannot make {}", figures.display()))?;
         let mut files = vec![(path.to_path_buf(), json)];
-        // A matrix of the board's comes alone.
+        // The board's record has the matrix alone.
         if !self.corruption.is_empty() {
             files.push((figures.join("faults.svg"), corruption::figure(&self.corruption)?));
         }

@@ -13,19 +13,19 @@ pub struct Row {
     pub injected: u64,
     /// Something was rejected, abandoned or ignored as a duplicate, or the frame was not published.
     pub detected: u64,
-    /// Nothing was noticed, and the frame was published as it was sent.
+    /// No effect was noticed, and the frame was published as sent.
     pub harmless: u64,
-    /// Nothing was noticed, and something else was published; or anything wrong was.
+    /// A surface was published that was not sent.
     pub published_wrong: u64,
-    /// How often each cause was counted.
+    /// Count of each cause.
     pub rejected: BTreeMap<&'static str, u64>,
-    /// Undisturbed frames until one was published; 0 where the disturbed one was.
+    /// Undisturbed frames until one was published; 0 if the disturbed one was.
     pub recovered_frames_mean: f64,
     pub recovered_frames_max: u32,
     /// Packets from the fault to the next publication.
     pub recovered_packets_mean: f64,
     pub recovered_packets_max: u32,
-    /// Faults after which nothing was published any more.
+    /// Faults after which no frame was published any more.
     pub not_recovered: u64,
     #[serde(skip)]
     pub(super) sums: [u64; 2],

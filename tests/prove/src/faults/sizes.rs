@@ -1,4 +1,4 @@
-//! Bytes of a frame of a beating heart, by how it is sent.
+//! Bytes of a frame of a beating heart, by way of sending.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -31,14 +31,14 @@ const BEAT: f32 = 1.0;
 pub struct Row {
     pub heart: &'static str,
     pub vertices: usize,
-    /// How it is sent.
+    /// The way of sending.
     pub frames: String,
     /// Frames a second: those of the record, or one a control tick, in between.
     pub rate: f32,
     pub bytes_per_frame: f64,
     pub bytes_max: usize,
     pub packets_per_frame: f64,
-    /// No vertex is farther from where the receiver has it, in mm; of modes, in any recorded frame.
+    /// Largest distance of a vertex from the receiver's, in mm; of modes, in any recorded frame.
     pub error_mm: f32,
     pub bytes_per_second: f64,
 }
@@ -61,7 +61,7 @@ impl fmt::Display for Row {
     }
 }
 
-/// The generated heart, and the real one where its files are.
+/// The generated heart, and the real one if present.
 pub fn run() -> Result<Vec<Row>> {
     let generate::MovingMesh { mesh, motion } = generate::heart(TRIANGLES)?;
     let mut rows = heart("generated", &mesh, &motion)?;
@@ -77,7 +77,7 @@ pub fn run() -> Result<Vec<Row>> {
 }
 
 fn heart(name: &'static str, mesh: &Mesh, motion: &Motion) -> Result<Vec<Row>> {
-    // Any limit: the packets do not depend on it.
+    // The packets do not depend on the limit.
     let tree = Builder::new().stretch(4.0).build(mesh)?;
     let order = SurfaceOrder::of(&tree.tree::<u16>()?);
     let recorded = motion.frames.len() as f32 / BEAT;
@@ -96,7 +96,7 @@ fn heart(name: &'static str, mesh: &Mesh, motion: &Motion) -> Result<Vec<Row>> {
     let row = |(frames, settings, rate)| {
         let mut sender = Sender::<_, MTU>::new(Vec::new(), order.clone(), settings);
         let (mut bytes, mut packets, mut error) = (Vec::new(), 0, 0.0_f32);
-        // One beat, after a first frame that is whole in any case.
+        // One beat, after a first frame, which is always whole.
         let steps = (motion.frames.len() as f32 * rate / recorded) as u32;
         for step in 0..=steps {
             let sent = sender.send(&at(motion, step as f32 / rate * recorded))?;
@@ -126,7 +126,7 @@ fn heart(name: &'static str, mesh: &Mesh, motion: &Motion) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// Modal frames: nothing but the weights, one frame a control tick.
+/// Modal frames: only the weights, one frame each control tick.
 fn modal(
     heart: &'static str,
     mesh: &Mesh,

@@ -27,7 +27,7 @@ pub const N: usize = RINGS * RINGS + 2;
 const _: () = assert!(N == VERTICES);
 /// The stretch that the receiver admits.
 const STRETCH: f32 = 1.3;
-/// No coordinate is larger, in mm.
+/// Limit on the coordinates, in mm.
 pub const LIMIT: f32 = 400.0;
 
 /// An egg of some 12 cm: the smallest heart takes ten times as long.
@@ -59,8 +59,7 @@ static MESH: LazyLock<Mesh> = LazyLock::new(|| {
 pub static TREE: LazyLock<BuiltTree> =
     LazyLock::new(|| Builder::new().stretch(STRETCH).build(&*MESH).expect("a tree"));
 
-/// The surface at a moment: a bump that wanders, so that from moment to moment some vertices move and
-/// some do not.
+/// The surface at a moment: a wandering bump, so that between two moments some vertices move and some do not.
 pub fn surface(moment: u32) -> Vec<Vec3> {
     let rest = &MESH.positions;
     let at = rest[(moment as usize * 7) % rest.len()];
@@ -69,17 +68,17 @@ pub fn surface(moment: u32) -> Vec<Vec3> {
     rest.iter().map(|&p| p + push * near(p)).collect()
 }
 
-/// From frame to frame, in ms.
+/// Time between two frames, in ms.
 pub const FRAME_MS: u32 = 40;
 
-/// How a run sends.
+/// The way in which a run sends.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
     pub quantised: bool,
     pub partial: bool,
 }
 
-/// Where the packets of a sender go, and those for it come from.
+/// The transport of a sender: packets sent, and packets to receive.
 #[derive(Default)]
 pub struct Mailbox {
     pub sent: Vec<Vec<u8>>,
@@ -100,7 +99,7 @@ impl Transport for Mailbox {
 /// A sender whose packets are collected.
 pub type Source<M> = Sender<Mailbox, MTU, M>;
 
-/// A sender on a clock that goes on by [`FRAME_MS`] whenever it is asked.
+/// A sender on a clock that advances by [`FRAME_MS`] at each reading.
 pub fn source<M: Mac>(
     case: Case,
     session: u32,
@@ -125,7 +124,7 @@ pub fn source<M: Mac>(
 #[derive(Default)]
 pub struct Log(VecDeque<(u32, Vec<[u32; 3]>)>);
 
-/// More frames than any fault looks back.
+/// More frames than any fault refers back to.
 const REMEMBERED: usize = 64;
 
 impl Log {
@@ -140,7 +139,7 @@ impl Log {
         }
     }
 
-    /// Takes the last frame back: it was not sent to its end.
+    /// Removes the last frame, which was not sent to its end.
     pub fn forget_last(&mut self) {
         self.0.pop_back();
     }
@@ -155,7 +154,7 @@ impl Log {
         self.0.iter().rev().any(|(number, bits)| *number == epoch && is_equal(bits))
     }
 
-    /// The same, of positions of which there is only the CRC-32.
+    /// The same, by the CRC-32 of the positions.
     pub fn has_digest(&self, epoch: u32, digest: u32) -> bool {
         let of = |bits: &[[u32; 3]]| {
             let mut crc = CRC.digest();
@@ -166,7 +165,7 @@ impl Log {
     }
 }
 
-/// A receiving end, wherever it runs.
+/// A receiving end, on this computer or the board.
 pub trait Receiver {
     /// Its counters.
     fn counters(&self) -> &Counters;
@@ -174,7 +173,7 @@ pub trait Receiver {
     /// Its status at this moment.
     fn status(&mut self) -> Vec<u8>;
 
-    /// A packet arrives as a message of its own.
+    /// A packet arrives as one message.
     fn message(&mut self, packet: &[u8], log: &Log);
 
     /// Bytes arrive on a stream.
@@ -183,12 +182,11 @@ pub trait Receiver {
     /// Frames published since the start.
     fn published(&self) -> u32;
 
-    /// Frames that were published and had not been sent.
+    /// Frames published that were not sent.
     fn wrong(&self) -> u64;
 }
 
-/// The receiver on this computer: what the bus interrupt does, and a look at what the control tick would
-/// see.
+/// The receiver on this computer: the work of the bus interrupt, and a check of the control tick's view.
 pub struct Controller<'f, M> {
     deframer: Deframer<MTU>,
     assembler: Assembler<'f, StretchMonitor<'f, u16>, N, M>,
@@ -207,7 +205,7 @@ impl<'f, M: Mac> Controller<'f, M> {
         Self { deframer: Deframer::new(), assembler, reader, published: 0, wrong: 0, now: 0 }
     }
 
-    /// Checks and publishes, in slices, and compares what is published with what was sent.
+    /// Checks and publishes, in slices, and compares the published frame with the sent one.
     fn work(&mut self, log: &Log) {
         for _ in 0..100 {
             match self.assembler.advance(WORK) {
@@ -270,13 +268,13 @@ pub fn mac_under(challenge: u32) -> AesCmac {
     AesCmac::new(&KEY, RECEIVER, challenge)
 }
 
-/// A packet as it goes over a byte stream.
+/// A packet framed for a byte stream.
 pub fn framed(packet: &[u8]) -> Vec<u8> {
     let mut line = [0; framed_bytes(MTU)];
     enframe(packet, &mut line).expect("packets fit").to_vec()
 }
 
-/// Rejections of each cause, and what else tells of a fault: abandoned frames and duplicates.
+/// Rejections of each cause, abandoned frames and duplicates: the signs of a fault.
 pub fn noticed(counters: &Counters) -> Vec<u32> {
     Event::ALL
         .into_iter()

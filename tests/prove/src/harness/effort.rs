@@ -1,4 +1,4 @@
-//! How much is tried.
+//! The sizes of the checks.
 
 /// Sizes of the checks.
 #[derive(Clone, Copy, serde::Serialize, serde::Deserialize)]
@@ -17,7 +17,7 @@ pub struct Effort {
     pub ticks: u32,
     /// Adversarial poses on the board.
     pub poses: usize,
-    /// Frames chosen to make the firmware's tick dear.
+    /// Frames chosen to make the firmware's tick long.
     pub tick_frames: usize,
     /// Queries under which frames are published.
     pub torn: u32,
@@ -31,9 +31,9 @@ pub struct Effort {
     pub fault_seconds: u32,
     /// Seconds of each fuzz target.
     pub fuzz_seconds: u32,
-    /// Whether the records are for the documents: those of a run of the tests are not.
+    /// Whether the records go to the documents, unlike those of a run of the tests.
     pub is_record: bool,
-    /// One in so many of the full size's cases.
+    /// Divisor of the full size's cases.
     pub share: u32,
 }
 
@@ -57,7 +57,7 @@ impl Effort {
         is_record: true,
         share: 1,
     };
-    /// The sizes that every run of the tests can afford.
+    /// The sizes for every run of the tests.
     pub const TEST: Self = Self {
         cases: 100_000,
         sides: 4_000,
@@ -77,7 +77,7 @@ impl Effort {
         share: 0,
     };
 
-    /// One in `share` of the cases, but at least as many as a run of the tests has.
+    /// One in `share` of the cases, but at least as many as in a run of the tests.
     pub fn divided(self, share: u32) -> Self {
         let wide = |full: usize, least: usize| (full / share as usize).max(least);
         let narrow = |full: u32, least: u32| (full / share).max(least);

@@ -15,7 +15,7 @@ use super::run::Run;
 /// A record of `crate::faults`; the board's has the matrix alone.
 #[derive(Deserialize)]
 struct Faults {
-    /// Records of before there were runs have none.
+    /// Older records have none.
     run: Option<Run>,
     matrix: Vec<Kind>,
     #[serde(default)]
@@ -64,7 +64,7 @@ struct Size {
     error_mm: f64,
 }
 
-/// The chapter; empty where nothing was recorded.
+/// The chapter; empty without a record.
 pub fn render() -> Result<String> {
     let mut out = String::new();
     if let Some(host) = read("faults.json")? {
@@ -88,7 +88,7 @@ pub fn render() -> Result<String> {
     Ok(out)
 }
 
-/// Of which run a chapter is.
+/// Names the run of a chapter.
 fn of(out: &mut String, run: Option<&Run>) -> Result<()> {
     match run {
         Some(Run { date, commit, machine, size, .. }) => {

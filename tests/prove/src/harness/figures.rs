@@ -24,7 +24,7 @@ impl Figures {
         self.measured.insert(name.to_owned(), Value::from(value));
     }
 
-    /// Takes over those of another run.
+    /// Adds another run's figures.
     pub fn append(&mut self, mut other: Self) {
         self.measured.append(&mut other.measured);
     }

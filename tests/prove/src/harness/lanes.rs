@@ -1,5 +1,5 @@
 //! Two lanes of checks: most wait for one emulator, which takes one core; sanitizers, fuzzers and the model checker
-//! build and run programs of their own, in a process beside, whose output is shown once both have ended.
+//! build and run other programs, in a second process, whose output is shown once both have ended.
 
 use std::env;
 use std::fs::{self, File};
@@ -16,20 +16,20 @@ use super::run::Run;
 use super::{Effort, Measured};
 use crate::checks::{BESIDE, CHECKS};
 
-/// Files through which the two processes talk.
+/// Files by which the two processes communicate.
 const EFFORT: &str = "effort.json";
 const FOUND: &str = "found.json";
 const STEPS: &str = "steps.txt";
 const LOG: &str = "log.txt";
 
-/// What the process beside has found.
+/// The results of the second process.
 #[derive(Serialize, Deserialize)]
 struct Found {
     figures: Figures,
     skipped: Vec<String>,
 }
 
-/// The process beside.
+/// The second process.
 pub struct Beside {
     process: Child,
     folder: PathBuf,
@@ -39,7 +39,7 @@ impl Beside {
     /// Starts it.
     pub fn start(effort: &Effort) -> Result<Self> {
         let folder = workspace::target().join("beside");
-        // So that nothing of an earlier run is taken for this one's.
+        // Removed, so that no file of an earlier run is taken for this one's.
         if folder.exists() {
             fs::remove_dir_all(&folder)?;
         }
@@ -51,7 +51,7 @@ impl Beside {
         Ok(Self { process: command.spawn()?, folder })
     }
 
-    /// Waits for it, and takes over its figures and steps.
+    /// Waits for it, and adds its figures and steps.
     pub fn join(mut self, measured: &mut Measured, steps: &mut Steps) -> Result<()> {
         let status = self.process.wait()?;
         let log = fs::read(self.folder.join(LOG))?;
@@ -68,7 +68,7 @@ impl Beside {
     }
 }
 
-/// Does the work of the process beside.
+/// Does the work of the second process.
 pub fn run(folder: &Path) -> Result<()> {
     let effort: Effort = read(&folder.join(EFFORT))?;
     let mut steps = Steps::default();

@@ -61,12 +61,12 @@ fn one_level_down(page: &str) -> String {
         .collect()
 }
 
-/// The last run that measured anything.
+/// The last run that made a measurement.
 fn newest(records: &[Record]) -> Option<&Run> {
     records.iter().map(|record| &record.run).max()
 }
 
-/// Whether all rows below are of one commit; otherwise, which row is of which.
+/// States the rows' commit, or that of each row if they differ.
 fn provenance(out: &mut String, records: &[Record], newest: Option<&Run>) -> Result<()> {
     let Some(newest) = newest else { return Ok(()) };
     let missing = promises().filter(|(_, p)| records.iter().all(|r| r.id != p.id)).count();
@@ -109,13 +109,13 @@ fn provenance(out: &mut String, records: &[Record], newest: Option<&Run>) -> Res
 }
 
 impl Record {
-    /// Whether it has a line of its own.
+    /// Whether it has a separate line.
     pub fn is_shown(&self) -> bool {
         let is_counted = ["host.", "m7.", "modes."].iter().any(|part| self.id.starts_with(part));
         !self.promise.is_empty() || is_counted
     }
 
-    /// Of which run it is, where that is not the newest.
+    /// Names its run, if that is not the newest.
     fn of(&self, newest: Option<&Run>) -> String {
         match newest {
             Some(newest) if !newest.is_of_the_same(&self.run) => {
@@ -138,7 +138,7 @@ fn with_figures(text: &str, records: &[Record]) -> String {
     text
 }
 
-/// A number with its thousands apart, or a text.
+/// A number with thousands separated, or a text.
 fn shown(figure: &Value) -> String {
     let Some(number) = figure.as_f64() else {
         return figure.as_str().map_or_else(|| figure.to_string(), |text| format!("`{text}`"));
@@ -149,7 +149,7 @@ fn shown(figure: &Value) -> String {
     grouped(number as u64)
 }
 
-/// A number with its thousands apart.
+/// A number with thousands separated.
 pub fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut grouped = String::new();

@@ -1,6 +1,6 @@
-//! One harness for every promise. A check, one file in `checks/`, measures figures and says what each of them
-//! promises; the records join both in docs/guarantees.json, and docs/guarantees.md is made from the records.
-//! `cargo xtask test` runs the same checks on fewer cases, and compares their figures with the records.
+//! One harness for every promise. A check, one file in `checks/`, measures figures and states a promise for each; the
+//! records join both in docs/guarantees.json, and docs/guarantees.md is made from the records. `cargo xtask test` runs
+//! the same checks on fewer cases, and compares their figures with the records.
 
 mod effort;
 mod faults;
@@ -22,7 +22,7 @@ use promise::Promise;
 use record::Raise;
 use run::Run;
 
-/// A check, and the promises that its figures are about.
+/// A check, and the promises of its figures.
 pub struct Check {
     /// The step's name; `--only` selects by it.
     pub name: &'static str,
@@ -97,12 +97,12 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Nothing yet.
+    /// No figures yet.
     fn new(run: Run) -> Self {
         Self { figures: Figures::default(), skipped: Vec::new(), run }
     }
 
-    /// Runs the checks with the names that are wanted, each as a step.
+    /// Runs the checks with the selected names, each as a step.
     fn run_each(&mut self, effort: &Effort, is_wanted: impl Fn(&str) -> bool, steps: &mut Steps) {
         for check in CHECKS.iter().filter(|check| is_wanted(check.name)) {
             steps.run(check.name, || {
@@ -134,18 +134,18 @@ fn run(effort: &Effort, only: Option<&str>, steps: &mut Steps) -> Measured {
 }
 
 impl Check {
-    /// The promises that the figures break, as far as they do not hang on the records.
+    /// The promises that the figures break, except those that depend on the records.
     fn broken(&self, figures: &Figures) -> Vec<String> {
         self.promises.iter().filter_map(|promise| promise.broken(figures)).collect()
     }
 }
 
 impl Promise {
-    /// The figure's fault, if it was measured and has one.
+    /// The broken promise of a measured figure, if any.
     pub fn broken(&self, figures: &Figures) -> Option<String> {
         let figure = figures.get(self.id)?;
         let other = |name: &str| figures.get(name)?.as_f64();
-        // A text, or JSON's substitute for a number that is none, keeps no bound.
+        // A text, or JSON's substitute for a NaN, keeps no bound.
         let is_kept = match figure.as_f64() {
             Some(number) => self.bound.holds(number, other),
             None => matches!(self.bound, promise::Bound::Informs),

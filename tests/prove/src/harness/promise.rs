@@ -26,8 +26,7 @@ pub enum Bound {
     AtLeast(f64),
     /// Not above another figure.
     NotAbove(&'static str),
-    /// Not above the lowest figure that was ever recorded by more than [`TOLERANCE`] per cent, unless it was
-    /// raised for a reason.
+    /// At most [`TOLERANCE`] per cent above the lowest figure ever recorded, unless that was raised for a reason.
     Golden,
 }
 
@@ -48,7 +47,7 @@ impl fmt::Display for Bound {
 }
 
 impl Bound {
-    /// Whether a figure keeps it; `other` tells other figures. A golden bound is for the records to judge.
+    /// Whether a figure keeps it; `other` returns other figures. The records judge a golden bound.
     pub fn holds(self, figure: f64, other: impl Fn(&str) -> Option<f64>) -> bool {
         match self {
             Self::Informs | Self::Golden => true,
@@ -60,7 +59,7 @@ impl Bound {
     }
 }
 
-/// A figure without a row of its own.
+/// A figure without a separate row.
 pub const fn note(id: &'static str) -> Promise {
     Promise { id, says: "", criterion: "", bound: Bound::Informs, unit: "", limits: "" }
 }

@@ -26,7 +26,7 @@ pub struct Record {
     pub bound: String,
     pub unit: String,
     pub limits: String,
-    /// Of a golden figure, the lowest that was ever recorded, or the one that it was raised to.
+    /// For a golden figure, the lowest ever recorded, or the one that it was raised to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub floor: Option<f64>,
     /// Why the floor was raised, and from which figure.
@@ -102,7 +102,7 @@ pub fn merge(
     (records, broken)
 }
 
-/// Makes docs/guarantees.md of docs/guarantees.json; measures nothing. A record keeps the words under which its
+/// Makes docs/guarantees.md from docs/guarantees.json, without a measurement. A record keeps the words under which its
 /// figure was measured.
 pub fn render() -> Result<()> {
     save(&committed()?)
@@ -120,8 +120,8 @@ fn save(records: &[Record]) -> Result<()> {
     Ok(())
 }
 
-/// Whether every promise was measured and is in the documents, no golden figure is above its floor by more
-/// than its tolerance, and the documents agree.
+/// Checks that every promise was measured and is in the documents, that no golden figure is above its floor by more
+/// than its tolerance, and that the documents agree.
 pub fn compare(measured: &Measured) -> Result<()> {
     let before = committed()?;
     let mut broken = Vec::new();
@@ -167,7 +167,7 @@ impl Record {
         }
     }
 
-    /// With the floor of the record before it, or an error that says how far it is above that.
+    /// With the floor of the previous record, or an error that states the excess over it.
     fn above(mut self, before: Option<&Self>, raise: Raise<'_>) -> Result<Self, String> {
         let (Some(now), Some(before)) = (self.floor, before) else { return Ok(self) };
         let Some(floor) = before.floor.or(before.figure.as_f64()) else { return Ok(self) };

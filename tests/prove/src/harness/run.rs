@@ -1,4 +1,4 @@
-//! When, where and of which commit something was measured.
+//! Time, machine and commit of a measurement.
 
 use std::process::Command;
 use std::time::Duration;
@@ -22,7 +22,7 @@ pub struct Run {
 }
 
 impl Run {
-    /// The one that has just begun.
+    /// The run that has just begun.
     pub fn now(size: String) -> Self {
         let dirty = said("git", &["status", "--porcelain", "--", ".", ":!docs"]);
         let dirty = if dirty.is_empty() { "" } else { "-dirty" };
@@ -36,12 +36,12 @@ impl Run {
         }
     }
 
-    /// Whether figures of both may stand side by side as those of one recording: all but the date is the same.
+    /// Whether figures of both count as one recording: all but the date is the same.
     pub fn is_of_the_same(&self, other: &Self) -> bool {
         Self { date: other.date.clone(), ..self.clone() } == *other
     }
 
-    /// Whether it is of a commit that can be had again, and of more than a run of the tests tries.
+    /// Whether it is of a clean commit, and of more cases than a run of the tests.
     pub fn is_whole(&self) -> bool {
         self.size != "test" && !self.commit.ends_with("-dirty") && self.commit != UNKNOWN
     }
@@ -52,7 +52,7 @@ impl Run {
     }
 }
 
-/// Stands for a fact that cannot be had.
+/// Stands for a fact that is not available.
 pub const UNKNOWN: &str = "unknown";
 
 /// The processor, its cores, and the operating system.

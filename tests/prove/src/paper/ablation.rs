@@ -14,7 +14,7 @@ use super::subjects;
 /// The stream of this experiment.
 const SEED: u64 = 2_000;
 
-/// A tree and how it is asked.
+/// A tree and its queries' options.
 struct Variant {
     name: &'static str,
     tree: BuiltTree,
@@ -90,7 +90,7 @@ fn one(plan: &Plan, name: &str, mesh: &Mesh, records: &mut Records) -> Result<()
         &format!("ablation, {name} of {size} triangles"),
         plan.ablation_queries as u64,
     );
-    // Each tool races on its own, so that a warm start is from the same tool's last query.
+    // Each tool has a separate race, so that a warm start is from the same tool's last query.
     for (tool, tool_name) in TOOLS.into_iter().enumerate() {
         let mut race = Race::new(variants.iter().map(Variant::contender).collect(), 1);
         let mut frames = Frames::new(&variants[0].tree);

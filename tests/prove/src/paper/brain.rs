@@ -102,7 +102,7 @@ fn one(plan: &Plan, subject: &Subject, count: usize, records: &mut Records) -> R
     Ok(())
 }
 
-/// Refused frames in a row after which the mesh, not the strength of its deformations, is to blame.
+/// Refused frames in a row after which the mesh, not the strength of its deformations, is the cause.
 const MOST_REFUSED: usize = 1_000;
 
 /// Frames that keep to the limit, and their stretches.
@@ -120,7 +120,7 @@ impl<'t> Frames<'t> {
     /// The stream's next frame within the tree's limit, with its tools.
     ///
     /// # Errors
-    /// Where frame after frame is beyond the limit, which says that the tree refuses the mesh itself.
+    /// If all frames are beyond the limit, so that the tree refuses the mesh itself.
     pub fn next(&mut self, stream: &mut Stream<'_>) -> Result<(&[Vec3], [Probe; 2])> {
         for _ in 0..MOST_REFUSED {
             stream.deform(&mut self.positions);
@@ -134,7 +134,7 @@ impl<'t> Frames<'t> {
     }
 }
 
-/// The hybrid's best split level: that of the least mean total over both tools, on a stream of its own.
+/// The hybrid's best split level: that of the least mean total over both tools, on a separate stream.
 fn split_level(ours: &BuiltTree, mesh: &dibs_build::Mesh, boxes: &AabbTree) -> Result<u32> {
     let deepest = mesh.triangles.len().ilog2().saturating_sub(2);
     let levels: Vec<u32> = (1..=deepest).collect();

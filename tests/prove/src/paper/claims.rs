@@ -1,7 +1,7 @@
 //! `docs/paper.md`: the paper's numbers, each beside this run's.
 //!
-//! The paper's are typed here, from its tables; this run's come from the records; the verdicts are worked
-//! out from both.
+//! The paper's numbers are typed here, from its tables; this run's come from the records; the verdicts follow from
+//! both.
 
 use std::fmt::Write;
 
@@ -43,7 +43,7 @@ const HEART: [(&str, f64); 4] =
 /// Counts agree within this factor: the meshes and the deformations are not the paper's.
 const COUNT_FACTOR: f64 = 1.5;
 
-/// Growth with the mesh's size to a power below this is far slower than the mesh's.
+/// Growth with a power of the mesh's size below this counts as far slower than the mesh's.
 const SUBLINEAR: f64 = 0.75;
 
 /// The page.
@@ -72,8 +72,8 @@ pub fn paper(records: &Records) -> String {
     page
 }
 
-/// A record of tables 1 and 2 or of what is made from them, by the paper's size: the brains' sizes are
-/// the paper's within a few triangles.
+/// A record of tables 1 and 2 or derived from them, by the paper's size: the brains' sizes are the paper's within a few
+/// triangles.
 fn at<'a>(
     records: &'a Records,
     experiment: &str,

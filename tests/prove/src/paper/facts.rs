@@ -40,7 +40,7 @@ pub fn run(plan: &Plan, options: &Options, records: &mut Records) {
     records.push(Record::number(&cell, "", "clock", clock(), "us"));
 }
 
-/// The part of the demo's report that is needed here.
+/// The part of the demo's report that is used here.
 #[derive(Deserialize)]
 struct Demo {
     ticks: u64,

@@ -11,7 +11,7 @@ use super::record::{Cell, Record, Records};
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// A colour that the colour-blind can tell from the others (Okabe and Ito).
+/// A colour that the colour-blind can distinguish from the others (Okabe and Ito).
 fn colour(method: &str) -> RGBColor {
     match method {
         DIBS => RGBColor(0, 114, 178),
@@ -99,7 +99,7 @@ fn total_against_size(area: &Area<'_>, records: &Records, tool: &str) -> Result<
     chart(area, &caption, &axes, &lines(tool), &[], SeriesLabelPosition::UpperLeft)
 }
 
-/// Figure 6: how often a surface may move before not refitting is faster.
+/// Figure 6: the rate of motion above which not refitting is faster.
 fn crossovers(area: &Area<'_>, records: &Records, ours: &str, tool: &str) -> Result<()> {
     let peers = [REFIT, HYBRID, OBVHS, PARRY_BVH, PARRY_TRIMESH];
     let lines = |ours, tool| peers.map(|m| (m, line(records, "crossover", tool, ours, m)));
@@ -114,7 +114,7 @@ fn crossovers(area: &Area<'_>, records: &Records, ours: &str, tool: &str) -> Res
 /// A method and its line.
 type Line = (&'static str, Vec<(f64, f64)>);
 
-/// What all panels of a sheet show, so that they can be compared, whatever the lines of one leave out.
+/// The common axes of all panels of a sheet, so that they can be compared.
 struct Axes {
     sizes: Vec<f64>,
     values: Vec<f64>,
@@ -204,7 +204,7 @@ fn right_above() -> Pos {
     Pos::new(HPos::Right, VPos::Bottom)
 }
 
-/// A number without noughts behind the point.
+/// A number without trailing zeros.
 fn number(value: f64) -> String {
     let text = format!("{value:.5}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

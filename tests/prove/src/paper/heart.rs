@@ -14,11 +14,11 @@ use super::record::{Cell, Record, Records};
 use super::statistics::{Summary, repeatable_worst};
 use super::subjects::{self, Heart};
 
-/// Spared above the largest stretch of a recorded motion.
+/// Margin above the largest stretch of a recorded motion.
 const MARGIN: f32 = 1.02;
-/// Beyond any motion: the limit of the tree that finds what a motion needs.
+/// A limit beyond any motion, for the tree that measures a motion's stretch.
 const ANY_STRETCH: f32 = 1_000.0;
-/// Ticks between the ones that train the hybrid's split level: a prime, so that they are from everywhere.
+/// Ticks between those that train the hybrid's split level: a prime, so that they spread over the beat.
 const TRAINING_STRIDE: u32 = 97;
 
 pub fn run(plan: &Plan, records: &mut Records) -> Result<()> {

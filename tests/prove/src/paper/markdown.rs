@@ -52,7 +52,7 @@ const DISTRIBUTION: &str = "\n## Node tests of each query\n\n\
     On a microcontroller the time of a query is its tests. The worst case of the run is marked.\n\n\
     ![node tests](figures/node-tests.svg)\n";
 
-/// Where a table's records are.
+/// The records of a table.
 struct Of<'a>(&'a Records, &'a str, &'a str, u64, &'a str);
 
 impl<'a> Of<'a> {

@@ -1,9 +1,7 @@
-//! Methods side by side on one stream, interleaved in one process, so that whatever slows the machine
-//! slows all of them.
+//! Methods side by side on one stream, interleaved in one process, so that a slower machine slows all of them.
 //!
-//! They take turns of a few steps rather than of one: a method that waits for ten others at every step
-//! finds its data evicted from the caches, which no controller does to it. The first step of a turn is
-//! done once before it is timed.
+//! They take turns of a few steps rather than of one: a method that waits for ten others at every step would find its
+//! data evicted from the caches, unlike in a controller. The first step of a turn is run once before it is timed.
 
 use std::time::Instant;
 
@@ -17,12 +15,12 @@ use super::statistics::Summary;
 /// The purpose of a method's `update`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Update {
-    /// Nothing is done.
+    /// No work.
     Nothing,
     /// Boxes are refitted: part of the total.
     Refit,
-    /// The stretch is measured: a column of its own, and a total of its own, because in a controller
-    /// the vertex path does it when a frame arrives.
+    /// The stretch is measured: in a separate column and total, because in a controller this is done when a frame
+    /// arrives.
     Measure,
 }
 
@@ -31,9 +29,9 @@ pub struct Contender<'a> {
     pub name: &'static str,
     pub method: Box<dyn Method + 'a>,
     pub update: Update,
-    /// Takes part in each of this many steps: more than 1 for what is too slow.
+    /// Takes part in one of this many steps: more than 1 for slow methods.
     pub every: usize,
-    /// How far its answers may be from the others', in mm.
+    /// Largest difference of its answers from the others', in mm.
     pub tolerance: f32,
 }
 
@@ -69,8 +67,8 @@ impl<'a> Contender<'a> {
             });
             samples.update.push(took);
             if self.update == Update::Measure && measured.is_none() {
-                // A frame is measured where it arrives, not in the tick of a query: the query finds the
-                // caches as the vertices' arrival left them. One measurement serves every tool.
+                // A frame is measured when it arrives, not in the tick of a query, so the query finds the caches as the
+                // vertices' arrival left them. One measurement serves every tool.
                 self.method.load(&step.positions);
                 measured = Some(took);
             }
@@ -145,16 +143,15 @@ impl<'a> Race<'a> {
         Ok(())
     }
 
-    /// Adds a step: every method takes the frame in, and for every tool updates itself and answers. The
-    /// separations must agree.
+    /// Adds a step: every method loads the frame, and for every tool updates itself and answers. The separations must
+    /// agree.
     pub fn step(&mut self, positions: &[Vec3], tools: &[Probe]) -> Result<()> {
         let reference = vec![None; tools.len()];
         self.waiting.push(Step { positions: positions.to_vec(), tools: tools.to_vec(), reference });
         if self.waiting.len() == TURN { self.finish() } else { Ok(()) }
     }
 
-    /// Does the steps that wait. Who comes first changes from turn to turn, and which tool from step to
-    /// step.
+    /// Runs the waiting steps. The first method changes from turn to turn, and the first tool from step to step.
     pub fn finish(&mut self) -> Result<()> {
         let mut steps = std::mem::take(&mut self.waiting);
         let count = self.contenders.len();

@@ -74,7 +74,7 @@ pub fn run(plan: &Plan, options: &Options) -> Result<Records> {
     Ok(records)
 }
 
-/// Everything that is made from the records: file names, below the folder of the records, and contents.
+/// All documents made from the records: file names, below the folder of the records, and contents.
 pub fn documents(records: &Records) -> Result<Vec<(String, String)>> {
     let mut documents = vec![
         ("benchmarks.md".to_owned(), markdown::benchmarks(records)),
@@ -84,7 +84,7 @@ pub fn documents(records: &Records) -> Result<Vec<(String, String)>> {
     Ok(documents)
 }
 
-/// Writes the records and all that is made from them.
+/// Writes the records and the documents made from them.
 pub fn write(records: &Records, folder: &Path) -> Result<()> {
     let json = ("benchmarks.json".to_owned(), records.json()?);
     std::fs::create_dir_all(folder.join("figures"))

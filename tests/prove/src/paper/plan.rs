@@ -1,4 +1,4 @@
-//! How much is run, and how far it is.
+//! The size of a run, and its progress.
 
 use std::path::PathBuf;
 
@@ -28,7 +28,7 @@ pub struct Options {
     pub no_board: bool,
 }
 
-/// How much is run.
+/// The size of a run.
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub name: &'static str,
@@ -82,7 +82,7 @@ impl Plan {
         }
     }
 
-    /// Seconds: everything runs, nothing is worth quoting.
+    /// Takes seconds: every experiment runs, but no figure is worth quoting.
     pub fn smoke() -> Self {
         Self {
             name: "smoke",
@@ -111,11 +111,11 @@ impl Plan {
     }
 }
 
-/// A progress bar on standard error, where that is a terminal.
+/// A progress bar on standard error, if that is a terminal.
 pub struct Progress(ProgressBar);
 
 impl Progress {
-    /// A bar of `length` steps, or without a length something that turns.
+    /// A bar of `length` steps, or without a length a spinner.
     pub fn start(what: &str, length: u64) -> Self {
         let bar = if length == 0 {
             ProgressBar::new_spinner()

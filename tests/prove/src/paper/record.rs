@@ -1,4 +1,4 @@
-//! The flat list of records that everything else is made from.
+//! The flat list of records, from which all documents are made.
 
 use std::path::Path;
 
@@ -68,7 +68,7 @@ impl Record {
     }
 }
 
-/// Where in the experiments a record belongs.
+/// The place of a record in the experiments.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cell {
     pub experiment: String,
@@ -84,7 +84,7 @@ impl Cell {
     }
 }
 
-/// Five significant digits: no measurement is better, and a diff stays readable.
+/// Rounds to five significant digits: no measurement is better, and a diff stays readable.
 fn short(value: f64) -> f64 {
     format!("{value:.4e}").parse().unwrap_or(value)
 }
@@ -100,7 +100,7 @@ impl Records {
         Ok(Self(serde_json::from_str(&text).with_context(|| format!("{name} is not a run's"))?))
     }
 
-    /// One record a line, so that a diff shows what changed.
+    /// One record a line, so that a diff shows the changes.
     pub fn json(&self) -> Result<String> {
         let lines: Vec<String> =
             self.0.iter().map(serde_json::to_string).collect::<Result<_, _>>()?;

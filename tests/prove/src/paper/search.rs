@@ -1,7 +1,7 @@
-//! The paper's own search on the paper's own construction, counted: the polygon tests of tables 1 and 2.
+//! Counts of the paper's search on the paper's construction: the polygon tests of tables 1 and 2.
 //!
-//! On the frames and tools of those tables. Counts are exact, so they may be recorded apart from the times
-//! (`--paper-search`); each carries the commit that it was counted at.
+//! They are made on the frames and tools of those tables. Counts are exact, so they may be recorded apart from the
+//! times (`--paper-search`); each names its commit.
 
 use anyhow::{Result, ensure};
 use dibs_build::{Builder, Construction};

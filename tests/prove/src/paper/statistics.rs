@@ -1,12 +1,12 @@
 //! Statistics of times: skewed, with outliers, and paired.
 //!
-//! The paper compares mean times by one-way ANOVA and Tukey's test. Those assume independent groups,
-//! equal variances and normal residuals. Here all methods answer the same queries on the same frames,
-//! variances differ by orders of magnitude, and an interrupt may make any query a hundred times slower.
-//! So: medians with order-statistic confidence intervals; the *ratio* of two methods' times on the same
-//! query; and the exact sign test on it, which assumes nothing but that queries are independent (they
-//! are: frame and pose are drawn anew for each), adjusted for many comparisons after Holm. With
-//! thousands of queries every difference is significant: the ratio and its interval matter.
+//! The paper compares mean times by one-way ANOVA and Tukey's test. Those assume independent groups, equal variances
+//! and normal residuals. Here all methods answer the same queries on the same frames, variances differ by orders of
+//! magnitude, and an interrupt may make any query a hundred times slower. So the benchmark states medians with
+//! order-statistic confidence intervals, the *ratio* of two methods' times on the same query, and the exact sign test
+//! on it, which assumes only that queries are independent (they are: frame and pose are drawn anew for each), adjusted
+//! for many comparisons after Holm. With thousands of queries every difference is significant: the ratio and its
+//! interval matter.
 
 use statrs::distribution::{Binomial, DiscreteCDF};
 
@@ -48,7 +48,7 @@ impl Summary {
         }
     }
 
-    /// A number that was not sampled.
+    /// The summary of an exact number.
     pub fn exactly(value: f64) -> Self {
         let (median_low, median_high) = (value, value);
         let (mean, median, p99, max) = (value, value, value, value);
@@ -61,8 +61,8 @@ fn middle(sorted: &[f64]) -> f64 {
     if sorted.len() % 2 == 1 { sorted[half] } else { (sorted[half - 1] + sorted[half]) / 2.0 }
 }
 
-/// The ranks (from 0) of the order statistics that enclose the median with 95 % confidence, whatever the
-/// distribution: of `n` values, the number below the median is binomial.
+/// The ranks (from 0) of the order statistics that enclose the median with 95 % confidence, for any distribution: of
+/// `n` values, the number below the median is binomial.
 fn median_ranks(n: usize) -> (usize, usize) {
     let Ok(below) = Binomial::new(0.5, n as u64) else { return (0, n - 1) };
     let low = (below.inverse_cdf(0.025) as usize).saturating_sub(1);
@@ -95,7 +95,7 @@ impl Paired {
     }
 }
 
-/// Adjusts p values for being many (Holm 1979): in the order given.
+/// Adjusts p values for multiple comparisons (Holm 1979), in the given order.
 pub fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|&a, &b| p[a].total_cmp(&p[b]));
@@ -138,8 +138,8 @@ pub fn crossover(ours: &[f64], traversal: &[f64], refit: &[f64], seed: u64) -> S
     Summary { median_low, median_high, n: n as u64, ..Summary::exactly(value) }
 }
 
-/// The slowest tick: each tick's time is its fastest repetition's, because a tick that was slow once was
-/// interrupted, and a tick that is slow every time is slow.
+/// The slowest tick, where each tick's time is that of its fastest repetition: a tick that was slow once was
+/// interrupted.
 pub fn repeatable_worst(times: &[f64], ticks: usize) -> f64 {
     let fastest =
         |tick: usize| times[tick..].iter().step_by(ticks).copied().fold(f64::MAX, f64::min);

@@ -1,11 +1,11 @@
-//! The surfaces: real anatomy where it is, generated elsewhere.
+//! The surfaces: real anatomy if present, else generated.
 
 use anyhow::{Context, Result};
 use dibs_build::{Mesh, Motion, generate};
 
 use crate::data::real;
 
-/// A surface and where it is from.
+/// A surface and its source.
 pub struct Subject {
     pub name: String,
     pub mesh: Mesh,
@@ -16,7 +16,7 @@ pub struct Heart {
     pub name: String,
     pub mesh: Mesh,
     pub motion: Motion,
-    /// The limit that the motion obeys, or `None` where it must be found.
+    /// The limit that the motion obeys, or `None` if it must be measured.
     pub stretch: Option<f32>,
 }
 
@@ -37,7 +37,7 @@ pub fn brain(triangles: u32) -> Result<Subject> {
     Ok(Subject { name: "generated brain".to_owned(), mesh })
 }
 
-/// The generated heart, and the real one where it is.
+/// The generated heart, and the real one if present.
 pub fn hearts(triangles: u32) -> Result<Vec<Heart>> {
     let generate::MovingMesh { mesh, motion } =
         generate::heart(triangles).context("generating a heart")?;

@@ -18,13 +18,13 @@ use xtask::{qemu, valgrind, workspace};
 
 use self::script::{Record, Script};
 
-/// One answer: its words, of which the first is its time on the clock.
+/// One answer: its words, the first of which is its time on the clock.
 pub struct Answer<'a> {
     /// The question.
     pub record: Record,
     /// The answers.
     pub words: &'a [u32],
-    /// Instructions that it took, where they were counted.
+    /// Its instructions, if counted.
     pub instructions: u32,
 }
 
@@ -34,7 +34,7 @@ impl Answer<'_> {
         [self.words[1].saturating_sub(1), self.words[2]]
     }
 
-    /// Everything that must be the same wherever it was answered.
+    /// The bits that must be the same on every machine.
     pub fn bits(&self) -> &[u32] {
         &self.words[1..]
     }
@@ -44,7 +44,7 @@ impl Answer<'_> {
 pub struct Answers {
     words: Vec<u32>,
     records: Vec<Record>,
-    /// Instructions of each query, where callgrind counted them.
+    /// Instructions of each query, if callgrind counted them.
     counts: Option<Vec<u32>>,
 }
 
@@ -79,7 +79,7 @@ fn length(record: Record) -> usize {
     }
 }
 
-/// The toolchain of the board, where there is an emulator too.
+/// The toolchain of the board, if there is an emulator too.
 pub fn board() -> Result<Cross> {
     let cross = Cross::find()?;
     qemu::find()?;
@@ -129,8 +129,8 @@ pub fn padded(bytes: &[u8]) -> impl Iterator<Item = u32> {
     })
 }
 
-/// How often each instruction of the functions between these addresses is executed while a script is
-/// answered: QEMU is told to execute one at a time, and to log them.
+/// The number of executions of each instruction between these addresses while a script is answered: QEMU executes one
+/// at a time, and logs it.
 pub fn executions(
     program: &Path,
     script: &Script,
@@ -143,7 +143,7 @@ pub fn executions(
         .map(|range| format!("0x{:x}..0x{:x}", range.start, range.end.saturating_sub(1)))
         .collect();
     let mut qemu = qemu::alone(program, Time::Real, &[]);
-    // Since QEMU 8.1 the option has another name, and since 9 the old one is gone.
+    // QEMU 8.1 renamed the option, and 9 removed the old name.
     if qemu_major()? >= 9 {
         qemu.args(["-accel", "tcg,one-insn-per-tb=on"]);
     } else {
@@ -176,7 +176,7 @@ fn qemu_major() -> Result<u32> {
 pub enum Build {
     Debug,
     Release,
-    /// For the very processor of this computer, with all of its instructions.
+    /// For this computer's processor, with all of its instructions.
     Native,
 }
 
@@ -205,8 +205,7 @@ impl Build {
         let profile = files.path().join("profile");
         let mut valgrind = Command::new("valgrind");
         valgrind.args(["--quiet", "--tool=callgrind", "--dump-line=no", "--combine-dumps=yes"]);
-        // Counted is what is below the function that asks; each time that it begins, so does a part of the
-        // profile.
+        // Counts the calls below `clocked`; each call of it begins a part of the profile.
         valgrind.args(["--collect-atstart=no", "--toggle-collect=probe::clocked"]);
         valgrind.arg("--dump-before=probe::clocked");
         valgrind.arg(format!("--callgrind-out-file={}", profile.display()));
@@ -219,7 +218,7 @@ impl Build {
         }
         let queries = script.queries();
         ensure!(counts.len() == queries + 1, "{} counts of {queries} queries", counts.len());
-        // The first part comes before the first query.
+        // The first part is before the first query.
         answers.counts = Some(counts.split_off(1));
         Ok(answers)
     }
@@ -248,7 +247,7 @@ impl Build {
     }
 }
 
-/// Has a program of this computer answer a script.
+/// Lets a program of this computer answer a script.
 fn answer(program: &mut Command, folder: &Path, script: &Script) -> Result<Answers> {
     let (script_file, answers) = (folder.join("script"), folder.join("answers"));
     fs::write(&script_file, script.bytes())?;

@@ -15,11 +15,11 @@ use fastrand::Rng;
 use glam::Vec3;
 use probe::{command, how};
 
-/// A script, and how many queries are in it.
+/// A script, and the kinds of its answers.
 #[derive(Default)]
 pub struct Script {
     words: Vec<u32>,
-    /// How every query is asked, besides with the measured stretch or without.
+    /// The options of every query, besides the measured stretch.
     how: u32,
     /// The kind of each answer, by its place.
     pub records: Vec<Record>,
@@ -57,7 +57,7 @@ pub enum Draw {
     EitherWay,
     /// Without a budget: the whole search.
     Exhausting,
-    /// With a budget of a few tests, so that the dearest of them shows.
+    /// With a budget of a few tests, so that the costliest of them shows.
     Short,
     /// With a budget made for a random number of instructions, at these costs of a sphere and a capsule.
     Deadline([Cost; 2]),
@@ -66,13 +66,13 @@ pub enum Draw {
 /// A query's prior knowledge.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Knows {
-    /// Nothing: cold, with the tree's limit on stretch.
+    /// None: cold, with the tree's limit on stretch.
     Nothing,
-    /// The last tick's triangle, and the measured stretch of its own frame.
+    /// The last tick's triangle, and the frame's measured stretch.
     Everything,
 }
 
-/// What a query is asked for.
+/// The outputs of a query.
 #[derive(Clone, Copy)]
 pub enum Asks {
     /// The unsigned distance.
@@ -93,7 +93,7 @@ impl Asks {
     }
 }
 
-/// A surface to ask about, and the most triangles of a leaf of its tree.
+/// A surface, and the most triangles of a leaf of its tree.
 pub struct Subject {
     pub name: &'static str,
     mesh: Mesh,
@@ -107,8 +107,8 @@ impl Subject {
 }
 
 impl Script {
-    /// Small surfaces of every kind in every deformation, with tools where it hurts: near, on and inside,
-    /// at centres and middle planes, where all distances are equal.
+    /// Small surfaces of every kind in every deformation, with adversarial tools: near, on and inside, at centres and
+    /// middle planes, where all distances are equal.
     pub fn adversarial(queries: usize, draw: Draw, seed: u64) -> Self {
         let subjects = [
             Subject::new("heart", generate::heart(1_280).expect("a valid size").mesh, 8),
@@ -119,7 +119,7 @@ impl Script {
         Self::about_all(&subjects, false, queries, draw, seed)
     }
 
-    /// The same about these surfaces; `wandering`: with half of the tools wandering about the surface.
+    /// The same about these surfaces; with `wandering`, half of the tools wander around the surface.
     pub fn about_all(
         subjects: &[Subject],
         wandering: bool,
@@ -130,7 +130,7 @@ impl Script {
         let mut rng = Rng::with_seed(seed);
         let mut script = Self::default();
         let of_each = queries.div_ceil(subjects.len());
-        // Few enough of a frame that every mesh has every deformation, twice.
+        // Few enough queries of a frame that every mesh has every deformation twice.
         let of_frame = (of_each / (2 * Deformation::ALL.len())).clamp(1, 100);
         for Subject { mesh, leaf, .. } in subjects {
             let built = build(mesh, *leaf);
@@ -159,7 +159,7 @@ impl Script {
         (script, built, motion)
     }
 
-    /// The heart of the firmware in its motion, and a tool that wanders about it: the usual case.
+    /// The heart of the firmware in its motion, and a tool that wanders around it: the usual case.
     pub fn usual(queries: usize, seed: u64) -> Self {
         let mut rng = Rng::with_seed(seed);
         let (mut script, built, motion) = Self::heart();
@@ -205,7 +205,7 @@ impl Script {
         script
     }
 
-    /// The same heart in its motion, with capsules where it hurts: on, in, through and far from it.
+    /// The same heart in its motion, with adversarial capsules: on, in, through and far from it.
     pub fn poses(queries: usize, asks: Asks, seed: u64) -> Self {
         let mut rng = Rng::with_seed(seed);
         let (mut script, built, motion) = Self::heart();
@@ -225,8 +225,8 @@ impl Script {
         script
     }
 
-    /// A heart with this many modes: each frame as rows, as weights, and as weights with a memory of
-    /// positions, and the same queries of each.
+    /// A heart with this many modes: each frame as rows, as weights, and as weights with a cache of positions, and the
+    /// same queries on each.
     pub fn modal(modes: usize, queries: usize, seed: u64) -> Self {
         let mut rng = Rng::with_seed(seed);
         let (mesh, motion) = trembling(10_272, modes.div_ceil(2), seed);
@@ -298,7 +298,7 @@ impl Script {
             } else {
                 pose(&rows, &triangles, rng)
             };
-            // A capsule of length zero is one too.
+            // A capsule of length zero is a capsule too.
             let is_capsule = tool.start != tool.end || rng.u32(..8) == 0;
             let warm = if rng.bool() { u32::MAX } else { rng.u32(..tree.triangle_count() + 2) };
             let measured = rng.bool();
@@ -363,7 +363,7 @@ impl Script {
     }
 }
 
-/// A tool that wanders about a surface: a sphere and a capsule by turns.
+/// A tool that wanders around a surface: a sphere and a capsule in turn.
 fn about(rows: &[Vec3], triangles: &[[u32; 3]], number: usize, rng: &mut Rng) -> Instrument {
     let [a, ..] = triangles[rng.usize(..triangles.len())].map(|v| rows[v as usize]);
     let away = a.normalize_or(Vec3::Z) * 60.0 * rng.f32();

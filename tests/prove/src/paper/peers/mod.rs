@@ -1,4 +1,4 @@
-//! The libraries that a user would pick instead today.
+//! Today's alternative libraries.
 
 mod obvhs;
 mod parry_bvh;

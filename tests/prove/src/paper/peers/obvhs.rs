@@ -1,5 +1,5 @@
-//! obvhs 0.4: its tree, its `refit_all`, and an exact closest-point traversal of its nodes (it has
-//! none itself), with the kernels and bounds that our own baselines use.
+//! obvhs 0.4: its tree, its `refit_all`, and an exact closest-point traversal of its nodes (it has none itself), with
+//! the kernels and bounds of our baselines.
 
 use std::time::Duration;
 
@@ -21,7 +21,7 @@ pub struct Obvhs {
     /// In the order of the tree's primitives.
     rows: Rows,
     leaves: Vec<u32>,
-    /// The vertices of each leaf, each once, and where each leaf's end.
+    /// The vertices of each leaf, each once, and the end of each leaf's.
     leaf_vertices: Vec<u32>,
     leaf_end: Vec<u32>,
 }
@@ -34,7 +34,7 @@ impl Obvhs {
             .iter()
             .map(|&[a, b, c]| Triangle { v0: at(a), v1: at(b), v2: at(c) })
             .collect();
-        // Splitting triangles is for rays: it puts one triangle into several leaves.
+        // Splitting is for rays: it puts one triangle into several leaves.
         let parameters = BvhBuildParams { pre_split: false, ..BvhBuildParams::slow_build() };
         let mut tree = build_bvh2_from_tris(&soup, parameters, &mut Duration::default());
         tree.reorder_in_stack_traversal_order();

@@ -1,4 +1,4 @@
-//! parry3d 0.31's `Bvh` driven by hand: its tree and refit, exact bounds and kernels.
+//! parry3d 0.31's `Bvh`, used directly: its tree and refit, exact bounds and kernels.
 
 use std::cell::Cell;
 
