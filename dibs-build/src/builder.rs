@@ -170,7 +170,7 @@ impl<'p> Builder<'p> {
     }
 
     /// Builds the tree of a [`Mesh`], or of an [`Import`](crate::Import) whose rounding to f32 then counts in the
-    /// accuracy of every answer. The same mesh and options give the same bytes, whatever the threads.
+    /// accuracy of every answer. The same mesh and options give the same bytes with any number of threads.
     ///
     /// Cost: `O(n log^2 n)` for `n` triangles, on all cores.
     ///

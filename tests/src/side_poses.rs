@@ -124,7 +124,7 @@ impl AddAssign for Tally {
 /// Poses judged together on one shape of a surface.
 pub const POSES_OF_A_FRAME: usize = 100;
 
-/// Judges poses on one shape of a surface; prints those that are wrong.
+/// Judges poses on one shape of a surface; prints the wrong ones.
 ///
 /// # Panics
 /// If a query fails, or a side is undefined for another reason than the accuracy.

@@ -1,4 +1,4 @@
-//! How deep a capsule's axis reaches below the surface that it crosses.
+//! The depth of a capsule's axis below the surface that it crosses.
 //!
 //! The depth along the axis, positive inside and negative outside, changes by at most the length moved, and is at most
 //! the distance to any one triangle of the surface. That distance is convex along the axis, so the triangles closest to

@@ -1,8 +1,8 @@
 //! Normals of the surface as it is now, at a face, an edge or a vertex.
 //!
-//! The sign of `(p - c) . n` tells the side of a point `p` whose closest point is `c`, if `n` is the angle-weighted
-//! pseudonormal there (Bærentzen & Aanæs, "Signed distance computation using the angle weighted pseudonormal",
-//! IEEE TVCG 11(3), 2005).
+//! The sign of `(p - c) . n` is the side of a point `p` whose closest point is `c`, if `n` is the angle-weighted
+//! pseudonormal there (Bærentzen & Aanæs, "Signed distance computation using the angle weighted pseudonormal", IEEE
+//! TVCG 11(3), 2005).
 
 use core::f32::consts::{FRAC_PI_2, PI};
 

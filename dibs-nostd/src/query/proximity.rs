@@ -11,8 +11,8 @@ use crate::TriangleRow;
 /// `[lower - accuracy, separation + accuracy]`; the two ends are equal when the query was not cut
 /// short by its budget.
 ///
-/// Where [`side`](Self::side) is undefined, the tool is taken to be outside: the interval is that of the unsigned
-/// distance less the radius, and too high for a tool that is inside.
+/// If [`side`](Self::side) is undefined, the tool is taken to be outside: the interval is that of the unsigned distance
+/// less the radius, and too high for a tool that is inside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -44,7 +44,7 @@ pub struct Proximity {
     /// capsule's second end passes through the surface.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub direction: Vec3,
-    /// Where along the tool's axis the pair sits: 0 at its start, 1 at its end; 0 for a sphere.
+    /// Parameter of the pair along the tool's axis: 0 at its start, 1 at its end; 0 for a sphere.
     pub axis_parameter: f32,
     /// The triangle of `point_on_surface`. `None` when the budget ran out while a pin was still the best point known;
     /// `corners` then repeats the pin.

@@ -29,7 +29,7 @@ pub struct Swept {
 pub struct Sweep<'s, 'v, W: ?Sized, V: ?Sized, T> {
     /// The surface's frames.
     pub step: &'s Step<'v, W, V>,
-    /// Where between the frames the surface starts and ends, each in 0..=1.
+    /// The surface's start and end between the frames, each in 0..=1.
     pub shares: [f32; 2],
     /// The tool at the start and at the end. On its way it has the larger of their radii.
     pub tools: [T; 2],

@@ -104,8 +104,8 @@ impl core::error::Error for StretchError {}
 /// triangle stretched more than all before it.
 ///
 /// # Errors
-/// [`StretchError::Exceeded`] names the first triangle beyond its limit; the others say why nothing
-/// could be measured.
+/// [`StretchError::Exceeded`] names the first triangle beyond its limit; the others name the cause of a missing
+/// measurement.
 pub fn measure_stretch<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     vertices: &V,

@@ -66,7 +66,7 @@ const _: () = assert!(REGIONS == u32::BITS as usize);
 #[derive(Clone, Debug)]
 pub struct StretchMonitor<'t, I> {
     tree: &'t Tree<'t, I>,
-    /// Which regions have corners in each block of `1 << block_shift` vertex rows.
+    /// The regions with corners in each block of `1 << block_shift` vertex rows.
     touched: [u32; BLOCKS],
     block_shift: u8,
     changed: Changed,

@@ -97,7 +97,7 @@ impl<'a, I: Index> Tree<'a, I> {
         }
     }
 
-    /// Checksum of all of the tree's bytes: tells this tree from another one of the same mesh.
+    /// Checksum of all of the tree's bytes, which differs between two trees of one mesh.
     #[must_use]
     pub const fn checksum(&self) -> u32 {
         self.header.checksum

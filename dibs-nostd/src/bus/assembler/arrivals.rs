@@ -34,7 +34,7 @@ pub(super) struct Arrivals {
     prefix: Contig,
     /// The others, in no order.
     others: [Contig; GAPS],
-    /// How many of these are in use.
+    /// Number of these in use.
     used: u8,
     /// Rows must follow each other without a gap.
     is_exact: bool,

@@ -31,15 +31,15 @@ pub struct Begin {
     pub session: u32,
     /// The contents of the frame.
     pub content: Content,
-    /// How its positions are written.
+    /// The encoding of its positions.
     pub encoding: Encoding,
     /// Vertices of the surface; in a modal frame, weights.
     pub rows: u32,
-    /// How fresh the frame was when this packet was made.
+    /// The frame's freshness when this packet was made.
     pub freshness: Freshness,
 }
 
-/// How fresh a frame was when its sender made the begin packet.
+/// The freshness of a frame when its sender made the begin packet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Freshness {
@@ -67,7 +67,7 @@ pub enum Content {
     Modal,
 }
 
-/// How a frame's positions are written.
+/// The encoding of a frame's positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Encoding {

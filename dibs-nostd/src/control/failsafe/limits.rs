@@ -153,7 +153,7 @@ impl Limits {
         self.age
     }
 
-    /// How far tissue moves within an age, in mm, rounded up.
+    /// Distance that tissue may move within an age, in mm, rounded up.
     #[must_use]
     pub fn margin(&self, age: u32) -> f32 {
         // Conversion and product each round by at most half an epsilon.

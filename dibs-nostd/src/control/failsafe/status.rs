@@ -45,7 +45,7 @@ struct Stamp {
     /// 1 once one came.
     came: AtomicU32,
     at: AtomicU32,
-    /// The reader's: the stamp that it looked at last, and its age.
+    /// The reader's state: the stamp that it last read, and that stamp's age.
     aged: AtomicU32,
     oldest: AtomicU32,
 }

@@ -31,7 +31,7 @@ pub struct Contact {
     /// The tool's point of the pair, on the tool's own surface.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub point_on_tool: Vec3,
-    /// Where along the tool's axis the pair sits: 0 at its start, 1 at its end.
+    /// Parameter of the pair along the tool's axis: 0 at its start, 1 at its end.
     pub axis_parameter: f32,
     /// The triangle of `point_on_surface`.
     pub triangle: TriangleRow,
@@ -123,7 +123,7 @@ impl<const N: usize, const NEAR: usize> Default for Contacts<N, NEAR> {
 }
 
 impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
-    /// None yet.
+    /// An empty list.
     #[must_use]
     pub const fn new() -> Self {
         let found = List {
@@ -143,13 +143,13 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         self.found.list.iter().take(self.found.count)
     }
 
-    /// How many there are.
+    /// Number of contacts.
     #[must_use]
     pub const fn len(&self) -> usize {
         self.found.count
     }
 
-    /// Whether there is none.
+    /// Whether there are no contacts.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.found.count == 0

@@ -2,7 +2,7 @@
 //!
 //! With `u = 2^-24`, all lengths in a query are at most the *scale* `S`: the distance to the farthest point of the root
 //! sphere, plus twice the axis and the tool's radius. The errors below are proven, not measured: hill climbing finds
-//! errors of at most 4 `u S`, so no test could tell a slack that is too small. The sums are asserted instead.
+//! errors of at most 4 `u S`, so no test could detect a slack that is too small. The sums are asserted instead.
 
 use crate::tool::ACCURACY as KERNEL;
 
@@ -38,7 +38,7 @@ const ON_AXIS: f32 = 2.0 * U;
 /// Slack of a plane's comparison in units of `C`, since positions enter it as they are. Half of this would do.
 pub(super) const COORDINATES: f32 = 16.0 * U;
 
-/// How far an axis is from perpendicular to the shortest vector to a point, in units of `S`.
+/// An axis' deviation from perpendicular to the shortest vector to a point, in units of `S`.
 const PERPENDICULAR: f32 = 16.0 * U;
 
 /// Slack of a plane's comparison in units of `S^2`: an axis' ends, at most `S / 2` away, are beyond the plane by

@@ -11,7 +11,7 @@ pub(in crate::query) fn is_before(a: u32, b: u32) -> bool {
     (a.wrapping_sub(b) as i32) < 0
 }
 
-/// A node whose children (or, of a leaf, whose triangles) have bounds of their own.
+/// A node whose children (or, of a leaf, whose triangles) have separate bounds.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::query) struct Opened {
     /// The node's children or triangles, as a link; [`UNUSED`] where this place is free.
@@ -73,7 +73,7 @@ pub(in crate::query) struct Front<const OPENED: usize> {
     /// it.)
     due: [u32; OPENED],
     nodes: [Opened; OPENED],
-    /// Places from here on were never used.
+    /// Places from here on are unused since the last clear.
     end: usize,
     /// The first free place below.
     free: u16,
@@ -98,7 +98,7 @@ impl<const OPENED: usize> Front<OPENED> {
     }
 }
 
-/// The front without its size, so that a search is compiled once whatever the size.
+/// The front without its size, so that a search is compiled once for all sizes.
 #[derive(Debug)]
 pub(in crate::query) struct FrontMut<'f> {
     due: &'f mut [u32],
@@ -127,7 +127,7 @@ impl FrontMut<'_> {
         *self.end == 0
     }
 
-    /// How many places were ever used.
+    /// Number of places used since the last [`clear`](Self::clear).
     pub fn used(&self) -> usize {
         *self.end
     }
@@ -153,7 +153,7 @@ impl FrontMut<'_> {
         Some(from + passed + at)
     }
 
-    /// How many nodes are due.
+    /// Number of nodes due.
     pub fn count_due(&self, threshold: u32) -> usize {
         let due = self.due.get(..*self.end).unwrap_or_default();
         due.iter().filter(|&&due| !is_before(threshold, due)).count()

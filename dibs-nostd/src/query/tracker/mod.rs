@@ -215,7 +215,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         Ok(closest)
     }
 
-    /// How far tool and surface moved since the last tick, in units.
+    /// Motion of tool and surface since the last tick, in units.
     #[inline(always)]
     fn moved(&self, tool: &impl Tool, travel: Option<Travel>) -> Result<u32, Fallback> {
         let last = self.last.ok_or(Fallback::Start)?;

@@ -9,7 +9,7 @@ pub struct Metric {
     /// The Gram matrix of the edges from the centre to the other of the first two corners and to the third corner, or
     /// the three squared lengths: see `docs/format.md`.
     pub squares: [f32; 3],
-    /// How the triangle continues the one in the row before.
+    /// The join of the triangle to the one in the row before.
     pub join: Join,
     /// The centre is its second corner, not its first.
     pub is_reversed: bool,

@@ -17,14 +17,14 @@ pub struct Record {
     pub run: Run,
     pub per_fault: u64,
     pub seed: u64,
-    /// Faults that no receiver can tell from the truth.
+    /// Faults that no receiver can detect.
     pub undetectable: [&'static str; 4],
     pub matrix: Vec<Row>,
     pub corruption: Vec<corruption::Row>,
     pub sizes: Vec<sizes::Row>,
 }
 
-/// Faults that no receiver can tell from the truth.
+/// Faults that no receiver can detect.
 pub const UNDETECTABLE: [&str; 4] = [
     "damage after which the CRC-32 is right again: none of up to 32 neighbouring bits, one in 2^32 of \
      the rest; it must then pass the limits on coordinates and stretch too",
