@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::Side;
+use super::{NoSide, Side};
 use crate::TriangleRow;
 
 /// The closest pair between a tool and a surface, with a certified interval for its separation.
@@ -60,6 +60,25 @@ pub struct Proximity {
 }
 
 impl Proximity {
+    /// No pair: what the C interface fills in from a caller's own copy of one.
+    #[doc(hidden)]
+    pub const NOWHERE: Self = Self {
+        separation: f32::NAN,
+        lower: f32::NAN,
+        accuracy: f32::NAN,
+        side: Side::Undefined(NoSide::NotAsked),
+        axis_distance: f32::NAN,
+        point_on_surface: Vec3::NAN,
+        point_on_tool: Vec3::NAN,
+        direction: Vec3::ZERO,
+        axis_parameter: 0.0,
+        triangle: None,
+        corners: [0; 3],
+        barycentric: [0.0; 3],
+        node_tests: 0,
+        triangle_tests: 0,
+    };
+
     /// Whether the budget ran out before the closest point was certain.
     pub(super) fn is_cut_short(&self) -> bool {
         self.triangle.is_none() || self.lower < self.separation

@@ -1,0 +1,1001 @@
+/**
+ * @file
+ * dibs: the closest point between a tool and a deforming mesh, on a microcontroller.
+ */
+/* Generated from dibs-c/src by `DIBS_WRITE=1 cargo test -p dibs-c --test header`. */
+
+
+#ifndef DIBS_H
+#define DIBS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/**
+ * Alignment, in bytes, of the storage of every object.
+ */
+#define DIBS_ALIGNMENT 8
+
+/**
+ * Bytes of a list's storage.
+ */
+#define DIBS_CONTACTS_SIZE 9728
+
+/**
+ * Contacts that a list holds: of more, the deepest.
+ */
+#define DIBS_CONTACTS 16
+
+/**
+ * Triangles that a list looks at together: of more, the nearest.
+ */
+#define DIBS_NEAR 512
+
+/**
+ * Bytes of a frame's storage.
+ */
+#define DIBS_FRAME_SIZE 192
+
+/**
+ * Bytes of a query's storage.
+ */
+#define DIBS_QUERY_SIZE 4480
+
+/**
+ * As much as it takes, for either number of a budget.
+ */
+#define DIBS_UNLIMITED UINT32_MAX
+
+/**
+ * A flag of options: neither answer nor cost depends on earlier queries.
+ */
+#define DIBS_COLD 1
+
+/**
+ * A flag of options: no side is asked for, at the cost of the distance alone. The separation is that of a tool outside.
+ */
+#define DIBS_UNSIGNED 2
+
+/**
+ * In place of a triangle's row: none.
+ */
+#define DIBS_NO_TRIANGLE UINT32_MAX
+
+/**
+ * Bytes of a tree's storage.
+ */
+#define DIBS_TREE_SIZE 384
+
+/**
+ * Bytes of a scrub's storage.
+ */
+#define DIBS_SCRUB_SIZE 128
+
+/**
+ * What a call came to. Numbers do not change from version to version.
+ */
+enum dibs_code
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * No error.
+   */
+  DIBS_CODE_OK = 0,
+  /**
+   * A pointer is null.
+   */
+  DIBS_CODE_NULL = 1,
+  /**
+   * A pointer is not aligned for its type.
+   */
+  DIBS_CODE_MISALIGNED = 2,
+  /**
+   * The storage has fewer bytes than the object's `_SIZE`.
+   */
+  DIBS_CODE_STORAGE_SIZE = 3,
+  /**
+   * The storage is not aligned to `DIBS_ALIGNMENT`.
+   */
+  DIBS_CODE_STORAGE_ALIGNMENT = 4,
+  /**
+   * No object of this kind was made in that storage.
+   */
+  DIBS_CODE_NOT_INITIALISED = 5,
+  /**
+   * Another call that has not returned uses the object.
+   */
+  DIBS_CODE_IN_USE = 6,
+  /**
+   * This end of the surface's buffers was taken before: one receiver, one reader.
+   */
+  DIBS_CODE_TAKEN = 7,
+  /**
+   * A frame is held already: release it first.
+   */
+  DIBS_CODE_HELD = 8,
+  /**
+   * The objects are not of one tree, or of one number of vertices.
+   */
+  DIBS_CODE_OTHER_TREE = 9,
+  /**
+   * A number that is not one of those allowed: flags, counts, states.
+   */
+  DIBS_CODE_ARGUMENT = 10,
+  /**
+   * The caller's buffer is too small for the result.
+   */
+  DIBS_CODE_CAPACITY = 11,
+  /**
+   * The tree has fewer bytes than its header states.
+   */
+  DIBS_CODE_TREE_LENGTH = 100,
+  /**
+   * The bytes are no tree.
+   */
+  DIBS_CODE_TREE_MAGIC = 101,
+  /**
+   * The tree is of another format version: build it again.
+   */
+  DIBS_CODE_TREE_VERSION = 102,
+  /**
+   * The tree has 32-bit indices: more than 65,536 vertices.
+   */
+  DIBS_CODE_TREE_WIDTH = 103,
+  /**
+   * The tree's bytes changed since they were written.
+   */
+  DIBS_CODE_TREE_CHECKSUM = 104,
+  /**
+   * The tree is not well formed: no builder writes such bytes.
+   */
+  DIBS_CODE_TREE_FORM = 105,
+  /**
+   * The tree's bytes changed since they were validated.
+   */
+  DIBS_CODE_TREE_CORRUPT = 106,
+  /**
+   * The tree was built without the section that stretch is measured with.
+   */
+  DIBS_CODE_TREE_NO_METRIC = 107,
+  /**
+   * The tree was built without adjacency: sides and contacts need it.
+   */
+  DIBS_CODE_TREE_NO_ADJACENCY = 108,
+  /**
+   * The tree was built without its rest shape, or has no such row.
+   */
+  DIBS_CODE_TREE_NO_REST_SHAPE = 109,
+  /**
+   * A coordinate of the tool is not finite or too large.
+   */
+  DIBS_CODE_TOOL_COORDINATE = 200,
+  /**
+   * The tool's radius is negative, not finite or too large.
+   */
+  DIBS_CODE_TOOL_RADIUS = 201,
+  /**
+   * The surface has not one vertex for each of the tree's.
+   */
+  DIBS_CODE_VERTEX_COUNT = 202,
+  /**
+   * The position of a vertex is not finite or too large.
+   */
+  DIBS_CODE_POSITION = 203,
+  /**
+   * The stretch was measured with another tree.
+   */
+  DIBS_CODE_STRETCH_OF_OTHER_TREE = 204,
+  /**
+   * The stretch was measured on another frame.
+   */
+  DIBS_CODE_STRETCH_OF_OTHER_FRAME = 205,
+  /**
+   * The surface is stretched beyond what the query was told.
+   */
+  DIBS_CODE_UNCOVERED = 206,
+  /**
+   * The margin is negative, not finite, or larger than that of the contacts.
+   */
+  DIBS_CODE_MARGIN = 207,
+  /**
+   * The query failed for another cause.
+   */
+  DIBS_CODE_QUERY_FAILED = 208,
+  /**
+   * No surface was published, or the frame is empty.
+   */
+  DIBS_CODE_NO_SURFACE = 300,
+  /**
+   * The surface is older than allowed.
+   */
+  DIBS_CODE_STALE = 301,
+  /**
+   * No good packet came for longer than allowed.
+   */
+  DIBS_CODE_LINK_LOST = 302,
+  /**
+   * No heartbeat came for longer than allowed.
+   */
+  DIBS_CODE_HEARTBEAT_LOST = 303,
+  /**
+   * More frames were refused or damaged than allowed.
+   */
+  DIBS_CODE_REJECTIONS = 304,
+  /**
+   * The surface was longer on its way than allowed.
+   */
+  DIBS_CODE_DELAYED = 305,
+  /**
+   * The surface was older than allowed when it was sent.
+   */
+  DIBS_CODE_SOURCE_STALE = 306,
+  /**
+   * More packets were forged than allowed.
+   */
+  DIBS_CODE_FORGERIES = 307,
+  /**
+   * The tool's axis touches the surface: no direction leads out.
+   */
+  DIBS_CODE_NO_DIRECTION = 308,
+  /**
+   * The budget ended before the side or the contacts were known.
+   */
+  DIBS_CODE_CUT_SHORT = 309,
+  /**
+   * A number is not finite.
+   */
+  DIBS_CODE_NOT_FINITE = 310,
+  /**
+   * A triangle is stretched beyond its limit.
+   */
+  DIBS_CODE_STRETCH_EXCEEDED = 311,
+  /**
+   * A region of the surface has shrunk below its limit.
+   */
+  DIBS_CODE_SHRUNK = 312,
+  /**
+   * A vertex moved faster than its limit.
+   */
+  DIBS_CODE_TOO_FAST = 313,
+  /**
+   * There is no surface for another cause.
+   */
+  DIBS_CODE_UNAVAILABLE = 314,
+  /**
+   * The packet's checksum does not match, or it is too short for one.
+   */
+  DIBS_CODE_PACKET_DAMAGED = 400,
+  /**
+   * The packet is of another protocol version.
+   */
+  DIBS_CODE_PACKET_VERSION = 401,
+  /**
+   * The packet's checksum is right and its form is not.
+   */
+  DIBS_CODE_PACKET_FORM = 402,
+  /**
+   * The packet is of another mesh.
+   */
+  DIBS_CODE_PACKET_MESH = 403,
+  /**
+   * The packet has no genuine tag.
+   */
+  DIBS_CODE_PACKET_FORGED = 404,
+  /**
+   * The packet's frame is not later than the published one.
+   */
+  DIBS_CODE_PACKET_STALE = 405,
+  /**
+   * The packet's frame is not being received.
+   */
+  DIBS_CODE_PACKET_UNEXPECTED = 406,
+  /**
+   * The frame before is still being checked.
+   */
+  DIBS_CODE_PACKET_BUSY = 407,
+  /**
+   * The frame changes another one than that published.
+   */
+  DIBS_CODE_PACKET_BASE = 408,
+  /**
+   * Rows came before the published frame was copied that far.
+   */
+  DIBS_CODE_PACKET_NOT_READY = 409,
+  /**
+   * The frame's rows are not those of this surface.
+   */
+  DIBS_CODE_PACKET_ROWS = 410,
+  /**
+   * The frame's content or encoding is not received here.
+   */
+  DIBS_CODE_PACKET_ENCODING = 411,
+  /**
+   * The packet's place in the frame does not fit the others, or leaves too many gaps.
+   */
+  DIBS_CODE_PACKET_ORDER = 412,
+  /**
+   * A coordinate in the packet is not finite.
+   */
+  DIBS_CODE_PACKET_NOT_FINITE = 413,
+  /**
+   * A coordinate in the packet is beyond the reach.
+   */
+  DIBS_CODE_PACKET_TOO_FAR = 414,
+  /**
+   * The packets are not all of one frame.
+   */
+  DIBS_CODE_PACKET_DIGEST = 415,
+  /**
+   * Bytes between two zeros of the stream are no packet.
+   */
+  DIBS_CODE_FRAMING = 416,
+  /**
+   * The packet was refused for another cause.
+   */
+  DIBS_CODE_PACKET_REFUSED = 417,
+  /**
+   * A stiffness, damping, largest force or margin is out of range.
+   */
+  DIBS_CODE_GAIN = 500,
+  /**
+   * A safe limit is below the degraded one.
+   */
+  DIBS_CODE_LIMIT_ORDER = 501,
+  /**
+   * A limit is 2^31 or more, or the age is not watched.
+   */
+  DIBS_CODE_LIMIT_TOO_LONG = 502,
+  /**
+   * The tissue's speed is negative or not finite.
+   */
+  DIBS_CODE_LIMIT_SPEED = 503,
+  /**
+   * No frame cannot recover a surface.
+   */
+  DIBS_CODE_LIMIT_RECOVERY = 504,
+  /**
+   * The acknowledgement came before the machine waited for it.
+   */
+  DIBS_CODE_ACKNOWLEDGE = 505,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_code dibs_code;
+#else
+typedef uint32_t dibs_code;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * How a force came about.
+ */
+enum dibs_force_state
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * The tool is outside the margin: no force.
+   */
+  DIBS_FORCE_STATE_INACTIVE = 0,
+  /**
+   * The wall acts.
+   */
+  DIBS_FORCE_STATE_ACTIVE = 1,
+  /**
+   * The wall acts with its largest force.
+   */
+  DIBS_FORCE_STATE_SATURATED = 2,
+  /**
+   * The answer cannot be used: the force is the hold.
+   */
+  DIBS_FORCE_STATE_SAFE = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_force_state dibs_force_state;
+#else
+typedef uint32_t dibs_force_state;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * A list of contacts.
+ *
+ * One context at a time.
+ */
+typedef struct dibs_contacts dibs_contacts;
+
+/**
+ * The surface at one moment: vertices of the caller's, or the frame that a reader holds. Queries search it.
+ *
+ * One context at a time.
+ */
+typedef struct dibs_frame dibs_frame;
+
+/**
+ * A query on one tree. It starts from its last answer.
+ *
+ * One context at a time.
+ */
+typedef struct dibs_query dibs_query;
+
+/**
+ * A background check of a tree's bytes: flash that rots after start-up gives wrong answers, and no error.
+ *
+ * One context at a time.
+ */
+typedef struct dibs_scrub dibs_scrub;
+
+/**
+ * A validated tree, by name `heart.dibs` of `dibs build heart.ply -o heart.dibs`. At most 65,536 vertices.
+ *
+ * Any number of contexts may use it at once.
+ */
+typedef struct dibs_tree dibs_tree;
+
+/**
+ * A wall: a margin around the surface, with a spring and a damper.
+ *
+ * A sampled wall is passive only if the device's own damping is above `stiffness * tick / 2 + damping`.
+ */
+typedef struct {
+  /**
+   * In N/mm, above 0.
+   */
+  float stiffness;
+  /**
+   * In N s/mm, at least 0.
+   */
+  float damping;
+  /**
+   * Damping (N s/mm, at least 0) where there is no answer to act on; 0 lets go of the tool.
+   */
+  float hold_damping;
+  /**
+   * In N, above 0.
+   */
+  float max_force;
+  /**
+   * How far (mm, above 0) the wall reaches from the surface.
+   */
+  float margin;
+} dibs_wall;
+
+/**
+ * A point, a direction, a force or a velocity.
+ */
+typedef struct {
+  /**
+   * Along x.
+   */
+  float x;
+  /**
+   * Along y.
+   */
+  float y;
+  /**
+   * Along z.
+   */
+  float z;
+} dibs_vec3;
+
+/**
+ * The closest pair, with an interval that holds its separation: `lower - accuracy` to `separation + accuracy`.
+ *
+ * Where the side is none of the first three, the tool is taken to be outside.
+ */
+typedef struct {
+  /**
+   * Signed separation (mm) of the best pair found: negative where tool and surface overlap.
+   */
+  float separation;
+  /**
+   * The interval's lower end (mm): equal to `separation`, unless the budget ran out or the axis crosses.
+   */
+  float lower;
+  /**
+   * No separation above is off by more (mm).
+   */
+  float accuracy;
+  /**
+   * A `dibs_side`.
+   */
+  uint32_t side;
+  /**
+   * Distance (mm) from the tool's axis to the surface: 0 where it crosses.
+   */
+  float axis_distance;
+  /**
+   * The surface's point of the pair (mm).
+   */
+  dibs_vec3 point_on_surface;
+  /**
+   * The tool's point of the pair, on the tool's surface (mm).
+   */
+  dibs_vec3 point_on_tool;
+  /**
+   * Unit vector that leads out; zero where none does.
+   */
+  dibs_vec3 direction;
+  /**
+   * Where along the tool's axis the pair is: 0 at its start, 1 at its end; 0 for a sphere.
+   */
+  float axis_parameter;
+  /**
+   * Row of the triangle of `point_on_surface`, or `DIBS_NO_TRIANGLE`.
+   */
+  uint32_t triangle;
+  /**
+   * That triangle's corners: rows of vertices.
+   */
+  uint32_t corners[3];
+  /**
+   * Weights of the corners at `point_on_surface`: not negative, sum 1.
+   */
+  float barycentric[3];
+  /**
+   * Sphere bounds evaluated.
+   */
+  uint32_t node_tests;
+  /**
+   * Exact tests of tool and triangle.
+   */
+  uint32_t triangle_tests;
+} dibs_proximity;
+
+/**
+ * A force and a torque on the tool.
+ */
+typedef struct {
+  /**
+   * In N. Always finite.
+   */
+  dibs_vec3 force;
+  /**
+   * In N mm, about the point asked for. Always finite; zero of one pair.
+   */
+  dibs_vec3 torque;
+  /**
+   * How they came about.
+   */
+  dibs_force_state state;
+  /**
+   * Why the force is the hold, where it is; else `DIBS_CODE_OK`.
+   */
+  dibs_code cause;
+} dibs_force;
+
+/**
+ * A rigid instrument: all points within `radius` of the segment from `start` to `end`, in the mesh's frame and unit
+ * (mm). A capsule; a sphere where both ends are equal.
+ */
+typedef struct {
+  /**
+   * One end of the axis (mm): at most 2^29 on each axis.
+   */
+  dibs_vec3 start;
+  /**
+   * The other end (mm).
+   */
+  dibs_vec3 end;
+  /**
+   * Radius (mm): 0 to 2^29.
+   */
+  float radius;
+} dibs_tool;
+
+/**
+ * The most work that a query may do.
+ */
+typedef struct {
+  /**
+   * Most sphere bounds evaluated.
+   */
+  uint32_t node_tests;
+  /**
+   * Most exact tests of a tool and a triangle.
+   */
+  uint32_t triangle_tests;
+} dibs_budget;
+
+/**
+ * Options of a query. Null for none: no budget, a warm start, signed.
+ */
+typedef struct {
+  /**
+   * The most work. Zeros ask for next to nothing: set both.
+   */
+  dibs_budget budget;
+  /**
+   * How far (mm) the interval of a depth may reach where the tool's axis crosses the surface; 0 for a 512th of the
+   * axis' length.
+   */
+  float depth_tolerance;
+  /**
+   * `DIBS_COLD`, `DIBS_UNSIGNED`, both or 0.
+   */
+  uint32_t flags;
+} dibs_options;
+
+/**
+ * What is certain about a list.
+ */
+typedef struct {
+  /**
+   * Contacts in the list.
+   */
+  uint32_t count;
+  /**
+   * Every contact whose separation is below this (mm) is in the list.
+   */
+  float bound;
+  /**
+   * No separation is off by more (mm).
+   */
+  float accuracy;
+  /**
+   * 1 where contacts within the margin were left out because the list is full; else 0.
+   */
+  uint32_t is_full;
+} dibs_contacts_facts;
+
+/**
+ * A locally closest pair of tool and surface.
+ */
+typedef struct {
+  /**
+   * Signed separation (mm), within the list's accuracy.
+   */
+  float separation;
+  /**
+   * Unit vector that leads out.
+   */
+  dibs_vec3 normal;
+  /**
+   * The surface's point (mm).
+   */
+  dibs_vec3 point_on_surface;
+  /**
+   * The tool's point (mm).
+   */
+  dibs_vec3 point_on_tool;
+  /**
+   * Where along the tool's axis the pair is: 0 at its start, 1 at its end.
+   */
+  float axis_parameter;
+  /**
+   * Row of the triangle.
+   */
+  uint32_t triangle;
+  /**
+   * That triangle's corners: rows of vertices.
+   */
+  uint32_t corners[3];
+  /**
+   * Weights of the corners at `point_on_surface`.
+   */
+  float barycentric[3];
+  /**
+   * Velocity (mm/s) of the surface there: zero until `dibs_contacts_set_velocities`.
+   */
+  dibs_vec3 velocity;
+} dibs_contact;
+
+/**
+ * One inequality on the tool's velocity: `linear . v + angular . w >= least`, with the velocity `v` (mm/s) of a point of
+ * the tool and the tool's angular velocity `w` (1/s). For any solver of quadratic programs.
+ */
+typedef struct {
+  /**
+   * Factors of the linear velocity: the contact's normal.
+   */
+  float linear[3];
+  /**
+   * Factors (mm) of the angular velocity.
+   */
+  float angular[3];
+  /**
+   * The least sum allowed (mm/s).
+   */
+  float least;
+} dibs_row;
+
+/**
+ * Facts about a tree.
+ */
+typedef struct {
+  /**
+   * Vertices: rows of a surface.
+   */
+  uint32_t vertices;
+  /**
+   * Triangles.
+   */
+  uint32_t triangles;
+  /**
+   * Nodes.
+   */
+  uint32_t nodes;
+  /**
+   * Identity of the mesh, which packets carry.
+   */
+  uint32_t mesh_id;
+  /**
+   * Checksum of the tree's bytes.
+   */
+  uint32_t checksum;
+  /**
+   * The stretch limit that the tree was built for; 1 for no stretch.
+   */
+  float stretch;
+  /**
+   * How far (mm) a vertex may be from where the mesh's file has it.
+   */
+  float position_error;
+} dibs_tree_facts;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+/**
+ * One sentence about a code, in English, without a full stop.
+ *
+ * Never null, also for a number that is no code. The text is static.
+ */
+const char *dibs_code_text(uint32_t code);
+
+/**
+ * The force of a wall on the tool, from its closest pair.
+ *
+ * Call it at every tick, with the code of whatever the pair came from: with an error the force is the hold, pure damping.
+ *
+ * @param wall       The wall.
+ * @param outcome    The code of the query, of the fail-safe machine, or of the reader: of the first that was not
+ *                   `DIBS_CODE_OK`.
+ * @param proximity  The closest pair; not read, and may be null, where the outcome is an error.
+ * @param velocity   Velocity (mm/s) of the tool's closest point against the surface.
+ * @param force      Where the force goes.
+ * @return `DIBS_CODE_OK`, also where the force is the hold; `DIBS_CODE_GAIN`; or a misuse.
+ */
+dibs_code dibs_wall_force(const dibs_wall *wall,
+                          uint32_t outcome,
+                          const dibs_proximity *proximity,
+                          dibs_vec3 velocity,
+                          dibs_force *force);
+
+/**
+ * The force and the torque of a wall on the tool, from all its contacts: a proxy that they hold outside together.
+ *
+ * @param wall      The wall. Its margin is at most that of the contacts.
+ * @param outcome   As for `dibs_wall_force`.
+ * @param contacts  The list.
+ * @param origin    The tool's point (mm) that the torque and the velocity are about.
+ * @param velocity  Velocity (mm/s) of the tool at `origin`.
+ * @param angular   Angular velocity (1/s) of the tool.
+ * @param force     Where force and torque go.
+ * @return `DIBS_CODE_OK`, also where the force is the hold; `DIBS_CODE_GAIN`; or a misuse.
+ */
+dibs_code dibs_wall_proxy_force(const dibs_wall *wall,
+                                uint32_t outcome,
+                                dibs_contacts *contacts,
+                                dibs_vec3 origin,
+                                dibs_vec3 velocity,
+                                dibs_vec3 angular,
+                                dibs_force *force);
+
+/**
+ * Makes an empty list of contacts.
+ *
+ * @param storage   `DIBS_CONTACTS_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+ * @param size      Bytes of the storage.
+ * @param contacts  Where the list's address goes.
+ */
+dibs_code dibs_contacts_init(void *storage, size_t size, dibs_contacts **contacts);
+
+/**
+ * Fills the list with all locally closest pairs whose separation is at most `margin`, deepest first.
+ *
+ * Cost: that of `dibs_query_closest`, a range search, and some hundred instructions a triangle within the margin.
+ *
+ * @param query      The query.
+ * @param frame      The surface.
+ * @param tool       The tool.
+ * @param margin     In mm, at least 0.
+ * @param options    Options, or null. A budget that runs out shows in the list's bound.
+ * @param contacts   The list; empty after an error.
+ * @param proximity  Where the closest pair goes, or null.
+ * @return As `dibs_query_closest`, `DIBS_CODE_MARGIN`, or `DIBS_CODE_TREE_NO_ADJACENCY`.
+ */
+dibs_code dibs_query_contacts(dibs_query *query,
+                              dibs_frame *frame,
+                              const dibs_tool *tool,
+                              float margin,
+                              const dibs_options *options,
+                              dibs_contacts *contacts,
+                              dibs_proximity *proximity);
+
+/**
+ * What is certain about the list.
+ */
+dibs_code dibs_contacts_get_facts(dibs_contacts *contacts, dibs_contacts_facts *facts);
+
+/**
+ * One contact of the list, the deepest being number 0.
+ *
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` where there are not so many, or a misuse.
+ */
+dibs_code dibs_contacts_get(dibs_contacts *contacts, uint32_t number, dibs_contact *contact);
+
+/**
+ * Sets each contact's velocity to that of the surface there.
+ *
+ * @param velocities  x, y and z (mm/s) of each vertex, in the tree's order of rows; only read during the call.
+ * @param vertices    How many.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_VERTEX_COUNT` where a contact's corner has no row, or a misuse.
+ */
+dibs_code dibs_contacts_set_velocities(dibs_contacts *contacts,
+                                       const float *velocities,
+                                       uint32_t vertices);
+
+/**
+ * The rows of all contacts in the list, deepest first.
+ *
+ * With a row, a contact's separation falls towards `stand_off` no faster than exponentially, at a rate of `gain`; below, it
+ * has to grow.
+ *
+ * @param contacts   The list.
+ * @param origin     The tool's point (mm) whose velocity the rows are about.
+ * @param stand_off  In mm.
+ * @param gain       In 1/s.
+ * @param capacity   Rows that there is room for.
+ * @param rows       Where they go.
+ * @param count      Where their number goes.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY` where there is room for fewer, or a misuse.
+ */
+dibs_code dibs_contacts_rows(dibs_contacts *contacts,
+                             dibs_vec3 origin,
+                             float stand_off,
+                             float gain,
+                             size_t capacity,
+                             dibs_row *rows,
+                             size_t *count);
+
+/**
+ * Makes an empty frame.
+ *
+ * @param storage  `DIBS_FRAME_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+ * @param size     Bytes of the storage.
+ * @param frame    Where the frame's address goes.
+ */
+dibs_code dibs_frame_init(void *storage, size_t size, dibs_frame **frame);
+
+/**
+ * Makes the frame one of these vertices. Its stretch is not measured: queries take the tree's limit.
+ *
+ * @param frame           The frame; one that a reader holds is released first.
+ * @param positions       x, y and z (mm) of each vertex, in the tree's order of rows. Not copied: unchanged until the
+ *                        frame is given other vertices or released.
+ * @param vertices        How many.
+ * @param position_error  No vertex is farther (mm, at least 0) than this from where it is here. Part of the accuracy of
+ *                        every answer.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for an error that is negative or not finite, or a misuse.
+ */
+dibs_code dibs_frame_set_vertices(dibs_frame *frame,
+                                  const float *positions,
+                                  uint32_t vertices,
+                                  float position_error);
+
+/**
+ * Measures the stretch of the frame's vertices, which makes queries on it cheaper. Frames from a receiver are measured.
+ *
+ * Cost: linear in the triangles, about 35 floating point operations each.
+ *
+ * @param stretch  Where the largest stretch goes, 1 for none; or null.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_STRETCH_EXCEEDED` where distances on this frame would be wrong, `DIBS_CODE_NO_SURFACE` of an
+ *         empty frame, `DIBS_CODE_TREE_NO_METRIC`, `DIBS_CODE_VERTEX_COUNT`, or a misuse.
+ */
+dibs_code dibs_frame_measure(dibs_frame *frame,
+                             dibs_tree *tree,
+                             float *stretch);
+
+/**
+ * Lets go of the vertices, or of the frame that a reader holds: the next one can then be published.
+ */
+dibs_code dibs_frame_release(dibs_frame *frame);
+
+/**
+ * Makes a query on a tree.
+ *
+ * @param storage  `DIBS_QUERY_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+ * @param size     Bytes of the storage.
+ * @param tree     The tree.
+ * @param query    Where the query's address goes.
+ */
+dibs_code dibs_query_init(void *storage, size_t size, dibs_tree *tree, dibs_query **query);
+
+/**
+ * The closest pair of the tool and the surface in the frame.
+ *
+ * Exact within `accuracy`, as long as the surface keeps to its stretch. A budget that runs out is no error: the interval is
+ * wider then.
+ *
+ * Cost: the budget at most.
+ *
+ * @param query      The query.
+ * @param frame      The surface.
+ * @param tool       The tool.
+ * @param options    Options, or null.
+ * @param proximity  Where the answer goes; nothing is written unless the code is `DIBS_CODE_OK`.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_TOOL_COORDINATE` to `DIBS_CODE_QUERY_FAILED`,
+ *         `DIBS_CODE_TREE_CORRUPT`, or a misuse.
+ */
+dibs_code dibs_query_closest(dibs_query *query,
+                             dibs_frame *frame,
+                             const dibs_tool *tool,
+                             const dibs_options *options,
+                             dibs_proximity *proximity);
+
+/**
+ * The budget of a query that is to end within so many instructions, by a fit with a margin of 20 %.
+ *
+ * @param cost  A `dibs_cost`.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a number that is no `dibs_cost`, or a misuse.
+ */
+dibs_code dibs_budget_for_instructions(uint32_t instructions, uint32_t cost, dibs_budget *budget);
+
+/**
+ * Validates the bytes of a tree, and makes the tree that every other object is made with.
+ *
+ * Cost: linear in the bytes; once, at start-up.
+ *
+ * @param storage  `DIBS_TREE_SIZE` bytes, aligned to `DIBS_ALIGNMENT`, for as long as the tree is used.
+ * @param size     Bytes of the storage.
+ * @param bytes    The tree, in flash or in memory. Not copied: it stays unchanged for as long as the tree, and any
+ *                 object made with it, is used. Aligned to 4 it is read faster.
+ * @param length   Bytes of the tree.
+ * @param tree     Where the tree's address goes.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_TREE_LENGTH` to `DIBS_CODE_TREE_FORM`, or a misuse.
+ */
+dibs_code dibs_tree_init(void *storage,
+                         size_t size,
+                         const uint8_t *bytes,
+                         size_t length,
+                         dibs_tree **tree);
+
+/**
+ * Facts about the tree.
+ */
+dibs_code dibs_tree_get_facts(dibs_tree *tree, dibs_tree_facts *facts);
+
+/**
+ * Rest position (mm) of the vertex in a row.
+ *
+ * @return `DIBS_CODE_OK`, or `DIBS_CODE_TREE_NO_REST_SHAPE` outside the table or where the tree was built without.
+ */
+dibs_code dibs_tree_rest_position(dibs_tree *tree,
+                                  uint32_t row,
+                                  dibs_vec3 *position);
+
+/**
+ * Makes a check of the tree's bytes.
+ */
+dibs_code dibs_scrub_init(void *storage, size_t size, dibs_tree *tree, dibs_scrub **scrub);
+
+/**
+ * Checks the next bytes, at most `most`, and at the end of a round compares the checksum.
+ *
+ * @return `DIBS_CODE_OK`, or `DIBS_CODE_TREE_CORRUPT` at the end of a round in which the bytes did not match: make the output
+ *         safe.
+ */
+dibs_code dibs_scrub_step(dibs_scrub *scrub,
+                          size_t most);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* DIBS_H */

@@ -1,0 +1,253 @@
+//! The border: the pointers that a C caller hands over, and nearly all of the code that trusts them.
+//!
+//! Only the header's functions call these, with the pointers that C gave them. The header states the contract: a pointer
+//! is null, or it points to as much as its function says, for as long as it says. Null, misalignment, another kind of
+//! object and an object in use are found here, and become codes.
+
+use core::cell::UnsafeCell;
+use core::ffi::c_void;
+use core::ops::{Deref, DerefMut};
+use core::slice;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use bytemuck::AnyBitPattern;
+
+use crate::code::dibs_code;
+
+/// Alignment, in bytes, of the storage of every object.
+pub const DIBS_ALIGNMENT: usize = 8;
+
+/// A pointer to a value, or to the first of several, that is read.
+pub trait Input<T>: Sized {
+    /// A copy of the value.
+    fn get(self) -> Result<T, dibs_code>;
+
+    /// The same, or `None` for a null pointer.
+    fn get_if_any(self) -> Result<Option<T>, dibs_code>;
+
+    /// So many values, which stay as long as the header says.
+    fn slice(self, count: usize) -> Result<&'static [T], dibs_code>;
+}
+
+impl<T: AnyBitPattern> Input<T> for *const T {
+    fn get(self) -> Result<T, dibs_code> {
+        check(self)?;
+        // SAFETY: neither null nor misaligned, so the caller promises a value; any bits are one of this type.
+        Ok(unsafe { self.read() })
+    }
+
+    fn get_if_any(self) -> Result<Option<T>, dibs_code> {
+        if self.is_null() { Ok(None) } else { self.get().map(Some) }
+    }
+
+    fn slice(self, count: usize) -> Result<&'static [T], dibs_code> {
+        check(self)?;
+        if count > isize::MAX as usize / size_of::<T>().max(1) {
+            return Err(dibs_code::Argument);
+        }
+        // SAFETY: neither null nor misaligned, so the caller promises `count` values that nobody changes.
+        Ok(unsafe { slice::from_raw_parts(self, count) })
+    }
+}
+
+/// A pointer to a place for a value, or for several.
+pub trait Output<T>: Sized {
+    /// The place, if it is one: asked for before any work is done.
+    fn check(self) -> Result<Place<T>, dibs_code>;
+
+    /// The same, or `None` for a null pointer.
+    fn check_if_any(self) -> Result<Option<Place<T>>, dibs_code>;
+
+    /// Places for so many values, side by side.
+    fn places(self, count: usize) -> Result<Places<T>, dibs_code>;
+}
+
+impl<T> Output<T> for *mut T {
+    fn check(self) -> Result<Place<T>, dibs_code> {
+        check(self)?;
+        Ok(Place(self))
+    }
+
+    fn check_if_any(self) -> Result<Option<Place<T>>, dibs_code> {
+        if self.is_null() { Ok(None) } else { self.check().map(Some) }
+    }
+
+    fn places(self, count: usize) -> Result<Places<T>, dibs_code> {
+        check(self)?;
+        Ok(Places { next: self, left: count })
+    }
+}
+
+/// A place that was checked.
+pub struct Place<T>(*mut T);
+
+impl<T> Place<T> {
+    /// Writes the value.
+    pub fn set(self, value: T) {
+        // SAFETY: checked, and so a place that is this call's alone.
+        unsafe { self.0.write(value) };
+    }
+}
+
+/// Places for several values, of which the first have one.
+pub struct Places<T> {
+    next: *mut T,
+    left: usize,
+}
+
+impl<T> Places<T> {
+    /// Writes a value after those before it.
+    pub fn push(&mut self, value: T) -> Result<(), dibs_code> {
+        self.left = self.left.checked_sub(1).ok_or(dibs_code::Capacity)?;
+        // SAFETY: the caller promises places for as many values as were asked for, this call's alone.
+        unsafe {
+            self.next.write(value);
+            self.next = self.next.add(1);
+        }
+        Ok(())
+    }
+}
+
+/// Memory of the caller's, in which an object is made.
+pub trait Storage {
+    /// Makes an object in memory of `size` bytes, and hands its address to `out`.
+    fn make<T: Kind>(
+        self,
+        size: usize,
+        out: *mut *mut T,
+        body: impl FnOnce() -> Result<T, dibs_code>,
+    ) -> Result<(), dibs_code>;
+}
+
+/// The start of the memory, if it is large enough and aligned.
+fn memory(storage: *mut c_void, size: usize, needed: usize) -> Result<*mut c_void, dibs_code> {
+    if storage.is_null() {
+        Err(dibs_code::Null)
+    } else if !storage.addr().is_multiple_of(DIBS_ALIGNMENT) {
+        Err(dibs_code::StorageAlignment)
+    } else if size < needed {
+        Err(dibs_code::StorageSize)
+    } else {
+        Ok(storage)
+    }
+}
+
+impl Storage for *mut c_void {
+    fn make<T: Kind>(
+        self,
+        size: usize,
+        out: *mut *mut T,
+        body: impl FnOnce() -> Result<T, dibs_code>,
+    ) -> Result<(), dibs_code> {
+        const { assert!(size_of::<Object<T>>() <= T::SIZE) };
+        const { assert!(align_of::<Object<T>>() <= DIBS_ALIGNMENT) };
+        let out = out.check()?;
+        let place = memory(self, size, T::SIZE)?.cast::<Object<T>>();
+        // Without its mark while it is made: nobody takes a half-made object for a whole one.
+        // SAFETY: large enough and aligned, and the caller's to give away.
+        unsafe { (&raw mut (*place).mark).write(AtomicU32::new(0)) };
+        let body = body()?;
+        // SAFETY: the same.
+        unsafe { (&raw mut (*place).body).write(UnsafeCell::new(body)) };
+        // SAFETY: both fields are written.
+        unsafe { &*place }.mark.store(T::MARK, Ordering::Release);
+        out.set(place.cast());
+        Ok(())
+    }
+}
+
+/// A kind of object.
+pub trait Kind: 'static {
+    /// Marks an object of this kind.
+    const MARK: u32;
+    /// Bytes of storage, as the header states them.
+    const SIZE: usize;
+}
+
+/// An object in the caller's storage.
+#[repr(C)]
+struct Object<T> {
+    mark: AtomicU32,
+    body: UnsafeCell<T>,
+}
+
+/// An object's address, as the caller has it from the function that made the object.
+pub trait Handle<T: Kind> {
+    /// The object, this call's alone.
+    fn open(self) -> Result<Open<T>, dibs_code>;
+
+    /// The object, shared with other contexts. Only for kinds that are never opened.
+    fn share(self) -> Result<&'static T, dibs_code>
+    where
+        T: Sync;
+}
+
+/// Turns a mark into that of an object in use.
+const IN_USE: u32 = 1;
+
+impl<T: Kind> Handle<T> for *mut T {
+    fn open(self) -> Result<Open<T>, dibs_code> {
+        let in_use = T::MARK ^ IN_USE;
+        match mark(self)?.compare_exchange(T::MARK, in_use, Ordering::Acquire, Ordering::Relaxed) {
+            Ok(_) => Ok(Open(self.cast())),
+            Err(found) if found == in_use => Err(dibs_code::InUse),
+            Err(_) => Err(dibs_code::NotInitialised),
+        }
+    }
+
+    fn share(self) -> Result<&'static T, dibs_code>
+    where
+        T: Sync,
+    {
+        if mark(self)?.load(Ordering::Acquire) != T::MARK {
+            return Err(dibs_code::NotInitialised);
+        }
+        let object = self.cast::<Object<T>>();
+        // SAFETY: its mark says that it was made here, and the caller keeps its storage. Nothing of this kind is opened.
+        Ok(unsafe { &*(*object).body.get() })
+    }
+}
+
+/// The mark of an object, or of storage in which none was made.
+fn mark<T: Kind>(object: *mut T) -> Result<&'static AtomicU32, dibs_code> {
+    let mark = object.cast::<AtomicU32>();
+    check(mark)?;
+    // SAFETY: neither null nor misaligned, so the caller promises an object or storage for one; any bits are a word.
+    Ok(unsafe { &*mark })
+}
+
+/// An object in use, until this is dropped.
+pub struct Open<T: Kind>(*mut Object<T>);
+
+impl<T: Kind> Deref for Open<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        // SAFETY: its mark said that it was made here, and keeps everybody else out.
+        unsafe { &*(*self.0).body.get() }
+    }
+}
+
+impl<T: Kind> DerefMut for Open<T> {
+    fn deref_mut(&mut self) -> &mut T {
+        // SAFETY: as above.
+        unsafe { &mut *(*self.0).body.get() }
+    }
+}
+
+impl<T: Kind> Drop for Open<T> {
+    fn drop(&mut self) {
+        // SAFETY: as above.
+        unsafe { &*self.0 }.mark.store(T::MARK, Ordering::Release);
+    }
+}
+
+fn check<T>(pointer: *const T) -> Result<(), dibs_code> {
+    if pointer.is_null() {
+        Err(dibs_code::Null)
+    } else if !pointer.is_aligned() {
+        Err(dibs_code::Misaligned)
+    } else {
+        Ok(())
+    }
+}

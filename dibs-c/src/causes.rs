@@ -1,0 +1,144 @@
+//! The code of each of the core's errors.
+
+use dibs_nostd::constraint::GainError;
+use dibs_nostd::failsafe::{AcknowledgeError, LimitError};
+use dibs_nostd::wire::{PacketError, StreamError};
+use dibs_nostd::{
+    CorruptTreeError, FormatError, QueryError, ReceiveError, StretchError, ToolError, Unavailable,
+};
+
+use crate::code::dibs_code;
+
+impl From<FormatError> for dibs_code {
+    fn from(error: FormatError) -> Self {
+        match error {
+            FormatError::Length { .. } => Self::TreeLength,
+            FormatError::Magic { .. } => Self::TreeMagic,
+            FormatError::Version { .. } => Self::TreeVersion,
+            FormatError::Width { .. } => Self::TreeWidth,
+            FormatError::Checksum { .. } => Self::TreeChecksum,
+            _ => Self::TreeForm,
+        }
+    }
+}
+
+impl From<CorruptTreeError> for dibs_code {
+    fn from(_: CorruptTreeError) -> Self {
+        Self::TreeCorrupt
+    }
+}
+
+impl From<ToolError> for dibs_code {
+    fn from(error: ToolError) -> Self {
+        match error {
+            ToolError::Radius { .. } => Self::ToolRadius,
+            _ => Self::ToolCoordinate,
+        }
+    }
+}
+
+impl From<QueryError> for dibs_code {
+    fn from(error: QueryError) -> Self {
+        match error {
+            QueryError::VertexCount { .. } => Self::VertexCount,
+            QueryError::Position { .. } => Self::Position,
+            QueryError::OtherTree { .. } => Self::StretchOfOtherTree,
+            QueryError::OtherFrame { .. } => Self::StretchOfOtherFrame,
+            QueryError::Uncovered { .. } => Self::Uncovered,
+            QueryError::NoAdjacency => Self::TreeNoAdjacency,
+            QueryError::Margin { .. } => Self::Margin,
+            QueryError::Corrupt { .. } => Self::TreeCorrupt,
+            _ => Self::QueryFailed,
+        }
+    }
+}
+
+impl From<Unavailable> for dibs_code {
+    fn from(cause: Unavailable) -> Self {
+        match cause {
+            Unavailable::NoSurface => Self::NoSurface,
+            Unavailable::Stale { .. } => Self::Stale,
+            Unavailable::Query(error) => error.into(),
+            Unavailable::CorruptTree => Self::TreeCorrupt,
+            Unavailable::LinkLost { .. } => Self::LinkLost,
+            Unavailable::HeartbeatLost { .. } => Self::HeartbeatLost,
+            Unavailable::Rejections { .. } => Self::Rejections,
+            Unavailable::Delayed { .. } => Self::Delayed,
+            Unavailable::SourceStale { .. } => Self::SourceStale,
+            Unavailable::Forgeries { .. } => Self::Forgeries,
+            Unavailable::NoDirection => Self::NoDirection,
+            Unavailable::CutShort => Self::CutShort,
+            Unavailable::NotFinite => Self::NotFinite,
+            _ => Self::Unavailable,
+        }
+    }
+}
+
+impl From<StretchError> for dibs_code {
+    fn from(error: StretchError) -> Self {
+        match error {
+            StretchError::NoMetric => Self::TreeNoMetric,
+            StretchError::VertexCount { .. } => Self::VertexCount,
+            StretchError::Shrunk { .. } => Self::Shrunk,
+            StretchError::TooFast { .. } => Self::TooFast,
+            StretchError::Corrupt { .. } => Self::TreeCorrupt,
+            _ => Self::StretchExceeded,
+        }
+    }
+}
+
+impl From<ReceiveError> for dibs_code {
+    fn from(error: ReceiveError) -> Self {
+        match error {
+            ReceiveError::Packet(PacketError::TooShort { .. } | PacketError::Checksum { .. }) => {
+                Self::PacketDamaged
+            }
+            ReceiveError::Packet(PacketError::Version { .. }) => Self::PacketVersion,
+            ReceiveError::Packet(_) => Self::PacketForm,
+            ReceiveError::WrongMesh { .. } => Self::PacketMesh,
+            ReceiveError::Forged { .. } => Self::PacketForged,
+            ReceiveError::Stale { .. } => Self::PacketStale,
+            ReceiveError::Unexpected { .. } => Self::PacketUnexpected,
+            ReceiveError::Busy { .. } => Self::PacketBusy,
+            ReceiveError::Base { .. } => Self::PacketBase,
+            ReceiveError::NotReady { .. } => Self::PacketNotReady,
+            ReceiveError::RowCount { .. } | ReceiveError::OutOfRange { .. } => Self::PacketRows,
+            ReceiveError::Encoding => Self::PacketEncoding,
+            ReceiveError::Order { .. } | ReceiveError::Gaps { .. } => Self::PacketOrder,
+            ReceiveError::NotFinite { .. } => Self::PacketNotFinite,
+            ReceiveError::TooFar { .. } => Self::PacketTooFar,
+            ReceiveError::Digest { .. } => Self::PacketDigest,
+            ReceiveError::Stretch(error) => error.into(),
+            _ => Self::PacketRefused,
+        }
+    }
+}
+
+impl From<StreamError> for dibs_code {
+    fn from(_: StreamError) -> Self {
+        Self::Framing
+    }
+}
+
+impl From<GainError> for dibs_code {
+    fn from(_: GainError) -> Self {
+        Self::Gain
+    }
+}
+
+impl From<LimitError> for dibs_code {
+    fn from(error: LimitError) -> Self {
+        match error {
+            LimitError::Order { .. } => Self::LimitOrder,
+            LimitError::Speed { .. } => Self::LimitSpeed,
+            LimitError::Recovery { .. } => Self::LimitRecovery,
+            _ => Self::LimitTooLong,
+        }
+    }
+}
+
+impl From<AcknowledgeError> for dibs_code {
+    fn from(_: AcknowledgeError) -> Self {
+        Self::Acknowledge
+    }
+}

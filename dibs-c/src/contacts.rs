@@ -1,0 +1,256 @@
+//! Contacts: all locally closest pairs within a margin.
+
+use core::ffi::c_void;
+
+use bytemuck::AnyBitPattern;
+use dibs_nostd::constraint::VelocityRow;
+use dibs_nostd::{Contact, Contacts, Proximity, TriangleRow};
+
+use crate::border::{Handle, Input, Kind, Output, Storage};
+use crate::code::dibs_code;
+use crate::frame::{Vertices, ask, dibs_frame, rows};
+use crate::query::{dibs_options, dibs_proximity, dibs_query};
+use crate::tool::{Shape, dibs_tool, dibs_vec3};
+
+/// Bytes of a list's storage.
+pub const DIBS_CONTACTS_SIZE: usize = 9_728;
+
+/// Contacts that a list holds: of more, the deepest.
+pub const DIBS_CONTACTS: usize = 16;
+
+/// Triangles that a list looks at together: of more, the nearest.
+pub const DIBS_NEAR: usize = 512;
+
+/// A list of contacts.
+///
+/// One context at a time.
+pub struct dibs_contacts(pub(crate) Contacts<DIBS_CONTACTS, DIBS_NEAR>);
+
+impl Kind for dibs_contacts {
+    const MARK: u32 = 0x6462_630A;
+    const SIZE: usize = DIBS_CONTACTS_SIZE;
+}
+
+/// A locally closest pair of tool and surface.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_contact {
+    /// Signed separation (mm), within the list's accuracy.
+    pub separation: f32,
+    /// Unit vector that leads out.
+    pub normal: dibs_vec3,
+    /// The surface's point (mm).
+    pub point_on_surface: dibs_vec3,
+    /// The tool's point (mm).
+    pub point_on_tool: dibs_vec3,
+    /// Where along the tool's axis the pair is: 0 at its start, 1 at its end.
+    pub axis_parameter: f32,
+    /// Row of the triangle.
+    pub triangle: u32,
+    /// That triangle's corners: rows of vertices.
+    pub corners: [u32; 3],
+    /// Weights of the corners at `point_on_surface`.
+    pub barycentric: [f32; 3],
+    /// Velocity (mm/s) of the surface there: zero until `dibs_contacts_set_velocities`.
+    pub velocity: dibs_vec3,
+}
+
+impl From<&Contact> for dibs_contact {
+    fn from(found: &Contact) -> Self {
+        let TriangleRow(triangle) = found.triangle;
+        Self {
+            separation: found.separation,
+            normal: found.normal.into(),
+            point_on_surface: found.point_on_surface.into(),
+            point_on_tool: found.point_on_tool.into(),
+            axis_parameter: found.axis_parameter,
+            triangle,
+            corners: found.corners,
+            barycentric: found.barycentric,
+            velocity: found.velocity.into(),
+        }
+    }
+}
+
+/// What is certain about a list.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct dibs_contacts_facts {
+    /// Contacts in the list.
+    pub count: u32,
+    /// Every contact whose separation is below this (mm) is in the list.
+    pub bound: f32,
+    /// No separation is off by more (mm).
+    pub accuracy: f32,
+    /// 1 where contacts within the margin were left out because the list is full; else 0.
+    pub is_full: u32,
+}
+
+/// Makes an empty list of contacts.
+///
+/// @param storage   `DIBS_CONTACTS_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+/// @param size      Bytes of the storage.
+/// @param contacts  Where the list's address goes.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_contacts_init(
+    storage: *mut c_void,
+    size: usize,
+    contacts: *mut *mut dibs_contacts,
+) -> dibs_code {
+    dibs_code::of(|| storage.make(size, contacts, || Ok(dibs_contacts(Contacts::new()))))
+}
+
+/// Fills the list with all locally closest pairs whose separation is at most `margin`, deepest first.
+///
+/// Cost: that of `dibs_query_closest`, a range search, and some hundred instructions a triangle within the margin.
+///
+/// @param query      The query.
+/// @param frame      The surface.
+/// @param tool       The tool.
+/// @param margin     In mm, at least 0.
+/// @param options    Options, or null. A budget that runs out shows in the list's bound.
+/// @param contacts   The list; empty after an error.
+/// @param proximity  Where the closest pair goes, or null.
+/// @return As `dibs_query_closest`, `DIBS_CODE_MARGIN`, or `DIBS_CODE_TREE_NO_ADJACENCY`.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_query_contacts(
+    query: *mut dibs_query,
+    frame: *mut dibs_frame,
+    tool: *const dibs_tool,
+    margin: f32,
+    options: *const dibs_options,
+    contacts: *mut dibs_contacts,
+    proximity: *mut dibs_proximity,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let proximity = proximity.check_if_any()?;
+        let mut list = contacts.open()?;
+        let list = &mut list.0;
+        let found = fill(query, frame, tool, margin, options, list);
+        if found.is_err() {
+            // Those of the last pose are none of this one.
+            *list = Contacts::new();
+        }
+        let found = found?;
+        if let Some(proximity) = proximity {
+            proximity.set(found.into());
+        }
+        Ok(())
+    })
+}
+
+fn fill(
+    query: *mut dibs_query,
+    frame: *mut dibs_frame,
+    tool: *const dibs_tool,
+    margin: f32,
+    options: *const dibs_options,
+    list: &mut Contacts<DIBS_CONTACTS, DIBS_NEAR>,
+) -> Result<Proximity, dibs_code> {
+    let (shape, options) = (Shape::try_from(tool.get()?)?, dibs_options::of(options)?);
+    let (mut query, frame) = (query.open()?, frame.open()?);
+    ask!(frame, shape, |table, tool| query.0.contacts(table, tool, margin, &options, list))
+}
+
+/// What is certain about the list.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_contacts_get_facts(
+    contacts: *mut dibs_contacts,
+    facts: *mut dibs_contacts_facts,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (facts, list) = (facts.check()?, contacts.open()?);
+        facts.set(dibs_contacts_facts {
+            count: list.0.len() as u32,
+            bound: list.0.bound(),
+            accuracy: list.0.accuracy(),
+            is_full: list.0.is_full().into(),
+        });
+        Ok(())
+    })
+}
+
+/// One contact of the list, the deepest being number 0.
+///
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` where there are not so many, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_contacts_get(
+    contacts: *mut dibs_contacts,
+    number: u32,
+    contact: *mut dibs_contact,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (contact, list) = (contact.check()?, contacts.open()?);
+        let found = list.0.iter().nth(number as usize).ok_or(dibs_code::Argument)?;
+        contact.set(found.into());
+        Ok(())
+    })
+}
+
+/// Sets each contact's velocity to that of the surface there.
+///
+/// @param velocities  x, y and z (mm/s) of each vertex, in the tree's order of rows; only read during the call.
+/// @param vertices    How many.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_VERTEX_COUNT` where a contact's corner has no row, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_contacts_set_velocities(
+    contacts: *mut dibs_contacts,
+    velocities: *const f32,
+    vertices: u32,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (mut list, rows) = (contacts.open()?, rows(velocities, vertices)?);
+        list.0.move_with(&Vertices::new(rows, 0.0))?;
+        Ok(())
+    })
+}
+
+/// One inequality on the tool's velocity: `linear . v + angular . w >= least`, with the velocity `v` (mm/s) of a point of
+/// the tool and the tool's angular velocity `w` (1/s). For any solver of quadratic programs.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct dibs_row {
+    /// Factors of the linear velocity: the contact's normal.
+    pub linear: [f32; 3],
+    /// Factors (mm) of the angular velocity.
+    pub angular: [f32; 3],
+    /// The least sum allowed (mm/s).
+    pub least: f32,
+}
+
+/// The rows of all contacts in the list, deepest first.
+///
+/// With a row, a contact's separation falls towards `stand_off` no faster than exponentially, at a rate of `gain`; below, it
+/// has to grow.
+///
+/// @param contacts   The list.
+/// @param origin     The tool's point (mm) whose velocity the rows are about.
+/// @param stand_off  In mm.
+/// @param gain       In 1/s.
+/// @param capacity   Rows that there is room for.
+/// @param rows       Where they go.
+/// @param count      Where their number goes.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY` where there is room for fewer, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_contacts_rows(
+    contacts: *mut dibs_contacts,
+    origin: dibs_vec3,
+    stand_off: f32,
+    gain: f32,
+    capacity: usize,
+    rows: *mut dibs_row,
+    count: *mut usize,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (count, list) = (count.check()?, contacts.open()?);
+        let mut places = rows.places(capacity)?;
+        let accuracy = list.0.accuracy();
+        for contact in list.0.iter() {
+            let row = VelocityRow::new(contact, accuracy, origin.into(), stand_off, gain);
+            let (linear, angular) = (row.linear, row.angular);
+            places.push(dibs_row { linear, angular, least: row.least })?;
+        }
+        count.set(list.0.len());
+        Ok(())
+    })
+}

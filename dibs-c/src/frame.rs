@@ -1,0 +1,167 @@
+//! Frames: the surface at one moment.
+
+use core::ffi::c_void;
+
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::{MeasuredStretch, VertexTable, measure_stretch};
+
+use crate::border::{Handle, Input, Kind, Output, Storage};
+use crate::code::dibs_code;
+use crate::tree::dibs_tree;
+
+/// Bytes of a frame's storage.
+pub const DIBS_FRAME_SIZE: usize = 192;
+
+/// The surface at one moment: vertices of the caller's, or the frame that a reader holds. Queries search it.
+///
+/// One context at a time.
+pub struct dibs_frame {
+    pub(crate) table: Table,
+}
+
+impl Kind for dibs_frame {
+    const MARK: u32 = 0x6462_6606;
+    const SIZE: usize = DIBS_FRAME_SIZE;
+}
+
+/// The positions of a frame.
+pub(crate) enum Table {
+    Empty,
+    Vertices(Vertices),
+}
+
+/// Vertices of the caller's.
+pub(crate) struct Vertices {
+    rows: &'static [[f32; 3]],
+    position_error: f32,
+    stretch: Option<MeasuredStretch>,
+}
+
+impl Vertices {
+    /// Vertices whose stretch is not measured.
+    pub(crate) const fn new(rows: &'static [[f32; 3]], position_error: f32) -> Self {
+        Self { rows, position_error, stretch: None }
+    }
+}
+
+impl VertexTable for Vertices {
+    fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    #[inline(always)]
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.rows.get(vertex as usize).copied().map(Vec3::from_array)
+    }
+
+    fn stretch(&self) -> Option<MeasuredStretch> {
+        self.stretch
+    }
+
+    fn position_error(&self) -> f32 {
+        self.position_error
+    }
+}
+
+/// Calls a function of the core with the frame's table and the tool, each as the type that it is.
+macro_rules! ask {
+    ($frame:expr, $shape:expr, |$table:ident, $tool:ident| $call:expr) => {{
+        use crate::frame::Table;
+        use crate::tool::Shape;
+        match (&$frame.table, &$shape) {
+            (Table::Empty, _) => Err(crate::code::dibs_code::NoSurface),
+            (Table::Vertices($table), Shape::Sphere($tool)) => $call.map_err(Into::into),
+            (Table::Vertices($table), Shape::Capsule($tool)) => $call.map_err(Into::into),
+        }
+    }};
+}
+pub(crate) use ask;
+
+/// Makes an empty frame.
+///
+/// @param storage  `DIBS_FRAME_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+/// @param size     Bytes of the storage.
+/// @param frame    Where the frame's address goes.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_frame_init(
+    storage: *mut c_void,
+    size: usize,
+    frame: *mut *mut dibs_frame,
+) -> dibs_code {
+    dibs_code::of(|| storage.make(size, frame, || Ok(dibs_frame { table: Table::Empty })))
+}
+
+/// Makes the frame one of these vertices. Its stretch is not measured: queries take the tree's limit.
+///
+/// @param frame           The frame; one that a reader holds is released first.
+/// @param positions       x, y and z (mm) of each vertex, in the tree's order of rows. Not copied: unchanged until the
+///                        frame is given other vertices or released.
+/// @param vertices        How many.
+/// @param position_error  No vertex is farther (mm, at least 0) than this from where it is here. Part of the accuracy of
+///                        every answer.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for an error that is negative or not finite, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_frame_set_vertices(
+    frame: *mut dibs_frame,
+    positions: *const f32,
+    vertices: u32,
+    position_error: f32,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let mut frame = frame.open()?;
+        let rows = rows(positions, vertices)?;
+        if !(position_error >= 0.0 && position_error.is_finite()) {
+            return Err(dibs_code::Argument);
+        }
+        frame.table = Table::Vertices(Vertices::new(rows, position_error));
+        Ok(())
+    })
+}
+
+/// So many positions of the caller's.
+pub(crate) fn rows(positions: *const f32, count: u32) -> Result<&'static [[f32; 3]], dibs_code> {
+    let floats = (count as usize).checked_mul(3).ok_or(dibs_code::Argument)?;
+    let (rows, _) = positions.slice(floats)?.as_chunks();
+    Ok(rows)
+}
+
+/// Measures the stretch of the frame's vertices, which makes queries on it cheaper. Frames from a receiver are measured.
+///
+/// Cost: linear in the triangles, about 35 floating point operations each.
+///
+/// @param stretch  Where the largest stretch goes, 1 for none; or null.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_STRETCH_EXCEEDED` where distances on this frame would be wrong, `DIBS_CODE_NO_SURFACE` of an
+///         empty frame, `DIBS_CODE_TREE_NO_METRIC`, `DIBS_CODE_VERTEX_COUNT`, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_frame_measure(
+    frame: *mut dibs_frame,
+    tree: *mut dibs_tree,
+    stretch: *mut f32,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (stretch, mut frame) = (stretch.check_if_any()?, frame.open()?);
+        let tree = &tree.share()?.tree;
+        let measured = match &mut frame.table {
+            Table::Empty => return Err(dibs_code::NoSurface),
+            Table::Vertices(vertices) => {
+                vertices.stretch = None;
+                let measured = measure_stretch(tree, vertices)?;
+                vertices.stretch = Some(measured);
+                measured
+            }
+        };
+        if let Some(stretch) = stretch {
+            stretch.set(measured.sigma());
+        }
+        Ok(())
+    })
+}
+
+/// Lets go of the vertices, or of the frame that a reader holds: the next one can then be published.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_frame_release(frame: *mut dibs_frame) -> dibs_code {
+    dibs_code::of(|| {
+        frame.open()?.table = Table::Empty;
+        Ok(())
+    })
+}

@@ -1,0 +1,27 @@
+//! The C interface of [`dibs_nostd`]: `include/dibs.h`, which is generated from this crate.
+//!
+//! Each function checks what it was given, calls the core, and returns a code. Objects live in storage of the caller's.
+//! Nothing is allocated and nothing panics. On a board the second is proved by the linker: the panic handler calls a
+//! function that does not exist.
+//!
+//! Names are those of the header. `unsafe` stands in `border`, which trusts the caller's pointers.
+#![no_std]
+#![allow(non_camel_case_types)]
+// Parameters are named in Doxygen's way.
+#![allow(clippy::doc_markdown)]
+
+// Brings the host's panic handler.
+#[cfg(not(target_os = "none"))]
+extern crate std;
+
+mod border;
+mod causes;
+mod code;
+mod constraint;
+mod contacts;
+mod frame;
+#[cfg(target_os = "none")]
+mod panic;
+mod query;
+mod tool;
+mod tree;

@@ -1,0 +1,296 @@
+//! Queries: the closest pair, signed, within a budget.
+
+use core::ffi::c_void;
+
+use bytemuck::AnyBitPattern;
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::{Budget, Cost, NoSide, Options, Proximity, Query, Side, TriangleRow};
+
+use crate::border::{Handle, Input, Kind, Output, Storage};
+use crate::code::dibs_code;
+use crate::frame::{ask, dibs_frame};
+use crate::tool::{Shape, dibs_tool, dibs_vec3};
+use crate::tree::dibs_tree;
+
+/// Bytes of a query's storage.
+pub const DIBS_QUERY_SIZE: usize = 4_480;
+
+/// Entries of the stack: as many as the format allows, so that any tree can be searched.
+pub(crate) const STACK: usize = 512;
+
+/// A query on one tree. It starts from its last answer.
+///
+/// One context at a time.
+pub struct dibs_query(pub(crate) Query<'static, u16, STACK>);
+
+impl Kind for dibs_query {
+    const MARK: u32 = 0x6462_7108;
+    const SIZE: usize = DIBS_QUERY_SIZE;
+}
+
+/// The most work that a query may do.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_budget {
+    /// Most sphere bounds evaluated.
+    pub node_tests: u32,
+    /// Most exact tests of a tool and a triangle.
+    pub triangle_tests: u32,
+}
+
+/// As much as it takes, for either number of a budget.
+pub const DIBS_UNLIMITED: u32 = u32::MAX;
+
+const _: () = assert!(Budget::UNLIMITED.node_tests == DIBS_UNLIMITED);
+
+/// A flag of options: neither answer nor cost depends on earlier queries.
+pub const DIBS_COLD: u32 = 1;
+
+/// A flag of options: no side is asked for, at the cost of the distance alone. The separation is that of a tool outside.
+pub const DIBS_UNSIGNED: u32 = 2;
+
+/// Options of a query. Null for none: no budget, a warm start, signed.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_options {
+    /// The most work. Zeros ask for next to nothing: set both.
+    pub budget: dibs_budget,
+    /// How far (mm) the interval of a depth may reach where the tool's axis crosses the surface; 0 for a 512th of the
+    /// axis' length.
+    pub depth_tolerance: f32,
+    /// `DIBS_COLD`, `DIBS_UNSIGNED`, both or 0.
+    pub flags: u32,
+}
+
+impl dibs_options {
+    /// The core's options.
+    pub(crate) fn of(options: *const Self) -> Result<Options, dibs_code> {
+        let Some(given) = options.get_if_any()? else { return Ok(Options::new()) };
+        if given.flags & !(DIBS_COLD | DIBS_UNSIGNED) != 0 || !(given.depth_tolerance >= 0.0) {
+            return Err(dibs_code::Argument);
+        }
+        let dibs_budget { node_tests, triangle_tests } = given.budget;
+        let mut options = Options::new().budget(Budget { node_tests, triangle_tests });
+        if given.flags & DIBS_COLD != 0 {
+            options = options.warm_start(None);
+        }
+        if given.flags & DIBS_UNSIGNED != 0 {
+            options = options.unsigned();
+        }
+        if given.depth_tolerance > 0.0 {
+            options = options.depth_tolerance(given.depth_tolerance);
+        }
+        Ok(options)
+    }
+}
+
+/// On which side of the surface a tool's axis is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum dibs_side {
+    /// Outside: where the triangles' corners are seen counter-clockwise.
+    Outside = 0,
+    /// The whole axis is inside.
+    Inside = 1,
+    /// The axis crosses the surface.
+    Crossing = 2,
+    /// No side: none was asked for.
+    NotAsked = 3,
+    /// No side: the tree has no adjacency.
+    NoAdjacency = 4,
+    /// No side: the closest point is on an open boundary of the surface.
+    OpenBoundary = 5,
+    /// No side: the sides are closer than the accuracy.
+    BelowAccuracy = 6,
+    /// No side: the triangles at the closest point have no clear normal.
+    Degenerate = 7,
+    /// No side: the budget ran out.
+    CutShort = 8,
+}
+
+/// Each side with its number.
+const SIDES: [(dibs_side, Side); 9] = [
+    (dibs_side::Outside, Side::Outside),
+    (dibs_side::Inside, Side::Inside),
+    (dibs_side::Crossing, Side::Crossing),
+    (dibs_side::NotAsked, Side::Undefined(NoSide::NotAsked)),
+    (dibs_side::NoAdjacency, Side::Undefined(NoSide::NoAdjacency)),
+    (dibs_side::OpenBoundary, Side::Undefined(NoSide::OpenBoundary)),
+    (dibs_side::BelowAccuracy, Side::Undefined(NoSide::BelowAccuracy)),
+    (dibs_side::Degenerate, Side::Undefined(NoSide::Degenerate)),
+    (dibs_side::CutShort, Side::Undefined(NoSide::CutShort)),
+];
+
+/// In place of a triangle's row: none.
+pub const DIBS_NO_TRIANGLE: u32 = u32::MAX;
+
+/// The closest pair, with an interval that holds its separation: `lower - accuracy` to `separation + accuracy`.
+///
+/// Where the side is none of the first three, the tool is taken to be outside.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_proximity {
+    /// Signed separation (mm) of the best pair found: negative where tool and surface overlap.
+    pub separation: f32,
+    /// The interval's lower end (mm): equal to `separation`, unless the budget ran out or the axis crosses.
+    pub lower: f32,
+    /// No separation above is off by more (mm).
+    pub accuracy: f32,
+    /// A `dibs_side`.
+    pub side: u32,
+    /// Distance (mm) from the tool's axis to the surface: 0 where it crosses.
+    pub axis_distance: f32,
+    /// The surface's point of the pair (mm).
+    pub point_on_surface: dibs_vec3,
+    /// The tool's point of the pair, on the tool's surface (mm).
+    pub point_on_tool: dibs_vec3,
+    /// Unit vector that leads out; zero where none does.
+    pub direction: dibs_vec3,
+    /// Where along the tool's axis the pair is: 0 at its start, 1 at its end; 0 for a sphere.
+    pub axis_parameter: f32,
+    /// Row of the triangle of `point_on_surface`, or `DIBS_NO_TRIANGLE`.
+    pub triangle: u32,
+    /// That triangle's corners: rows of vertices.
+    pub corners: [u32; 3],
+    /// Weights of the corners at `point_on_surface`: not negative, sum 1.
+    pub barycentric: [f32; 3],
+    /// Sphere bounds evaluated.
+    pub node_tests: u32,
+    /// Exact tests of tool and triangle.
+    pub triangle_tests: u32,
+}
+
+impl From<Proximity> for dibs_proximity {
+    fn from(found: Proximity) -> Self {
+        let side = SIDES.iter().find(|(_, side)| *side == found.side);
+        Self {
+            separation: found.separation,
+            lower: found.lower,
+            accuracy: found.accuracy,
+            side: side.map_or(dibs_side::NotAsked, |(number, _)| *number) as u32,
+            axis_distance: found.axis_distance,
+            point_on_surface: found.point_on_surface.into(),
+            point_on_tool: found.point_on_tool.into(),
+            direction: found.direction.into(),
+            axis_parameter: found.axis_parameter,
+            triangle: found.triangle.map_or(DIBS_NO_TRIANGLE, |TriangleRow(row)| row),
+            corners: found.corners,
+            barycentric: found.barycentric,
+            node_tests: found.node_tests,
+            triangle_tests: found.triangle_tests,
+        }
+    }
+}
+
+impl TryFrom<dibs_proximity> for Proximity {
+    type Error = dibs_code;
+
+    fn try_from(given: dibs_proximity) -> Result<Self, dibs_code> {
+        let side = SIDES.iter().find(|(number, _)| *number as u32 == given.side);
+        let mut found = Self::NOWHERE;
+        found.separation = given.separation;
+        found.lower = given.lower;
+        found.accuracy = given.accuracy;
+        found.side = side.ok_or(dibs_code::Argument)?.1;
+        found.axis_distance = given.axis_distance;
+        found.point_on_surface = given.point_on_surface.into();
+        found.point_on_tool = given.point_on_tool.into();
+        found.direction = Vec3::from(given.direction);
+        found.axis_parameter = given.axis_parameter;
+        found.triangle =
+            (given.triangle != DIBS_NO_TRIANGLE).then_some(TriangleRow(given.triangle));
+        found.corners = given.corners;
+        found.barycentric = given.barycentric;
+        found.node_tests = given.node_tests;
+        found.triangle_tests = given.triangle_tests;
+        Ok(found)
+    }
+}
+
+/// Makes a query on a tree.
+///
+/// @param storage  `DIBS_QUERY_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+/// @param size     Bytes of the storage.
+/// @param tree     The tree.
+/// @param query    Where the query's address goes.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_query_init(
+    storage: *mut c_void,
+    size: usize,
+    tree: *mut dibs_tree,
+    query: *mut *mut dibs_query,
+) -> dibs_code {
+    dibs_code::of(|| storage.make(size, query, || Ok(dibs_query(Query::new(&tree.share()?.tree)?))))
+}
+
+/// The closest pair of the tool and the surface in the frame.
+///
+/// Exact within `accuracy`, as long as the surface keeps to its stretch. A budget that runs out is no error: the interval is
+/// wider then.
+///
+/// Cost: the budget at most.
+///
+/// @param query      The query.
+/// @param frame      The surface.
+/// @param tool       The tool.
+/// @param options    Options, or null.
+/// @param proximity  Where the answer goes; nothing is written unless the code is `DIBS_CODE_OK`.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_TOOL_COORDINATE` to `DIBS_CODE_QUERY_FAILED`,
+///         `DIBS_CODE_TREE_CORRUPT`, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_query_closest(
+    query: *mut dibs_query,
+    frame: *mut dibs_frame,
+    tool: *const dibs_tool,
+    options: *const dibs_options,
+    proximity: *mut dibs_proximity,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (proximity, options) = (proximity.check()?, dibs_options::of(options)?);
+        let shape = Shape::try_from(tool.get()?)?;
+        let (mut query, frame) = (query.open()?, frame.open()?);
+        let found: Result<Proximity, dibs_code> =
+            ask!(frame, shape, |table, tool| query.0.closest(table, tool, &options));
+        proximity.set(found?.into());
+        Ok(())
+    })
+}
+
+/// A processor and a tool whose tests were counted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum dibs_cost {
+    /// A sphere on a Cortex-M7.
+    M7Sphere = 0,
+    /// A capsule on a Cortex-M7.
+    M7Capsule = 1,
+    /// A sphere on x86-64.
+    X86Sphere = 2,
+    /// A capsule on x86-64.
+    X86Capsule = 3,
+}
+
+/// The budget of a query that is to end within so many instructions, by a fit with a margin of 20 %.
+///
+/// @param cost  A `dibs_cost`.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a number that is no `dibs_cost`, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_budget_for_instructions(
+    instructions: u32,
+    cost: u32,
+    budget: *mut dibs_budget,
+) -> dibs_code {
+    const COSTS: [(dibs_cost, &Cost); 4] = [
+        (dibs_cost::M7Sphere, &Cost::M7_SPHERE),
+        (dibs_cost::M7Capsule, &Cost::M7_CAPSULE),
+        (dibs_cost::X86Sphere, &Cost::X86_64_SPHERE),
+        (dibs_cost::X86Capsule, &Cost::X86_64_CAPSULE),
+    ];
+    dibs_code::of(|| {
+        let (_, cost) =
+            COSTS.iter().find(|(number, _)| *number as u32 == cost).ok_or(dibs_code::Argument)?;
+        let Budget { node_tests, triangle_tests } = Budget::for_instructions(instructions, cost);
+        budget.check()?.set(dibs_budget { node_tests, triangle_tests });
+        Ok(())
+    })
+}

@@ -1,0 +1,63 @@
+//! Points and tools.
+
+use bytemuck::AnyBitPattern;
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::{Capsule, Sphere};
+
+use crate::code::dibs_code;
+
+/// A point, a direction, a force or a velocity.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_vec3 {
+    /// Along x.
+    pub x: f32,
+    /// Along y.
+    pub y: f32,
+    /// Along z.
+    pub z: f32,
+}
+
+impl From<Vec3> for dibs_vec3 {
+    fn from(Vec3 { x, y, z }: Vec3) -> Self {
+        Self { x, y, z }
+    }
+}
+
+impl From<dibs_vec3> for Vec3 {
+    fn from(dibs_vec3 { x, y, z }: dibs_vec3) -> Self {
+        Self::new(x, y, z)
+    }
+}
+
+/// A rigid instrument: all points within `radius` of the segment from `start` to `end`, in the mesh's frame and unit
+/// (mm). A capsule; a sphere where both ends are equal.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_tool {
+    /// One end of the axis (mm): at most 2^29 on each axis.
+    pub start: dibs_vec3,
+    /// The other end (mm).
+    pub end: dibs_vec3,
+    /// Radius (mm): 0 to 2^29.
+    pub radius: f32,
+}
+
+/// The core's tool.
+pub enum Shape {
+    Sphere(Sphere),
+    Capsule(Capsule),
+}
+
+impl TryFrom<dibs_tool> for Shape {
+    type Error = dibs_code;
+
+    fn try_from(tool: dibs_tool) -> Result<Self, dibs_code> {
+        let (start, end) = (Vec3::from(tool.start), Vec3::from(tool.end));
+        Ok(if start == end {
+            Self::Sphere(Sphere::new(start, tool.radius)?)
+        } else {
+            Self::Capsule(Capsule::new(start, end, tool.radius)?)
+        })
+    }
+}

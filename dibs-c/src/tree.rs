@@ -1,0 +1,143 @@
+//! The tree, validated.
+
+use core::ffi::c_void;
+
+use dibs_nostd::{Scrub, Tree};
+
+use crate::border::{Handle, Input, Kind, Output, Storage};
+use crate::code::dibs_code;
+use crate::tool::dibs_vec3;
+
+/// Bytes of a tree's storage.
+pub const DIBS_TREE_SIZE: usize = 384;
+
+/// A validated tree, by name `heart.dibs` of `dibs build heart.ply -o heart.dibs`. At most 65,536 vertices.
+///
+/// Any number of contexts may use it at once.
+pub struct dibs_tree {
+    /// The view of the bytes.
+    pub(crate) tree: Tree<'static, u16>,
+    bytes: &'static [u8],
+}
+
+impl Kind for dibs_tree {
+    const MARK: u32 = 0x6462_7402;
+    const SIZE: usize = DIBS_TREE_SIZE;
+}
+
+/// Facts about a tree.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct dibs_tree_facts {
+    /// Vertices: rows of a surface.
+    pub vertices: u32,
+    /// Triangles.
+    pub triangles: u32,
+    /// Nodes.
+    pub nodes: u32,
+    /// Identity of the mesh, which packets carry.
+    pub mesh_id: u32,
+    /// Checksum of the tree's bytes.
+    pub checksum: u32,
+    /// The stretch limit that the tree was built for; 1 for no stretch.
+    pub stretch: f32,
+    /// How far (mm) a vertex may be from where the mesh's file has it.
+    pub position_error: f32,
+}
+
+/// Validates the bytes of a tree, and makes the tree that every other object is made with.
+///
+/// Cost: linear in the bytes; once, at start-up.
+///
+/// @param storage  `DIBS_TREE_SIZE` bytes, aligned to `DIBS_ALIGNMENT`, for as long as the tree is used.
+/// @param size     Bytes of the storage.
+/// @param bytes    The tree, in flash or in memory. Not copied: it stays unchanged for as long as the tree, and any
+///                 object made with it, is used. Aligned to 4 it is read faster.
+/// @param length   Bytes of the tree.
+/// @param tree     Where the tree's address goes.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_TREE_LENGTH` to `DIBS_CODE_TREE_FORM`, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_tree_init(
+    storage: *mut c_void,
+    size: usize,
+    bytes: *const u8,
+    length: usize,
+    tree: *mut *mut dibs_tree,
+) -> dibs_code {
+    dibs_code::of(|| {
+        storage.make(size, tree, || {
+            let bytes = bytes.slice(length)?;
+            Ok(dibs_tree { tree: Tree::from_bytes(bytes)?, bytes })
+        })
+    })
+}
+
+/// Facts about the tree.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_tree_get_facts(
+    tree: *mut dibs_tree,
+    facts: *mut dibs_tree_facts,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (facts, tree) = (facts.check()?, &tree.share()?.tree);
+        facts.set(dibs_tree_facts {
+            vertices: tree.vertex_count(),
+            triangles: tree.triangle_count(),
+            nodes: tree.node_count(),
+            mesh_id: tree.mesh_id(),
+            checksum: tree.checksum(),
+            stretch: tree.stretch(),
+            position_error: tree.position_error(),
+        });
+        Ok(())
+    })
+}
+
+/// Rest position (mm) of the vertex in a row.
+///
+/// @return `DIBS_CODE_OK`, or `DIBS_CODE_TREE_NO_REST_SHAPE` outside the table or where the tree was built without.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_tree_rest_position(
+    tree: *mut dibs_tree,
+    row: u32,
+    position: *mut dibs_vec3,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (position, tree) = (position.check()?, &tree.share()?.tree);
+        position.set(tree.rest_position(row).ok_or(dibs_code::TreeNoRestShape)?.into());
+        Ok(())
+    })
+}
+
+/// Bytes of a scrub's storage.
+pub const DIBS_SCRUB_SIZE: usize = 128;
+
+/// A background check of a tree's bytes: flash that rots after start-up gives wrong answers, and no error.
+///
+/// One context at a time.
+pub struct dibs_scrub(Scrub<'static>);
+
+impl Kind for dibs_scrub {
+    const MARK: u32 = 0x6462_7304;
+    const SIZE: usize = DIBS_SCRUB_SIZE;
+}
+
+/// Makes a check of the tree's bytes.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_scrub_init(
+    storage: *mut c_void,
+    size: usize,
+    tree: *mut dibs_tree,
+    scrub: *mut *mut dibs_scrub,
+) -> dibs_code {
+    dibs_code::of(|| storage.make(size, scrub, || Ok(dibs_scrub(Scrub::new(tree.share()?.bytes)))))
+}
+
+/// Checks the next bytes, at most `most`, and at the end of a round compares the checksum.
+///
+/// @return `DIBS_CODE_OK`, or `DIBS_CODE_TREE_CORRUPT` at the end of a round in which the bytes did not match: make the output
+///         safe.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_scrub_step(scrub: *mut dibs_scrub, most: usize) -> dibs_code {
+    dibs_code::of(|| Ok(scrub.open()?.0.step(most)?))
+}

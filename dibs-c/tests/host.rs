@@ -1,0 +1,42 @@
+//! `examples/c/host` answers a script with the bits of the Rust library.
+
+mod programs;
+mod script;
+
+use std::fs;
+use std::process::Command;
+
+use programs::{LIMIT, library, tool};
+use script::Script;
+use xtask::process::quiet;
+use xtask::workspace;
+
+#[test]
+fn c_and_rust_answer_a_script_with_the_same_bits() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let build = folder.path().join("build");
+    let mut configure = tool("cmake", "cmake");
+    configure.arg("-S").arg(workspace::root().join("examples/c/host")).arg("-B").arg(&build);
+    configure.arg(format!("-DDIBS_LIBRARY={}", library().display()));
+    quiet(&mut configure, LIMIT).expect("cmake configures");
+    quiet(Command::new("cmake").arg("--build").arg(&build), LIMIT).expect("cmake builds");
+
+    let script = Script::new();
+    let mut program = Command::new(build.join("dibs-host"));
+    for (name, bytes) in [
+        ("tree", &script.tree),
+        ("frames", &script.frames),
+        ("script", &script.lines.clone().into()),
+    ] {
+        let path = folder.path().join(name);
+        fs::write(&path, bytes).expect("writable");
+        program.arg(path);
+    }
+    let answers = quiet(&mut program, LIMIT).expect("the program answers");
+    let expected = script.answers();
+    assert!(expected.len() >= 1_000, "{} answers", expected.len());
+    for (number, (c, rust)) in answers.lines().zip(&expected).enumerate() {
+        assert_eq!(c, rust, "answer {number}");
+    }
+    assert_eq!(answers.lines().count(), expected.len());
+}

@@ -1,0 +1,174 @@
+//! A script of surfaces and poses, and what the Rust library answers to it.
+
+mod print;
+
+use std::fmt::Write;
+
+use dibs_build::{Builder, BuiltTree, generate};
+use dibs_nostd::constraint::{ForbiddenRegion, Proxy, SpringDamper, VelocityRow, Wrench};
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::{
+    Budget, Capsule, Contacts, MeasuredStretch, Options, Query, Sphere, Tool, Tree, VertexTable,
+    measure_stretch,
+};
+use print::Line;
+
+/// Margin of contacts and wall, in mm.
+const MARGIN: f32 = 8.0;
+const POSES: usize = 100;
+const FRAMES: usize = 12;
+
+/// A script and the files that it is about.
+pub struct Script {
+    built: BuiltTree,
+    /// The tree's bytes.
+    pub tree: Vec<u8>,
+    /// The positions of all frames.
+    pub frames: Vec<u8>,
+    /// The script's lines.
+    pub lines: String,
+    surfaces: Vec<Vec<Vec3>>,
+    poses: Vec<Pose>,
+}
+
+struct Pose {
+    start: Vec3,
+    end: Vec3,
+    radius: f32,
+    budget: Budget,
+    is_cold: bool,
+}
+
+impl Script {
+    /// Poses on, in and around a heart that beats.
+    pub fn new() -> Self {
+        let generate::MovingMesh { mesh, motion } = generate::heart(1_000).expect("a size");
+        let built = Builder::new().stretch(1.5).build(&mesh).expect("a tree");
+        let mut random = fastrand::Rng::with_seed(17);
+        let (mut surfaces, mut poses) = (Vec::new(), Vec::new());
+        let (mut frames, mut lines) = (Vec::new(), String::new());
+        for frame in 0..FRAMES {
+            let rows = built.to_rows(&motion.frames[frame * 3 % motion.frames.len()]);
+            frames.extend(rows.iter().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes));
+            writeln!(lines, "frame {frame}").expect("a string");
+            for _ in 0..POSES {
+                let pose = Pose::new(&rows, &mut random);
+                pose.write(&mut lines);
+                poses.push(pose);
+            }
+            surfaces.push(rows);
+        }
+        Self { tree: built.blob().to_vec(), built, frames, lines, surfaces, poses }
+    }
+
+    /// The lines that a program must answer.
+    pub fn answers(&self) -> Vec<String> {
+        let tree = Tree::<u16>::from_bytes(self.built.blob()).expect("a tree");
+        let mut query = Query::<_, 512>::new(&tree).expect("a stack");
+        let mut contacts = Contacts::<16>::new();
+        let mut answers = Vec::new();
+        for (rows, poses) in self.surfaces.iter().zip(self.poses.chunks(POSES)) {
+            let rows = rows.as_slice();
+            let stretch = measure_stretch(&tree, rows).expect("a surface within its limit");
+            let surface = Surface { rows, stretch };
+            answers.extend(poses.iter().map(|pose| {
+                if pose.start == pose.end {
+                    let tool = Sphere::new(pose.start, pose.radius).expect("a tool");
+                    answer(&mut query, &mut contacts, &surface, &tool, pose)
+                } else {
+                    let tool = Capsule::new(pose.start, pose.end, pose.radius).expect("a tool");
+                    answer(&mut query, &mut contacts, &surface, &tool, pose)
+                }
+            }));
+        }
+        answers
+    }
+}
+
+impl Pose {
+    /// A sphere or a capsule that begins near a vertex, on either side; now and then with a budget that is too small.
+    fn new(rows: &[Vec3], random: &mut fastrand::Rng) -> Self {
+        let mut within = |size: f32| {
+            let mut axis = || (random.f32() - 0.5) * 2.0 * size;
+            Vec3::new(axis(), axis(), axis())
+        };
+        let (near, span) = (within(12.0), within(40.0));
+        let start = rows[random.usize(..rows.len())] + near;
+        let end = if random.u8(..3) == 0 { start } else { start + span };
+        let budget = match random.u8(..5) {
+            0 => Budget { node_tests: random.u32(..200), triangle_tests: random.u32(..20) },
+            _ => Budget::UNLIMITED,
+        };
+        let radius = random.f32() * 3.0;
+        Self { start, end, radius, budget, is_cold: random.u8(..4) == 0 }
+    }
+
+    fn write(&self, lines: &mut String) {
+        let Self { start, end, radius, budget, is_cold, .. } = self;
+        let numbers = [start.x, start.y, start.z, end.x, end.y, end.z, *radius];
+        let numbers = numbers.map(|number| number.to_string()).join(" ");
+        let Budget { node_tests, triangle_tests } = budget;
+        let flags = u32::from(*is_cold);
+        writeln!(lines, "pose {numbers} {node_tests} {triangle_tests} {flags}").expect("a string");
+    }
+
+    fn options(&self) -> Options {
+        let options = if self.is_cold { Options::cold() } else { Options::new() };
+        options.budget(self.budget)
+    }
+}
+
+/// A frame with its stretch.
+struct Surface<'s> {
+    rows: &'s [Vec3],
+    stretch: MeasuredStretch,
+}
+
+impl VertexTable for Surface<'_> {
+    fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.rows.position(vertex)
+    }
+
+    fn stretch(&self) -> Option<MeasuredStretch> {
+        Some(self.stretch)
+    }
+}
+
+/// One line: the closest pair and its force; the contacts, their rows, and their force.
+fn answer(
+    query: &mut Query<'_, u16, 512>,
+    contacts: &mut Contacts<16>,
+    surface: &Surface<'_>,
+    tool: &impl Tool,
+    pose: &Pose,
+) -> String {
+    let options = pose.options();
+    let (velocity, angular) = (Vec3::new(10.0, -20.0, 5.0), Vec3::new(0.0, 0.1, 0.0));
+    let spring = SpringDamper::new(1.0, 0.002, 5.0).expect("gains");
+    let mut line = Line::new("closest 0");
+
+    let found = query.closest(surface, tool, &options).expect("an answer");
+    line.proximity(&found);
+    let region = ForbiddenRegion::new(spring, MARGIN).expect("a margin");
+    let force = region.force(&Ok(found), velocity);
+    line.force(&Wrench { force: force.force, torque: Vec3::ZERO, state: force.state });
+
+    query.contacts(surface, tool, MARGIN, &options, contacts).expect("contacts");
+    line.word(" contacts 0");
+    line.contacts(contacts);
+    for contact in contacts.iter() {
+        let row = VelocityRow::new(contact, contacts.accuracy(), pose.start, 1.0, 20.0);
+        line.floats(&row.linear);
+        line.floats(&row.angular);
+        line.floats(&[row.least]);
+    }
+    let proxy = Proxy::new(spring, MARGIN).expect("a margin");
+    let within = contacts.within(MARGIN);
+    let wrench = proxy.wrench(within, contacts.accuracy(), pose.start, velocity, angular);
+    line.force(&wrench);
+    line.end()
+}

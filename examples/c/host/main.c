@@ -1,0 +1,174 @@
+/*
+ * Answers a script of surfaces and poses, one line of bits for each pose:
+ *
+ *     dibs-host TREE FRAMES SCRIPT
+ *
+ * TREE    a tree, as `dibs build` writes it
+ * FRAMES  x, y, z of each vertex, 32-bit floats, in the tree's order of rows, frame after frame
+ * SCRIPT  lines:
+ *     frame NUMBER                       the surface is this frame of FRAMES
+ *     pose START END RADIUS NODES TRIANGLES FLAGS
+ *                                        a capsule, a budget, the options' flags
+ *
+ * dibs-c/tests/host.rs has the same script answered in Rust, and compares the bits.
+ */
+#include <dibs.h>
+
+#include <stdalign.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "script.h"
+
+#define MARGIN 8.0f
+
+/* Memory of the objects: nothing is allocated by the library. */
+static alignas(DIBS_ALIGNMENT) uint8_t tree_memory[DIBS_TREE_SIZE];
+static alignas(DIBS_ALIGNMENT) uint8_t frame_memory[DIBS_FRAME_SIZE];
+static alignas(DIBS_ALIGNMENT) uint8_t query_memory[DIBS_QUERY_SIZE];
+static alignas(DIBS_ALIGNMENT) uint8_t contacts_memory[DIBS_CONTACTS_SIZE];
+
+static dibs_tree *tree;
+static dibs_frame *frame;
+static dibs_query *query;
+static dibs_contacts *contacts;
+
+static const dibs_wall wall = {
+    .stiffness = 1.0f, .damping = 0.002f, .hold_damping = 0.002f, .max_force = 5.0f, .margin = MARGIN};
+
+/* Ends the program where a call that must succeed has not. */
+static void must(dibs_code code) {
+    if (code != DIBS_CODE_OK) {
+        fprintf(stderr, "%s\n", dibs_code_text(code));
+        exit(EXIT_FAILURE);
+    }
+}
+
+static void print_floats(const float *values, size_t count) {
+    for (size_t at = 0; at < count; at++) {
+        uint32_t bits;
+        memcpy(&bits, &values[at], sizeof bits);
+        printf(" %08x", bits);
+    }
+}
+
+static void print_vec3(dibs_vec3 value) {
+    print_floats((float[]){value.x, value.y, value.z}, 3);
+}
+
+static void print_proximity(const dibs_proximity *found) {
+    printf(" %u", found->side);
+    print_floats((float[]){found->separation, found->lower, found->accuracy, found->axis_distance}, 4);
+    print_vec3(found->point_on_surface);
+    print_vec3(found->point_on_tool);
+    print_vec3(found->direction);
+    print_floats(&found->axis_parameter, 1);
+    print_floats(found->barycentric, 3);
+    printf(" %u %u %u %u", found->triangle, found->corners[0], found->corners[1], found->corners[2]);
+    printf(" %u %u", found->node_tests, found->triangle_tests);
+}
+
+static void print_force(const dibs_force *force) {
+    printf(" %u %u", force->state, force->cause);
+    print_vec3(force->force);
+    print_vec3(force->torque);
+}
+
+/* All contacts, their rows, and the force that they hold the tool with together. */
+static void print_contacts(dibs_code code, const dibs_tool *tool, dibs_vec3 velocity) {
+    dibs_contacts_facts facts;
+    must(dibs_contacts_get_facts(contacts, &facts));
+    printf(" %u %u", facts.count, facts.is_full);
+    print_floats((float[]){facts.bound, facts.accuracy}, 2);
+    for (uint32_t number = 0; number < facts.count; number++) {
+        dibs_contact contact;
+        must(dibs_contacts_get(contacts, number, &contact));
+        print_floats(&contact.separation, 1);
+        print_vec3(contact.normal);
+        print_vec3(contact.point_on_tool);
+    }
+    dibs_row rows[DIBS_CONTACTS];
+    size_t count;
+    must(dibs_contacts_rows(contacts, tool->start, 1.0f, 20.0f, DIBS_CONTACTS, rows, &count));
+    for (size_t number = 0; number < count; number++) {
+        print_floats(rows[number].linear, 3);
+        print_floats(rows[number].angular, 3);
+        print_floats(&rows[number].least, 1);
+    }
+    dibs_force force;
+    const dibs_vec3 angular = {0.0f, 0.1f, 0.0f};
+    must(dibs_wall_proxy_force(&wall, code, contacts, tool->start, velocity, angular, &force));
+    print_force(&force);
+}
+
+static void answer(const dibs_tool *tool, const dibs_options *options) {
+    const dibs_vec3 velocity = {10.0f, -20.0f, 5.0f};
+    dibs_proximity found;
+    dibs_force force;
+    dibs_code code = dibs_query_closest(query, frame, tool, options, &found);
+    printf("closest %u", code);
+    if (code == DIBS_CODE_OK) {
+        print_proximity(&found);
+    }
+    /* An error makes the force the hold: there is always one. */
+    must(dibs_wall_force(&wall, code, &found, velocity, &force));
+    print_force(&force);
+
+    code = dibs_query_contacts(query, frame, tool, MARGIN, options, contacts, NULL);
+    printf(" contacts %u", code);
+    print_contacts(code, tool, velocity);
+    printf("\n");
+}
+
+static void pose(char *text) {
+    dibs_tool tool;
+    float numbers[7];
+    dibs_options options = {.depth_tolerance = 0.0f};
+    uint32_t words[3];
+    if (!take_floats(&text, numbers, 7) || !take_words(&text, words, 3)) {
+        fprintf(stderr, "a pose takes 7 floats and 3 numbers\n");
+        exit(EXIT_FAILURE);
+    }
+    tool.start = (dibs_vec3){numbers[0], numbers[1], numbers[2]};
+    tool.end = (dibs_vec3){numbers[3], numbers[4], numbers[5]};
+    tool.radius = numbers[6];
+    options.budget = (dibs_budget){.node_tests = words[0], .triangle_tests = words[1]};
+    options.flags = words[2];
+    answer(&tool, &options);
+}
+
+int main(int argc, char **argv) {
+    if (argc != 4) {
+        fprintf(stderr, "dibs-host TREE FRAMES SCRIPT\n");
+        return EXIT_FAILURE;
+    }
+    size_t tree_length, frames_length, script_length;
+    const uint8_t *bytes = file_read(argv[1], &tree_length);
+    const float *frames = (const float *)(const void *)file_read(argv[2], &frames_length);
+    char *script = (char *)file_read(argv[3], &script_length);
+
+    dibs_tree_facts facts;
+    must(dibs_tree_init(tree_memory, sizeof tree_memory, bytes, tree_length, &tree));
+    must(dibs_tree_get_facts(tree, &facts));
+    must(dibs_frame_init(frame_memory, sizeof frame_memory, &frame));
+    must(dibs_query_init(query_memory, sizeof query_memory, tree, &query));
+    must(dibs_contacts_init(contacts_memory, sizeof contacts_memory, &contacts));
+
+    const size_t frame_floats = 3 * (size_t)facts.vertices;
+    for (char *line = strtok(script, "\n"); line != NULL; line = strtok(NULL, "\n")) {
+        uint32_t number;
+        char *text = line + 5;
+        if (strncmp(line, "frame", 5) == 0 && take_words(&text, &number, 1)
+            && (number + 1) * frame_floats * sizeof(float) <= frames_length) {
+            must(dibs_frame_set_vertices(frame, frames + number * frame_floats, facts.vertices, 0.0f));
+            must(dibs_frame_measure(frame, tree, NULL));
+        } else if (strncmp(line, "pose ", 5) == 0) {
+            pose(text);
+        } else {
+            fprintf(stderr, "not a line of a script: %s\n", line);
+            return EXIT_FAILURE;
+        }
+    }
+    return EXIT_SUCCESS;
+}
