@@ -90,6 +90,9 @@ pub use surface::{
     MeasuredStretch, Moved, MovingSurface, Odometer, OutOfTableError, PublishError,
     QuantisedVertices, REGIONS, SplitError, Step, Travel, VertexTable,
 };
+/// Surfaces of a size that no type has, for the C interface. They may change with any version.
+#[doc(hidden)]
+pub use surface::{Buffer, Position, ends};
 pub use tool::{ACCURACY, AxisPair, Capsule, MAX_COORDINATE, Sphere, Tool, ToolError};
 /// The layout of a tree's bytes, for `dibs-build`. It may change with any version.
 #[doc(hidden)]

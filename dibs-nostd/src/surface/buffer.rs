@@ -22,18 +22,19 @@ pub struct FrameLabel {
 
 /// One position, as bits of `f32`.
 #[derive(Debug)]
-pub(crate) struct Position([AtomicU32; 3]);
+#[repr(transparent)]
+pub struct Position([AtomicU32; 3]);
 
 impl Position {
     #[inline(always)]
-    pub fn get(&self) -> Vec3 {
+    pub(crate) fn get(&self) -> Vec3 {
         let [x, y, z] = &self.0;
         let load = |bits: &AtomicU32| f32::from_bits(bits.load(Ordering::Relaxed));
         Vec3::new(load(x), load(y), load(z))
     }
 
     #[inline(always)]
-    pub fn set(&self, position: Vec3) {
+    pub(crate) fn set(&self, position: Vec3) {
         let [x, y, z] = &self.0;
         x.store(position.x.to_bits(), Ordering::Relaxed);
         y.store(position.y.to_bits(), Ordering::Relaxed);
@@ -42,54 +43,82 @@ impl Position {
 
     #[cfg(feature = "bus")]
     #[inline(always)]
-    pub fn copy(&self, from: &Self) {
+    pub(crate) fn copy(&self, from: &Self) {
         for (to, from) in self.0.iter().zip(&from.0) {
             to.store(from.load(Ordering::Relaxed), Ordering::Relaxed);
         }
     }
 }
 
-/// One buffer: positions as bits of `f32`, and the label of the frame in it.
+/// The positions of a buffer: an array, or a slice where only the program that runs knows how many there are.
+pub trait Rows {
+    fn rows(&self) -> &[Position];
+}
+
+impl<const N: usize> Rows for [Position; N] {
+    #[inline(always)]
+    fn rows(&self) -> &[Position] {
+        self
+    }
+}
+
+impl Rows for [Position] {
+    #[inline(always)]
+    fn rows(&self) -> &[Position] {
+        self
+    }
+}
+
+/// One buffer: positions as bits of `f32`, and the label of the frame in it. All zero at start, so that memory of
+/// zeros is one.
 #[derive(Debug)]
-pub(super) struct Buffer<const N: usize> {
-    pub positions: [Position; N],
-    pub epoch: AtomicU32,
-    pub received: AtomicU32,
+#[repr(C)]
+pub struct Buffer<P: ?Sized> {
+    pub(super) epoch: AtomicU32,
+    pub(super) received: AtomicU32,
     position_error: AtomicU32,
     /// Measured stretch; the first word is a NaN if there is none.
     stretch: [AtomicU32; MeasuredStretch::WORDS],
+    positions: P,
 }
 
-impl<const N: usize> Buffer<N> {
+impl<const N: usize> Buffer<[Position; N]> {
     #[cfg(not(loom))]
-    pub const fn new() -> Self {
+    pub(super) const fn new() -> Self {
         Self {
-            positions: [const { Position([const { AtomicU32::new(0) }; 3]) }; N],
             epoch: AtomicU32::new(0),
             received: AtomicU32::new(0),
             position_error: AtomicU32::new(0),
             stretch: [const { AtomicU32::new(0) }; MeasuredStretch::WORDS],
+            positions: [const { Position([const { AtomicU32::new(0) }; 3]) }; N],
         }
     }
 
     #[cfg(loom)]
-    pub fn new() -> Self {
+    pub(super) fn new() -> Self {
         use core::array::from_fn;
         Self {
-            positions: from_fn(|_| Position(from_fn(|_| AtomicU32::new(0)))),
             epoch: AtomicU32::new(0),
             received: AtomicU32::new(0),
             position_error: AtomicU32::new(0),
             stretch: from_fn(|_| AtomicU32::new(0)),
+            positions: from_fn(|_| Position(from_fn(|_| AtomicU32::new(0)))),
         }
+    }
+}
+
+impl<P: Rows + ?Sized> Buffer<P> {
+    #[inline(always)]
+    pub(super) fn rows(&self) -> &[Position] {
+        self.positions.rows()
     }
 
     #[inline(always)]
-    pub fn position(&self, vertex: u32) -> Option<Vec3> {
-        self.positions.get(vertex as usize).map(Position::get)
+    pub(super) fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.rows().get(vertex as usize).map(Position::get)
     }
 
-    pub fn set_label(&self, label: FrameLabel) {
+    pub(super) fn set_label(&self, label: FrameLabel) {
         self.epoch.store(label.epoch, Ordering::Relaxed);
         self.received.store(label.received, Ordering::Relaxed);
         self.position_error.store(label.position_error.to_bits(), Ordering::Relaxed);
@@ -102,7 +131,7 @@ impl<const N: usize> Buffer<N> {
         }
     }
 
-    pub fn label(&self) -> FrameLabel {
+    pub(super) fn label(&self) -> FrameLabel {
         FrameLabel {
             epoch: self.epoch.load(Ordering::Relaxed),
             received: self.received.load(Ordering::Relaxed),
@@ -111,11 +140,11 @@ impl<const N: usize> Buffer<N> {
         }
     }
 
-    pub fn position_error(&self) -> f32 {
+    pub(super) fn position_error(&self) -> f32 {
         f32::from_bits(self.position_error.load(Ordering::Relaxed))
     }
 
-    pub fn stretch(&self) -> Option<MeasuredStretch> {
+    pub(super) fn stretch(&self) -> Option<MeasuredStretch> {
         let words = self.stretch.each_ref().map(|word| word.load(Ordering::Relaxed));
         let epoch = self.epoch.load(Ordering::Relaxed);
         let is_measured = words.first().is_some_and(|&sigma| !f32::from_bits(sigma).is_nan());

@@ -35,7 +35,7 @@ use glam::Vec3;
 #[cfg(feature = "bus")]
 use super::age::elapsed;
 use super::atomic::{AtomicBool, AtomicU32, Ordering};
-use super::buffer::{Buffer, FrameLabel, Position};
+use super::buffer::{Buffer, FrameLabel, Position, Rows};
 use super::error::{OutOfTableError, PublishError, SplitError};
 use super::{Ageing, FrameAge, Latest, MeasuredStretch, VertexTable};
 
@@ -73,7 +73,7 @@ const PUBLISHED: u32 = 4;
 /// ```
 #[derive(Debug)]
 pub struct Frames<const N: usize> {
-    buffers: [Buffer<N>; 2],
+    buffers: [Buffer<[Position; N]>; 2],
     state: AtomicU32,
     split: AtomicBool,
 }
@@ -110,9 +110,29 @@ impl<const N: usize> Frames<N> {
         if self.split.swap(true, Ordering::AcqRel) {
             return Err(SplitError);
         }
-        let writer = FrameWriter { frames: self, back: &self.buffers[1], state: 0, filled: 0 };
-        Ok((writer, FrameReader { frames: self, ageing: (0, Ageing::default()) }))
+        let [first, second] = &self.buffers;
+        Ok(ends(&self.state, [first, second]))
     }
+}
+
+/// The two ends of these buffers, of the same size, and of their state. All must be zero, and no other ends be made of
+/// them: [`Frames::split`] sees to that, and so does the C interface, whose surfaces have a size that no type has.
+#[doc(hidden)]
+pub const fn ends<'f, const N: usize, P: Rows + ?Sized>(
+    state: &'f AtomicU32,
+    buffers: [&'f Buffer<P>; 2],
+) -> (FrameWriter<'f, N, P>, FrameReader<'f, N, P>) {
+    let [_, back] = buffers;
+    let writer = FrameWriter { shared: Shared { state, buffers }, back, state: 0, filled: 0 };
+    let ageing = (0, Ageing { stamp: 0, oldest: 0 });
+    (writer, FrameReader { shared: Shared { state, buffers }, ageing })
+}
+
+/// The part that both ends share.
+#[derive(Debug)]
+struct Shared<'f, P: ?Sized> {
+    state: &'f AtomicU32,
+    buffers: [&'f Buffer<P>; 2],
 }
 
 impl<const N: usize> Default for Frames<N> {
@@ -127,16 +147,21 @@ impl<const N: usize> Default for Frames<N> {
 /// [`publish`](Self::publish). An [`Assembler`](crate::Assembler) takes rows in any order, and proves that all have
 /// come.
 #[derive(Debug)]
-pub struct FrameWriter<'f, const N: usize> {
-    frames: &'f Frames<N>,
-    back: &'f Buffer<N>,
+pub struct FrameWriter<'f, const N: usize, P: ?Sized = [Position; N]> {
+    shared: Shared<'f, P>,
+    back: &'f Buffer<P>,
     /// The state word after the last publication; only the writer changes these bits.
     state: u32,
     /// Rows pushed since the last `begin`.
     filled: u32,
 }
 
-impl<const N: usize> FrameWriter<'_, N> {
+impl<const N: usize, P: Rows + ?Sized> FrameWriter<'_, N, P> {
+    /// Rows of a frame.
+    pub(crate) fn len(&self) -> u32 {
+        self.back.rows().len() as u32
+    }
+
     /// Starts a frame and forgets an unfinished one. O(1).
     pub fn begin(&mut self) {
         self.filled = 0;
@@ -150,7 +175,7 @@ impl<const N: usize> FrameWriter<'_, N> {
     pub fn push(&mut self, position: Vec3) -> Result<(), OutOfTableError> {
         let row = self.filled;
         let Some([place]) = self.rows(row..row.saturating_add(1)).and_then(<[_]>::as_array) else {
-            return Err(OutOfTableError { vertex: row, vertices: N as u32 });
+            return Err(OutOfTableError { vertex: row, vertices: self.len() });
         };
         place.set(position);
         self.filled = row.saturating_add(1);
@@ -159,22 +184,22 @@ impl<const N: usize> FrameWriter<'_, N> {
 
     /// Vertices not yet pushed.
     #[must_use]
-    pub const fn missing(&self) -> u32 {
-        (N as u32).saturating_sub(self.filled)
+    pub fn missing(&self) -> u32 {
+        self.len().saturating_sub(self.filled)
     }
 
     /// Rows of the back buffer; `None` outside it.
     #[inline]
     pub(crate) fn rows(&self, rows: Range<u32>) -> Option<&[Position]> {
-        self.back.positions.get(rows.start as usize..rows.end as usize)
+        self.back.rows().get(rows.start as usize..rows.end as usize)
     }
 
     /// Copies rows of the published frame to the back buffer. O(rows).
     #[cfg(feature = "bus")]
     pub(crate) fn copy(&self, rows: Range<u32>) {
         let range = rows.start as usize..rows.end as usize;
-        let front = self.front_buffer().positions.get(range.clone()).unwrap_or_default();
-        let back = self.back.positions.get(range).unwrap_or_default();
+        let front = self.front_buffer().rows().get(range.clone()).unwrap_or_default();
+        let back = self.back.rows().get(range).unwrap_or_default();
         for (to, from) in back.iter().zip(front) {
             to.copy(from);
         }
@@ -182,18 +207,18 @@ impl<const N: usize> FrameWriter<'_, N> {
 
     /// The frame being written, complete or not: for a check before it is published.
     #[must_use]
-    pub const fn back(&self) -> FrameView<'_, N> {
+    pub const fn back(&self) -> FrameView<'_, N, P> {
         FrameView { buffer: self.back }
     }
 
     /// The published frame, `None` before the first.
     #[must_use]
-    pub fn front(&self) -> Option<FrameView<'_, N>> {
+    pub fn front(&self) -> Option<FrameView<'_, N, P>> {
         (self.state & PUBLISHED != 0).then_some(FrameView { buffer: self.front_buffer() })
     }
 
-    fn front_buffer(&self) -> &Buffer<N> {
-        let [first, second] = &self.frames.buffers;
+    fn front_buffer(&self) -> &Buffer<P> {
+        let [first, second] = self.shared.buffers;
         if self.state & FRONT == 0 { first } else { second }
     }
 
@@ -218,11 +243,11 @@ impl<const N: usize> FrameWriter<'_, N> {
     /// Publishes a labelled frame that the caller has proven complete.
     pub(crate) fn publish_complete(&mut self) -> Result<(), PublishError> {
         let next = (self.state ^ FRONT) | PUBLISHED;
-        self.frames
+        self.shared
             .state
             .compare_exchange(self.state, next, Ordering::AcqRel, Ordering::Relaxed)
             .map_err(|_| PublishError::Busy)?;
-        let [first, second] = &self.frames.buffers;
+        let [first, second] = self.shared.buffers;
         self.back = if next & FRONT == 0 { second } else { first };
         self.state = next;
         // The back buffer now holds an old frame: it must be begun before it is published.
@@ -233,19 +258,19 @@ impl<const N: usize> FrameWriter<'_, N> {
 
 /// The end that reads: owned by the control tick.
 #[derive(Debug)]
-pub struct FrameReader<'f, const N: usize> {
-    frames: &'f Frames<N>,
+pub struct FrameReader<'f, const N: usize, P: ?Sized = [Position; N]> {
+    shared: Shared<'f, P>,
     /// Epoch and age of the frame read last.
     ageing: (u32, Ageing),
 }
 
-impl<const N: usize> FrameReader<'_, N> {
+impl<'f, const N: usize, P: Rows + ?Sized> FrameReader<'f, N, P> {
     /// The published frame and its age at `now`, on the receiver's clock. [`Latest::within`] a limit gives the frame,
     /// held as by [`read`](Self::read).
     #[inline]
-    pub fn latest(&mut self, now: u32) -> Latest<FrameGuard<'_, N>> {
+    pub fn latest(&mut self, now: u32) -> Latest<FrameGuard<'_, N, P>> {
         let (epoch_before, before) = self.ageing;
-        let Some(guard) = read(self.frames) else { return Latest::new(None) };
+        let Some(guard) = read(&self.shared) else { return Latest::new(None) };
         let FrameLabel { epoch, received, .. } = guard.label();
         let before = if epoch == epoch_before { before } else { Ageing::default() };
         let ageing = before.at(now, received);
@@ -258,29 +283,29 @@ impl<const N: usize> FrameReader<'_, N> {
     /// Keep the guard for one query, not longer: no frame is published meanwhile. A leaked guard keeps the surface at
     /// its present frame, whose age then grows. This does not check the age: use [`latest`](Self::latest).
     #[inline]
-    pub fn read(&mut self) -> Option<FrameGuard<'_, N>> {
-        read(self.frames)
+    pub fn read(&mut self) -> Option<FrameGuard<'_, N, P>> {
+        read(&self.shared)
     }
 }
 
 #[inline]
-fn read<const N: usize>(frames: &Frames<N>) -> Option<FrameGuard<'_, N>> {
-    let state = frames.state.fetch_or(READING, Ordering::Acquire);
-    let [first, second] = &frames.buffers;
+fn read<'f, const N: usize, P: ?Sized>(shared: &Shared<'f, P>) -> Option<FrameGuard<'f, N, P>> {
+    let state = shared.state.fetch_or(READING, Ordering::Acquire);
+    let [first, second] = shared.buffers;
     let buffer = if state & FRONT == 0 { first } else { second };
     // Created before the check, so that it clears READING on both paths.
-    let guard = FrameGuard { state: &frames.state, view: FrameView { buffer } };
+    let guard = FrameGuard { state: shared.state, view: FrameView { buffer } };
     (state & PUBLISHED != 0).then_some(guard)
 }
 
 /// The published frame, held still: a [`VertexTable`] that carries its measured stretch and its position error.
 #[derive(Debug)]
-pub struct FrameGuard<'f, const N: usize> {
+pub struct FrameGuard<'f, const N: usize, P: ?Sized = [Position; N]> {
     state: &'f AtomicU32,
-    view: FrameView<'f, N>,
+    view: FrameView<'f, N, P>,
 }
 
-impl<const N: usize> FrameGuard<'_, N> {
+impl<const N: usize, P: Rows + ?Sized> FrameGuard<'_, N, P> {
     /// The facts about this frame.
     #[must_use]
     pub fn label(&self) -> FrameLabel {
@@ -288,15 +313,15 @@ impl<const N: usize> FrameGuard<'_, N> {
     }
 }
 
-impl<const N: usize> Drop for FrameGuard<'_, N> {
+impl<const N: usize, P: ?Sized> Drop for FrameGuard<'_, N, P> {
     fn drop(&mut self) {
         self.state.fetch_and(!READING, Ordering::Release);
     }
 }
 
-impl<const N: usize> VertexTable for FrameGuard<'_, N> {
+impl<const N: usize, P: Rows + ?Sized> VertexTable for FrameGuard<'_, N, P> {
     fn len(&self) -> usize {
-        N
+        self.view.len()
     }
 
     #[inline(always)]
@@ -318,13 +343,21 @@ impl<const N: usize> VertexTable for FrameGuard<'_, N> {
 }
 
 /// The writer's view of one buffer: a [`VertexTable`].
-#[derive(Clone, Copy, Debug)]
-pub struct FrameView<'f, const N: usize> {
-    buffer: &'f Buffer<N>,
+#[derive(Debug)]
+pub struct FrameView<'f, const N: usize, P: ?Sized = [Position; N]> {
+    buffer: &'f Buffer<P>,
 }
 
+impl<const N: usize, P: ?Sized> Clone for FrameView<'_, N, P> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<const N: usize, P: ?Sized> Copy for FrameView<'_, N, P> {}
+
 #[cfg(feature = "bus")]
-impl<const N: usize> FrameView<'_, N> {
+impl<const N: usize, P: Rows + ?Sized> FrameView<'_, N, P> {
     /// The facts about the frame; arbitrary for a frame not yet labelled.
     pub(crate) fn label(&self) -> FrameLabel {
         self.buffer.label()
@@ -336,9 +369,9 @@ impl<const N: usize> FrameView<'_, N> {
     }
 }
 
-impl<const N: usize> VertexTable for FrameView<'_, N> {
+impl<const N: usize, P: Rows + ?Sized> VertexTable for FrameView<'_, N, P> {
     fn len(&self) -> usize {
-        N
+        self.buffer.rows().len()
     }
 
     #[inline(always)]

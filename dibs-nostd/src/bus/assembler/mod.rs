@@ -11,7 +11,7 @@ use crate::bus::wire::{
     Content, Counters, Event, FrameId, Mac, NoMac, Packet, Status, StreamError,
 };
 use crate::stretch::{Arriving, Gate, StretchError, StretchMonitor, SurfaceLimits, Verdict};
-use crate::surface::{FrameLabel, FrameView, FrameWriter, PublishError};
+use crate::surface::{FrameLabel, FrameView, FrameWriter, Position, PublishError, Rows};
 use crate::tree::{Index, Tree};
 
 use collector::Collector;
@@ -58,8 +58,8 @@ use health::FrameName;
 /// assert_eq!(reader.read().unwrap().position(2), Some(Vec3::Z));
 /// ```
 #[derive(Debug)]
-pub struct Assembler<'f, G, const N: usize, M = NoMac> {
-    writer: FrameWriter<'f, N>,
+pub struct Assembler<'f, G, const N: usize, M = NoMac, P: ?Sized = [Position; N]> {
+    writer: FrameWriter<'f, N, P>,
     gate: G,
     mac: M,
     max_coordinate: f32,
@@ -124,24 +124,26 @@ pub enum Advance {
     },
 }
 
-impl<'f, G: Gate, const N: usize> Assembler<'f, G, N> {
+impl<'f, G: Gate, const N: usize, P: Rows + ?Sized> Assembler<'f, G, N, NoMac, P> {
     /// An assembler for the mesh with this id, whose vertices keep within `max_coordinate` (mm) of the origin on each
     /// axis, at most [`MAX_COORDINATE`]. A smaller limit detects more damage, and bounds the accuracy of every query.
     /// With NaN nothing is ever published.
     #[must_use]
-    pub fn new(writer: FrameWriter<'f, N>, gate: G, mesh_id: u32, max_coordinate: f32) -> Self {
+    pub fn new(writer: FrameWriter<'f, N, P>, gate: G, mesh_id: u32, max_coordinate: f32) -> Self {
         Assembler::with_mac(writer, gate, mesh_id, max_coordinate, NoMac)
     }
 }
 
-impl<'f, 't, I: Index, const N: usize> Assembler<'f, StretchMonitor<'t, I>, N> {
+impl<'f, 't, I: Index, const N: usize, P: Rows + ?Sized>
+    Assembler<'f, StretchMonitor<'t, I>, N, NoMac, P>
+{
     /// An assembler for surfaces of this tree. It checks them in slices, and publishes those within the tree's stretch
     /// limit and these limits.
     ///
     /// # Errors
     /// [`StretchError::NoMetric`] where the tree was emitted without its metric section.
     pub fn for_tree(
-        writer: FrameWriter<'f, N>,
+        writer: FrameWriter<'f, N, P>,
         tree: &'t Tree<'t, I>,
         limits: SurfaceLimits,
     ) -> Result<Self, StretchError> {
@@ -150,11 +152,11 @@ impl<'f, 't, I: Index, const N: usize> Assembler<'f, StretchMonitor<'t, I>, N> {
     }
 }
 
-impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
+impl<'f, G: Gate, M: Mac, const N: usize, P: Rows + ?Sized> Assembler<'f, G, N, M, P> {
     /// The same, for packets with tags.
     #[must_use]
     pub fn with_mac(
-        writer: FrameWriter<'f, N>,
+        writer: FrameWriter<'f, N, P>,
         gate: G,
         mesh_id: u32,
         max_coordinate: f32,
@@ -223,7 +225,7 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
         let Some(frame) = &self.collector.frame else {
             self.clean();
             let has_base = self.takes_partial && self.collector.published_id().is_some();
-            if has_base && self.copied < N as u32 {
+            if has_base && self.copied < self.writer.len() {
                 self.copy(work);
             }
             return Ok(Advance::Idle);
@@ -234,11 +236,11 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
         let ready = match frame.begin.content {
             Content::Partial { .. } => {
                 let (is_complete, ready) = (frame.is_complete, frame.arrivals.ready());
-                if self.copied < N as u32 {
+                if self.copied < self.writer.len() {
                     self.copy(work);
                     return Ok(if is_complete { Advance::Pending } else { Advance::Idle });
                 }
-                if is_complete { N as u32 } else { ready }
+                if is_complete { self.writer.len() } else { ready }
             }
             _ => frame.arrivals.ready(),
         };
@@ -284,7 +286,7 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
 
     /// The frame published last.
     #[must_use]
-    pub fn surface(&self) -> Option<FrameView<'_, N>> {
+    pub fn surface(&self) -> Option<FrameView<'_, N, P>> {
         self.writer.front()
     }
 
@@ -311,7 +313,7 @@ impl<'f, G: Gate, M: Mac, const N: usize> Assembler<'f, G, N, M> {
     /// Copies rows from the published buffer to the back buffer.
     fn copy(&mut self, work: u32) {
         let end = self.copied.saturating_add(work);
-        let end = if end < N as u32 { end } else { N as u32 };
+        let end = if end < self.writer.len() { end } else { self.writer.len() };
         self.writer.copy(self.copied..end);
         self.copied = end;
     }

@@ -10,8 +10,9 @@ use crate::bus::wire::{
     quantised_row,
 };
 use crate::stretch::{Changed, Gate};
+use crate::surface::Rows as SurfaceRows;
 
-impl<G: Gate, M: Mac, const N: usize> Assembler<'_, G, N, M> {
+impl<G: Gate, M: Mac, const N: usize, P: SurfaceRows + ?Sized> Assembler<'_, G, N, M, P> {
     #[inline]
     pub(super) fn take(&mut self, packet: &Packet<'_>) -> Result<Progress, ReceiveError> {
         self.collector.check_mesh(packet)?;
@@ -43,7 +44,7 @@ impl<G: Gate, M: Mac, const N: usize> Assembler<'_, G, N, M> {
         }
         let takes_weights = self.gate.weight_range(0).is_some();
         let is_acceptable = |begin: &Begin| {
-            if begin.rows as usize != N {
+            if begin.rows != self.writer.len() {
                 Err(ReceiveError::RowCount { rows: begin.rows })
             } else if (begin.content == Content::Modal) != takes_weights {
                 Err(ReceiveError::Encoding)
