@@ -1,6 +1,15 @@
 /**
  * @file
  * dibs: the closest point between a tool and a deforming mesh, on a microcontroller.
+ *
+ * Objects are made by an `_init` function in storage of the caller's: of the size that a constant states or more, aligned
+ * to `DIBS_ALIGNMENT`, without an initial value, and kept, unmoved, for as long as the object is used. Nothing is allocated.
+ *
+ * Calls return a `dibs_code`: `DIBS_CODE_OK`, an error of the call's own, or a misuse, which is one of the codes below 100.
+ * After an error nothing is written to the places for results, unless a function says otherwise.
+ *
+ * A pointer is null, or it points to as much as its function says: more is not checked. Lengths are in the mesh's own unit,
+ * mm in these comments; positions are in the mesh's frame.
  */
 /* Generated from dibs-c/src by `DIBS_WRITE=1 cargo test -p dibs-c --test header`. */
 
@@ -10,6 +19,9 @@
 
 #include <stddef.h>
 #include <stdint.h>
+/** Bytes of the storage of a surface of so many vertices. */
+#define DIBS_SURFACE_SIZE(vertices) (DIBS_SURFACE_BASE + (size_t)DIBS_SURFACE_VERTEX * (vertices))
+
 
 /**
  * Alignment, in bytes, of the storage of every object.
@@ -30,6 +42,11 @@
  * Triangles that a list looks at together: of more, the nearest.
  */
 #define DIBS_NEAR 512
+
+/**
+ * Bytes of a machine's storage.
+ */
+#define DIBS_FAILSAFE_SIZE 192
 
 /**
  * Bytes of a frame's storage.
@@ -62,6 +79,41 @@
 #define DIBS_NO_TRIANGLE UINT32_MAX
 
 /**
+ * Bytes of a reader's storage.
+ */
+#define DIBS_READER_SIZE 128
+
+/**
+ * Bytes of a receiver's storage.
+ */
+#define DIBS_RECEIVER_SIZE 2816
+
+/**
+ * Largest packet of a byte stream: that of an Ethernet frame.
+ */
+#define DIBS_MTU 1472
+
+/**
+ * Largest status, framed or not.
+ */
+#define DIBS_STATUS 98
+
+/**
+ * Events that a receiver counts.
+ */
+#define DIBS_EVENTS 26
+
+/**
+ * Bytes of a surface's storage besides its vertices.
+ */
+#define DIBS_SURFACE_BASE 384
+
+/**
+ * Bytes of a surface's storage for each vertex: two positions.
+ */
+#define DIBS_SURFACE_VERTEX 24
+
+/**
  * Bytes of a tree's storage.
  */
 #define DIBS_TREE_SIZE 384
@@ -72,7 +124,7 @@
 #define DIBS_SCRUB_SIZE 128
 
 /**
- * What a call came to. Numbers do not change from version to version.
+ * The outcome of a call. Numbers do not change from version to version; those from 1 to 99 are misuses.
  */
 enum dibs_code
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -402,11 +454,96 @@ typedef uint32_t dibs_force_state;
 #endif // __cplusplus
 
 /**
+ * The outcome of a packet.
+ */
+enum dibs_progress
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * No packet is complete yet.
+   */
+  DIBS_PROGRESS_NONE = 0,
+  /**
+   * A frame began.
+   */
+  DIBS_PROGRESS_BEGUN = 1,
+  /**
+   * The packet was taken.
+   */
+  DIBS_PROGRESS_STORED = 2,
+  /**
+   * The packet had come before, and was ignored.
+   */
+  DIBS_PROGRESS_DUPLICATE = 3,
+  /**
+   * The frame is complete: `dibs_receiver_advance` checks and publishes it.
+   */
+  DIBS_PROGRESS_COMPLETE = 4,
+  /**
+   * The sender lives.
+   */
+  DIBS_PROGRESS_HEARTBEAT = 5,
+  /**
+   * The sender asks for a status: it is due now.
+   */
+  DIBS_PROGRESS_HELLO = 6,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_progress dibs_progress;
+#else
+typedef uint32_t dibs_progress;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * The outcome of a slice of work.
+ */
+enum dibs_advance
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * No complete frame waits to be checked.
+   */
+  DIBS_ADVANCE_IDLE = 0,
+  /**
+   * More work is left.
+   */
+  DIBS_ADVANCE_PENDING = 1,
+  /**
+   * The frame is admitted, but the last one is being read: a later call publishes it.
+   */
+  DIBS_ADVANCE_HELD = 2,
+  /**
+   * The frame is published.
+   */
+  DIBS_ADVANCE_PUBLISHED = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_advance dibs_advance;
+#else
+typedef uint32_t dibs_advance;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * A list of contacts.
  *
  * One context at a time.
  */
 typedef struct dibs_contacts dibs_contacts;
+
+/**
+ * The machine. It begins in the safe state.
+ *
+ * One context at a time.
+ */
+typedef struct dibs_failsafe dibs_failsafe;
 
 /**
  * The surface at one moment: vertices of the caller's, or the frame that a reader holds. Queries search it.
@@ -423,11 +560,32 @@ typedef struct dibs_frame dibs_frame;
 typedef struct dibs_query dibs_query;
 
 /**
+ * Reads the frame that was published last.
+ *
+ * One context at a time: the control interrupt.
+ */
+typedef struct dibs_reader dibs_reader;
+
+/**
+ * Assembles frames from packets, checks them, and publishes those that are complete and right.
+ *
+ * One context at a time, of lower priority than the reader's: the bus interrupt.
+ */
+typedef struct dibs_receiver dibs_receiver;
+
+/**
  * A background check of a tree's bytes: flash that rots after start-up gives wrong answers, and no error.
  *
  * One context at a time.
  */
 typedef struct dibs_scrub dibs_scrub;
+
+/**
+ * Two buffers of vertices: the receiver fills one, the reader holds the other, and neither waits.
+ *
+ * Any number of contexts may use it at once.
+ */
+typedef struct dibs_surface dibs_surface;
 
 /**
  * A validated tree, by name `heart.dibs` of `dibs build heart.ply -o heart.dibs`. At most 65,536 vertices.
@@ -704,6 +862,181 @@ typedef struct {
 } dibs_row;
 
 /**
+ * Two limits on one input: beyond the first the state is degraded, beyond the second safe. Both `DIBS_UNLIMITED` where
+ * the input is not watched; otherwise below 2^31.
+ */
+typedef struct {
+  /**
+   * The first limit.
+   */
+  uint32_t degraded;
+  /**
+   * The second limit, not below the first.
+   */
+  uint32_t safe;
+} dibs_watch;
+
+/**
+ * The machine's limits. Times are in the receiver's clock's unit.
+ */
+typedef struct {
+  /**
+   * Age of the surface; must be watched.
+   */
+  dibs_watch age;
+  /**
+   * Time since any good packet.
+   */
+  dibs_watch silence;
+  /**
+   * Time since the last heartbeat.
+   */
+  dibs_watch heartbeat;
+  /**
+   * Frames refused or damaged since the last one was published.
+   */
+  dibs_watch rejections;
+  /**
+   * Time that the published frame was on its way.
+   */
+  dibs_watch transit;
+  /**
+   * Age of the published frame when it was sent.
+   */
+  dibs_watch source_age;
+  /**
+   * Forged packets since the last frame was published.
+   */
+  dibs_watch forgeries;
+  /**
+   * Largest speed of any point of the tissue, in mm per unit of the clock; at least 0.
+   */
+  float tissue_speed;
+  /**
+   * Frames in a row that recover: 1 to 65,535.
+   */
+  uint32_t recovery_frames;
+  /**
+   * 0 to leave the safe state by an acknowledgement alone; otherwise without one.
+   */
+  uint32_t automatic;
+} dibs_limits;
+
+/**
+ * Which frame was published last, and how old it is.
+ */
+typedef struct {
+  /**
+   * 0 before the first frame; then the rest is 0, too.
+   */
+  uint32_t is_published;
+  /**
+   * Number of the frame; wraps.
+   */
+  uint32_t epoch;
+  /**
+   * When its first packet came, on the receiver's clock; wraps.
+   */
+  uint32_t received;
+  /**
+   * Time since then, in the clock's unit.
+   */
+  uint32_t age;
+} dibs_age;
+
+/**
+ * The health of the bus. `UINT32_MAX` for a time that is not known.
+ */
+typedef struct {
+  /**
+   * Time since the last good packet.
+   */
+  uint32_t silence;
+  /**
+   * Time since the last heartbeat.
+   */
+  uint32_t heartbeat;
+  /**
+   * Frames refused or damaged since the last one was published.
+   */
+  uint32_t rejections;
+  /**
+   * Packets without a genuine tag since then.
+   */
+  uint32_t forgeries;
+  /**
+   * Time that the published frame was on its way, at most.
+   */
+  uint32_t transit;
+  /**
+   * Age of the published frame when it was sent.
+   */
+  uint32_t source_age;
+} dibs_link;
+
+/**
+ * The input of a step.
+ */
+typedef struct {
+  /**
+   * The published frame and its age: of `dibs_reader_latest`.
+   */
+  dibs_age age;
+  /**
+   * The bus's health: of `dibs_reader_link`.
+   */
+  dibs_link link;
+  /**
+   * Code of the query on that frame: `DIBS_CODE_OK` where it gave an answer, and where it was not asked.
+   */
+  uint32_t query;
+  /**
+   * Other than 0 once the tree's bytes were found changed: of `dibs_scrub_step`. Leave it set.
+   */
+  uint32_t has_rotted;
+} dibs_observation;
+
+/**
+ * The result of a step.
+ */
+typedef struct {
+  /**
+   * A `dibs_state`.
+   */
+  uint32_t state;
+  /**
+   * Why it is not nominal: a `dibs_code`.
+   */
+  uint32_t cause;
+  /**
+   * How far (mm) the tissue may have moved since the surface was received.
+   */
+  float margin;
+  /**
+   * 1 where only an acknowledgement is missing to leave the safe state; else 0.
+   */
+  uint32_t waits_for_acknowledgement;
+} dibs_verdict;
+
+/**
+ * Limits of a surface besides the tree's stretch limit. A limit that is not a number refuses every frame.
+ */
+typedef struct {
+  /**
+   * No coordinate is beyond this (mm) on any axis. The smaller, the more damage it tells from a surface.
+   */
+  float reach;
+  /**
+   * Largest speed of a vertex, in mm per unit of the receiver's clock; `INFINITY` for no limit.
+   */
+  float speed;
+  /**
+   * Least size of a region as a part of its size at rest, 0.25 for example; 0 for no limit.
+   */
+  float shrinkage;
+} dibs_surface_limits;
+
+/**
  * Facts about a tree.
  */
 typedef struct {
@@ -865,7 +1198,47 @@ dibs_code dibs_contacts_rows(dibs_contacts *contacts,
                              size_t *count);
 
 /**
- * Makes an empty frame.
+ * Makes a machine.
+ *
+ * @param storage   `DIBS_FAILSAFE_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+ * @param size      Bytes of the storage.
+ * @param limits    Its limits.
+ * @param failsafe  Where the machine's address goes.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`, or a misuse.
+ */
+dibs_code dibs_failsafe_init(void *storage, size_t size, const dibs_limits *limits, dibs_failsafe **failsafe);
+
+/**
+ * One control tick of the machine.
+ *
+ * Cost: ten comparisons of two limits.
+ *
+ * @return `DIBS_CODE_OK`, whatever the state; `DIBS_CODE_ARGUMENT` for a query's code that is none; or a misuse.
+ */
+dibs_code dibs_failsafe_step(dibs_failsafe *failsafe,
+                             const dibs_observation *seen,
+                             dibs_verdict *verdict);
+
+/**
+ * An operator's acknowledgement: the next step leaves the safe state if its inputs are within their limits.
+ *
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_ACKNOWLEDGE` unless the last step waited for it, or a misuse.
+ */
+dibs_code dibs_failsafe_acknowledge(dibs_failsafe *failsafe);
+
+/**
+ * Widens an answer by the verdict's margin, if it may be acted on.
+ *
+ * @param verdict    The verdict of this tick.
+ * @param proximity  The answer of this tick, which is widened.
+ * @return `DIBS_CODE_OK`; in the safe state the cause, to be passed on to a wall; `DIBS_CODE_ARGUMENT` for numbers that are
+ *         no state or no code; or a misuse.
+ */
+dibs_code dibs_verdict_admit(const dibs_verdict *verdict,
+                             dibs_proximity *proximity);
+
+/**
+ * Makes an empty frame. Storage of a frame that a reader holds is released before it is used anew.
  *
  * @param storage  `DIBS_FRAME_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
  * @param size     Bytes of the storage.
@@ -908,6 +1281,11 @@ dibs_code dibs_frame_measure(dibs_frame *frame,
 dibs_code dibs_frame_release(dibs_frame *frame);
 
 /**
+ * A panic path put in on purpose.
+ */
+uint8_t dibs_planted_panic(size_t at);
+
+/**
  * Makes a query on a tree.
  *
  * @param storage  `DIBS_QUERY_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
@@ -946,6 +1324,151 @@ dibs_code dibs_query_closest(dibs_query *query,
  * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a number that is no `dibs_cost`, or a misuse.
  */
 dibs_code dibs_budget_for_instructions(uint32_t instructions, uint32_t cost, dibs_budget *budget);
+
+/**
+ * Makes the reader of a surface, once.
+ *
+ * @param storage  `DIBS_READER_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+ * @param size     Bytes of the storage.
+ * @param surface  The surface.
+ * @param reader   Where the reader's address goes.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_TAKEN` where the surface has a reader, or a misuse.
+ */
+dibs_code dibs_reader_init(void *storage, size_t size, dibs_surface *surface, dibs_reader **reader);
+
+/**
+ * Holds the frame that was published last, if it is not too old. Until it is released no frame is published, so release it
+ * after the tick's queries.
+ *
+ * @param reader  The reader.
+ * @param now     The receiver's clock.
+ * @param limit   The greatest age, in the clock's unit; UINT32_MAX leaves the age to the fail-safe machine.
+ * @param frame   The frame that holds it; what it held before is released.
+ * @param age     Where its age goes, also where it is too old; or null.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE`, `DIBS_CODE_STALE`, `DIBS_CODE_HELD` where another frame holds one of this
+ *         surface, or a misuse. The frame is then empty.
+ */
+dibs_code dibs_reader_latest(dibs_reader *reader,
+                             uint32_t now,
+                             uint32_t limit,
+                             dibs_frame *frame,
+                             dibs_age *age);
+
+/**
+ * The health of the bus at `now`, on the receiver's clock.
+ */
+dibs_code dibs_reader_link(dibs_reader *reader, uint32_t now, dibs_link *link);
+
+/**
+ * Makes the receiver of a surface, once.
+ *
+ * @param storage   `DIBS_RECEIVER_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+ * @param size      Bytes of the storage.
+ * @param surface   The surface.
+ * @param tree      Its tree.
+ * @param limits    Limits of every frame.
+ * @param receiver  Where the receiver's address goes.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many vertices; `DIBS_CODE_TAKEN` where
+ *         the surface has a receiver; `DIBS_CODE_TREE_NO_METRIC`; or a misuse.
+ */
+dibs_code dibs_receiver_init(void *storage,
+                             size_t size,
+                             dibs_surface *surface,
+                             dibs_tree *tree,
+                             const dibs_surface_limits *limits,
+                             dibs_receiver **receiver);
+
+/**
+ * Takes one packet, whole: a datagram, or the data of a CAN-FD message.
+ *
+ * Cost: linear in the bytes.
+ *
+ * @param receiver  The receiver.
+ * @param packet    The packet, read during the call.
+ * @param length    Its bytes.
+ * @param now       The receiver's clock, in ms; wraps.
+ * @param progress  Where its outcome goes, or null.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_PACKET_DAMAGED` to `DIBS_CODE_PACKET_REFUSED` where the packet was not taken, which
+ *         has been counted, or a misuse.
+ */
+dibs_code dibs_receiver_accept(dibs_receiver *receiver,
+                               const uint8_t *packet,
+                               size_t length,
+                               uint32_t now,
+                               dibs_progress *progress);
+
+/**
+ * Takes one byte of a stream of COBS frames, each ended by a zero: a serial line.
+ *
+ * @param receiver  The receiver.
+ * @param byte      The byte.
+ * @param now       The receiver's clock, in ms; wraps.
+ * @param progress  Where the outcome of the packet goes that the byte completes, or `DIBS_PROGRESS_NONE`; or null.
+ * @return As `dibs_receiver_accept`; `DIBS_CODE_FRAMING` where bytes between two zeros are no packet.
+ */
+dibs_code dibs_receiver_byte(dibs_receiver *receiver,
+                             uint8_t byte,
+                             uint32_t now,
+                             dibs_progress *progress);
+
+/**
+ * Does some of the work that is due: checks rows and triangles, and publishes a frame that keeps to its limits.
+ *
+ * Worth calling after each packet, and from time to time when the bus is quiet. Cost: linear in `work`.
+ *
+ * @param receiver  The receiver.
+ * @param work      Most rows and triangles that are checked or copied.
+ * @param advance   Where the outcome goes, or null.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_STRETCH_EXCEEDED`, `DIBS_CODE_SHRUNK` or `DIBS_CODE_TOO_FAST` where the frame is refused,
+ *         which has been counted; or a misuse.
+ */
+dibs_code dibs_receiver_advance(dibs_receiver *receiver,
+                                uint32_t work,
+                                dibs_advance *advance);
+
+/**
+ * Writes the receiver's status for the sender: every 100 ms or so, and when a hello asks for it.
+ *
+ * @param receiver  The receiver.
+ * @param now       The receiver's clock, in ms.
+ * @param safety    0 not reported, 1 nominal, 2 degraded, 3 safe.
+ * @param framed    0 for a packet; otherwise a COBS frame with the zero that ends it, for a stream.
+ * @param out       Where it goes.
+ * @param capacity  Bytes that there is room for: `DIBS_STATUS` are enough.
+ * @param length    Where its length goes.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY`, or a misuse.
+ */
+dibs_code dibs_receiver_status(dibs_receiver *receiver,
+                               uint32_t now,
+                               uint8_t safety,
+                               uint32_t framed,
+                               uint8_t *out,
+                               size_t capacity,
+                               size_t *length);
+
+/**
+ * How often each event has happened since the start, in the order of docs/wire.md: published, abandoned, duplicate,
+ * heartbeat, and from the fifth on rejections by their cause.
+ *
+ * @param receiver  The receiver.
+ * @param counters  Room for `DIBS_EVENTS` numbers.
+ */
+dibs_code dibs_receiver_counters(dibs_receiver *receiver,
+                                 uint32_t *counters);
+
+/**
+ * Makes a surface without a frame.
+ *
+ * @param storage   `DIBS_SURFACE_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`. Needs no initial value. For as long as
+ *                  its receiver, its reader and their frames are used.
+ * @param size      Bytes of the storage.
+ * @param vertices  Vertices of the surface: those of the tree.
+ * @param surface   Where the surface's address goes.
+ */
+dibs_code dibs_surface_init(void *storage,
+                            size_t size,
+                            uint32_t vertices,
+                            dibs_surface **surface);
 
 /**
  * Validates the bytes of a tree, and makes the tree that every other object is made with.

@@ -87,6 +87,15 @@ impl<T> Place<T> {
         // SAFETY: checked, and so a place that is this call's alone.
         unsafe { self.0.write(value) };
     }
+
+    /// The value there.
+    pub fn get(&self) -> T
+    where
+        T: AnyBitPattern,
+    {
+        // SAFETY: checked, and the function takes a value there; any bits are one of this type.
+        unsafe { self.0.read() }
+    }
 }
 
 /// Places for several values, of which the first have one.
@@ -117,6 +126,14 @@ pub trait Storage {
         out: *mut *mut T,
         body: impl FnOnce() -> Result<T, dibs_code>,
     ) -> Result<(), dibs_code>;
+
+    /// So many zeroed words after the first `offset` bytes, a multiple of 4.
+    fn words(
+        self,
+        size: usize,
+        offset: usize,
+        words: usize,
+    ) -> Result<&'static mut [u32], dibs_code>;
 }
 
 /// The start of the memory, if it is large enough and aligned.
@@ -153,6 +170,23 @@ impl Storage for *mut c_void {
         unsafe { &*place }.mark.store(T::MARK, Ordering::Release);
         out.set(place.cast());
         Ok(())
+    }
+
+    fn words(
+        self,
+        size: usize,
+        offset: usize,
+        words: usize,
+    ) -> Result<&'static mut [u32], dibs_code> {
+        let bytes = words.checked_mul(4).and_then(|bytes| bytes.checked_add(offset));
+        let needed = bytes.filter(|_| offset.is_multiple_of(4)).ok_or(dibs_code::Argument)?;
+        let start = memory(self, size, needed)?.cast::<u32>();
+        // SAFETY: inside the caller's memory, which is this object's alone from now on.
+        unsafe {
+            let start = start.add(offset / 4);
+            start.write_bytes(0, words);
+            Ok(slice::from_raw_parts_mut(start, words))
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use core::ffi::{CStr, c_char};
 
-/// What a call came to. Numbers do not change from version to version.
+/// The outcome of a call. Numbers do not change from version to version; those from 1 to 99 are misuses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum dibs_code {

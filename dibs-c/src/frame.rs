@@ -7,6 +7,7 @@ use dibs_nostd::{MeasuredStretch, VertexTable, measure_stretch};
 
 use crate::border::{Handle, Input, Kind, Output, Storage};
 use crate::code::dibs_code;
+use crate::surface::Held;
 use crate::tree::dibs_tree;
 
 /// Bytes of a frame's storage.
@@ -28,6 +29,7 @@ impl Kind for dibs_frame {
 pub(crate) enum Table {
     Empty,
     Vertices(Vertices),
+    Held(Held),
 }
 
 /// Vertices of the caller's.
@@ -72,12 +74,14 @@ macro_rules! ask {
             (Table::Empty, _) => Err(crate::code::dibs_code::NoSurface),
             (Table::Vertices($table), Shape::Sphere($tool)) => $call.map_err(Into::into),
             (Table::Vertices($table), Shape::Capsule($tool)) => $call.map_err(Into::into),
+            (Table::Held($table), Shape::Sphere($tool)) => $call.map_err(Into::into),
+            (Table::Held($table), Shape::Capsule($tool)) => $call.map_err(Into::into),
         }
     }};
 }
 pub(crate) use ask;
 
-/// Makes an empty frame.
+/// Makes an empty frame. Storage of a frame that a reader holds is released before it is used anew.
 ///
 /// @param storage  `DIBS_FRAME_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
 /// @param size     Bytes of the storage.
@@ -143,6 +147,7 @@ pub extern "C" fn dibs_frame_measure(
         let tree = &tree.share()?.tree;
         let measured = match &mut frame.table {
             Table::Empty => return Err(dibs_code::NoSurface),
+            Table::Held(held) => held.stretch().ok_or(dibs_code::NoSurface)?,
             Table::Vertices(vertices) => {
                 vertices.stretch = None;
                 let measured = measure_stretch(tree, vertices)?;

@@ -4,7 +4,8 @@
 //! Nothing is allocated and nothing panics. On a board the second is proved by the linker: the panic handler calls a
 //! function that does not exist.
 //!
-//! Names are those of the header. `unsafe` stands in `border`, which trusts the caller's pointers.
+//! Names are those of the header. `unsafe` stands in `border`, which trusts the caller's pointers, and in
+//! `surface`, whose buffers have a size that no type has.
 #![no_std]
 #![allow(non_camel_case_types)]
 // Parameters are named in Doxygen's way.
@@ -19,9 +20,13 @@ mod causes;
 mod code;
 mod constraint;
 mod contacts;
+mod failsafe;
 mod frame;
 #[cfg(target_os = "none")]
 mod panic;
 mod query;
+mod reader;
+mod receiver;
+mod surface;
 mod tool;
 mod tree;

@@ -1,15 +1,16 @@
-//! Building and running programs in C.
+//! Building and running programs in C and C++.
+#![allow(dead_code, reason = "no test uses all of it")]
 
-use std::env;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
+use std::{env, fs};
 
+use dibs_build::{Builder, generate};
+use dibs_nostd::Tree;
+use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, enframe, framed_bytes};
 use xtask::process::quiet;
 use xtask::{apt, workspace};
-
-/// Longest that a program may take.
-pub const LIMIT: Duration = Duration::from_secs(300);
 
 /// The host's static library, built in the profile of this test.
 pub fn library() -> PathBuf {
@@ -17,9 +18,23 @@ pub fn library() -> PathBuf {
     let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     cargo.args(["rustc", "--quiet", "--package", "dibs-c", "--lib", "--profile", profile]);
     cargo.args(["--crate-type", "staticlib"]).current_dir(workspace::root());
-    quiet(&mut cargo, LIMIT).expect("the static library");
+    run(&mut cargo);
     let folder = if cfg!(debug_assertions) { "debug" } else { "release" };
     workspace::target().join(folder).join("libdibs_c.a")
+}
+
+/// The header's folder.
+pub fn include() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("include")
+}
+
+/// The output of a program that must succeed.
+pub fn run(command: &mut Command) -> String {
+    let output = command.output().expect("a program that starts");
+    let [out, err] =
+        [output.stdout, output.stderr].map(|text| String::from_utf8(text).expect("text"));
+    assert!(output.status.success(), "{command:?}: {}\n{out}\n{err}", output.status);
+    out
 }
 
 /// A tool by name, installed where it is missing.
@@ -29,4 +44,25 @@ pub fn tool(name: &str, package: &str) -> Command {
         apt::install(&[package]).unwrap_or_else(|error| panic!("no {name}: {error:#}"));
     }
     Command::new(name)
+}
+
+/// A tree, and two frames of its rest shape as a serial line brings them.
+pub fn tree_and_stream(folder: &Path) -> [PathBuf; 2] {
+    let mesh = generate::heart(1_000).expect("a size").mesh;
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a tree");
+    let mesh_id = Tree::<u16>::from_bytes(built.blob()).expect("a tree").mesh_id();
+    let rows = built.to_rows(&mesh.positions);
+    let mut line = Vec::new();
+    for epoch in 1..=2 {
+        let id = FrameId { mesh_id, session: 1, epoch };
+        let frame = FrameEncoder::<_, 256>::new(id, Encoding::Float, &rows[..]);
+        let (mut frame, mut packet) = (frame.expect("a frame"), [0; 256]);
+        while let Some(packet) = frame.next_packet(&mut packet) {
+            line.extend_from_slice(enframe(packet, &mut [0; framed_bytes(256)]).expect("room"));
+        }
+    }
+    let [tree, stream] = ["tree", "stream"].map(|name| folder.join(name));
+    fs::write(&tree, built.blob()).expect("writable");
+    fs::write(&stream, line).expect("writable");
+    [tree, stream]
 }

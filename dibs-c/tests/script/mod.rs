@@ -1,5 +1,6 @@
 //! A script of surfaces and poses, and what the Rust library answers to it.
 
+mod bus;
 mod print;
 
 use std::fmt::Write;
@@ -29,6 +30,7 @@ pub struct Script {
     pub lines: String,
     surfaces: Vec<Vec<Vec3>>,
     poses: Vec<Pose>,
+    events: Vec<bus::Event>,
 }
 
 struct Pose {
@@ -58,7 +60,8 @@ impl Script {
             }
             surfaces.push(rows);
         }
-        Self { tree: built.blob().to_vec(), built, frames, lines, surfaces, poses }
+        let events = bus::events(&built, &surfaces, &mut lines);
+        Self { tree: built.blob().to_vec(), built, frames, lines, surfaces, poses, events }
     }
 
     /// The lines that a program must answer.
@@ -81,6 +84,7 @@ impl Script {
                 }
             }));
         }
+        answers.extend(bus::answers(&self.built, &self.events));
         answers
     }
 }

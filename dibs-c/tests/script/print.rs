@@ -64,6 +64,13 @@ impl Line {
         self.vec3(wrench.torque);
     }
 
+    /// The hold, for a cause with this code.
+    pub fn hold(&mut self, wrench: &Wrench, cause: u32) {
+        self.numbers(&[3, cause]);
+        self.vec3(wrench.force);
+        self.vec3(wrench.torque);
+    }
+
     pub fn contacts(&mut self, contacts: &Contacts<16>) {
         self.numbers(&[contacts.len() as u32, contacts.is_full().into()]);
         self.floats(&[contacts.bound(), contacts.accuracy()]);

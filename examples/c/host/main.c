@@ -9,6 +9,8 @@
  *     frame NUMBER                       the surface is this frame of FRAMES
  *     pose START END RADIUS NODES TRIANGLES FLAGS
  *                                        a capsule, a budget, the options' flags
+ *     packet NOW BYTES                   a packet from the bus, in hexadecimal
+ *     tick NOW START END RADIUS          a control tick with the surface that came over the bus
  *
  * dibs-c/tests/host.rs has the same script answered in Rust, and compares the bits.
  */
@@ -19,6 +21,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "bus.h"
+#include "print.h"
 #include "script.h"
 
 #define MARGIN 8.0f
@@ -37,42 +41,11 @@ static dibs_contacts *contacts;
 static const dibs_wall wall = {
     .stiffness = 1.0f, .damping = 0.002f, .hold_damping = 0.002f, .max_force = 5.0f, .margin = MARGIN};
 
-/* Ends the program where a call that must succeed has not. */
-static void must(dibs_code code) {
+void must(dibs_code code) {
     if (code != DIBS_CODE_OK) {
         fprintf(stderr, "%s\n", dibs_code_text(code));
         exit(EXIT_FAILURE);
     }
-}
-
-static void print_floats(const float *values, size_t count) {
-    for (size_t at = 0; at < count; at++) {
-        uint32_t bits;
-        memcpy(&bits, &values[at], sizeof bits);
-        printf(" %08x", bits);
-    }
-}
-
-static void print_vec3(dibs_vec3 value) {
-    print_floats((float[]){value.x, value.y, value.z}, 3);
-}
-
-static void print_proximity(const dibs_proximity *found) {
-    printf(" %u", found->side);
-    print_floats((float[]){found->separation, found->lower, found->accuracy, found->axis_distance}, 4);
-    print_vec3(found->point_on_surface);
-    print_vec3(found->point_on_tool);
-    print_vec3(found->direction);
-    print_floats(&found->axis_parameter, 1);
-    print_floats(found->barycentric, 3);
-    printf(" %u %u %u %u", found->triangle, found->corners[0], found->corners[1], found->corners[2]);
-    printf(" %u %u", found->node_tests, found->triangle_tests);
-}
-
-static void print_force(const dibs_force *force) {
-    printf(" %u %u", force->state, force->cause);
-    print_vec3(force->force);
-    print_vec3(force->torque);
 }
 
 /* All contacts, their rows, and the force that they hold the tool with together. */
@@ -121,21 +94,60 @@ static void answer(const dibs_tool *tool, const dibs_options *options) {
     printf("\n");
 }
 
-static void pose(char *text) {
-    dibs_tool tool;
+static bool take_tool(char **text, dibs_tool *tool) {
     float numbers[7];
+    if (!take_floats(text, numbers, 7)) {
+        return false;
+    }
+    tool->start = (dibs_vec3){numbers[0], numbers[1], numbers[2]};
+    tool->end = (dibs_vec3){numbers[3], numbers[4], numbers[5]};
+    tool->radius = numbers[6];
+    return true;
+}
+
+static bool pose(char *text) {
+    dibs_tool tool;
     dibs_options options = {.depth_tolerance = 0.0f};
     uint32_t words[3];
-    if (!take_floats(&text, numbers, 7) || !take_words(&text, words, 3)) {
-        fprintf(stderr, "a pose takes 7 floats and 3 numbers\n");
-        exit(EXIT_FAILURE);
+    if (!take_tool(&text, &tool) || !take_words(&text, words, 3)) {
+        return false;
     }
-    tool.start = (dibs_vec3){numbers[0], numbers[1], numbers[2]};
-    tool.end = (dibs_vec3){numbers[3], numbers[4], numbers[5]};
-    tool.radius = numbers[6];
     options.budget = (dibs_budget){.node_tests = words[0], .triangle_tests = words[1]};
     options.flags = words[2];
     answer(&tool, &options);
+    return true;
+}
+
+static bool packet(char *text) {
+    static uint8_t bytes[DIBS_MTU];
+    uint32_t now;
+    if (!take_words(&text, &now, 1)) {
+        return false;
+    }
+    bus_packet(bytes, take_bytes(&text, bytes, sizeof bytes), now);
+    return true;
+}
+
+static bool tick(char *text) {
+    dibs_tool tool;
+    uint32_t now;
+    if (!take_words(&text, &now, 1) || !take_tool(&text, &tool)) {
+        return false;
+    }
+    bus_tick(frame, query, &tool, now);
+    return true;
+}
+
+/* The surface is this frame of the file's. */
+static bool surface(char *text, const float *frames, size_t length, uint32_t vertices) {
+    uint32_t number;
+    const size_t floats = 3 * (size_t)vertices;
+    if (!take_words(&text, &number, 1) || (number + 1) * floats * sizeof(float) > length) {
+        return false;
+    }
+    must(dibs_frame_set_vertices(frame, frames + number * floats, vertices, 0.0f));
+    must(dibs_frame_measure(frame, tree, NULL));
+    return true;
 }
 
 int main(int argc, char **argv) {
@@ -155,18 +167,17 @@ int main(int argc, char **argv) {
     must(dibs_query_init(query_memory, sizeof query_memory, tree, &query));
     must(dibs_contacts_init(contacts_memory, sizeof contacts_memory, &contacts));
 
-    const size_t frame_floats = 3 * (size_t)facts.vertices;
+    bus_init(tree, facts.vertices);
+
     for (char *line = strtok(script, "\n"); line != NULL; line = strtok(NULL, "\n")) {
-        uint32_t number;
-        char *text = line + 5;
-        if (strncmp(line, "frame", 5) == 0 && take_words(&text, &number, 1)
-            && (number + 1) * frame_floats * sizeof(float) <= frames_length) {
-            must(dibs_frame_set_vertices(frame, frames + number * frame_floats, facts.vertices, 0.0f));
-            must(dibs_frame_measure(frame, tree, NULL));
-        } else if (strncmp(line, "pose ", 5) == 0) {
-            pose(text);
-        } else {
-            fprintf(stderr, "not a line of a script: %s\n", line);
+        const size_t word = strcspn(line, " ");
+        char *rest = line + word;
+        bool is_known = (strncmp(line, "frame", word) == 0 && surface(rest, frames, frames_length, facts.vertices))
+            || (strncmp(line, "pose", word) == 0 && pose(rest))
+            || (strncmp(line, "packet", word) == 0 && packet(rest))
+            || (strncmp(line, "tick", word) == 0 && tick(rest));
+        if (!is_known) {
+            fprintf(stderr, "not a line of a script: %.40s\n", line);
             return EXIT_FAILURE;
         }
     }

@@ -1,0 +1,235 @@
+//! The fail-safe machine: when to stop trusting the surface.
+
+use core::ffi::c_void;
+
+use bytemuck::AnyBitPattern;
+use dibs_nostd::failsafe::{FailSafe, LimitError, Limits, Observation, State, Watch};
+use dibs_nostd::{Proximity, QueryError, Unavailable};
+
+use crate::border::{Handle, Input, Kind, Output, Storage};
+use crate::code::dibs_code;
+use crate::query::dibs_proximity;
+use crate::reader::{dibs_age, dibs_link};
+
+/// Bytes of a machine's storage.
+pub const DIBS_FAILSAFE_SIZE: usize = 192;
+
+/// The machine. It begins in the safe state.
+///
+/// One context at a time.
+pub struct dibs_failsafe {
+    machine: FailSafe,
+    /// Code of the last query error that was seen.
+    query: dibs_code,
+}
+
+impl Kind for dibs_failsafe {
+    const MARK: u32 = 0x6462_7312;
+    const SIZE: usize = DIBS_FAILSAFE_SIZE;
+}
+
+/// Two limits on one input: beyond the first the state is degraded, beyond the second safe. Both `DIBS_UNLIMITED` where
+/// the input is not watched; otherwise below 2^31.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_watch {
+    /// The first limit.
+    pub degraded: u32,
+    /// The second limit, not below the first.
+    pub safe: u32,
+}
+
+impl TryFrom<dibs_watch> for Watch {
+    type Error = LimitError;
+
+    fn try_from(dibs_watch { degraded, safe }: dibs_watch) -> Result<Self, LimitError> {
+        if degraded == u32::MAX && safe == u32::MAX {
+            return Ok(Self::OFF);
+        }
+        Self::new(degraded, safe)
+    }
+}
+
+/// The machine's limits. Times are in the receiver's clock's unit.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_limits {
+    /// Age of the surface; must be watched.
+    pub age: dibs_watch,
+    /// Time since any good packet.
+    pub silence: dibs_watch,
+    /// Time since the last heartbeat.
+    pub heartbeat: dibs_watch,
+    /// Frames refused or damaged since the last one was published.
+    pub rejections: dibs_watch,
+    /// Time that the published frame was on its way.
+    pub transit: dibs_watch,
+    /// Age of the published frame when it was sent.
+    pub source_age: dibs_watch,
+    /// Forged packets since the last frame was published.
+    pub forgeries: dibs_watch,
+    /// Largest speed of any point of the tissue, in mm per unit of the clock; at least 0.
+    pub tissue_speed: f32,
+    /// Frames in a row that recover: 1 to 65,535.
+    pub recovery_frames: u32,
+    /// 0 to leave the safe state by an acknowledgement alone; otherwise without one.
+    pub automatic: u32,
+}
+
+impl TryFrom<dibs_limits> for Limits {
+    type Error = LimitError;
+
+    fn try_from(given: dibs_limits) -> Result<Self, LimitError> {
+        // Beyond the largest number there is none.
+        let frames = u16::try_from(given.recovery_frames).unwrap_or(0);
+        let limits = Self::new(given.age.try_into()?, given.tissue_speed)?
+            .recovery(frames)?
+            .silence(given.silence.try_into()?)
+            .heartbeat(given.heartbeat.try_into()?)
+            .rejections(given.rejections.try_into()?)
+            .transit(given.transit.try_into()?)
+            .source_age(given.source_age.try_into()?)
+            .forgeries(given.forgeries.try_into()?);
+        Ok(if given.automatic == 0 { limits } else { limits.automatic() })
+    }
+}
+
+/// Makes a machine.
+///
+/// @param storage   `DIBS_FAILSAFE_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+/// @param size      Bytes of the storage.
+/// @param limits    Its limits.
+/// @param failsafe  Where the machine's address goes.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_failsafe_init(
+    storage: *mut c_void,
+    size: usize,
+    limits: *const dibs_limits,
+    failsafe: *mut *mut dibs_failsafe,
+) -> dibs_code {
+    dibs_code::of(|| {
+        storage.make(size, failsafe, || {
+            let machine = FailSafe::new(limits.get()?.try_into()?);
+            Ok(dibs_failsafe { machine, query: dibs_code::QueryFailed })
+        })
+    })
+}
+
+/// The input of a step.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_observation {
+    /// The published frame and its age: of `dibs_reader_latest`.
+    pub age: dibs_age,
+    /// The bus's health: of `dibs_reader_link`.
+    pub link: dibs_link,
+    /// Code of the query on that frame: `DIBS_CODE_OK` where it gave an answer, and where it was not asked.
+    pub query: u32,
+    /// Other than 0 once the tree's bytes were found changed: of `dibs_scrub_step`. Leave it set.
+    pub has_rotted: u32,
+}
+
+/// How far the surface may be trusted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum dibs_state {
+    /// Every input is within its limits.
+    Nominal = 0,
+    /// The surface is acted on, with a growing margin.
+    Degraded = 1,
+    /// The surface is not acted on.
+    Safe = 2,
+}
+
+/// The result of a step.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_verdict {
+    /// A `dibs_state`.
+    pub state: u32,
+    /// Why it is not nominal: a `dibs_code`.
+    pub cause: u32,
+    /// How far (mm) the tissue may have moved since the surface was received.
+    pub margin: f32,
+    /// 1 where only an acknowledgement is missing to leave the safe state; else 0.
+    pub waits_for_acknowledgement: u32,
+}
+
+/// One control tick of the machine.
+///
+/// Cost: ten comparisons of two limits.
+///
+/// @return `DIBS_CODE_OK`, whatever the state; `DIBS_CODE_ARGUMENT` for a query's code that is none; or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_failsafe_step(
+    failsafe: *mut dibs_failsafe,
+    seen: *const dibs_observation,
+    verdict: *mut dibs_verdict,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (verdict, seen) = (verdict.check()?, seen.get()?);
+        let query = dibs_code::from_number(seen.query).ok_or(dibs_code::Argument)?;
+        let mut failsafe = failsafe.open()?;
+        if query != dibs_code::Ok {
+            failsafe.query = query;
+        }
+        let found = failsafe.machine.step(&Observation {
+            frame: seen.age.into(),
+            link: seen.link.into(),
+            // The machine asks whether there was one; which one is kept here.
+            query_error: (query != dibs_code::Ok).then_some(QueryError::NoAdjacency),
+            has_rotted: seen.has_rotted != 0,
+        });
+        let cause = match found.cause {
+            None => dibs_code::Ok,
+            Some(Unavailable::Query(_)) => failsafe.query,
+            Some(cause) => cause.into(),
+        };
+        verdict.set(dibs_verdict {
+            state: found.state as u32,
+            cause: cause as u32,
+            margin: found.margin,
+            waits_for_acknowledgement: found.waits_for_acknowledgement.into(),
+        });
+        Ok(())
+    })
+}
+
+const _: () = assert!(State::Nominal as u32 == dibs_state::Nominal as u32);
+const _: () = assert!(State::Degraded as u32 == dibs_state::Degraded as u32);
+const _: () = assert!(State::Safe as u32 == dibs_state::Safe as u32);
+
+/// An operator's acknowledgement: the next step leaves the safe state if its inputs are within their limits.
+///
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_ACKNOWLEDGE` unless the last step waited for it, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_failsafe_acknowledge(failsafe: *mut dibs_failsafe) -> dibs_code {
+    dibs_code::of(|| Ok(failsafe.open()?.machine.acknowledge()?))
+}
+
+/// Widens an answer by the verdict's margin, if it may be acted on.
+///
+/// @param verdict    The verdict of this tick.
+/// @param proximity  The answer of this tick, which is widened.
+/// @return `DIBS_CODE_OK`; in the safe state the cause, to be passed on to a wall; `DIBS_CODE_ARGUMENT` for numbers that are
+///         no state or no code; or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_verdict_admit(
+    verdict: *const dibs_verdict,
+    proximity: *mut dibs_proximity,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (verdict, place) = (verdict.get()?, proximity.check()?);
+        let cause = dibs_code::from_number(verdict.cause).ok_or(dibs_code::Argument)?;
+        if verdict.state == dibs_state::Safe as u32 {
+            return Err(if cause == dibs_code::Ok { dibs_code::NoSurface } else { cause });
+        }
+        if verdict.state > dibs_state::Safe as u32 {
+            return Err(dibs_code::Argument);
+        }
+        let found = Proximity::try_from(place.get())?;
+        place.set(found.widened(verdict.margin).into());
+        Ok(())
+    })
+}

@@ -1,0 +1,159 @@
+//! The control tick's end of a surface.
+
+use core::ffi::c_void;
+
+use bytemuck::AnyBitPattern;
+use dibs_nostd::FrameAge;
+use dibs_nostd::failsafe::Link;
+
+use crate::border::{Handle, Kind, Output, Storage};
+use crate::code::dibs_code;
+use crate::frame::{Table, dibs_frame};
+use crate::surface::{Held, Reader, dibs_surface};
+
+/// Bytes of a reader's storage.
+pub const DIBS_READER_SIZE: usize = 128;
+
+/// Reads the frame that was published last.
+///
+/// One context at a time: the control interrupt.
+pub struct dibs_reader {
+    reader: Reader,
+    surface: &'static dibs_surface,
+}
+
+impl Kind for dibs_reader {
+    const MARK: u32 = 0x6462_6510;
+    const SIZE: usize = DIBS_READER_SIZE;
+}
+
+/// Which frame was published last, and how old it is.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_age {
+    /// 0 before the first frame; then the rest is 0, too.
+    pub is_published: u32,
+    /// Number of the frame; wraps.
+    pub epoch: u32,
+    /// When its first packet came, on the receiver's clock; wraps.
+    pub received: u32,
+    /// Time since then, in the clock's unit.
+    pub age: u32,
+}
+
+impl From<Option<FrameAge>> for dibs_age {
+    fn from(frame: Option<FrameAge>) -> Self {
+        match frame {
+            None => Self { is_published: 0, epoch: 0, received: 0, age: 0 },
+            Some(FrameAge { epoch, received, age }) => {
+                Self { is_published: 1, epoch, received, age }
+            }
+        }
+    }
+}
+
+impl From<dibs_age> for Option<FrameAge> {
+    fn from(dibs_age { is_published, epoch, received, age }: dibs_age) -> Self {
+        (is_published != 0).then_some(FrameAge { epoch, received, age })
+    }
+}
+
+/// The health of the bus. `UINT32_MAX` for a time that is not known.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_link {
+    /// Time since the last good packet.
+    pub silence: u32,
+    /// Time since the last heartbeat.
+    pub heartbeat: u32,
+    /// Frames refused or damaged since the last one was published.
+    pub rejections: u32,
+    /// Packets without a genuine tag since then.
+    pub forgeries: u32,
+    /// Time that the published frame was on its way, at most.
+    pub transit: u32,
+    /// Age of the published frame when it was sent.
+    pub source_age: u32,
+}
+
+impl From<Link> for dibs_link {
+    fn from(link: Link) -> Self {
+        let Link { silence, heartbeat, rejections, forgeries, transit, source_age } = link;
+        Self { silence, heartbeat, rejections, forgeries, transit, source_age }
+    }
+}
+
+impl From<dibs_link> for Link {
+    fn from(link: dibs_link) -> Self {
+        let dibs_link { silence, heartbeat, rejections, forgeries, transit, source_age } = link;
+        Self { silence, heartbeat, rejections, forgeries, transit, source_age }
+    }
+}
+
+/// Makes the reader of a surface, once.
+///
+/// @param storage  `DIBS_READER_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+/// @param size     Bytes of the storage.
+/// @param surface  The surface.
+/// @param reader   Where the reader's address goes.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_TAKEN` where the surface has a reader, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_reader_init(
+    storage: *mut c_void,
+    size: usize,
+    surface: *mut dibs_surface,
+    reader: *mut *mut dibs_reader,
+) -> dibs_code {
+    dibs_code::of(|| {
+        storage.make(size, reader, || {
+            let surface = surface.share()?;
+            Ok(dibs_reader { reader: surface.take_reader()?, surface })
+        })
+    })
+}
+
+/// Holds the frame that was published last, if it is not too old. Until it is released no frame is published, so release it
+/// after the tick's queries.
+///
+/// @param reader  The reader.
+/// @param now     The receiver's clock.
+/// @param limit   The greatest age, in the clock's unit; UINT32_MAX leaves the age to the fail-safe machine.
+/// @param frame   The frame that holds it; what it held before is released.
+/// @param age     Where its age goes, also where it is too old; or null.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE`, `DIBS_CODE_STALE`, `DIBS_CODE_HELD` where another frame holds one of this
+///         surface, or a misuse. The frame is then empty.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_reader_latest(
+    reader: *mut dibs_reader,
+    now: u32,
+    limit: u32,
+    frame: *mut dibs_frame,
+    age: *mut dibs_age,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let mut frame = frame.open()?;
+        frame.table = Table::Empty;
+        let (age, mut reader) = (age.check_if_any()?, reader.open()?);
+        let hold = reader.surface.hold()?;
+        let latest = reader.reader.latest(now);
+        if let Some(age) = age {
+            age.set(latest.frame().into());
+        }
+        frame.table = Table::Held(Held::new(latest.within(limit)?, hold));
+        Ok(())
+    })
+}
+
+/// The health of the bus at `now`, on the receiver's clock.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_reader_link(
+    reader: *mut dibs_reader,
+    now: u32,
+    link: *mut dibs_link,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (link, reader) = (link.check()?, reader.open()?);
+        link.set(reader.surface.link.read(now).into());
+        Ok(())
+    })
+}

@@ -1,0 +1,311 @@
+//! The bus's end of a surface: from packets to published frames.
+
+use core::ffi::c_void;
+
+use bytemuck::AnyBitPattern;
+use dibs_nostd::wire::{Deframer, Event, NoMac, encode_status, enframe, framed_bytes};
+use dibs_nostd::{Advance, Assembler, Position, Progress, StretchMonitor, SurfaceLimits};
+
+use crate::border::{Handle, Input, Kind, Output, Storage};
+use crate::code::dibs_code;
+use crate::surface::dibs_surface;
+use crate::tree::dibs_tree;
+
+/// Bytes of a receiver's storage.
+pub const DIBS_RECEIVER_SIZE: usize = 2_816;
+
+/// Largest packet of a byte stream: that of an Ethernet frame.
+pub const DIBS_MTU: usize = 1_472;
+
+/// Largest status, framed or not.
+pub const DIBS_STATUS: usize = 98;
+
+/// Largest status packet: the report and all counters in three of them.
+const STATUS: usize = 96;
+
+const _: () = assert!(DIBS_STATUS == framed_bytes(STATUS));
+
+/// Assembles frames from packets, checks them, and publishes those that are complete and right.
+///
+/// One context at a time, of lower priority than the reader's: the bus interrupt.
+pub struct dibs_receiver {
+    assembler: Assembler<'static, StretchMonitor<'static, u16>, 0, NoMac, [Position]>,
+    deframer: Deframer<DIBS_MTU>,
+    surface: &'static dibs_surface,
+    mesh_id: u32,
+}
+
+impl Kind for dibs_receiver {
+    const MARK: u32 = 0x6462_720E;
+    const SIZE: usize = DIBS_RECEIVER_SIZE;
+}
+
+impl dibs_receiver {
+    /// Tells the reader how the bus is.
+    fn note(&self) {
+        self.surface.link.set(&self.assembler.health());
+    }
+}
+
+/// Limits of a surface besides the tree's stretch limit. A limit that is not a number refuses every frame.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_surface_limits {
+    /// No coordinate is beyond this (mm) on any axis. The smaller, the more damage it tells from a surface.
+    pub reach: f32,
+    /// Largest speed of a vertex, in mm per unit of the receiver's clock; `INFINITY` for no limit.
+    pub speed: f32,
+    /// Least size of a region as a part of its size at rest, 0.25 for example; 0 for no limit.
+    pub shrinkage: f32,
+}
+
+/// Makes the receiver of a surface, once.
+///
+/// @param storage   `DIBS_RECEIVER_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+/// @param size      Bytes of the storage.
+/// @param surface   The surface.
+/// @param tree      Its tree.
+/// @param limits    Limits of every frame.
+/// @param receiver  Where the receiver's address goes.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many vertices; `DIBS_CODE_TAKEN` where
+///         the surface has a receiver; `DIBS_CODE_TREE_NO_METRIC`; or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_receiver_init(
+    storage: *mut c_void,
+    size: usize,
+    surface: *mut dibs_surface,
+    tree: *mut dibs_tree,
+    limits: *const dibs_surface_limits,
+    receiver: *mut *mut dibs_receiver,
+) -> dibs_code {
+    dibs_code::of(|| {
+        storage.make(size, receiver, || {
+            let (surface, tree, given) = (surface.share()?, &tree.share()?.tree, limits.get()?);
+            if surface.vertices() != tree.vertex_count() as usize {
+                return Err(dibs_code::OtherTree);
+            }
+            let limits = SurfaceLimits::reach_mm(given.reach);
+            let limits = limits.speed(given.speed).shrinkage(given.shrinkage);
+            let monitor = StretchMonitor::new(tree)?.limits(limits);
+            let (writer, mesh_id) = (surface.take_writer()?, tree.mesh_id());
+            let assembler = Assembler::new(writer, monitor, mesh_id, given.reach);
+            Ok(dibs_receiver { assembler, deframer: Deframer::new(), surface, mesh_id })
+        })
+    })
+}
+
+/// The outcome of a packet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum dibs_progress {
+    /// No packet is complete yet.
+    None = 0,
+    /// A frame began.
+    Begun = 1,
+    /// The packet was taken.
+    Stored = 2,
+    /// The packet had come before, and was ignored.
+    Duplicate = 3,
+    /// The frame is complete: `dibs_receiver_advance` checks and publishes it.
+    Complete = 4,
+    /// The sender lives.
+    Heartbeat = 5,
+    /// The sender asks for a status: it is due now.
+    Hello = 6,
+}
+
+impl From<Progress> for dibs_progress {
+    fn from(progress: Progress) -> Self {
+        match progress {
+            Progress::Begun { .. } => Self::Begun,
+            Progress::Duplicate => Self::Duplicate,
+            Progress::Complete { .. } => Self::Complete,
+            Progress::Heartbeat => Self::Heartbeat,
+            Progress::Hello => Self::Hello,
+            _ => Self::Stored,
+        }
+    }
+}
+
+/// Takes one packet, whole: a datagram, or the data of a CAN-FD message.
+///
+/// Cost: linear in the bytes.
+///
+/// @param receiver  The receiver.
+/// @param packet    The packet, read during the call.
+/// @param length    Its bytes.
+/// @param now       The receiver's clock, in ms; wraps.
+/// @param progress  Where its outcome goes, or null.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_PACKET_DAMAGED` to `DIBS_CODE_PACKET_REFUSED` where the packet was not taken, which
+///         has been counted, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_receiver_accept(
+    receiver: *mut dibs_receiver,
+    packet: *const u8,
+    length: usize,
+    now: u32,
+    progress: *mut dibs_progress,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (progress, mut receiver) = (progress.check_if_any()?, receiver.open()?);
+        let outcome = receiver.assembler.accept(packet.slice(length)?, now);
+        receiver.note();
+        let outcome = outcome?.into();
+        if let Some(progress) = progress {
+            progress.set(outcome);
+        }
+        Ok(())
+    })
+}
+
+/// Takes one byte of a stream of COBS frames, each ended by a zero: a serial line.
+///
+/// @param receiver  The receiver.
+/// @param byte      The byte.
+/// @param now       The receiver's clock, in ms; wraps.
+/// @param progress  Where the outcome of the packet goes that the byte completes, or `DIBS_PROGRESS_NONE`; or null.
+/// @return As `dibs_receiver_accept`; `DIBS_CODE_FRAMING` where bytes between two zeros are no packet.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_receiver_byte(
+    receiver: *mut dibs_receiver,
+    byte: u8,
+    now: u32,
+    progress: *mut dibs_progress,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (progress, mut receiver) = (progress.check_if_any()?, receiver.open()?);
+        let dibs_receiver { assembler, deframer, .. } = &mut *receiver;
+        let outcome: Result<_, dibs_code> = match deframer.push(byte) {
+            None => Ok(dibs_progress::None),
+            Some(Ok(packet)) => match assembler.accept(packet, now) {
+                Ok(progress) => Ok(progress.into()),
+                Err(error) => Err(error.into()),
+            },
+            Some(Err(error)) => {
+                assembler.count_framing(&error);
+                Err(error.into())
+            }
+        };
+        if outcome != Ok(dibs_progress::None) {
+            receiver.note();
+        }
+        let outcome = outcome?;
+        if let Some(progress) = progress {
+            progress.set(outcome);
+        }
+        Ok(())
+    })
+}
+
+/// The outcome of a slice of work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum dibs_advance {
+    /// No complete frame waits to be checked.
+    Idle = 0,
+    /// More work is left.
+    Pending = 1,
+    /// The frame is admitted, but the last one is being read: a later call publishes it.
+    Held = 2,
+    /// The frame is published.
+    Published = 3,
+}
+
+/// Does some of the work that is due: checks rows and triangles, and publishes a frame that keeps to its limits.
+///
+/// Worth calling after each packet, and from time to time when the bus is quiet. Cost: linear in `work`.
+///
+/// @param receiver  The receiver.
+/// @param work      Most rows and triangles that are checked or copied.
+/// @param advance   Where the outcome goes, or null.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_STRETCH_EXCEEDED`, `DIBS_CODE_SHRUNK` or `DIBS_CODE_TOO_FAST` where the frame is refused,
+///         which has been counted; or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_receiver_advance(
+    receiver: *mut dibs_receiver,
+    work: u32,
+    advance: *mut dibs_advance,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (advance, mut receiver) = (advance.check_if_any()?, receiver.open()?);
+        let outcome = receiver.assembler.advance(work);
+        receiver.note();
+        let outcome = match outcome? {
+            Advance::Pending => dibs_advance::Pending,
+            Advance::Held { .. } => dibs_advance::Held,
+            Advance::Published { .. } => dibs_advance::Published,
+            _ => dibs_advance::Idle,
+        };
+        if let Some(advance) = advance {
+            advance.set(outcome);
+        }
+        Ok(())
+    })
+}
+
+/// Writes the receiver's status for the sender: every 100 ms or so, and when a hello asks for it.
+///
+/// @param receiver  The receiver.
+/// @param now       The receiver's clock, in ms.
+/// @param safety    0 not reported, 1 nominal, 2 degraded, 3 safe.
+/// @param framed    0 for a packet; otherwise a COBS frame with the zero that ends it, for a stream.
+/// @param out       Where it goes.
+/// @param capacity  Bytes that there is room for: `DIBS_STATUS` are enough.
+/// @param length    Where its length goes.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY`, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_receiver_status(
+    receiver: *mut dibs_receiver,
+    now: u32,
+    safety: u8,
+    framed: u32,
+    out: *mut u8,
+    capacity: usize,
+    length: *mut usize,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (length, mut out) = (length.check()?, out.places(capacity)?);
+        let mut receiver = receiver.open()?;
+        let status = receiver.assembler.status(now, safety);
+        let (counters, mac) = (receiver.assembler.counters(), receiver.assembler.mac());
+        let (mut packet, mut line) = ([0; STATUS], [0; DIBS_STATUS]);
+        let packet = encode_status(receiver.mesh_id, &status, counters, mac, &mut packet);
+        let bytes = if framed == 0 {
+            packet
+        } else {
+            enframe(packet, &mut line).ok_or(dibs_code::Capacity)?
+        };
+        if bytes.len() > capacity {
+            return Err(dibs_code::Capacity);
+        }
+        for &byte in bytes {
+            out.push(byte)?;
+        }
+        length.set(bytes.len());
+        Ok(())
+    })
+}
+
+/// Events that a receiver counts.
+pub const DIBS_EVENTS: usize = 26;
+
+const _: () = assert!(Event::ALL.len() == DIBS_EVENTS);
+
+/// How often each event has happened since the start, in the order of docs/wire.md: published, abandoned, duplicate,
+/// heartbeat, and from the fifth on rejections by their cause.
+///
+/// @param receiver  The receiver.
+/// @param counters  Room for `DIBS_EVENTS` numbers.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_receiver_counters(
+    receiver: *mut dibs_receiver,
+    counters: *mut u32,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (mut out, receiver) = (counters.places(DIBS_EVENTS)?, receiver.open()?);
+        for event in Event::ALL {
+            out.push(receiver.assembler.counters().of(event))?;
+        }
+        Ok(())
+    })
+}
