@@ -4,7 +4,7 @@ use core::ffi::c_void;
 
 use bytemuck::AnyBitPattern;
 use dibs_nostd::wire::{Deframer, Event, NoMac, encode_status, enframe, framed_bytes};
-use dibs_nostd::{Advance, Assembler, Position, Progress, StretchMonitor, SurfaceLimits};
+use dibs_nostd::{Advance, Assembler, BorrowedFrames, Progress, StretchMonitor, SurfaceLimits};
 
 use crate::border::{Handle, Input, Kind, Output, Storage};
 use crate::code::dibs_code;
@@ -29,7 +29,7 @@ const _: () = assert!(DIBS_STATUS == framed_bytes(STATUS));
 ///
 /// One context at a time, of lower priority than the reader's: the bus interrupt.
 pub struct dibs_receiver {
-    assembler: Assembler<'static, StretchMonitor<'static, u16>, 0, NoMac, [Position]>,
+    assembler: Assembler<'static, StretchMonitor<'static, u16>, 0, NoMac, BorrowedFrames<'static>>,
     deframer: Deframer<DIBS_MTU>,
     surface: &'static dibs_surface,
     mesh_id: u32,

@@ -8,7 +8,8 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use dibs_nostd::failsafe::LinkStatus;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
-    Buffer, FrameGuard, FrameReader, FrameWriter, MeasuredStretch, Position, VertexTable, ends,
+    BorrowedFrames, Buffer, FrameGuard, FrameReader, FrameWriter, MeasuredStretch, Position,
+    VertexTable,
 };
 
 use crate::border::{DIBS_ALIGNMENT, Kind, Storage};
@@ -24,8 +25,7 @@ pub const DIBS_SURFACE_VERTEX: usize = 24;
 ///
 /// Any number of contexts may use it at once.
 pub struct dibs_surface {
-    state: &'static AtomicU32,
-    buffers: [&'static Rows; 2],
+    frames: BorrowedFrames<'static>,
     /// Which ends were taken: the receiver's and the reader's.
     taken: [AtomicBool; 2],
     /// A reader holds a frame.
@@ -41,9 +41,9 @@ impl Kind for dibs_surface {
 
 /// The ends' type has no size: `0` stands for it.
 type Rows = Buffer<[Position]>;
-pub(crate) type Writer = FrameWriter<'static, 0, [Position]>;
-pub(crate) type Reader = FrameReader<'static, 0, [Position]>;
-type Guard<'f> = FrameGuard<'f, 0, [Position]>;
+pub(crate) type Writer = FrameWriter<'static, 0, BorrowedFrames<'static>>;
+pub(crate) type Reader = FrameReader<'static, 0, BorrowedFrames<'static>>;
+type Guard<'f> = FrameGuard<'f, 0, BorrowedFrames<'static>>;
 
 /// Where the buffers begin, after the object and the word of their state.
 const BUFFERS: usize = 256;
@@ -84,9 +84,11 @@ pub extern "C" fn dibs_surface_init(
             let (second, rest) = rest.split_at_mut_checked(each).ok_or(dibs_code::Argument)?;
             let state = rest.first_mut().ok_or(dibs_code::Argument)?;
             Ok(dibs_surface {
-                // SAFETY: a word of this surface's own, aligned, and from here on never used but as an atomic.
-                state: unsafe { AtomicU32::from_ptr(state) },
-                buffers: [buffer(first, vertices), buffer(second, vertices)],
+                frames: BorrowedFrames {
+                    // SAFETY: a word of this surface's own, aligned, and from here on never used but as an atomic.
+                    state: unsafe { AtomicU32::from_ptr(state) },
+                    buffers: [buffer(first, vertices), buffer(second, vertices)],
+                },
                 taken: [AtomicBool::new(false), AtomicBool::new(false)],
                 is_held: AtomicBool::new(false),
                 link: LinkStatus::new(),
@@ -107,20 +109,20 @@ fn buffer(words: &'static mut [u32], vertices: usize) -> &'static Rows {
 impl dibs_surface {
     /// How many there are.
     pub(crate) fn vertices(&self) -> usize {
-        let (writer, _) = ends::<0, _>(self.state, self.buffers);
+        let (writer, _) = self.frames.ends();
         writer.back().len()
     }
 
     /// The receiver's end, once.
-    pub(crate) fn take_writer(&self) -> Result<Writer, dibs_code> {
+    pub(crate) fn take_writer(&'static self) -> Result<Writer, dibs_code> {
         self.take(0)?;
-        Ok(ends(self.state, self.buffers).0)
+        Ok(self.frames.ends().0)
     }
 
     /// The reader's end, once.
-    pub(crate) fn take_reader(&self) -> Result<Reader, dibs_code> {
+    pub(crate) fn take_reader(&'static self) -> Result<Reader, dibs_code> {
         self.take(1)?;
-        Ok(ends(self.state, self.buffers).1)
+        Ok(self.frames.ends().1)
     }
 
     fn take(&self, end: usize) -> Result<(), dibs_code> {

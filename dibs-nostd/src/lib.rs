@@ -92,7 +92,7 @@ pub use surface::{
 };
 /// Surfaces of a size that no type has, for the C interface. They may change with any version.
 #[doc(hidden)]
-pub use surface::{Buffer, Position, ends};
+pub use surface::{BorrowedFrames, Buffer, Position};
 pub use tool::{ACCURACY, AxisPair, Capsule, MAX_COORDINATE, Sphere, Tool, ToolError};
 /// The layout of a tree's bytes, for `dibs-build`. It may change with any version.
 #[doc(hidden)]

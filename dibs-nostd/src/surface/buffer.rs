@@ -1,5 +1,7 @@
 //! One of the two buffers: positions and the label of their frame, in relaxed atomics.
 
+use core::fmt;
+
 use glam::Vec3;
 
 use super::MeasuredStretch;
@@ -51,7 +53,7 @@ impl Position {
 }
 
 /// The positions of a buffer: an array, or a slice where only the program that runs knows how many there are.
-pub trait Rows {
+pub trait Rows: fmt::Debug {
     fn rows(&self) -> &[Position];
 }
 

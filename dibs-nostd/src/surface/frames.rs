@@ -110,29 +110,69 @@ impl<const N: usize> Frames<N> {
         if self.split.swap(true, Ordering::AcqRel) {
             return Err(SplitError);
         }
-        let [first, second] = &self.buffers;
-        Ok(ends(&self.state, [first, second]))
+        Ok(ends(self))
     }
 }
 
-/// The two ends of these buffers, of the same size, and of their state. All must be zero, and no other ends be made of
-/// them: [`Frames::split`] sees to that, and so does the C interface, whose surfaces have a size that no type has.
-#[doc(hidden)]
-pub const fn ends<'f, const N: usize, P: Rows + ?Sized>(
-    state: &'f AtomicU32,
-    buffers: [&'f Buffer<P>; 2],
-) -> (FrameWriter<'f, N, P>, FrameReader<'f, N, P>) {
-    let [_, back] = buffers;
-    let writer = FrameWriter { shared: Shared { state, buffers }, back, state: 0, filled: 0 };
-    let ageing = (0, Ageing { stamp: 0, oldest: 0 });
-    (writer, FrameReader { shared: Shared { state, buffers }, ageing })
+/// Two buffers and their state: [`Frames`], or memory of a size that no type has.
+pub trait Buffers {
+    /// Positions of a buffer.
+    type Rows: Rows + ?Sized;
+
+    fn state(&self) -> &AtomicU32;
+
+    fn buffers(&self) -> [&Buffer<Self::Rows>; 2];
 }
 
-/// The part that both ends share.
+impl<const N: usize> Buffers for Frames<N> {
+    type Rows = [Position; N];
+
+    #[inline(always)]
+    fn state(&self) -> &AtomicU32 {
+        &self.state
+    }
+
+    #[inline(always)]
+    fn buffers(&self) -> [&Buffer<[Position; N]>; 2] {
+        let [first, second] = &self.buffers;
+        [first, second]
+    }
+}
+
+/// Buffers in somebody else's memory, of the same size, and their state. All of it must be zero at first.
 #[derive(Debug)]
-struct Shared<'f, P: ?Sized> {
-    state: &'f AtomicU32,
-    buffers: [&'f Buffer<P>; 2],
+pub struct BorrowedFrames<'m> {
+    /// As that of [`Frames`].
+    pub state: &'m AtomicU32,
+    /// The same.
+    pub buffers: [&'m Buffer<[Position]>; 2],
+}
+
+impl Buffers for BorrowedFrames<'_> {
+    type Rows = [Position];
+
+    fn state(&self) -> &AtomicU32 {
+        self.state
+    }
+
+    fn buffers(&self) -> [&Buffer<[Position]>; 2] {
+        self.buffers
+    }
+}
+
+impl BorrowedFrames<'_> {
+    /// The two ends. Whoever calls it sees to it that each is used once.
+    #[must_use]
+    pub fn ends(&self) -> (FrameWriter<'_, 0, Self>, FrameReader<'_, 0, Self>) {
+        ends(self)
+    }
+}
+
+/// The two ends of these buffers.
+fn ends<const N: usize, F: Buffers>(frames: &F) -> (FrameWriter<'_, N, F>, FrameReader<'_, N, F>) {
+    let [_, back] = frames.buffers();
+    let writer = FrameWriter { frames, back, state: 0, filled: 0 };
+    (writer, FrameReader { frames, ageing: (0, Ageing::default()) })
 }
 
 impl<const N: usize> Default for Frames<N> {
@@ -147,16 +187,16 @@ impl<const N: usize> Default for Frames<N> {
 /// [`publish`](Self::publish). An [`Assembler`](crate::Assembler) takes rows in any order, and proves that all have
 /// come.
 #[derive(Debug)]
-pub struct FrameWriter<'f, const N: usize, P: ?Sized = [Position; N]> {
-    shared: Shared<'f, P>,
-    back: &'f Buffer<P>,
+pub struct FrameWriter<'f, const N: usize, F: Buffers = Frames<N>> {
+    frames: &'f F,
+    back: &'f Buffer<F::Rows>,
     /// The state word after the last publication; only the writer changes these bits.
     state: u32,
     /// Rows pushed since the last `begin`.
     filled: u32,
 }
 
-impl<const N: usize, P: Rows + ?Sized> FrameWriter<'_, N, P> {
+impl<const N: usize, F: Buffers> FrameWriter<'_, N, F> {
     /// Rows of a frame.
     pub(crate) fn len(&self) -> u32 {
         self.back.rows().len() as u32
@@ -207,18 +247,18 @@ impl<const N: usize, P: Rows + ?Sized> FrameWriter<'_, N, P> {
 
     /// The frame being written, complete or not: for a check before it is published.
     #[must_use]
-    pub const fn back(&self) -> FrameView<'_, N, P> {
+    pub const fn back(&self) -> FrameView<'_, N, F> {
         FrameView { buffer: self.back }
     }
 
     /// The published frame, `None` before the first.
     #[must_use]
-    pub fn front(&self) -> Option<FrameView<'_, N, P>> {
+    pub fn front(&self) -> Option<FrameView<'_, N, F>> {
         (self.state & PUBLISHED != 0).then_some(FrameView { buffer: self.front_buffer() })
     }
 
-    fn front_buffer(&self) -> &Buffer<P> {
-        let [first, second] = self.shared.buffers;
+    fn front_buffer(&self) -> &Buffer<F::Rows> {
+        let [first, second] = self.frames.buffers();
         if self.state & FRONT == 0 { first } else { second }
     }
 
@@ -243,11 +283,11 @@ impl<const N: usize, P: Rows + ?Sized> FrameWriter<'_, N, P> {
     /// Publishes a labelled frame that the caller has proven complete.
     pub(crate) fn publish_complete(&mut self) -> Result<(), PublishError> {
         let next = (self.state ^ FRONT) | PUBLISHED;
-        self.shared
-            .state
+        self.frames
+            .state()
             .compare_exchange(self.state, next, Ordering::AcqRel, Ordering::Relaxed)
             .map_err(|_| PublishError::Busy)?;
-        let [first, second] = self.shared.buffers;
+        let [first, second] = self.frames.buffers();
         self.back = if next & FRONT == 0 { second } else { first };
         self.state = next;
         // The back buffer now holds an old frame: it must be begun before it is published.
@@ -258,19 +298,19 @@ impl<const N: usize, P: Rows + ?Sized> FrameWriter<'_, N, P> {
 
 /// The end that reads: owned by the control tick.
 #[derive(Debug)]
-pub struct FrameReader<'f, const N: usize, P: ?Sized = [Position; N]> {
-    shared: Shared<'f, P>,
+pub struct FrameReader<'f, const N: usize, F: Buffers = Frames<N>> {
+    frames: &'f F,
     /// Epoch and age of the frame read last.
     ageing: (u32, Ageing),
 }
 
-impl<'f, const N: usize, P: Rows + ?Sized> FrameReader<'f, N, P> {
+impl<const N: usize, F: Buffers> FrameReader<'_, N, F> {
     /// The published frame and its age at `now`, on the receiver's clock. [`Latest::within`] a limit gives the frame,
     /// held as by [`read`](Self::read).
     #[inline]
-    pub fn latest(&mut self, now: u32) -> Latest<FrameGuard<'_, N, P>> {
+    pub fn latest(&mut self, now: u32) -> Latest<FrameGuard<'_, N, F>> {
         let (epoch_before, before) = self.ageing;
-        let Some(guard) = read(&self.shared) else { return Latest::new(None) };
+        let Some(guard) = read(self.frames) else { return Latest::new(None) };
         let FrameLabel { epoch, received, .. } = guard.label();
         let before = if epoch == epoch_before { before } else { Ageing::default() };
         let ageing = before.at(now, received);
@@ -283,29 +323,29 @@ impl<'f, const N: usize, P: Rows + ?Sized> FrameReader<'f, N, P> {
     /// Keep the guard for one query, not longer: no frame is published meanwhile. A leaked guard keeps the surface at
     /// its present frame, whose age then grows. This does not check the age: use [`latest`](Self::latest).
     #[inline]
-    pub fn read(&mut self) -> Option<FrameGuard<'_, N, P>> {
-        read(&self.shared)
+    pub fn read(&mut self) -> Option<FrameGuard<'_, N, F>> {
+        read(self.frames)
     }
 }
 
 #[inline]
-fn read<'f, const N: usize, P: ?Sized>(shared: &Shared<'f, P>) -> Option<FrameGuard<'f, N, P>> {
-    let state = shared.state.fetch_or(READING, Ordering::Acquire);
-    let [first, second] = shared.buffers;
+fn read<const N: usize, F: Buffers>(frames: &F) -> Option<FrameGuard<'_, N, F>> {
+    let state = frames.state().fetch_or(READING, Ordering::Acquire);
+    let [first, second] = frames.buffers();
     let buffer = if state & FRONT == 0 { first } else { second };
     // Created before the check, so that it clears READING on both paths.
-    let guard = FrameGuard { state: shared.state, view: FrameView { buffer } };
+    let guard = FrameGuard { state: frames.state(), view: FrameView { buffer } };
     (state & PUBLISHED != 0).then_some(guard)
 }
 
 /// The published frame, held still: a [`VertexTable`] that carries its measured stretch and its position error.
 #[derive(Debug)]
-pub struct FrameGuard<'f, const N: usize, P: ?Sized = [Position; N]> {
+pub struct FrameGuard<'f, const N: usize, F: Buffers = Frames<N>> {
     state: &'f AtomicU32,
-    view: FrameView<'f, N, P>,
+    view: FrameView<'f, N, F>,
 }
 
-impl<const N: usize, P: Rows + ?Sized> FrameGuard<'_, N, P> {
+impl<const N: usize, F: Buffers> FrameGuard<'_, N, F> {
     /// The facts about this frame.
     #[must_use]
     pub fn label(&self) -> FrameLabel {
@@ -313,13 +353,13 @@ impl<const N: usize, P: Rows + ?Sized> FrameGuard<'_, N, P> {
     }
 }
 
-impl<const N: usize, P: ?Sized> Drop for FrameGuard<'_, N, P> {
+impl<const N: usize, F: Buffers> Drop for FrameGuard<'_, N, F> {
     fn drop(&mut self) {
         self.state.fetch_and(!READING, Ordering::Release);
     }
 }
 
-impl<const N: usize, P: Rows + ?Sized> VertexTable for FrameGuard<'_, N, P> {
+impl<const N: usize, F: Buffers> VertexTable for FrameGuard<'_, N, F> {
     fn len(&self) -> usize {
         self.view.len()
     }
@@ -344,20 +384,20 @@ impl<const N: usize, P: Rows + ?Sized> VertexTable for FrameGuard<'_, N, P> {
 
 /// The writer's view of one buffer: a [`VertexTable`].
 #[derive(Debug)]
-pub struct FrameView<'f, const N: usize, P: ?Sized = [Position; N]> {
-    buffer: &'f Buffer<P>,
+pub struct FrameView<'f, const N: usize, F: Buffers = Frames<N>> {
+    buffer: &'f Buffer<F::Rows>,
 }
 
-impl<const N: usize, P: ?Sized> Clone for FrameView<'_, N, P> {
+impl<const N: usize, F: Buffers> Clone for FrameView<'_, N, F> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<const N: usize, P: ?Sized> Copy for FrameView<'_, N, P> {}
+impl<const N: usize, F: Buffers> Copy for FrameView<'_, N, F> {}
 
 #[cfg(feature = "bus")]
-impl<const N: usize, P: Rows + ?Sized> FrameView<'_, N, P> {
+impl<const N: usize, F: Buffers> FrameView<'_, N, F> {
     /// The facts about the frame; arbitrary for a frame not yet labelled.
     pub(crate) fn label(&self) -> FrameLabel {
         self.buffer.label()
@@ -369,7 +409,7 @@ impl<const N: usize, P: Rows + ?Sized> FrameView<'_, N, P> {
     }
 }
 
-impl<const N: usize, P: Rows + ?Sized> VertexTable for FrameView<'_, N, P> {
+impl<const N: usize, F: Buffers> VertexTable for FrameView<'_, N, F> {
     fn len(&self) -> usize {
         self.buffer.rows().len()
     }

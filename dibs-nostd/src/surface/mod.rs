@@ -12,9 +12,11 @@ mod moving;
 mod vertices;
 
 pub(crate) use age::Ageing;
-pub use buffer::{Buffer, FrameLabel, Position, Rows};
+pub use buffer::{Buffer, FrameLabel, Position};
 pub use error::{OutOfTableError, PublishError, SplitError};
-pub use frames::{FrameGuard, FrameReader, FrameView, FrameWriter, Frames, ends};
+pub use frames::{
+    BorrowedFrames, Buffers, FrameGuard, FrameReader, FrameView, FrameWriter, Frames,
+};
 pub use latest::{FrameAge, Latest};
 pub(crate) use measured::share;
 pub use measured::{MeasuredStretch, REGIONS};

@@ -11,7 +11,7 @@ use crate::bus::wire::{
     Content, Counters, Event, FrameId, Mac, NoMac, Packet, Status, StreamError,
 };
 use crate::stretch::{Arriving, Gate, StretchError, StretchMonitor, SurfaceLimits, Verdict};
-use crate::surface::{FrameLabel, FrameView, FrameWriter, Position, PublishError, Rows};
+use crate::surface::{Buffers, FrameLabel, FrameView, FrameWriter, Frames, PublishError};
 use crate::tree::{Index, Tree};
 
 use collector::Collector;
@@ -58,8 +58,8 @@ use health::FrameName;
 /// assert_eq!(reader.read().unwrap().position(2), Some(Vec3::Z));
 /// ```
 #[derive(Debug)]
-pub struct Assembler<'f, G, const N: usize, M = NoMac, P: ?Sized = [Position; N]> {
-    writer: FrameWriter<'f, N, P>,
+pub struct Assembler<'f, G, const N: usize, M = NoMac, F: Buffers = Frames<N>> {
+    writer: FrameWriter<'f, N, F>,
     gate: G,
     mac: M,
     max_coordinate: f32,
@@ -124,18 +124,18 @@ pub enum Advance {
     },
 }
 
-impl<'f, G: Gate, const N: usize, P: Rows + ?Sized> Assembler<'f, G, N, NoMac, P> {
+impl<'f, G: Gate, const N: usize, F: Buffers> Assembler<'f, G, N, NoMac, F> {
     /// An assembler for the mesh with this id, whose vertices keep within `max_coordinate` (mm) of the origin on each
     /// axis, at most [`MAX_COORDINATE`]. A smaller limit detects more damage, and bounds the accuracy of every query.
     /// With NaN nothing is ever published.
     #[must_use]
-    pub fn new(writer: FrameWriter<'f, N, P>, gate: G, mesh_id: u32, max_coordinate: f32) -> Self {
+    pub fn new(writer: FrameWriter<'f, N, F>, gate: G, mesh_id: u32, max_coordinate: f32) -> Self {
         Assembler::with_mac(writer, gate, mesh_id, max_coordinate, NoMac)
     }
 }
 
-impl<'f, 't, I: Index, const N: usize, P: Rows + ?Sized>
-    Assembler<'f, StretchMonitor<'t, I>, N, NoMac, P>
+impl<'f, 't, I: Index, const N: usize, F: Buffers>
+    Assembler<'f, StretchMonitor<'t, I>, N, NoMac, F>
 {
     /// An assembler for surfaces of this tree. It checks them in slices, and publishes those within the tree's stretch
     /// limit and these limits.
@@ -143,7 +143,7 @@ impl<'f, 't, I: Index, const N: usize, P: Rows + ?Sized>
     /// # Errors
     /// [`StretchError::NoMetric`] where the tree was emitted without its metric section.
     pub fn for_tree(
-        writer: FrameWriter<'f, N, P>,
+        writer: FrameWriter<'f, N, F>,
         tree: &'t Tree<'t, I>,
         limits: SurfaceLimits,
     ) -> Result<Self, StretchError> {
@@ -152,11 +152,11 @@ impl<'f, 't, I: Index, const N: usize, P: Rows + ?Sized>
     }
 }
 
-impl<'f, G: Gate, M: Mac, const N: usize, P: Rows + ?Sized> Assembler<'f, G, N, M, P> {
+impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> {
     /// The same, for packets with tags.
     #[must_use]
     pub fn with_mac(
-        writer: FrameWriter<'f, N, P>,
+        writer: FrameWriter<'f, N, F>,
         gate: G,
         mesh_id: u32,
         max_coordinate: f32,
@@ -286,7 +286,7 @@ impl<'f, G: Gate, M: Mac, const N: usize, P: Rows + ?Sized> Assembler<'f, G, N, 
 
     /// The frame published last.
     #[must_use]
-    pub fn surface(&self) -> Option<FrameView<'_, N, P>> {
+    pub fn surface(&self) -> Option<FrameView<'_, N, F>> {
         self.writer.front()
     }
 

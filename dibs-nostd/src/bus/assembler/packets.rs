@@ -10,9 +10,9 @@ use crate::bus::wire::{
     quantised_row,
 };
 use crate::stretch::{Changed, Gate};
-use crate::surface::Rows as SurfaceRows;
+use crate::surface::Buffers;
 
-impl<G: Gate, M: Mac, const N: usize, P: SurfaceRows + ?Sized> Assembler<'_, G, N, M, P> {
+impl<G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'_, G, N, M, F> {
     #[inline]
     pub(super) fn take(&mut self, packet: &Packet<'_>) -> Result<Progress, ReceiveError> {
         self.collector.check_mesh(packet)?;
