@@ -22,6 +22,9 @@
 /** Bytes of the storage of a surface of so many vertices. */
 #define DIBS_SURFACE_SIZE(vertices) (DIBS_SURFACE_BASE + (size_t)DIBS_SURFACE_VERTEX * (vertices))
 
+/** Bytes of the storage of a tracker on a tree of so many vertices. */
+#define DIBS_TRACKER_SIZE(vertices) (DIBS_TRACKER_BASE + (size_t)DIBS_TRACKER_VERTEX * (vertices))
+
 
 /**
  * Alignment, in bytes, of the storage of every object.
@@ -112,6 +115,21 @@
  * Bytes of a surface's storage for each vertex: two positions.
  */
 #define DIBS_SURFACE_VERTEX 24
+
+/**
+ * Bytes of a tracker's storage besides its vertices.
+ */
+#define DIBS_TRACKER_BASE 16384
+
+/**
+ * Bytes of a tracker's storage for each vertex: the surface as it is, and as it was.
+ */
+#define DIBS_TRACKER_VERTEX 24
+
+/**
+ * Nodes of the tree that a tracker remembers: more, and ticks are whole queries.
+ */
+#define DIBS_OPENED 256
 
 /**
  * Bytes of a tree's storage.
@@ -532,6 +550,43 @@ typedef uint32_t dibs_advance;
 #endif // __cplusplus
 
 /**
+ * Why a tick was a whole query.
+ */
+enum dibs_fallback
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * It was none.
+   */
+  DIBS_FALLBACK_NONE = 0,
+  /**
+   * The first tick, or the one after an error.
+   */
+  DIBS_FALLBACK_START = 1,
+  /**
+   * The surface's motion was not measured all the way.
+   */
+  DIBS_FALLBACK_SURFACE = 2,
+  /**
+   * Tool or surface moved too far.
+   */
+  DIBS_FALLBACK_JUMP = 3,
+  /**
+   * More nodes had to be opened than there are places.
+   */
+  DIBS_FALLBACK_FULL = 4,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_fallback dibs_fallback;
+#else
+typedef uint32_t dibs_fallback;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * A list of contacts.
  *
  * One context at a time.
@@ -586,6 +641,13 @@ typedef struct dibs_scrub dibs_scrub;
  * Any number of contexts may use it at once.
  */
 typedef struct dibs_surface dibs_surface;
+
+/**
+ * A query that remembers its last answer's proof.
+ *
+ * It keeps a copy of the surface, so that a frame is held for its copying alone. One context at a time.
+ */
+typedef struct dibs_tracker dibs_tracker;
 
 /**
  * A validated tree, by name `heart.dibs` of `dibs build heart.ply -o heart.dibs`. At most 65,536 vertices.
@@ -1469,6 +1531,48 @@ dibs_code dibs_surface_init(void *storage,
                             size_t size,
                             uint32_t vertices,
                             dibs_surface **surface);
+
+/**
+ * Makes a tracker on a tree, without a surface.
+ *
+ * @param storage  `DIBS_TRACKER_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`. Needs no initial value.
+ * @param size     Bytes of the storage.
+ * @param tree     The tree.
+ * @param tracker  Where the tracker's address goes.
+ */
+dibs_code dibs_tracker_init(void *storage, size_t size, dibs_tree *tree, dibs_tracker **tracker);
+
+/**
+ * Takes over a new surface: copies it, and measures how far it moved. Call it for each new frame, and release the frame
+ * then; ticks with no new frame go without.
+ *
+ * Cost: linear in the vertices.
+ *
+ * @param tracker  The tracker.
+ * @param frame    The surface.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_VERTEX_COUNT`, or a misuse. After an error
+ *         the surface is the one before.
+ */
+dibs_code dibs_tracker_set_frame(dibs_tracker *tracker,
+                                 dibs_frame *frame);
+
+/**
+ * The closest pair of the tool and the tracker's surface: the answer of `dibs_query_closest`, within its accuracy.
+ *
+ * Cost: the budget at most, and a number for each opened node.
+ *
+ * @param tracker    The tracker.
+ * @param tool       The tool.
+ * @param options    Options, or null.
+ * @param proximity  Where the answer goes; its counts of tests are this tick's.
+ * @param fallback   Where goes why the tick was a whole query, if it was; or null.
+ * @return As `dibs_query_closest`.
+ */
+dibs_code dibs_tracker_closest(dibs_tracker *tracker,
+                               const dibs_tool *tool,
+                               const dibs_options *options,
+                               dibs_proximity *proximity,
+                               dibs_fallback *fallback);
 
 /**
  * Validates the bytes of a tree, and makes the tree that every other object is made with.

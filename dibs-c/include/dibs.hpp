@@ -121,6 +121,18 @@ struct Reader : Object<dibs_reader, DIBS_READER_SIZE> {
     }
 };
 
+/** The closest pair from tick to tick, on a copy of a surface of at most so many vertices. */
+template <std::uint32_t Vertices>
+struct Tracker : Object<dibs_tracker, DIBS_TRACKER_SIZE(Vertices)> {
+    dibs_code init(dibs_tree *tree) { return this->make(dibs_tracker_init, tree); }
+
+    dibs_code set(dibs_frame *frame) { return dibs_tracker_set_frame(*this, frame); }
+
+    dibs_code closest(const dibs_tool &tool, dibs_proximity &found, const dibs_options *options = nullptr) {
+        return dibs_tracker_closest(*this, &tool, options, &found, nullptr);
+    }
+};
+
 /** The fail-safe machine. */
 struct FailSafe : Object<dibs_failsafe, DIBS_FAILSAFE_SIZE> {
     dibs_code init(const dibs_limits &limits) { return make(dibs_failsafe_init, &limits); }

@@ -29,4 +29,5 @@ mod reader;
 mod receiver;
 mod surface;
 mod tool;
+mod tracker;
 mod tree;

@@ -19,3 +19,10 @@ fn panic(_info: &PanicInfo<'_>) -> ! {
         core::hint::spin_loop();
     }
 }
+
+/// A panic path put in on purpose.
+#[cfg(feature = "planted-panic")]
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_planted_panic(at: usize) -> u8 {
+    [1, 2, 3][at]
+}

@@ -35,7 +35,16 @@ fn c_and_rust_answer_a_script_with_the_same_bits() {
     let expected = script.answers();
     assert!(expected.len() >= 1_000, "{} answers", expected.len());
     // Without an answer, nominal, degraded, too old; a packet damaged, one of no frame, a frame stretched too far.
-    for start in ["tick 300 2", "tick 0 0", "tick 0 1", "tick 301 2", "packet 400", "packet 406"] {
+    for start in [
+        "tick 300 2",
+        "tick 0 0",
+        "tick 0 1",
+        "tick 301 2",
+        "packet 400",
+        "packet 406",
+        "track 0 0",
+        "track 0 1",
+    ] {
         assert!(expected.iter().any(|line| line.starts_with(start)), "nothing is {start}");
     }
     assert!(expected.iter().any(|line| line.starts_with("packet") && line.contains(" 311 ")));

@@ -4,6 +4,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
+use xtask::c_interface;
 use xtask::process::{quiet, run};
 use xtask::qemu;
 use xtask::steps::{Outcome, Steps};
@@ -58,6 +59,7 @@ pub fn test(options: &Options) -> Result<()> {
             println!("\nboard: {}", cross.describe());
             steps.run("core crate for the board", || core_crate(&cross));
             steps.run("lints of the firmware", || firmware_lints(&cross));
+            steps.run("C interface for the board", || c_interface::has_no_panic_path(&cross));
             if options.whole {
                 steps.run("a new user", || new_user(&cross));
             }

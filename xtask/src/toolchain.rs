@@ -144,7 +144,7 @@ fn debian_installed() -> bool {
 }
 
 /// Debian's compiler has no `rust-lld`; the toolchain that builds xtask has one.
-fn linker() -> Result<PathBuf> {
+pub fn linker() -> Result<PathBuf> {
     let verbose = quiet(Command::new("rustc").arg("-vV"), MOMENT)?;
     let host = verbose
         .lines()

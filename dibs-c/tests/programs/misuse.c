@@ -41,6 +41,7 @@ MEMORY(small_surface_memory, DIBS_SURFACE_SIZE(10));
 MEMORY(receiver_memory, DIBS_RECEIVER_SIZE);
 MEMORY(reader_memory, DIBS_READER_SIZE);
 MEMORY(failsafe_memory, DIBS_FAILSAFE_SIZE);
+MEMORY(tracker_memory, DIBS_TRACKER_SIZE(502));
 MEMORY(scrub_memory, DIBS_SCRUB_SIZE);
 MEMORY(unmade, 64);
 
@@ -335,6 +336,17 @@ int main(int argc, char **argv) {
     held(argv[2]);
     failsafe();
     texts();
+
+    dibs_tracker *tracker;
+    EXPECT(STORAGE_SIZE, dibs_tracker_init(tracker_memory, sizeof tracker_memory - 1, tree, &tracker));
+    EXPECT(OK, dibs_tracker_init(tracker_memory, sizeof tracker_memory, tree, &tracker));
+    EXPECT(NO_SURFACE, dibs_tracker_closest(tracker, &tool, NULL, &found, NULL));
+    EXPECT(NO_SURFACE, dibs_tracker_set_frame(tracker, frame));
+    EXPECT(OK, dibs_frame_set_vertices(frame, positions, facts.vertices - 1, 0.0f));
+    EXPECT(VERTEX_COUNT, dibs_tracker_set_frame(tracker, frame));
+    EXPECT(OK, dibs_frame_set_vertices(frame, positions, facts.vertices, 0.0f));
+    EXPECT(OK, dibs_tracker_set_frame(tracker, frame));
+    EXPECT(OK, dibs_tracker_closest(tracker, &tool, NULL, &found, NULL));
 
     dibs_scrub *scrub;
     EXPECT(OK, dibs_scrub_init(scrub_memory, sizeof scrub_memory, tree, &scrub));

@@ -13,6 +13,7 @@ use dibs_nostd::{
 };
 
 use super::print::Line;
+use super::track::Track;
 
 /// Vertices of the generated heart of 1,000 triangles.
 const VERTICES: usize = 502;
@@ -98,6 +99,8 @@ pub fn answers(built: &BuiltTree, events: &[Event]) -> Vec<String> {
     let spring = SpringDamper::new(1.0, 0.002, 5.0).expect("gains");
     let wall = ForbiddenRegion::new(spring, 5.0).expect("a margin");
 
+    let mut track = Track::new(&tree);
+
     let answer = |event: &Event| match event {
         Event::Packet(now, bytes) => {
             let accepted = receiver.accept(bytes, *now);
@@ -117,9 +120,12 @@ pub fn answers(built: &BuiltTree, events: &[Event]) -> Vec<String> {
         Event::Tick(now, tool) => {
             let latest = reader.latest(*now);
             let frame = latest.frame();
-            let found = latest
-                .of_any_age()
-                .and_then(|surface| Ok(query.closest(&surface, tool, &Options::new())?));
+            let mut tracked = String::new();
+            let found = latest.of_any_age().and_then(|surface| {
+                let found = query.closest(&surface, tool, &Options::new())?;
+                tracked = track.answer(&surface, tool) + "\n";
+                Ok(found)
+            });
             let link = link.read(*now);
             let seen = Observation { frame, link, query_error: None, has_rotted: false };
             let verdict = machine.step(&seen);
@@ -144,10 +150,11 @@ pub fn answers(built: &BuiltTree, events: &[Event]) -> Vec<String> {
                 ConstraintState::Safe(_) => line.hold(&wrench, outcome),
                 _ => line.force(&wrench),
             }
-            line.end()
+            tracked + &line.end()
         }
     };
-    events.iter().map(answer).collect()
+    let lines = events.iter().map(answer).collect::<Vec<_>>().join("\n");
+    lines.lines().map(str::to_owned).collect()
 }
 
 fn number(progress: Progress) -> u32 {

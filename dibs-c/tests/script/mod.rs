@@ -2,6 +2,7 @@
 
 mod bus;
 mod print;
+mod track;
 
 use std::fmt::Write;
 

@@ -1,0 +1,61 @@
+//! The C interface's static library for the board.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::Command;
+
+use anyhow::{Context, Result, ensure};
+
+use crate::process::run;
+use crate::steps::Outcome;
+use crate::toolchain::{self, Cross};
+use crate::workspace;
+
+/// Builds the library, with these features of its own.
+pub fn build(cross: &Cross, features: &str) -> Result<PathBuf> {
+    let mut cargo = cross.cargo("rustc");
+    cargo.args(["--quiet", "--package", "dibs-c", "--lib", "--crate-type", "staticlib"]);
+    cargo.args(["--profile", "firmware", "--features", features]);
+    run(&mut cargo).context("the C interface does not build for the board")?;
+    Ok(cross.program("firmware", "libdibs_c.a"))
+}
+
+/// Links every function of the header: a panic path that survived is a symbol that is not there. One put in on purpose
+/// must break the link, so that a link is known to show something.
+pub fn has_no_panic_path(cross: &Cross) -> Result<Outcome> {
+    let header = fs::read_to_string(workspace::root().join("dibs-c/include/dibs.h"))?;
+    let functions = functions(&header);
+    ensure!(functions.len() > 20, "the header has no functions");
+
+    let planted = [&functions[..], &["dibs_planted_panic"]].concat();
+    let said = link(&build(cross, "planted-panic")?, &planted)?.unwrap_or_default();
+    let is_noticed = said.contains("dibs_a_panic_path_survived");
+    ensure!(is_noticed, "a planted panic path did not break the link:\n{said}");
+
+    let said = link(&build(cross, "")?, &functions)?;
+    ensure!(said.is_none(), "the C interface has a panic path:\n{}", said.unwrap_or_default());
+    println!("{} functions, and no panic path", functions.len());
+    Ok(Outcome::Passed)
+}
+
+/// The functions that a header declares.
+fn functions(header: &str) -> Vec<&str> {
+    let declarations = header.lines().filter(|line| !line.starts_with([' ', '#', '/']));
+    let names = declarations.filter_map(|line| {
+        let (before, _) = line.split_once('(')?;
+        let name = before.rsplit([' ', '*']).next()?;
+        name.starts_with("dibs_").then_some(name)
+    });
+    names.collect()
+}
+
+/// Links these functions of a library; what the linker says where it cannot.
+fn link(library: &PathBuf, functions: &[&str]) -> Result<Option<String>> {
+    let mut linker = Command::new(toolchain::linker()?);
+    linker.args(["-flavor", "gnu", "--gc-sections", "--entry", "0"]);
+    linker.args(functions.iter().map(|function| format!("--undefined={function}")));
+    linker.arg(library).arg("-o").arg(workspace::target().join("dibs-c-linked"));
+    let output = linker.output().context("cannot start the linker")?;
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    Ok((!output.status.success()).then_some(said))
+}
