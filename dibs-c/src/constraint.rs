@@ -1,9 +1,7 @@
 //! Constraints: the force that keeps a tool out of a margin around the surface.
 
 use bytemuck::AnyBitPattern;
-use dibs_nostd::constraint::{
-    ConstraintState, ForbiddenRegion, GainError, Proxy, SpringDamper, Wrench,
-};
+use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, Proxy, SpringDamper, Wrench};
 use dibs_nostd::{Proximity, Unavailable};
 
 use crate::border::{Handle, Input, Output};
@@ -31,9 +29,9 @@ pub struct dibs_wall {
 }
 
 impl dibs_wall {
-    fn spring(&self) -> Result<SpringDamper, GainError> {
-        SpringDamper::new(self.stiffness, self.damping, self.max_force)?
-            .with_hold_damping(self.hold_damping)
+    fn spring(&self) -> SpringDamper {
+        let spring = SpringDamper::stiffness(self.stiffness).damping(self.damping);
+        spring.hold_damping(self.hold_damping).max_force(self.max_force)
     }
 }
 
@@ -111,7 +109,7 @@ pub extern "C" fn dibs_wall_force(
 ) -> dibs_code {
     dibs_code::of(|| {
         let (force, wall, failure) = (force.check()?, wall.get()?, failure(outcome));
-        let region = ForbiddenRegion::new(wall.spring()?, wall.margin)?;
+        let region = ForbiddenRegion::new(wall.spring(), wall.margin)?;
         let proximity = match failure {
             None => Ok(Proximity::try_from(proximity.get()?)?),
             Some(_) => Err(Unavailable::NoSurface),
@@ -145,7 +143,7 @@ pub extern "C" fn dibs_wall_proxy_force(
 ) -> dibs_code {
     dibs_code::of(|| {
         let (force, wall, list) = (force.check()?, wall.get()?, contacts.open()?);
-        let (proxy, failure) = (Proxy::new(wall.spring()?, wall.margin)?, failure(outcome));
+        let (proxy, failure) = (Proxy::new(wall.spring(), wall.margin)?, failure(outcome));
         let found = match failure {
             None => list.0.within(wall.margin),
             Some(_) => Err(Unavailable::NoSurface),

@@ -246,7 +246,8 @@ pub extern "C" fn dibs_contacts_rows(
         let mut places = rows.places(capacity)?;
         let accuracy = list.0.accuracy();
         for contact in list.0.iter() {
-            let row = VelocityRow::new(contact, accuracy, origin.into(), stand_off, gain);
+            let row =
+                VelocityRow::new(contact, accuracy, origin.into()).stand_off(stand_off).gain(gain);
             let (linear, angular) = (row.linear, row.angular);
             places.push(dibs_row { linear, angular, least: row.least })?;
         }

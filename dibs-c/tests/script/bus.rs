@@ -96,7 +96,7 @@ pub fn answers(built: &BuiltTree, events: &[Event]) -> Vec<String> {
     let limits = Limits::new(watch(40, 80), 0.1).and_then(|limits| limits.recovery(2));
     let limits = limits.expect("limits").silence(watch(30, 100)).rejections(watch(1, 10));
     let mut machine = FailSafe::new(limits.automatic());
-    let spring = SpringDamper::new(1.0, 0.002, 5.0).expect("gains");
+    let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
     let wall = ForbiddenRegion::new(spring, 5.0).expect("a margin");
 
     let mut track = Track::new(&tree);

@@ -153,7 +153,7 @@ fn answer(
 ) -> String {
     let options = pose.options();
     let (velocity, angular) = (Vec3::new(10.0, -20.0, 5.0), Vec3::new(0.0, 0.1, 0.0));
-    let spring = SpringDamper::new(1.0, 0.002, 5.0).expect("gains");
+    let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
     let mut line = Line::new("closest 0");
 
     let found = query.closest(surface, tool, &options).expect("an answer");
@@ -166,7 +166,8 @@ fn answer(
     line.word(" contacts 0");
     line.contacts(contacts);
     for contact in contacts.iter() {
-        let row = VelocityRow::new(contact, contacts.accuracy(), pose.start, 1.0, 20.0);
+        let row =
+            VelocityRow::new(contact, contacts.accuracy(), pose.start).stand_off(1.0).gain(20.0);
         line.floats(&row.linear);
         line.floats(&row.angular);
         line.floats(&[row.least]);

@@ -21,8 +21,13 @@ fn the_page_of_proofs_names_every_check_and_files_that_exist() {
     for link in &links {
         assert!(docs.join(link).exists(), "{link} is not there");
     }
-    let folders =
-        ["tests/tests", "tests/prove/tests", "dibs-build/tests", "firmware-example/tests"];
+    let folders = [
+        "tests/tests",
+        "tests/prove/tests",
+        "dibs-build/tests",
+        "dibs-c/tests",
+        "firmware-example/tests",
+    ];
     for folder in folders {
         for file in files(folder) {
             let link = format!("../{file}");
