@@ -6,7 +6,7 @@
 
 use std::hint::black_box;
 
-use dibs_nostd::constraint::{ForbiddenRegion, SpringDamper};
+use dibs_nostd::constraint::{ForbiddenRegion, GainError, SpringDamper};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
     Assembler, Budget, Capsule, Frames, Options, Proximity, QuantisedVertices, Query, Scrub,
@@ -153,6 +153,9 @@ fn quantised_positions(rows: Vec<[u16; 3]>) -> Vec3 {
     (0..100).filter_map(|row| table.position(black_box(row))).sum()
 }
 
+const SPRING: SpringDamper = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
+const WALL: Result<ForbiddenRegion, GainError> = ForbiddenRegion::new(SPRING, 50.0);
+
 fn found() -> Result<Proximity, Unavailable> {
     Ok(capsule_query(&mut cold()))
 }
@@ -160,8 +163,7 @@ fn found() -> Result<Proximity, Unavailable> {
 #[library_benchmark]
 #[bench::wall(setup = found)]
 fn force(found: Result<Proximity, Unavailable>) -> Vec3 {
-    let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
-    let wall = ForbiddenRegion::new(spring, 50.0).expect("a valid margin");
+    let wall = const { WALL }.expect("valid gains");
     black_box(wall.force(black_box(&found), Vec3::X)).force
 }
 

@@ -10,7 +10,7 @@ use crate::bus::wire::{
     quantised_row,
 };
 use crate::stretch::{Changed, Gate};
-use crate::surface::Buffers;
+use crate::surface::{Buffers, Position};
 
 impl<G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'_, G, N, M, F> {
     #[inline]
@@ -100,13 +100,11 @@ impl<G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'_, G, N, M, F> {
         }
         match (rows, grid) {
             (Rows::Quantised(rows), Some(grid)) => {
-                let decode = |row| grid.position(quantised_row(row));
+                let decode = |row: &[u8; 6]| grid.position(quantised_row(row));
                 if !self.is_box_inside {
                     check(rows.iter().map(decode), first, limit)?;
                 }
-                for (place, row) in places.iter().zip(rows) {
-                    place.set(decode(row));
-                }
+                store(places, rows, decode);
             }
             (Rows::Float(rows), _) => {
                 check(rows.iter().map(float_position), first, limit)?;
@@ -163,6 +161,15 @@ impl<G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'_, G, N, M, F> {
         self.is_dirty = true;
         self.gate.moved(rows);
         Ok(stored(self.collector.take_rows(share, place)?, epoch))
+    }
+}
+
+/// Stores rows in their places. (On the board a function of its own, so that the loop has the registers.)
+#[cfg_attr(target_arch = "arm", inline(never))]
+#[cfg_attr(not(target_arch = "arm"), inline(always))]
+fn store<R>(places: &[Position], rows: &[R], decode: impl Fn(&R) -> Vec3) {
+    for (place, row) in places.iter().zip(rows) {
+        place.set(decode(row));
     }
 }
 
