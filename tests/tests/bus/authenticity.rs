@@ -1,7 +1,7 @@
 //! Packets with tags: without the right key nothing is published, replays and forgeries are counted.
 
 use dibs_nostd::wire::{
-    AesCmac, Body, Counters, Encoding, Event, FrameEncoder, FrameId, NoMac, Packet, Status,
+    AesCmac, Body, Counters, Encoding, Event, FrameEncoder, FrameId, Mac, NoMac, Packet, Status,
     TAG_BYTES, WeightsEncoder, encode_heartbeat, encode_status,
 };
 use dibs_nostd::{Assembler, FrameReader, Frames, Progress, ReceiveError, Unchecked};
@@ -195,6 +195,15 @@ fn heartbeats_and_statuses_are_under_the_tag() {
     let plain = Status { challenge: 0, ..status };
     let plain = encode_status(MESH, &plain, &Counters::new(), &NoMac, &mut buffer).to_vec();
     assert!(!Packet::decode(&plain).unwrap().is_genuine(&mac(), 0));
+}
+
+/// The challenge is that of the key in use, by value or by reference; without a key it is 0.
+#[test]
+fn a_status_states_the_challenge_in_use() {
+    assert_eq!(mac().challenge(), CHALLENGE);
+    assert_eq!(<&AesCmac>::challenge(&&mac()), CHALLENGE);
+    assert_eq!(NoMac.challenge(), 0);
+    assert_eq!(bus().0.status(0, 1).challenge, 0);
 }
 
 proptest! {
