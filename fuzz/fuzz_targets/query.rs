@@ -13,8 +13,8 @@ use dibs_nostd::{
 use dibs_tests::tree_bytes::reseal;
 use libfuzzer_sys::fuzz_target;
 
-/// The search for the closest pair, and up to 26 more for the depth of an axis.
-const MOST_LOOKS: u32 = 27;
+/// The search for the closest pair, and up to 27 more for the depth of an axis.
+const MOST_LOOKS: u32 = 28;
 
 static SOUND: LazyLock<(Vec<u8>, Vec<Vec3>)> = LazyLock::new(|| {
     let mesh = generate::heart(320).expect("a valid size").mesh;
