@@ -439,7 +439,7 @@ typedef uint32_t dibs_code;
 #endif // __cplusplus
 
 /**
- * How a force came about.
+ * The origin of a force.
  */
 enum dibs_force_state
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -550,7 +550,7 @@ typedef uint32_t dibs_advance;
 #endif // __cplusplus
 
 /**
- * Why a tick was a whole query.
+ * The reason for a whole query.
  */
 enum dibs_fallback
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -679,7 +679,7 @@ typedef struct {
    */
   float max_force;
   /**
-   * How far (mm, above 0) the wall reaches from the surface.
+   * Reach of the wall from the surface (mm, above 0).
    */
   float margin;
 } dibs_wall;
@@ -741,7 +741,7 @@ typedef struct {
    */
   dibs_vec3 direction;
   /**
-   * Where along the tool's axis the pair is: 0 at its start, 1 at its end; 0 for a sphere.
+   * Place of the pair along the tool's axis: 0 at its start, 1 at its end; 0 for a sphere.
    */
   float axis_parameter;
   /**
@@ -779,11 +779,11 @@ typedef struct {
    */
   dibs_vec3 torque;
   /**
-   * How they came about.
+   * Their origin.
    */
   dibs_force_state state;
   /**
-   * Why the force is the hold, where it is; else `DIBS_CODE_OK`.
+   * The cause of a hold; otherwise `DIBS_CODE_OK`.
    */
   dibs_code cause;
 } dibs_force;
@@ -830,7 +830,7 @@ typedef struct {
    */
   dibs_budget budget;
   /**
-   * How far (mm) the interval of a depth may reach where the tool's axis crosses the surface; 0 for a 512th of the
+   * Largest length (mm) of the interval of a depth where the tool's axis crosses the surface; 0 for a 512th of the
    * axis' length.
    */
   float depth_tolerance;
@@ -841,7 +841,7 @@ typedef struct {
 } dibs_options;
 
 /**
- * What is certain about a list.
+ * Facts that hold for a list.
  */
 typedef struct {
   /**
@@ -883,7 +883,7 @@ typedef struct {
    */
   dibs_vec3 point_on_tool;
   /**
-   * Where along the tool's axis the pair is: 0 at its start, 1 at its end.
+   * Place of the pair along the tool's axis: 0 at its start, 1 at its end.
    */
   float axis_parameter;
   /**
@@ -985,7 +985,7 @@ typedef struct {
 } dibs_limits;
 
 /**
- * Which frame was published last, and how old it is.
+ * The frame that was published last, and its age.
  */
 typedef struct {
   /**
@@ -1067,11 +1067,11 @@ typedef struct {
    */
   uint32_t state;
   /**
-   * Why it is not nominal: a `dibs_code`.
+   * Cause of a state that is not nominal: a `dibs_code`.
    */
   uint32_t cause;
   /**
-   * How far (mm) the tissue may have moved since the surface was received.
+   * Largest way (mm) of the tissue since the surface was received.
    */
   float margin;
   /**
@@ -1127,7 +1127,7 @@ typedef struct {
    */
   float stretch;
   /**
-   * How far (mm) a vertex may be from where the mesh's file has it.
+   * Largest distance (mm) of a vertex from its place in the mesh's file.
    */
   float position_error;
 } dibs_tree_facts;
@@ -1153,7 +1153,7 @@ const char *dibs_code_text(uint32_t code);
  *                   `DIBS_CODE_OK`.
  * @param proximity  The closest pair; not read, and may be null, where the outcome is an error.
  * @param velocity   Velocity (mm/s) of the tool's closest point against the surface.
- * @param force      Where the force goes.
+ * @param force      Receives the force.
  * @return `DIBS_CODE_OK`, also where the force is the hold; `DIBS_CODE_GAIN`; or a misuse.
  */
 dibs_code dibs_wall_force(const dibs_wall *wall,
@@ -1171,7 +1171,7 @@ dibs_code dibs_wall_force(const dibs_wall *wall,
  * @param origin    The tool's point (mm) that the torque and the velocity are about.
  * @param velocity  Velocity (mm/s) of the tool at `origin`.
  * @param angular   Angular velocity (1/s) of the tool.
- * @param force     Where force and torque go.
+ * @param force     Receives force and torque.
  * @return `DIBS_CODE_OK`, also where the force is the hold; `DIBS_CODE_GAIN`; or a misuse.
  */
 dibs_code dibs_wall_proxy_force(const dibs_wall *wall,
@@ -1187,7 +1187,7 @@ dibs_code dibs_wall_proxy_force(const dibs_wall *wall,
  *
  * @param storage   `DIBS_CONTACTS_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
  * @param size      Bytes of the storage.
- * @param contacts  Where the list's address goes.
+ * @param contacts  Receives the list's address.
  */
 dibs_code dibs_contacts_init(void *storage, size_t size, dibs_contacts **contacts);
 
@@ -1202,7 +1202,7 @@ dibs_code dibs_contacts_init(void *storage, size_t size, dibs_contacts **contact
  * @param margin     In mm, at least 0.
  * @param options    Options, or null. A budget that runs out shows in the list's bound.
  * @param contacts   The list; empty after an error.
- * @param proximity  Where the closest pair goes, or null.
+ * @param proximity  Receives the closest pair, or null.
  * @return As `dibs_query_closest`, `DIBS_CODE_MARGIN`, or `DIBS_CODE_TREE_NO_ADJACENCY`.
  */
 dibs_code dibs_query_contacts(dibs_query *query,
@@ -1214,7 +1214,7 @@ dibs_code dibs_query_contacts(dibs_query *query,
                               dibs_proximity *proximity);
 
 /**
- * What is certain about the list.
+ * Facts that hold for the list.
  */
 dibs_code dibs_contacts_get_facts(dibs_contacts *contacts, dibs_contacts_facts *facts);
 
@@ -1229,7 +1229,7 @@ dibs_code dibs_contacts_get(dibs_contacts *contacts, uint32_t number, dibs_conta
  * Sets each contact's velocity to that of the surface there.
  *
  * @param velocities  x, y and z (mm/s) of each vertex, in the tree's order of rows; only read during the call.
- * @param vertices    How many.
+ * @param vertices    Their number.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_VERTEX_COUNT` where a contact's corner has no row, or a misuse.
  */
 dibs_code dibs_contacts_set_velocities(dibs_contacts *contacts,
@@ -1247,8 +1247,8 @@ dibs_code dibs_contacts_set_velocities(dibs_contacts *contacts,
  * @param stand_off  In mm.
  * @param gain       In 1/s.
  * @param capacity   Rows that there is room for.
- * @param rows       Where they go.
- * @param count      Where their number goes.
+ * @param rows       Receives them.
+ * @param count      Receives their number.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY` where there is room for fewer, or a misuse.
  */
 dibs_code dibs_contacts_rows(dibs_contacts *contacts,
@@ -1265,7 +1265,7 @@ dibs_code dibs_contacts_rows(dibs_contacts *contacts,
  * @param storage   `DIBS_FAILSAFE_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
  * @param size      Bytes of the storage.
  * @param limits    Its limits.
- * @param failsafe  Where the machine's address goes.
+ * @param failsafe  Receives the machine's address.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`, or a misuse.
  */
 dibs_code dibs_failsafe_init(void *storage, size_t size, const dibs_limits *limits, dibs_failsafe **failsafe);
@@ -1273,7 +1273,7 @@ dibs_code dibs_failsafe_init(void *storage, size_t size, const dibs_limits *limi
 /**
  * One control tick of the machine.
  *
- * Cost: ten comparisons of two limits.
+ * Cost: a comparison of two limits for each input.
  *
  * @return `DIBS_CODE_OK`, whatever the state; `DIBS_CODE_ARGUMENT` for a query's code that is none; or a misuse.
  */
@@ -1304,7 +1304,7 @@ dibs_code dibs_verdict_admit(const dibs_verdict *verdict,
  *
  * @param storage  `DIBS_FRAME_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
  * @param size     Bytes of the storage.
- * @param frame    Where the frame's address goes.
+ * @param frame    Receives the frame's address.
  */
 dibs_code dibs_frame_init(void *storage, size_t size, dibs_frame **frame);
 
@@ -1314,7 +1314,7 @@ dibs_code dibs_frame_init(void *storage, size_t size, dibs_frame **frame);
  * @param frame           The frame; one that a reader holds is released first.
  * @param positions       x, y and z (mm) of each vertex, in the tree's order of rows. Not copied: unchanged until the
  *                        frame is given other vertices or released.
- * @param vertices        How many.
+ * @param vertices        Their number.
  * @param position_error  No vertex is farther (mm, at least 0) than this from where it is here. Part of the accuracy of
  *                        every answer.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for an error that is negative or not finite, or a misuse.
@@ -1327,9 +1327,9 @@ dibs_code dibs_frame_set_vertices(dibs_frame *frame,
 /**
  * Measures the stretch of the frame's vertices, which makes queries on it cheaper. Frames from a receiver are measured.
  *
- * Cost: linear in the triangles, about 35 floating point operations each.
+ * Cost: linear in the triangles.
  *
- * @param stretch  Where the largest stretch goes, 1 for none; or null.
+ * @param stretch  Receives the largest stretch, 1 for none; or null.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_STRETCH_EXCEEDED` where distances on this frame would be wrong, `DIBS_CODE_NO_SURFACE` of an
  *         empty frame, `DIBS_CODE_TREE_NO_METRIC`, `DIBS_CODE_VERTEX_COUNT`, or a misuse.
  */
@@ -1353,7 +1353,7 @@ uint8_t dibs_planted_panic(size_t at);
  * @param storage  `DIBS_QUERY_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
  * @param size     Bytes of the storage.
  * @param tree     The tree.
- * @param query    Where the query's address goes.
+ * @param query    Receives the query's address.
  */
 dibs_code dibs_query_init(void *storage, size_t size, dibs_tree *tree, dibs_query **query);
 
@@ -1369,7 +1369,7 @@ dibs_code dibs_query_init(void *storage, size_t size, dibs_tree *tree, dibs_quer
  * @param frame      The surface.
  * @param tool       The tool.
  * @param options    Options, or null.
- * @param proximity  Where the answer goes; nothing is written unless the code is `DIBS_CODE_OK`.
+ * @param proximity  Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_TOOL_COORDINATE` to `DIBS_CODE_QUERY_FAILED`,
  *         `DIBS_CODE_TREE_CORRUPT`, or a misuse.
  */
@@ -1393,7 +1393,7 @@ dibs_code dibs_budget_for_instructions(uint32_t instructions, uint32_t cost, dib
  * @param storage  `DIBS_READER_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
  * @param size     Bytes of the storage.
  * @param surface  The surface.
- * @param reader   Where the reader's address goes.
+ * @param reader   Receives the reader's address.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_TAKEN` where the surface has a reader, or a misuse.
  */
 dibs_code dibs_reader_init(void *storage, size_t size, dibs_surface *surface, dibs_reader **reader);
@@ -1406,7 +1406,7 @@ dibs_code dibs_reader_init(void *storage, size_t size, dibs_surface *surface, di
  * @param now     The receiver's clock.
  * @param limit   The greatest age, in the clock's unit; UINT32_MAX leaves the age to the fail-safe machine.
  * @param frame   The frame that holds it; what it held before is released.
- * @param age     Where its age goes, also where it is too old; or null.
+ * @param age     Receives its age, also where it is too old; or null.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE`, `DIBS_CODE_STALE`, `DIBS_CODE_HELD` where another frame holds one of this
  *         surface, or a misuse. The frame is then empty.
  */
@@ -1429,7 +1429,7 @@ dibs_code dibs_reader_link(dibs_reader *reader, uint32_t now, dibs_link *link);
  * @param surface   The surface.
  * @param tree      Its tree.
  * @param limits    Limits of every frame.
- * @param receiver  Where the receiver's address goes.
+ * @param receiver  Receives the receiver's address.
  * @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many vertices; `DIBS_CODE_TAKEN` where
  *         the surface has a receiver; `DIBS_CODE_TREE_NO_METRIC`; or a misuse.
  */
@@ -1449,7 +1449,7 @@ dibs_code dibs_receiver_init(void *storage,
  * @param packet    The packet, read during the call.
  * @param length    Its bytes.
  * @param now       The receiver's clock, in ms; wraps.
- * @param progress  Where its outcome goes, or null.
+ * @param progress  Receives its outcome, or null.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_PACKET_DAMAGED` to `DIBS_CODE_PACKET_REFUSED` where the packet was not taken, which
  *         has been counted, or a misuse.
  */
@@ -1465,7 +1465,7 @@ dibs_code dibs_receiver_accept(dibs_receiver *receiver,
  * @param receiver  The receiver.
  * @param byte      The byte.
  * @param now       The receiver's clock, in ms; wraps.
- * @param progress  Where the outcome of the packet goes that the byte completes, or `DIBS_PROGRESS_NONE`; or null.
+ * @param progress  Receives the outcome of the packet that the byte completes, or `DIBS_PROGRESS_NONE`; or null.
  * @return As `dibs_receiver_accept`; `DIBS_CODE_FRAMING` where bytes between two zeros are no packet.
  */
 dibs_code dibs_receiver_byte(dibs_receiver *receiver,
@@ -1480,7 +1480,7 @@ dibs_code dibs_receiver_byte(dibs_receiver *receiver,
  *
  * @param receiver  The receiver.
  * @param work      Most rows and triangles that are checked or copied.
- * @param advance   Where the outcome goes, or null.
+ * @param advance   Receives the outcome, or null.
  * @return `DIBS_CODE_OK`; `DIBS_CODE_STRETCH_EXCEEDED`, `DIBS_CODE_SHRUNK` or `DIBS_CODE_TOO_FAST` where the frame is refused,
  *         which has been counted; or a misuse.
  */
@@ -1495,9 +1495,9 @@ dibs_code dibs_receiver_advance(dibs_receiver *receiver,
  * @param now       The receiver's clock, in ms.
  * @param safety    0 not reported, 1 nominal, 2 degraded, 3 safe.
  * @param framed    0 for a packet; otherwise a COBS frame with the zero that ends it, for a stream.
- * @param out       Where it goes.
+ * @param out       Receives it.
  * @param capacity  Bytes that there is room for: `DIBS_STATUS` are enough.
- * @param length    Where its length goes.
+ * @param length    Receives its length.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY`, or a misuse.
  */
 dibs_code dibs_receiver_status(dibs_receiver *receiver,
@@ -1509,14 +1509,13 @@ dibs_code dibs_receiver_status(dibs_receiver *receiver,
                                size_t *length);
 
 /**
- * How often each event has happened since the start, in the order of docs/wire.md: published, abandoned, duplicate,
+ * The count of each event since the start, in the order of docs/wire.md: published, abandoned, duplicate,
  * heartbeat, and from the fifth on rejections by their cause.
  *
  * @param receiver  The receiver.
  * @param counters  Room for `DIBS_EVENTS` numbers.
  */
-dibs_code dibs_receiver_counters(dibs_receiver *receiver,
-                                 uint32_t *counters);
+dibs_code dibs_receiver_counters(dibs_receiver *receiver, uint32_t *counters);
 
 /**
  * Makes a surface without a frame.
@@ -1525,7 +1524,7 @@ dibs_code dibs_receiver_counters(dibs_receiver *receiver,
  *                  its receiver, its reader and their frames are used.
  * @param size      Bytes of the storage.
  * @param vertices  Vertices of the surface: those of the tree.
- * @param surface   Where the surface's address goes.
+ * @param surface   Receives the surface's address.
  */
 dibs_code dibs_surface_init(void *storage,
                             size_t size,
@@ -1538,7 +1537,7 @@ dibs_code dibs_surface_init(void *storage,
  * @param storage  `DIBS_TRACKER_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`. Needs no initial value.
  * @param size     Bytes of the storage.
  * @param tree     The tree.
- * @param tracker  Where the tracker's address goes.
+ * @param tracker  Receives the tracker's address.
  */
 dibs_code dibs_tracker_init(void *storage, size_t size, dibs_tree *tree, dibs_tracker **tracker);
 
@@ -1564,8 +1563,8 @@ dibs_code dibs_tracker_set_frame(dibs_tracker *tracker,
  * @param tracker    The tracker.
  * @param tool       The tool.
  * @param options    Options, or null.
- * @param proximity  Where the answer goes; its counts of tests are this tick's.
- * @param fallback   Where goes why the tick was a whole query, if it was; or null.
+ * @param proximity  Receives the answer; its counts of tests are this tick's.
+ * @param fallback   Receives the reason for a whole query; or null.
  * @return As `dibs_query_closest`.
  */
 dibs_code dibs_tracker_closest(dibs_tracker *tracker,
@@ -1584,7 +1583,7 @@ dibs_code dibs_tracker_closest(dibs_tracker *tracker,
  * @param bytes    The tree, in flash or in memory. Not copied: it stays unchanged for as long as the tree, and any
  *                 object made with it, is used. Aligned to 4 it is read faster.
  * @param length   Bytes of the tree.
- * @param tree     Where the tree's address goes.
+ * @param tree     Receives the tree's address.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_TREE_LENGTH` to `DIBS_CODE_TREE_FORM`, or a misuse.
  */
 dibs_code dibs_tree_init(void *storage,

@@ -24,7 +24,7 @@ pub struct dibs_wall {
     pub hold_damping: f32,
     /// In N, above 0.
     pub max_force: f32,
-    /// How far (mm, above 0) the wall reaches from the surface.
+    /// Reach of the wall from the surface (mm, above 0).
     pub margin: f32,
 }
 
@@ -35,7 +35,7 @@ impl dibs_wall {
     }
 }
 
-/// How a force came about.
+/// The origin of a force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum dibs_force_state {
@@ -57,9 +57,9 @@ pub struct dibs_force {
     pub force: dibs_vec3,
     /// In N mm, about the point asked for. Always finite; zero of one pair.
     pub torque: dibs_vec3,
-    /// How they came about.
+    /// Their origin.
     pub state: dibs_force_state,
-    /// Why the force is the hold, where it is; else `DIBS_CODE_OK`.
+    /// The cause of a hold; otherwise `DIBS_CODE_OK`.
     pub cause: dibs_code,
 }
 
@@ -97,7 +97,7 @@ fn failure(outcome: u32) -> Option<dibs_code> {
 ///                   `DIBS_CODE_OK`.
 /// @param proximity  The closest pair; not read, and may be null, where the outcome is an error.
 /// @param velocity   Velocity (mm/s) of the tool's closest point against the surface.
-/// @param force      Where the force goes.
+/// @param force      Receives the force.
 /// @return `DIBS_CODE_OK`, also where the force is the hold; `DIBS_CODE_GAIN`; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_wall_force(
@@ -129,7 +129,7 @@ pub extern "C" fn dibs_wall_force(
 /// @param origin    The tool's point (mm) that the torque and the velocity are about.
 /// @param velocity  Velocity (mm/s) of the tool at `origin`.
 /// @param angular   Angular velocity (1/s) of the tool.
-/// @param force     Where force and torque go.
+/// @param force     Receives force and torque.
 /// @return `DIBS_CODE_OK`, also where the force is the hold; `DIBS_CODE_GAIN`; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_wall_proxy_force(

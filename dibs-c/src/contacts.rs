@@ -43,7 +43,7 @@ pub struct dibs_contact {
     pub point_on_surface: dibs_vec3,
     /// The tool's point (mm).
     pub point_on_tool: dibs_vec3,
-    /// Where along the tool's axis the pair is: 0 at its start, 1 at its end.
+    /// Place of the pair along the tool's axis: 0 at its start, 1 at its end.
     pub axis_parameter: f32,
     /// Row of the triangle.
     pub triangle: u32,
@@ -72,7 +72,7 @@ impl From<&Contact> for dibs_contact {
     }
 }
 
-/// What is certain about a list.
+/// Facts that hold for a list.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct dibs_contacts_facts {
@@ -90,7 +90,7 @@ pub struct dibs_contacts_facts {
 ///
 /// @param storage   `DIBS_CONTACTS_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
 /// @param size      Bytes of the storage.
-/// @param contacts  Where the list's address goes.
+/// @param contacts  Receives the list's address.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_contacts_init(
     storage: *mut c_void,
@@ -110,7 +110,7 @@ pub extern "C" fn dibs_contacts_init(
 /// @param margin     In mm, at least 0.
 /// @param options    Options, or null. A budget that runs out shows in the list's bound.
 /// @param contacts   The list; empty after an error.
-/// @param proximity  Where the closest pair goes, or null.
+/// @param proximity  Receives the closest pair, or null.
 /// @return As `dibs_query_closest`, `DIBS_CODE_MARGIN`, or `DIBS_CODE_TREE_NO_ADJACENCY`.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_query_contacts(
@@ -152,7 +152,7 @@ fn fill(
     ask!(frame, shape, |table, tool| query.0.contacts(table, tool, margin, &options, list))
 }
 
-/// What is certain about the list.
+/// Facts that hold for the list.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_contacts_get_facts(
     contacts: *mut dibs_contacts,
@@ -190,7 +190,7 @@ pub extern "C" fn dibs_contacts_get(
 /// Sets each contact's velocity to that of the surface there.
 ///
 /// @param velocities  x, y and z (mm/s) of each vertex, in the tree's order of rows; only read during the call.
-/// @param vertices    How many.
+/// @param vertices    Their number.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_VERTEX_COUNT` where a contact's corner has no row, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_contacts_set_velocities(
@@ -228,8 +228,8 @@ pub struct dibs_row {
 /// @param stand_off  In mm.
 /// @param gain       In 1/s.
 /// @param capacity   Rows that there is room for.
-/// @param rows       Where they go.
-/// @param count      Where their number goes.
+/// @param rows       Receives them.
+/// @param count      Receives their number.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY` where there is room for fewer, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_contacts_rows(

@@ -99,7 +99,7 @@ impl TryFrom<dibs_limits> for Limits {
 /// @param storage   `DIBS_FAILSAFE_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
 /// @param size      Bytes of the storage.
 /// @param limits    Its limits.
-/// @param failsafe  Where the machine's address goes.
+/// @param failsafe  Receives the machine's address.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_failsafe_init(
@@ -130,7 +130,7 @@ pub struct dibs_observation {
     pub has_rotted: u32,
 }
 
-/// How far the surface may be trusted.
+/// Trust in the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum dibs_state {
@@ -148,9 +148,9 @@ pub enum dibs_state {
 pub struct dibs_verdict {
     /// A `dibs_state`.
     pub state: u32,
-    /// Why it is not nominal: a `dibs_code`.
+    /// Cause of a state that is not nominal: a `dibs_code`.
     pub cause: u32,
-    /// How far (mm) the tissue may have moved since the surface was received.
+    /// Largest way (mm) of the tissue since the surface was received.
     pub margin: f32,
     /// 1 where only an acknowledgement is missing to leave the safe state; else 0.
     pub waits_for_acknowledgement: u32,
@@ -158,7 +158,7 @@ pub struct dibs_verdict {
 
 /// One control tick of the machine.
 ///
-/// Cost: ten comparisons of two limits.
+/// Cost: a comparison of two limits for each input.
 ///
 /// @return `DIBS_CODE_OK`, whatever the state; `DIBS_CODE_ARGUMENT` for a query's code that is none; or a misuse.
 #[unsafe(no_mangle)]
@@ -177,7 +177,7 @@ pub extern "C" fn dibs_failsafe_step(
         let found = failsafe.machine.step(&Observation {
             frame: seen.age.into(),
             link: seen.link.into(),
-            // The machine asks whether there was one; which one is kept here.
+            // The machine needs only the fact; the code is kept here.
             query_error: (query != dibs_code::Ok).then_some(QueryError::NoAdjacency),
             has_rotted: seen.has_rotted != 0,
         });

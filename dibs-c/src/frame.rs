@@ -85,7 +85,7 @@ pub(crate) use ask;
 ///
 /// @param storage  `DIBS_FRAME_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
 /// @param size     Bytes of the storage.
-/// @param frame    Where the frame's address goes.
+/// @param frame    Receives the frame's address.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_frame_init(
     storage: *mut c_void,
@@ -100,7 +100,7 @@ pub extern "C" fn dibs_frame_init(
 /// @param frame           The frame; one that a reader holds is released first.
 /// @param positions       x, y and z (mm) of each vertex, in the tree's order of rows. Not copied: unchanged until the
 ///                        frame is given other vertices or released.
-/// @param vertices        How many.
+/// @param vertices        Their number.
 /// @param position_error  No vertex is farther (mm, at least 0) than this from where it is here. Part of the accuracy of
 ///                        every answer.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for an error that is negative or not finite, or a misuse.
@@ -131,9 +131,9 @@ pub(crate) fn rows(positions: *const f32, count: u32) -> Result<&'static [[f32; 
 
 /// Measures the stretch of the frame's vertices, which makes queries on it cheaper. Frames from a receiver are measured.
 ///
-/// Cost: linear in the triangles, about 35 floating point operations each.
+/// Cost: linear in the triangles.
 ///
-/// @param stretch  Where the largest stretch goes, 1 for none; or null.
+/// @param stretch  Receives the largest stretch, 1 for none; or null.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_STRETCH_EXCEEDED` where distances on this frame would be wrong, `DIBS_CODE_NO_SURFACE` of an
 ///         empty frame, `DIBS_CODE_TREE_NO_METRIC`, `DIBS_CODE_VERTEX_COUNT`, or a misuse.
 #[unsafe(no_mangle)]

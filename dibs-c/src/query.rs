@@ -55,7 +55,7 @@ pub const DIBS_UNSIGNED: u32 = 2;
 pub struct dibs_options {
     /// The most work. Zeros ask for next to nothing: set both.
     pub budget: dibs_budget,
-    /// How far (mm) the interval of a depth may reach where the tool's axis crosses the surface; 0 for a 512th of the
+    /// Largest length (mm) of the interval of a depth where the tool's axis crosses the surface; 0 for a 512th of the
     /// axis' length.
     pub depth_tolerance: f32,
     /// `DIBS_COLD`, `DIBS_UNSIGNED`, both or 0.
@@ -146,7 +146,7 @@ pub struct dibs_proximity {
     pub point_on_tool: dibs_vec3,
     /// Unit vector that leads out; zero where none does.
     pub direction: dibs_vec3,
-    /// Where along the tool's axis the pair is: 0 at its start, 1 at its end; 0 for a sphere.
+    /// Place of the pair along the tool's axis: 0 at its start, 1 at its end; 0 for a sphere.
     pub axis_parameter: f32,
     /// Row of the triangle of `point_on_surface`, or `DIBS_NO_TRIANGLE`.
     pub triangle: u32,
@@ -212,7 +212,7 @@ impl TryFrom<dibs_proximity> for Proximity {
 /// @param storage  `DIBS_QUERY_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
 /// @param size     Bytes of the storage.
 /// @param tree     The tree.
-/// @param query    Where the query's address goes.
+/// @param query    Receives the query's address.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_query_init(
     storage: *mut c_void,
@@ -234,7 +234,7 @@ pub extern "C" fn dibs_query_init(
 /// @param frame      The surface.
 /// @param tool       The tool.
 /// @param options    Options, or null.
-/// @param proximity  Where the answer goes; nothing is written unless the code is `DIBS_CODE_OK`.
+/// @param proximity  Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_TOOL_COORDINATE` to `DIBS_CODE_QUERY_FAILED`,
 ///         `DIBS_CODE_TREE_CORRUPT`, or a misuse.
 #[unsafe(no_mangle)]

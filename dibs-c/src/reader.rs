@@ -27,7 +27,7 @@ impl Kind for dibs_reader {
     const SIZE: usize = DIBS_READER_SIZE;
 }
 
-/// Which frame was published last, and how old it is.
+/// The frame that was published last, and its age.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_age {
@@ -95,7 +95,7 @@ impl From<dibs_link> for Link {
 /// @param storage  `DIBS_READER_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
 /// @param size     Bytes of the storage.
 /// @param surface  The surface.
-/// @param reader   Where the reader's address goes.
+/// @param reader   Receives the reader's address.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_TAKEN` where the surface has a reader, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_reader_init(
@@ -119,7 +119,7 @@ pub extern "C" fn dibs_reader_init(
 /// @param now     The receiver's clock.
 /// @param limit   The greatest age, in the clock's unit; UINT32_MAX leaves the age to the fail-safe machine.
 /// @param frame   The frame that holds it; what it held before is released.
-/// @param age     Where its age goes, also where it is too old; or null.
+/// @param age     Receives its age, also where it is too old; or null.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE`, `DIBS_CODE_STALE`, `DIBS_CODE_HELD` where another frame holds one of this
 ///         surface, or a misuse. The frame is then empty.
 #[unsafe(no_mangle)]

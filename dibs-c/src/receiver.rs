@@ -66,7 +66,7 @@ pub struct dibs_surface_limits {
 /// @param surface   The surface.
 /// @param tree      Its tree.
 /// @param limits    Limits of every frame.
-/// @param receiver  Where the receiver's address goes.
+/// @param receiver  Receives the receiver's address.
 /// @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many vertices; `DIBS_CODE_TAKEN` where
 ///         the surface has a receiver; `DIBS_CODE_TREE_NO_METRIC`; or a misuse.
 #[unsafe(no_mangle)]
@@ -135,7 +135,7 @@ impl From<Progress> for dibs_progress {
 /// @param packet    The packet, read during the call.
 /// @param length    Its bytes.
 /// @param now       The receiver's clock, in ms; wraps.
-/// @param progress  Where its outcome goes, or null.
+/// @param progress  Receives its outcome, or null.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_PACKET_DAMAGED` to `DIBS_CODE_PACKET_REFUSED` where the packet was not taken, which
 ///         has been counted, or a misuse.
 #[unsafe(no_mangle)]
@@ -163,7 +163,7 @@ pub extern "C" fn dibs_receiver_accept(
 /// @param receiver  The receiver.
 /// @param byte      The byte.
 /// @param now       The receiver's clock, in ms; wraps.
-/// @param progress  Where the outcome of the packet goes that the byte completes, or `DIBS_PROGRESS_NONE`; or null.
+/// @param progress  Receives the outcome of the packet that the byte completes, or `DIBS_PROGRESS_NONE`; or null.
 /// @return As `dibs_receiver_accept`; `DIBS_CODE_FRAMING` where bytes between two zeros are no packet.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_receiver_byte(
@@ -217,7 +217,7 @@ pub enum dibs_advance {
 ///
 /// @param receiver  The receiver.
 /// @param work      Most rows and triangles that are checked or copied.
-/// @param advance   Where the outcome goes, or null.
+/// @param advance   Receives the outcome, or null.
 /// @return `DIBS_CODE_OK`; `DIBS_CODE_STRETCH_EXCEEDED`, `DIBS_CODE_SHRUNK` or `DIBS_CODE_TOO_FAST` where the frame is refused,
 ///         which has been counted; or a misuse.
 #[unsafe(no_mangle)]
@@ -249,9 +249,9 @@ pub extern "C" fn dibs_receiver_advance(
 /// @param now       The receiver's clock, in ms.
 /// @param safety    0 not reported, 1 nominal, 2 degraded, 3 safe.
 /// @param framed    0 for a packet; otherwise a COBS frame with the zero that ends it, for a stream.
-/// @param out       Where it goes.
+/// @param out       Receives it.
 /// @param capacity  Bytes that there is room for: `DIBS_STATUS` are enough.
-/// @param length    Where its length goes.
+/// @param length    Receives its length.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY`, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_receiver_status(
@@ -291,7 +291,7 @@ pub const DIBS_EVENTS: usize = 26;
 
 const _: () = assert!(Event::ALL.len() == DIBS_EVENTS);
 
-/// How often each event has happened since the start, in the order of docs/wire.md: published, abandoned, duplicate,
+/// The count of each event since the start, in the order of docs/wire.md: published, abandoned, duplicate,
 /// heartbeat, and from the fifth on rejections by their cause.
 ///
 /// @param receiver  The receiver.

@@ -26,11 +26,11 @@ pub const DIBS_SURFACE_VERTEX: usize = 24;
 /// Any number of contexts may use it at once.
 pub struct dibs_surface {
     frames: BorrowedFrames<'static>,
-    /// Which ends were taken: the receiver's and the reader's.
+    /// Ends that were taken: the receiver's and the reader's.
     taken: [AtomicBool; 2],
     /// A reader holds a frame.
     is_held: AtomicBool,
-    /// What the receiver notes for the reader.
+    /// The receiver's notes for the reader.
     pub(crate) link: LinkStatus,
 }
 
@@ -45,7 +45,7 @@ pub(crate) type Writer = FrameWriter<'static, 0, BorrowedFrames<'static>>;
 pub(crate) type Reader = FrameReader<'static, 0, BorrowedFrames<'static>>;
 type Guard<'f> = FrameGuard<'f, 0, BorrowedFrames<'static>>;
 
-/// Where the buffers begin, after the object and the word of their state.
+/// Offset of the buffers, after the object and the word of their state.
 const BUFFERS: usize = 256;
 const HEAD: usize = size_of::<Buffer<[Position; 0]>>();
 
@@ -60,7 +60,7 @@ const _: () = assert!(align_of::<Buffer<[Position; 0]>>() == 4);
 ///                  its receiver, its reader and their frames are used.
 /// @param size      Bytes of the storage.
 /// @param vertices  Vertices of the surface: those of the tree.
-/// @param surface   Where the surface's address goes.
+/// @param surface   Receives the surface's address.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_surface_init(
     storage: *mut c_void,
@@ -107,7 +107,7 @@ fn buffer(words: &'static mut [u32], vertices: usize) -> &'static Rows {
 }
 
 impl dibs_surface {
-    /// How many there are.
+    /// Vertices of the surface.
     pub(crate) fn vertices(&self) -> usize {
         let (writer, _) = self.frames.ends();
         writer.back().len()

@@ -88,7 +88,7 @@ impl VertexTable for Copied {
 /// @param storage  `DIBS_TRACKER_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`. Needs no initial value.
 /// @param size     Bytes of the storage.
 /// @param tree     The tree.
-/// @param tracker  Where the tracker's address goes.
+/// @param tracker  Receives the tracker's address.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tracker_init(
     storage: *mut c_void,
@@ -168,7 +168,7 @@ impl dibs_tracker {
     }
 }
 
-/// Why a tick was a whole query.
+/// The reason for a whole query.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum dibs_fallback {
@@ -191,8 +191,8 @@ pub enum dibs_fallback {
 /// @param tracker    The tracker.
 /// @param tool       The tool.
 /// @param options    Options, or null.
-/// @param proximity  Where the answer goes; its counts of tests are this tick's.
-/// @param fallback   Where goes why the tick was a whole query, if it was; or null.
+/// @param proximity  Receives the answer; its counts of tests are this tick's.
+/// @param fallback   Receives the reason for a whole query; or null.
 /// @return As `dibs_query_closest`.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tracker_closest(

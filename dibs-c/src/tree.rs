@@ -41,7 +41,7 @@ pub struct dibs_tree_facts {
     pub checksum: u32,
     /// The stretch limit that the tree was built for; 1 for no stretch.
     pub stretch: f32,
-    /// How far (mm) a vertex may be from where the mesh's file has it.
+    /// Largest distance (mm) of a vertex from its place in the mesh's file.
     pub position_error: f32,
 }
 
@@ -54,7 +54,7 @@ pub struct dibs_tree_facts {
 /// @param bytes    The tree, in flash or in memory. Not copied: it stays unchanged for as long as the tree, and any
 ///                 object made with it, is used. Aligned to 4 it is read faster.
 /// @param length   Bytes of the tree.
-/// @param tree     Where the tree's address goes.
+/// @param tree     Receives the tree's address.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_TREE_LENGTH` to `DIBS_CODE_TREE_FORM`, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tree_init(
