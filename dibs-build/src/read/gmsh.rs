@@ -1,4 +1,4 @@
-//! Gmsh's meshes, versions 2.2, 4.0 and 4.1, text or binary: their triangles and quads.
+//! Gmsh's meshes, versions 2 and 4.1, text or binary: their triangles and quads.
 //!
 //! Our own reader, although `mshio` exists: that is of 2020, knows version 4.1 alone, and panics on numbers of other
 //! widths than it expects.

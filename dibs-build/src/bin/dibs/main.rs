@@ -42,7 +42,7 @@ enum Command {
     Stream(stream::Args),
     /// Generate a procedural heart or brain
     Generate(generate::Args),
-    /// Print what a shell needs to complete this program's arguments
+    /// Print the completion script of a shell
     Completions(manual::Completions),
     /// Print or write the manual page
     Man(manual::Man),
@@ -57,7 +57,7 @@ Examples:
   dibs query heart.dibs --tool capsule:0,0,60,0,0,200,4 --vertices heart.pc2 --frame 9
   dibs stream heart.dibs heart.pc2 --to serial:/dev/ttyUSB0@921600 --quantise --loop
 
-Lengths are in millimetres, or whatever the mesh is in. Warnings and progress go to standard error, results to
+Lengths are in millimetres. Warnings and progress go to standard error, results to
 standard output; --json makes them one JSON object. Bad input ends with exit code 1.";
 
 fn main() -> ExitCode {

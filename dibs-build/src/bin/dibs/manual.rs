@@ -1,4 +1,4 @@
-//! `dibs completions` and `dibs man`: what shells and `man` know of this program.
+//! `dibs completions` and `dibs man`: completion scripts and manual pages.
 
 use crate::{Cli, output};
 use anyhow::{Result, anyhow};

@@ -24,7 +24,7 @@ pub struct MeshArgs {
 /// The unit of files.
 #[derive(clap::Args)]
 pub struct Lengths {
-    /// What the lengths in files of meshes and motions are: they are read as millimetres
+    /// Unit of the lengths in files of meshes and motions; they become millimetres
     #[arg(long, value_enum, default_value = "mm")]
     unit: UnitName,
 }

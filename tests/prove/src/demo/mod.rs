@@ -27,7 +27,7 @@ use xtask::workspace;
 /// checks every answer against exhaustive search.
 #[derive(clap::Args, Default)]
 pub struct Options {
-    /// Mesh of the surface at rest (OBJ, STL, PLY or OFF); the generated heart of 10,272 triangles
+    /// Mesh of the surface at rest, in any format that `dibs build` reads; the generated heart of 10,272 triangles
     /// if absent.
     #[arg(long, requires = "motion")]
     pub mesh: Option<PathBuf>,
