@@ -53,7 +53,6 @@ fn main() -> ExitCode {
         Task::Test { demo_seconds, steps: file } => {
             let mut steps = Steps::default();
             harness::test(&Effort { demo_seconds, ..Effort::TEST }, &mut steps);
-            steps.run("demo on this computer", || demo::on_host(demo_seconds));
             steps.write(&file)
         }
         Task::Beside { folder } => harness::lanes::run(&folder),

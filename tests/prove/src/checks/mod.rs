@@ -59,11 +59,15 @@ pub const CHECKS: &[Check] = &[
     instructions::CHECK,
 ];
 
-/// Names of the checks that build and run other programs, on the other core.
-pub const BESIDE: [&str; 5] = [
+/// Names of the checks that need no emulator, but for a few short ones: these run on the other core.
+pub const BESIDE: [&str; 9] = [
     sanitizers::ADDRESS.name,
     sanitizers::THREAD.name,
     interleavings::CHECK.name,
     miri::CHECK.name,
     fuzz::CHECK.name,
+    cost::HOST.name,
+    instructions::CHECK.name,
+    host_faults::CHECK.name,
+    corruption::CHECK.name,
 ];

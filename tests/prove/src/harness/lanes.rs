@@ -1,5 +1,5 @@
-//! Two lanes of checks: most wait for one emulator, which takes one core; sanitizers, fuzzers and the model checker
-//! build and run other programs, in a second process, whose output is shown once both have ended.
+//! Two lanes of checks: most wait for one emulator, which takes one core; sanitizers, fuzzers, the model checker and
+//! others without an emulator run in a second process, whose output is shown once both have ended.
 
 use std::env;
 use std::fs::{self, File};
@@ -15,6 +15,7 @@ use super::figures::Figures;
 use super::run::Run;
 use super::{Effort, Measured};
 use crate::checks::{BESIDE, CHECKS};
+use crate::demo;
 
 /// Files by which the two processes communicate.
 const EFFORT: &str = "effort.json";
@@ -74,6 +75,9 @@ pub fn run(folder: &Path) -> Result<()> {
     let mut steps = Steps::default();
     let mut measured = Measured::new(Run::now(effort.size()));
     measured.run_each(&effort, |name| BESIDE.contains(&name), &mut steps);
+    if !effort.is_record {
+        steps.run("demo on this computer", || demo::on_host(effort.demo_seconds));
+    }
     let skipped = measured.skipped.iter().map(|&name| name.to_owned()).collect();
     let found = Found { figures: measured.figures, skipped };
     fs::write(folder.join(FOUND), serde_json::to_string(&found)?)?;
