@@ -1055,7 +1055,7 @@ typedef struct {
   /**
    * Other than 0 once the tree's bytes were found changed: of `dibs_scrub_step`. Leave it set.
    */
-  uint32_t has_rotted;
+  uint32_t is_tree_corrupt;
 } dibs_observation;
 
 /**

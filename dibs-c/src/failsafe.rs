@@ -127,7 +127,7 @@ pub struct dibs_observation {
     /// Code of the query on that frame: `DIBS_CODE_OK` where it gave an answer, and where it was not asked.
     pub query: u32,
     /// Other than 0 once the tree's bytes were found changed: of `dibs_scrub_step`. Leave it set.
-    pub has_rotted: u32,
+    pub is_tree_corrupt: u32,
 }
 
 /// Trust in the surface.
@@ -179,7 +179,7 @@ pub extern "C" fn dibs_failsafe_step(
             link: seen.link.into(),
             // The machine needs only the fact; the code is kept here.
             query_error: (query != dibs_code::Ok).then_some(QueryError::NoAdjacency),
-            has_rotted: seen.has_rotted != 0,
+            is_tree_corrupt: seen.is_tree_corrupt != 0,
         });
         let cause = match found.cause {
             None => dibs_code::Ok,

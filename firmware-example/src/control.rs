@@ -137,7 +137,8 @@ impl Control {
                 Err(Unavailable::Query(error)) => Some(error),
                 _ => None,
             },
-            has_rotted: self.bus.has_rotted() || self.query.tree().check(TREE.bytes()).is_err(),
+            is_tree_corrupt: self.bus.is_tree_corrupt()
+                || self.query.tree().check(TREE.bytes()).is_err(),
         });
         self.bus.set_state(verdict.state);
         let admitted = answer.and_then(|closest| verdict.admit(closest));

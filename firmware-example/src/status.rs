@@ -18,7 +18,7 @@ pub struct BusStatus {
     /// Epoch and digest of a published frame: [`fingerprint`](Self::fingerprint).
     epoch: AtomicU32,
     digest: AtomicU32,
-    has_rotted: AtomicBool,
+    is_tree_corrupt: AtomicBool,
 }
 
 impl BusStatus {
@@ -33,7 +33,7 @@ impl BusStatus {
             safety: AtomicU32::new(0),
             epoch: AtomicU32::new(0),
             digest: AtomicU32::new(0),
-            has_rotted: AtomicBool::new(false),
+            is_tree_corrupt: AtomicBool::new(false),
         }
     }
 
@@ -72,8 +72,8 @@ impl BusStatus {
 
     /// Whether the tree was ever found changed. It is never cleared: flash that read wrong once is not trusted.
     #[must_use]
-    pub fn has_rotted(&self) -> bool {
-        self.has_rotted.load(Ordering::Relaxed)
+    pub fn is_tree_corrupt(&self) -> bool {
+        self.is_tree_corrupt.load(Ordering::Relaxed)
     }
 
     pub(crate) fn count_byte(&self) {
@@ -95,7 +95,7 @@ impl BusStatus {
         self.epoch.store(epoch, Ordering::Release);
     }
 
-    pub(crate) fn set_rotted(&self) {
-        self.has_rotted.store(true, Ordering::Relaxed);
+    pub(crate) fn set_tree_corrupt(&self) {
+        self.is_tree_corrupt.store(true, Ordering::Relaxed);
     }
 }

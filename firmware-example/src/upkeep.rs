@@ -24,7 +24,7 @@ impl Upkeep {
     /// One slice: some thousand instructions.
     pub fn step(&mut self) {
         if self.scrub.step(SLICE).is_err() {
-            self.status.set_rotted();
+            self.status.set_tree_corrupt();
         }
     }
 

@@ -127,7 +127,7 @@ pub fn answers(built: &BuiltTree, events: &[Event]) -> Vec<String> {
                 Ok(found)
             });
             let link = link.read(*now);
-            let seen = Observation { frame, link, query_error: None, has_rotted: false };
+            let seen = Observation { frame, link, query_error: None, is_tree_corrupt: false };
             let verdict = machine.step(&seen);
             let admitted = found.and_then(|found| verdict.admit(found));
             let force = wall.force(&admitted, Vec3::new(10.0, -20.0, 5.0));

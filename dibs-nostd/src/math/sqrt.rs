@@ -1,8 +1,7 @@
 //! The square root, correctly rounded, by the hardware's own instruction where there is one.
 //!
-//! `core` has no stable square root, and the portable software one takes 59 instructions on a
-//! Cortex-M7 whose FPU needs a single one. All ways below round correctly, so that host and target agree in
-//! every bit.
+//! `core` has no stable square root, and the portable one in software takes tens of instructions on a Cortex-M7 whose
+//! FPU needs a single one. All ways below round correctly, so that host and target agree in every bit.
 #![allow(unsafe_code)]
 
 /// The square root of `x`, correctly rounded; NaN for a negative number or NaN.

@@ -33,13 +33,13 @@ struct Slot {
 }
 
 /// No row has this number, since a table's length is at most this.
-const NOBODY: u32 = u32::MAX;
+const NO_VERTEX: u32 = u32::MAX;
 
 impl<'t, T: VertexTable + ?Sized, const N: usize> Memo<'t, T, N> {
     /// An empty cache of this table. Cost: `N` slots are written.
     #[must_use]
     pub const fn new(table: &'t T) -> Self {
-        const EMPTY: Slot = Slot { vertex: NOBODY, position: Vec3::ZERO };
+        const EMPTY: Slot = Slot { vertex: NO_VERTEX, position: Vec3::ZERO };
         Self { table, slots: [const { Cell::new(EMPTY) }; N] }
     }
 }
@@ -54,7 +54,7 @@ impl<T: VertexTable + ?Sized, const N: usize> VertexTable for Memo<'_, T, N> {
         let place = (vertex as usize).checked_rem(N).and_then(|place| self.slots.get(place));
         let Some(slot) = place else { return self.table.position(vertex) };
         let known = slot.get();
-        if known.vertex == vertex && vertex != NOBODY {
+        if known.vertex == vertex && vertex != NO_VERTEX {
             return Some(known.position);
         }
         let position = self.table.position(vertex)?;

@@ -76,7 +76,7 @@ impl Feature {
 
     /// The pseudonormal of a feature of a triangle.
     ///
-    /// Cost: one normal of a face, two of an edge, at most [`MAX_RING`] of a vertex; about 150 instructions each.
+    /// Cost: one normal of a face, two of an edge, at most [`MAX_RING`] of a vertex.
     pub fn pseudonormal<I: Index, V: VertexTable + ?Sized>(
         self,
         tree: &Tree<'_, I>,

@@ -34,7 +34,7 @@ impl Sphere {
     }
 
     /// The centre as given.
-    pub fn center(&self) -> Vec3 {
+    pub fn centre(&self) -> Vec3 {
         self.center
     }
 }

@@ -81,7 +81,7 @@ static dibs_code track(dibs_frame *frame, const dibs_age *age, const dibs_tool *
 
 void bus_tick(dibs_frame *frame, dibs_query *query, const dibs_tool *tool, uint32_t now) {
     const dibs_vec3 velocity = {10.0f, -20.0f, 5.0f};
-    dibs_observation seen = {.query = DIBS_CODE_OK, .has_rotted = 0};
+    dibs_observation seen = {.query = DIBS_CODE_OK, .is_tree_corrupt = 0};
     dibs_verdict verdict;
     dibs_proximity found;
     dibs_force force;

@@ -69,7 +69,7 @@ enum Table<'a> {
     /// From the rows of a frame.
     Rows,
     /// From the rows of a frame, for the wide search.
-    InRounds,
+    Wide,
     /// From weights.
     Modal(ModalSurface<'a, MAX_MODES>),
     /// From weights, with a cache.
@@ -163,7 +163,7 @@ fn queries(
                 put(machine, &answer)?;
             }
             command::QUERY_IN_ROUNDS => {
-                let answer = ask(&mut query, &Table::InRounds, rows, measured, machine)?;
+                let answer = ask(&mut query, &Table::Wide, rows, measured, machine)?;
                 put(machine, &answer)?;
             }
             command::WEIGHTS => {
@@ -266,7 +266,7 @@ fn timed(
     match table {
         Table::Rows if how & how::CONTACTS != 0 => contacts(query, rows, tool, options, machine),
         Table::Rows => clocked(machine, || query.closest(rows, tool, options)),
-        Table::InRounds => clocked(machine, || query.closest_wide(rows, tool, options)),
+        Table::Wide => clocked(machine, || query.closest_wide(rows, tool, options)),
         Table::Modal(surface) => clocked(machine, || query.closest(surface, tool, options)),
         Table::Remembered(surface) => {
             clocked(machine, || query.closest(&Memo::<_, SLOTS>::new(surface), tool, options))

@@ -16,7 +16,7 @@ use xtask::toolchain::Cross;
 use xtask::{qemu, workspace};
 
 use crate::harness::record;
-use crate::probe::script::{Asks, Knows, Script};
+use crate::probe::script::{Asks, Script, Start};
 use crate::probe::{build_for_board, executions};
 
 /// Ticks profiled, spread over the whole path.
@@ -53,7 +53,7 @@ const REST: &str = "loop over subtrees";
 pub fn run() -> Result<()> {
     qemu::find()?;
     let program = build_for_board(&Cross::find()?, "probe")?;
-    let script = Script::beating(TICKS, Knows::Everything, Asks::Distance);
+    let script = Script::beating(TICKS, Start::Warm, Asks::Distance);
     let counts = executions(&program, &script, &ranges(&program)?)?;
     let loader = Loader::new(&program).map_err(|error| anyhow!("no debug information: {error}"))?;
     let mut parts: BTreeMap<&str, u64> = BTreeMap::new();

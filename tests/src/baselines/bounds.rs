@@ -20,7 +20,7 @@ impl Axis for Sphere {
     type Prepared = Vec3A;
 
     fn prepare(&self) -> Vec3A {
-        self.center().into()
+        self.centre().into()
     }
 
     #[inline(always)]

@@ -275,7 +275,7 @@ fn no_budget_turns_the_force_inwards() {
             let alone = wall.force(&Ok(closest), Vec3::ZERO);
             let accuracy = contacts.accuracy();
             let within = contacts.within(5.0);
-            let all = proxy.wrench(within, accuracy, tool.center(), Vec3::ZERO, Vec3::ZERO);
+            let all = proxy.wrench(within, accuracy, tool.centre(), Vec3::ZERO, Vec3::ZERO);
             let forces = [(alone.force, alone.state), (all.force, all.state)];
             for (force, state) in forces {
                 if state == ConstraintState::Safe(Unavailable::CutShort) {
@@ -347,7 +347,7 @@ fn one_wall_is_never_two() {
     let contact = *contacts.iter().next().expect("one");
     for count in [1, 2, 5, 8] {
         let same = std::iter::repeat_n(&contact, count);
-        let found = proxy.wrench(Ok(same), 0.0, tool.center(), Vec3::ZERO, Vec3::ZERO);
+        let found = proxy.wrench(Ok(same), 0.0, tool.centre(), Vec3::ZERO, Vec3::ZERO);
         let part = found.force.z / 2.0;
         assert!((0.99..1.07).contains(&part), "{count}: {part}");
     }
@@ -357,10 +357,10 @@ fn one_wall_is_never_two() {
     moving.velocity = Vec3::Z * 40.0;
     let still = std::iter::once(&contact);
     let one = damped.expect("a valid margin");
-    let pushed = one.wrench(Ok(still), 0.0, tool.center(), Vec3::Z * -40.0, Vec3::ZERO);
-    let met = one.wrench(Ok(std::iter::once(&moving)), 0.0, tool.center(), Vec3::ZERO, Vec3::ZERO);
+    let pushed = one.wrench(Ok(still), 0.0, tool.centre(), Vec3::Z * -40.0, Vec3::ZERO);
+    let met = one.wrench(Ok(std::iter::once(&moving)), 0.0, tool.centre(), Vec3::ZERO, Vec3::ZERO);
     assert!(pushed.force.distance(met.force) < 1e-5 && pushed.force.z > 2.3, "{pushed:?} {met:?}");
-    let row = VelocityRow::new(&moving, 0.0, tool.center()).stand_off(0.5).gain(10.0);
+    let row = VelocityRow::new(&moving, 0.0, tool.centre()).stand_off(0.5).gain(10.0);
     // 40 mm/s with the wall, and 10 a second of the half mm that is left.
     assert!(row.allows(Vec3::Z * 35.1, Vec3::ZERO) && !row.allows(Vec3::Z * 34.9, Vec3::ZERO));
 }

@@ -25,7 +25,7 @@ use crate::query::Contact;
 /// let tool = Sphere::new(Vec3::new(-60.0, 0.0, 20.0), 2.5)?;
 /// query.contacts(rows.as_slice(), &tool, 50.0, &Options::new(), &mut contacts)?;
 /// for contact in contacts.iter() {
-///     let row = VelocityRow::new(contact, contacts.accuracy(), tool.center()).stand_off(1.0).gain(20.0);
+///     let row = VelocityRow::new(contact, contacts.accuracy(), tool.centre()).stand_off(1.0).gain(20.0);
 ///     let along = |speed: f32| Vec3::from(row.linear) * speed;
 ///     assert!(row.allows(along(row.least + 0.01), Vec3::ZERO));
 ///     assert!(!row.allows(along(row.least - 0.01), Vec3::ZERO));

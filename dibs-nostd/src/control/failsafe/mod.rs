@@ -72,7 +72,7 @@ pub struct Observation {
     pub query_error: Option<QueryError>,
     /// Whether the tree's bytes were found changed: [`Scrub`](crate::Scrub). Leave it set for the rest of the run,
     /// unless the memory's defect is known and repaired.
-    pub has_rotted: bool,
+    pub is_tree_corrupt: bool,
 }
 
 /// The trust in the surface, best first.
@@ -127,7 +127,7 @@ impl Verdict {
 /// let link = Link::CLEAR;
 /// let mut state = |now: u32, epoch, received| {
 ///     let frame = Some(FrameAge { epoch, received, age: now - received }); // from `Latest::frame`
-///     let seen = Observation { frame, link, query_error: None, has_rotted: false };
+///     let seen = Observation { frame, link, query_error: None, is_tree_corrupt: false };
 ///     machine.step(&seen).state
 /// };
 /// assert_eq!(state(1000, 1, 1000), State::Safe); // it starts safe
@@ -249,7 +249,7 @@ impl FailSafe {
             worst = (State::Safe, Some(Unavailable::NoSurface));
         }
         let inputs = [
-            (safe_if(seen.has_rotted), Unavailable::CorruptTree),
+            (safe_if(seen.is_tree_corrupt), Unavailable::CorruptTree),
             (limits.age.level(age), stale),
             (limits.silence.level(link.silence), silent),
             (limits.heartbeat.level(link.heartbeat), heartbeat),

@@ -51,7 +51,7 @@ fn seen(now: u32, epoch: u32, age: u32) -> Observation {
         frame: Some(FrameAge { epoch, received: now.wrapping_sub(age), age }),
         link: GOOD,
         query_error: None,
-        has_rotted: false,
+        is_tree_corrupt: false,
     }
 }
 
@@ -84,7 +84,7 @@ fn requests() -> Vec<(State, Observation, Option<Unavailable>)> {
     ));
     all.push((
         Safe,
-        Observation { has_rotted: true, ..seen(2000, 100, 0) },
+        Observation { is_tree_corrupt: true, ..seen(2000, 100, 0) },
         Some(Unavailable::CorruptTree),
     ));
     for (level, age) in [(Nominal, 50), (Degraded, 51), (Degraded, 200), (Safe, 201)] {
@@ -257,7 +257,7 @@ struct Step {
     delay: u32,
     link: Link,
     query_failed: bool,
-    has_rotted: bool,
+    is_tree_corrupt: bool,
     acknowledge: bool,
 }
 
@@ -279,7 +279,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
             delay,
             link,
             query_failed: fault == 0,
-            has_rotted: fault == 1,
+            is_tree_corrupt: fault == 1,
             acknowledge,
         },
     );
@@ -302,9 +302,9 @@ fn run(steps: &[Step], limits: Limits, start: u32) -> (Vec<Observation>, Vec<Ver
             ageing = ageing.at(now, received);
             FrameAge { epoch, received, age: ageing.oldest }
         });
-        let Step { link, query_failed, has_rotted, .. } = *step;
+        let Step { link, query_failed, is_tree_corrupt, .. } = *step;
         let query_error = query_failed.then_some(QUERY);
-        let seen = Observation { frame, link, query_error, has_rotted };
+        let seen = Observation { frame, link, query_error, is_tree_corrupt };
         verdicts.push(machine.step(&seen));
         acknowledged.push(step.acknowledge && machine.acknowledge().is_ok());
         observations.push(seen);
@@ -317,7 +317,7 @@ fn is_beyond(seen: &Observation, second: bool) -> bool {
     let limit = |watch: Watch| if second { watch.safe() } else { watch.degraded() };
     let Some(frame) = seen.frame else { return true };
     seen.query_error.is_some()
-        || seen.has_rotted
+        || seen.is_tree_corrupt
         || frame.age > limit(AGE)
         || seen.link.silence > limit(SILENCE)
         || seen.link.heartbeat > limit(HEARTBEAT)

@@ -105,12 +105,12 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
     /// Tests the bounds that run out with a motion of `moved` units. Returns the closest triangle too, where one was
     /// tested.
     pub fn run(mut self, moved: u32) -> Result<(Outcome, Option<u32>), QueryError> {
-        let outcome = self.test_what_is_due(moved)?;
+        let outcome = self.test_all_due(moved)?;
         Ok((outcome, self.search.best.map(|_| self.search.best_triangle)))
     }
 
     #[inline(always)]
-    fn test_what_is_due(&mut self, moved: u32) -> Result<Outcome, QueryError> {
+    fn test_all_due(&mut self, moved: u32) -> Result<Outcome, QueryError> {
         let corrupt = QueryError::Corrupt { row: 0 };
         self.search.waiting = 0;
         if self.search.best.is_none()

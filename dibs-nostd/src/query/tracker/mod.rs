@@ -30,9 +30,9 @@ const FARTHEST: u32 = 1 << 29;
 /// Another tool counts as a step to its position. The stretch in the options may change from tick to tick: remembered
 /// bounds hold for any.
 ///
-/// `STACK` must be at least [`Tree::stack`]. `OPENED` nodes of the tree are remembered with their children: a generated
-/// heart of 10,272 triangles opened 180 at most in 7 s. If `OPENED` is too small, ticks are whole queries. Keep it in a
-/// `static`: it can be larger than a controller's stack.
+/// `STACK` must be at least [`Tree::stack`]. `OPENED` nodes of the tree are remembered with their children, some hundred
+/// as a rule; the repository's `docs/guarantees.md` has the most that a beating heart took. If `OPENED` is too small,
+/// ticks are whole queries. Keep it in a `static`: it can be larger than a controller's stack.
 ///
 /// RAM: 8 bytes for each entry of the stack, 44 for each opened node.
 ///

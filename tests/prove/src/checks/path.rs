@@ -6,7 +6,7 @@ use xtask::steps::Outcome;
 use crate::harness::figures::Figures;
 use crate::harness::promise::{Bound, Promise, criteria::TIMING, golden, note};
 use crate::harness::{Check, Effort};
-use crate::probe::script::{Asks, Knows, Record, Script};
+use crate::probe::script::{Asks, Record, Script, Start};
 use crate::probe::{Answers, board, build_for_board, on_board};
 
 pub const CHECK: Check = Check {
@@ -66,8 +66,8 @@ pub const CHECK: Check = Check {
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let program = build_for_board(&board()?, "probe")?;
     let ask = |script: Script| on_board(&program, &script, true);
-    for (name, knows) in [("warm", Knows::Everything), ("cold", Knows::Nothing)] {
-        tell(name, &ask(Script::beating(effort.ticks, knows, Asks::Distance))?, figures);
+    for (name, start) in [("warm", Start::Warm), ("cold", Start::Cold)] {
+        tell(name, &ask(Script::beating(effort.ticks, start, Asks::Distance))?, figures);
     }
     tell("poses", &ask(Script::poses(effort.poses, Asks::Distance, 41))?, figures);
     Ok(Outcome::Passed)

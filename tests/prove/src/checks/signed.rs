@@ -6,7 +6,7 @@ use xtask::steps::Outcome;
 use crate::harness::figures::Figures;
 use crate::harness::promise::{Bound, Promise, criteria::TIMING, note};
 use crate::harness::{Check, Effort};
-use crate::probe::script::{Asks, Knows, Record, Script};
+use crate::probe::script::{Asks, Record, Script, Start};
 use crate::probe::{Answer, board, build_for_board, on_board};
 
 pub const CHECK: Check = Check {
@@ -66,7 +66,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
         taken.sort_unstable_by(f64::total_cmp);
         Ok(taken)
     };
-    let path = |asks| Script::beating(effort.ticks, Knows::Nothing, asks);
+    let path = |asks| Script::beating(effort.ticks, Start::Cold, asks);
     let mean = |taken: &[f64]| (taken.iter().sum::<f64>() / taken.len() as f64).round();
     let unsigned = taken(path(Asks::Distance), |answer| !crosses(answer))?;
     let signed = taken(path(Asks::Side), |answer| !crosses(answer))?;

@@ -53,7 +53,7 @@ const FRAMES_OF_POSES: usize = 10;
 pub enum Draw {
     /// Every option at random.
     Any,
-    /// The same, half of the queries in rounds.
+    /// The same, half of the queries wide.
     EitherWay,
     /// Without a budget: the whole search.
     Exhausting,
@@ -65,11 +65,11 @@ pub enum Draw {
 
 /// A query's prior knowledge.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Knows {
-    /// None: cold, with the tree's limit on stretch.
-    Nothing,
+pub enum Start {
+    /// None, and the tree's limit on stretch.
+    Cold,
     /// The last tick's triangle, and the frame's measured stretch.
-    Everything,
+    Warm,
 }
 
 /// The outputs of a query.
@@ -178,7 +178,7 @@ impl Script {
 
     /// The generated heart as it beats and the capsule of table 3, at ticks spread over the whole path:
     /// each on the surface of its own tick.
-    pub fn beating(ticks: u32, knows: Knows, asks: Asks) -> Self {
+    pub fn beating(ticks: u32, start: Start, asks: Asks) -> Self {
         let (mut script, built, motion) = Self::heart();
         script.how = asks.how();
         let tree = built.tree::<u16>().expect("16-bit indices");
@@ -197,9 +197,9 @@ impl Script {
             let (rows, tool) = at(tick);
             script.rows(&rows, tree.triangle_count());
             let tool = Instrument::capsule(tool.start(), tool.end(), tool.radius());
-            let knows = knows == Knows::Everything;
-            let warm = before.triangle.filter(|_| knows).map_or(u32::MAX, |triangle| triangle.0);
-            script.query(&tool, true, knows, warm, Budget::UNLIMITED, None);
+            let is_warm = start == Start::Warm;
+            let first = before.triangle.filter(|_| is_warm).map_or(u32::MAX, |triangle| triangle.0);
+            script.query(&tool, true, is_warm, first, Budget::UNLIMITED, None);
         }
         script.words.push(command::END);
         script

@@ -39,7 +39,7 @@ impl Method for ParryTriMesh {
         let still = Pose::IDENTITY;
         let found = match tool {
             Probe::Sphere(sphere) => {
-                let at = Pose::from_translation(to_parry(sphere.center()));
+                let at = Pose::from_translation(to_parry(sphere.centre()));
                 distance(&still, &self.mesh, &at, &Ball::new(sphere.radius()))
             }
             Probe::Capsule(capsule) => {
