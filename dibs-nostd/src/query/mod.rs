@@ -1,5 +1,6 @@
 //! The traversal: the closest pair between a tool and the surface as it is now.
 
+mod chain;
 mod contacts;
 mod cost;
 mod cost_m7;
@@ -84,7 +85,7 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     ) -> Result<Proximity, QueryError> {
         let first = options.first(self.triangle);
         let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options, first)?;
-        let found = search.run()?;
+        let found = search.within(options.within).run()?;
         self.triangle = found.triangle.or(self.triangle);
         let error = vertices.position_error();
         signed(&self.tree, &mut self.stack, vertices, tool, options, found, error)
@@ -107,7 +108,7 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     ) -> Result<Proximity, QueryError> {
         let first = options.first(self.triangle);
         let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options, first)?;
-        let found = WideSearch::new(search).run()?;
+        let found = WideSearch::new(search.within(options.within)).run()?;
         self.triangle = found.triangle.or(self.triangle);
         let error = vertices.position_error();
         signed(&self.tree, &mut self.stack, vertices, tool, options, found, error)

@@ -69,6 +69,8 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     /// can be closer.
     cutoff: f32,
     cutoff_squared: f32,
+    /// What is farther than this from the axis is not looked for.
+    limit: f32,
     nearest_pin: NearestPin,
     best: Option<AxisPair>,
     best_squared: f32,
@@ -148,6 +150,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             tilt_slack: TILT * scale * scale,
             cutoff: f32::INFINITY,
             cutoff_squared: f32::INFINITY,
+            limit: f32::INFINITY,
             nearest_pin: NearestPin { row: root.pin, distance: f32::INFINITY },
             best: None,
             best_squared: f32::INFINITY,
@@ -165,6 +168,18 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         let subtree = Waiting { lower: distance - radius, link: root.link };
         search.push(0, subtree).ok_or(QueryError::Corrupt { row: 0 })?;
         Ok(search)
+    }
+
+    /// Looks only for a pair whose separation is at most `separation`.
+    #[inline(always)]
+    pub fn within(mut self, separation: f32) -> Self {
+        let limit = separation + self.tool.radius();
+        // A NaN limits nothing.
+        if limit < self.limit {
+            self.limit = if limit > 0.0 { limit } else { 0.0 };
+            self.lower_cutoff(self.limit);
+        }
+        self
     }
 
     /// Visits subtrees, near ones first, until none below the cutoff is left or the budget runs out.
