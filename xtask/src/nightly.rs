@@ -167,7 +167,7 @@ pub fn sanitize(sanitizer: &str) -> Result<Sanitized> {
     let text = String::from_utf8_lossy(&text);
     ensure!(
         !found.status.success() && reports(&text) > 0 && text.contains(planted),
-        "the {sanitizer} sanitizer does not find what was put in on purpose:\n{}",
+        "the {sanitizer} sanitizer does not find the planted fault:\n{}",
         end(&text)
     );
 

@@ -68,14 +68,14 @@ fn no_order_of_steps_tears_a_frame() {
                 let buffer = usize::from(position_error == 1.0);
                 assert_eq!(frame.label(), label(epoch, buffer), "the label is of one epoch");
                 beside.read(buffer);
-                assert_eq!(frame.position(0), Some(position(epoch)), "as is the position");
+                assert_eq!(frame.position(0), Some(position(epoch)), "so is the position");
                 assert!(epoch >= newest, "no frame is older than one that was read");
                 newest = epoch;
             }
         }
         let published = sender.join().expect("no panic");
         let last = reader.read().map_or(0, |frame| frame.label().epoch);
-        assert_eq!(last, published, "what was published last is what is read");
+        assert_eq!(last, published, "the frame published last is read");
     });
     let orders = orders.load(std::sync::atomic::Ordering::Relaxed);
     println!("interleavings: {orders}");

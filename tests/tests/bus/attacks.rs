@@ -304,15 +304,16 @@ fn a_frozen_source_grows_old() {
     assert_eq!(assembler.health().source_age, 0);
 }
 
-/// Two frames of one session and epoch, both with genuine tags, are mixed so that sums over their public bytes nearly
-/// agree. The mixture is refused: the digest sums shares that nobody without the key can compute.
+/// Two frames of one session and epoch, both with genuine tags, are mixed. The mixture is refused: the digest sums
+/// shares that nobody without the key can compute.
 #[test]
 fn two_frames_of_one_name_are_not_spliced() {
     let rows: [Vec<Vec3>; 2] = [surface(1), surface(500)];
     let [a, b] = rows.map(|rows| tagged(id(1), &rows, Freshness::default()));
     assert_eq!(a[0], b[0], "the begins are the same");
     let last = a.len() - 1;
-    // Anybody can compute the checksums and their scrambled form. Every mixture of twelve packets is considered.
+    // Checksums and their scrambled form are public. For each, the mixture of twelve packets with the least sum of
+    // changes is tried.
     for public in [checksum, share] {
         let mixtures = 1_u32..1 << 12;
         let closest = mixtures.min_by_key(|mixture| {
@@ -408,7 +409,7 @@ fn a_frame_counts_once() {
     assert_eq!(assembler.health().forgeries, 0);
 }
 
-/// A MAC that counts its work.
+/// A MAC that counts its calls.
 struct Counting(AesCmac, Cell<u32>);
 
 impl Mac for &Counting {

@@ -1,4 +1,4 @@
-//! `docs/wire.md` against the code: its test vectors are what is sent, and are read as what was sent.
+//! `docs/wire.md` against the code: the encoders write its test vectors, and the decoder reads them.
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{

@@ -61,7 +61,7 @@ fn any_stack_that_holds_the_tree_is_enough() {
     let more = tests_with::<{ NEEDED + 16 }>(&mesh, &built, &rows);
     let most = tests_with::<{ NEEDED + 128 }>(&mesh, &built, &rows);
     println!("{least}, {more} and {most} node tests on stacks that spare 0, 16 and 128 entries");
-    assert!(least != more && more != most, "what the stack has to spare is used");
+    assert!(least != more && more != most, "spare entries of the stack are used");
     assert_eq!(tests_with::<{ NEEDED + 129 }>(&mesh, &built, &rows), most, "128 are used");
     assert_eq!(tests_with::<MAX_STACK>(&mesh, &built, &rows), most, "128 are used");
 }

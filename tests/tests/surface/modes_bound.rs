@@ -34,7 +34,7 @@ fn the_stretch_bound_is_sound_and_tight() {
         let check = |weights: &[f32], most: f64| {
             let surface = modes.surface::<10>(weights).expect("in range");
             let now = positions(&surface);
-            // A triangle's stretch counts in proportion to its own limit.
+            // A triangle's stretch counts relative to its own limit.
             let share = |triangle: u32| {
                 let limit = tree.stretch_limit(TriangleRow(triangle)).expect("in the table");
                 let own = stretch::of_triangle(&rows, &now, triangle as usize, tree.paths());

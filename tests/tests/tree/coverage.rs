@@ -244,8 +244,8 @@ fn on_clouds_from_fat_to_flat() {
     climb_on(family, 6000, 2);
 }
 
-/// A flat triangle between two fat ones: a chord across it can grow by more than the measured stretch, because the check
-/// counts the flat triangle as higher at rest.
+/// A flat triangle between two fat ones: a chord across it can grow by more than the measured stretch, because the
+/// check counts the flat triangle as higher at rest.
 #[test]
 fn on_chords_from_fat_to_fat_across_flat() {
     let family = |rng: &mut Rng| {

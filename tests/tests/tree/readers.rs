@@ -1,5 +1,5 @@
-//! Readers and checks on mesh files written here: every format gives the same surface, and vertices and faces keep the
-//! numbers of the file.
+//! Readers and checks on mesh files written here: every format gives the same surface, and indexed files keep the
+//! numbers of their vertices.
 
 use std::path::Path;
 
