@@ -35,7 +35,7 @@ fn c_and_rust_answer_a_script_with_the_same_bits() {
     let expected = script.answers();
     assert!(expected.len() >= 1_000, "{} answers", expected.len());
     // Ticks before the first frame, nominal, degraded and with a frame too old; a damaged packet and one without a
-    // frame; a tracker's answer and its first.
+    // frame; a tracker's later answers and its first.
     for start in [
         "tick 300 2",
         "tick 0 0",

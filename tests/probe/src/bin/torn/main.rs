@@ -184,7 +184,7 @@ fn run() -> Option<()> {
             let center = Vec3::new(32.0 + 70.0 * wave(angle), 70.0 * wave(angle + 1.0), 5.0);
             let tool = Sphere::new(center, 2.5).ok()?;
             if let Some(frame) = reader.read() {
-                // The label's epoch, which positions give only modulo 64.
+                // Positions give the epoch only modulo 64, so the label gives it.
                 let watched = Watched::new(&frame, &rest, Some(frame.label().epoch));
                 query.closest(&watched, &tool, &Options::cold()).ok()?;
                 mixed += u32::from(watched.is_mixed.get());
