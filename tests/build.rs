@@ -1,11 +1,11 @@
-//! The README's `build.rs`, with a generated mesh instead of a file: the README's control loop is a
-//! documentation example of this package. And the same with modes, for their tests. Tests on real meshes are
-//! ignored where these are absent.
+//! Builds the tree of the README's control loop, which is a documentation example of this package, from a generated
+//! mesh instead of a file; and a tree with modes, for their tests. Tests on real meshes are ignored where the meshes
+//! are absent.
 
 /// Real meshes, beside the repository.
 const DATA: &str = "../../shared/data";
 
-/// `cfg(real_meshes)` where they are there.
+/// Sets `cfg(real_meshes)` where the real meshes are present.
 fn look_for_real_meshes() {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rustc-check-cfg=cfg(real_meshes)");

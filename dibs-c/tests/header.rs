@@ -1,4 +1,4 @@
-//! `include/dibs.h` is the one that cbindgen generates. `DIBS_WRITE=1` writes it anew.
+//! `include/dibs.h` is the header that cbindgen generates. `DIBS_WRITE=1` writes it anew.
 
 use std::path::Path;
 use std::{env, fs};

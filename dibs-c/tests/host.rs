@@ -1,4 +1,4 @@
-//! `examples/c/host` answers a script with the bits of the Rust library.
+//! `examples/c/host` answers a script with the same bits as the Rust library.
 
 mod programs;
 mod script;
@@ -34,7 +34,8 @@ fn c_and_rust_answer_a_script_with_the_same_bits() {
     let answers = run(&mut program);
     let expected = script.answers();
     assert!(expected.len() >= 1_000, "{} answers", expected.len());
-    // Without an answer, nominal, degraded, too old; a packet damaged, one of no frame, a frame stretched too far.
+    // Ticks before the first frame, nominal, degraded and with a frame too old; a damaged packet and one without a
+    // frame; a tracker's later answers and its first.
     for start in [
         "tick 300 2",
         "tick 0 0",
@@ -47,6 +48,7 @@ fn c_and_rust_answer_a_script_with_the_same_bits() {
     ] {
         assert!(expected.iter().any(|line| line.starts_with(start)), "nothing is {start}");
     }
+    // A frame that is stretched too far.
     assert!(expected.iter().any(|line| line.starts_with("packet") && line.contains(" 311 ")));
     for (number, (c, rust)) in answers.lines().zip(&expected).enumerate() {
         assert_eq!(c, rust, "answer {number}");

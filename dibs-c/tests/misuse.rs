@@ -1,4 +1,4 @@
-//! Misuse in C is a code, and touches no memory that is not the object's.
+//! Misuse in C returns a code, and touches no memory outside the object.
 
 mod programs;
 

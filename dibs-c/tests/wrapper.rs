@@ -1,4 +1,4 @@
-//! `include/dibs.hpp` compiles as C++20 without exceptions, and answers.
+//! `include/dibs.hpp` compiles as C++20 without exceptions, and its queries answer.
 
 mod programs;
 

@@ -1,4 +1,4 @@
-//! Writes the first inputs of each target's corpus, valid ones: `cargo run --example seeds`.
+//! Writes the first inputs of each target's corpus: `cargo run --example seeds`.
 
 use std::fs;
 use std::path::Path;
@@ -46,8 +46,8 @@ fn main() {
     let capsule = [60.0_f32, 0.0, 0.0, 90.0, 10.0, 0.0, 2.5];
     let words = [0_u32; 5].into_iter().chain(capsule.map(f32::to_bits));
     write("query", "capsule", &words.flat_map(u32::to_le_bytes).collect::<Vec<_>>());
-    // A unit of the radii so large that no sphere and no plane rejects a triangle, and a capsule that crosses the heart:
-    // the most searches of the most triangles.
+    // The slowest query: a unit of the radii so large that no sphere and no plane rejects a triangle, and a capsule
+    // that crosses the heart, whose depth takes many searches.
     let damage = [1, (RADIUS_UNIT / 4) as u32, 1e6_f32.to_bits()];
     let capsule = [-50.0_f32, 15.0, 0.0, 50.0, 0.0, 5.0, 1.0];
     let words = damage.into_iter().chain([0; 4]).chain(capsule.map(f32::to_bits));

@@ -1,4 +1,5 @@
-//! Any bytes as a mesh file: refused with a sentence, or a mesh that a tree can be built for.
+//! Reads any bytes as a mesh file. It is refused with a message, or its triangles name vertices that exist, at finite
+//! positions, and the builder does not panic.
 #![no_main]
 
 use std::path::PathBuf;
@@ -7,7 +8,7 @@ use std::sync::LazyLock;
 use dibs_build::Builder;
 use libfuzzer_sys::fuzz_target;
 
-/// The file is read from memory where the system has a place for that.
+/// The file's path, in memory where the system has a folder for that.
 static FILE: LazyLock<PathBuf> = LazyLock::new(|| {
     let memory = PathBuf::from("/dev/shm");
     let folder = if memory.is_dir() { memory } else { std::env::temp_dir() };
@@ -24,7 +25,7 @@ fuzz_target!(|bytes: &[u8]| {
             assert!(mesh.triangles.iter().flatten().all(|&corner| corner < rows));
             assert!(mesh.positions.iter().all(|position| position.is_finite()));
             if mesh.triangles.len() <= 64 {
-                // A mesh may still be too large for f32 lengths: that is an error, not a panic.
+                // The builder may refuse the mesh: its lengths can be too large for f32.
                 let _ = Builder::new().build(&mesh);
             }
         }

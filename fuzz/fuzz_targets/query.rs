@@ -1,5 +1,5 @@
-//! Any tree that passes validation, with any floats as vertices, tool and options: an answer whose
-//! interval is one, within the tree's count of records and the budget; or an error.
+//! Queries any tree that passes validation, with any floats as vertices, tool and options. The outcome is an error, or
+//! an answer whose interval is in order and whose tests are within the budget and the tree's number of records.
 #![no_main]
 
 use std::sync::LazyLock;
@@ -13,10 +13,12 @@ use dibs_nostd::{
 use dibs_tests::tree_bytes::reseal;
 use libfuzzer_sys::fuzz_target;
 
-/// The search for the closest pair, and up to 27 more for the depth of an axis.
+/// Most searches of a query: one for the closest pair, the others for the depth of an axis (`POINTS` in the core's
+/// `query/depth.rs`).
 const MOST_LOOKS: u32 = 28;
 
-/// Built before the first input, whose time limit it would take on a busy machine.
+/// A valid tree and its rows. They are built before the first input: on a busy machine they would use up its time
+/// limit.
 static SOUND: LazyLock<(Vec<u8>, Vec<Vec3>)> = LazyLock::new(|| {
     let mesh = generate::heart(320).expect("a valid size").mesh;
     let built = Builder::new().index(IndexWidth::Bits16).build(&mesh).expect("a valid mesh");
@@ -97,7 +99,7 @@ fn ask(
     let tree = *query.tree();
     let both = [query.closest(rows, tool, options), query.closest_wide(rows, tool, options)];
     for answer in both.into_iter().flatten() {
-        // Of each look: one, or all that a depth takes where the tool's axis crosses the surface.
+        // Tests of one search. A query makes one search, or many where the tool's axis crosses the surface.
         let most = 3 * tree.node_count() + tree.triangle_count() + 1;
         let is_depth =
             answer.side == Side::Crossing || answer.side == Side::Undefined(NoSide::BelowAccuracy);

@@ -1,5 +1,5 @@
-//! Any bytes as a tree: refused, or a tree whose every record can be read. The checksum is made right, so
-//! that it is not what refuses them.
+//! Reads any bytes as a tree. It is refused, or every one of its records can be read. Length and checksum are made
+//! right, so that the bytes reach the checks behind them.
 #![no_main]
 
 use dibs_nostd::format::{HEADER_BYTES, Link, field};
@@ -18,7 +18,7 @@ fuzz_target!(|bytes: &[u8]| {
     walk::<u32>(&bytes);
 });
 
-/// A valid tree has every record that it says it has.
+/// Reads every node and triangle of a valid tree.
 fn walk<I: Index>(bytes: &[u8]) {
     let Ok(tree) = Tree::<I>::from_bytes(bytes) else { return };
     let mut triangles = 0;

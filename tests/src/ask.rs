@@ -1,10 +1,10 @@
-//! Queries on a tree with any tool and index width.
+//! Unsigned queries on a tree of either index width, with the oracle's instrument as the tool.
 
 use dibs_nostd::{Capsule, Index, Options, Proximity, Query, QueryError, Sphere, VertexTable};
 
 use crate::oracle::Instrument;
 
-/// An unsigned query with the instrument: a sphere if its ends coincide, else a capsule.
+/// The closest pair of the instrument: a sphere if its ends coincide, else a capsule.
 ///
 /// # Errors
 /// The query's.

@@ -38,7 +38,7 @@ pub fn surface(epoch: u32) -> Vec<Vec3> {
         .collect()
 }
 
-/// The encoding of a surface: a box around it, or floats.
+/// The encoding of a surface: quantised in a box around it, or floats.
 ///
 /// # Panics
 /// If no box covers the positions.
@@ -85,11 +85,11 @@ pub fn frame(epoch: u32, quantised: bool) -> Vec<Vec<u8>> {
     packets::<64>(epoch, encoding(quantised, &positions), &positions)
 }
 
-/// Gives a packet to the assembler, and lets it do all the work that follows, in slices. Returns the published epoch,
-/// if any.
+/// Gives a packet to the assembler, and lets it do all work that is due, in slices. Returns the epoch of the frame
+/// that this publishes, if any.
 ///
 /// # Errors
-/// The assembler's rejections.
+/// The assembler's rejection.
 pub fn give<G: Gate, M: Mac, const N: usize>(
     assembler: &mut Assembler<'_, G, N, M>,
     packet: &[u8],
@@ -100,7 +100,7 @@ pub fn give<G: Gate, M: Mac, const N: usize>(
 /// The same, at a time on the receiver's clock.
 ///
 /// # Errors
-/// The assembler's rejections.
+/// The assembler's rejection.
 pub fn give_at<G: Gate, M: Mac, const N: usize>(
     assembler: &mut Assembler<'_, G, N, M>,
     packet: &[u8],
@@ -123,8 +123,7 @@ pub fn give_at<G: Gate, M: Mac, const N: usize>(
     Ok(None)
 }
 
-/// A packet by the specification alone: kind, session, epoch, sequence, count, first and body, with
-/// padding and checksum.
+/// A packet with padding and checksum, written by the specification alone.
 pub fn raw(
     kind: u8,
     session: u32,
@@ -147,7 +146,7 @@ pub fn raw(
     reseal(packet)
 }
 
-/// A begin packet of a float frame, by the specification alone.
+/// A begin packet of a float frame, written by the specification alone.
 pub fn raw_begin(session: u32, epoch: u32, content: u8, rows: u32, base: u32) -> Vec<u8> {
     let mut body = ((session >> 16) as u16).to_le_bytes().to_vec();
     body.extend([0, 0, content]);
@@ -157,7 +156,7 @@ pub fn raw_begin(session: u32, epoch: u32, content: u8, rows: u32, base: u32) ->
     raw(1, session, epoch, [0, 0], 0, &body)
 }
 
-/// Checksum that a packet carries.
+/// The checksum in a packet.
 ///
 /// # Panics
 /// For a packet without room for one.
@@ -175,7 +174,7 @@ pub fn published(reader: &mut FrameReader<'_, N>) -> Option<(u32, Vec<[u32; 3]>)
     Some((frame.label().epoch, positions.collect()))
 }
 
-/// A packet's share of its frame's digest, by the specification alone.
+/// A packet's share of its frame's digest, computed by the specification alone.
 pub fn share(packet: &[u8]) -> u32 {
     let mut share = checksum(packet);
     for (shift, factor) in [(16, 0x85EB_CA6B_u32), (13, 0xC2B2_AE35)] {
@@ -184,14 +183,14 @@ pub fn share(packet: &[u8]) -> u32 {
     share ^ (share >> 16)
 }
 
-/// CRC-32 by its definition, one bit at a time, unlike the packets' checksum.
+/// CRC-32 by its definition, one bit at a time: it shares no code with the core's checksum.
 pub fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(u32::MAX, |crc, &byte| {
         (0..8).fold(crc ^ u32::from(byte), |crc, _| (crc >> 1) ^ (0xEDB8_8320 * (crc & 1)))
     })
 }
 
-/// Corrects the checksum of a changed packet.
+/// Puts the right checksum into a changed packet.
 pub fn reseal(mut packet: Vec<u8>) -> Vec<u8> {
     packet.truncate(packet.len() - CHECKSUM_BYTES);
     let checksum = crc32(&packet);

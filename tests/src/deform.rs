@@ -46,15 +46,15 @@ impl Deformation {
         Self::Collapse,
     ];
 
-    /// Positions of the mesh's vertices after the deformation, at random strength but with a stretch
-    /// of at most `limit`, then turned and moved as a whole.
+    /// Positions of the mesh's vertices after a random deformation of this kind, turned and moved as a whole. A
+    /// deformation that stretches beyond `limit` is weakened until it does not.
     #[must_use]
     pub fn apply(self, mesh: &Mesh, paths: PathKind, limit: f32, rng: &mut Rng) -> Vec<Vec3> {
         let most = f64::from(limit) * 0.999;
         self.apply_while(mesh, |moved| stretch::largest(mesh, moved, paths) <= most, rng)
     }
 
-    /// The same at a random strength for which the deformed mesh satisfies `fits`.
+    /// The same with a condition of the caller's: a deformation is weakened until its positions satisfy `is_fit`.
     #[must_use]
     pub fn apply_while(
         self,
@@ -77,7 +77,7 @@ impl Deformation {
         blend(strength)
     }
 
-    /// The deformation at full strength, with any stretch.
+    /// The deformation at full strength, whatever its stretch.
     fn full(self, mesh: &Mesh, middle: Vec3, size: f32, rng: &mut Rng) -> Vec<Vec3> {
         let at = &mesh.positions;
         let [axis, push] = [unit(rng), unit(rng)];
@@ -141,7 +141,7 @@ pub fn unit(rng: &mut Rng) -> Vec3 {
     }
 }
 
-/// A heart, its tree, and some deformations of it.
+/// A heart, its tree for stretches up to 1.5, and deformations within that limit.
 ///
 /// # Panics
 /// Never: a heart of this size exists.

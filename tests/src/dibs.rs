@@ -1,4 +1,4 @@
-//! The library under test as a method of the benchmark, by the wide search, since it runs on a host.
+//! The library under test as a method of the benchmark. It takes the wide search, which is the one for hosts.
 
 use dibs_build::BuiltTree;
 use dibs_nostd::format::MAX_STACK;
@@ -119,7 +119,7 @@ struct Unordered<'t, I> {
     table: Looked<'t>,
 }
 
-/// Positions in the mesh's order, looked up by the tree's rows.
+/// Positions in the mesh's order, as a table in the order of the tree's rows.
 struct Looked<'t> {
     order: &'t [u32],
     positions: Vec<Vec3>,

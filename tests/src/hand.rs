@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use crate::surfaces::{ball, sheet};
 
-/// Seconds of a tick, and ticks of a push.
+/// Seconds of a tick, and number of ticks of a push.
 const TICK: f32 = 0.001;
 const TICKS: u32 = 4_000;
 
@@ -28,7 +28,7 @@ const MASS: f32 = 2e-4;
 const DAMPER: f32 = 0.02;
 const RADIUS: f32 = 1.0;
 
-/// A surface, the place that the hand starts from, and the direction of its push.
+/// A surface, the hand's first position, and the direction of its push.
 pub struct Scene {
     /// Its name.
     pub name: &'static str,
@@ -41,33 +41,33 @@ pub struct Scene {
 /// The outcome of a push.
 #[derive(Clone, Copy, Debug)]
 pub struct Pushed {
-    /// Least signed separation (mm). Below minus the radius the instrument's centre was through the surface.
+    /// Least signed separation (mm). Below minus the radius, the instrument's centre went through the surface.
     pub least: f32,
     /// Largest change of the force from one tick to the next (N).
     pub step: f32,
 }
 
 impl Pushed {
-    /// Whether the centre went through.
+    /// Whether the instrument's centre went through the surface.
     #[must_use]
     pub fn is_through(&self) -> bool {
         self.least < -RADIUS
     }
 }
 
-/// A flat wall, a corner of four, a gap that is narrower than two margins, a groove whose walls lean 12 degrees from
-/// upright, so that one wall alone cannot bear the hand, a ball, and a beating heart.
+/// A flat wall; a corner of four slopes; a gap narrower than two margins; a groove whose walls are so steep that one
+/// alone cannot bear the hand; a ball; and a beating heart.
 ///
 /// # Panics
 /// Never: the sizes are valid.
 #[must_use]
 pub fn scenes() -> Vec<Scene> {
     let down = |name, mesh, from| Scene { name, mesh, motion: None, from, push: Vec3::NEG_Z };
-    // Two walls 9 mm apart above a floor, hardly wider at the top.
+    // Two walls on a floor, less than two margins apart there and a little more at the top.
     let gap = sheet(60, 60.0, |x, _| 60.0 * ((x.abs() - 4.5) / 1.5).clamp(0.0, 1.0));
     let sideways = Vec3::new(-1.0, 0.1, 0.0).normalize();
     let generate::MovingMesh { mesh, motion } = generate::heart(1_000).expect("a valid size");
-    // Into the left ventricle's side, from just outside the margin.
+    // Into the heart's side with the least x, from just outside the margin.
     let side = mesh.positions.iter().copied().min_by(|a, b| a.x.total_cmp(&b.x));
     let side = side.expect("has vertices") - Vec3::X * (MARGIN + RADIUS + 0.5);
     vec![
@@ -81,7 +81,7 @@ pub fn scenes() -> Vec<Scene> {
 }
 
 impl Scene {
-    /// Pushes for four seconds against the force of all contacts, or of the closest pair alone.
+    /// Pushes against the force of all contacts, or of the closest pair alone.
     ///
     /// # Panics
     /// If a query fails.

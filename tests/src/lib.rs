@@ -35,7 +35,7 @@ pub mod tree_bytes;
 #[doc = include_str!("../../README.md")]
 pub struct Readme;
 
-/// The guide's code for the host: it compiles and runs. `tests/new_user.rs` runs the code for the board.
+/// The guide's code for the host: it compiles and runs. `tests/pages/new_user.rs` runs the code for the board.
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/guide.md")]
 pub struct Guide;

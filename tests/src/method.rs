@@ -23,8 +23,8 @@ pub struct Found {
 
 /// A method for closest-point queries on a surface that deforms.
 ///
-/// A step is `load`, `update`, then any number of `find`; the same frame may be loaded again before a
-/// `find`. All methods are single-threaded.
+/// A step is `load`, `update`, then any number of `find`; between two of them the same frame may be loaded again. All
+/// methods are single-threaded.
 pub trait Method {
     /// Copies the frame's positions (in the mesh's order) to the method's order and layout. Not timed, because every
     /// method needs its vertices written.

@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use crate::motions::trembling;
 
-/// Every row of a table.
+/// The positions of all rows of a table.
 ///
 /// # Panics
 /// If a row is missing.

@@ -2,9 +2,9 @@
 //!
 //! It shares no code with the kernels under test. Two convex sets are closest at a pair of their faces, so all 21 pairs
 //! of faces are tried: {two ends, inside} of the segment with {three corners, three edges, inside} of the triangle.
-//! Each is a least-squares problem of at most three unknowns, solved by orthogonalisation; its solution is clamped to
-//! the two sets and the distance evaluated, so no pair tried can be below the true distance. [`ClosestPair::lower`]
-//! certifies by duality that the best one is not above it.
+//! Each is a least-squares problem of at most three unknowns, solved by orthogonalisation. Its solution is clamped to
+//! the two sets, so no distance is below the true one. [`ClosestPair::lower`] certifies by duality that the least of
+//! them is not above it.
 
 use glam::{DVec3, Vec3};
 
@@ -37,7 +37,7 @@ pub struct ClosestPair {
     /// Their distance.
     pub distance: f64,
     /// A proven lower bound of the distance: along some direction, the axis' and the triangle's extents are this far
-    /// apart. Equal to `distance` up to rounding, unless that is nearly 0.
+    /// apart. Equal to `distance` up to rounding, unless `distance` is nearly 0.
     pub lower: f64,
     /// The axis' point.
     pub on_axis: DVec3,
@@ -108,8 +108,8 @@ fn closest_from_origin(end: DVec3, corners: [DVec3; 3]) -> ClosestPair {
     best
 }
 
-/// The `x` that minimises `|sum of x_i column_i - target|`, and the residual, by modified Gram-Schmidt; 0 for columns
-/// that depend on earlier ones.
+/// The `x` that minimises `|sum of x_i column_i - target|`, and the residual, by modified Gram-Schmidt. For a column
+/// that depends on earlier ones, `x_i` is 0.
 fn least_squares(columns: [DVec3; 3], target: DVec3) -> ([f64; 3], DVec3) {
     let mut basis = columns;
     let mut upper = [[0.0; 3]; 3];

@@ -6,7 +6,7 @@ use glam::Vec3;
 use crate::deform::unit;
 use crate::oracle::Instrument;
 
-/// A random tool, a sphere or a capsule, near, on, in or far from the surface.
+/// A random tool, a sphere or a capsule: near the surface, on it, in it or far from it.
 #[must_use]
 pub fn pose(positions: &[Vec3], triangles: &[[u32; 3]], rng: &mut Rng) -> Instrument {
     let low = positions.iter().copied().fold(Vec3::INFINITY, Vec3::min);
@@ -22,7 +22,7 @@ pub fn pose(positions: &[Vec3], triangles: &[[u32; 3]], rng: &mut Rng) -> Instru
         0 => corners[0],
         1 => (corners[0] + corners[1]) / 2.0,
         2 => on_surface,
-        // At the centre of a round surface, and on the middle plane, many distances are equal.
+        // At the middle of a round surface many distances are equal.
         3 => middle,
         4 => middle + (on_surface - middle) * rng.f32(),
         5 => middle + unit(rng) * size * 20.0,

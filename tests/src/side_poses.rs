@@ -1,5 +1,5 @@
-//! Judges sides and signed separations of poses in f64: by generalised winding numbers, by exhaustive search, and where
-//! a surface is shown to cut itself by the pseudonormal of the nearest sheet.
+//! Judges sides and signed separations of poses in f64, by generalised winding numbers and exhaustive search. Where a
+//! surface is shown to cut itself, the pseudonormal of the nearest sheet decides.
 
 use std::ops::AddAssign;
 
@@ -22,11 +22,11 @@ pub struct Closed {
     pub mesh: Mesh,
     /// Its tree.
     pub built: BuiltTree,
-    /// Its share of the poses.
+    /// Its weight in the division of the poses among the surfaces.
     pub share: usize,
 }
 
-/// Generated hearts and brains, a ball, and the real heart and brains if present.
+/// Generated hearts and brains, a ball, and the real heart and brains where they are present.
 ///
 /// # Panics
 /// Never: the sizes are valid.
@@ -52,7 +52,7 @@ pub fn closed() -> Vec<Closed> {
     all.into_iter().map(build).collect()
 }
 
-/// Bends all space, and a surface with it, without folding it: no derivative reaches 1.
+/// Bends all space, and a surface with it. Space does not fold: the bend's derivative stays below 1.
 #[must_use]
 pub fn bent(mesh: &Mesh, rng: &mut Rng) -> Vec<Vec3> {
     let mut number = |size: f32| (rng.f32() * 2.0 - 1.0) * size;
@@ -69,7 +69,7 @@ pub fn bent(mesh: &Mesh, rng: &mut Rng) -> Vec<Vec3> {
     mesh.positions.iter().map(bend).collect()
 }
 
-/// A random point: next to a vertex, an edge, a face or a sliver, in a fold, or anywhere.
+/// A random point: near a vertex, an edge or a face of a random triangle, at distances of many scales.
 ///
 /// # Panics
 /// If there is no triangle.
@@ -99,9 +99,9 @@ pub struct Tally {
     pub inside: usize,
     /// Poses whose side is undefined.
     pub undefined: usize,
-    /// Undefined, though at least a hundredth of a mm away.
+    /// Poses whose side is undefined, though the axis is more than a hundredth of a mm from the surface.
     pub undefined_away: usize,
-    /// At least that far away.
+    /// Poses whose axis is that far from the surface.
     pub away: usize,
     /// Poses where the surface is shown to cut itself: the side is that of the nearest sheet.
     pub self_cut: usize,
@@ -136,7 +136,7 @@ pub fn judge(surface: &Closed, seed: u64) -> Tally {
     assert!(tree.has_adjacency(), "{}", surface.name);
     let triangles = surfaces::triangles(&tree);
     let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
-    // Sometimes at rest.
+    // One frame in eight is the rest shape.
     let moved = if seed.is_multiple_of(8) {
         surface.mesh.positions.clone()
     } else {

@@ -73,9 +73,9 @@ pub fn is_below(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -
 
 /// Whether the sheet nearest to a point proves that the surface cuts itself there.
 ///
-/// A triangle separates a region of winding number `k` above it from one of `k + 1`. If a closed surface that faces
-/// outwards does not cut itself, `k` is 0. The test points are next to the closest point, on each triangle that touches
-/// it, and near enough to that triangle to be within a fold.
+/// A triangle separates a region of winding number `k` above it from one of `k + 1` below. On a closed surface that
+/// faces outwards and does not cut itself, `k` is 0. The tested points lie next to the closest point, above and below
+/// each triangle that touches it, so near that no fold is between them.
 #[must_use]
 pub fn is_cut(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -> bool {
     let winds = |at: DVec3| winding_number(positions, triangles, at);
@@ -85,10 +85,10 @@ pub fn is_cut(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -> 
         let at = pair.on_surface.lerp((a + b + c) / 3.0, share);
         let across = (b - a).cross(c - a);
         let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-        // A share of the place's distance from the triangle's edges.
+        // Less than the distance from the triangle's edges.
         let up = across.normalize_or_zero() * (across.length() / longest * share * height);
         let (above, below) = (winds(at + up), winds(at - up));
-        // Only this sheet separates them, and no other is between the two places.
+        // The winding numbers differ by 1: no other sheet is between the two points.
         (below - above - 1.0).abs() < 0.1 && above.abs() > 0.9
     };
     let touches = |triangle: &&[u32; 3]| {
@@ -119,7 +119,7 @@ pub fn separation(
 }
 
 /// An interval that holds the signed separation of a tool whose axis crosses a closed surface, from the depths of
-/// `points` points of it.
+/// `points + 1` points of the axis.
 #[must_use]
 pub fn crossing_separation(
     positions: &[Vec3],
@@ -131,7 +131,7 @@ pub fn crossing_separation(
     for step in 0..=points {
         let at = tool.start.lerp(tool.end, step as f32 / points as f32);
         let nearest = exhaustive(positions, triangles, &Instrument::sphere(at, 0.0))?;
-        // Only a point farther from the surface than all before needs a side.
+        // Only a point farther from the surface than the deepest so far needs a side.
         if nearest.axis_distance > deepest && is_inside(positions, triangles, at.as_dvec3())? {
             deepest = nearest.axis_distance;
         }
@@ -142,8 +142,8 @@ pub fn crossing_separation(
     Some((-radius - deepest - between, -radius - deepest))
 }
 
-/// An interval that holds the signed separation of any tool from a closed surface: if the axis is within `accuracy` of
-/// the surface, it covers crossing and not crossing; where the surface cuts itself, both sides.
+/// An interval that holds the signed separation of any tool from a closed surface. If the axis is within `accuracy` of
+/// the surface, the interval covers crossing and not crossing; where the surface cuts itself, it covers both sides.
 #[must_use]
 pub fn signed_separation(
     positions: &[Vec3],

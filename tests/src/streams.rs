@@ -10,7 +10,7 @@ use glam::{Quat, Vec3};
 use crate::deform::unit;
 use crate::method::Probe;
 
-/// Radius of the spheres, radius and length of the capsules, in mm.
+/// Radius of the spheres, in mm.
 pub const SPHERE_RADIUS: f32 = 3.0;
 /// Radius of the capsules, in mm.
 pub const CAPSULE_RADIUS: f32 = 2.5;
@@ -20,11 +20,9 @@ pub const CAPSULE_LENGTH: f32 = 60.0;
 /// Independent random deformations of one surface, each with a sphere and a capsule near it.
 ///
 /// A deformation is the paper's: every axis scaled on its own, long waves over the whole surface, one local bump, and a
-/// rotation. On the brains its largest stretch is 1.2 to 1.4 of the 2 that the trees are built for; a frame beyond the
-/// limit is not used.
+/// rotation. Its stretch is not bounded here: the user of a frame checks it.
 ///
-/// A tool's distance from a random vertex is drawn so that its separation, which folds around that vertex only reduce,
-/// is about 40 +- 30 mm on a brain, as in the paper.
+/// A tool's distance from a random vertex is drawn so that separations on a brain are distributed as in the paper.
 pub struct Stream<'m> {
     rest: &'m [Vec3],
     middle: Vec3,
@@ -47,7 +45,7 @@ impl<'m> Stream<'m> {
         let (rng, middle, size) = (&mut self.rng, self.middle, self.size);
         let scale = Vec3::ONE + signed(rng) * 0.06;
         let waves: [Wave; 3] = std::array::from_fn(|_| Wave {
-            // Turns a mm, so that a wave is at least a third of the surface long.
+            // In turns a mm. The shortest wave is somewhat less than a third of the surface's diagonal.
             along: unit(rng) * unit(rng) * (20.0 / TAU / size),
             push: unit(rng) * size * 0.009,
             phase: rng.f32(),
@@ -103,9 +101,9 @@ fn signed(rng: &mut Rng) -> Vec3 {
     Vec3::new(rng.f32(), rng.f32(), rng.f32()) * 2.0 - 1.0
 }
 
-/// A smooth wave of period and height 1, made of parabolas: a sine would take most of a run's time.
+/// A smooth wave of period and height 1, made of parabolas: sines would dominate the time of a run.
 fn smooth_wave(turns: f32) -> f32 {
-    // Rounds to the nearest whole turn, for any of fewer than 4 million turns.
+    // Adding and subtracting 1.5 * 2^23 rounds to the nearest whole turn, up to 2^22 turns.
     const ROUND: f32 = 12_582_912.0;
     let t = turns - ((turns + ROUND) - ROUND);
     t * (8.0 - 16.0 * t.abs())
@@ -137,7 +135,7 @@ impl<'m> Beat<'m> {
         Self { motion, middle, reach }
     }
 
-    /// The positions at a tick, between the two frames around it.
+    /// The positions at a tick, interpolated between the two frames around it.
     pub fn deform(&self, tick: u32, positions: &mut Vec<Vec3>) {
         let rate = if self.motion.rate > 0.0 { self.motion.rate } else { 25.0 };
         let frames = &self.motion.frames;

@@ -25,7 +25,7 @@ pub fn of_triangle(mesh: &Mesh, now: &[Vec3], triangle: usize, paths: PathKind) 
     }
 }
 
-/// In the triangle's plane, `F = [now] [rest]^-1` for the 2x2 edge matrices of both shapes.
+/// The largest singular value of `F = [now] [rest]^-1`, from the 2x2 edge matrices of both shapes in their planes.
 fn largest_singular_value(rest: [DVec3; 3], now: [DVec3; 3]) -> f64 {
     let gradient = flat(now) * higher(flat(rest)).inverse();
     let metric = gradient.transpose() * gradient;
@@ -34,8 +34,8 @@ fn largest_singular_value(rest: [DVec3; 3], now: [DVec3; 3]) -> f64 {
     (trace / 2.0 + root).sqrt()
 }
 
-/// The rest shape of a triangle lower than 1/64 of its longest edge counts as that high: it is stretched across that
-/// edge until it is.
+/// Raises a triangle lower than 1/64 of its longest edge to that height, by a stretch across that edge: the measurement
+/// under test counts its rest shape so.
 fn higher(edges: DMat2) -> DMat2 {
     let (first, second) = (edges.x_axis, edges.y_axis);
     let longest = [first, second, second - first]

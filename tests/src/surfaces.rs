@@ -12,8 +12,8 @@ pub struct Surface {
     pub tree: BuiltTree,
 }
 
-/// An organ with folds, a bumpy ball, a closed ball whose centre is equally far from everything, and a
-/// flat patch of slivers. Lean trees hold only the sections that a query reads.
+/// A heart with small and with large leaves, a folded brain, a ball whose centre is equally far from all vertices, and
+/// an open band of slivers. Lean trees have neither rest shape nor vertex order.
 ///
 /// # Panics
 /// Never: the sizes are valid.
@@ -40,8 +40,7 @@ pub fn triangles<I: Index>(tree: &Tree<'_, I>) -> Vec<[u32; 3]> {
         .collect()
 }
 
-/// An octahedron whose triangles are split into four, this many times: every vertex is at the same distance
-/// from the centre, 40 mm.
+/// A ball of 40 mm radius around the origin: an octahedron whose triangles are split into four, this many times.
 #[must_use]
 pub fn ball(splits: u32) -> Mesh {
     let (x, y, z) = (Vec3::X, Vec3::Y, Vec3::Z);
@@ -90,7 +89,7 @@ pub fn slivers(rows: u32) -> Mesh {
     Mesh { positions, triangles }
 }
 
-/// A square grid around the origin, each of its squares cut in two, with a height function of x and y.
+/// A square grid around the origin, each of its squares cut in two, raised by a height function of x and y.
 #[must_use]
 pub fn sheet(cells: u32, size: f32, height: impl Fn(f32, f32) -> f32) -> Mesh {
     let at = |x: u32, y: u32| y * (cells + 1) + x;

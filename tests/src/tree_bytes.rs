@@ -14,7 +14,7 @@ pub fn section(bytes: &[u8], kind: u32) -> (usize, usize) {
     (word(at + 4) as usize, word(at + 8) as usize)
 }
 
-/// Corrects the checksum of changed bytes.
+/// Puts the right checksum into changed bytes.
 ///
 /// # Panics
 /// If there are fewer bytes than a header has.

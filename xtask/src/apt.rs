@@ -1,4 +1,4 @@
-//! Installs Debian packages, if that needs no password.
+//! Installs Debian packages where this needs no password.
 
 use std::path::Path;
 use std::process::Command;

@@ -11,7 +11,7 @@ use crate::steps::Outcome;
 use crate::toolchain::{self, Cross};
 use crate::workspace;
 
-/// Builds the library, with these features of its own.
+/// Builds the library with features of `dibs-c`.
 pub fn build(cross: &Cross, features: &str) -> Result<PathBuf> {
     let mut cargo = cross.cargo("rustc");
     cargo.args(["--quiet", "--package", "dibs-c", "--lib", "--crate-type", "staticlib"]);
@@ -20,8 +20,8 @@ pub fn build(cross: &Cross, features: &str) -> Result<PathBuf> {
     Ok(cross.program("firmware", "libdibs_c.a"))
 }
 
-/// Links every function of the header: a panic path that survived is a symbol that is not there. One put in on purpose
-/// must break the link, so that a link is known to show something.
+/// Links every function of the header. A panic path that the compiler did not remove calls a symbol that does not
+/// exist, and breaks the link. A planted panic path must break it too: otherwise the check shows nothing.
 pub fn has_no_panic_path(cross: &Cross) -> Result<Outcome> {
     let header = fs::read_to_string(workspace::root().join("dibs-c/include/dibs.h"))?;
     let functions = functions(&header);
@@ -49,7 +49,7 @@ fn functions(header: &str) -> Vec<&str> {
     names.collect()
 }
 
-/// Links these functions of a library; what the linker says where it cannot.
+/// Links functions of a library. Returns the linker's errors, or `None` on success.
 fn link(library: &PathBuf, functions: &[&str]) -> Result<Option<String>> {
     let mut linker = Command::new(toolchain::linker()?);
     linker.args(["-flavor", "gnu", "--gc-sections", "--entry", "0"]);

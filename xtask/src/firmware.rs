@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use crate::process::run;
 use crate::toolchain::Cross;
 
-/// The surface that the firmware is built for.
+/// The firmware's surface.
 pub struct Surface {
     /// A mesh file, or the generated heart.
     pub mesh: Option<PathBuf>,
@@ -16,7 +16,7 @@ pub struct Surface {
     pub stretch: f32,
 }
 
-/// Limit on stretch of the generated heart, whose motion keeps to it: the paper's.
+/// The generated heart's limit on stretch, as in the paper; its motion stays within it.
 pub const HEART_STRETCH: f32 = 1.5;
 
 impl Default for Surface {
@@ -41,7 +41,7 @@ pub fn command(cross: &Cross, surface: &Surface) -> Command {
 }
 
 impl Surface {
-    /// Tells the build script the surface. It sets no variable for the default one, because cargo rebuilds for any
+    /// Passes the surface to the build script. The default surface sets no variable, because cargo rebuilds at any
     /// change of these variables.
     pub fn describe_to(&self, cargo: &mut Command) {
         match &self.mesh {

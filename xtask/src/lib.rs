@@ -1,5 +1,5 @@
-//! Builds, runs and installs: the toolchain of the board, the emulator, the programs of the nightly compiler. `cargo
-//! xtask` and `tests/prove` use it.
+//! Builds, runs and installs the board's toolchain, the emulator and the programs that need the nightly compiler, for
+//! `cargo xtask` and `tests/prove`.
 
 pub mod apt;
 pub mod c_interface;

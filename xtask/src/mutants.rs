@@ -1,4 +1,4 @@
-//! `cargo xtask mutants`: whether the tests notice a changed operator of the core, by `cargo-mutants`.
+//! `cargo xtask mutants`: changes operators of the core by `cargo-mutants`, and lists the changes that no test notices.
 //!
 //! `.cargo/mutants.toml` lists accepted survivors with their reasons, `docs/mutants.md` the mutants tried by hand.
 
@@ -11,11 +11,11 @@ use xtask::process::{quiet, run};
 use xtask::steps::Outcome;
 use xtask::workspace;
 
-/// Version that the lists of survivors are written for.
+/// The version of cargo-mutants for which the lists of survivors are written.
 const VERSION: &str = "27.1.0";
 
-/// Folders of the core, with the test programs and tests that their mutants are tried on: few, so that it takes
-/// seconds.
+/// Folders of the core, each with the test programs and tests that try its mutants. The tests are few, so that a trial
+/// takes seconds besides its build.
 const AREAS: [(&str, &[&str], &[&str]); 6] = [
     ("dibs-nostd/src/tool", &["query"], &["kernels", "refusals"]),
     (
@@ -33,13 +33,13 @@ const AREAS: [(&str, &[&str], &[&str]); 6] = [
     ),
 ];
 
-/// In the paths of all unit tests of the core.
+/// A part of the path of every unit test of the core.
 const UNIT_TESTS: &str = "tests::";
 
 /// The exit code of cargo-mutants where mutants survived.
 const SURVIVED: i32 = 2;
 
-/// Mutants of changed lines that CI tries: each takes a build of the core and its tests.
+/// Most mutants of changed lines that CI tries: each takes a build of the core and its tests.
 const SAMPLE: usize = 4;
 
 /// Changes operators of the core one by one, and lists the changes that no test notices. The whole core takes
@@ -127,8 +127,8 @@ pub fn sample() -> Result<Outcome> {
 fn command(arguments: &[&str], programs: &[&str], tests: &[&str]) -> Command {
     let mut cargo = Command::new("cargo");
     cargo.current_dir(workspace::root());
-    // Shared among the mutants, but with nothing else: the next build of the workspace would take a mutant of the core
-    // for the core, which is older.
+    // The mutants share a target folder of their own. In the workspace's folder, the next build would take a mutant for
+    // the core, because the core's sources are older.
     cargo.env("CARGO_TARGET_DIR", workspace::root().join("target/mutants"));
     cargo.args(["mutants", "--package", "dibs-nostd", "--output", "target"]).args(arguments);
     cargo.args(["--", "--package", "dibs-tests", "--package", "dibs-nostd", "--lib"]);
@@ -139,7 +139,7 @@ fn command(arguments: &[&str], programs: &[&str], tests: &[&str]) -> Command {
     cargo
 }
 
-/// The files changed since the branch left `main`, or in the last commit.
+/// The core's diff since the branch left `main`, or in the last commit; `None` without an earlier commit.
 fn changes() -> Option<String> {
     let git = |arguments: &[&str]| {
         let mut git = Command::new("git");

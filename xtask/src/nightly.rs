@@ -46,7 +46,7 @@ pub struct Sanitized {
     pub findings: u64,
 }
 
-/// Why nothing can run, or `None`. Tries to install the nightly compiler first.
+/// The reason for which neither fuzzers nor sanitizers can run, or `None`. Tries to install the nightly compiler first.
 pub fn missing() -> Option<String> {
     let found = || quiet(Command::new("cargo").args(["+nightly", "--version"]), MOMENT).is_ok();
     if found() {
@@ -135,8 +135,8 @@ fn end(text: &str) -> String {
     lines[lines.len().saturating_sub(20)..].join("\n")
 }
 
-/// Runs the tests of frames and bus under a sanitizer, `address` or `thread`, and those of the format under the address
-/// sanitizer. Before that the sanitizer must find a planted fault.
+/// Runs the tests of frames and bus under a sanitizer, `address` or `thread`, and the tests of the format under the
+/// address sanitizer. First the sanitizer must find a planted fault.
 pub fn sanitize(sanitizer: &str) -> Result<Sanitized> {
     let (tests, planted) = match sanitizer {
         "address" => (&["frames", "bus", "format"][..], "an_access_out_of_bounds"),
@@ -148,7 +148,7 @@ pub fn sanitize(sanitizer: &str) -> Result<Sanitized> {
             cargo.args(["--test", name]);
         }
         cargo.arg("--target-dir").arg(workspace::target().join(sanitizer));
-        // One test at a time, since tests with two threads wait long for each other.
+        // One test at a time: side by side, tests of two threads wait long for each other.
         cargo.args(["--", "--test-threads=1"]).args(arguments);
         let flags = format!("-Zsanitizer={sanitizer} -Cunsafe-allow-abi-mismatch=sanitizer");
         cargo.env("RUSTFLAGS", flags).env("CARGO_PROFILE_DEV_DEBUG", "line-tables-only");
@@ -167,7 +167,7 @@ pub fn sanitize(sanitizer: &str) -> Result<Sanitized> {
     let text = String::from_utf8_lossy(&text);
     ensure!(
         !found.status.success() && reports(&text) > 0 && text.contains(planted),
-        "the {sanitizer} sanitizer does not find what was put in on purpose:\n{}",
+        "the {sanitizer} sanitizer does not find the planted fault:\n{}",
         end(&text)
     );
 
@@ -184,7 +184,7 @@ pub fn sanitize(sanitizer: &str) -> Result<Sanitized> {
     Ok(Sanitized { tests: passed.sum(), findings })
 }
 
-/// Runs both sanitizers for their user.
+/// Runs both sanitizers for a user: findings are an error.
 pub fn sanitize_by_hand() -> Result<()> {
     for sanitizer in ["address", "thread"] {
         let Sanitized { tests, findings } = sanitize(sanitizer)?;
@@ -194,7 +194,7 @@ pub fn sanitize_by_hand() -> Result<()> {
     Ok(())
 }
 
-/// Why Miri cannot run here, or `None`.
+/// The reason for which Miri cannot run here, or `None`.
 pub fn miri_missing() -> Option<String> {
     let found = quiet(&mut nightly(&["miri", "--version"]), MOMENT).is_ok();
     (!found).then(|| {

@@ -17,8 +17,8 @@ pub fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Runs a command quietly and returns its standard output; on failure or after `limit` the error
-/// holds the last line of its output.
+/// Runs a command quietly and returns its standard output. On failure the error holds the last line of its output.
+/// After `limit` the command is killed.
 pub fn quiet(command: &mut Command, limit: Duration) -> Result<String> {
     let name = shown(command);
     let mut child = command
@@ -52,7 +52,7 @@ pub fn quiet(command: &mut Command, limit: Duration) -> Result<String> {
     Ok(out)
 }
 
-/// A command as one would type it.
+/// A command as a user would type it.
 pub fn shown(command: &Command) -> String {
     let variables = command.get_envs().filter_map(|(name, value)| {
         Some(format!("{}={}", name.to_string_lossy(), value?.to_string_lossy()))
@@ -64,7 +64,7 @@ pub fn shown(command: &Command) -> String {
 
 fn text(mut pipe: impl Read) -> String {
     let mut bytes = Vec::new();
-    // The message needs the output before an error.
+    // After a read error, the output so far still serves the message.
     let _ = pipe.read_to_end(&mut bytes);
     String::from_utf8_lossy(&bytes).into_owned()
 }

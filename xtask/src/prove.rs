@@ -12,8 +12,7 @@ pub struct Passed {
     arguments: Vec<String>,
 }
 
-/// `cargo run` of the program, to which arguments are added. It runs in the user's folder, since arguments may be
-/// paths.
+/// `cargo run` of the program, without its arguments. It runs in the user's folder, because arguments may be paths.
 pub fn command(features: &[&str]) -> Command {
     let mut cargo = Command::new("cargo");
     cargo.args(["run", "--quiet", "--release", "--package", "dibs-prove", "--manifest-path"]);
@@ -21,8 +20,8 @@ pub fn command(features: &[&str]) -> Command {
     cargo
 }
 
-/// The program, built together with the whole workspace and its tests. Alone it would build its dependencies again,
-/// with fewer features.
+/// The program, built together with the whole workspace and its tests: a build of it alone would compile its
+/// dependencies again, with fewer features.
 pub fn with_workspace() -> Result<Command> {
     let mut cargo = Command::new("cargo");
     cargo.args(["build", "--quiet", "--release", "--workspace", "--bins", "--tests"]);

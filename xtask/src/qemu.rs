@@ -11,8 +11,8 @@ use crate::process::quiet;
 
 const PROGRAM: &str = "qemu-system-arm";
 
-/// `-icount shift=1`: one instruction takes 2 ns of the board's time, so 500 million of them make a
-/// second: a Cortex-M7 at about 480 MHz that always executes one instruction a cycle.
+/// `-icount shift=1`: one instruction takes 2 ns of the board's time. This is about a Cortex-M7 at 480 MHz that always
+/// executes one instruction a cycle.
 const SHIFT: u32 = 1;
 
 /// Instructions that the processor executes while the board's 25 MHz clock counts one.
@@ -33,17 +33,17 @@ fn version() -> Result<String> {
 /// The emulated processor's time.
 #[derive(Clone, Copy)]
 pub enum Time {
-    /// As this computer's.
+    /// This computer's clock.
     Real,
     /// Every instruction takes 2 to this power nanoseconds.
     Counted(u32),
 }
 
-/// The time of a Cortex-M7 at about 480 MHz. While it sleeps, time jumps to the next interrupt; by this computer's
-/// clock it would overshoot by this computer's wake-up delay.
+/// The time of a Cortex-M7 at about 480 MHz. While the processor sleeps, counted time jumps to the next interrupt; real
+/// time would overshoot by this computer's wake-up delay.
 pub const BOARD: Time = Time::Counted(SHIFT);
 
-/// The command that boots a program which needs nothing but semihosting, with these arguments.
+/// The command that boots a program with these arguments, without serial lines: the program needs only semihosting.
 pub fn alone(program: &Path, time: Time, arguments: &[&str]) -> Command {
     let mut command = boot(program, time, arguments);
     command.args(["-serial", "none"]);

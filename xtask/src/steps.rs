@@ -10,7 +10,7 @@ use anyhow::{Context, Result};
 use crate::process::run;
 use crate::workspace;
 
-/// Lines of an error that the list repeats: a list of broken promises starts with a heading.
+/// Most lines of an error that the list repeats. One is too few: a list of broken promises starts with a heading.
 const REASON_LINES: usize = 4;
 
 const PASSED: &str = "passed";
@@ -20,7 +20,7 @@ const FAILED: &str = "FAILED";
 pub enum Outcome {
     /// It succeeded.
     Passed,
-    /// It could not run here; the reason.
+    /// It could not run here, for this reason.
     Skipped(String),
 }
 
@@ -59,7 +59,7 @@ impl Steps {
         self.lines.push(line);
     }
 
-    /// Writes the steps to a file, for the program that has started this one.
+    /// Writes the steps to a file, for the program that started this one.
     ///
     /// # Errors
     /// If it cannot be written.

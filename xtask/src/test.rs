@@ -30,10 +30,10 @@ pub struct Options {
 pub fn test(options: &Options) -> Result<()> {
     let mut steps = Steps::default();
     steps.cargo("format", &["fmt", "--all", "--check"], &[]);
-    // In the tests' profile, as the documentation below, so that common dependencies are built once.
+    // Lints and documentation take the tests' profile, so that common dependencies are built once.
     let lints = ["clippy", "--release", "--workspace", "--all-targets", "--", "-D", "warnings"];
     steps.cargo("lints", &lints, &[]);
-    // Including the examples in the documentation.
+    // This also runs the examples in the documentation.
     steps.cargo("tests", &["test", "--release", "--workspace", "--no-fail-fast"], &[]);
     steps.cargo(
         "documentation",
@@ -77,10 +77,10 @@ pub fn test(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// The checks of `tests/prove`, whose steps join those here.
+/// Runs the checks of `tests/prove`, and adds its steps to these.
 fn checks(demo_seconds: u32, steps: &mut Steps) -> Result<()> {
     let list = workspace::target().join("steps.txt");
-    // Emptied, so that an earlier run's list is not taken for this one's.
+    // An earlier run's list must not be taken for this run's.
     std::fs::write(&list, "")?;
     let mut prove = prove::with_workspace()?;
     prove.args(["test", "--demo-seconds", &demo_seconds.to_string(), "--steps"]).arg(&list);
@@ -117,7 +117,8 @@ fn oldest_compiler() -> Result<Outcome> {
     run(command.current_dir(workspace::root())).map(|()| Outcome::Passed)
 }
 
-/// The core crate compiles for the board with only `core`: with defmt, and with each of its layers alone or none.
+/// The core crate compiles for the board with only `core`: with all layers and defmt, and with every smaller set of
+/// layers.
 fn core_crate(cross: &Cross) -> Result<Outcome> {
     let mut check = cross.cargo("check");
     run(check.args(["--quiet", "--package", "dibs-nostd", "--features", "defmt"]))?;
@@ -125,7 +126,7 @@ fn core_crate(cross: &Cross) -> Result<Outcome> {
         let mut check = cross.cargo("check");
         check.args(["--quiet", "--package", "dibs-nostd", "--no-default-features"]);
         run(check.args(["--features", layer]))
-            .with_context(|| format!("dibs-nostd with the layers \"{layer}\" alone"))?;
+            .with_context(|| format!("dibs-nostd with only the layers \"{layer}\""))?;
     }
     Ok(Outcome::Passed)
 }
@@ -143,7 +144,7 @@ fn firmware_lints(cross: &Cross) -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-/// The guide, followed from an empty crate outside the repository to an answer on the board.
+/// Follows the guide from an empty crate outside the repository to an answer on the board.
 fn new_user(cross: &Cross) -> Result<Outcome> {
     if !matches!(cross, Cross::Rustup) {
         return Ok(Outcome::Skipped("the guide takes rustup's target".to_owned()));
@@ -153,8 +154,8 @@ fn new_user(cross: &Cross) -> Result<Outcome> {
     run(command.args(["--", "--ignored"])).map(|()| Outcome::Passed)
 }
 
-/// Runs the program that measures cycles on silicon. In the emulator it counts `SysTick` instead, but must end and
-/// print constants.
+/// Runs the program that measures cycles on silicon. In the emulator the cycle counter stands still, and the program
+/// counts `SysTick` instead; it must still end and print constants.
 fn cycles(cross: &Cross) -> Result<Outcome> {
     let mut cargo = cross.cargo("build");
     cargo.args(["--quiet", "--package", "firmware-example", "--bin", "cycles"]);

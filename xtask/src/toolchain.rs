@@ -1,8 +1,8 @@
-//! The only place that decides how to build for the board.
+//! Chooses the toolchain that builds for the board; no other code does.
 //!
-//! In this order: the target is installed for the toolchain in use; `rustup target add` can add it; Debian's own
-//! toolchain builds it together with `core`; or a message gives the manual steps. `DIBS_CROSS=rustup|debian|none`
-//! forces one of them.
+//! The first of these that works: the toolchain in use has the target; `rustup target add` adds it; Debian's own
+//! toolchain builds it together with `core`. Otherwise a message gives the manual steps. `DIBS_CROSS=rustup|debian`
+//! forces one of them, `DIBS_CROSS=none` refuses all.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -35,7 +35,7 @@ pub enum Cross {
 }
 
 impl Cross {
-    /// Finds a toolchain, or makes one.
+    /// Finds a toolchain, or installs one.
     pub fn find() -> Result<Self> {
         match env::var("DIBS_CROSS").as_deref() {
             Ok("rustup") => rustup(),
@@ -47,8 +47,8 @@ impl Cross {
         }
     }
 
-    /// `cargo SUBCOMMAND` for the board. Each toolchain has its own folder, so that two compilers do not discard each
-    /// other's output.
+    /// `cargo SUBCOMMAND` for the board. Each toolchain has its own target folder, so that two compilers do not
+    /// discard each other's output.
     pub fn cargo(&self, subcommand: &str) -> Command {
         let mut command = match self {
             Self::Rustup => {
@@ -63,7 +63,7 @@ impl Cross {
                     .env("RUSTC", DEBIAN_RUSTC)
                     .env("RUSTC_BOOTSTRAP", "1")
                     .env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker)
-                    // The stack frame of every function.
+                    // `tests/prove` reads the stack frame of every function from it.
                     .env("RUSTFLAGS", "-Zemit-stack-sizes")
                     .env_remove("RUSTUP_TOOLCHAIN");
                 command
@@ -74,7 +74,7 @@ impl Cross {
         command
     }
 
-    /// The output of `cargo build --profile PROFILE`.
+    /// The path of a program that `cargo build --profile PROFILE` writes.
     pub fn program(&self, profile: &str, name: &str) -> PathBuf {
         self.target_dir().join(TARGET).join(profile).join(name)
     }
@@ -143,7 +143,7 @@ fn debian_installed() -> bool {
         && Path::new(DEBIAN_CARGO).exists()
 }
 
-/// Debian's compiler has no `rust-lld`; the toolchain that builds xtask has one.
+/// The `rust-lld` of the toolchain that builds xtask: Debian's compiler has none.
 pub fn linker() -> Result<PathBuf> {
     let verbose = quiet(Command::new("rustc").arg("-vV"), MOMENT)?;
     let host = verbose

@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use crate::apt;
 use crate::process::{quiet, run};
 
-/// Version of the benches' runner, equal to the library's.
+/// Version of the benches' runner: it must be the library's version.
 const RUNNER: &str = "0.20.0";
 
 /// Finds valgrind, or installs it.

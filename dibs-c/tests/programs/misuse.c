@@ -1,9 +1,9 @@
 /*
- * Every misuse is a code: run under the address and the undefined-behaviour sanitizer by tests/misuse.rs.
+ * Every misuse returns a code. tests/misuse.rs runs this under the address and the undefined-behaviour sanitizer.
  *
  *     misuse TREE STREAM
  *
- * STREAM is two frames of a serial line.
+ * STREAM is two frames in the bytes of a serial line.
  */
 #include <dibs.h>
 
@@ -28,7 +28,7 @@ static void expect(dibs_code expected, dibs_code found, const char *call, int li
 
 #define EXPECT(code, call) expect(DIBS_CODE_##code, call, #call, __LINE__)
 
-/* Each of its own, so that the sanitizer sees a write behind one. */
+/* Each object has an array of its own: the sanitizer sees a write behind its end. */
 #define MEMORY(name, size) static alignas(DIBS_ALIGNMENT) unsigned char name[size]
 MEMORY(tree_memory, DIBS_TREE_SIZE);
 MEMORY(frame_memory, DIBS_FRAME_SIZE);
@@ -62,7 +62,7 @@ static unsigned char *read_file(const char *path, size_t *length) {
     }
     *length = fread(bytes, 1, 1 << 20, file);
     fclose(file);
-    /* Exactly as many as there are: one byte more would be found. */
+    /* The exact length: the sanitizer finds a read behind it. */
     return realloc(bytes, *length);
 }
 
@@ -91,7 +91,7 @@ static void storage(const unsigned char *bytes, size_t length) {
     EXPECT(STORAGE_ALIGNMENT, dibs_surface_init(surface_memory + 4, sizeof surface_memory, 10, &s));
 }
 
-/* Calls before the object is made, and with an object of another kind. */
+/* Calls before the object is made, with an object of another kind, misaligned, null, or before a surface is set. */
 static void order(void) {
     dibs_tree_facts facts;
     dibs_proximity found;
@@ -163,14 +163,14 @@ static void values(const float *positions, uint32_t vertices) {
     EXPECT(NULL, dibs_wall_force(&wall, DIBS_CODE_OK, NULL, zero, &force));
     found.side = 99;
     EXPECT(ARGUMENT, dibs_wall_force(&wall, DIBS_CODE_OK, &found, zero, &force));
-    /* An error gives a hold, from no answer at all. */
+    /* A query's error gives a hold, without an answer. */
     EXPECT(OK, dibs_wall_force(&wall, DIBS_CODE_STALE, NULL, zero, &force));
     EXPECT(STALE, force.cause);
     EXPECT(OK, dibs_wall_proxy_force(&wall, 77777, contacts, zero, zero, zero, &force));
     EXPECT(ARGUMENT, force.cause);
 }
 
-/* Each end of a surface is there once, and one frame of it is held at a time. */
+/* A surface has one receiver and one reader. Before a frame is published there is no surface, but there is a status. */
 static void two_readers(void) {
     dibs_surface *surface, *small;
     dibs_receiver *receiver, *receiver2;
@@ -196,7 +196,7 @@ static void two_readers(void) {
     EXPECT(OK, dibs_receiver_status(receiver, 0, 0, 1, status, sizeof status, &length));
 }
 
-/* With a frame on the bus: a second frame cannot hold the surface, and nothing is published meanwhile. */
+/* While one frame object holds the surface, no other can hold it, and nothing is published. */
 static void held(const char *packets) {
     dibs_receiver *receiver = (dibs_receiver *)(void *)receiver_memory;
     dibs_reader *reader = (dibs_reader *)(void *)reader_memory;
@@ -266,7 +266,7 @@ static void *keep_asking(void *unused) {
     return unused;
 }
 
-/* Two contexts in one object: the second is told. */
+/* Of two threads in one query, the second gets DIBS_CODE_IN_USE. */
 static void in_use(void) {
     pthread_t other;
     dibs_proximity found;
@@ -282,7 +282,7 @@ static void in_use(void) {
     EXPECT(OK, is_seen ? DIBS_CODE_OK : DIBS_CODE_IN_USE);
 }
 
-/* Each code has a text of its own. */
+/* No two codes share a text. */
 static void texts(void) {
     const char *unknown = dibs_code_text(99999);
     unsigned codes = 0;

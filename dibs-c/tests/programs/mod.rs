@@ -1,4 +1,4 @@
-//! Building and running programs in C and C++.
+//! Builds and runs programs in C and C++.
 #![allow(dead_code, reason = "no test uses all of it")]
 
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ pub fn include() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("include")
 }
 
-/// The output of a program that must succeed.
+/// Runs a program that must succeed. Returns its output.
 pub fn run(command: &mut Command) -> String {
     let output = command.output().expect("a program that starts");
     let [out, err] =
@@ -37,7 +37,7 @@ pub fn run(command: &mut Command) -> String {
     out
 }
 
-/// A tool by name, installed where it is missing.
+/// A command by name, installed where it is missing.
 pub fn tool(name: &str, package: &str) -> Command {
     let version = quiet(Command::new(name).arg("--version"), Duration::from_secs(20));
     if version.is_err() {
@@ -46,7 +46,7 @@ pub fn tool(name: &str, package: &str) -> Command {
     Command::new(name)
 }
 
-/// A tree, and two frames of its rest shape as a serial line brings them.
+/// Writes a tree, and two frames of its rest shape in the bytes of a serial line. Returns the paths of both files.
 pub fn tree_and_stream(folder: &Path) -> [PathBuf; 2] {
     let mesh = generate::heart(1_000).expect("a size").mesh;
     let built = Builder::new().stretch(1.5).build(&mesh).expect("a tree");

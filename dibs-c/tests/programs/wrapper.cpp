@@ -1,4 +1,5 @@
-/* dibs.hpp: an answer, a frame held and released by scope, and codes instead of exceptions. Run by tests/wrapper.rs. */
+/* Tests dibs.hpp: a query, a frame held and released by scope, and codes instead of exceptions. Run by
+* tests/wrapper.rs. */
 #include <dibs.hpp>
 
 #include <cstdio>
@@ -66,7 +67,7 @@ int main(int argc, char **argv) {
     }
     dibs::Frame frame;
     MUST(frame.init());
-    /* Free again: the scope released it. */
+    /* The end of the scope released the surface. */
     MUST(reader.latest(1, 50, frame));
 
     dibs_tree_facts facts;

@@ -1,4 +1,4 @@
-//! The part of a script that comes over a bus.
+//! The part of a script that concerns the bus: packets, and control ticks between them.
 
 use std::fmt::Write;
 
@@ -18,14 +18,14 @@ use super::track::Track;
 /// Vertices of the generated heart of 1,000 triangles.
 const VERTICES: usize = 502;
 
-/// What comes at a time, in ms.
+/// A packet or a control tick, at a time in ms.
 pub enum Event {
     Packet(u32, Vec<u8>),
     Tick(u32, Capsule),
 }
 
-/// Frames of this motion every 16 ms, in one encoding after the other, with ticks between: a packet is lost, one is
-/// damaged, a frame is stretched too far, and in the end the line falls silent.
+/// Frames of this motion in alternating encodings, with a tick after every packet. A packet is lost, another is
+/// damaged, a frame is stretched too far, and at the end the line falls silent.
 pub fn events(built: &BuiltTree, motion: &[Vec<Vec3>], lines: &mut String) -> Vec<Event> {
     let tree = Tree::<u16>::from_bytes(built.blob()).expect("a tree");
     let (mesh_id, mut events) = (tree.mesh_id(), Vec::new());
@@ -76,14 +76,14 @@ pub fn events(built: &BuiltTree, motion: &[Vec<Vec3>], lines: &mut String) -> Ve
     events
 }
 
-/// A capsule that sweeps through the heart.
+/// The instrument at a time: a capsule that moves through the heart.
 fn tool(now: u32) -> Capsule {
     let along = now as f32 * 0.3;
     let start = Vec3::new(120.0 - along, 5.0, 20.0);
     Capsule::new(start, start + Vec3::new(40.0, 0.0, 30.0), 2.5).expect("a tool")
 }
 
-/// What the Rust library answers.
+/// The Rust library's answers.
 pub fn answers(built: &BuiltTree, events: &[Event]) -> Vec<String> {
     let tree = Tree::<u16>::from_bytes(built.blob()).expect("a tree");
     let frames = Frames::<VERTICES>::new();

@@ -1,4 +1,4 @@
-//! A script of surfaces and poses, and what the Rust library answers to it.
+//! A script of surfaces and poses, and the Rust library's answers to it.
 
 mod bus;
 mod print;
@@ -20,7 +20,7 @@ const MARGIN: f32 = 8.0;
 const POSES: usize = 100;
 const FRAMES: usize = 12;
 
-/// A script and the files that it is about.
+/// A script, and the files that it refers to.
 pub struct Script {
     built: BuiltTree,
     /// The tree's bytes.
@@ -43,7 +43,7 @@ struct Pose {
 }
 
 impl Script {
-    /// Poses on, in and around a heart that beats.
+    /// Makes a script of poses on, in and around a beating heart.
     pub fn new() -> Self {
         let generate::MovingMesh { mesh, motion } = generate::heart(1_000).expect("a size");
         let built = Builder::new().stretch(1.5).build(&mesh).expect("a tree");
@@ -65,7 +65,7 @@ impl Script {
         Self { tree: built.blob().to_vec(), built, frames, lines, surfaces, poses, events }
     }
 
-    /// The lines that a program must answer.
+    /// The answers that a program must give, line by line.
     pub fn answers(&self) -> Vec<String> {
         let tree = Tree::<u16>::from_bytes(self.built.blob()).expect("a tree");
         let mut query = Query::<_, 512>::new(&tree).expect("a stack");
@@ -91,7 +91,7 @@ impl Script {
 }
 
 impl Pose {
-    /// A sphere or a capsule that begins near a vertex, on either side; now and then with a budget that is too small.
+    /// A sphere or a capsule that begins near a vertex, on either side of the surface. One in five has a small budget.
     fn new(rows: &[Vec3], random: &mut fastrand::Rng) -> Self {
         let mut within = |size: f32| {
             let mut axis = || (random.f32() - 0.5) * 2.0 * size;
@@ -143,7 +143,7 @@ impl VertexTable for Surface<'_> {
     }
 }
 
-/// One line: the closest pair and its force; the contacts, their rows, and their force.
+/// The line of a pose: the closest pair and its force; the contacts, their rows, and their force.
 fn answer(
     query: &mut Query<'_, u16, 512>,
     contacts: &mut Contacts<16>,

@@ -1,4 +1,4 @@
-//! A line of an answer, as `examples/c/host/main.c` prints it.
+//! A line of an answer, in the format of the program in `examples/c/host`.
 
 use std::fmt::Write;
 
@@ -64,7 +64,7 @@ impl Line {
         self.vec3(wrench.torque);
     }
 
-    /// The hold, for a cause with this code.
+    /// The force of a hold whose cause has this code.
     pub fn hold(&mut self, wrench: &Wrench, cause: u32) {
         self.numbers(&[3, cause]);
         self.vec3(wrench.force);

@@ -7,7 +7,7 @@ use dibs_nostd::{
 
 use super::print::Line;
 
-/// A tracker with the surface that it was given last.
+/// A tracker, and the last frame that it was given.
 pub struct Track<'t> {
     tracker: Tracker<'t, u16, 512, 256>,
     odometer: Odometer,

@@ -7,7 +7,7 @@
 
 #include "print.h"
 
-/* The largest surface that there is room for. */
+/* Vertices of the largest surface. */
 #define VERTICES 10000
 /* Rows and triangles that are checked after each packet. */
 #define WORK 200
@@ -22,7 +22,7 @@ static dibs_receiver *receiver;
 static dibs_reader *reader;
 static dibs_failsafe *failsafe;
 static dibs_tracker *tracker;
-/* Number of the frame that the tracker has. */
+/* Epoch of the tracker's frame. */
 static uint32_t tracked;
 
 static const dibs_wall wall = {
@@ -61,7 +61,7 @@ void bus_packet(const uint8_t *bytes, size_t length, uint32_t now) {
     printf("packet %u %u %u %u\n", accepted, progress, checked, advance);
 }
 
-/* The same pair from a tracker, which takes over a frame once. */
+/* Prints the same pair from a tracker, which takes each frame only once. */
 static dibs_code track(dibs_frame *frame, const dibs_age *age, const dibs_tool *tool) {
     dibs_proximity found;
     dibs_fallback fallback;

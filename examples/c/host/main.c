@@ -1,5 +1,5 @@
 /*
- * Answers a script of surfaces and poses, one line of bits for each pose:
+ * Answers a script of surfaces, poses, packets and control ticks. Floats are printed by their bits:
  *
  *     dibs-host TREE FRAMES SCRIPT
  *
@@ -10,9 +10,9 @@
  *     pose START END RADIUS NODES TRIANGLES FLAGS
  *                                        a capsule, a budget, the options' flags
  *     packet NOW BYTES                   a packet from the bus, in hexadecimal
- *     tick NOW START END RADIUS          a control tick with the surface that came over the bus
+ *     tick NOW START END RADIUS          a control tick, with the surface from the bus
  *
- * dibs-c/tests/host.rs has the same script answered in Rust, and compares the bits.
+ * dibs-c/tests/host.rs answers the same script in Rust, and compares the bits.
  */
 #include <dibs.h>
 
@@ -27,7 +27,7 @@
 
 #define MARGIN 8.0f
 
-/* Memory of the objects: nothing is allocated by the library. */
+/* Memory of the objects: the library allocates nothing. */
 static alignas(DIBS_ALIGNMENT) uint8_t tree_memory[DIBS_TREE_SIZE];
 static alignas(DIBS_ALIGNMENT) uint8_t frame_memory[DIBS_FRAME_SIZE];
 static alignas(DIBS_ALIGNMENT) uint8_t query_memory[DIBS_QUERY_SIZE];
@@ -48,7 +48,7 @@ void must(dibs_code code) {
     }
 }
 
-/* All contacts, their rows, and the force that they hold the tool with together. */
+/* All contacts, their rows, and their joint force on the tool. */
 static void print_contacts(dibs_code code, const dibs_tool *tool, dibs_vec3 velocity) {
     dibs_contacts_facts facts;
     must(dibs_contacts_get_facts(contacts, &facts));
@@ -84,7 +84,7 @@ static void answer(const dibs_tool *tool, const dibs_options *options) {
     if (code == DIBS_CODE_OK) {
         print_proximity(&found);
     }
-    /* An error makes the force the hold: there is always one. */
+    /* After an error the force is the hold, so there is always a force. */
     must(dibs_wall_force(&wall, code, &found, velocity, &force));
     print_force(&force);
 
@@ -138,7 +138,7 @@ static bool tick(char *text) {
     return true;
 }
 
-/* The surface is this frame of the file's. */
+/* Makes a frame of the file the surface. */
 static bool surface(char *text, const float *frames, size_t length, uint32_t vertices) {
     uint32_t number;
     const size_t floats = 3 * (size_t)vertices;

@@ -1,4 +1,4 @@
-/* Answers as text: floats by their bits, so that two programs can be compared. */
+/* Prints answers as text: floats by their bits, so that the outputs of two programs can be compared. */
 #ifndef PRINT_H
 #define PRINT_H
 

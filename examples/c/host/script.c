@@ -9,7 +9,7 @@ uint8_t *file_read(const char *path, size_t *length) {
     uint8_t *bytes = NULL;
     if (file != NULL && fseek(file, 0, SEEK_END) == 0 && (size = ftell(file)) >= 0) {
         rewind(file);
-        /* One byte more, so that a text ends with a zero. */
+        /* One zero byte more ends a text. */
         bytes = calloc((size_t)size + 1, 1);
     }
     if (bytes == NULL || fread(bytes, 1, (size_t)size, file) != (size_t)size) {

@@ -2,7 +2,7 @@
 
 /// Vertices of the surface.
 pub const VERTICES: usize = 66;
-/// Largest packet to the board, in bytes: some packets a frame.
+/// Largest packet to the board, in bytes: so small that a frame takes several packets.
 pub const MTU: usize = 128;
 /// Triangles checked, or rows copied, in one slice.
 pub const WORK: u32 = 64;

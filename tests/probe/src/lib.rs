@@ -1,7 +1,7 @@
 //! Answers a script of queries, on the board under QEMU and on the host in any build.
 //!
-//! A script is a stream of little-endian 32-bit words, made by `cargo xtask guarantees`; the answers are another. Both
-//! sides run this code, so that a difference comes from compiler or processor.
+//! A script is a stream of little-endian 32-bit words, written by `cargo xtask guarantees`; the answers are such a
+//! stream too. Board and host run this same code, so that a difference comes from the compiler or the processor.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
@@ -23,16 +23,16 @@ pub mod command {
     pub const END: u32 = 0;
     /// A tree of 16-bit indices: its length in bytes, then the bytes, padded to a word.
     pub const TREE: u32 = 1;
-    /// A frame: three `f32` for each of the tree's vertices. Answered by the instructions of measuring its stretch, and
-    /// the stretch's bits.
+    /// A frame: three `f32` for each of the tree's vertices. Answered by the clock's counts for measuring its stretch,
+    /// and the stretch's bits.
     pub const FRAME: u32 = 2;
     /// A query: [`QUERY_WORDS`](super::QUERY_WORDS). Answered by [`ANSWER_WORDS`](super::ANSWER_WORDS).
     pub const QUERY: u32 = 3;
-    /// The same by the wide search, of a frame of rows.
+    /// The same by the wide search, on a frame of rows.
     pub const QUERY_IN_ROUNDS: u32 = 5;
     /// A modal frame, of a tree with modes: 1 for queries that remember positions and 0 for others, the number of
-    /// weights, then an `f32` each. Answered by the instructions of bounding its stretch and the bound's bits; then by
-    /// those of computing every position, and a hash of their bits.
+    /// weights, then an `f32` each. Answered by the clock's counts for bounding its stretch and the bound's bits; then
+    /// by the counts for computing every position, and a hash of their bits.
     pub const WEIGHTS: u32 = 4;
 }
 
@@ -42,14 +42,14 @@ pub mod how {
     pub const MEASURED: u32 = 1;
     /// With side and signed separation.
     pub const SIGNED: u32 = 2;
-    /// With the contacts within [`MARGIN`](super::MARGIN) besides, of a frame of rows.
+    /// Also with the contacts within [`MARGIN`](super::MARGIN), on a frame of rows.
     pub const CONTACTS: u32 = 4;
 }
 
 /// Words of a query: the axis' ends, the radius, 1 for a capsule and 0 for a sphere, the options ([`how`]), the warm
 /// start or `u32::MAX`, and the budget's node and triangle tests.
 pub const QUERY_WORDS: usize = 12;
-/// Words of an answer: its counts on the clock, then all fields of a [`Proximity`].
+/// Words of an answer: its counts on the clock, then the fields of a [`Proximity`], except for its side.
 pub const ANSWER_WORDS: usize = 24;
 /// Margin of the contacts, in mm.
 pub const MARGIN: f32 = 5.0;
@@ -239,7 +239,7 @@ fn ask(
     }
 }
 
-/// A separate function keeps the contacts out of the stack frame of modal surfaces.
+/// Asks for contacts. A separate function keeps their list out of the stack frame of queries on modal surfaces.
 #[inline(never)]
 fn contacts(
     query: &mut Query<'_, u16, STACK>,
@@ -261,7 +261,7 @@ fn timed(
     options: &Options,
     machine: &impl Machine,
 ) -> Result<[u32; ANSWER_WORDS], Fault> {
-    // Behind a pointer that is opaque to the compiler, as in a controller.
+    // As in a controller, the compiler must not see through the pointer.
     let rows = core::hint::black_box(rows);
     match table {
         Table::Rows if how & how::CONTACTS != 0 => contacts(query, rows, tool, options, machine),

@@ -10,6 +10,6 @@ pub const UNTAGGED: u32 = 1;
 pub const TAGGED: u32 = 2;
 /// The key.
 pub const KEY: [u8; 16] = *b"a key for a test";
-/// Words of an answer: packets; the counts of accepting them, in all and at most for one; the counts of checking and
-/// publishing, in all and at most for a slice.
+/// Words of an answer: the number of packets; the clock's counts for accepting them, their sum and the largest for one
+/// packet; the counts for checking and publishing, their sum and the largest for one slice.
 pub const ANSWER_WORDS: usize = 5;

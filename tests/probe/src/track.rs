@@ -16,14 +16,14 @@ pub mod command {
     pub const END: u32 = 0;
     /// The next frame: three `f32` for each of the tree's vertices.
     pub const FRAME: u32 = 1;
-    /// A tick: the surface (0 held, 1 interpolated, 2 extrapolated), its share of the way between frames, the
-    /// axis' ends and the capsule's radius. Answered by [`ANSWER_WORDS`](super::ANSWER_WORDS).
+    /// A tick: the surface (0 held, 1 interpolated), its share of the way between frames, the axis' ends and the
+    /// capsule's radius. Answered by [`ANSWER_WORDS`](super::ANSWER_WORDS).
     pub const TICK: u32 = 2;
 }
 
-/// Words of an answer: instructions of the tracker and of a whole query (warm, with measured stretch) on the clock, the
-/// tracker's node and triangle tests, its [`Fallback`] (0 for none), the places it has used, its separation, and the
-/// difference from the query's in units of the accuracy of both.
+/// Words of an answer: the clock's counts for the tracker and for a whole query (warm, with measured stretch), the
+/// tracker's node and triangle tests, its [`Fallback`] (0 for none), its used places of [`OPENED`], its separation, and
+/// the difference from the query's separation in units of both accuracies.
 pub const ANSWER_WORDS: usize = 8;
 /// Largest tree, in bytes.
 pub const TREE_BYTES: usize = 1 << 20;
@@ -33,7 +33,7 @@ const STACK: usize = 128;
 /// Opened nodes that the tracker remembers.
 pub const OPENED: usize = 184;
 
-/// Memory for a tree and three frames.
+/// Memory for a tree and two frames.
 pub struct Memory {
     tree: [u8; TREE_BYTES],
     frames: [[Vec3; VERTICES]; 2],
@@ -65,7 +65,7 @@ pub fn run(memory: &mut Memory, machine: &mut impl Machine) -> Result<(), Fault>
     let count = tree.vertex_count() as usize;
     let [before, after] = frames.each_mut().map(|rows| rows.get_mut(..count));
     let (mut before, mut after) = (before.ok_or(Fault)?, after.ok_or(Fault)?);
-    // Not moved: the board's stack has no room for a second one.
+    // The tracker is not moved: the board's stack has no room for a second one.
     let Ok(mut tracker) = Tracker::new(&tree) else { return Err(Fault) };
     let query = Query::new(&tree).map_err(|_| Fault)?;
     let mut session = Session { query, tracker: &mut tracker, last: None };

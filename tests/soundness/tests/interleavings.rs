@@ -1,5 +1,5 @@
-//! Every order in which one writer and one reader can see each other's steps, by the model checker loom:
-//! no frame is torn, none is lost, and nobody waits.
+//! Runs one writer and one reader in every order of their steps, by the model checker loom: no frame is torn, the
+//! last published frame is read, and neither end waits.
 #![cfg(loom)]
 
 use dibs_nostd::glam::Vec3;
@@ -9,9 +9,9 @@ use loom::thread;
 
 const VERTICES: usize = 1;
 
-/// A cell beside each buffer, touched when the buffer is. Positions are relaxed atomics, so that reading them while
-/// they are written is no data race, and loom lets no load see a later store: only here does it see that nothing orders
-/// a read before the next write. It reports that as a causality violation.
+/// A cell beside each buffer, touched together with it. Positions are relaxed atomics: to loom, a read during a write
+/// is no data race, and no load sees a later store. A cell's accesses must be ordered: loom reports an unordered read
+/// and write as a causality violation.
 struct Beside([UnsafeCell<()>; 2]);
 
 impl Beside {
@@ -24,7 +24,7 @@ impl Beside {
     }
 }
 
-/// A frame that carries its epoch everywhere, and the buffer that it is in.
+/// A label whose fields carry the frame's epoch and the number of its buffer.
 fn label(epoch: u32, buffer: usize) -> FrameLabel {
     let position_error = buffer as f32;
     FrameLabel { epoch, received: epoch + 100, position_error, stretch: None }
@@ -34,9 +34,9 @@ fn position(epoch: u32) -> Vec3 {
     Vec3::new(epoch as f32, epoch as f32 + 0.25, epoch as f32 + 0.5)
 }
 
-/// The writer publishes three frames, giving up a frame when the reader is in the way; the reader reads
-/// three times. Loom runs this in every order, and finds no read that is not ordered against every write of its buffer:
-/// weaken one of the four orderings of `Frames`, and it does.
+/// The writer publishes three frames, and gives up a frame that a read holds back; the reader reads three times. Loom
+/// runs this in every order. Every read is ordered against every write of its buffer: with a weaker ordering in
+/// `Frames`, loom finds one that is not.
 #[test]
 fn no_order_of_steps_tears_a_frame() {
     let orders = std::sync::Arc::new(std::sync::atomic::AtomicU32::new(0));
@@ -68,21 +68,21 @@ fn no_order_of_steps_tears_a_frame() {
                 let buffer = usize::from(position_error == 1.0);
                 assert_eq!(frame.label(), label(epoch, buffer), "the label is of one epoch");
                 beside.read(buffer);
-                assert_eq!(frame.position(0), Some(position(epoch)), "as is the position");
+                assert_eq!(frame.position(0), Some(position(epoch)), "so is the position");
                 assert!(epoch >= newest, "no frame is older than one that was read");
                 newest = epoch;
             }
         }
         let published = sender.join().expect("no panic");
         let last = reader.read().map_or(0, |frame| frame.label().epoch);
-        assert_eq!(last, published, "what was published last is what is read");
+        assert_eq!(last, published, "the frame published last is read");
     });
     let orders = orders.load(std::sync::atomic::Ordering::Relaxed);
     println!("interleavings: {orders}");
     assert!(orders > 100, "{orders}");
 }
 
-/// The same check on a buffer without the protocol finds the torn read: it can fail.
+/// The check can fail: on a buffer without the protocol it finds a torn read.
 #[test]
 #[should_panic(expected = "torn")]
 fn a_buffer_without_the_protocol_is_torn() {

@@ -1,5 +1,5 @@
-//! Faults put in on purpose, one for each sanitizer: `cargo xtask sanitize` runs them first, and fails unless
-//! they are found. They are undefined behaviour, so nothing else may run them.
+//! Planted faults, one for each sanitizer. `cargo xtask sanitize` runs them first, and fails unless they are found.
+//! They are undefined behaviour: nothing else may run them.
 #![cfg(not(loom))]
 
 use std::cell::UnsafeCell;
@@ -7,7 +7,7 @@ use std::hint::black_box;
 
 struct Shared(UnsafeCell<u32>);
 
-// SAFETY: not at all. This is the fault.
+// SAFETY: none. This is the fault.
 unsafe impl Sync for Shared {}
 
 #[test]
@@ -16,7 +16,7 @@ fn a_race() {
     static SHARED: Shared = Shared(UnsafeCell::new(0));
     let count = || {
         for _ in 0..1_000 {
-            // SAFETY: not at all. The other thread writes here at the same time.
+            // SAFETY: none. The other thread writes here at the same time.
             unsafe { *black_box(SHARED.0.get()) += 1 };
         }
     };
@@ -30,7 +30,7 @@ fn a_race() {
 #[ignore = "an access out of bounds on purpose, for the address sanitizer"]
 fn an_access_out_of_bounds() {
     let bytes = black_box(vec![1_u8; 16]);
-    // SAFETY: not at all. Index 16 is the first behind the end.
+    // SAFETY: none. Index 16 is the first behind the end.
     let behind = unsafe { *black_box(bytes.as_ptr()).add(16) };
     black_box(behind);
 }

@@ -11,10 +11,10 @@ use crate::method::Found;
 
 /// Most triangles of a leaf.
 const LEAF: usize = 6;
-/// Bins of the surface area heuristic, and the cost of a box test against a triangle test.
+/// Bins of the surface area heuristic, and the cost of a box test in triangle tests.
 const BINS: usize = 16;
 const BOX_COST: f32 = 1.0;
-/// Enough for trees that halve at least every other level; `new` checks the depth.
+/// Entries of the traversal's stack; `new` checks the tree's depth against them.
 const STACK: usize = 96;
 
 /// A box: its lowest and highest corner.
@@ -28,14 +28,14 @@ const NOTHING: Bounds = [Vec3A::INFINITY, Vec3A::NEG_INFINITY];
 pub struct Link {
     /// The first child, or the first triangle.
     pub first: u32,
-    /// 0 for an inner node, the triangles of a leaf, or [`DEFERRED`] and more: see the hybrid.
+    /// 0 for an inner node, a leaf's number of triangles, or [`DEFERRED`] and more for the hybrid's cuts.
     pub count: u32,
 }
 
 /// Counts from here on mark an inner node with outdated descendants.
 pub const DEFERRED: u32 = 1 << 31;
 
-/// The tree, its triangles in the order of the leaves, its vertices in the order of the triangles.
+/// The tree. Its triangles are in the order of the leaves, its vertices in the order of the triangles.
 #[derive(Clone)]
 pub struct AabbTree {
     pub(super) boxes: Vec<Bounds>,
@@ -44,7 +44,7 @@ pub struct AabbTree {
     /// The numbers of leaves and of inner nodes, ascending, so that a loop over either has no unpredictable branch.
     leaves: Vec<u32>,
     inner: Vec<u32>,
-    /// The vertices of each leaf, each once, and the start of each leaf's.
+    /// The vertices of each leaf, each once, and the start of each leaf's part.
     leaf_vertices: Vec<u32>,
     leaf_start: Vec<u32>,
 }
@@ -91,8 +91,8 @@ impl AabbTree {
         tree
     }
 
-    /// Refits a range of nodes that includes all their descendants: first leaves, then inner nodes from the last to the
-    /// first, so that children come before parents.
+    /// Refits a range of nodes that includes all their descendants. Leaves are first; inner nodes follow from the last
+    /// to the first, so that children come before parents.
     pub(super) fn refit(&mut self, nodes: Range<usize>) {
         let leaves = within(&self.leaves, &nodes);
         let mut start = self.leaf_start[leaves.start] as usize;
@@ -129,7 +129,7 @@ impl AabbTree {
         }
     }
 
-    /// The closest pair; `refresh` brings a deferred node's descendants up to date and returns its first child.
+    /// The closest pair. `refresh` refits the descendants of a deferred node and returns its first child.
     #[inline(always)]
     pub(super) fn closest<A: Axis>(
         &mut self,
@@ -167,7 +167,7 @@ impl<F: FnMut(&mut AabbTree, usize) -> u32> BoxTree for Refreshed<'_, F> {
     }
 }
 
-/// The places of a range's numbers in an ascending list.
+/// The range of an ascending list whose numbers are in `range`.
 fn within(numbers: &[u32], range: &Range<usize>) -> Range<usize> {
     let below = |limit: usize| numbers.partition_point(|&number| (number as usize) < limit);
     below(range.start)..below(range.end)

@@ -5,14 +5,14 @@ use glam::{Vec3, Vec3A};
 
 /// A tool whose axis' distance from boxes can be bounded.
 pub trait Axis: Tool {
-    /// The axis in the form for bounds, made once for each query.
+    /// The axis in the form for bounds.
     type Prepared: Copy;
 
-    /// Makes that form.
+    /// Makes that form, once for each query.
     fn prepare(&self) -> Self::Prepared;
 
-    /// A lower bound of the squared distance between the axis and the box: exact for a point; for a
-    /// segment rarely more than two percent below (or just known to be above `limit`).
+    /// A lower bound of the squared distance between the axis and the box. It is exact for a point. For a segment it is
+    /// rarely more than two percent below, unless it is above `limit`.
     fn bound(axis: &Self::Prepared, low: Vec3A, high: Vec3A, limit: f32) -> f32;
 }
 

@@ -19,7 +19,7 @@ pub enum Node {
 
 /// A tree of boxes.
 pub trait BoxTree {
-    /// A node, whose subtree is brought up to date.
+    /// A node, whose children's boxes are up to date.
     fn node(&mut self, node: u32) -> Node;
 
     /// A node's box: its lowest and highest corner.
@@ -29,7 +29,7 @@ pub trait BoxTree {
     fn corners(&self, triangle: usize) -> [Vec3; 3];
 }
 
-/// The closest pair. `STACK` is at least as deep as the tree.
+/// The closest pair. `STACK` must be at least the tree's depth.
 #[inline(always)]
 pub fn closest<A: Axis, T: BoxTree, const STACK: usize>(tree: &mut T, tool: &A) -> Found {
     let axis = tool.prepare();
@@ -91,7 +91,7 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// The mesh's triangles in this order.
+    /// The mesh's triangles in the order of `items`.
     #[must_use]
     pub fn new(mesh: &Mesh, items: &[u32]) -> Self {
         let mut row = vec![u32::MAX; mesh.positions.len()];

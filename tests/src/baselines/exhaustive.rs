@@ -1,4 +1,4 @@
-//! No tree: every triangle, with the kernels' early rejection.
+//! Exhaustive search without a tree, with the kernels' early rejection.
 
 use dibs_build::Mesh;
 use dibs_nostd::Tool;
@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use crate::method::{Found, Method, Probe};
 
-/// Every triangle at every query.
+/// A search of every triangle at every query.
 pub struct Exhaustive {
     triangles: Vec<[u32; 3]>,
     positions: Vec<Vec3>,

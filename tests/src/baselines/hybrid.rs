@@ -22,10 +22,10 @@ struct Cut {
     node: u32,
     first_child: u32,
     end: u32,
-    /// The vertices below: the rows from `rows.0` to `rows.1`, and others.
+    /// The vertices below the node: the rows from `rows.0` to `rows.1`, and others.
     rows: (u32, u32),
     others: Vec<u32>,
-    /// The frame that the descendants were refitted for.
+    /// The last frame for which the descendants were refitted.
     refitted: u64,
 }
 
@@ -61,7 +61,7 @@ impl Cut {
         let below = tree.descendants(node);
         let itself = node..node + 1;
         let vertices = tree.vertices_of(if below.is_empty() { &itself } else { &below });
-        // Rows are numbered in the order of the leaves, so most of a subtree's rows are one run at its end.
+        // Rows are numbered in the order of the leaves: most rows of a subtree are its last ones, and consecutive.
         let run = vertices.windows(2).rev().take_while(|pair| pair[0] + 1 == pair[1]).count() + 1;
         let (others, rows) = vertices.split_at(vertices.len() - run);
         Self {

@@ -1,5 +1,5 @@
-//! The paper's baselines, written to win: flat arrays in f32, SAH splits, one tight loop to
-//! refit, SIMD boxes, near child first, and the triangle kernels of the library under test.
+//! The paper's baselines, written to be fast: flat arrays in f32, SAH splits, one tight loop to refit, SIMD boxes, near
+//! child first, and the triangle kernels of the library under test.
 
 mod aabb_tree;
 pub mod bounds;

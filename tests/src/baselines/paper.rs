@@ -1,9 +1,9 @@
 //! The paper's search, for the counts of its tables 1 and 2.
 //!
-//! Recursive and depth first on a binary tree with one triangle a leaf. A node's bound is the separation of its pin
-//! less its radius; a leaf's radius is elastic, the largest distance now from its pin to its corners. Of two children
-//! the nearer comes first, and a child is entered while its bound is below the least separation so far. It has no upper
-//! bounds from pins, no planes, slack or warm starts, which are the library's.
+//! It is recursive and depth first, on a binary tree with one triangle a leaf. A node's bound is the separation of its
+//! pin less its radius; a leaf's radius is elastic, the largest distance now from its pin to its corners. Of two
+//! children the nearer comes first, and a child is entered while its bound is below the least separation so far. The
+//! library's upper bounds from pins, planes, slack and warm starts are absent.
 
 use dibs_build::BuiltTree;
 use dibs_nostd::format::Link;

@@ -1,5 +1,5 @@
-//! What an attacker without the key, or an accident without malice, tries on bus and sender: each of these
-//! once worked.
+//! Attacks on bus and sender by somebody without the key, and accidents of the same effect. Each of them once
+//! succeeded.
 
 use std::cell::Cell;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -48,7 +48,7 @@ fn status<M: Mac>(assembler: &mut Guarded<M>, now: u32, safety: u8) -> Vec<u8> {
     encode_status(MESH, &status, assembler.counters(), assembler.mac(), &mut [0; 256]).to_vec()
 }
 
-/// Packets there, packets back.
+/// A line without loss: packets to the receiver, and packets to the sender.
 #[derive(Clone, Default)]
 struct Pipe(Arc<Mutex<[Vec<Vec<u8>>; 2]>>);
 
@@ -97,7 +97,8 @@ impl<M: Mac + 'static> Source<M> {
         self.clock.store(u64::from(now), Ordering::Relaxed);
     }
 
-    /// A status, and what the sender says to it.
+    /// Gives the receiver's status to the sender, and the sender's packets to the receiver. Returns the outcome of the
+    /// sender's poll.
     fn hear(&mut self, assembler: &mut Guarded<M>, now: u32, safety: u8) -> Result<(), SendError> {
         self.set_clock(now);
         self.pipe.answer(&status(assembler, now, safety));
@@ -108,7 +109,7 @@ impl<M: Mac + 'static> Source<M> {
         heard
     }
 
-    /// Until the sender knows the receiver.
+    /// Gives statuses to the sender until it knows the receiver.
     fn meet(&mut self, assembler: &mut Guarded<M>, now: u32) {
         for _ in 0..4 {
             self.hear(assembler, now, 1).unwrap();
@@ -116,7 +117,7 @@ impl<M: Mac + 'static> Source<M> {
         assert!(self.sender.is_ready());
     }
 
-    /// A frame and all that comes of it: the epoch that was published.
+    /// Sends a frame, and does all work that follows. Returns the published epoch.
     fn frame(&mut self, assembler: &mut Guarded<M>, moment: u32, now: u32) -> Option<u32> {
         self.set_clock(now);
         self.sender.send(&surface(moment)).unwrap();
@@ -124,7 +125,7 @@ impl<M: Mac + 'static> Source<M> {
     }
 }
 
-/// Packets, and the checking in between: the epoch that was published.
+/// Gives packets to the receiver, with checking in between. Returns the published epoch.
 fn deliver<M: Mac>(assembler: &mut Guarded<M>, packets: &[Vec<u8>], now: u32) -> Option<u32> {
     let mut published = None;
     for packet in packets {
@@ -138,7 +139,7 @@ fn keyed(challenge: u32) -> AesCmac {
     AesCmac::new(&KEY, RECEIVER, challenge)
 }
 
-/// Whoever has recorded the begin of one unfinished frame replays it behind every later begin.
+/// An attacker has recorded the begin of an unfinished frame, and replays it after every later begin.
 #[test]
 fn a_replayed_begin_displaces_nothing() {
     let (mut assembler, _reader) = guarded(mac());
@@ -167,8 +168,8 @@ fn a_replayed_begin_displaces_nothing() {
     assert_eq!(assembler.health().rejections, 0, "replays are no trouble of the line");
 }
 
-/// The receiver has frames of the sender's own session that the sender has not sent: of an earlier run of
-/// it, or one that somebody made up, 2^31 - 1 ahead.
+/// The receiver has published a frame of the sender's session that the sender has not sent: one of its earlier run, or
+/// one that somebody made up, 2^31 - 1 epochs ahead. The sender moves to the next session.
 #[test]
 fn a_sender_is_not_locked_out_of_its_session() {
     for ahead in [5000, i32::MAX as u32] {
@@ -191,7 +192,7 @@ fn a_sender_is_not_locked_out_of_its_session() {
     }
 }
 
-/// The later sender wins, and the other one is told: they never alternate.
+/// The later of two senders wins, and the earlier one is told to stop: frames of both never alternate.
 #[test]
 fn of_two_senders_one_is_told_to_stop() {
     let (mut assembler, _reader) = guarded(mac());
@@ -215,7 +216,7 @@ fn of_two_senders_one_is_told_to_stop() {
     assert_eq!(assembler.published().map(|id| id.session), Some(101));
 }
 
-/// Recorded statuses of this run and of an earlier one show the sender nothing.
+/// Recorded statuses, of this run and of an earlier one, change nothing in the sender.
 #[test]
 fn recorded_statuses_are_not_believed() {
     let (mut assembler, _reader) = guarded(mac());
@@ -243,14 +244,14 @@ fn recorded_statuses_are_not_believed() {
         let published = deliver(&mut assembler, &source.pipe.sent(), 20 * n);
         assert!(published.is_some(), "the challenge is still the receiver's");
     }
-    // A receiver that has really started anew is believed, once it answers.
+    // A receiver that really started anew is believed, once it answers the sender's hello.
     let (mut anew, _reader) = guarded(keyed(78));
     source.set_clock(9999);
     source.meet(&mut anew, 9999);
     assert!(source.frame(&mut anew, 3, 10_000).is_some());
 }
 
-/// Somebody holds every packet back for ten minutes, or only the statuses.
+/// A delay of ten minutes, of the frames or of the statuses, shows in the transit time.
 #[test]
 fn delay_shows_whoever_is_delayed() {
     for (frames_late, statuses_late) in [(0, 0), (600_000, 0), (0, 600_000)] {
@@ -258,7 +259,7 @@ fn delay_shows_whoever_is_delayed() {
         let mut source = Source::new(9, keyed);
         source.meet(&mut assembler, 0);
         let start = 1_000_000;
-        // The sender has heard the status of `heard`, and sends at `start`.
+        // The sender has last heard a status made at `heard`, and sends at `start`.
         let heard = start - 30 - statuses_late;
         source.hear(&mut assembler, heard, 1).unwrap();
         source.set_clock(start);
@@ -273,7 +274,7 @@ fn delay_shows_whoever_is_delayed() {
         let age = assembler.status(start + 2 + frames_late + 5, 1).published.unwrap().age_ms;
         assert_eq!(age, 12 + 5, "the age counts from the capture");
     }
-    // A sender that heard nothing, and one that echoes what this receiver has not said yet.
+    // A sender that heard no status, and senders that echo a clock which this receiver has not reached.
     for echo in [None, Some(1001), Some(1 << 31)] {
         let (mut assembler, _reader) = guarded(mac());
         for packet in tagged(id(1), &surface(1), Freshness { age_ms: 3, echo }) {
@@ -284,7 +285,7 @@ fn delay_shows_whoever_is_delayed() {
     }
 }
 
-/// The source stands still while its sender lives.
+/// The source repeats its last frame, while its sender goes on sending.
 #[test]
 fn a_frozen_source_grows_old() {
     let (mut assembler, mut reader) = guarded(NoMac);
@@ -303,15 +304,16 @@ fn a_frozen_source_grows_old() {
     assert_eq!(assembler.health().source_age, 0);
 }
 
-/// Two frames of one name, both with genuine tags, mixed so that their public digests agree: the sums
-/// that the receiver compares are not those.
+/// Two frames of one session and epoch, both with genuine tags, are mixed. The mixture is refused: the digest sums
+/// shares that nobody without the key can compute.
 #[test]
 fn two_frames_of_one_name_are_not_spliced() {
     let rows: [Vec<Vec3>; 2] = [surface(1), surface(500)];
     let [a, b] = rows.map(|rows| tagged(id(1), &rows, Freshness::default()));
     assert_eq!(a[0], b[0], "the begins are the same");
     let last = a.len() - 1;
-    // Checksums, and their scrambled form: what anybody can compute. Every mixture of twelve packets.
+    // Checksums and their scrambled form are public. For each, the mixture of twelve packets with the least sum of
+    // changes is tried.
     for public in [checksum, share] {
         let mixtures = 1_u32..1 << 12;
         let closest = mixtures.min_by_key(|mixture| {
@@ -329,7 +331,7 @@ fn two_frames_of_one_name_are_not_spliced() {
         assert!(matches!(outcome, Err(ReceiveError::Digest { .. })), "{outcome:?}");
         assert!(published(&mut reader).is_none());
     }
-    // The share that travels nowhere is what the digest sums.
+    // The digest sums the shares, which are in no packet.
     let code = |i: usize| mac().code(Direction::ToReceiver, 1, &a[i][..a[i].len() - 10]);
     let sum = (0..last).fold(0_u32, |sum, i| sum.wrapping_add(code(i).share));
     assert_eq!(a[last][18..22], sum.to_le_bytes());
@@ -339,7 +341,7 @@ fn two_frames_of_one_name_are_not_spliced() {
     }
 }
 
-/// A packet for one receiver is a forgery to another, and one direction's to the other.
+/// The same packet has another tag for another receiver, and another for the other direction.
 #[test]
 fn keys_differ_by_receiver_and_direction() {
     let packet = [7; 40];
@@ -355,7 +357,7 @@ fn keys_differ_by_receiver_and_direction() {
     }
 }
 
-/// One fault is one rejection to the fail-safe machine, however many packets it takes with it.
+/// The fail-safe machine counts one rejection for a fault, however many packets are rejected with it.
 #[test]
 fn a_frame_counts_once() {
     let (mut assembler, _reader) = bus();
@@ -363,20 +365,20 @@ fn a_frame_counts_once() {
     for packet in frame(1, true) {
         give(&mut assembler, &packet).unwrap();
     }
-    // The begin is lost, and everything behind it is unexpected.
+    // The begin is lost, and every packet after it is unexpected.
     for packet in &frame(2, true)[1..] {
         give(&mut assembler, packet).unwrap_err();
     }
     assert_eq!(rejections(&assembler), 1);
     assert!(assembler.counters().rejected() > 5);
-    // So is the next, whose begin is damaged rather than lost, and its packets come twice.
+    // The next frame's begin is damaged, and its packets come twice.
     let mut third = frame(3, true);
     third[0][30] ^= 1;
     for packet in third.iter().chain(&third) {
         give(&mut assembler, packet).unwrap_err();
     }
     assert_eq!(rejections(&assembler), 2);
-    // Other meshes and what is over do not count, nor does one packet that is replayed for ever.
+    // Packets of other meshes and of past frames do not count, however often they are repeated.
     let other = FrameId { mesh_id: MESH ^ 1, ..id(9) };
     let rows = surface(9);
     let foreign = collect(FrameEncoder::<_, 64>::new(other, Encoding::Float, &rows[..]).unwrap());
@@ -386,16 +388,16 @@ fn a_frame_counts_once() {
         }
     }
     assert_eq!(rejections(&assembler), 2);
-    // A damaged line without a single good packet: once.
+    // A damaged line, without a good packet.
     for _ in 0..9 {
         give(&mut assembler, &[0; 64]).unwrap_err();
     }
-    assert_eq!(rejections(&assembler), 2, "the frames counted last may be those");
+    assert_eq!(rejections(&assembler), 2, "the damage may be of the frames counted last");
     for packet in frame(5, true) {
         give(&mut assembler, &packet).unwrap();
     }
     assert_eq!(rejections(&assembler), 0);
-    // Recordings of what is over, before anything else went wrong.
+    // Recordings of past frames, before any other fault.
     for packet in frame(5, true).iter().chain(&frame(1, true)) {
         give(&mut assembler, packet).unwrap_err();
     }
@@ -407,7 +409,7 @@ fn a_frame_counts_once() {
     assert_eq!(assembler.health().forgeries, 0);
 }
 
-/// A MAC that counts its work.
+/// A MAC that counts its calls.
 struct Counting(AesCmac, Cell<u32>);
 
 impl Mac for &Counting {
@@ -423,7 +425,7 @@ impl Mac for &Counting {
     }
 }
 
-/// Forgeries have a count of their own, and cost one code each.
+/// Forgeries have a count of their own, and the receiver computes one code for each.
 #[test]
 fn a_forgery_is_verified_once_and_counted_apart() {
     let counting = Box::leak(Box::new(Counting(mac(), Cell::new(0))));
@@ -448,7 +450,7 @@ fn a_forgery_is_verified_once_and_counted_apart() {
     assert_eq!(assembler.health().forgeries, 0);
 }
 
-/// A sender that died, of which somebody repeats a packet or says hello.
+/// The sender has died, and somebody repeats its packets or says hello in its name.
 #[test]
 fn repetitions_are_no_sign_of_life() {
     let (mut assembler, _reader) = bus();

@@ -1,4 +1,4 @@
-//! Packets with tags: without the right key nothing is published, replays and forgeries are counted.
+//! Packets with tags: without the right key nothing is published; replays and forgeries are counted.
 
 use dibs_nostd::wire::{
     AesCmac, Body, Counters, Encoding, Event, FrameEncoder, FrameId, Mac, NoMac, Packet, Status,
@@ -60,7 +60,7 @@ fn everything_fits_a_can_message() {
     assert_eq!(packets, 4, "nine weights");
 }
 
-/// Each bit of each packet of a frame, with a checksum that was made right again.
+/// Flips each bit of the begin, of a packet of rows and of the commit, under a right checksum.
 #[test]
 fn no_changed_bit_passes() {
     let packets = tagged(1, 1, &mac());
@@ -77,7 +77,7 @@ fn no_changed_bit_passes() {
             assert!(outcome.is_err(), "bit {bit} of packet {which}: {outcome:?}");
         }
         assert!(assembler.counters().of(Event::Forged) >= 60);
-        // The genuine ones are still taken.
+        // The genuine packets are still taken.
         let mut last = None;
         for packet in &packets[which..] {
             last = give(&mut assembler, packet).unwrap();
@@ -87,7 +87,7 @@ fn no_changed_bit_passes() {
     }
 }
 
-/// Another key, another challenge, none at all.
+/// Packets under another key, another challenge or another receiver's id, or without tags.
 #[test]
 fn without_key_and_challenge_nothing_is_published() {
     let wrong_key = AesCmac::new(b"0123456789abcdeF", RECEIVER, CHALLENGE);
@@ -105,7 +105,7 @@ fn without_key_and_challenge_nothing_is_published() {
         for packet in &packets[1..] {
             assert_eq!(give(&mut assembler, packet), Err(ReceiveError::Unexpected { epoch: 1 }));
         }
-        // Within a genuine frame too.
+        // Forgeries within a genuine frame are refused too.
         let genuine = tagged(1, 1, &mac());
         give(&mut assembler, &genuine[0]).unwrap();
         for packet in &packets {
@@ -123,7 +123,7 @@ fn without_key_and_challenge_nothing_is_published() {
     assert_eq!(give(&mut open, &tagged(1, 1, &mac())[0]), Err(ReceiveError::Forged { epoch: 1 }));
 }
 
-/// Everything that was ever sent, sent again in any order: no frame comes back.
+/// All packets that were ever sent are sent again: no frame comes back.
 #[test]
 fn recordings_are_worth_nothing() {
     let (mut assembler, mut reader) = guarded();
@@ -145,7 +145,7 @@ fn recordings_are_worth_nothing() {
         assert_eq!(refused as usize, recorded.len());
         assert_eq!(assembler.published(), Some(name));
     }
-    // Nor to a receiver that has started again, with another challenge.
+    // A receiver that started again has another challenge, and takes none of them.
     let frames = Frames::<N>::new();
     let (writer, _reader) = frames.split().unwrap();
     let other = mac().with_challenge(CHALLENGE + 1);
@@ -156,7 +156,7 @@ fn recordings_are_worth_nothing() {
     assert_eq!(restarted.published(), None);
 }
 
-/// A packet of a frame with the same epoch, sequence and lower half of the session.
+/// A packet of another frame, with the same epoch, sequence and lower half of the session, is a forgery.
 #[test]
 fn the_whole_session_is_under_the_tag() {
     let (mut assembler, _) = guarded();
@@ -197,7 +197,7 @@ fn heartbeats_and_statuses_are_under_the_tag() {
     assert!(!Packet::decode(&plain).unwrap().is_genuine(&mac(), 0));
 }
 
-/// The challenge is that of the key in use, by value or by reference; without a key it is 0.
+/// The challenge is the one of the MAC in use, by value or by reference; without a MAC it is 0.
 #[test]
 fn a_status_states_the_challenge_in_use() {
     assert_eq!(mac().challenge(), CHALLENGE);
@@ -207,7 +207,7 @@ fn a_status_states_the_challenge_in_use() {
 }
 
 proptest! {
-    /// Guessed tags, and any bytes at all.
+    /// Guessed tags, and any bytes.
     #[test]
     fn guesses_are_forgeries(
         tags in prop::collection::vec(any::<[u8; TAG_BYTES]>(), 1..20),

@@ -1,4 +1,4 @@
-//! `docs/black-channel.md` against the tests that it names and the arithmetic that it shows.
+//! Checks `docs/black-channel.md`: the tests that it names exist, and the arithmetic that it shows is right.
 
 use std::fmt::Write;
 use std::fs;
@@ -6,7 +6,7 @@ use std::path::Path;
 
 use dibs_nostd::format::CRC;
 
-/// Vertices of the heart, rows of a packet of 1,024 bytes without and with a tag, and the rates.
+/// The page's assumptions: vertices of the heart, rows of a packet of 1,024 bytes without and with a tag, and rates.
 const VERTICES: u32 = 5_138;
 const ROWS: [u32; 2] = [(1024 - 22) / 6, (1024 - 28) / 6];
 const FRAMES_A_SECOND: f64 = 40.0;
@@ -16,7 +16,7 @@ const HOUR: f64 = 3_600.0;
 /// 1 % of the allowance of a function of SIL 3.
 const ALLOWANCE_AN_HOUR: f64 = 1e-9;
 
-/// A number of thousands.
+/// A number between 1,000 and 999,999, with a comma.
 fn grouped(number: u32) -> String {
     format!("{},{:03}", number / 1_000, number % 1_000)
 }
@@ -54,7 +54,7 @@ fn arithmetic() -> String {
     text
 }
 
-/// Which comparison with the allowance holds for which rate, as the page says.
+/// The page compares each rate with the allowance.
 #[test]
 fn the_rates_compare_with_the_allowance_as_the_page_says() {
     let text = arithmetic();
@@ -71,7 +71,7 @@ fn the_rates_compare_with_the_allowance_as_the_page_says() {
     assert!(!is_below("with a key, 10,000 forgeries a second: a false heartbeat"));
 }
 
-/// What each single flipped bit of a packet does to the remainder of the checksum.
+/// The change of the checksum's remainder by each single flipped bit of a packet.
 fn syndromes(bytes: usize) -> Vec<u32> {
     let mut packet = vec![0; bytes - 4];
     let undamaged = CRC.checksum(&packet);
@@ -84,7 +84,8 @@ fn syndromes(bytes: usize) -> Vec<u32> {
     syndromes
 }
 
-/// Damage is missed where the syndromes of its bits cancel: no two, three or four do.
+/// Damage is missed where the syndromes of its bits cancel. No two or three cancel in a packet of 1,024 bytes, and no
+/// four in one of 375.
 #[test]
 fn the_checksum_finds_as_many_flips_as_the_page_says() {
     let mut singles = syndromes(1024);
@@ -106,7 +107,7 @@ fn the_checksum_finds_as_many_flips_as_the_page_says() {
     assert!(pairs.windows(2).all(|two| two[0] != two[1]), "four bits");
 }
 
-/// The guarantees contain the page, of this one source.
+/// The guarantees repeat the page's tables and arithmetic.
 #[test]
 fn the_guarantees_show_the_black_channel() {
     let guarantees = include_str!("../../../docs/guarantees.md");

@@ -1,4 +1,4 @@
-//! Every way to be rejected: named by its cause, counted once, and without a trace.
+//! Rejections: each names its cause, is counted once and leaves no trace.
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
@@ -15,7 +15,7 @@ fn edit(packet: &[u8], at: usize, value: &[u8]) -> Vec<u8> {
     reseal(packet)
 }
 
-/// What a fault within frame 1 is rejected as, after its begin and third packet have come.
+/// The rejection of a fault within frame 1, after its begin and packet 3.
 fn rejection_of(fault: &[u8]) -> ReceiveError {
     let good = frame(1, false);
     let (mut assembler, mut reader) = bus();
@@ -144,7 +144,7 @@ fn what_is_a_packet_and_not_right() {
         let fault = edit(vertices, 15, &u32::to_le_bytes(first)[..3]);
         rejected(&fault, ReceiveError::OutOfRange { first, count: 3 });
     }
-    // Packet 3 has come, with rows 6 to 8: in packet 2 there is room for rows 3 to 5 only.
+    // Packet 3 has brought rows 6 to 8, so packet 2 can only have rows 3 to 5.
     for first in [0, 2, 4, 5, 6, 7, 9, 20] {
         let fault = edit(&good[2], 15, &u32::to_le_bytes(first)[..3]);
         rejected(&fault, ReceiveError::Order { sequence: 2 });
@@ -162,7 +162,7 @@ fn what_is_a_packet_and_not_right() {
     rejected(&raw_begin(1, 2, 1, N as u32, 1), ReceiveError::Base { epoch: 1 });
 }
 
-/// A quantisation box may reach beyond the receiver's limit, a vertex may not.
+/// A quantisation box may reach beyond the receiver's limit on coordinates; a vertex may not.
 #[test]
 fn a_box_may_be_larger_than_the_surface() {
     let coarse = QuantisedBox::new(Vec3::splat(-60.0), Vec3::splat(0.1)).unwrap();
@@ -192,7 +192,7 @@ fn packets_beyond_the_commit_do_not_belong() {
         let outcome = give(&mut assembler, packet);
         match sequence {
             1 => assert_eq!(outcome, Ok(None)),
-            // With it the frame would be complete, but the digest is that of all packets.
+            // The frame would be complete, but the commit's digest is the one of all packets.
             2 => assert!(matches!(outcome, Err(ReceiveError::Digest { .. }))),
             _ => assert_eq!(outcome, Err(ReceiveError::Unexpected { epoch: 1 })),
         }
@@ -205,7 +205,7 @@ fn packets_beyond_the_commit_do_not_belong() {
         give(&mut again, commit),
         Err(ReceiveError::Order { sequence: good.len() as u16 - 1 })
     );
-    // Or last.
+    // The same commit comes last.
     let (mut last, _) = bus();
     for packet in others {
         give(&mut last, packet).unwrap();
@@ -216,7 +216,7 @@ fn packets_beyond_the_commit_do_not_belong() {
     assert!(published(&mut reader).is_none());
 }
 
-/// A frame that ends early, with a digest that is right.
+/// A frame that ends early, with a right digest.
 #[test]
 fn a_frame_without_its_last_rows_is_not_published() {
     let good = frame(1, false);
@@ -235,7 +235,7 @@ fn a_frame_without_its_last_rows_is_not_published() {
     assert_eq!(give(&mut assembler, &good[1]), Err(ReceiveError::Unexpected { epoch: 1 }));
 }
 
-/// Every second packet: more gaps than can be noted.
+/// Every second packet of a frame is lost: more gaps than the receiver can note.
 #[test]
 fn gaps_are_bounded() {
     let positions: Vec<Vec3> = (0..200).map(|i| Vec3::splat(i as f32 * 0.01)).collect();
@@ -254,7 +254,7 @@ fn gaps_are_bounded() {
     let gaps = packets.len() / 2 - 1 - refused.len();
     assert!((5..=20).contains(&gaps), "{gaps} gaps are noted");
     assert_eq!(assembler.counters().of(Event::Gaps) as usize, refused.len());
-    // Everything comes again, in order, until nothing is missing.
+    // All packets come again, in order, until none is missing.
     let published = packets.iter().find_map(|packet| give(&mut assembler, packet).unwrap());
     assert_eq!(published, Some(1));
     let frame = reader.read().expect("complete");

@@ -1,4 +1,4 @@
-//! The bus: packets, COBS, and the assembler that publishes complete, right frames only.
+//! The bus: packets, COBS, and the assembler, which publishes only complete and right frames.
 
 use std::cell::Cell;
 use std::rc::Rc;
@@ -64,7 +64,7 @@ fn a_packet_has_one_meaning_at_every_transport_unit() {
     }
 }
 
-/// Exhaustive: each bit, and each pair of bits, of each kind of packet.
+/// Flips each bit, and each pair of bits, of the begin, of packets of rows and of the commit.
 #[test]
 fn one_or_two_flipped_bits_are_always_detected() {
     for quantised in [false, true] {
@@ -102,8 +102,8 @@ fn a_frame_without_any_one_of_its_packets_is_not_published() {
     }
 }
 
-/// A sender that starts again within a frame, and numbers its frames from the same epoch: whatever
-/// is lost of its packets, the mixture is not published.
+/// A sender starts again within a frame, and numbers its frames from the same epoch: a mixture of both frames is not
+/// published.
 #[test]
 fn two_frames_of_one_epoch_are_never_mixed() {
     let (old, new) = (surface(1), surface(500));
@@ -137,7 +137,7 @@ fn two_frames_of_one_epoch_are_never_mixed() {
     assert_eq!(assembler.counters().of(Event::Abandoned), 1);
 }
 
-/// Refuses while it is told to.
+/// A gate that refuses complete surfaces while the cell is true.
 struct Refuse(Rc<Cell<bool>>);
 
 impl Gate for Refuse {
@@ -172,7 +172,7 @@ fn a_refused_surface_is_not_published_and_the_last_one_stays() {
             assert_eq!(give(&mut assembler, packet), Ok(None));
         }
         if refuse {
-            // The rows are all there: there is no need to wait for the commit.
+            // All rows have come: the check need not wait for the commit.
             let rejection = give(&mut assembler, last).unwrap_err();
             assert_eq!(rejection, ReceiveError::Stretch(StretchError::NoMetric));
             assert_eq!(assembler.advance(1), Ok(Advance::Idle), "the frame is gone");
@@ -189,7 +189,7 @@ fn a_refused_surface_is_not_published_and_the_last_one_stays() {
     assert_eq!(assembler.counters().of(Event::Stretch), 1);
 }
 
-/// Counts the triangles that it was given to check, and takes its time.
+/// A gate that takes 100 units of work for a frame, and counts its calls.
 struct Slow {
     left: u32,
     began: Rc<Cell<u32>>,
@@ -224,7 +224,7 @@ impl Gate for Slow {
     }
 }
 
-/// The check runs along with the packets, and a complete frame is not given up for a newer one.
+/// The check runs between the packets, and a complete frame is not given up for a newer one.
 #[test]
 fn a_frame_is_checked_in_slices_and_then_published() {
     let [began, moved, done] = [(); 3].map(|()| Rc::new(Cell::new(0)));
@@ -240,7 +240,7 @@ fn a_frame_is_checked_in_slices_and_then_published() {
     let next = frame(2, false);
     assert_eq!(assembler.accept(&next[0], 0), Err(ReceiveError::Busy { epoch: 2 }));
     assert_eq!(assembler.accept(&next[1], 0), Err(ReceiveError::Unexpected { epoch: 2 }));
-    // 100 triangles, of which 2 for each packet are checked.
+    // 2 of 100 units of work were done after each packet.
     let left = 100 - 2 * packets.len() as u32;
     for _ in 0..left / 2 - 1 {
         assert_eq!(assembler.advance(2), Ok(Advance::Pending));
@@ -269,7 +269,7 @@ fn a_frame_that_meets_a_read_is_held_and_published_later() {
     drop(guard);
     assert_eq!(assembler.advance(9), Ok(Advance::Published { epoch: 2 }));
     assert_eq!(published(&mut reader).unwrap().0, 2);
-    // Or when the next frame begins.
+    // The next frame's begin publishes a held frame, too.
     let guard = reader.read().unwrap();
     for packet in frame(3, false) {
         assembler.accept(&packet, 0).unwrap();

@@ -1,4 +1,4 @@
-//! The receiver against models so small that every case can be tried.
+//! The receiver on surfaces so small that every case can be tried.
 
 use std::collections::BTreeMap;
 
@@ -17,16 +17,16 @@ fn receiver<const R: usize>(
     (Assembler::new(writer, Unchecked, MESH, 1e3), reader)
 }
 
-/// What the specification says of a line without damage, by sets instead of runs.
+/// A model of the specification for a line without damage: it keeps the set of packets that have come.
 #[derive(Default)]
 struct Model {
     published: Option<u32>,
-    /// Epoch, packets that have come, and when the last of them was taken.
+    /// Epoch, the packets that have come, and the time of the last one taken.
     frame: Option<(u32, [bool; 5], u32)>,
 }
 
 impl Model {
-    /// Packet `which` of a frame: 0 begins, 1 to 3 have rows, 4 commits. The epoch that is published.
+    /// Takes packet `which` of a frame: 0 is the begin, 1 to 3 have rows, 4 is the commit. Returns the published epoch.
     fn take(&mut self, epoch: u32, which: usize, now: u32) -> Option<u32> {
         if self.published.is_some_and(|published| epoch <= published) {
             return None;
@@ -52,8 +52,8 @@ impl Model {
     }
 }
 
-/// Every sequence of six packets out of those of two frames, and what follows when the rest of the
-/// later one comes: the receiver publishes exactly what the model does, and only whole frames.
+/// Sends every sequence of six packets of two frames, then the later frame. The receiver publishes exactly the model's
+/// frames, and only whole ones.
 #[test]
 fn every_sequence_of_packets_of_two_frames() {
     let positions = |epoch: u32| [Vec3::splat(epoch as f32); ROWS];
@@ -69,9 +69,9 @@ fn every_sequence_of_packets_of_two_frames() {
         let (mut assembler, mut reader) = receiver(&buffers);
         let mut model = Model::default();
         let digits = (0..6).map(|place| case / 10_u32.pow(place) % 10);
-        // Then the later frame again, and once more from its begin.
+        // The later frame follows: first without its begin, then whole.
         for (place, letter) in (0..).zip(digits.chain([6, 7, 8, 9, 5, 6, 7, 8, 9])) {
-            // Three packets that are not taken, and a frame has stood still.
+            // After three packets that it does not take, an unfinished frame may be displaced (100 ms).
             let now = 40 * place;
             let (epoch, which) = (letter / 5 + 1, (letter % 5) as usize);
             let packet = &frames[letter as usize / 5][which];
@@ -97,13 +97,13 @@ fn every_sequence_of_packets_of_two_frames() {
     println!("{cases} sequences, {publications} publications");
 }
 
-/// A sender that makes everything up, and gets every checksum and digest right: any first rows, counts
-/// and sequence numbers. Whatever it does, a row that it did not send is not published.
+/// A sender makes up first rows, counts and sequence numbers, with right checksums and digests. Every published row was
+/// sent exactly once.
 #[test]
 fn no_row_that_was_not_sent_is_published() {
     const SMALL: usize = 3;
     let begin = raw_begin(1, 1, 0, SMALL as u32, 0);
-    // Sequence 1 to 3; every run of rows.
+    // Sequence numbers 1 to 3, with every range of rows.
     let mut letters = Vec::new();
     for sequence in 1..=3_u16 {
         for first in 0..SMALL as u32 {

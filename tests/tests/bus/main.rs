@@ -1,4 +1,4 @@
-//! Packets to frames: every loss, order, damage and attack.
+//! From packets to frames: losses, orders, damage and attacks.
 
 mod attacks;
 mod authenticity;

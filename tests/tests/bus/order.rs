@@ -1,4 +1,4 @@
-//! Which frame comes after which: sessions, epochs, heartbeats, statuses, and every wrap of a counter.
+//! The order of frames, heartbeats and statuses: sessions, epochs, and the wraps of their counters.
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
@@ -17,7 +17,7 @@ fn frame_of(session: u32, epoch: u32) -> Vec<Vec<u8>> {
     collect(FrameEncoder::<_, 64>::new(id, Encoding::Float, &positions[..]).unwrap())
 }
 
-/// The last thing that came of a frame.
+/// Sends a frame. Returns the outcome of its last packet.
 fn send(assembler: &mut Bus, session: u32, epoch: u32) -> Result<Option<u32>, ReceiveError> {
     let mut last = Ok(None);
     for packet in frame_of(session, epoch) {
@@ -36,7 +36,7 @@ fn epochs_wrap() {
     let mut bus = bus();
     for epoch in [u32::MAX - 1, u32::MAX, 0, 1, 0x7FFF_FFFF, 0xFFFF_FFFE_u32, 5] {
         assert_eq!(send(&mut bus, 1, epoch), Ok(Some(epoch)));
-        // The same again, an older one, and the one just too far ahead.
+        // The same epoch, older ones, and the nearest one that is too far ahead.
         for stale in
             [epoch, epoch.wrapping_sub(1), epoch.wrapping_sub(0x7FFF_FFFF), epoch ^ (1 << 31)]
         {
@@ -48,8 +48,7 @@ fn epochs_wrap() {
     }
 }
 
-/// A sender that starts again is believed at its first frame, whatever its epochs; one with an earlier
-/// session is not, whatever its epochs.
+/// A frame of a later session is taken whatever its epoch; a frame of an earlier session is refused whatever its epoch.
 #[test]
 fn sessions_supersede_and_wrap() {
     let mut bus = bus();
@@ -69,7 +68,7 @@ fn sessions_supersede_and_wrap() {
     }
 }
 
-/// Sessions of which only the upper halves differ: packets have the lower one.
+/// Sessions whose upper halves differ: a packet of rows carries only the lower half.
 #[test]
 fn sessions_are_told_apart_by_both_halves() {
     let mut bus = bus();
@@ -78,7 +77,7 @@ fn sessions_are_told_apart_by_both_halves() {
     let new = frame_of(0x0002_0005, 9);
     give(&mut bus.0, &new[0]).unwrap();
     give(&mut bus.0, &new[1]).unwrap();
-    // A packet of the old session comes late: the digest tells.
+    // A late packet of the old session is stored; the digest shows it.
     give(&mut bus.0, &old[2]).unwrap();
     for packet in &new[3..new.len() - 1] {
         give(&mut bus.0, packet).unwrap();
@@ -98,7 +97,7 @@ fn a_newer_frame_supersedes_an_unfinished_one() {
         }
         assert_eq!(bus.0.accept(&second[0], 0), Ok(Progress::Begun { epoch }));
         assert_eq!(bus.0.counters().of(Event::Abandoned), 1);
-        // What is left of the first is of no use any more, not even its begin.
+        // The rest of the first frame is refused, also its begin.
         assert_eq!(give(&mut bus.0, &first[0]), Err(ReceiveError::Stale { epoch: 1 }));
         if epoch != 1 {
             assert_eq!(give(&mut bus.0, &first[5]), Err(ReceiveError::Unexpected { epoch: 1 }));
@@ -110,7 +109,7 @@ fn a_newer_frame_supersedes_an_unfinished_one() {
     }
 }
 
-/// A begin from the far future, of which nothing more comes, costs the frames of a tenth of a second.
+/// A begin from the far future without further packets holds the line up for a tenth of a second.
 #[test]
 fn a_stray_begin_does_not_block_the_line() {
     for (session, epoch) in [(1, 0x3000_0000), (0x4000_0000, 7)] {
@@ -129,7 +128,7 @@ fn a_stray_begin_does_not_block_the_line() {
             assert!(send_at(&mut bus, epoch, after).is_err());
         }
         assert_eq!(send_at(&mut bus, 7, 100), Ok(Some(7)));
-        // While its packets come, it stays.
+        // While its packets come, a frame is not displaced.
         let ahead = frame_of(session, epoch);
         for (place, packet) in (3..).zip(&ahead[..ahead.len() - 1]) {
             let now = start.wrapping_add(90 * place);
@@ -142,7 +141,7 @@ fn a_stray_begin_does_not_block_the_line() {
     }
 }
 
-/// A frame of as many packets as the sequence can number, and one more row.
+/// A frame of as many packets as the sequence can number is sent; with one row more it is refused.
 #[test]
 fn the_sequence_is_used_up_to_its_end() {
     const ROWS: usize = 3 * 65_534;
@@ -185,13 +184,13 @@ fn heartbeats_are_in_order_and_wrap() {
         }
         assert_eq!(assembler.last_heartbeat(), Some(last));
     }
-    // A later session starts to count anew, an earlier one is not heard.
+    // A later session counts from its own start; an earlier one is refused.
     assert_eq!(assembler.accept(&heartbeat(4, 1, 0), 1), Ok(Progress::Heartbeat));
     assert_eq!(assembler.accept(&heartbeat(3, 99, 10), 1), Err(ReceiveError::Stale { epoch: 99 }));
     assert_eq!(assembler.counters().of(Event::Heartbeat), 5);
 }
 
-/// Heartbeats of a session from nowhere are believed until the sender publishes, not longer.
+/// Heartbeats of an unknown session are believed until the sender's next frame is published.
 #[test]
 fn a_published_frame_decides_whose_heartbeats_count() {
     let mut bus = bus();
@@ -224,7 +223,7 @@ fn a_status_says_what_was_published() {
     assert_eq!(ages, [0x8000_0000 - 100, u32::MAX - 100, u32::MAX, u32::MAX, u32::MAX]);
 }
 
-/// Every counter arrives after a few statuses, and the packets are read back as they were written.
+/// A few statuses carry every counter, and are decoded as they were encoded.
 #[test]
 fn statuses_carry_all_counters_in_turn() {
     let mut bus = bus();

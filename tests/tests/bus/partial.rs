@@ -1,4 +1,4 @@
-//! Partial frames: only what moved, on top of what is published.
+//! Partial frames: only the moved rows, on top of the published frame.
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, Event, FrameEncoder, FrameId, QuantisedBox};
@@ -8,7 +8,7 @@ use dibs_nostd::{
 use dibs_tests::bus::*;
 use fastrand::Rng;
 
-/// Rows of the larger surface: several packets, and several slices of copying.
+/// Rows of the larger surface, which takes several packets and several slices of copying.
 const ROWS: usize = 300;
 
 fn large() -> (Assembler<'static, Unchecked, ROWS>, FrameReader<'static, ROWS>) {
@@ -26,8 +26,8 @@ fn partial(epoch: u32, encoding: Encoding, now: &[Vec3], base: u32, held: &[Vec3
     collect(FrameEncoder::<_, 64>::partial(id(epoch), encoding, now, base, held).unwrap())
 }
 
-/// Long chains of partial frames, of any number of moved vertices: the receiver has every vertex within
-/// the error that it states, and those that were not sent untouched.
+/// Long chains of partial frames, of any number of moved vertices: the receiver has every vertex within the stated
+/// error, and leaves unmoved vertices untouched.
 #[test]
 fn chains_of_partial_frames_add_up_without_errors() {
     let mut rng = Rng::with_seed(5);
@@ -82,8 +82,8 @@ fn a_partial_frame_takes_no_more_packets_than_it_must() {
     assert_eq!(runs, [(0, 3), (9, 2), (39, 1)]);
 }
 
-/// Only on the published frame, of the same session; else the sender is asked for a whole one, until
-/// one has come.
+/// The base must be the published frame, of the same session. Otherwise the sender is asked for a whole frame until one
+/// is published.
 #[test]
 fn another_base_is_refused_and_a_whole_frame_asked_for() {
     let (mut assembler, mut reader) = bus();
@@ -111,7 +111,7 @@ fn another_base_is_refused_and_a_whole_frame_asked_for() {
     assert_eq!(published(&mut reader).unwrap().0, 5);
 }
 
-/// A partial frame that was given up, or refused at its end, leaves nothing behind in the next.
+/// A frame that was abandoned, or refused at its end, leaves nothing behind in the next.
 #[test]
 fn nothing_of_an_unpublished_frame_shows_up_later() {
     let mut rng = Rng::with_seed(8);
@@ -146,7 +146,7 @@ fn nothing_of_an_unpublished_frame_shows_up_later() {
             }
             let mut is_published = false;
             for packet in &packets {
-                // Sometimes there is no time for anything else.
+                // Slices of different lengths come between the packets, or none.
                 if rng.bool() {
                     assembler.advance(rng.u32(0..20)).unwrap();
                 }
@@ -164,7 +164,7 @@ fn nothing_of_an_unpublished_frame_shows_up_later() {
     }
 }
 
-/// The rest of the published frame is copied in slices, and rows wait for it.
+/// The published rows are copied in slices; a packet is refused until the rows before its own are copied.
 #[test]
 fn copying_is_bounded_and_rows_wait_for_it() {
     let (mut assembler, mut reader) = large();
@@ -177,7 +177,7 @@ fn copying_is_bounded_and_rows_wait_for_it() {
     positions[10].x = -1.0;
     positions[250].x = -2.0;
     let packets = partial(2, Encoding::Float, &positions, 1, &held);
-    // The first partial frame: nothing was copied before.
+    // Before the first partial frame nothing was copied.
     assembler.accept(&packets[0], 0).unwrap();
     assert_eq!(assembler.accept(&packets[1], 0), Err(ReceiveError::NotReady { first: 10 }));
     assert!(assembler.status(0, 0).wants_whole);
@@ -207,7 +207,7 @@ fn copying_is_bounded_and_rows_wait_for_it() {
     assert_eq!(read(&mut reader), positions);
 }
 
-/// What a surface takes besides 24 bytes a vertex, for any number of them.
+/// The memory of a surface beyond 24 bytes a vertex is the same for any number of vertices.
 #[test]
 fn memory_does_not_grow_with_marks() {
     fn besides<const N: usize>() -> (usize, usize) {

@@ -26,7 +26,7 @@ proptest! {
         for &i in repeated.iter().chain(&order).filter(|&&i| i < frame.len()) {
             match give(&mut assembler, &frame[i]) {
                 Ok(Some(7)) => is_published = true,
-                // Repetitions after the end are of a frame that is published already.
+                // The frame is already published.
                 Err(ReceiveError::Stale { epoch: 7 }) => prop_assert!(is_published),
                 outcome => prop_assert!(outcome.is_ok(), "{outcome:?}"),
             }
@@ -35,8 +35,8 @@ proptest! {
         prop_assert_eq!(published(&mut reader), published(&mut expected));
     }
 
-    /// Frames through a line that loses, repeats, reorders and damages packets: only whole frames as
-    /// they were sent are ever published.
+    /// Sends frames over a line that loses, repeats, reorders and damages packets: every published frame is one that
+    /// was sent.
     #[test]
     fn only_what_was_sent_is_published(
         faults in prop::collection::vec((0..6_u8, any::<prop::sample::Index>(), 0..512_usize), 0..30),
@@ -106,8 +106,8 @@ proptest! {
         }
     }
 
-    /// The same with a right checksum and likely fields, so that everything behind it is reached: a
-    /// frame of which one packet never comes is not published whatever else does.
+    /// The same with right checksums and plausible fields, which reach the checks behind the checksum. A frame was
+    /// begun before; without its other packets nothing is published.
     #[test]
     fn arbitrary_fields_are_survived(
         packets in prop::collection::vec((
@@ -178,7 +178,7 @@ proptest! {
             prop_assert!(!framed[..framed.len() - 1].contains(&0));
             stream.extend_from_slice(framed);
         }
-        // One byte damaged: only the packet it is in, or that and its neighbour, may suffer.
+        // A damaged byte spoils only its own packet, or that one and its neighbour.
         let mut spoiled = None;
         if let Some((at, flip)) = damage && flip != 0 {
             let at = at.index(stream.len());

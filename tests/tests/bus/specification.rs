@@ -1,4 +1,4 @@
-//! `docs/wire.md` against the code: the test vectors, and what the tables say about sizes.
+//! `docs/wire.md` against the code: the encoders write its test vectors, and the decoder reads them.
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
@@ -14,7 +14,7 @@ const FRESHNESS: Freshness = Freshness { age_ms: 35, echo: Some(0x0001_E208) };
 /// The key of the tagged packets: bytes 0 to 15.
 const KEY: [u8; 16] = 0x0001_0203_0405_0607_0809_0A0B_0C0D_0E0F_u128.to_be_bytes();
 
-/// Every line of the vectors: name and bytes.
+/// The vectors, in the page's order: name and bytes.
 fn vectors() -> Vec<(&'static str, Vec<u8>)> {
     let mut buffer = [0; 64];
     let mut all = Vec::new();

@@ -1,4 +1,4 @@
-//! Weights on a bus: received, bounded or measured, refused and counted.
+//! Weights on a bus: they are received, bounded or measured, refused and counted.
 
 use dibs_build::Builder;
 use dibs_build::modes::ModalFit;
@@ -14,7 +14,7 @@ use dibs_tests::motions::trembling;
 use fastrand::Rng;
 use glam::Vec3;
 
-/// Everything between a sender's weights and a controller's query.
+/// A receiver of weights, and the modes of its tree.
 struct Bus {
     tree: Tree<'static, u16>,
     modes: Modes<'static>,
@@ -53,7 +53,7 @@ impl Bus {
         packets
     }
 
-    /// What the last packet led to, or the first that was rejected.
+    /// Sends a frame of weights. Returns the outcome of its last packet, or the first rejection.
     fn send(&mut self, epoch: u32, weights: &[f32]) -> Result<Advance, ReceiveError> {
         let packets = self.packets(epoch, weights);
         packets.iter().try_fold(Advance::Idle, |_, packet| {
@@ -63,7 +63,7 @@ impl Bus {
     }
 }
 
-/// A frame of weights becomes the surface that these weights make, with all that is known of it.
+/// A frame of weights becomes their surface, with its label, age and bound on the stretch.
 #[test]
 fn weights_come_over_the_bus() {
     let mut bus = bus();
@@ -90,8 +90,8 @@ fn weights_come_over_the_bus() {
     }
 }
 
-/// Weights that no surface has, frames of vertices, and packets that are not all of one frame: refused
-/// and counted, and the last good surface stays.
+/// Weights out of range, frames of vertices, and mixtures of two frames are refused and counted, and the last good
+/// surface stays.
 #[test]
 fn hostile_frames_of_weights_are_rejected_and_counted() {
     let mut bus = bus();
@@ -141,7 +141,7 @@ fn hostile_frames_of_weights_are_rejected_and_counted() {
     assert!(bus.send(100, &bus.recorded[8].clone()).is_ok());
 }
 
-/// A vertex receiver takes no weights.
+/// A receiver of vertices takes no weights.
 #[test]
 fn a_receiver_of_vertices_refuses_weights() {
     let (mut assembler, _) = dibs_tests::bus::bus();
@@ -153,8 +153,8 @@ fn a_receiver_of_vertices_refuses_weights() {
     assert_eq!(assembler.accept(begin, 0), Err(ReceiveError::Encoding));
 }
 
-/// Where the bound cannot tell, the surface is measured; what is published is within the limit, what is
-/// refused for its stretch is not, whatever the bound said.
+/// A surface whose bound exceeds the limit is measured. Exactly the surfaces within the limit are admitted, whatever
+/// the bound.
 #[test]
 fn the_gate_is_exact_whatever_the_bound() {
     let (mesh, motion) = trembling(320, 3, 6);

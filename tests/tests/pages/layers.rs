@@ -1,13 +1,13 @@
 //! Dependencies between the folders of a crate point one way.
 //!
-//! `docs/dependencies.md` lists them: `DIBS_WRITE=1` writes that list anew. `DIBS_CHECKOUT=FOLDER cargo test -p dibs-tests
-//! --test pages layers -- --nocapture` prints those of another checkout.
+//! `docs/dependencies.md` lists them, and `DIBS_WRITE=1` writes that list anew. `DIBS_CHECKOUT=FOLDER cargo test -p
+//! dibs-tests --test pages layers -- --nocapture` prints the list of another checkout.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-/// Which folder imports from which others.
+/// The folders that each folder imports from.
 type Imports = BTreeMap<String, BTreeSet<String>>;
 
 #[test]
@@ -53,10 +53,10 @@ fn a_cycle_is_found() {
     assert!(cycle(&imports(&[("a", &["b"]), ("b", &["c"]), ("c", &["a"])])).is_some());
 }
 
-/// Folders that import each other, directly or not.
+/// Folders on cycles of imports, or that import from them; `None` without a cycle.
 fn cycle(imports: &Imports) -> Option<BTreeSet<&str>> {
     let mut left: BTreeSet<&str> = imports.keys().map(String::as_str).collect();
-    // Take away what imports from nothing that is left, until nothing is.
+    // Remove folders that import from none of the others left, until no such folder is left.
     loop {
         let is_free = |from: &&str| !imports[*from].iter().any(|to| left.contains(to.as_str()));
         let free: Vec<&str> = left.iter().copied().filter(is_free).collect();
@@ -85,7 +85,7 @@ fn imports(package: &str) -> Imports {
         to.extend(names(&code(&file)).filter_map(|name| home.get(&name).cloned()));
         to.remove(&from);
     }
-    // A module that is a name for another one, as `wire`, has no row.
+    // A module without a folder of its own, such as `wire`, has no row.
     let rows: BTreeSet<String> = imports.keys().cloned().collect();
     imports.values_mut().for_each(|to| to.retain(|to| rows.contains(to)));
     imports
@@ -105,7 +105,7 @@ fn table(package: &str, imports: &Imports) -> String {
     rows + "\n"
 }
 
-/// The folder of each name that `lib.rs` has, modules among them.
+/// The folder of each name in `lib.rs`, modules among them.
 fn homes(lib: &str) -> BTreeMap<String, String> {
     let mut home = BTreeMap::new();
     for statement in lib.split(';').map(str::trim) {

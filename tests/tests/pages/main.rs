@@ -1,4 +1,4 @@
-//! What the documents say: figures, public items, packages, dependencies, the guide.
+//! The documents are true: figures, public items, packages, dependencies, the guide.
 
 mod layers;
 mod new_user;

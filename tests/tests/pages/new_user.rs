@@ -1,6 +1,7 @@
-//! A new user: an empty crate outside the repository, and `docs/guide.md`, copied block by block.
+//! A new user copies the blocks of `docs/guide.md` into an empty crate outside the repository, and gets an answer.
 //!
-//! `cargo test --release -p dibs-tests --test pages new_user -- --ignored --nocapture` shows each command and its output.
+//! `cargo test --release -p dibs-tests --test pages new_user -- --ignored --nocapture` shows each command and its
+//! output.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -29,7 +30,7 @@ fn the_guide_leads_to_an_answer_on_a_host_and_on_the_board() {
     heart.write_ply(guard.root.join("heart.ply")).expect("writable");
     let on_host = distance(&guard.cargo("run --release", true));
 
-    // An unrelated edit does not run the script again; the mesh does, and what is wrong with it is said.
+    // An edit of a source does not run the build script again; a change of the mesh does, and its error names the file.
     let source = block(section(1), "`src/main.rs`");
     guard.write("src/main.rs", &format!("{source}// An edit.\n"));
     let ran = |log: &str| log.contains("build-script-build`");
@@ -49,7 +50,7 @@ fn the_guide_leads_to_an_answer_on_a_host_and_on_the_board() {
     let on_board = distance(&guard.cargo("run --release", true));
     assert!((on_board - on_host).abs() < 1e-3, "{on_board} on the board, {on_host} here");
 
-    // 3. The loop in RTIC, with a device that has what it uses.
+    // 3. The loop in RTIC, with a minimal device.
     let rtic = "rtic = { version = \"2\", features = [\"thumbv7-backend\"] }\n";
     let manifest = manifest.replace("[build-dep", &format!("{rtic}\n[build-dep"));
     guard.write("Cargo.toml", &with_paths(&manifest));
@@ -57,7 +58,7 @@ fn the_guide_leads_to_an_answer_on_a_host_and_on_the_board() {
     guard.cargo("build --release", true);
 }
 
-/// What the guide's RTIC application takes from its board.
+/// The items that the guide's RTIC application takes from its board.
 const DEVICE: &str = r#"
 #![no_std]
 #![no_main]
@@ -102,7 +103,7 @@ impl User {
         fs::write(self.root.join(file), content).expect("writable");
     }
 
-    /// What a command of cargo says, on both of its streams.
+    /// Runs a command of cargo, which must succeed or fail as stated. Returns both of its output streams.
     fn cargo(&self, line: &str, succeeds: bool) -> String {
         println!("$ cargo {line}");
         let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
@@ -119,7 +120,7 @@ impl User {
     }
 }
 
-/// The first code block after a text.
+/// The content of the first code block after a text.
 fn block(section: &str, after: &str) -> String {
     let (_, rest) = section.split_once(after).unwrap_or_else(|| panic!("{after} in the guide"));
     let (_, rest) = rest.split_once("```").expect("a block");
@@ -127,7 +128,7 @@ fn block(section: &str, after: &str) -> String {
     code.split_once('\n').expect("the block's language").1.to_owned() + "\n"
 }
 
-/// The crates of this checkout in place of the published ones.
+/// The manifest with the crates of this checkout in place of the published ones.
 fn with_paths(manifest: &str) -> String {
     let path = |name: &str| Path::new(REPOSITORY).join(name).canonicalize().expect("a crate");
     let [core, build] = ["dibs-nostd", "dibs-build"].map(path);

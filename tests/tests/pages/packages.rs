@@ -1,4 +1,4 @@
-//! The published crates point at no file that is not in their package.
+//! The sources of the published crates refer to no page that is not in their package.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};

@@ -1,6 +1,6 @@
-//! The public items of both crates are those of `docs/public-api.txt`. `DIBS_WRITE=1` writes it anew.
+//! `docs/public-api.txt` lists the public items of the core and the builder. `DIBS_WRITE=1` writes it anew.
 //!
-//! An item is what has a path: a type, trait, function, constant or macro, not its methods and fields.
+//! An item has a path: a type, trait, function, constant or macro. Methods and fields are not listed.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use syn::{Attribute, Item, UseTree, Visibility};
 
 const REPOSITORY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
-/// The core crate has fewer items than this.
+/// The core crate must have fewer items than this.
 const MOST: usize = 130;
 
 #[test]
@@ -92,7 +92,7 @@ impl Listing {
         }
     }
 
-    /// Exported macros, which are the crate's own wherever they stand.
+    /// Lists the macros exported by the files directly in `src`: their paths are in the crate's root.
     fn macros(&mut self, source: &Path, name: &str) {
         for file in fs::read_dir(source).expect("a folder") {
             let path = file.expect("a file").path();
@@ -112,7 +112,7 @@ impl Listing {
         }
     }
 
-    /// What a `pub use` brings; of a module, all that it has.
+    /// Lists the items of a `pub use`; for a module, its items.
     fn uses(&mut self, tree: &UseTree, folder: &Path, path: &str) {
         match tree {
             UseTree::Path(item) => {

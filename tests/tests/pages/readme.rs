@@ -1,4 +1,4 @@
-//! The README's figures are those of the records. `DIBS_WRITE=1` writes them anew.
+//! The README's figures come from the records. `DIBS_WRITE=1` writes them anew.
 
 use std::{env, fs};
 
@@ -89,7 +89,7 @@ fn records(name: &str) -> Vec<Value> {
     serde_json::from_str(&text).expect("rows")
 }
 
-/// Two digits below 10, none above.
+/// One decimal below 10, none from there on.
 fn short(value: f64) -> String {
     match value {
         _ if value < 10.0 => format!("{value:.1}"),

@@ -14,7 +14,7 @@ use fastrand::Rng;
 use glam::Vec3;
 
 const MARGIN: f32 = 6.0;
-/// As the library has it, but for its accuracy.
+/// The library's least height of a ridge between two contacts, without its accuracy.
 const RIDGE: f64 = MARGIN as f64 / 64.0;
 
 /// A valley of the distance over the surface.
@@ -27,7 +27,7 @@ struct Valley {
     up: f64,
 }
 
-/// Every valley in f64, and the valley of every triangle, where ridges up to [`RIDGE`] do not count.
+/// Every valley in f64, and the valley of every triangle. Ridges up to [`RIDGE`] part no valleys.
 fn valleys(rows: &[Vec3], triangles: &[[u32; 3]], tool: [Vec3; 2]) -> (Vec<Valley>, Vec<usize>) {
     let mut across = HashMap::new();
     for (row, &[a, b, c]) in triangles.iter().enumerate() {
@@ -40,7 +40,7 @@ fn valleys(rows: &[Vec3], triangles: &[[u32; 3]], tool: [Vec3; 2]) -> (Vec<Valle
     let pairs: Vec<_> = (0..triangles.len()).map(|row| closest_pair(start, end, at(row))).collect();
     let mut order: Vec<usize> = (0..triangles.len()).collect();
     order.sort_by(|&a, &b| pairs[a].distance.total_cmp(&pairs[b].distance));
-    // Of each triangle the valley that it drains into: of all, and of those that count as one.
+    // The valley that each triangle drains into: with all ridges, and without the low ones.
     let (mut all, mut one) = (vec![usize::MAX; order.len()], vec![usize::MAX; order.len()]);
     let bottom = |of: &[usize], mut row: usize| {
         while of[row] != row {
@@ -174,7 +174,7 @@ fn a_flat_wall_along_a_capsule_is_one_contact() {
     }
 }
 
-/// The far side of a thin organ is as near as its margin, but on the tool's other side.
+/// The far side of a thin plate is within the margin, but faces away from the tool.
 #[test]
 fn the_far_side_of_a_thin_plate_is_no_contact() {
     let top = sheet(12, 30.0, |_, _| 0.0);
@@ -184,7 +184,7 @@ fn the_far_side_of_a_thin_plate_is_no_contact() {
     plate
         .triangles
         .extend(top.triangles.iter().map(|t| [t[0] + count, t[2] + count, t[1] + count]));
-    // Its rim.
+    // The plate's rim.
     let edges: Vec<(u32, u32)> =
         top.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]).collect();
     for &(a, b) in edges.iter().filter(|&&(a, b)| !edges.contains(&(b, a))) {
@@ -252,7 +252,8 @@ fn a_short_list_and_a_short_budget_state_what_still_holds() {
     assert!(cut_short > 20, "{cut_short}");
 }
 
-/// Inside, what a short budget found nearest would lead in.
+/// Inside the surface, the nearest triangle found within a short budget may be on the far side: its force would point
+/// inwards.
 #[test]
 fn no_budget_turns_the_force_inwards() {
     let mesh = ball(4);
@@ -330,7 +331,7 @@ fn what_cannot_be_asked_is_named() {
     assert!(contacts.is_empty());
 }
 
-/// Twice the same wall is that wall, and no force where nothing is near.
+/// Contacts that repeat one wall push like that wall, up to the compliance.
 #[test]
 fn one_wall_is_never_two() {
     let mesh = sheet(20, 60.0, |_, _| 0.0);
@@ -351,7 +352,7 @@ fn one_wall_is_never_two() {
         let part = found.force.z / 2.0;
         assert!((0.99..1.07).contains(&part), "{count}: {part}");
     }
-    // A wall that comes at the tool is a tool that comes at the wall, for damper and row alike.
+    // A wall that approaches the tool counts like a tool that approaches the wall, for damper and row alike.
     let damped = Proxy::new(SpringDamper::stiffness(1.0).damping(0.01).max_force(50.0), 3.0);
     let mut moving = contact;
     moving.velocity = Vec3::Z * 40.0;
@@ -361,6 +362,6 @@ fn one_wall_is_never_two() {
     let met = one.wrench(Ok(std::iter::once(&moving)), 0.0, tool.centre(), Vec3::ZERO, Vec3::ZERO);
     assert!(pushed.force.distance(met.force) < 1e-5 && pushed.force.z > 2.3, "{pushed:?} {met:?}");
     let row = VelocityRow::new(&moving, 0.0, tool.centre()).stand_off(0.5).gain(10.0);
-    // 40 mm/s with the wall, and 10 a second of the half mm that is left.
+    // The wall's 40 mm/s, less 10 a second of the half mm that is left.
     assert!(row.allows(Vec3::Z * 35.1, Vec3::ZERO) && !row.allows(Vec3::Z * 34.9, Vec3::ZERO));
 }

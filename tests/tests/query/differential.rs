@@ -1,5 +1,5 @@
-//! Whole queries against exhaustive search in f64: every construction, both index widths, spheres and
-//! capsules, deformations up to the limit. Nothing may be off by more than the stated accuracy.
+//! Whole queries against exhaustive search in f64: every construction, both index widths, spheres and capsules,
+//! deformations up to the limit. No separation may be off by more than the stated accuracy.
 
 use dibs_build::{Builder, BuiltTree, Construction, IndexWidth, Mesh, Paths, generate};
 use dibs_nostd::format::MAX_STACK;
@@ -11,7 +11,7 @@ use dibs_tests::{ask, surfaces};
 use fastrand::Rng;
 use glam::Vec3;
 
-/// Queries of a case, before it is shared out over the kinds of deformation.
+/// Least queries of a case: it ends after a round of all kinds of deformation.
 const QUERIES: usize = if cfg!(debug_assertions) { 90 } else { 4_500 };
 
 /// Poses tried on each deformation.
@@ -24,7 +24,7 @@ struct Case<'m> {
     queries: usize,
 }
 
-/// What a case found.
+/// The outcome of a case.
 #[derive(Default)]
 struct Tally {
     queries: usize,
@@ -124,7 +124,7 @@ fn check_interval(truth: &OraclePair, cut: &Proximity, budget: Budget) {
     assert!(inside, "{budget:?} {cut:?} {truth:?}");
 }
 
-/// Runs cases on all cores and prints what each found.
+/// Runs cases on all cores and prints the outcome of each. Returns the number of queries.
 fn run_all(cases: &[Case<'_>]) -> usize {
     let next = std::sync::atomic::AtomicUsize::new(0);
     let total = std::sync::atomic::AtomicUsize::new(0);
@@ -143,7 +143,7 @@ fn run_all(cases: &[Case<'_>]) -> usize {
     total.into_inner()
 }
 
-/// Every construction, path kind, leaf size and index width of one mesh.
+/// Trees of one mesh in every construction, and with several kinds of paths, sizes of leaves and index widths.
 fn cases_of<'m>(name: &str, mesh: &'m Mesh, queries: usize) -> Vec<Case<'m>> {
     let geodesic = Builder::new().stretch(1.5);
     let builders = [

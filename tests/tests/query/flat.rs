@@ -1,4 +1,4 @@
-//! Meshes in which some triangles are nearly flat: they neither get anything wrong nor set the pace.
+//! Meshes with some nearly flat triangles: answers stay right, and rounding on the bus does not count as stretch.
 
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::{MAX_STACK, PathKind};
@@ -11,8 +11,8 @@ use dibs_tests::{ask, stretch, surfaces};
 use fastrand::Rng;
 use glam::Vec3;
 
-/// A heart some of whose triangles have a corner nearly on the opposite edge, or nearly on another corner.
-/// One of them is as flat as `flattest`: its height over its longest edge.
+/// A heart some of whose triangles have a corner nearly on the opposite edge, or nearly on another corner. The flattest
+/// has a height of `flattest` of its longest edge.
 fn with_flat_triangles(flattest: f32, rng: &mut Rng) -> Mesh {
     let mut mesh = generate::heart(320).expect("a valid size").mesh;
     let mut touched = vec![false; mesh.positions.len()];
@@ -20,7 +20,7 @@ fn with_flat_triangles(flattest: f32, rng: &mut Rng) -> Mesh {
     for number in 0..count {
         let flat = flattest.powf(1.0 - number as f32 / count as f32);
         let [a, b, c] = mesh.triangles[rng.usize(..mesh.triangles.len())].map(|v| v as usize);
-        // Twice at one place might leave a triangle without size.
+        // Two changes at one vertex could leave a triangle without area.
         if [a, b, c].iter().any(|&v| std::mem::replace(&mut touched[v], true)) {
             continue;
         }
@@ -32,8 +32,7 @@ fn with_flat_triangles(flattest: f32, rng: &mut Rng) -> Mesh {
     mesh
 }
 
-/// Whatever their stretch is counted as, an answer is right in all deformations within the limits: with one
-/// limit for all triangles, and with one for each.
+/// Answers are right in all deformations within the limits, with one limit for all triangles and with one for each.
 #[test]
 fn answers_are_right_whatever_is_flat() {
     let mut rng = Rng::with_seed(41);
@@ -75,8 +74,8 @@ fn answers_are_right_whatever_is_flat() {
     println!("largest error: {worst:.2} of the stated accuracy");
 }
 
-/// A band that is next to nothing high at rest, and as high as its limit lets it become. Distances along it at
-/// rest say nothing of those that it has then.
+/// A band is very low at rest, and now as high as its limit allows. Its distances at rest do not bound its present
+/// ones.
 #[test]
 fn what_is_flat_may_unfold() {
     let mut rng = Rng::with_seed(43);
@@ -109,8 +108,8 @@ fn what_is_flat_may_unfold() {
     }
 }
 
-/// The sixteen bits of a coordinate on the bus move a vertex by more than the height of such a triangle: at
-/// rest, its frames are within a limit that leaves no more room than tissue needs.
+/// Rounding to 16 bits on the bus moves a vertex by more than the height of such a triangle. The measured stretch of a
+/// frame at rest hardly grows.
 #[test]
 fn a_bus_that_rounds_does_not_stretch_what_is_flat() {
     let mut rng = Rng::with_seed(42);

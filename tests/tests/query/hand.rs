@@ -1,4 +1,5 @@
-//! What a force of all contacts holds that one of the closest pair alone does not.
+//! A hand pushes an instrument into surfaces: the force of all contacts holds it everywhere, the force of the closest
+//! pair does not.
 
 use dibs_tests::hand::scenes;
 

@@ -1,8 +1,8 @@
 //! The certified interval at both of its ends, as the budget grows and from tick to tick.
 //!
-//! What holds: every answer's own interval holds the truth; to one question, a larger budget gives an interval that
-//! is nowhere wider. What does not: from tick to tick, with a warm start, the lower end may fall although nothing has
-//! moved, because a test is spent elsewhere.
+//! The interval of every answer holds the truth. A larger budget for the same query widens neither end beyond the
+//! accuracy. From tick to tick, with a warm start, the lower end may fall although nothing has moved, because tests are
+//! spent elsewhere.
 
 use dibs_build::{Builder, generate};
 use dibs_nostd::format::MAX_STACK;
@@ -17,12 +17,12 @@ use fastrand::Rng;
 /// Frames of each kind of deformation, and poses on each.
 const FRAMES: usize = 4;
 const POSES: usize = 30;
-/// Budgets of one question, from none to unlimited.
+/// Growing budgets of one query, from zero on.
 const BUDGETS: u32 = 24;
-/// Ticks of one pose, each warm-started by the last.
+/// Ticks of one pose, each warm-started from the last.
 const TICKS: usize = 6;
 
-/// How far each end is beyond the truth, in units of the stated accuracy: at most 1 is right.
+/// The distance of each end beyond the truth, in units of the stated accuracy: at most 1 is right.
 fn beyond(found: &Proximity, truth: &OraclePair) -> [f64; 2] {
     let accuracy = f64::from(found.accuracy);
     let lower = f64::from(found.lower) - truth.separation;
@@ -60,7 +60,7 @@ fn both_ends_hold_the_truth_and_close_in_on_it_as_the_budget_grows() {
             let options =
                 if rng.bool() { Options::cold().stretch(measured) } else { Options::cold() };
 
-            // One question, ever larger budgets.
+            // The same query with growing budgets.
             let mut before: Option<Proximity> = None;
             let mut budget = Budget { node_tests: 0, triangle_tests: 0 };
             for _ in 0..BUDGETS {

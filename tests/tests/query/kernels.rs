@@ -1,5 +1,5 @@
-//! The tool kernels against the f64 oracle: every shape of triangle with every kind of axis, at every
-//! scale, within the accuracy that the core states.
+//! The tool kernels against the f64 oracle, within the core's stated accuracy: every shape of triangle with every kind
+//! of axis, at every scale.
 
 use dibs_nostd::{ACCURACY, AxisPair, Capsule, Sphere, Tool, ToolError};
 use dibs_tests::oracle::{Instrument, closest_pair, exhaustive};
@@ -21,7 +21,7 @@ fn vector(rng: &mut fastrand::Rng) -> Vec3 {
     Vec3::new(next(), next(), next())
 }
 
-/// A number between 10^low and 10^high, each decade as likely.
+/// A number between 10^low and 10^high, with equally likely decades.
 fn decades(rng: &mut fastrand::Rng, low: f32, high: f32) -> f32 {
     10f32.powf(low + (high - low) * rng.f32())
 }
@@ -74,7 +74,7 @@ const AXES: [&str; 11] = [
     "grid",
 ];
 
-/// A segment that stands to the triangle as `kind` says.
+/// A segment of this kind relative to the triangle.
 fn axis(kind: &str, [a, b, c]: Triangle, rng: &mut fastrand::Rng) -> Segment {
     let normal = (b - a).cross(c - a).normalize_or_zero();
     let (v, w) = {
@@ -125,7 +125,7 @@ fn axis(kind: &str, [a, b, c]: Triangle, rng: &mut fastrand::Rng) -> Segment {
 
 const FRAMES: [&str; 6] = ["unit", "any size", "far from the origin", "huge", "tiny", "denormal"];
 
-/// Scale and offset of everything.
+/// Scale and offset of triangle and axis.
 fn frame(kind: &str, rng: &mut fastrand::Rng) -> (f32, Vec3) {
     match kind {
         "unit" => (1.0, Vec3::ZERO),
@@ -145,7 +145,7 @@ struct Case {
 }
 
 impl Case {
-    /// The size `S` that the stated accuracy is relative to.
+    /// The size `S` to which the stated accuracy is relative.
     fn size(&self) -> f64 {
         let start = self.start.as_dvec3();
         let reach = self.corners.map(|c| c.as_dvec3().distance(start)).into_iter();
@@ -162,8 +162,8 @@ impl Case {
         let end = self.end.as_dvec3() - start;
         let corners = self.corners.map(|c| c.as_dvec3() - start);
         let pair = closest_pair(DVec3::ZERO, end, corners);
-        // The direction of a short pair is rounded relative to its length, levered by the size: only
-        // pairs of some length can be certified from below.
+        // The rounding of a short pair's direction has the size as its lever: only pairs of some length can be
+        // certified from below.
         let size = self.size();
         if pair.distance > 1e-6 * size {
             let doubt = 1e-3 * U * size + 1e-14 * size * size / pair.distance;
@@ -172,7 +172,7 @@ impl Case {
         pair.distance
     }
 
-    /// Compares a tool's kernel with the truth; the error, in units of `2^-24 S`.
+    /// Compares a tool's kernel with the truth. Returns the error in units of `2^-24 S`.
     fn check(&self, tool: &impl Tool) -> f64 {
         let truth = self.truth();
         let allowed = self.allowed();
@@ -186,7 +186,7 @@ impl Case {
         assert!(error <= allowed, "{distance:e}, not {truth:e}: {}", describe());
         self.check_points(tool, &pair);
 
-        // A limit must neither drop what is below it nor keep what is not.
+        // A limit must drop no pair below it, and keep no pair above it.
         let square = |x: f64| (x * x) as f32;
         let above = tool
             .closest_on_triangle(&self.corners, square((truth + allowed) * (1.0 + 2.0 * U) + FLOOR))
@@ -205,7 +205,7 @@ impl Case {
         if size > 1e-6 { error.max(error_above) / (U * size) } else { 0.0 }
     }
 
-    /// The pair's points, weights and distance belong together.
+    /// Checks that the pair's points, weights and distance agree.
     fn check_points(&self, tool: &impl Tool, pair: &AxisPair) {
         let corners = self.corners.map(Vec3::as_dvec3);
         let (start, end) = (self.start.as_dvec3(), self.end.as_dvec3());
@@ -228,7 +228,7 @@ impl Case {
         assert!(f64::from(tool.axis_length()) >= start.distance(end) - FLOOR);
     }
 
-    /// The node test, at the triangle's corners; the error, in units of `2^-24 S`.
+    /// Compares the node test with the truth at the triangle's corners. Returns the error in units of `2^-24 S`.
     fn check_node(&self, tool: &impl Tool) -> f64 {
         let (start, end) = (self.start.as_dvec3(), self.end.as_dvec3());
         let mut worst = 0.0_f64;
@@ -246,7 +246,7 @@ impl Case {
     }
 }
 
-/// Every shape with every axis in every frame: 594 combinations.
+/// Every shape with every axis in every frame.
 #[test]
 fn every_triangle_is_within_the_stated_accuracy() {
     let mut worst = [0.0_f64; 3];
@@ -288,11 +288,11 @@ fn every_triangle_is_within_the_stated_accuracy() {
         f64::from(ACCURACY) / U,
         worst[2],
     );
-    // Less than half of what is stated: a kernel that needs more has lost one of its cases.
+    // No more than half of the stated accuracy: a kernel with a larger error has lost one of its cases.
     assert!(worst[0] < 8.0 && worst[1] < 8.0 && worst[2] < 4.0, "{worst:?}");
 }
 
-/// A length of zero makes a capsule a sphere.
+/// A capsule of length zero is as accurate as a sphere.
 #[test]
 fn a_capsule_of_length_zero_answers_as_a_sphere() {
     let mut rng = fastrand::Rng::with_seed(7);
@@ -315,7 +315,7 @@ fn a_capsule_of_length_zero_answers_as_a_sphere() {
     }
 }
 
-/// The oracle's search of a whole surface passes over triangles, but never the closest.
+/// The oracle's search of a whole surface skips triangles, but never the closest one.
 #[test]
 fn exhaustive_search_finds_the_closest_triangle() {
     let mut rng = fastrand::Rng::with_seed(17);
@@ -360,7 +360,7 @@ fn spheres_agree_with_parry() {
         let distance = center.as_dvec3().distance(theirs.as_dvec3());
         let difference = (distance - f64::from(ours.distance_squared).sqrt()).abs();
         worst = worst.max(difference);
-        // The distance hardly changes around its minimum, so the point is known less well.
+        // The distance hardly changes around its minimum, so the points differ more than the distances.
         worst_point = worst_point.max(theirs.distance(ours.on_surface));
         compared += 1;
     }
@@ -426,7 +426,7 @@ fn tools_name_the_value_that_they_refuse() {
 }
 
 fn any_point() -> impl Strategy<Value = Vec3> {
-    // Few distinct values, so that exact coincidences are common; shrinks well.
+    // Few distinct values make exact coincidences common, and shrink well.
     let coordinate = prop_oneof![
         (-3_i8..=3).prop_map(f32::from),
         (-100.0_f32..100.0),

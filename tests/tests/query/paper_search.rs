@@ -1,4 +1,4 @@
-//! The baseline of the paper's own search: it finds what exhaustive search finds, by fewer polygon tests.
+//! The baseline of the paper's search agrees with exhaustive search, by fewer polygon tests.
 
 use dibs_build::{Builder, Construction, IndexWidth, Mesh, generate};
 use dibs_nostd::format::PathKind;
@@ -21,7 +21,7 @@ fn probe(tool: &Instrument) -> Probe {
     }
 }
 
-/// Polygon tests of 10 poses on each of 9 deformations, twice.
+/// Compares the paper's search with exhaustive search, at poses around deformed surfaces. Returns its polygon tests.
 fn agrees(mesh: &Mesh, width: IndexWidth, seed: u64) -> u64 {
     let builder = Builder::new().construction(Construction::Paper).stretch(STRETCH);
     let built = builder.index(width).build(mesh).expect("a valid mesh");
@@ -58,7 +58,7 @@ fn it_finds_what_exhaustive_search_finds() {
         let tests = agrees(mesh, width, 5);
         let all = 180 * mesh.triangles.len() as u64;
         println!("{tests} polygon tests where exhaustive search takes {all}");
-        // Collapsed and flattened surfaces leave nothing to prune.
+        // The limit is high because collapsed and flattened surfaces allow no pruning.
         assert!(tests < all / 2, "{tests} of {all}");
     }
 }

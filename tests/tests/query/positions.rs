@@ -1,4 +1,4 @@
-//! Positions that are no positions: a query names the vertex, or does not come near it.
+//! A position that is not finite: a query names its vertex, or its answer is finite.
 
 use dibs_build::{Builder, generate};
 use dibs_nostd::format::MAX_STACK;

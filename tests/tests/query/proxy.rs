@@ -1,4 +1,5 @@
-//! The proxy's force against every active set tried in f64: the same, outward, continuous, and no wall twice.
+//! The proxy's force against a search of all active sets in f64. It is the same force, it points outward, it is
+//! continuous, and no wall counts twice.
 
 use dibs_build::Builder;
 use dibs_nostd::constraint::{Proxy, SpringDamper};
@@ -10,18 +11,18 @@ use fastrand::Rng;
 use glam::{DMat3, DVec3, Vec3};
 
 const MARGIN: f32 = 3.0;
-/// As the library has it.
+/// The library's compliance.
 const COMPLIANCE: f64 = 1.0 / 16.0;
-/// Relative to the largest depth: f32, whose errors the compliance may multiply by 16.
+/// Relative to the largest depth: f32 errors, which the compliance may multiply by 16.
 const TOLERANCE: f64 = 2e-4;
 
-/// Sets of walls: `DIBS_POSES` of them.
+/// The number of tried sets of walls: `DIBS_POSES`, if set.
 fn cases() -> usize {
     let asked = std::env::var("DIBS_POSES").ok().map(|n| n.parse().expect("a number of cases"));
     asked.unwrap_or(if cfg!(debug_assertions) { 300 } else { 20_000 })
 }
 
-/// A contact to make others of.
+/// A contact whose copies become walls.
 fn contact() -> Contact {
     let mesh = sheet(4, 20.0, |_, _| 0.0);
     let built = Builder::new().build(&mesh).expect("a valid mesh");
@@ -42,7 +43,7 @@ struct Wall {
     at: Vec3,
 }
 
-/// Force and torque of a spring of 1 N/mm that never saturates: the displacement, and its moment.
+/// The library's force and torque for a spring of 1 N/mm that never saturates: the displacement, and its moment.
 fn found(template: &Contact, walls: &[Wall]) -> [DVec3; 2] {
     let spring = SpringDamper::stiffness(1.0).max_force(1e9);
     let proxy = Proxy::new(spring, MARGIN).expect("a valid margin");
@@ -60,7 +61,7 @@ fn found(template: &Contact, walls: &[Wall]) -> [DVec3; 2] {
     [wrench.force.as_dvec3(), wrench.torque.as_dvec3()]
 }
 
-/// The same by trying every set of walls that may act: displacement, moment, and the walls' pushes.
+/// The true displacement and moment, and the walls' pushes, by trying every set of acting walls.
 fn truth(walls: &[Wall]) -> ([DVec3; 2], Vec<f64>) {
     let wanted = |wall: &Wall| {
         let depth = f64::from(MARGIN - (MARGIN - wall.depth));
@@ -93,7 +94,7 @@ fn truth(walls: &[Wall]) -> ([DVec3; 2], Vec<f64>) {
     panic!("one set is right: {walls:?}");
 }
 
-/// Up to eight walls: anyhow, nearly the same, in pairs that face each other, or around a groove's axis.
+/// Up to eight walls: random ones, nearly equal ones, pairs that face each other, or walls around a groove's axis.
 fn walls(rng: &mut Rng) -> Vec<Wall> {
     let kind = rng.u32(..4);
     let (axis, main) = (unit(rng), unit(rng));
@@ -108,12 +109,12 @@ fn walls(rng: &mut Rng) -> Vec<Wall> {
                 _ => (other - axis * axis.dot(other) * (1.0 + 0.1 * rng.f32())).normalize(),
             };
             let depth = if rng.bool() { 2.0 } else { 10_f32.powf(rng.f32() * 4.0 - 3.0) };
-            // Or not within the margin yet.
+            // Some walls are still outside the margin.
             let depth = if row > 0 && rng.u32(..4) == 0 { -depth } else { depth };
             Wall { normal, depth, at: other * 5.0 }
         })
         .collect();
-    // As a list of contacts has them.
+    // A list of contacts is in this order.
     walls.sort_by(|a, b| b.depth.total_cmp(&a.depth));
     walls
 }
@@ -129,12 +130,12 @@ fn the_force_is_that_of_the_best_of_all_active_sets() {
         let [force, torque] = found(&template, &walls);
         let deepest = f64::from(walls[0].depth);
         let all: f64 = pushes.iter().sum();
-        // Where all but cancels, force and torque keep the proportion of the rest.
+        // Where pushes nearly cancel, the torque's error is relative to their sum.
         let off = [force.distance(moved) / deepest, torque.distance(moment) / (5.0 * all)];
         assert!(off[0] < TOLERANCE && off[1] < TOLERANCE, "{off:?} {walls:?} {force} {moved}");
         worst = [worst[0].max(off[0]), worst[1].max(off[1])];
         several += usize::from(pushes.iter().filter(|&&push| push > 0.0).count() > 2);
-        // Outward: no two walls that face each other, and each is held by its own depth at least.
+        // Where no two walls face each other, each is held by at least its own depth.
         let face = |a: &Wall| walls.iter().any(|b| a.normal.dot(b.normal) < 0.0);
         if !walls.iter().any(face) {
             for wall in &walls {
@@ -142,7 +143,7 @@ fn the_force_is_that_of_the_best_of_all_active_sets() {
                 assert!(out > -TOLERANCE * deepest, "{wall:?} of {walls:?}: {out}");
             }
         }
-        // The deepest wall of two that face each other wins, and no sum of walls is more than the compliance allows.
+        // Of two walls that face each other, the deeper one prevails.
         if let [one, other] = walls[..] {
             let out = force.dot((one.normal - other.normal).as_dvec3());
             assert!(out > -TOLERANCE * deepest, "{walls:?}: {out}");
@@ -152,8 +153,8 @@ fn the_force_is_that_of_the_best_of_all_active_sets() {
     assert!(several * 5 > cases());
 }
 
-/// A small change of the walls changes the force little; the compliance `c` bounds by how much: depths alone by
-/// `sqrt(8) / (2 sqrt(c))` times their change, normals by `16 / c` times the displacement, at most `sqrt(8 / c)` depths.
+/// A small change of the walls changes the force little. The compliance bounds the change: by `by_depths` times a
+/// change of the depths alone, and by `by_normals` times a change of the normals too.
 #[test]
 fn the_force_is_continuous() {
     let template = contact();
@@ -173,7 +174,7 @@ fn the_force_is_continuous() {
             }
         }
         let [one, _] = found(&template, &walls);
-        // One that comes, farther off than the proxy is moved.
+        // Sometimes a wall is added, farther off than the proxy's displacement: it does not act.
         if near.len() < 8 && rng.bool() {
             let depth = -0.1 - one.length() as f32;
             near.push(Wall { normal: unit(&mut rng), depth, at: Vec3::ZERO });
@@ -187,7 +188,7 @@ fn the_force_is_continuous() {
     assert!(steepest[0] < by_depths && steepest[1] < by_normals, "{by_depths} {by_normals}");
 }
 
-/// Any number of contacts with one wall are that wall, up to the compliance.
+/// Any number of contacts with one wall push like that wall, up to the compliance.
 #[test]
 fn one_wall_is_never_two() {
     let template = contact();

@@ -1,4 +1,4 @@
-//! What a query refuses, and what a budget of nothing leaves to it.
+//! Refusals of a query, and the answer within a budget without triangle tests.
 
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
@@ -46,7 +46,7 @@ fn a_measurement_of_any_other_frame_is_refused() {
         assert_eq!(query.closest(&numbered(expected), &sphere, &options), refused);
         assert_eq!(query.closest_wide(&numbered(expected), &sphere, &options), refused);
     }
-    // The frame itself, and a table that does not know its frame.
+    // The measured frame itself is taken, and a table without an epoch.
     assert!(query.closest(&numbered(7), &sphere, &options).is_ok());
     assert!(query.closest(rows.as_slice(), &sphere, &options).is_ok());
 }
@@ -72,7 +72,7 @@ fn a_stack_is_enough_or_refused() {
     assert!((1..21).contains(&refused), "{needed} entries are not among those tried");
 }
 
-/// A triangle that is known beforehand is tested within the budget, as any other.
+/// The triangle of a warm start is tested within the budget, as any other.
 #[test]
 fn a_budget_of_nothing_tests_no_triangle() {
     let (mesh, built) = heart();
@@ -81,7 +81,7 @@ fn a_budget_of_nothing_tests_no_triangle() {
     let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("enough for any tree");
     for row in (0..rows.len()).step_by(7) {
         let sphere = Sphere::new(rows[row] * 1.2, 1.0).expect("valid");
-        // Without a side, which a query that was cut short does not know.
+        // Unsigned, because a query that was cut short has no side.
         let unsigned = Options::cold().unsigned();
         let whole = query.closest(rows.as_slice(), &sphere, &unsigned).expect("an answer");
         for node_tests in [0, u32::MAX] {

@@ -1,6 +1,6 @@
 //! Sides and signed separations against f64: generalised winding numbers, exhaustive search, dense sampling.
 //!
-//! `DIBS_POSES=1000000` asks for as many poses as that.
+//! `DIBS_POSES` sets the number of poses.
 
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
@@ -17,7 +17,7 @@ use dibs_tests::tree_bytes::{reseal, section};
 use fastrand::Rng;
 use glam::Vec3;
 
-/// Poses in all.
+/// The number of poses of all surfaces together.
 fn poses() -> usize {
     let asked = std::env::var("DIBS_POSES").ok().map(|n| n.parse().expect("a number of poses"));
     asked.unwrap_or(if cfg!(debug_assertions) { 400 } else { 10_000 })
@@ -78,7 +78,7 @@ fn depths_are_those_of_dense_sampling() {
                 continue;
             }
             assert!(holds, "{}: {tool:?} {found:?} {low} {high}", surface.name);
-            // The depth stated is that of the point stated.
+            // The stated depth is the depth of the stated point.
             let deepest = capsule.axis_point(found.axis_parameter);
             let depth = sides::depth(&rows, &triangles, deepest).expect("a clear side");
             let stated = -upper - f64::from(radius);
@@ -99,7 +99,7 @@ fn depths_are_those_of_dense_sampling() {
     assert!(crossing as usize > count / 10 && wide * 50 < crossing as usize);
 }
 
-/// Whether a surface is shown to cut itself next to an axis: the depth along it then jumps.
+/// Whether a surface is shown to cut itself next to an axis, so that the depth along it jumps.
 fn is_cut_along(rows: &[Vec3], triangles: &[[u32; 3]], tool: &Capsule, points: u32) -> bool {
     (0..=points).any(|step| {
         let at = tool.axis_point(step as f32 / points as f32);
@@ -108,7 +108,7 @@ fn is_cut_along(rows: &[Vec3], triangles: &[[u32; 3]], tool: &Capsule, points: u
     })
 }
 
-/// The reproduction of what was wrong: the separation and the way out of a ball, from far outside to its middle.
+/// From far outside a ball to near its middle, the separation falls steadily, and the direction points out.
 #[test]
 fn the_way_out_of_a_ball_never_turns() {
     let mesh = ball(4);
@@ -178,14 +178,14 @@ fn a_side_that_is_not_there_says_why() {
     assert_eq!(cut.side, Side::Undefined(NoSide::CutShort));
     assert_eq!(ask(&built, &round, at, Options::cold()).side, Side::Inside);
     is(ask(&built, &round, round.positions[0], Options::cold()), NoSide::BelowAccuracy);
-    // Wound against each other: the surface has no sides, and the tree no adjacency.
+    // One triangle is wound against its neighbours: the surface has no sides, and the tree no adjacency.
     let mut twisted = round.clone();
     twisted.triangles[7].swap(0, 1);
     let built = Builder::new().build(&twisted).expect("a valid mesh");
     is(ask(&built, &twisted, at, Options::cold()), NoSide::NoAdjacency);
 }
 
-/// A budget that ends in the search for the depth leaves an interval that holds it.
+/// A budget that ends within the search for the depth leaves an interval that holds the depth.
 #[test]
 fn a_depth_that_was_cut_short_is_certified() {
     let mesh = ball(3);
@@ -237,7 +237,8 @@ fn neighbours_share_their_edges_and_wrong_ones_are_refused() {
     }
 }
 
-/// More triangles than 16 bits number: neighbours are found by the edge that they share. And what all that takes.
+/// Every triangle of a closed surface has a neighbour at each edge, also where 16 bits cannot number all triangles; and
+/// a tree with adjacency and vertex order is small.
 #[test]
 fn a_tree_with_adjacency_takes_at_most_16_bytes_a_triangle() {
     let sizes: &[u32] = if cfg!(debug_assertions) { &[2_000] } else { &[10_272, 66_000] };

@@ -1,5 +1,5 @@
-//! The slacks of a query, each on surfaces and poses that need it: radii that are used up to their last part
-//! in a thousand, coordinates far from the origin, axes along long triangles.
+//! The slacks of a query, each on surfaces and poses that need it: radii that are used nearly in full, coordinates far
+//! from the origin, axes along long triangles.
 
 use dibs_build::{Builder, BuiltTree, Mesh};
 use dibs_nostd::format::MAX_STACK;
@@ -11,12 +11,12 @@ use dibs_tests::surfaces;
 use fastrand::Rng;
 use glam::Vec3;
 
-/// A number between `low` and `high`, each decade as likely.
+/// A number between `low` and `high`, with equally likely decades.
 fn decades(rng: &mut Rng, low: f32, high: f32) -> f32 {
     low * (high / low).powf(rng.f32())
 }
 
-/// A surface as it is now, with its tree, and the largest error of a query so far in units of its accuracy.
+/// A tree, its surface's present rows, and the largest error of a query so far in units of its accuracy.
 struct Searched<'b> {
     built: &'b BuiltTree,
     rows: Vec<Vec3>,
@@ -28,8 +28,8 @@ impl<'b> Searched<'b> {
         Self { built, rows: built.to_rows(positions), worst: 0.0 }
     }
 
-    /// Compares both searches, with the tree's limit and with the measured stretch, cold and from a triangle that
-    /// is known beforehand, to the exhaustive one.
+    /// Compares both searches with the exhaustive one: with the tree's limit, with the measured stretch, and with a
+    /// warm start from the triangle closest to `known`.
     fn check(&mut self, tool: &Instrument, known: &Instrument) {
         let tree = self.built.tree::<u16>().expect("valid");
         let rows = self.rows.as_slice();
@@ -65,8 +65,8 @@ fn ladder(cells: usize, length: f32, width: f32) -> Mesh {
     Mesh { positions, triangles: (0..cells).flat_map(cell).collect() }
 }
 
-/// Straight bands, stretched to their limit, whose last edge is the closest to `end`: every sphere around it reaches
-/// exactly that far. The band's other half runs past the tool and is hardly farther away. Calls
+/// Straight bands, stretched nearly to their limit, whose first edge is the closest to `end`: every sphere around it
+/// reaches hardly farther. The band's other half runs back past the tool, hardly farther away. Calls
 /// `check(built, positions, end, radius)` for each.
 fn for_each_band(number: usize, mut check: impl FnMut(&BuiltTree, &[Vec3], Vec3, f32)) {
     const LIMIT: f32 = 1.5;
@@ -76,7 +76,7 @@ fn for_each_band(number: usize, mut check: impl FnMut(&BuiltTree, &[Vec3], Vec3,
     let mut rng = Rng::with_seed(51);
     for _ in 0..number {
         let apart = 4.0 + 20.0 * rng.f32();
-        // Along the band: straight to a corner, up by `apart`, and back above itself, beyond its start.
+        // The band runs straight to a corner, up by `apart`, and back above itself, beyond its start.
         let straight = 40.0 * cell * (1.0 + rng.f32() * 0.1) * LIMIT;
         let place = |along: f32| {
             let past = along - straight;
@@ -105,7 +105,7 @@ fn a_radius_is_used_in_full() {
     let mut worst: f64 = 0.0;
     for_each_band(400, |built, positions, end, radius| {
         let mut searched = Searched::new(built, positions);
-        // Above the tool, the other half is closer.
+        // To a sphere above the tool, the other half is closer.
         let above = Instrument::sphere(end + Vec3::Y, radius);
         searched.check(&Instrument::sphere(end, radius), &above);
         searched.check(&Instrument::capsule(end, end + Vec3::Z * 0.1, radius), &above);
@@ -114,8 +114,8 @@ fn a_radius_is_used_in_full() {
     println!("largest error: {worst:.2} of the stated accuracy");
 }
 
-/// So it is by a tracker, at its first tick and as its tool comes down to the band's end, and by a search for all
-/// contacts within hardly more than the distance.
+/// The same with a tracker, at its first tick and as its tool comes down to the band's end, and with contacts within a
+/// margin hardly larger than the separation.
 #[test]
 fn tracker_and_contacts_use_a_radius_in_full() {
     for_each_band(100, |built, positions, end, radius| {
@@ -147,8 +147,8 @@ fn tracker_and_contacts_use_a_radius_in_full() {
     });
 }
 
-/// Coordinates of millions, on which the mesh's own places are exact: planes are compared in coordinates as
-/// they are. Next to the centre of a ball every leaf is nearly the closest.
+/// Coordinates of millions, at which the mesh's whole numbers are still exact. Near the centre of a ball every leaf is
+/// nearly the closest, so planes need their slack.
 #[test]
 fn planes_allow_for_large_coordinates() {
     let mut rng = Rng::with_seed(52);
@@ -178,9 +178,8 @@ fn planes_allow_for_large_coordinates() {
     println!("largest error: {worst:.2} of the stated accuracy");
 }
 
-/// A long tube, folded so that its ridges run along an axis in its middle, all about as close. The shortest
-/// vector to one end of a ridge is rounded, and so tilted along the axis: the distance of the other end is a
-/// lever.
+/// A long tube, folded so that its ridges run along an axis in its middle, all about as close. The shortest vector to
+/// one end of a ridge is rounded, and so tilted along the axis, with the tube's length as its lever.
 #[test]
 fn planes_allow_for_a_tilt_along_the_axis() {
     let mut rng = Rng::with_seed(53);
@@ -212,7 +211,7 @@ fn planes_allow_for_a_tilt_along_the_axis() {
                 let off = unit(&mut rng) * rough;
                 turn * Vec3::new(off.x, off.y, z)
             };
-            // Beyond a ridge's end, the vector to that end leaves the axis far from its start: the longest lever.
+            // Where the axis ends beyond the ridge, the vector leaves it far from its start: the longest lever.
             let reach = if round % 2 == 0 { length + 10.0 } else { length * 0.8 };
             let (start, end) = (end(-10.0), end(reach));
             let capsule = Instrument::capsule(start, end, 0.0);
@@ -223,7 +222,7 @@ fn planes_allow_for_a_tilt_along_the_axis() {
     println!("largest error: {worst:.2} of the stated accuracy");
 }
 
-/// What an answer states covers what the kernels state of a triangle, as far away as the tool is.
+/// An answer's accuracy covers the kernels' accuracy on a triangle, at any distance of the tool.
 #[test]
 fn the_accuracy_covers_the_kernels() {
     let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
@@ -238,7 +237,7 @@ fn the_accuracy_covers_the_kernels() {
         let sphere = Sphere::new(center, 0.0).expect("valid");
         let found = query.closest(rows.as_slice(), &sphere, &Options::cold()).expect("an answer");
         let size = corners.iter().map(|corner| corner.distance(center)).fold(0.0, f32::max);
-        // And the root that is taken of the square.
+        // The epsilon is for the root of the square.
         assert!(found.accuracy >= (ACCURACY + f32::EPSILON) * size, "{center}: {found:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! Sweeps against dense sub-sampling in f64: nothing may be jumped over.
+//! Sweeps against dense sampling in f64: no contact may be jumped over.
 
 use std::env;
 
@@ -14,12 +14,12 @@ use dibs_tests::surfaces;
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
 
-/// Ticks; `DIBS_SWEPT_TICKS` for more.
+/// The number of ticks: `DIBS_SWEPT_TICKS`, if set.
 fn ticks() -> usize {
     env::var("DIBS_SWEPT_TICKS").map_or(400, |text| text.parse().expect("a number of ticks"))
 }
 
-/// Instants of a tick that are looked at in f64.
+/// Times of a tick at which f64 gives the truth.
 const SAMPLES: usize = 40;
 const LOOKS: u32 = 32;
 const RADIUS: f32 = 1.0;
@@ -38,7 +38,7 @@ fn sheet(size: f32, cells: u32) -> Mesh {
     Mesh { positions, triangles: (0..cells * cells).flat_map(cell).collect() }
 }
 
-/// One tick: the surface's frames, and where the tool is at both ends.
+/// One tick: the surface's frames, and the tool at both ends.
 struct Way<'a> {
     frames: [&'a [Vec3]; 2],
     triangles: &'a [[u32; 3]],
@@ -102,10 +102,10 @@ struct Tally {
 }
 
 impl Tally {
-    /// Compares with the truth at many instants.
+    /// Compares a sweep with the truth at many times.
     fn check(&mut self, way: &Way<'_>, found: &Swept) {
         let margin = f64::from(way.margin);
-        // The rounding of f32 coordinates this large.
+        // Room for the rounding of f32 coordinates of this size.
         let points = way.ends.iter().flat_map(|end| [end.start, end.end]);
         let size = points.map(|p| f64::from(p.length())).fold(0.0, f64::max);
         let spare = 1e-4 + 2e-5 * size;
@@ -131,13 +131,13 @@ impl Tally {
     }
 }
 
-/// Through the surface, along it at about the margin, or somewhere.
+/// The tool at both ends of a way through the surface, along it at about the margin, or anywhere.
 fn ends(rest: &[Vec3], size: f32, margin: f32, rng: &mut Rng) -> [Instrument; 2] {
     let target = rest[rng.usize(..rest.len())];
     let across = unit(rng);
     let (from, to) = match rng.u32(..4) {
         0 => (target + across * size * 0.5, target - across * size * 0.5),
-        // Faster than anything that is near.
+        // The tool is much faster than the surface.
         1 => (target + across * size * 20.0, target - across * size * 20.0),
         2 => {
             let aside = Vec3::Z * (RADIUS + margin + 0.02 * (rng.f32() - 0.5));
@@ -201,7 +201,7 @@ fn nothing_is_jumped_over() {
     println!("{tally:?}");
     let all = tally.clear + tally.contacts + tally.undecided;
     assert!(tally.clear > all / 10 && tally.contacts > all / 10, "{tally:?}");
-    // Along the surface at the margin, a look clears next to nothing.
+    // Along the surface at the margin a search clears little, so some ways stay undecided.
     assert!(tally.undecided < all / 2, "{tally:?}");
 }
 
@@ -229,7 +229,7 @@ fn hostile_ways_are_refused_or_never_cleared() {
         assert_eq!(ask(&still, [share, 1.0], [9.0, 8.0], 1.0), Err(refused));
         assert_eq!(ask(&still, [0.0, share], [9.0, 8.0], 1.0), Err(refused));
     }
-    // Nothing moves: one look tells.
+    // Nothing moves: one search decides.
     let found = ask(&still, [0.3, 0.3], [9.0, 9.0], 1.0).expect("an answer");
     assert!(found.clear_until > 1.0 && found.contact.is_none() && found.looks == 1, "{found:?}");
     let found = ask(&still, [0.3, 0.3], [1.5, 1.5], 1.0).expect("an answer");
@@ -237,7 +237,7 @@ fn hostile_ways_are_refused_or_never_cleared() {
     // From one end of f32's range to the other, through a sheet.
     let found = ask(&still, [0.0, 1.0], [5e8, -5e8], 0.0).expect("an answer");
     assert!(found.clear_until < 0.5, "{found:?}");
-    // One vertex is nowhere: how far the surface moves is unknown.
+    // One vertex is not finite: the surface's motion is unknown.
     let mut torn = rest.clone();
     torn[0] = Vec3::NAN;
     let mut odometer = Odometer::new(&tree);

@@ -1,4 +1,4 @@
-//! The tracker against whole queries: the same separation at every tick, whatever tool and surface do.
+//! The tracker against whole queries: the same separation at every tick, for any motion of tool and surface.
 
 use std::env;
 
@@ -17,17 +17,17 @@ use dibs_tests::surfaces;
 use fastrand::Rng;
 use glam::Vec3;
 
-/// Ticks of each test; `DIBS_TRACKER_TICKS` for more (1,000,000 are the promise).
+/// The number of ticks of each test: `DIBS_TRACKER_TICKS`, if set, else `few`.
 fn ticks(few: usize) -> usize {
     env::var("DIBS_TRACKER_TICKS").map_or(few, |text| text.parse().expect("a number of ticks"))
 }
 
-/// What a run of ticks met.
+/// Counts of the ticks of a run.
 #[derive(Debug, Default)]
 struct Tally {
     ticks: usize,
     cut_short: usize,
-    /// By cause: start, surface, jump, full, and none.
+    /// Ticks by the cause of their fallback: start, surface, jump, full, and none.
     fallbacks: [usize; 5],
     nodes: [u64; 2],
     /// Largest difference from the whole query, in units of the accuracy stated for both.
@@ -65,7 +65,7 @@ impl<'t, const OPENED: usize> Subject<'t, OPENED> {
         }
     }
 
-    /// One tick, and the whole query that it must agree with.
+    /// Makes one tick, and compares it with a whole query.
     fn tick(
         &mut self,
         surface: &impl MovingSurface,
@@ -121,7 +121,7 @@ impl<'t, const OPENED: usize> Subject<'t, OPENED> {
     }
 }
 
-/// Positions from frame to frame: a motion's, a random deformation of the mesh, or the same again.
+/// The next frame: the same again, a random deformation of the mesh, or the surface moved as a whole.
 fn next_frame(built: &BuiltTree, mesh: &Mesh, before: &[Vec3], rng: &mut Rng) -> Vec<Vec3> {
     match rng.u32(..12) {
         0 => before.to_vec(),
@@ -130,7 +130,7 @@ fn next_frame(built: &BuiltTree, mesh: &Mesh, before: &[Vec3], rng: &mut Rng) ->
             let paths = built.tree::<u16>().expect("16-bit indices").paths();
             built.to_rows(&deformation.apply(mesh, paths, 1.4, rng))
         }
-        // Moved as a whole, so that stretch stays.
+        // A motion of the whole keeps the stretch.
         _ => {
             let by = unit(rng) * rng.f32() * if rng.u32(..8) == 0 { 5.0 } else { 0.5 };
             before.iter().map(|&p| p + by).collect()
@@ -154,7 +154,7 @@ fn next_tool(
         1 => walk(tool, 20.0, rng),
         2..6 => *tool,
         6..12 => walk(tool, 2.0, rng),
-        // A cutter is another tool at the same place.
+        // The tool is changed at the same place.
         12 => Instrument::sphere(tool.start, 1.0),
         _ => walk(tool, 0.3, rng),
     }
@@ -175,12 +175,12 @@ fn wander<const OPENED: usize>(mesh: &Mesh, ticks: usize, seed: u64) -> Tally {
         let after = next_frame(&built, mesh, &before, &mut rng);
         let measured = stretch_of(&after);
         if rng.u32(..40) == 0 {
-            // Nobody knows where it came from.
+            // The odometer starts anew: the way to this frame is unknown.
             odometer.start(after.as_slice());
         }
         let step = odometer.step(before.as_slice(), after.as_slice());
         let both = stretch.or_larger(measured).expect("one tree");
-        // None: a frame that was skipped.
+        // With no tick, the frame is skipped.
         let ticks_of_frame = rng.u32(..20);
         for tick in 0..ticks_of_frame {
             tool = next_tool(&tool, &after, &triangles, &mut rng);
@@ -233,7 +233,7 @@ fn a_full_front_falls_back_on_whole_queries() {
     assert!(full > 0 && none > 0, "{tally:?}");
 }
 
-/// A tick makes as many triangle tests as its budget has, and no more.
+/// A tick that needs more triangle tests than its budget has makes as many as the budget has.
 #[test]
 fn a_tick_takes_all_of_its_budget_and_no_more() {
     let mesh = generate::heart(320).expect("a valid size").mesh;
@@ -252,7 +252,7 @@ fn a_tick_takes_all_of_its_budget_and_no_more() {
         };
         let whole = first(u32::MAX);
         let enough = whole.triangle_tests;
-        // A triangle is not even looked at unless a test of it is left.
+        // One test more than needed changes nothing.
         assert_eq!(first(enough + 1), whole);
         most = most.max(enough);
         for too_few in 0..enough {
@@ -261,7 +261,7 @@ fn a_tick_takes_all_of_its_budget_and_no_more() {
             assert!(found.separation >= whole.separation, "{found:?} {whole:?}");
             assert!(found.lower <= whole.separation + whole.accuracy, "{found:?} {whole:?}");
         }
-        // A triangle that was tested would be the closest so far.
+        // Without a test there is no closest triangle.
         assert_eq!(first(0).triangle, None);
     }
     assert!(most >= 3, "{most} tests at most");
@@ -279,13 +279,13 @@ fn odometers_wrap() {
     let mut rng = Rng::with_seed(6);
     let middle = rows.iter().sum::<Vec3>() / rows.len() as f32;
     let size = rows.iter().map(|p| p.distance(middle)).fold(0.0, f32::max);
-    // To and fro by a 70th of the surface: the odometer turns once in some 15,000 ticks.
+    // The tool moves to and fro, so far in all that the odometer wraps within the test.
     let mut tip = middle + Vec3::X * size * 1.2;
     for tick in 0..40_000 {
         let step = Vec3::X * size / 70.0;
         tip += (if tick % 2 == 0 { step } else { -step }) + unit(&mut rng) * size * 1e-4;
         let tool = Instrument::capsule(tip, tip + Vec3::ONE * size, 1.0);
-        // For a long time nothing is tested: bounds get as old as they can.
+        // For a long time no node is tested, so that bounds get as old as they can.
         let is_starved = tick / 8_000 % 3 == 1;
         let budget = is_starved.then_some(Budget { node_tests: 0, triangle_tests: 1 });
         subject.tick(&surface, &tool, &Options::cold().unsigned(), budget);

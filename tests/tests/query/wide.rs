@@ -1,5 +1,4 @@
-//! The wide search: as exact as the other one (`differential.rs` searches for a miss of either), on any stack,
-//! within any budget.
+//! The wide search: its counts, its stacks and its budgets. `differential.rs` tests the accuracy of both searches.
 
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
@@ -19,7 +18,7 @@ fn tool(mesh: &Mesh, rng: &mut Rng) -> Sphere {
     Sphere::new(on_surface + unit(rng) * 40.0 * rng.f32(), 2.0).expect("valid")
 }
 
-/// Counts are exact: a change of the tree or of the batches shows here, and must be meant.
+/// Counts are compared exactly: a change of the tree or of the batches shows here, and must be intended.
 #[test]
 fn counts_of_a_fixed_stream_are_what_they_were() {
     let (mesh, built) = heart();
@@ -62,12 +61,12 @@ fn any_stack_that_holds_the_tree_is_enough() {
     let more = tests_with::<{ NEEDED + 16 }>(&mesh, &built, &rows);
     let most = tests_with::<{ NEEDED + 128 }>(&mesh, &built, &rows);
     println!("{least}, {more} and {most} node tests on stacks that spare 0, 16 and 128 entries");
-    assert!(least != more && more != most, "what the stack has to spare is used");
+    assert!(least != more && more != most, "spare entries of the stack are used");
     assert_eq!(tests_with::<{ NEEDED + 129 }>(&mesh, &built, &rows), most, "128 are used");
     assert_eq!(tests_with::<MAX_STACK>(&mesh, &built, &rows), most, "128 are used");
 }
 
-/// Node tests of a stream on a stack of `D` entries, whose separations are those of [`Query::closest`].
+/// Node tests of a stream on a stack of `D` entries. Its separations must agree with [`Query::closest`].
 fn tests_with<const D: usize>(mesh: &Mesh, built: &BuiltTree, rows: &[Vec3]) -> u32 {
     let tree = built.tree::<u16>().expect("valid");
     let mut query = Query::<u16, D>::new(&tree).expect("deep enough");
@@ -85,7 +84,7 @@ fn tests_with<const D: usize>(mesh: &Mesh, built: &BuiltTree, rows: &[Vec3]) -> 
     tests
 }
 
-/// With more budget a query goes the same way further: its interval never grows.
+/// A larger budget continues the same search: the interval grows at neither end by more than the accuracy.
 #[test]
 fn more_budget_tells_no_less() {
     let (mesh, built) = heart();

@@ -1,4 +1,4 @@
-//! A surface handed to a query carries its facts, and a query its last answer: the caller states neither.
+//! A surface carries its stretch and its error, and a query its last answer: the caller states none of them.
 
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
@@ -11,7 +11,7 @@ use glam::Vec3;
 /// Vertices of the heart below.
 const N: usize = 502;
 
-/// How far its vertices are said to be off, in mm.
+/// The position error in its label, in mm.
 const ERROR: f32 = 0.25;
 
 struct Heart {
@@ -31,13 +31,13 @@ fn query<'t>(tree: &Tree<'t, u16>) -> Query<'t, u16, { MAX_STACK + 128 }> {
     Query::new(tree).expect("enough for any tree")
 }
 
-/// Beside the heart, and through it.
+/// A capsule beside the heart, and one through it.
 fn tools() -> [Capsule; 2] {
     let through = |x| Capsule::new(Vec3::new(x, 0.0, 20.0), Vec3::new(120.0, 0.0, 60.0), 2.5);
     [through(70.0).expect("valid"), through(10.0).expect("valid")]
 }
 
-/// Publishes rows as the one frame there is.
+/// Publishes rows as the only frame.
 fn publish<'f>(
     frames: &'f Frames<N>,
     rows: &[Vec3],
@@ -85,7 +85,7 @@ fn a_frame_is_searched_with_its_own_stretch_and_error() {
             let limit = ask(&rows, &options).widened(ERROR);
             assert!(same(&ask(&known, &options), &by_hand));
             assert!(same(&ask(&unknown, &options), &limit));
-            // Stated by the caller, it is the caller's.
+            // A stretch that the caller states takes precedence.
             let stated = ask(&rows, &options.stretch(less)).widened(ERROR);
             assert!(same(&ask(&known, &options.stretch(less)), &stated));
             assert!(stated.node_tests <= by_hand.node_tests);
@@ -113,7 +113,7 @@ fn a_measurement_with_another_tree_is_refused_with_its_frame() {
     assert!(query(&tree).closest(&surface, &tool, &Options::new().stretch(measured)).is_ok());
 }
 
-/// Trackers and contacts ask the same tables, and a table within a table is still that table.
+/// Trackers and contacts read stretch and error from the surface as queries do, also through an odometer's surface.
 #[test]
 fn tracker_and_contacts_read_the_same_facts() {
     let heart = heart();
@@ -140,7 +140,7 @@ fn tracker_and_contacts_read_the_same_facts() {
     let found = query(&tree).contacts(&surface, &tool, margin, &options, &mut contacts);
     assert!(same(&found.expect("an answer"), &closest));
     assert_eq!(contacts.accuracy(), closest.accuracy);
-    // The valleys are those of the positions as they are.
+    // The error widens the interval, not the contacts: they are of the positions as published.
     let mut exact = Contacts::<8>::new();
     query(&tree).contacts(rows, &tool, margin, &options, &mut exact).expect("an answer");
     assert!(!exact.is_empty() && exact.iter().eq(contacts.iter()));
@@ -170,7 +170,7 @@ fn a_surface_between_two_frames_has_a_stretch_of_both_and_beyond_them_none() {
     }
     let beyond = step.beyond(0.5);
     assert!(beyond.stretch().is_none());
-    // Half a step farther: one and a half errors of the later frame, half an error of the earlier.
+    // Half a step beyond: one and a half errors of the later frame, and half an error of the earlier.
     assert!((beyond.position_error() - 2.0 * ERROR).abs() < 1e-6);
 }
 

@@ -30,10 +30,10 @@ fn nothing_is_read_before_the_first_frame() {
     assert!(reader.read().is_none());
     assert!(writer.front().is_none());
     assert_eq!(writer.publish(label(1)), Err(PublishError::Incomplete { missing: 2 }));
-    // An attempt to read nothing holds nothing up.
+    // The read without a frame does not hold the publication up.
     writer.push(Vec3::ONE).unwrap();
     assert_eq!(writer.publish(label(1)), Err(PublishError::Incomplete { missing: 1 }));
-    // A frame that begins anew has none of it.
+    // A frame that is begun anew has no vertices.
     writer.begin();
     assert_eq!(writer.missing(), 2);
     writer.push(Vec3::ONE).unwrap();
@@ -113,7 +113,7 @@ fn age_is_right_over_a_wrap_of_the_clock() {
     assert_eq!(reader.latest(5).within(9).err(), Some(Unavailable::Stale { age: 10 }));
 }
 
-/// The clock may wrap any number of times: a frame that was found old stays old.
+/// The clock may wrap any number of times: a frame's age never falls.
 #[test]
 fn a_frame_does_not_grow_young_again() {
     let frames = Frames::<1>::new();
@@ -139,8 +139,8 @@ fn age<const N: usize>(reader: &mut FrameReader<'_, N>, now: u32) -> u32 {
     reader.latest(now).frame().expect("published").age
 }
 
-/// Another core may have stamped the frame a little later than this one read its clock. A frame from farther ahead is
-/// old: one flipped bit of the stamp would else keep a frozen surface fresh for days.
+/// Another core may have stamped the frame a little later than this one read its clock: such a frame is new. A frame
+/// from farther ahead is old: otherwise one flipped bit of the stamp would keep a frozen surface fresh for days.
 #[test]
 fn a_frame_from_the_future_is_new_or_old_but_never_in_between() {
     let frames = Frames::<1>::new();
@@ -157,19 +157,19 @@ fn a_frame_from_the_future_is_new_or_old_but_never_in_between() {
     }
 }
 
-/// Whatever the number of vertices: two buffers, and room for labels.
+/// For any number of vertices: two buffers of positions, and a fixed size for labels and state.
 #[test]
 fn a_double_buffer_takes_24_bytes_a_vertex() {
     assert_eq!(size_of::<Frames<1>>() - 24, size_of::<Frames<10_001>>() - 24 * 10_001);
     assert!(size_of::<Frames<1>>() <= 24 + 128, "{}", size_of::<Frames<1>>());
 }
 
-/// Two threads at full speed: every read sees one whole frame, and frames never go back. Runs until
-/// the reader has seen many frames, however the machine schedules the two.
+/// A writer and a reader run at full speed: every read sees one whole frame, and epochs never fall. The test ends when
+/// the reader has seen many frames, however the machine schedules the two threads.
 #[test]
 fn no_read_is_torn() {
     const N: usize = 97;
-    // The sanitizers run what is not optimised.
+    // Unoptimised builds, such as the sanitizers', see fewer frames.
     const FRAMES_TO_SEE: u32 = if cfg!(debug_assertions) { 4_000 } else { 20_000 };
     static FRAMES: Frames<N> = Frames::new();
     static SEEN: AtomicU32 = AtomicU32::new(0);
@@ -192,7 +192,7 @@ fn no_read_is_torn() {
             (epoch, busy)
         });
         let (mut reads, mut last) = (0_u64, 0_u32);
-        // Before an assertion fails, the writer must be let go, or the scope waits for it forever.
+        // After a failed assertion the writer must be stopped first, or the scope would wait for it forever.
         let verdict = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
             while SEEN.load(Ordering::Relaxed) < FRAMES_TO_SEE {
                 if let Some(frame) = reader.read() {
@@ -213,7 +213,7 @@ fn no_read_is_torn() {
                     }
                     last = epoch;
                 }
-                // Pauses of all lengths, so that publications fall everywhere.
+                // Pauses of many lengths: publications come at every place of a read.
                 for _ in 0..reads % 61 {
                     std::hint::spin_loop();
                 }

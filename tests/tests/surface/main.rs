@@ -1,4 +1,4 @@
-//! Surfaces that move: stretch, frames, modes, and what is refused of them.
+//! Surfaces that move: frames, stretch, modes, and the frames that are refused.
 
 mod facts;
 mod frames;

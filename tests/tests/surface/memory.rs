@@ -1,5 +1,5 @@
-//! What a surface takes of a controller's memory: two buffers of positions, and at most 1,024 bytes for both of
-//! their ends, the assembler, and the stretch of every region.
+//! A surface's share of a controller's memory: two buffers of positions, and at most 1,024 bytes for both of their
+//! ends, the assembler, and the stretch of every region.
 
 use dibs_nostd::{Assembler, FrameReader, Frames, StretchMonitor};
 
@@ -11,7 +11,7 @@ const fn besides<const N: usize>() -> usize {
         - 2 * 12 * N
 }
 
-/// On this computer references are twice as long as on the board, which can only take less.
+/// References on this computer are at least as long as the board's, so the board takes no more.
 #[test]
 fn a_surface_takes_1024_bytes_besides_its_positions() {
     let all = [besides::<162>(), besides::<5_138>(), besides::<65_536>()];

@@ -1,5 +1,4 @@
-//! Modal surfaces: what is computed lazily, how far it is from the recorded motion, and that the stretch
-//! bound is one.
+//! Modal surfaces: their positions, their distance from the recorded motion, and their refusals.
 
 use std::cell::RefCell;
 use std::collections::HashSet;
@@ -19,8 +18,8 @@ use dibs_tests::{ask, surfaces};
 use fastrand::Rng;
 use glam::Vec3;
 
-/// The stated errors hold at every vertex of every frame, and are reached; the same positions come out
-/// of a sum in f64, but for rounding.
+/// The stated errors hold at every vertex of every frame, and are reached. Positions agree with a sum in f64 up to
+/// rounding.
 #[test]
 fn every_frame_is_within_the_stated_error() {
     let (mesh, motion) = trembling(2_000, 5, 1);
@@ -55,13 +54,13 @@ fn every_frame_is_within_the_stated_error() {
             [(modes.position_error(), largest, stated.max), (modes.rms_error(), rms, stated.rms)]
         {
             assert!(f64::from(stated) >= found && f64::from(stated) <= found * 1.001 + 1e-9);
-            // Rounding the modes to 16 bits costs next to nothing.
+            // Rounding the modes to 16 bits adds little to the fit's error.
             assert!((found - before).abs() < 0.01 * before + 1e-3, "{count}: {found} {before}");
         }
     }
 }
 
-/// A vertex table that notes what it is asked for.
+/// A vertex table that notes the rows that are read.
 struct Watched<'a, T> {
     table: &'a T,
     asked: RefCell<Vec<u32>>,
@@ -78,9 +77,8 @@ impl<T: VertexTable> VertexTable for Watched<'_, T> {
     }
 }
 
-/// A query that computes vertices when it comes to them finds, bit for bit, what it finds in a table
-/// where all were computed before; that is what exhaustive search finds; and most vertices are never
-/// computed.
+/// A query that computes vertices when it reads them answers with the same bits as one on a table computed before. The
+/// answer agrees with exhaustive search, and most vertices are never computed.
 #[test]
 fn lazy_is_eager_bit_for_bit_and_right() {
     let (mesh, motion) = trembling(2_000, 5, 2);
@@ -163,7 +161,7 @@ fn weights_that_make_no_surface_are_refused() {
     assert_eq!(modes.range(4), None);
 }
 
-/// The range that is admitted is the recorded one with the stated margin.
+/// The admitted range of a weight is its recorded range with the stated margin.
 #[test]
 fn the_ranges_are_the_recorded_ones_with_the_margin() {
     let (built, _) = small(4);
@@ -178,7 +176,7 @@ fn the_ranges_are_the_recorded_ones_with_the_margin() {
     }
 }
 
-/// The same input gives the same bytes; a sender that has nothing but the tree finds the same weights.
+/// The same input gives the same bytes, and a sender that has only the tree finds the same weights.
 #[test]
 fn fits_are_reproducible() {
     let (first, second) = (small(5).0, small(5).0);
@@ -219,7 +217,7 @@ fn what_cannot_be_fitted_is_named() {
     assert!(matches!(Modes::of(&bare), Err(modes::ModesError::Absent)));
 }
 
-/// A motion beyond the limit is named, and is no anchor: what is bounded by it stays refused.
+/// Frames beyond the limit are listed, and are no anchors of the bound: they stay beyond the limit.
 #[test]
 fn frames_beyond_the_limit_are_named() {
     let generate::MovingMesh { mesh, motion } = generate::heart(320).expect("a valid size");
@@ -241,8 +239,8 @@ fn frames_beyond_the_limit_are_named() {
     }
 }
 
-/// Every damaged field of the section is an error that names it; any other damage makes other
-/// positions, and nothing worse.
+/// A wrong field of the section is an error that names it. Damage at random is an error, or gives other positions
+/// without a panic.
 #[test]
 fn damaged_modes_do_not_validate() {
     let (built, _) = small(3);
@@ -318,7 +316,7 @@ fn damaged_modes_do_not_validate() {
 
 dibs_nostd::include_tree!("modal_heart");
 
-/// The generated module is what the builder built.
+/// The generated module holds the builder's modes.
 #[test]
 fn the_generated_module_holds_the_modes() {
     let generate::MovingMesh { mesh, motion } = generate::heart(1_000).expect("a valid size");
@@ -338,7 +336,8 @@ fn the_generated_module_holds_the_modes() {
     assert_eq!(modal_heart::STACK, tree_of_module.stack() as usize);
 }
 
-/// All 24 modes of the real heart's 25 frames: driven whole by as many numbers a tick.
+/// All modes of the real heart's motion together give its recorded frames; fewer modes give them less exactly. Prints
+/// errors, positions read and the bound's excess.
 #[test]
 #[cfg_attr(not(real_meshes), ignore = "../shared/data is absent")]
 fn the_real_heart_is_driven_by_its_modes() {

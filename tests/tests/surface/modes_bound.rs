@@ -10,8 +10,7 @@ use dibs_tests::tree_bytes::{reseal, section};
 use dibs_tests::{stretch, surfaces};
 use fastrand::Rng;
 
-/// The bound is never below the true stretch, whatever the weights, and at a recorded frame hardly
-/// above it.
+/// The bound is never below the true stretch, whatever the weights, and hardly above it at a recorded frame.
 #[test]
 fn the_stretch_bound_is_sound_and_tight() {
     let (mesh, motion) = trembling(1_000, 5, 4);
@@ -35,7 +34,7 @@ fn the_stretch_bound_is_sound_and_tight() {
         let check = |weights: &[f32], most: f64| {
             let surface = modes.surface::<10>(weights).expect("in range");
             let now = positions(&surface);
-            // Counted as the part of its limit that it takes.
+            // A triangle's stretch counts relative to its own limit.
             let share = |triangle: u32| {
                 let limit = tree.stretch_limit(TriangleRow(triangle)).expect("in the table");
                 let own = stretch::of_triangle(&rows, &now, triangle as usize, tree.paths());
@@ -66,10 +65,10 @@ fn the_stretch_bound_is_sound_and_tight() {
     }
 }
 
-/// What the bound is made of, read by `docs/format.md` alone, in f64.
+/// The stored numbers of the bound, read by `docs/format.md` alone, in f64.
 struct Stored {
     growths: Vec<f64>,
-    /// Weights and stretch of each.
+    /// The weights and the stretch of each anchor.
     anchors: Vec<(Vec<f64>, f64)>,
 }
 
@@ -94,7 +93,7 @@ impl Stored {
         each.map(|((from, to), growth)| growth * (from - to).abs()).sum()
     }
 
-    /// The least bound: from an anchor, or from the two segments at the nearest recorded one.
+    /// The least of the bounds from every anchor and from the two segments at the nearest recorded one.
     fn bound(&self, weights: &[f64]) -> f64 {
         let from = |(at, sigma): &(Vec<f64>, f64)| sigma + self.growth(at, weights);
         let from_anchors = self.anchors.iter().map(from).fold(f64::INFINITY, f64::min);
@@ -122,8 +121,7 @@ impl Stored {
     }
 }
 
-/// Anchors, segments, rounding and slack all count as written: neither less, which would not be sound, nor more,
-/// which would refuse frames.
+/// Anchors, segments, rounding and slack count as documented: less would not be sound, and more would refuse frames.
 #[test]
 fn the_stretch_bound_is_the_documented_one() {
     const SLACK: f32 = 0.01;

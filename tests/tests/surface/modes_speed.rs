@@ -1,4 +1,4 @@
-//! Modal surfaces have the limit on speed that surfaces of vertices have, whether a frame is measured or not.
+//! The limit on speed holds for modal surfaces as for surfaces of vertices, whether a frame is measured or not.
 
 use dibs_build::modes::ModalFit;
 use dibs_build::{Builder, BuiltTree};
@@ -31,8 +31,8 @@ fn largest_step(modes: &Modes<'_>, before: &[f32], now: &[f32]) -> f32 {
     rows(before).zip(rows(now)).map(|(a, b)| a.distance(b)).fold(0.0, f32::max)
 }
 
-/// At the speed of its fastest vertex a recorded motion passes; a jump across it is counted by its own cause,
-/// and passes once so much time has gone by.
+/// A recorded motion passes a limit at the speed of its fastest vertex. A jump is refused and counted as too fast, and
+/// passes after enough time.
 #[test]
 fn a_modal_surface_that_jumps_is_too_fast() {
     let built = surface();
@@ -40,7 +40,7 @@ fn a_modal_surface_that_jumps_is_too_fast() {
     let bytes: &'static [u8] = built.blob().to_vec().leak();
     let tree = Tree::<u16>::from_bytes(bytes).expect("valid");
     let modes = Modes::of(&tree).expect("valid");
-    // A frame every 7 ticks, and the clock counts whole ones.
+    // A frame comes every 7 ticks; the receiver adds one, because the clock counts whole ticks.
     let steps = recorded.windows(2).map(|pair| largest_step(&modes, &pair[0], &pair[1]));
     let speed = steps.fold(0.0, f32::max) / 8.0 * 1.0001;
     let limits = SurfaceLimits::reach_mm(1e4).speed(speed);
@@ -91,8 +91,8 @@ fn a_modal_surface_that_jumps_is_too_fast() {
     assert_eq!(send(epoch, far).0, Ok(Advance::Published { epoch }));
 }
 
-/// Whatever the weights: a step a little beyond the limit is refused, one a little within it is not, and one far
-/// within it is not even measured.
+/// For any weights, a step a little beyond the limit is refused, a step a little within it passes, and a step far
+/// within it passes, often without a measurement.
 #[test]
 fn the_limit_on_the_speed_of_modes_is_exact() {
     let built = surface();

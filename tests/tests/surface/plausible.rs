@@ -1,5 +1,5 @@
-//! What is no surface of this tissue is not published, and counted by its own cause: collapsed, in another unit,
-//! mirrored, turned or jumped. And what is one passes.
+//! Implausible surfaces are not published, and counted by their cause: collapsed, in another unit, mirrored, turned or
+//! jumped. Plausible ones pass.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use dibs_tests::bus::collect;
 
 /// Vertices of the generated heart of 1,000 triangles.
 const N: usize = 502;
-/// mm a tick: a heart of one beat a second, at ticks of a millisecond.
+/// Limit on speed in mm a tick, for a heart of one beat a second at ticks of a millisecond.
 const SPEED: f32 = 0.3;
 
 struct Bus {
@@ -60,7 +60,7 @@ fn heart() -> (&'static BuiltTree, Motion) {
     (Box::leak(Box::new(Builder::new().stretch(1.5).build(&mesh).unwrap())), motion)
 }
 
-/// Shapes that no first frame may have.
+/// Collapsed shapes, which no first frame may have.
 fn collapsed(rest: &[Vec3]) -> Vec<(&'static str, Vec<Vec3>)> {
     let of = |f: &dyn Fn(Vec3) -> Vec3| rest.iter().map(|&p| f(p)).collect();
     vec![
@@ -87,7 +87,7 @@ fn a_collapsed_surface_is_refused_from_the_first_frame_on() {
             assert_eq!(bus.counted(Event::Shrunk), 1, "{name}");
             assert_eq!(bus.assembler.counters().rejected(), 1, "{name}: nothing else");
             assert!(bus.reader.read().is_none());
-            // And a good frame follows.
+            // A good frame passes afterwards.
             assert_eq!(bus.send(&rest, 0, work), Ok(()));
         }
     }
@@ -116,7 +116,7 @@ fn a_surface_that_is_mirrored_turned_or_jumped_is_too_fast() {
         for (name, rows) in &wrong {
             let mut bus = Bus::new(built, limits);
             bus.send(&rest, u32::MAX - 5, work).unwrap();
-            // 30 ticks later, over the wrap of the clock: 3.1 mm are allowed.
+            // 30 ticks later, over the wrap of the clock; one more counts for rounding, so 3.1 mm are allowed.
             let refused = bus.send(rows, 24, work);
             let is_fast = matches!(
                 refused,
@@ -131,11 +131,11 @@ fn a_surface_that_is_mirrored_turned_or_jumped_is_too_fast() {
             );
             assert_eq!(bus.assembler.counters().rejected(), 1, "{name}: nothing else");
         }
-        // As the first frame, turned and moved surfaces are what they are: nothing says where the tissue lies.
+        // As first frames these pass: without an earlier frame there is no speed.
         for (name, rows) in &wrong[..3] {
             assert_eq!(Bus::new(built, limits).send(rows, 0, work), Ok(()), "{name}");
         }
-        // Time heals: 200 mm in two seconds are 0.1 mm a tick.
+        // After enough time the jump passes: 200 mm in two seconds are 0.1 mm a tick.
         let mut bus = Bus::new(built, limits);
         bus.send(&rest, 0, work).unwrap();
         assert!(bus.send(&wrong[2].1, 1_990, work).is_err());
@@ -143,7 +143,7 @@ fn a_surface_that_is_mirrored_turned_or_jumped_is_too_fast() {
     }
 }
 
-/// Every recorded motion at its own speed, and every deformation that the stretch limit allows, passes.
+/// The generated heart's motion passes at its own speed, and so do strongly squeezed shapes as first frames.
 #[test]
 fn the_motion_of_a_heart_is_plausible() {
     let (built, motion) = heart();
@@ -152,7 +152,7 @@ fn the_motion_of_a_heart_is_plausible() {
     for (number, frame) in (0..).zip(motion.frames.iter().cycle().take(3 * motion.frames.len())) {
         bus.send(&built.to_rows(frame), number * interval, 64).unwrap();
     }
-    // Half of its size, in any direction, is still a surface.
+    // Shapes of half the size, or squeezed along one or two axes, are still plausible.
     let rest = built.to_rows(&motion.frames[0]);
     for scale in [Vec3::splat(0.5), Vec3::new(0.3, 1.0, 1.0), Vec3::new(1.2, 0.5, 0.4)] {
         let rows: Vec<_> = rest.iter().map(|&p| p * scale).collect();
@@ -161,7 +161,8 @@ fn the_motion_of_a_heart_is_plausible() {
     }
 }
 
-/// The default limit leaves room on a heart whose motion was recorded: no region shrinks to less than half.
+/// The default limit on shrinkage leaves room on a heart whose motion was recorded: no region shrinks to less than
+/// half.
 #[test]
 #[cfg_attr(not(real_meshes), ignore = "../shared/data is absent")]
 fn a_recorded_heart_shrinks_far_less_than_the_limit() {

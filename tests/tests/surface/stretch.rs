@@ -1,4 +1,4 @@
-//! The measured stretch against f64, and the gate that it is.
+//! The measured stretch against f64, and as a gate.
 
 use dibs_build::{Builder, Mesh, Motion, MotionStretch, Paths, generate};
 use dibs_nostd::format::{Join, MAX_STACK};
@@ -14,7 +14,7 @@ use dibs_tests::oracle::{Instrument, exhaustive};
 use dibs_tests::stretch;
 use fastrand::Rng;
 
-/// Never below the truth, and above it by no more than the rounding that is added.
+/// The measured stretch is never below the truth, and above it by no more than the added rounding.
 #[test]
 fn the_measured_stretch_is_the_true_one_rounded_up() {
     let mesh = generate::heart(600).expect("a valid size").mesh;
@@ -37,14 +37,14 @@ fn the_measured_stretch_is_the_true_one_rounded_up() {
     }
 }
 
-/// A triangle that is nearly flat is measured with less precision, and its neighbours are not: at rest all of
-/// them keep to a limit that leaves room for that.
+/// A nearly flat triangle is measured with less precision; its neighbours are not. At rest, all of them are within a
+/// limit that leaves room for that.
 #[test]
 fn a_flat_triangle_does_not_spoil_its_neighbours() {
     let mut rng = Rng::with_seed(37);
     for round in 0..60 {
         let mut mesh = generate::heart(320).expect("a valid size").mesh;
-        // One corner nearly onto the opposite edge: half the angle that is missing from 180 degrees.
+        // One corner moves nearly onto the opposite edge.
         let [a, b, c] = mesh.triangles[rng.usize(..mesh.triangles.len())].map(|v| v as usize);
         let [start, end] = [mesh.positions[b], mesh.positions[c]];
         let foot = start + (end - start) * (0.3 + 0.4 * rng.f32());
@@ -64,7 +64,7 @@ fn a_flat_triangle_does_not_spoil_its_neighbours() {
             let (e1, e2) = (b - a, c - a);
             let squares = [e1.length_squared(), e1.dot(e2), e2.length_squared()];
             if e1.angle_between(e2).sin() > 0.35 {
-                // Each of them is off by some roundings, as in any other mesh.
+                // Each stored number is off only by a few roundings.
                 let scale = squares[0].max(squares[2]);
                 for (stored, exact) in metric.squares.into_iter().zip(squares) {
                     let off = (f64::from(stored) - exact).abs();
@@ -75,7 +75,7 @@ fn a_flat_triangle_does_not_spoil_its_neighbours() {
     }
 }
 
-/// Triangles of every shape, needles and caps too, and of every size, squeezed and pulled every way.
+/// Triangles of every shape and size, needles and caps too, squeezed and pulled in every direction.
 #[test]
 fn no_triangle_is_taken_for_less_stretched_than_it_is() {
     let mut rng = Rng::with_seed(22);
@@ -94,7 +94,7 @@ fn no_triangle_is_taken_for_less_stretched_than_it_is() {
         corners.rotate_left(rng.usize(..3));
         let mesh = Mesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2]] };
         let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
-        // Along or across the triangle, more or less; and noise a millionth to all of its size.
+        // A pull along or across the triangle, and noise from a millionth of its size to all of it.
         let (axis, pull) = (if rng.bool() { x } else { y }, rng.f32() * 3.0);
         let noise = size * 10f32.powf(-6.0 * rng.f32());
         let moved = corners.map(|p| {
@@ -122,7 +122,7 @@ fn no_triangle_is_taken_for_less_stretched_than_it_is() {
                 );
                 excess.push(above);
             }
-            // What is too flat for f32 may be refused, but not let through.
+            // A triangle too flat for f32 may be refused, but must not pass with too small a stretch.
             Err(StretchError::Exceeded { .. }) => excess.push(f64::INFINITY),
             Err(error) => panic!("{error}"),
         }
@@ -190,8 +190,8 @@ fn each_region_is_measured_on_its_own() {
     }
 }
 
-/// A region may begin in the middle of a fan. The edge that its first triangle shares with the region before is
-/// one of its own edges, too.
+/// A region may begin in the middle of a fan. The edge that its first triangle shares with the region before is also
+/// its own.
 #[test]
 fn an_edge_between_two_regions_counts_for_both() {
     let mesh = generate::heart(2_000).expect("a valid size").mesh;
@@ -207,7 +207,7 @@ fn an_edge_between_two_regions_counts_for_both() {
             if join == Join::Start {
                 continue;
             }
-            // All is small but that edge, with the third corner in its middle.
+            // All edges shrink, this one the least, and the third corner moves into its middle.
             let [a, b, c] =
                 tree.corners(TriangleRow(first)).expect("a row").map(|row| row as usize);
             let mut moved: Vec<Vec3> = rest.iter().map(|position| *position * 0.3).collect();
@@ -262,7 +262,7 @@ fn what_cannot_be_measured_is_named() {
     assert!(matches!(refused, Err(StretchError::NoMetric)));
 }
 
-/// With a tree as the gate, a frame beyond the stretch limit is refused and the triangle named.
+/// With a tree as the gate, a frame beyond the stretch limit is refused, and the earlier one stays.
 #[test]
 fn a_surface_beyond_the_stretch_limit_is_refused() {
     let mesh = generate::heart(320).expect("a valid size").mesh;
@@ -297,8 +297,8 @@ fn a_surface_beyond_the_stretch_limit_is_refused() {
     assert!((1.15..1.1501).contains(&sigma), "{sigma}");
 }
 
-/// A real heart stretches by 2.4 somewhere, and hardly anywhere else: limits for each triangle spare what
-/// one limit for all costs, and answer the same. Prints mean node and triangle tests.
+/// A real heart stretches strongly in few places: with a limit for each triangle, queries need less than half the node
+/// tests that they need with one limit for all, and their answers are as right. Prints mean node and triangle tests.
 #[test]
 #[cfg_attr(not(real_meshes), ignore = "../shared/data is absent")]
 fn limits_of_single_triangles_spare_tests_on_a_real_heart() {

@@ -1,4 +1,4 @@
-//! The stretch check in slices comes to what a measurement of the whole frame does.
+//! The stretch check in slices has the result of a measurement of the whole frame.
 
 use dibs_nostd::{
     Arriving, Changed, Gate, MeasuredStretch, REGIONS, StretchError, StretchMonitor, SurfaceLimits,
@@ -7,7 +7,7 @@ use dibs_nostd::{
 use dibs_tests::deform::{deformed, unit};
 use fastrand::Rng;
 
-/// Feeds a frame as a bus would: packets of rows in some order, and slices of work between them.
+/// Feeds a frame to a gate as a bus does: packets of rows in some order, and slices of work between them.
 fn feed<V: VertexTable + ?Sized>(
     gate: &mut impl Gate,
     surface: &V,
@@ -54,7 +54,8 @@ fn in_packets(rows: u32, each: usize) -> Vec<std::ops::Range<u32>> {
     (0..rows).step_by(each).map(|first| first..rows.min(first + each as u32)).collect()
 }
 
-/// A monitor that has measured other frames before comes to the same, but for the rounding that is added.
+/// Compares the results of a monitor that has measured earlier frames, and of a whole measurement: they are the same
+/// but for the added rounding.
 fn assert_same(
     sliced: Result<MeasuredStretch, StretchError>,
     whole: Result<MeasuredStretch, StretchError>,
@@ -64,7 +65,7 @@ fn assert_same(
     };
     let (sigma, exact) = (sliced.sigma(), whole.sigma());
     assert!((sigma / exact - 1.0).abs() < 2e-5, "{sigma} for {exact}");
-    // A region's stretch is stored in parts of 256 of that.
+    // A region's stretch is stored in 256ths of the whole.
     for (region, exact) in sliced.regions().into_iter().zip(whole.regions()) {
         assert!((region - exact).abs() < sigma * 1.01 / 256.0, "{region} for {exact}");
     }
@@ -82,7 +83,7 @@ fn sliced_is_whole_whatever_the_slices_and_the_packets() {
         let mut rows = built.to_rows(moved);
         let packets = in_packets(tree.vertex_count(), [1, 3, 7, 40][round % 4]);
         if round % 3 == 2 {
-            // One vertex is pulled out, in every third frame.
+            // Every third frame is beyond the limit at one vertex.
             let at = rng.usize(..rows.len());
             rows[at] += unit(&mut rng) * 30.0;
         }
@@ -107,7 +108,7 @@ fn partial_is_whole_and_measures_only_what_moved() {
     let mut rng = Rng::with_seed(26);
     let mut surface = built.to_rows(&mesh.positions);
     let vertices = tree.vertex_count();
-    // Without anything published a partial frame is measured whole.
+    // Before the first publication, a partial frame is measured whole.
     let first =
         feed(&mut monitor, surface.as_slice(), Changed::Partial, &in_packets(1, 1), &mut rng);
     assert_eq!(first, measure_stretch(&tree, surface.as_slice()));
@@ -122,7 +123,7 @@ fn partial_is_whole_and_measures_only_what_moved() {
         let whole = measure_stretch(&tree, next.as_slice());
         let packets: Vec<_> = moved.clone().map(|row| row..row + 1).collect();
         if rng.u32(..5) == 0 {
-            // Half of a frame that never comes to its end.
+            // A frame that is abandoned half-way.
             monitor.begin(Changed::Partial);
             monitor.moved(moved);
             let _ = monitor.advance(Arriving::new(next.as_slice(), vertices), 20);
@@ -141,7 +142,7 @@ fn partial_is_whole_and_measures_only_what_moved() {
     }
     assert!(refused > 10 && abandoned > 10, "{refused} refused, {abandoned} abandoned");
 
-    // One vertex: a few regions' triangles, not all.
+    // For one vertex, only the triangles of its regions are measured.
     monitor.begin(Changed::Partial);
     monitor.moved(7..8);
     let mut work = 0;
@@ -151,8 +152,8 @@ fn partial_is_whole_and_measures_only_what_moved() {
     assert!(work > 0 && work < tree.triangle_count() / 4, "{work} triangles for one vertex");
 }
 
-/// No call does more work than it is told: with work for one triangle a frame takes as many calls as
-/// it has triangles, and from the second on one more for each region, whose worst triangle comes first.
+/// No call does more work than it may. With work for one triangle a call, a frame takes as many calls as it has
+/// triangles; from the second frame on, each region takes one more, for its last worst triangle.
 #[test]
 fn a_slice_is_no_longer_than_it_may_be() {
     let (mesh, built, _) = deformed(0, 0);
@@ -174,7 +175,7 @@ fn a_slice_is_no_longer_than_it_may_be() {
     }
 }
 
-/// Bytes may stand anywhere: where they are not aligned the measurement is the same.
+/// The tree's bytes may be at any address: unaligned, they give the same measurement.
 #[test]
 fn an_odd_address_changes_nothing() {
     let (_, built, frames) = deformed(9, 29);

@@ -1,4 +1,4 @@
-//! The builder: coverage against distances computed another way, determinism, cost, refusals.
+//! The builder: coverage against independently computed distances, determinism, cost, refusals.
 
 use dibs_build::{BuildError, Builder, BuiltTree, Construction, IndexWidth, Mesh, Paths, generate};
 use dibs_nostd::format::{Link, MAX_STACK, PathKind};
@@ -42,7 +42,7 @@ fn all_pairs(mesh: &Mesh) -> Vec<Vec<f64>> {
     distance
 }
 
-/// Calls `visit` with every node's pin, radius and vertices, as vertex numbers of the mesh.
+/// Calls `visit` with every node's pin, radius and vertices; vertices by their numbers in the mesh.
 fn each_node<I: Index>(tree: &Tree<'_, I>, visit: &mut impl FnMut(u32, f64, &[u32])) {
     let number = |row: u32| tree.vertex_number(row).expect("in the tree").0;
     for row in 0..tree.node_count() {
@@ -100,7 +100,7 @@ fn surface_radii_lie_between_straight_lines_and_edge_paths() {
     assert!(shorter > 50, "chords shorten paths: {shorter}");
 }
 
-/// Stretches to the very limit, with every vertex of every node held against its sphere.
+/// Deforms the mesh up to its limit, and compares every vertex of every node with the node's sphere.
 #[test]
 fn spheres_cover_their_sections_up_to_the_limit() {
     let mesh = heart(320);
@@ -125,8 +125,8 @@ fn spheres_cover_their_sections_up_to_the_limit() {
     }
 }
 
-/// The same with a limit for each triangle: random ones, and ones that one deformation needs and no more,
-/// which then stretches every triangle to its limit.
+/// The same with a limit for each triangle: random limits, and the least limits of one deformation, which then
+/// stretches every triangle to its limit.
 #[test]
 fn spheres_cover_their_sections_up_to_each_triangles_limit() {
     let mesh = heart(320);
@@ -142,7 +142,7 @@ fn spheres_cover_their_sections_up_to_each_triangles_limit() {
         let random = triangles.clone().map(|_| 1.05 + rng.f32() * rng.f32() * 2.0).collect();
         for limits in [needed, random] {
             let limits: Vec<f32> = limits;
-            // A little within, for the f32 rounding of what is measured.
+            // A little within the limits, for the f32 rounding of the measurement.
             let fits = |moved: &[Vec3]| {
                 triangles.clone().all(|t| of(moved, t) <= f64::from(limits[t]) * 0.99998)
             };
@@ -182,7 +182,7 @@ fn spheres_cover_their_sections_up_to_each_triangles_limit() {
     assert!(narrowest < 1.01, "no case comes near the limit: {narrowest}");
 }
 
-/// A stretch beyond the limit is refused and named; a tree that is told too little misses.
+/// A stretch beyond the limit is refused and named. Without this check, some answers would be wrong.
 #[test]
 fn a_violated_limit_is_reported_not_tolerated() {
     let mesh = heart(320);
@@ -227,7 +227,7 @@ fn the_heart_takes_at_most_22_bytes_a_triangle() {
     assert_eq!(summary.query_bytes, 8 * summary.nodes as usize + 6 * 10_272);
 }
 
-/// The RAM that the builder prints is what the firmware's buffers take.
+/// The RAM in the builder's summary is the size of the firmware's buffers.
 #[test]
 fn the_stated_ram_is_that_of_the_frames() {
     let stated = |triangles: u32| {
@@ -300,7 +300,7 @@ fn what_cannot_be_built_is_named() {
     assert!(shallow.is_err(), "a stack of 3 is too small");
 }
 
-/// Triangles that repeat each other unfold to chords without length, which cross their edges nowhere.
+/// Triangles that repeat each other unfold to chords without length, which cross no edge: the builder accepts them.
 #[test]
 fn limits_on_triangles_that_repeat_each_other_build() {
     let positions = [[3.0, 2.0, 1.0], [2.0, 2.0, 1.0], [2.0, 3.0, 0.0], [3.0, 1.0, 0.0]];
@@ -310,7 +310,7 @@ fn limits_on_triangles_that_repeat_each_other_build() {
     Builder::new().limits(vec![1.85, 1.5, 1.65, 1.01, 1.0]).build(&mesh).expect("a valid mesh");
 }
 
-/// Counts are exact: a change of the tree or of the traversal shows here, and must be meant.
+/// Counts are compared exactly: a change of the tree or of the traversal shows here, and must be intended.
 #[test]
 fn counts_of_a_fixed_stream_are_what_they_were() {
     let mesh = heart(2_000);

@@ -1,10 +1,10 @@
-//! Coverage itself: in every frame that the stretch check admits, each vertex of every section lies within its
-//! sphere, which is the tree's radius times the measured stretch.
+//! Coverage: in every frame that the stretch check admits, each vertex of every section lies within its sphere, whose
+//! radius is the tree's radius times the measured stretch.
 //!
-//! Frames are searched for by hill climbing: a vertex of a section is driven away from its pin for as long as the
-//! check admits the frame. So spheres too small by a thousandth are found, where random poses and distances
-//! find only those that are too small by some percent. Everything is held in f64 against the stored numbers, without
-//! tolerance but for 1e-9. `COVERAGE=20 cargo test ...` climbs twenty times as often.
+//! Hill climbing searches for frames that break this: it drives a vertex of a section away from its pin while the check
+//! admits the frame. It finds spheres that are too small by so little that random poses would miss them. Comparisons
+//! are in f64 with the stored numbers, with a tolerance of 1e-9. `COVERAGE=20 cargo test ...` tries twenty times as
+//! many trees.
 
 use dibs_build::{Builder, BuiltTree, Construction, Mesh, Paths};
 use dibs_nostd::format::Link;
@@ -12,7 +12,7 @@ use dibs_nostd::{Tree, TriangleRow, measure_stretch};
 use fastrand::Rng;
 use glam::Vec3;
 
-/// A node's sphere, and the vertex rows of the section that it has to cover.
+/// A node's sphere, and the vertex rows of the section that it must cover.
 struct Sphere {
     pin: usize,
     radius: f64,
@@ -41,10 +41,10 @@ fn spheres(tree: &Tree<'_, u16>) -> Vec<Sphere> {
 }
 
 impl Sphere {
-    /// How far a vertex is from the pin, in radii.
+    /// The distance of a vertex from the pin, in radii.
     fn share(&self, frame: &[Vec3], vertex: usize) -> f64 {
         let away = frame[vertex].as_dvec3().distance(frame[self.pin].as_dvec3());
-        // A radius of 0 covers only what is at the pin.
+        // A radius of 0 covers only vertices at the pin.
         if away == 0.0 { 0.0 } else { away / self.radius }
     }
 
@@ -55,7 +55,7 @@ impl Sphere {
     }
 }
 
-/// The largest copy of the rest shape that the check admits: everything is stretched to a limit at once.
+/// The largest copy of the rest shape that the check admits: all triangles are stretched alike.
 fn scaled(tree: &Tree<'_, u16>, rest: &[Vec3]) -> Option<Vec<Vec3>> {
     let at = |scale: f32| rest.iter().map(|&p| p * scale).collect::<Vec<_>>();
     let admits = |scale: &f32| measure_stretch(tree, at(*scale).as_slice()).is_ok();
@@ -94,7 +94,7 @@ fn climb(
             }
             // Some vertices away from the pin.
             1 => next.iter_mut().filter(|_| rng.bool()).for_each(|p| *p += away * step),
-            // All of them towards the line from the pin, which is drawn out.
+            // All vertices towards the line from the pin to the target, and along it.
             _ => {
                 let narrower = 0.5 * rng.f32();
                 for p in &mut next {
@@ -115,7 +115,7 @@ fn climb(
     }
 }
 
-/// What was looked at, and how close to its sphere a vertex came.
+/// Counts of trees and climbs, and the largest distance of a vertex from its pin, as a part of what its sphere covers.
 #[derive(Debug, Default)]
 struct Seen {
     trees: u32,
@@ -124,7 +124,7 @@ struct Seen {
 }
 
 impl Seen {
-    /// Holds every vertex of every section against its sphere.
+    /// Compares every vertex of every section with its sphere.
     fn check(&mut self, built: &BuiltTree, tree: &Tree<'_, u16>, all: &[Sphere], frame: &[Vec3]) {
         let sigma = f64::from(measure_stretch(tree, frame).expect("admitted").sigma());
         for sphere in all {
@@ -140,7 +140,7 @@ impl Seen {
     }
 }
 
-/// Builds trees on the meshes of a family, with all kinds of paths, limits and leaves, and climbs in each.
+/// Builds trees on the meshes of a family, with all kinds of paths, limits and leaves, and climbs on each.
 fn climb_on(family: impl Fn(&mut Rng) -> Mesh, trees: u32, seed: u64) {
     let mut rng = Rng::with_seed(seed);
     let more: u32 = std::env::var("COVERAGE").map_or(1, |text| text.parse().expect("a number"));
@@ -167,7 +167,7 @@ fn climb_on(family: impl Fn(&mut Rng) -> Mesh, trees: u32, seed: u64) {
             let limit = |_: &[u32; 3]| 1.0 + (stretch - 1.0) * rng.f32() * 2.0;
             builder = builder.limits(mesh.triangles.iter().map(limit).collect());
         }
-        // What has no area or falls apart is refused.
+        // The builder refuses meshes with triangles without area, or of several parts.
         let Ok(built) = builder.build(&mesh) else { continue };
         let tree = built.tree::<u16>().expect("valid");
         let all = spheres(&tree);
@@ -192,8 +192,8 @@ fn climb_on(family: impl Fn(&mut Rng) -> Mesh, trees: u32, seed: u64) {
     assert!(seen.nearest_miss > 0.9999, "no vertex came near its sphere: {seen:?}");
 }
 
-/// Triangles on these points, each of which shares an edge with an earlier one; edges of three triangles happen,
-/// and triangles twice.
+/// Triangles on these points, each of which shares an edge with an earlier one. Some edges have three triangles, and
+/// some triangles repeat.
 fn grown(mut positions: Vec<Vec3>, rng: &mut Rng) -> Mesh {
     let mut triangles = vec![[0, 1, 2]];
     let mut used = 3;
@@ -212,7 +212,7 @@ fn grown(mut positions: Vec<Vec3>, rng: &mut Rng) -> Mesh {
     Mesh { positions, triangles }
 }
 
-/// How thin a mesh is in two of its directions.
+/// A mesh's extent in two of its directions, relative to the third.
 fn thinness(rng: &mut Rng) -> f32 {
     [1.0, 0.1, 0.01, 1e-3, 1e-5][rng.usize(..5)]
 }
@@ -244,7 +244,8 @@ fn on_clouds_from_fat_to_flat() {
     climb_on(family, 6000, 2);
 }
 
-/// A flat triangle between two fat ones: a chord across it would be shorter than the check allows the way to grow.
+/// A flat triangle between two fat ones: a chord across it can grow by more than the measured stretch, because the
+/// check counts the flat triangle as higher at rest.
 #[test]
 fn on_chords_from_fat_to_fat_across_flat() {
     let family = |rng: &mut Rng| {
@@ -266,13 +267,13 @@ fn on_chords_from_fat_to_fat_across_flat() {
     climb_on(family, 6000, 3);
 }
 
-/// Fans of isosceles needles on a sheet: two equal longest edges each, so that which one is the longest is a matter
-/// of taste, but must be of one taste.
+/// Fans of isosceles needles on a sheet. Each has two equal longest edges: either may count as the longest, but builder
+/// and check must choose the same.
 #[test]
 fn on_fans_of_isosceles_needles() {
     let family = |rng: &mut Rng| {
         let (width, rest) = (10f32.powf(-2.0 - 3.0 * rng.f32()), 0.4);
-        // All at the same distance from the tip, also after rounding.
+        // All spokes have the same length, also after rounding.
         let around = [(1, -4), (1, 4), (4, 1), (-4, 1), (-1, 4), (-1, -4), (-4, -1), (4, -1)];
         let spokes =
             around.map(|(y, z)| Vec3::new(10.0, y as f32 * width * rest, z as f32 * width));

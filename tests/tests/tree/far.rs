@@ -9,7 +9,7 @@ use dibs_tests::surfaces::ball;
 use fastrand::Rng;
 use glam::DVec3;
 
-/// A sphere of text at this distance from the origin, and its exact positions.
+/// The text of a ball's mesh file, this far from the origin, and its exact positions.
 fn far_ball(away: f64) -> (String, Vec<DVec3>) {
     let mesh = ball(2);
     let centre = DVec3::new(away, -away / 3.0, away / 7.0);
@@ -20,8 +20,8 @@ fn far_ball(away: f64) -> (String, Vec<DVec3>) {
     (vertices.chain(faces).collect(), exact)
 }
 
-/// What rounding to f32 does to a mesh far from the origin counts in the accuracy of its answers, and where it would
-/// spoil the shape the mesh is refused.
+/// The rounding of a mesh to f32, far from the origin, counts in the accuracy of its answers. Where it would spoil the
+/// shape, the mesh is refused.
 #[test]
 fn coordinates_far_from_the_origin_are_refused_or_counted() {
     let folder = tempfile::tempdir().unwrap();

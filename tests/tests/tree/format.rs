@@ -17,7 +17,7 @@ fn word(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"))
 }
 
-/// Puts a word and makes the checksum right again, so that only the meaning is wrong.
+/// Changes a word and makes the checksum right again, so that only the word is wrong.
 fn with_word(bytes: &[u8], at: usize, value: u32) -> Vec<u8> {
     let mut changed = bytes.to_vec();
     changed[at..at + 4].copy_from_slice(&value.to_le_bytes());
@@ -126,11 +126,11 @@ fn a_wrong_value_with_a_right_checksum_is_named() {
     assert!(matches!(corner, FormatError::Corner { triangle: 0, vertex: 0xFFFF }));
 }
 
-/// A leaf's vertices must be where a query looks for them, or it would reject the leaf too early.
+/// A leaf's vertices must be at the places that a query reads: otherwise it could reject the leaf too early.
 #[test]
 fn a_leaf_whose_vertices_are_not_at_their_places_is_refused() {
     let (mesh, _) = heart(IndexWidth::Bits16);
-    // The rest metric and the adjacency, which are checked too, would object as well.
+    // Without rest metric and adjacency, whose checks would refuse the change too.
     let built = Builder::new().with_metric(false).with_adjacency(false).build(&mesh);
     let built = built.expect("a valid mesh");
     let tree = built.tree::<u16>().expect("valid");
@@ -162,7 +162,7 @@ fn a_leaf_whose_vertices_are_not_at_their_places_is_refused() {
     assert!(refused > 50, "{refused} leaves tried");
 }
 
-/// A query that looks at a leaf's first rows relies on them having no other vertices.
+/// A query that reads a leaf's first rows relies on their vertices being at the leaf's first places.
 #[test]
 fn a_leaf_whose_triangles_come_too_early_is_refused() {
     let (mesh, _) = heart(IndexWidth::Bits16);
@@ -175,7 +175,7 @@ fn a_leaf_whose_triangles_come_too_early_is_refused() {
     for row in 0..tree.node_count() {
         let Some((.., Link::Leaf { first, count })) = tree.node(row) else { continue };
         for triangle in first + 1..(first + count).saturating_sub(1) {
-            // The next one before this one.
+            // The next triangle comes before this one.
             let at = table + 6 * triangle as usize;
             let mut swapped = bytes.to_vec();
             swapped[at..at + 12].rotate_left(6);
@@ -200,7 +200,7 @@ fn a_leaf_whose_triangles_come_too_early_is_refused() {
     assert!(refused > 50 && accepted > 5, "{refused} refused, {accepted} accepted");
 }
 
-/// What a validated tree does when its bytes rot afterwards: an error or an answer, but it ends.
+/// A query on a validated tree whose bytes were corrupted afterwards ends, with an error or an answer.
 #[test]
 fn a_query_on_rotten_bytes_ends() {
     let (mesh, built) = heart(IndexWidth::Bits16);
@@ -237,7 +237,7 @@ fn a_query_on_rotten_bytes_ends() {
     assert!(answers > 0 && errors > 0);
 }
 
-/// The metric and the limits, read by the specification alone, and what is refused of them.
+/// Metric and limits, read by the specification alone, and the refusals of wrong ones.
 #[test]
 fn metric_and_limits_stand_where_the_specification_says() {
     let mesh = generate::heart(320).expect("a valid size").mesh;
@@ -312,7 +312,8 @@ fn metric_and_limits_stand_where_the_specification_says() {
             let refused = refuse(metric + 24, wrong.to_bits());
             assert_eq!(refused, Err(FormatError::Metric { triangle: 2 }));
         }
-        // What starts is neither the one nor the other, and measured from its first corner.
+        // A triangle that starts a fan cannot be marked as one that continues or flips a fan, or be measured from
+        // another corner.
         let touches = |row: usize| rows(row).iter().any(|v| rows(row - 1).contains(v));
         let alone = starts.into_iter().skip(1).find(|&row| !touches(row)).expect("not one patch");
         let at = metric + 12 * alone;

@@ -1,4 +1,4 @@
-//! From mesh files to the bytes of a tree: what is read, built, specified and refused.
+//! From mesh files to the bytes of a tree: reading, building, the format, and refusals.
 
 mod construction;
 mod coverage;

@@ -1,18 +1,18 @@
-//! Malformed and degenerate mesh files: the outcome of each is written down here.
+//! Malformed and degenerate mesh files, and the expected outcome of each.
 //!
-//! The files are not part of the project; without them these tests say so and pass.
+//! The files are not part of the project; without them these tests are ignored.
 
 use dibs_build::{Import, ReadErrorKind, ReadOptions};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What reading a file must give.
+/// The expected outcome of reading a file.
 enum Want {
-    /// Rows of the vertex table, triangles, and every other count of the report that is not 0.
+    /// A mesh: its vertices, its triangles, and every other count of the report that is not 0.
     Mesh(usize, usize, &'static [(&'static str, usize)]),
-    /// A kind of error, and a part of its sentence.
+    /// A kind of error, and a part of its message.
     Error(fn(&ReadErrorKind) -> bool, &'static str),
-    /// Several components: how many, and what the largest gives when only it is kept.
+    /// Several components: their number; then vertices, triangles and counts where only the largest is kept.
     Components(usize, usize, usize, &'static [(&'static str, usize)]),
 }
 use ReadErrorKind as K;
@@ -55,7 +55,7 @@ const OUTCOMES: &[(&str, Want)] = &[
         Components(18, 722, 98, &[welded(3382), unreferenced(671), degenerate(56)]),
     ),
     ("assimp_box.obj", Mesh(8, 12, &[polygons(6)])),
-    // One face goes round and round its four corners on a very long line.
+    // On a very long line, one face goes around its four corners many times.
     (
         "assimp_box_longline.obj",
         Mesh(
@@ -70,13 +70,13 @@ const OUTCOMES: &[(&str, Want)] = &[
             ],
         ),
     ),
-    // A ring, cut open to be one polygon: its area is checked below.
+    // A ring, cut open to be one polygon; a test below checks its area.
     ("assimp_concave_polygon.obj", Mesh(64, 64, &[polygons(1), border(64)])),
     ("assimp_cube.ply", Mesh(8, 12, &[polygons(6)])),
     ("assimp_cube_with_vertexcolors.obj", Mesh(8, 12, &[])),
     ("assimp_invalid_empty.obj", Error(|k| matches!(k, K::Empty), "empty")),
     ("assimp_invalid_empty.ply", Error(|k| matches!(k, K::Empty), "empty")),
-    // A face without any vertex: something is lost, and a surface with a hole would hide it.
+    // A face without vertices is an error: a surface with a hole would hide the loss.
     (
         "assimp_invalid_malformed2.obj",
         Error(|k| matches!(k, K::Malformed { line: Some(23), .. }), "a face without vertices"),
@@ -103,14 +103,14 @@ const OUTCOMES: &[(&str, Want)] = &[
         "synthetic_count_too_large.stl",
         Error(|k| matches!(k, K::Count { claimed: 1_000_000_000, found: 320, .. }), "triangles"),
     ),
-    // Whether the count or the data is wrong, the file does not say.
+    // The file does not tell whether its count or its data is wrong.
     (
         "synthetic_count_zero_with_data.stl",
         Error(|k| matches!(k, K::Count { claimed: 0, found: 320, .. }), "triangles"),
     ),
     ("synthetic_dup_faces_and_flipped.obj", Mesh(162, 320, &[duplicates(20)])),
     ("synthetic_empty_file.stl", Error(|k| matches!(k, K::Empty), "empty")),
-    // A ball pressed flat: its two sides coincide, and are still two sheets.
+    // A ball pressed flat: its two sides coincide, but stay two sheets.
     ("synthetic_flat_plane_z0.obj", Mesh(162, 304, &[coincident(73), degenerate(16), border(32)])),
     ("synthetic_header_only_83_bytes.stl", Error(|k| matches!(k, K::Truncated { .. }), "83 bytes")),
     (
@@ -136,9 +136,9 @@ const OUTCOMES: &[(&str, Want)] = &[
     ("trimesh_LICENSE.md", Error(|k| matches!(k, K::UnknownFormat), "convert")),
     ("trimesh_empty.obj", Error(|k| matches!(k, K::NoTriangles { degenerate: 0 }), "faces")),
     ("trimesh_empty.stl", Error(|k| matches!(k, K::NoTriangles { degenerate: 0 }), "faces")),
-    // Its normals are numbered, but absent; a group's name contains an f.
+    // Its faces name normals that are absent; a group's name contains an f.
     ("trimesh_face_in_group_name_mid_file.obj", Mesh(5, 2, &[border(6)])),
-    // Two tetrahedra, each with the triangle between them.
+    // Two tetrahedra, each of which has the triangle between them.
     ("trimesh_joined_tetrahedra.obj", Mesh(5, 7, &[duplicates(1), ("non_manifold_edges", 3)])),
     ("trimesh_mirror.ply", Mesh(143, 286, &[])),
     (
@@ -154,7 +154,7 @@ const OUTCOMES: &[(&str, Want)] = &[
         "trimesh_ply_empty_header.ply",
         Error(|k| matches!(k, K::NoTriangles { degenerate: 0 }), "faces"),
     ),
-    // Five corners in no plane: seen along their normal, one side runs back over another.
+    // A polygon of five corners in no plane: seen along its normal, one side runs back over another.
     ("trimesh_polygonfaces.obj", Mesh(5, 3, &[polygons(1), ("polygons_not_simple", 1), border(5)])),
     ("trimesh_soup.stl", Components(100, 300, 1, &[unreferenced(297), border(3)])),
     (
@@ -282,7 +282,7 @@ fn the_concave_polygon_keeps_its_area() {
             (b - a).cross(c - a).length() / 2.0
         })
         .sum();
-    // Both rings are regular polygons of 32 corners, to the digits of the file.
+    // Both edges of the ring are regular polygons of 32 corners, up to the file's digits.
     let polygon = |radius: f64| {
         let corners = 32.0;
         corners / 2.0 * radius * radius * (std::f64::consts::TAU / corners).sin()

@@ -1,4 +1,5 @@
-//! Readers and checks on meshes written here: every format gives the same surface, and numbers stay the file's own.
+//! Readers and checks on mesh files written here: every format gives the same surface, and indexed files keep the
+//! numbers of their vertices.
 
 use std::path::Path;
 
@@ -26,7 +27,7 @@ fn every_format_gives_the_same_surface() {
         if matches!(format, Format::StlAscii | Format::StlBinary) {
             assert_eq!(import.mesh.positions.len(), 6, "{name}");
             assert_eq!(import.report.welded, 18, "{name}");
-            // Numbered in the order in which they appear.
+            // Vertices are numbered in the order of their first use.
             assert_eq!(import.mesh.triangles[..2], [[0, 1, 2], [1, 3, 2]], "{name}");
         } else {
             assert_eq!(import.mesh, mesh, "{name}");
@@ -97,7 +98,7 @@ fn stl_agrees_with_stl_io() {
 
 #[test]
 fn text_is_rounded_to_f32_once() {
-    // Just above the middle between 1 and its successor, by less than f64 can tell.
+    // A number above the middle between 1 and its successor, by less than f64 resolves.
     let above = "1.000000059604644775390625000000000001";
     let text = format!("v {above} 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n");
     let mesh = Folder::new().read("a.obj", text).unwrap().mesh;
@@ -147,8 +148,8 @@ fn lying_counts_are_errors_and_cost_nothing() {
     }
 }
 
-/// Two triangles that share an edge, with the shared vertices written twice, and a third that
-/// shares a vertex number with the second.
+/// Two triangles that share an edge, with the shared vertices written twice, and a third that shares two vertex numbers
+/// with the second.
 const SEAM: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0.00001 0\nv 0 1 -0.0\nv 1 1 0\nv 2 2 0\n\
                     f 1 2 3\nf 4 6 5\nf 6 4 7\n";
 
@@ -218,7 +219,7 @@ fn triangles_that_rounding_made_from_a_line_are_degenerate() {
         "v 0.1 0.2 0.3\nv 10.1 20.2 30.3\nv 4.1 8.2 12.3\nv 9 9 0\nf 1 2 3\nf 1 3 4\nf 3 2 4\n";
     let import = folder.read("a.obj", line).unwrap();
     assert_eq!((import.report.dropped_degenerate, import.report.triangles), (1, 2));
-    // A real sliver, a thousand times thicker than that, stays.
+    // A sliver that is not an effect of rounding stays.
     let sliver = "v 0 0 0\nv 30 0 0\nv 15 0.004 0\nf 1 2 3\n";
     assert_eq!(folder.read("a.obj", sliver).unwrap().report.dropped_degenerate, 0);
 }

@@ -1,4 +1,4 @@
-//! No bytes make a reader panic, hang or allocate beyond the file's size.
+//! Damaged mesh files are refused with a message, or give a sound mesh; no reader panics.
 
 use std::fmt::Write;
 
@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use crate::mesh_files::{Folder, samples};
 
-/// What every accepted mesh promises.
+/// Checks the promises of every accepted mesh.
 fn check_promises(import: &Import) {
     let mesh = &import.mesh;
     assert!(!mesh.triangles.is_empty());
@@ -18,13 +18,13 @@ fn check_promises(import: &Import) {
     }
 }
 
-/// Bytes that mean something in one format or another.
+/// Bytes with a meaning in some format.
 const TELLING: &[u8] = b"0123456789-+.eE/\\# \n\rvfnaif\0\xff";
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 3000, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Bytes flipped, overwritten with bytes that occur in such files, cut out, doubled, cut off.
+    /// Bits are flipped, bytes are overwritten with bytes of such files, cut out or doubled, and the end is cut off.
     #[test]
     fn damaged_files_never_panic(
         which in 0_usize..7,
@@ -54,8 +54,8 @@ proptest! {
         }
     }
 
-    /// Polygons of any shape, flat or not, simple or not, are cut without a panic, and n corners
-    /// give at most n - 2 triangles.
+    /// Polygons of any shape, flat or not, simple or not, are cut without a panic, and n corners give at most n - 2
+    /// triangles.
     #[test]
     fn polygons_of_any_shape_are_cut(
         points in prop::collection::vec((-5_i8..5, -5_i8..5, -1_i8..2), 3..40)

@@ -71,7 +71,7 @@ pub fn stl_ascii(mesh: &Mesh) -> Vec<u8> {
     (text + "endsolid\n").into_bytes()
 }
 
-/// Written by another crate.
+/// Written by the crate `stl_io`.
 pub fn stl_binary(mesh: &Mesh) -> Vec<u8> {
     let triangles: Vec<stl_io::Triangle> = corners(mesh)
         .map(|t| stl_io::Triangle {
@@ -81,12 +81,12 @@ pub fn stl_binary(mesh: &Mesh) -> Vec<u8> {
         .collect();
     let mut bytes = Vec::new();
     stl_io::write_stl(&mut bytes, triangles.iter()).unwrap();
-    // Many exporters do this to binary files.
+    // Many exporters begin binary files with this word.
     bytes[..6].copy_from_slice(b"solid ");
     bytes
 }
 
-/// PLY with properties that nobody asked for, doubles, and an extra element.
+/// PLY with properties besides positions and corners, and with coordinates of two types.
 pub fn ply(mesh: &Mesh, encoding: &str) -> Vec<u8> {
     let big = encoding == "binary_big_endian";
     let ascii = encoding == "ascii";

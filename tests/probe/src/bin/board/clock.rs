@@ -15,7 +15,7 @@ pub fn start() {
     }
 }
 
-/// Counts since `start`.
+/// The timer's counts since `start`.
 pub fn now() -> u32 {
     // SAFETY: a register of TIMER 0, which tolerates any read.
     !unsafe { read_volatile(with_exposed_provenance_mut::<u32>(VALUE)) }

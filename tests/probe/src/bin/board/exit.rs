@@ -1,4 +1,4 @@
-//! The end of a program on the board: an exit code for the emulator, 1 for every panic and fault.
+//! Ends a program on the board with an exit code for the emulator, a failure after every panic and fault.
 
 use cortex_m_rt::exception;
 use cortex_m_semihosting::debug;

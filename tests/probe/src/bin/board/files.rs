@@ -7,7 +7,7 @@ const BUFFER: usize = 2 * 1024;
 const READ: usize = 1;
 const WRITE: usize = 5;
 
-/// A file that is read.
+/// The script: a file to read.
 pub struct Input {
     handle: usize,
     buffer: [u8; BUFFER],
@@ -15,7 +15,7 @@ pub struct Input {
     end: usize,
 }
 
-/// A file that is written.
+/// The answers: a file to write.
 pub struct Output {
     handle: usize,
     buffer: [u8; BUFFER],
@@ -36,7 +36,7 @@ impl Input {
         Some(Self { handle: open(b"script.bin\0", READ)?, buffer: [0; BUFFER], next: 0, end: 0 })
     }
 
-    /// Fills all of `bytes`; `None` if the file ends before.
+    /// Fills all of `bytes`; `None` if the file ends too early.
     pub fn read(&mut self, bytes: &mut [u8]) -> Option<()> {
         for byte in bytes {
             if self.next == self.end {

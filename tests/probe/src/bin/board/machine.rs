@@ -1,4 +1,4 @@
-//! The board as a script's [`Machine`]: a file of questions, a file of answers, and a clock.
+//! The board as a script's [`Machine`]: the script, the file of answers, and a clock.
 
 use probe::{Fault, Machine};
 

@@ -1,5 +1,5 @@
-//! Answers the file `script.bin` on the emulated board, into the file `answers.bin`, both in the folder
-//! that the emulator was started in. With `-icount shift=6` the clock counts 1.6 to an instruction.
+//! Answers the script `script.bin` on the emulated board, and writes `answers.bin`; both are in the emulator's working
+//! folder. With `-icount shift=6` an instruction takes 64 ns, or 1.6 counts of the 25 MHz clock.
 #![no_std]
 #![no_main]
 

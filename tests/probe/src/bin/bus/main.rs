@@ -1,17 +1,17 @@
 //! A receiver of the bus on the emulated board, for the fault matrix: bytes come over UART 0, and reports go back.
 //!
-//! Reads from `script.bin` four words and a tree of [`VERTICES`] vertices: whether packets carry tags, the challenge,
-//! the bits of the largest coordinate, the tree's length. After all bytes received it reports, as one COBS frame: the
-//! number of bytes, frames published, epoch of the last, the CRC-32 of its positions in memory (a word each), and a
-//! status packet with every counter.
+//! Reads from `script.bin` four words and a tree of [`VERTICES`] vertices. The words are: 1 for packets with tags, else
+//! 0; the challenge; the bits of the largest coordinate; the tree's length. Whenever no byte waits and no work is due,
+//! it reports, as one COBS frame: the bytes received, the frames published, the epoch of the last, the CRC-32 of its
+//! positions in memory (a word each), and a status packet with every counter.
 //!
-//! This program polls UART 0; the firmware, which the demo runs, takes it by interrupt.
+//! This program polls UART 0; the firmware, which the demo runs, receives by interrupt.
 #![no_std]
 #![no_main]
 
 #[path = "../board/exit.rs"]
 mod exit;
-// It writes no file.
+// This program writes no file.
 #[allow(dead_code)]
 #[path = "../board/files.rs"]
 mod files;
@@ -117,7 +117,7 @@ impl<'t, M: Mac> Receiver<'t, M> {
             Ok(Advance::Pending) => return true,
             Ok(Advance::Published { .. }) => {
                 self.published = self.published.wrapping_add(1);
-                // The control tick's view.
+                // Reads the frame as a control tick would.
                 if let Some(frame) = self.reader.read() {
                     let mut digest = CRC.digest();
                     for row in 0..VERTICES as u32 {

@@ -3,8 +3,8 @@
 //! Reads from `script.bin`, in little-endian words: the length of a tree of [`VERTICES`] vertices and its bytes, padded
 //! to a word; then frames, each as [`UNTAGGED`] or [`TAGGED`], the number of its packets, the number of packets between
 //! two advances of the check, and each packet's length and bytes, padded; then 0. Writes
-//! [`ANSWER_WORDS`](probe::receive::ANSWER_WORDS) words a frame to `answers.bin`. With `-icount shift=6` the clock
-//! counts 1.6 to an instruction.
+//! [`ANSWER_WORDS`](probe::receive::ANSWER_WORDS) words a frame to `answers.bin`. With `-icount shift=6` an instruction
+//! takes 64 ns, or 1.6 counts of the 25 MHz clock.
 #![no_std]
 #![no_main]
 
@@ -26,7 +26,7 @@ use probe::receive::{ANSWER_WORDS, KEY, TAGGED, TREE_BYTES, UNTAGGED, VERTICES};
 
 /// Largest packet.
 const MTU: usize = 1024;
-/// Triangles that the check may take at a time.
+/// The work of one advance of the check.
 const SLICE: u32 = 512;
 
 static FRAMES: [Frames<VERTICES>; 2] = [const { Frames::new() }; 2];
@@ -70,7 +70,7 @@ fn run() -> Option<()> {
     })
 }
 
-/// Times of calls on the clock.
+/// The time of some calls, in counts of the clock: their sum and the longest.
 #[derive(Default)]
 struct Stopwatch {
     sum: u32,
@@ -88,7 +88,7 @@ impl Stopwatch {
     }
 }
 
-/// Takes a frame; `None` unless it is published.
+/// Receives a frame, and returns its answer; `None` unless it is published.
 fn frame<M: Mac>(
     assembler: &mut Receiver<'_, M>,
     script: &mut files::Input,
@@ -105,7 +105,7 @@ fn frame<M: Mac>(
             check.time(|| assembler.advance(SLICE)).ok()?;
         }
     }
-    // A frame has fewer triangles than this many slices have.
+    // This many slices are enough for any frame.
     for _ in 0..1_000 {
         match check.time(|| assembler.advance(SLICE)).ok()? {
             Advance::Pending => (),

@@ -1,8 +1,8 @@
-//! The firmware's receiver and control tick on the emulated board, fed from a script instead of a line: the cost of a
-//! tick on adversarial frames.
+//! Measures the firmware's control tick on adversarial frames: its receiver and its tick run on the emulated board, fed
+//! from a script instead of a line.
 //!
 //! Reads commands from `script.bin`, in little-endian words ([`probe::tick`]), and writes an answer for each tick to
-//! `answers.bin`. With `-icount shift=6` the clock counts 1.6 to an instruction.
+//! `answers.bin`. With `-icount shift=6` an instruction takes 64 ns, or 1.6 counts of the 25 MHz clock.
 #![no_std]
 #![no_main]
 

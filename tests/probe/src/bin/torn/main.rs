@@ -1,9 +1,9 @@
 //! Checks that no query sees vertices of two epochs while the bus interrupt fires throughout. In a controller the query
-//! preempts the bus; the reverse, as here, is worse.
+//! preempts the bus. Here the bus preempts the query, which is worse.
 //!
-//! Reads a tree of [`VERTICES`] vertices with its rest shape from `script.bin` after the number of queries; writes five
-//! words to `answers.bin`: queries, queries that saw two epochs, frames published, publications delayed, and queries
-//! that saw two epochs on a table without the protocol.
+//! Reads from `script.bin` the number of queries, the length of a tree of [`VERTICES`] vertices with its rest shape,
+//! and the tree. Writes five words to `answers.bin`: queries, queries that saw two epochs, frames published,
+//! publications refused during a read, and queries that saw two epochs on a table without the protocol.
 #![no_std]
 #![no_main]
 
@@ -30,7 +30,7 @@ const VERTICES: usize = 258;
 const SHARE: usize = 16;
 
 static FRAMES: Frames<VERTICES> = Frames::new();
-/// The same positions without the protocol: one buffer for writes and reads.
+/// The same positions without the protocol: one buffer that is both written and read.
 static PLAIN: [[AtomicU32; 3]; VERTICES] = [const { [const { AtomicU32::new(0) }; 3] }; VERTICES];
 static SENDER: Mutex<RefCell<Option<Sender>>> = Mutex::new(RefCell::new(None));
 static BYTES: Mutex<RefCell<[u8; 64 * 1024]>> = Mutex::new(RefCell::new([0; 64 * 1024]));
@@ -52,7 +52,7 @@ fn placed(rest: Vec3, epoch: u32) -> Vec3 {
 }
 
 impl Sender {
-    /// One interrupt: the next vertices, and at the end of a frame its publication.
+    /// Writes the next vertices, and publishes a complete frame.
     fn interrupt(&mut self) {
         if self.next == 0 {
             self.epoch = self.epoch.wrapping_add(1);
@@ -77,7 +77,7 @@ impl Sender {
             let counter = if self.writer.publish(label).is_ok() { &PUBLISHED } else { &PUT_OFF };
             counter.fetch_add(1, Ordering::Relaxed);
         }
-        // Irregular, so that every place of a query is hit.
+        // Irregular intervals interrupt queries at every place.
         self.random = self.random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         // SAFETY: one write of SysTick's reload register, which nobody else uses.
         unsafe { (*SYST::PTR).rvr.write(60 + (self.random >> 25)) };
@@ -95,7 +95,7 @@ fn SysTick() {
     });
 }
 
-/// A table that detects reads of vertices of two epochs.
+/// A table that notes whether vertices of two epochs are read.
 struct Watched<'a, V> {
     table: &'a V,
     rest: &'a [Vec3; VERTICES],
@@ -117,7 +117,7 @@ impl<V: VertexTable> VertexTable for Watched<'_, V> {
     fn position(&self, vertex: u32) -> Option<Vec3> {
         let position = self.table.position(vertex)?;
         let rest = *self.rest.get(vertex as usize)?;
-        // Without a label the first vertex defines the epoch.
+        // Without a label, the first vertex that is read gives the epoch, modulo 64.
         let epoch = self.epoch.get().unwrap_or((position.x - rest.x + 0.5) as u32);
         self.epoch.set(Some(epoch));
         if position != placed(rest, epoch) {
@@ -184,14 +184,14 @@ fn run() -> Option<()> {
             let center = Vec3::new(32.0 + 70.0 * wave(angle), 70.0 * wave(angle + 1.0), 5.0);
             let tool = Sphere::new(center, 2.5).ok()?;
             if let Some(frame) = reader.read() {
-                // Positions repeat after 64 epochs, so the label's epoch serves.
+                // Positions give the epoch only modulo 64, so the label gives it.
                 let watched = Watched::new(&frame, &rest, Some(frame.label().epoch));
                 query.closest(&watched, &tool, &Options::cold()).ok()?;
                 mixed += u32::from(watched.is_mixed.get());
                 done += 1;
             }
             let watched = Watched::new(&Plain, &rest, None);
-            // A surface of two epochs may be stretched beyond the limit, and the query fail.
+            // On a surface of two epochs, which may be stretched beyond the limit, the query may fail.
             let _ = query.closest(&watched, &tool, &Options::cold());
             mixed_plain += u32::from(watched.is_mixed.get());
         }
@@ -206,7 +206,7 @@ fn run() -> Option<()> {
     answers.flush()
 }
 
-/// A wave between -1 and 1, without a sine.
+/// A triangle wave of period 1 between -1 and 1, for positive `x`: the board has no sine.
 fn wave(x: f32) -> f32 {
     let turns = x - (x as i32) as f32;
     4.0 * if turns < 0.5 { turns } else { 1.0 - turns } - 1.0

@@ -1,5 +1,5 @@
-//! Follows the ticks in the file `script.bin` on the emulated board, and writes into the file `answers.bin`. With
-//! `-icount shift=6` the clock counts 1.6 to an instruction.
+//! Follows the ticks of the script `script.bin` on the emulated board, and writes `answers.bin`. With `-icount shift=6`
+//! an instruction takes 64 ns, or 1.6 counts of the 25 MHz clock.
 #![no_std]
 #![no_main]
 
