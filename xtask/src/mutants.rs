@@ -39,6 +39,12 @@ const UNIT_TESTS: &str = "tests::";
 /// The exit code of cargo-mutants where mutants survived.
 const SURVIVED: i32 = 2;
 
+/// Its exit code where mutants made the tests hang, and none survived.
+const TIMED_OUT: i32 = 3;
+
+/// Its exit code where the tests fail without a mutant.
+const BASELINE_FAILED: i32 = 4;
+
 /// Most mutants of changed lines that CI tries: each takes a build of the core and its tests.
 const SAMPLE: usize = 4;
 
@@ -110,14 +116,19 @@ pub fn sample() -> Result<Outcome> {
                 command(&[&changed[..], &["--shard", &shard]].concat(), programs, tests);
             let status = trial.status().context("cannot start cargo-mutants")?;
             match status.code() {
-                Some(0) => (),
+                // Tests that a mutant makes hang notice it.
+                Some(0 | TIMED_OUT) => (),
                 Some(SURVIVED) => {
                     bail!("no test notices a mutant of a changed line: see target/mutants.out")
                 }
+                Some(BASELINE_FAILED) => bail!("the tests fail without a mutant"),
                 _ => return Ok(Outcome::Skipped(format!("cargo-mutants could not run: {status}"))),
             }
             tried += count.min(SAMPLE - tried);
         }
+    }
+    if tried == 0 {
+        return Ok(Outcome::Skipped("no line changed that has a mutant".to_owned()));
     }
     println!("{tried} mutants of changed lines, all noticed");
     Ok(Outcome::Passed)

@@ -58,7 +58,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
             }
             chain.add(number, found);
         }
-        if chain.limit() == f32::INFINITY && passed != 0 {
+        if !chain.is_outside {
             chain.options = chain.options.within(options.within);
             for (number, tool) in tools.iter().enumerate().take(PASSED) {
                 if passed >> number & 1 != 0 {
@@ -96,6 +96,8 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
 /// The answers of a chain's tools so far.
 struct Chain {
     best: Option<(usize, Proximity)>,
+    /// No tool was found inside or crossing.
+    is_outside: bool,
     lower: f32,
     accuracy: f32,
     node_tests: u32,
@@ -108,6 +110,7 @@ impl Chain {
     fn new(options: &Options) -> Self {
         Self {
             best: None,
+            is_outside: true,
             lower: f32::INFINITY,
             accuracy: 0.0,
             node_tests: 0,
@@ -116,16 +119,12 @@ impl Chain {
         }
     }
 
-    /// No tool outside that is farther than this is the closest.
+    /// A tool outside that is farther than this is not the closest; infinite once a tool was found inside or crossing,
+    /// since others may then be deeper.
     fn limit(&self) -> f32 {
         match &self.best {
-            Some((_, closest)) => match closest.side {
-                Side::Inside | Side::Crossing | Side::Undefined(NoSide::BelowAccuracy) => {
-                    f32::INFINITY
-                }
-                _ => closest.separation,
-            },
-            None => f32::INFINITY,
+            Some((_, closest)) if self.is_outside => closest.separation,
+            _ => f32::INFINITY,
         }
     }
 
@@ -137,6 +136,10 @@ impl Chain {
         };
         self.node_tests = self.node_tests.saturating_add(found.node_tests);
         self.triangle_tests = self.triangle_tests.saturating_add(found.triangle_tests);
+        let side = found.side;
+        if matches!(side, Side::Inside | Side::Crossing | Side::Undefined(NoSide::BelowAccuracy)) {
+            self.is_outside = false;
+        }
         if found.lower < self.lower {
             self.lower = found.lower;
         }

@@ -85,7 +85,7 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     ) -> Result<Proximity, QueryError> {
         let first = options.first(self.triangle);
         let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options, first)?;
-        let found = search.within(options.within).run()?;
+        let found = search.run()?;
         self.triangle = found.triangle.or(self.triangle);
         let error = vertices.position_error();
         signed(&self.tree, &mut self.stack, vertices, tool, options, found, error)
@@ -108,7 +108,7 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     ) -> Result<Proximity, QueryError> {
         let first = options.first(self.triangle);
         let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options, first)?;
-        let found = WideSearch::new(search.within(options.within)).run()?;
+        let found = WideSearch::new(search).run()?;
         self.triangle = found.triangle.or(self.triangle);
         let error = vertices.position_error();
         signed(&self.tree, &mut self.stack, vertices, tool, options, found, error)

@@ -69,7 +69,7 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     /// can be closer.
     cutoff: f32,
     cutoff_squared: f32,
-    /// What is farther than this from the axis is not looked for.
+    /// What is farther than this from the axis is not looked for: [`Options::within`].
     limit: f32,
     nearest_pin: NearestPin,
     best: Option<AxisPair>,
@@ -80,7 +80,7 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T> {
-    /// A search that tests the triangle `first` before anything else.
+    /// A search that tests the triangle `first` before anything else, if the surface can be within the limit at all.
     #[inline(always)]
     pub fn start(
         tree: &'s Tree<'t, I>,
@@ -157,7 +157,16 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             best_triangle: u32::MAX,
         };
         search.lower_cutoff_to_pin(root.pin, distance);
+        let limit = options.within + tool.radius();
+        // Written so that a NaN limits nothing.
+        if limit < f32::INFINITY {
+            // With rounding to spare, so that an axis that touches the surface is always within.
+            let rounding = search.slack + header.position_error;
+            search.limit = rounding + if limit > 0.0 { limit } else { 0.0 };
+            search.lower_cutoff(search.limit);
+        }
         if let Some(TriangleRow(triangle)) = first
+            && !(distance - radius > search.cutoff)
             && triangle < header.triangles
             && let Some(left) = search.left.triangle_tests.checked_sub(1)
         {
@@ -168,18 +177,6 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         let subtree = Waiting { lower: distance - radius, link: root.link };
         search.push(0, subtree).ok_or(QueryError::Corrupt { row: 0 })?;
         Ok(search)
-    }
-
-    /// Looks only for a pair whose separation is at most `separation`.
-    #[inline(always)]
-    pub fn within(mut self, separation: f32) -> Self {
-        let limit = separation + self.tool.radius();
-        // A NaN limits nothing.
-        if limit < self.limit {
-            self.limit = if limit > 0.0 { limit } else { 0.0 };
-            self.lower_cutoff(self.limit);
-        }
-        self
     }
 
     /// Visits subtrees, near ones first, until none below the cutoff is left or the budget runs out.

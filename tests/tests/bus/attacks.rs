@@ -312,20 +312,11 @@ fn two_frames_of_one_name_are_not_spliced() {
     let [a, b] = rows.map(|rows| tagged(id(1), &rows, Freshness::default()));
     assert_eq!(a[0], b[0], "the begins are the same");
     let last = a.len() - 1;
-    // Checksums and their scrambled form are public. For each, the mixture of twelve packets with the least sum of
-    // changes is tried.
-    for public in [checksum, share] {
-        let mixtures = 1_u32..1 << 12;
-        let closest = mixtures.min_by_key(|mixture| {
-            let picked = (1..=12).filter(|i| mixture >> (i - 1) & 1 == 1);
-            let change = |i: usize| public(&b[i]).wrapping_sub(public(&a[i]));
-            picked.fold(0_u32, |sum, i| sum.wrapping_add(change(i))) as i32
-        });
-        let closest = closest.unwrap();
+    for mixture in [1, 0b11, 0b1010_1010_1010, 0b1111_1111_1111] {
         let (mut assembler, mut reader) = guarded(mac());
         let mut outcome = Ok(None);
         for i in 0..=last {
-            let is_other = (1..=12).contains(&i) && closest >> (i - 1) & 1 == 1;
+            let is_other = (1..=12).contains(&i) && mixture >> (i - 1) & 1 == 1;
             outcome = give(&mut assembler, if is_other { &b[i] } else { &a[i] });
         }
         assert!(matches!(outcome, Err(ReceiveError::Digest { .. })), "{outcome:?}");

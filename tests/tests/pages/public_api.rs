@@ -92,10 +92,13 @@ impl Listing {
         }
     }
 
-    /// Lists the macros exported by the files directly in `src`: their paths are in the crate's root.
+    /// Lists the exported macros, wherever they are: their paths are in the crate's root.
     fn macros(&mut self, source: &Path, name: &str) {
         for file in fs::read_dir(source).expect("a folder") {
             let path = file.expect("a file").path();
+            if path.is_dir() {
+                self.macros(&path, name);
+            }
             if path.extension().is_none_or(|extension| extension != "rs") {
                 continue;
             }

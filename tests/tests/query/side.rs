@@ -66,8 +66,6 @@ fn depths_are_those_of_dense_sampling() {
             if found.side != Side::Crossing {
                 continue;
             }
-            crossing += 1;
-            searches += u64::from(found.node_tests);
             let truth = sides::crossing_separation(&rows, &triangles, &tool, POINTS);
             let Some((low, high)) = truth else { continue };
             let accuracy = f64::from(found.accuracy);
@@ -78,6 +76,8 @@ fn depths_are_those_of_dense_sampling() {
                 continue;
             }
             assert!(holds, "{}: {tool:?} {found:?} {low} {high}", surface.name);
+            crossing += 1;
+            searches += u64::from(found.node_tests);
             // The stated depth is the depth of the stated point.
             let deepest = capsule.axis_point(found.axis_parameter);
             let depth = sides::depth(&rows, &triangles, deepest).expect("a clear side");
@@ -219,7 +219,6 @@ fn neighbours_share_their_edges_and_wrong_ones_are_refused() {
         let mesh = ball(2);
         let built = Builder::new().index(index).build(&mesh).expect("a valid mesh");
         let (at, _) = section(built.blob(), 8);
-        let mut refused = 0;
         for place in 0..3 * mesh.triangles.len() {
             let mut bytes = built.blob().to_vec();
             let code = &mut bytes[at + place * width..][..width];
@@ -231,9 +230,7 @@ fn neighbours_share_their_edges_and_wrong_ones_are_refused() {
             };
             let is_named = matches!(error, Some(FormatError::Neighbour { .. }));
             assert!(is_named, "neighbour {place}: {error:?}");
-            refused += 1;
         }
-        assert_eq!(refused, 3 * 128);
     }
 }
 

@@ -89,7 +89,7 @@ fn a_frame_is_searched_with_its_own_stretch_and_error() {
             let stated = ask(&rows, &options.stretch(less)).widened(ERROR);
             assert!(same(&ask(&known, &options.stretch(less)), &stated));
             assert!(stated.node_tests <= by_hand.node_tests);
-            fewer += limit.node_tests - by_hand.node_tests;
+            fewer += i64::from(limit.node_tests) - i64::from(by_hand.node_tests);
         }
     }
     assert!(fewer > 0, "the stretch made no difference");
@@ -194,7 +194,7 @@ fn a_query_starts_from_its_last_answer_unless_it_is_told_not_to() {
         assert!(same(&second, &stated), "{second:?} {stated:?}");
         assert!(same(&wide, &stated_wide), "{wide:?} {stated_wide:?}");
         assert_eq!(second.separation, first.separation);
-        saved += first.node_tests - second.node_tests;
+        saved += i64::from(first.node_tests) - i64::from(second.node_tests);
     }
     assert!(saved > 0, "the last answer saved nothing");
 }

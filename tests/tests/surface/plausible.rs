@@ -186,7 +186,7 @@ fn a_recorded_heart_shrinks_far_less_than_the_limit() {
 }
 
 #[test]
-fn a_limit_that_is_no_number_refuses_every_frame() {
+fn a_limit_that_is_no_number_refuses_frames() {
     let (built, motion) = heart();
     let rest = built.to_rows(&motion.frames[0]);
     assert!(

@@ -106,7 +106,7 @@ fn text_is_rounded_to_f32_once() {
 }
 
 #[test]
-fn lying_counts_are_errors_and_cost_nothing() {
+fn lying_counts_are_errors() {
     let folder = Folder::new();
     let huge = u32::MAX;
     let header =
