@@ -4,11 +4,14 @@ use core::ffi::c_void;
 
 use bytemuck::AnyBitPattern;
 use dibs_nostd::wire::{Deframer, Event, NoMac, encode_status, enframe, framed_bytes};
-use dibs_nostd::{Advance, Assembler, BorrowedFrames, Progress, StretchMonitor, SurfaceLimits};
+use dibs_nostd::{
+    Advance, Assembler, BorrowedFrames, Progress, StretchMonitor, SurfaceLimits, VertexTable,
+};
 
 use crate::border::{Handle, Input, Kind, Output, Storage};
 use crate::code::dibs_code;
 use crate::surface::dibs_surface;
+use crate::tool::dibs_vec3;
 use crate::tree::dibs_tree;
 
 /// Bytes of a receiver's storage.
@@ -282,6 +285,24 @@ pub extern "C" fn dibs_receiver_status(
             out.push(byte)?;
         }
         length.set(bytes.len());
+        Ok(())
+    })
+}
+
+/// Position (mm) of a vertex in the frame that was published last. Row after row it serves a checksum of what is in
+/// memory, or a log.
+///
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` outside the table, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_receiver_position(
+    receiver: *mut dibs_receiver,
+    row: u32,
+    position: *mut dibs_vec3,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (position, receiver) = (position.check()?, receiver.open()?);
+        let surface = receiver.assembler.surface().ok_or(dibs_code::NoSurface)?;
+        position.set(surface.position(row).ok_or(dibs_code::Argument)?.into());
         Ok(())
     })
 }
