@@ -1534,6 +1534,13 @@ dibs_code dibs_receiver_status(dibs_receiver *receiver,
                                size_t *length);
 
 /**
+ * Number of the frame that was published last, which wraps.
+ *
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, or a misuse.
+ */
+dibs_code dibs_receiver_epoch(dibs_receiver *receiver, uint32_t *epoch);
+
+/**
  * Position (mm) of a vertex in the frame that was published last. Row after row it serves a checksum of what is in
  * memory, or a log.
  *

@@ -2,6 +2,7 @@
 //! xtask` and `tests/prove` use it.
 
 pub mod apt;
+pub mod c_firmware;
 pub mod c_interface;
 pub mod firmware;
 pub mod nightly;

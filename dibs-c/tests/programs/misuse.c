@@ -200,6 +200,8 @@ static void two_readers(void) {
     EXPECT(NO_SURFACE, dibs_reader_latest(reader, 0, 50, held, NULL));
     EXPECT(PACKET_DAMAGED, dibs_receiver_accept(receiver, again, 8, 0, NULL));
     EXPECT(NULL, dibs_receiver_accept(receiver, NULL, 8, 0, NULL));
+    EXPECT(NULL, dibs_receiver_epoch(receiver, NULL));
+    EXPECT(NO_SURFACE, dibs_receiver_epoch(receiver, &(uint32_t){0}));
     EXPECT(NULL, dibs_receiver_position(receiver, 0, NULL));
     EXPECT(NO_SURFACE, dibs_receiver_position(receiver, 0, &(dibs_vec3){0}));
     uint8_t status[DIBS_STATUS];
@@ -233,7 +235,10 @@ static void held(const char *packets, const float *positions, uint32_t vertices)
     EXPECT(STALE, dibs_reader_latest(reader, 11, 50, frame, NULL));
     EXPECT(OK, dibs_reader_latest(reader, 11, 1000, frame, NULL));
     EXPECT(OK, dibs_frame_release(frame));
-    /* The stream is of the shape at rest. */
+    /* The stream is two frames of the shape at rest. */
+    uint32_t epoch;
+    EXPECT(OK, dibs_receiver_epoch(receiver, &epoch));
+    EXPECT_THAT(epoch == 2);
     dibs_vec3 at;
     for (uint32_t row = 0; row < vertices; row++) {
         EXPECT(OK, dibs_receiver_position(receiver, row, &at));
