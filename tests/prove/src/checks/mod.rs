@@ -6,6 +6,7 @@ mod board_faults;
 mod corruption;
 pub mod cost;
 mod demo;
+mod demo_c;
 mod demo_faults;
 mod fuzz;
 mod hand;
@@ -44,6 +45,7 @@ pub const CHECKS: &[Check] = &[
     stack::CHECK,
     demo::CHECK,
     demo_faults::CHECK,
+    demo_c::CHECK,
     rot::CHECK,
     host_faults::CHECK,
     board_faults::CHECK,
@@ -60,10 +62,11 @@ pub const CHECKS: &[Check] = &[
 ];
 
 /// Names of the checks that build and run other programs, on the other core.
-pub const BESIDE: [&str; 5] = [
+pub const BESIDE: [&str; 6] = [
     sanitizers::ADDRESS.name,
     sanitizers::THREAD.name,
     interleavings::CHECK.name,
+    demo_c::CHECK.name,
     miri::CHECK.name,
     fuzz::CHECK.name,
 ];

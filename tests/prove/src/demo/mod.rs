@@ -5,6 +5,7 @@ pub mod debugger;
 mod faults;
 pub mod machine;
 mod plot;
+mod push;
 mod report;
 pub mod scene;
 mod sender;
