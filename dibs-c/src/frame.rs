@@ -162,6 +162,47 @@ pub extern "C" fn dibs_frame_measure(
     })
 }
 
+/// Facts about a frame.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct dibs_frame_facts {
+    /// Vertices.
+    pub vertices: u32,
+    /// No vertex is farther (mm) than this from where it is here. Part of the accuracy of every answer.
+    pub position_error: f32,
+    /// The largest stretch, 1 for none; 0 where it was not measured.
+    pub stretch: f32,
+}
+
+impl dibs_frame_facts {
+    fn of(table: &impl VertexTable) -> Self {
+        Self {
+            vertices: table.len() as u32,
+            position_error: table.position_error(),
+            stretch: table.stretch().map_or(0.0, |measured| measured.sigma()),
+        }
+    }
+}
+
+/// Facts about the frame.
+///
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_frame_get_facts(
+    frame: *mut dibs_frame,
+    facts: *mut dibs_frame_facts,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (facts, frame) = (facts.check()?, frame.open()?);
+        facts.set(match &frame.table {
+            Table::Empty => return Err(dibs_code::NoSurface),
+            Table::Vertices(vertices) => dibs_frame_facts::of(vertices),
+            Table::Held(held) => dibs_frame_facts::of(held),
+        });
+        Ok(())
+    })
+}
+
 /// Lets go of the vertices, or of the frame that a reader holds: the next one can then be published.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_frame_release(frame: *mut dibs_frame) -> dibs_code {

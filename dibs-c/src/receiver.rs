@@ -4,11 +4,14 @@ use core::ffi::c_void;
 
 use bytemuck::AnyBitPattern;
 use dibs_nostd::wire::{Deframer, Event, NoMac, encode_status, enframe, framed_bytes};
-use dibs_nostd::{Advance, Assembler, BorrowedFrames, Progress, StretchMonitor, SurfaceLimits};
+use dibs_nostd::{
+    Advance, Assembler, BorrowedFrames, Progress, StretchMonitor, SurfaceLimits, VertexTable,
+};
 
 use crate::border::{Handle, Input, Kind, Output, Storage};
 use crate::code::dibs_code;
 use crate::surface::dibs_surface;
+use crate::tool::dibs_vec3;
 use crate::tree::dibs_tree;
 
 /// Bytes of a receiver's storage.
@@ -33,6 +36,8 @@ pub struct dibs_receiver {
     deframer: Deframer<DIBS_MTU>,
     surface: &'static dibs_surface,
     mesh_id: u32,
+    /// Number of the frame published last.
+    published: Option<u32>,
 }
 
 impl Kind for dibs_receiver {
@@ -89,7 +94,8 @@ pub extern "C" fn dibs_receiver_init(
             let monitor = StretchMonitor::new(tree)?.limits(limits);
             let (writer, mesh_id) = (surface.take_writer()?, tree.mesh_id());
             let assembler = Assembler::new(writer, monitor, mesh_id, given.reach);
-            Ok(dibs_receiver { assembler, deframer: Deframer::new(), surface, mesh_id })
+            let (deframer, published) = (Deframer::new(), None);
+            Ok(dibs_receiver { assembler, deframer, surface, mesh_id, published })
         })
     })
 }
@@ -233,7 +239,10 @@ pub extern "C" fn dibs_receiver_advance(
         let outcome = match outcome? {
             Advance::Pending => dibs_advance::Pending,
             Advance::Held { .. } => dibs_advance::Held,
-            Advance::Published { .. } => dibs_advance::Published,
+            Advance::Published { epoch } => {
+                receiver.published = Some(epoch);
+                dibs_advance::Published
+            }
             _ => dibs_advance::Idle,
         };
         if let Some(advance) = advance {
@@ -282,6 +291,36 @@ pub extern "C" fn dibs_receiver_status(
             out.push(byte)?;
         }
         length.set(bytes.len());
+        Ok(())
+    })
+}
+
+/// Number of the frame that was published last, which wraps.
+///
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_receiver_epoch(receiver: *mut dibs_receiver, epoch: *mut u32) -> dibs_code {
+    dibs_code::of(|| {
+        let (epoch, receiver) = (epoch.check()?, receiver.open()?);
+        epoch.set(receiver.published.ok_or(dibs_code::NoSurface)?);
+        Ok(())
+    })
+}
+
+/// Position (mm) of a vertex in the frame that was published last. Row after row it serves a checksum of what is in
+/// memory, or a log.
+///
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` outside the table, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_receiver_position(
+    receiver: *mut dibs_receiver,
+    row: u32,
+    position: *mut dibs_vec3,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (position, receiver) = (position.check()?, receiver.open()?);
+        let surface = receiver.assembler.surface().ok_or(dibs_code::NoSurface)?;
+        position.set(surface.position(row).ok_or(dibs_code::Argument)?.into());
         Ok(())
     })
 }

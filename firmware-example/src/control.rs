@@ -62,11 +62,17 @@ pub const TICK_INSTRUCTIONS: u64 = 480_000;
 // The rest of the tick takes some thousand instructions.
 const _: () = assert!(Cost::M7_CAPSULE.instructions(BUDGET) < TICK_INSTRUCTIONS);
 
-/// Stiffness (N/mm), damping (N s/mm), largest force (N) and margin (mm) of the constraint.
-const STIFFNESS: f32 = 1.0;
-const DAMPING: f32 = 0.002;
-const MAX_FORCE: f32 = 5.0;
-const MARGIN: f32 = 5.0;
+/// Stiffness of the constraint, in N/mm.
+pub const STIFFNESS: f32 = 1.0;
+
+/// Its damping, in N s/mm.
+pub const DAMPING: f32 = 0.002;
+
+/// Its largest force, in N.
+pub const MAX_FORCE: f32 = 5.0;
+
+/// How far it reaches from the surface, in mm.
+pub const MARGIN: f32 = 5.0;
 
 /// The controller's state from tick to tick.
 pub struct Control {

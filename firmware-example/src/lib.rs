@@ -23,8 +23,8 @@ pub mod telemetry;
 mod upkeep;
 
 pub use control::{
-    BUDGET, Control, SILENCE_LIMIT, SILENCE_WARNING, SURFACE_AGE_LIMIT, SURFACE_AGE_WARNING,
-    SetupError, TICK_INSTRUCTIONS,
+    BUDGET, Control, DAMPING, MARGIN, MAX_FORCE, SILENCE_LIMIT, SILENCE_WARNING, STIFFNESS,
+    SURFACE_AGE_LIMIT, SURFACE_AGE_WARNING, SetupError, TICK_INSTRUCTIONS,
 };
 pub use fingerprint::fingerprint;
 pub use instrument::instrument;

@@ -2,6 +2,7 @@
 //! `cargo xtask` and `tests/prove`.
 
 pub mod apt;
+pub mod c_firmware;
 pub mod c_interface;
 pub mod firmware;
 pub mod nightly;

@@ -26,6 +26,7 @@ static void expect(dibs_code expected, dibs_code found, const char *call, int li
     }
 }
 
+#define EXPECT_THAT(is_so) expect(DIBS_CODE_OK, (is_so) ? DIBS_CODE_OK : DIBS_CODE_ARGUMENT, #is_so, __LINE__)
 #define EXPECT(code, call) expect(DIBS_CODE_##code, call, #call, __LINE__)
 
 /* Each object has an array of its own: the sanitizer sees a write behind its end. */
@@ -118,6 +119,7 @@ static void order(void) {
     EXPECT(NULL, dibs_tree_get_facts(tree, NULL));
     EXPECT(NO_SURFACE, dibs_query_closest(query, frame, &tool, NULL, &found));
     EXPECT(NO_SURFACE, dibs_frame_measure(frame, tree, NULL));
+    EXPECT(NO_SURFACE, dibs_frame_get_facts(frame, &(dibs_frame_facts){0}));
 }
 
 /* Values that are out of range. */
@@ -127,6 +129,7 @@ static void values(const float *positions, uint32_t vertices) {
     dibs_contact contact;
     dibs_row rows[1];
     dibs_budget budget;
+    dibs_frame_facts facts;
     size_t count;
     const dibs_vec3 zero = {0.0f, 0.0f, 0.0f};
     const dibs_options options = {{DIBS_UNLIMITED, DIBS_UNLIMITED}, 0.0f, 4};
@@ -142,6 +145,13 @@ static void values(const float *positions, uint32_t vertices) {
     EXPECT(OK, dibs_frame_set_vertices(frame, positions, vertices - 1, 0.0f));
     EXPECT(VERTEX_COUNT, dibs_query_closest(query, frame, &tool, NULL, &found));
     EXPECT(VERTEX_COUNT, dibs_frame_measure(frame, tree, NULL));
+    EXPECT(OK, dibs_frame_set_vertices(frame, positions, vertices, 0.25f));
+    EXPECT(NULL, dibs_frame_get_facts(frame, NULL));
+    EXPECT(OK, dibs_frame_get_facts(frame, &facts));
+    EXPECT_THAT(facts.vertices == vertices && facts.position_error == 0.25f && facts.stretch == 0.0f);
+    EXPECT(OK, dibs_frame_measure(frame, tree, NULL));
+    EXPECT(OK, dibs_frame_get_facts(frame, &facts));
+    EXPECT_THAT(facts.stretch >= 1.0f);
     EXPECT(OK, dibs_frame_set_vertices(frame, positions, vertices, 0.0f));
 
     EXPECT(NULL, dibs_query_closest(query, frame, NULL, NULL, &found));
@@ -190,6 +200,10 @@ static void two_readers(void) {
     EXPECT(NO_SURFACE, dibs_reader_latest(reader, 0, 50, held, NULL));
     EXPECT(PACKET_DAMAGED, dibs_receiver_accept(receiver, again, 8, 0, NULL));
     EXPECT(NULL, dibs_receiver_accept(receiver, NULL, 8, 0, NULL));
+    EXPECT(NULL, dibs_receiver_epoch(receiver, NULL));
+    EXPECT(NO_SURFACE, dibs_receiver_epoch(receiver, &(uint32_t){0}));
+    EXPECT(NULL, dibs_receiver_position(receiver, 0, NULL));
+    EXPECT(NO_SURFACE, dibs_receiver_position(receiver, 0, &(dibs_vec3){0}));
     uint8_t status[DIBS_STATUS];
     size_t length;
     EXPECT(CAPACITY, dibs_receiver_status(receiver, 0, 0, 1, status, 10, &length));
@@ -197,7 +211,7 @@ static void two_readers(void) {
 }
 
 /* While one frame object holds the surface, no other can hold it, and nothing is published. */
-static void held(const char *packets) {
+static void held(const char *packets, const float *positions, uint32_t vertices) {
     dibs_receiver *receiver = (dibs_receiver *)(void *)receiver_memory;
     dibs_reader *reader = (dibs_reader *)(void *)reader_memory;
     dibs_frame *first = (dibs_frame *)(void *)other_frame_memory;
@@ -221,6 +235,16 @@ static void held(const char *packets) {
     EXPECT(STALE, dibs_reader_latest(reader, 11, 50, frame, NULL));
     EXPECT(OK, dibs_reader_latest(reader, 11, 1000, frame, NULL));
     EXPECT(OK, dibs_frame_release(frame));
+    /* The stream is two frames of the shape at rest. */
+    uint32_t epoch;
+    EXPECT(OK, dibs_receiver_epoch(receiver, &epoch));
+    EXPECT_THAT(epoch == 2);
+    dibs_vec3 at;
+    for (uint32_t row = 0; row < vertices; row++) {
+        EXPECT(OK, dibs_receiver_position(receiver, row, &at));
+        EXPECT_THAT(memcmp(&at, positions + 3 * row, sizeof at) == 0);
+    }
+    EXPECT(ARGUMENT, dibs_receiver_position(receiver, vertices, &at));
     free(bytes);
 }
 
@@ -333,7 +357,7 @@ int main(int argc, char **argv) {
     values(positions, facts.vertices);
     two_readers();
     in_use();
-    held(argv[2]);
+    held(argv[2], positions, facts.vertices);
     failsafe();
     texts();
 
@@ -351,6 +375,12 @@ int main(int argc, char **argv) {
     dibs_scrub *scrub;
     EXPECT(OK, dibs_scrub_init(scrub_memory, sizeof scrub_memory, tree, &scrub));
     EXPECT(OK, dibs_scrub_step(scrub, length));
+    EXPECT(NOT_INITIALISED, dibs_tree_check((dibs_tree *)(void *)unmade));
+    EXPECT(OK, dibs_tree_check(tree));
+    /* The stretch limit, which was decoded: no scrub would read it. */
+    bytes[28] ^= 1;
+    EXPECT(TREE_CORRUPT, dibs_tree_check(tree));
+    bytes[28] ^= 1;
     bytes[length - 1] ^= 4;
     EXPECT(TREE_CORRUPT, dibs_scrub_step(scrub, length));
 

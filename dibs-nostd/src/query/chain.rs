@@ -12,9 +12,9 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// empty slice.
     ///
     /// The answer has the least signed separation of all tools, and the least lower end; its tests are those of all. A
-    /// tool that is farther than the closest so far costs some ten tests, and is asked in full only if another one is
-    /// found inside or crossing. That suffices for a chain, whose axes touch each other: it cannot have one tool outside
-    /// and another one inside unless one of them crosses the surface. Query tools that do not touch one by one.
+    /// tool is searched no farther than the closest so far, and again without that limit if another one is found inside
+    /// or crossing. That suffices for a chain, whose axes touch each other: it cannot have one tool outside and another
+    /// one inside unless one of them crosses the surface. Query tools that do not touch one by one.
     ///
     /// Cost: the budget at most, for all tools together.
     ///

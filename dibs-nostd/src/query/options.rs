@@ -117,7 +117,7 @@ impl Options {
 
     /// Looks only for a pair whose unsigned separation is at most this (mm). Where there is none, the answer's interval
     /// begins there, and its side is not known ([`NoSide::CutShort`](crate::NoSide::CutShort)). A far surface of a scene
-    /// costs some ten tests that way.
+    /// costs a few tests that way.
     ///
     /// [`Query::closest`](crate::Query::closest) and [`Query::closest_wide`](crate::Query::closest_wide) heed it, a
     /// tracker and the search for contacts do not.

@@ -94,7 +94,7 @@ pub const CHECK: Check = Check {
 
 /// Notes the figures of the demo's report.
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
-    let report = report_of(effort.demo_seconds, false)?;
+    let report = report_of(Run { seconds: effort.demo_seconds, ..Run::default() })?;
     for (name, field) in [
         ("demo.ticks", "ticks"),
         ("demo.answers", "queries"),
@@ -113,13 +113,29 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-/// The report of a demo, with faults on the bus or without.
-pub fn report_of(seconds: u32, faults: bool) -> Result<Value> {
-    let name = if faults { "demo-faults" } else { "demo" };
+/// A run of the demo.
+#[derive(Clone, Copy, Default)]
+pub struct Run {
+    pub seconds: u32,
+    /// Faults on the bus.
+    pub faults: bool,
+    /// The controller in C.
+    pub c: bool,
+}
+
+/// The report of a demo.
+pub fn report_of(Run { seconds, faults, c }: Run) -> Result<Value> {
+    let name = match (faults, c) {
+        (false, false) => "demo",
+        (true, false) => "demo-faults",
+        (false, true) => "demo-c",
+        (true, true) => "demo-c-faults",
+    };
     let output = workspace::target().join("guarantees").join(name);
     demo::run(&demo::Options {
         seconds,
         faults,
+        c,
         seed: 1,
         board_only: true,
         output: Some(output.clone()),

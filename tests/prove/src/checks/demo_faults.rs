@@ -4,7 +4,7 @@ use anyhow::{Context, Result};
 use serde_json::Value;
 use xtask::steps::Outcome;
 
-use super::demo::{number, report_of};
+use super::demo::{Run, number, report_of};
 use crate::harness::figures::Figures;
 use crate::harness::promise::{
     Bound, Promise,
@@ -62,7 +62,7 @@ pub const CHECK: Check = Check {
 };
 
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
-    let report = report_of(effort.fault_seconds, true)?;
+    let report = report_of(Run { seconds: effort.fault_seconds, faults: true, c: false })?;
     for (name, field) in [
         ("demo.faults.ticks", "ticks"),
         ("demo.faults.answers", "queries"),

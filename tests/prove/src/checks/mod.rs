@@ -6,6 +6,7 @@ mod board_faults;
 mod corruption;
 pub mod cost;
 mod demo;
+mod demo_c;
 mod demo_faults;
 mod fuzz;
 mod hand;
@@ -44,6 +45,7 @@ pub const CHECKS: &[Check] = &[
     stack::CHECK,
     demo::CHECK,
     demo_faults::CHECK,
+    demo_c::CHECK,
     rot::CHECK,
     host_faults::CHECK,
     board_faults::CHECK,
@@ -60,10 +62,11 @@ pub const CHECKS: &[Check] = &[
 ];
 
 /// Names of the checks that need no emulator, but for a few short ones: these run on the other core.
-pub const BESIDE: [&str; 9] = [
+pub const BESIDE: [&str; 10] = [
     sanitizers::ADDRESS.name,
     sanitizers::THREAD.name,
     interleavings::CHECK.name,
+    demo_c::CHECK.name,
     miri::CHECK.name,
     fuzz::CHECK.name,
     cost::HOST.name,

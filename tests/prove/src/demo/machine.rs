@@ -3,11 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use anyhow::{Context, Result};
-use xtask::firmware;
+use anyhow::{Context, Result, ensure};
 use xtask::process::run;
 use xtask::toolchain::Cross;
-use xtask::{qemu, workspace};
+use xtask::{c_firmware, firmware, qemu, workspace};
 
 use super::Options;
 use super::scene::Scene;
@@ -19,9 +18,11 @@ pub enum Machine {
     Board {
         /// The firmware.
         program: PathBuf,
+        /// Its log's file.
+        log: &'static str,
         /// Its needs of the board.
         footprint: Footprint,
-        /// The toolchain that built it.
+        /// The toolchains that built it.
         toolchain: String,
         /// The emulator's version.
         emulator: String,
@@ -46,11 +47,16 @@ impl Machine {
             }
             return Self::host(scene, reason);
         }
+        if options.c {
+            return Self::in_c(scene);
+        }
         match Cross::find().and_then(|cross| Ok((cross, qemu::find()?))) {
             Ok((cross, emulator)) => {
                 let program = firmware::build(&cross, &scene.surface)?;
                 let footprint = Footprint::read(&program)?;
-                Ok(Self::Board { program, footprint, toolchain: cross.describe(), emulator })
+                // In defmt's encoding: `defmt-print -e FIRMWARE < log.defmt`.
+                let (log, toolchain) = ("log.defmt", cross.describe());
+                Ok(Self::Board { program, log, footprint, toolchain, emulator })
             }
             Err(error) if options.board_only => Err(error),
             Err(error) => {
@@ -61,6 +67,17 @@ impl Machine {
                 Self::host(scene, format!("no board: {error:#}"))
             }
         }
+    }
+
+    /// The controller in C, for which nothing stands in where it cannot be had.
+    fn in_c(scene: &Scene) -> Result<Self> {
+        ensure!(scene.tree.index_bits() == 16, "the C interface takes at most 65,536 vertices");
+        let (cross, emulator, compiler) = (Cross::find()?, qemu::find()?, c_firmware::find()?);
+        let vertices = scene.tree.summary().vertices;
+        let program = c_firmware::build(&cross, scene.tree.blob(), vertices)?;
+        let footprint = Footprint::read(&program)?;
+        let toolchain = format!("{compiler}, its library by {}", cross.describe());
+        Ok(Self::Board { program, log: "log.txt", footprint, toolchain, emulator })
     }
 
     fn host(scene: &Scene, reason: String) -> Result<Self> {
@@ -93,6 +110,14 @@ impl Machine {
         };
         command.stdin(Stdio::null());
         command
+    }
+
+    /// The name of the file for the controller's log.
+    pub fn log(&self) -> &'static str {
+        match self {
+            Self::Board { log, .. } => log,
+            Self::Host { .. } => "log.txt",
+        }
     }
 
     /// One line for the user.

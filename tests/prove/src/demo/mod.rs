@@ -5,6 +5,7 @@ pub mod debugger;
 mod faults;
 pub mod machine;
 mod plot;
+mod push;
 mod report;
 pub mod scene;
 mod sender;
@@ -44,6 +45,9 @@ pub struct Options {
     /// Runs the controller as a program on this computer, without cross toolchain and QEMU.
     #[arg(long)]
     pub host: bool,
+    /// Runs the controller in C, `examples/c/firmware`, compiled by Debian's `arm-none-eabi-gcc`.
+    #[arg(long, conflicts_with = "host")]
+    pub c: bool,
     /// Puts faults of every kind on the bus, and silences it once for a while.
     #[arg(long)]
     pub faults: bool,

@@ -15,6 +15,7 @@ use xtask::qemu;
 use super::check;
 use super::faults::{Faults, Silence};
 use super::machine::Machine;
+use super::push::Pushed;
 use super::scene::Scene;
 use super::session::Outcome;
 use super::transition::Transition;
@@ -48,6 +49,14 @@ pub struct Report {
     separation_min_mm: f32,
     separation_max_mm: f32,
     force_max_n: f32,
+    /// Ticks whose force was compared with that of the wall, and those of them that were within its margin.
+    forces_compared: usize,
+    forces_pushing: usize,
+    /// Ticks with another force.
+    forces_wrong: usize,
+    /// The first of them.
+    #[serde(skip)]
+    first_wrong_force: u32,
     /// Ticks before the first frame, when the output is safe.
     ticks_waiting: usize,
     ticks_nominal: usize,
@@ -112,6 +121,7 @@ impl Report {
         let largest =
             |value: fn(&Tick) -> f32| answered.iter().map(|tick| value(tick)).fold(0.0, f32::max);
         let summary = outcome.summary;
+        let pushed = Pushed::of(&outcome.ticks);
         let footprint = match machine {
             Machine::Board { footprint, .. } => Some(footprint),
             Machine::Host { .. } => None,
@@ -137,6 +147,10 @@ impl Report {
             separation_min_mm: least(|tick| tick.separation),
             separation_max_mm: largest(|tick| tick.separation),
             force_max_n: largest(force),
+            forces_compared: pushed.checked,
+            forces_pushing: pushed.pushing,
+            forces_wrong: pushed.wrong,
+            first_wrong_force: pushed.first,
             ticks_waiting: waiting,
             ticks_nominal: count(State::Nominal),
             ticks_degraded: count(State::Degraded),
@@ -193,6 +207,11 @@ impl Report {
         promise(
             wrong == 0,
             format!("{wrong} answers differ from exhaustive search, the first at tick {tick}"),
+        );
+        let (wrong, first) = (self.forces_wrong, self.first_wrong_force);
+        promise(
+            wrong == 0,
+            format!("{wrong} ticks have another force than the wall's, the first is {first}"),
         );
         let wrong = self.frames_published_wrong;
         promise(wrong == 0, format!("{wrong} published frames differ from what was sent"));
@@ -305,6 +324,13 @@ impl Report {
             format!("{:.2} to {:.2} mm", self.separation_min_mm, self.separation_max_mm),
         );
         row("largest force", format!("{:.2} N", self.force_max_n));
+        row(
+            "forces compared",
+            format!(
+                "{}, {} of them within the margin, {} differ",
+                self.forces_compared, self.forces_pushing, self.forces_wrong
+            ),
+        );
         row(
             "tests a query",
             format!("{:.0} nodes, {:.0} triangles", self.node_tests_mean, self.triangle_tests_mean),

@@ -94,8 +94,7 @@ pub fn run(
     let shown = shown(&command)
         .replace(&format!("{}/", workspace::root().display()), "")
         .replace(&format!("{}/", sockets.path().display()), "");
-    // The firmware's log, in defmt's encoding: `defmt-print -e FIRMWARE < log.defmt`.
-    command.stdout(File::create(folder.join("log.defmt"))?);
+    command.stdout(File::create(folder.join(machine.log()))?);
     let start = Instant::now();
     let mut child = Guard(command.spawn().with_context(|| format!("cannot start `{shown}`"))?);
     let bus = accept(&bus_socket, &mut child.0)?;

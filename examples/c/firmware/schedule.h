@@ -1,0 +1,31 @@
+/* The two interrupts, and the watch over the first one's deadline. */
+#ifndef SCHEDULE_H
+#define SCHEDULE_H
+
+#include <dibs.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "telemetry.h"
+
+/* Starts clock and interrupts. */
+void schedule_start(void);
+
+/* Stops the interrupts. */
+void schedule_stop(void);
+
+/* Does a slice of work on complete frames, and writes the status to send, if one is due; its length, or 0. Meanwhile the bus
+   interrupt is disabled: for some microseconds no byte is taken. */
+size_t schedule_background(uint8_t status[DIBS_STATUS]);
+
+/* Control ticks run so far. */
+uint32_t schedule_ticks(void);
+
+/* Fills in what is known here of the run. */
+void schedule_sum_up(summary_record *summary);
+
+/* The handlers: of SysTick, and of UART 0. */
+void schedule_tick(void);
+void schedule_bus(void);
+
+#endif

@@ -1,0 +1,18 @@
+/* The debugger's services: the length of a run, a message, and the end. Without a debugger a `bkpt` is a fault: leave this
+   out on silicon. */
+#ifndef SEMIHOSTING_H
+#define SEMIHOSTING_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Prints a text. */
+void semihosting_print(const char *text);
+
+/* Ticks to run: the digits that the command line ends with. 0, for ever, if it ends otherwise. */
+uint32_t semihosting_run_length(void);
+
+/* Ends the emulation with exit code 0 or 1. */
+_Noreturn void semihosting_exit(bool is_well);
+
+#endif

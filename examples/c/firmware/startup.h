@@ -1,0 +1,11 @@
+/* From reset to the program. */
+#ifndef STARTUP_H
+#define STARTUP_H
+
+/* The first code after reset. */
+_Noreturn void reset(void);
+
+/* Where every fault ends. */
+_Noreturn void stop_on_fault(void);
+
+#endif

@@ -1,0 +1,30 @@
+/* The surface: its tree in flash and its buffers. */
+#ifndef SURFACE_H
+#define SURFACE_H
+
+#include <dibs.h>
+
+/* Vertices of the tree: `dibs inspect --json`. */
+#ifndef SURFACE_VERTICES
+#error "-DSURFACE_VERTICES=N: the vertices of surface.dibs"
+#endif
+
+/* Validates the tree, and makes the buffers. */
+void surface_init(void);
+
+/* The tree. */
+dibs_tree *surface_tree(void);
+
+/* Bytes of the tree. */
+uint32_t surface_bytes(void);
+
+/* The buffers: the receiver fills one, the control tick reads the other. */
+dibs_surface *surface_buffers(void);
+
+/* Centre of the rest shape's bounding box, in mm. */
+dibs_vec3 surface_centre(void);
+
+/* Half the longest side of that box, in mm. */
+float surface_reach(void);
+
+#endif

@@ -1,0 +1,73 @@
+/*
+ * The controller's records for the host: one a tick, and a summary at the end.
+ *
+ * A record is its fields in order, little-endian, 32 bits each, then a CRC-32 of them, framed with COBS and a zero byte.
+ * firmware-example/src/telemetry.rs says what each field means.
+ */
+#ifndef TELEMETRY_H
+#define TELEMETRY_H
+
+#include <dibs.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/* One control tick. */
+typedef struct {
+    uint32_t kind;
+    uint32_t tick;
+    uint32_t state;
+    uint32_t cause;
+    uint32_t answered;
+    float margin;
+    uint32_t epoch;
+    uint32_t age;
+    float position_error;
+    dibs_vec3 tool_start;
+    dibs_vec3 tool_end;
+    float tool_radius;
+    float separation;
+    float lower;
+    float accuracy;
+    dibs_vec3 point_on_surface;
+    uint32_t triangle;
+    uint32_t node_tests;
+    uint32_t triangle_tests;
+    dibs_vec3 force;
+    uint32_t query_counts;
+    uint32_t bytes;
+    uint32_t silence;
+    uint32_t frames_published;
+    uint32_t rejected;
+    uint32_t read_epoch;
+    uint32_t read_digest;
+} tick_record;
+
+#define TICK_KIND 1u
+
+/* The whole run. */
+typedef struct {
+    uint32_t kind;
+    uint32_t ticks;
+    uint32_t deadline_misses;
+    uint32_t latency_counts;
+    uint32_t tick_counts;
+    uint32_t records_dropped;
+    uint32_t bus_overrun;
+    uint32_t stack_bytes;
+    uint32_t masked_counts;
+    uint32_t bus_masked_counts;
+    uint32_t scrub_rounds;
+    uint32_t events[DIBS_EVENTS];
+} summary_record;
+
+#define SUMMARY_KIND 2u
+
+/* A cause of the fail-safe machine's as a number of the record's. A tree found changed counts as that only if the tree was
+   checked: a query that stumbles over one has failed. */
+uint32_t telemetry_cause(dibs_code cause, bool is_tree_corrupt);
+
+/* Sends a record, whichever it is. */
+void telemetry_send(const void *record, size_t size);
+
+#endif
