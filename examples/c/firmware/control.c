@@ -127,7 +127,7 @@ void control_tick(tick_record *record) {
     const float share = code == DIBS_CODE_OK ? found.axis_parameter : 0.5f;
 
     must(dibs_reader_link(reader, tick, &seen.link));
-    seen.is_tree_corrupt = upkeep_has_rotted() || dibs_tree_check(surface_tree()) != DIBS_CODE_OK;
+    seen.is_tree_corrupt = upkeep_is_tree_corrupt() || dibs_tree_check(surface_tree()) != DIBS_CODE_OK;
     dibs_verdict verdict;
     must(dibs_failsafe_step(failsafe, &seen, &verdict));
     bus_set_state(verdict.state);

@@ -36,6 +36,6 @@ uint32_t upkeep_rounds(void) {
     return rounds;
 }
 
-bool upkeep_has_rotted(void) {
+bool upkeep_is_tree_corrupt(void) {
     return atomic_load_explicit(&is_tree_corrupt, memory_order_relaxed);
 }

@@ -15,6 +15,6 @@ void upkeep_step(void);
 uint32_t upkeep_rounds(void);
 
 /* Whether the tree was ever found changed: flash that read wrong once is not trusted. From any context. */
-bool upkeep_has_rotted(void);
+bool upkeep_is_tree_corrupt(void);
 
 #endif
