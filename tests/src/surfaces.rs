@@ -66,7 +66,11 @@ pub fn ball(splits: u32) -> Mesh {
         }
         triangles = split;
     }
-    Mesh { positions: positions.into_iter().map(|p| p * 40.0).collect(), triangles }
+    Mesh {
+        positions: positions.into_iter().map(|p| p * 40.0).collect(),
+        triangles,
+        ..Mesh::default()
+    }
 }
 
 /// A band of triangles a hundred times longer than wide.
@@ -87,7 +91,7 @@ pub fn slivers(rows: u32) -> Mesh {
             }
         }
     }
-    Mesh { positions, triangles }
+    Mesh { positions, triangles, ..Mesh::default() }
 }
 
 /// A square grid around the origin, each of its squares cut in two, with a height function of x and y.
