@@ -13,7 +13,8 @@ use std::path::Path;
 
 impl Motion {
     /// Reads a motion: a PC2 file, a NumPy array (.npy) of frames x vertices x 3, or a numbered series of mesh files,
-    /// named as `heart_%03d.vtp`. PC2 alone says how many frames a second were recorded.
+    /// named as `heart_%03d.vtp`. The mesh's [origin](crate::Mesh::origin) is zero: [`read_around`](Self::read_around)
+    /// serves others. PC2 alone says how many frames a second were recorded.
     ///
     /// # Errors
     /// [`ReadError`], one sentence that names the file, the offending element and the remedy; of a series also where

@@ -30,7 +30,7 @@ pub struct MotionMismatchError {
 }
 
 impl Motion {
-    /// Reads a PC2 file.
+    /// Reads a PC2 file of a mesh whose [origin](Mesh::origin) is zero; [`read_around`](Self::read_around) serves others.
     ///
     /// # Errors
     /// [`ReadError`] for a file that is not PC2, is shorter than it claims, or has a coordinate that is not finite.

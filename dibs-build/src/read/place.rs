@@ -11,6 +11,9 @@ const MOST_ROUNDING: f64 = 1.0 / 1_048_576.0;
 /// Distance between neighbouring numbers, as a part of the mesh's extent, above which its shape is lost.
 const MOST_RESOLUTION: f64 = 1e-4;
 
+/// Lengths beyond this are none of an organ in any unit, and their sums might overflow.
+const MOST_DISTANCE: f64 = 1e18;
+
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
 /// The place of a file's coordinates among a mesh's.
@@ -41,8 +44,8 @@ impl Place {
         let positions = || raw.corner_positions();
         let bounds = Bounds::of(positions().map(|position| unmoved.of(position)));
         let extent = bounds.extent();
-        // Later checks say more of positions that all coincide or are not finite.
-        let is_surface = extent > 0.0 && extent.is_finite();
+        // Later checks say more of positions that coincide, or are too large or not finite.
+        let is_surface = extent > f32::MIN_POSITIVE.into() && bounds.largest() <= MOST_DISTANCE;
         let is_coarse = bounds.resolution(f32::EPSILON.into()) > MOST_RESOLUTION * extent;
         if is_surface && is_coarse {
             check_digits(&bounds, positions)?;

@@ -128,6 +128,20 @@ fn lost_digits_are_refused() {
         let kind = far(away, digits).unwrap_err();
         assert!(matches!(kind, ReadErrorKind::TooFar { .. }), "{away}: {kind}");
     }
+    // Sizes that no surface has get the sentences that they had before.
+    let of = |corners: [&str; 3]| {
+        let [a, b, c] = corners;
+        let text = format!("v {a} 0 0\nv {b} 0 0\nv {c} {c} 0\nf 1 2 3\n");
+        read(&folder, &text, &Import::options()).unwrap_err()
+    };
+    let kind = of(["1e308", "1.1e308", "1.2e308"]);
+    assert!(matches!(kind, ReadErrorKind::Overflow { .. }), "{kind}");
+    let kind = of(["1e20", "1.1e20", "1.2e20"]);
+    assert!(matches!(kind, ReadErrorKind::TooLarge { .. }), "{kind}");
+    let kind = of(["0", "5e-324", "1e-323"]);
+    assert!(matches!(kind, ReadErrorKind::NoTriangles { .. }), "{kind}");
+    let kind = of(["0", "1e-30", "2e-30"]);
+    assert!(matches!(kind, ReadErrorKind::TooSmall { .. }), "{kind}");
     // Whole numbers are f32 too, and exact.
     let import = far(4e6, DVec3::round).unwrap();
     assert!(import.report.recentred && import.report.position_error < 1e-8);
@@ -142,7 +156,9 @@ fn lost_digits_are_refused() {
 #[test]
 fn a_far_motion_keeps_its_digits() {
     let folder = tempfile::tempdir().unwrap();
-    let (mesh, exact) = far_ball(4e3);
+    let (mesh, exact) = far_ball(4e6);
+    // In metres, so that the mesh is 4,000 m away.
+    let exact: Vec<DVec3> = exact.iter().map(|p| *p / 1e3).collect();
     let frames: Vec<Vec<DVec3>> = (0..3)
         .map(|n| exact.iter().map(|p| *p + DVec3::Z * 0.001 * f64::from(n)).collect())
         .collect();
@@ -156,7 +172,6 @@ fn a_far_motion_keeps_its_digits() {
     npy.extend((header.len() as u16).to_le_bytes());
     npy.extend(header.bytes().chain(numbers.flat_map(f64::to_le_bytes)));
     std::fs::write(folder.path().join("f.npy"), npy).unwrap();
-    // In metres, so that the mesh is 4,000 m away.
     let options = ReadOptions { unit: Unit::Metre, ..Import::options() };
     let import = read(&folder, &obj(&exact, &mesh), &options).unwrap();
     let origin = import.mesh.origin;

@@ -89,7 +89,8 @@ fn vector(vector: Vec3) -> [f64; 3] {
 
 /// A point in the coordinates of the mesh's file.
 fn point(point: Vec3, origin: DVec3) -> [f64; 3] {
-    (origin + point.as_dvec3()).to_array()
+    // A sum with zero would lose the sign of -0.
+    if origin == DVec3::ZERO { vector(point) } else { (origin + point.as_dvec3()).to_array() }
 }
 
 /// The same for a reader.
