@@ -219,7 +219,7 @@ impl<'p> Builder<'p> {
             with_adjacency: self.with_adjacency,
         };
         let (bytes, order) = flatten::<I>(mesh, &root, facts)?;
-        Ok(BuiltTree::new::<I>(bytes, order))
+        Ok(BuiltTree::new::<I>(bytes, order, mesh.origin))
     }
 
     fn construct(&self, mesh: &Mesh, paths: Paths, shares: &Shares) -> Result<Cluster, BuildError> {
@@ -267,6 +267,9 @@ impl<'p> Builder<'p> {
             && !(1..=MAX_LEAF_TRIANGLES as usize).contains(&triangles)
         {
             return Err(BuildError::LeafSize { triangles });
+        }
+        if !mesh.origin.is_finite() {
+            return Err(BuildError::Origin { origin: mesh.origin });
         }
         if let Some(vertex) = mesh.positions.iter().position(|p| !p.is_finite()) {
             return Err(BuildError::Coordinate { vertex });

@@ -34,6 +34,12 @@ pub enum BuildError {
         /// The vertex.
         vertex: usize,
     },
+    /// The mesh's origin is not a point.
+    #[error("the mesh's origin, {origin}, has a coordinate that is not a finite number")]
+    Origin {
+        /// The origin.
+        origin: glam::DVec3,
+    },
     /// The mesh has more vertices than the index width can number.
     #[error(
         "the mesh has {vertices} vertices, {bits}-bit indices number at most {most}: \

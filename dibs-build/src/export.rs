@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::write::{WriteError, WriteErrorKind, write_atomically};
 use crate::{Format, Mesh};
@@ -34,11 +34,13 @@ impl Format {
 }
 
 impl Mesh {
-    /// Writes the mesh. Text holds the shortest digits that give the same f32 numbers back; STL holds positions but no
-    /// vertex numbers.
+    /// Writes the mesh, in the coordinates of the file that it was read from: from its [origin](Mesh::origin) if that
+    /// is zero, otherwise in double precision. Text holds the shortest digits that give the same numbers back; STL
+    /// holds positions but no vertex numbers.
     ///
     /// # Errors
-    /// [`WriteError`], also for a format that is only read; the file is complete or untouched.
+    /// [`WriteError`], also for a format that is only read, and for binary STL, of single precision, where the origin is
+    /// not zero; the file is complete or untouched.
     ///
     /// # Panics
     /// For STL, if a triangle names a vertex that the mesh does not have.
@@ -55,28 +57,54 @@ impl Mesh {
                 return Err(WriteError { path: path.to_path_buf(), kind });
             }
         };
+        if format == Format::StlBinary && self.is_recentred() {
+            return Err(WriteError { path: path.to_path_buf(), kind: WriteErrorKind::TooFar });
+        }
         write_atomically(path, |out| contents(self, out))
     }
 
-    /// Writes a binary little-endian PLY file, whatever its name: f32 positions, 32-bit vertex numbers.
+    /// Writes a binary little-endian PLY file, whatever its name: 32-bit vertex numbers, and f32 positions unless the
+    /// [origin](Mesh::origin) is not zero.
     ///
     /// # Errors
     /// [`WriteError`]; the file is complete or untouched.
     pub fn write_ply(&self, path: impl AsRef<Path>) -> Result<(), WriteError> {
         self.write(path, Format::Ply)
     }
+
+    fn is_recentred(&self) -> bool {
+        self.origin != DVec3::ZERO
+    }
+
+    /// A position as a text has it.
+    fn text(&self, position: Vec3) -> String {
+        if self.is_recentred() {
+            let DVec3 { x, y, z } = self.origin + position.as_dvec3();
+            return format!("{x} {y} {z}");
+        }
+        let Vec3 { x, y, z } = position;
+        format!("{x} {y} {z}")
+    }
 }
 
 fn ply(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
+    let number = if mesh.is_recentred() { "double" } else { "float" };
     write!(
         out,
         "ply\nformat binary_little_endian 1.0\n\
-         element vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+         element vertex {}\nproperty {number} x\nproperty {number} y\nproperty {number} z\n\
          element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
         mesh.positions.len(),
         mesh.triangles.len()
     )?;
-    mesh.positions.iter().try_for_each(|&position| put(out, position))?;
+    for &position in &mesh.positions {
+        if mesh.is_recentred() {
+            let exact = mesh.origin + position.as_dvec3();
+            exact.to_array().iter().try_for_each(|x| out.write_all(&x.to_le_bytes()))?;
+        } else {
+            put(out, position)?;
+        }
+    }
     for triangle in &mesh.triangles {
         out.write_all(&[3])?;
         for corner in triangle {
@@ -106,8 +134,8 @@ fn ascii_stl(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
         let corners = mesh.corners(triangle);
         let Vec3 { x, y, z } = normal(corners);
         writeln!(out, "facet normal {x} {y} {z}\nouter loop")?;
-        for Vec3 { x, y, z } in corners {
-            writeln!(out, "vertex {x} {y} {z}")?;
+        for corner in corners {
+            writeln!(out, "vertex {}", mesh.text(corner))?;
         }
         writeln!(out, "endloop\nendfacet")?;
     }
@@ -119,8 +147,8 @@ fn normal([a, b, c]: [Vec3; 3]) -> Vec3 {
 }
 
 fn obj(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
-    for Vec3 { x, y, z } in &mesh.positions {
-        writeln!(out, "v {x} {y} {z}")?;
+    for &position in &mesh.positions {
+        writeln!(out, "v {}", mesh.text(position))?;
     }
     for [a, b, c] in mesh.triangles.iter().map(|corners| corners.map(|corner| corner + 1)) {
         writeln!(out, "f {a} {b} {c}")?;
@@ -130,8 +158,8 @@ fn obj(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
 
 fn off(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, "OFF\n{} {} 0", mesh.positions.len(), mesh.triangles.len())?;
-    for Vec3 { x, y, z } in &mesh.positions {
-        writeln!(out, "{x} {y} {z}")?;
+    for &position in &mesh.positions {
+        writeln!(out, "{}", mesh.text(position))?;
     }
     for [a, b, c] in &mesh.triangles {
         writeln!(out, "3 {a} {b} {c}")?;

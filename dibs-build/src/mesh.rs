@@ -1,6 +1,6 @@
 //! The surface in its rest shape: positions and triangles.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// A triangle mesh: fixed connectivity, and the positions of one frame.
 ///
@@ -8,6 +8,9 @@ use glam::Vec3;
 /// numbers would not bound its distances.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
+    /// The point of the mesh's file, in millimetres, that positions count from: zero unless the file's coordinates are so
+    /// far from their own origin that f32 would lose them. A tree stores it.
+    pub origin: DVec3,
     /// One position a vertex.
     pub positions: Vec<Vec3>,
     /// Three vertex numbers a triangle.
@@ -15,6 +18,13 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// Positions of the mesh's file, or of a frame in its coordinates (mm), as this mesh has them: less the
+    /// [origin](Mesh::origin), and rounded to f32 only then.
+    #[must_use]
+    pub fn local(&self, positions: &[DVec3]) -> Vec<Vec3> {
+        positions.iter().map(|&position| (position - self.origin).as_vec3()).collect()
+    }
+
     /// Positions of a triangle's corners.
     pub(crate) fn corners(&self, vertices: [u32; 3]) -> [Vec3; 3] {
         vertices.map(|vertex| self.positions[vertex as usize])
@@ -53,7 +63,7 @@ impl<S: RestSurface> RestSurface for &S {
 /// A recorded or generated deformation of a mesh: every frame holds one position a vertex.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Motion {
-    /// The frames, in order of time.
+    /// The frames, in order of time. Positions count from the mesh's [origin](Mesh::origin).
     pub frames: Vec<Vec<Vec3>>,
     /// Frames a second; 0 if the file does not state it.
     pub rate: f32,

@@ -278,7 +278,8 @@ mod tests {
     #[test]
     fn a_moebius_strip_and_a_fin_are_refused() {
         let ring = |i: u32| (2 * (i % 5), 2 * (i % 5) + 1);
-        let mut strip = Mesh { positions: vec![Vec3::ZERO; 10], triangles: Vec::new() };
+        let mut strip =
+            Mesh { positions: vec![Vec3::ZERO; 10], triangles: Vec::new(), ..Mesh::default() };
         for i in 0..5 {
             let ((a, b), (c, d)) = (ring(i), ring(i + 1));
             let (c, d) = if i == 4 { (d, c) } else { (c, d) };

@@ -160,7 +160,8 @@ impl TreeScript {
         warn(label, built.summary().warnings());
         #[cfg(feature = "modes")]
         if let Some((path, count)) = self.modes {
-            let motion = crate::Motion::read(&path)?.in_millimetres(self.reading.unit);
+            let origin = surface.mesh().origin;
+            let motion = crate::Motion::read_around(&path, self.reading.unit, origin)?;
             let failed = |error| format!("{}: {error}", path.display());
             let fit = crate::modes::ModalFit::new(surface.mesh(), &motion).map_err(failed)?;
             return built.with_modes(&fit, count).map_err(|error| failed(error).into());

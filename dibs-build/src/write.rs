@@ -35,6 +35,11 @@ pub enum WriteErrorKind {
     /// A name without the extension of a format that can be written.
     #[error("a mesh is written as what its name ends in: .ply, .stl, .obj or .off")]
     UnknownFormat,
+    /// A format of single precision, for a mesh that f32 does not hold where it lies.
+    #[error(
+        "the mesh lies too far from the origin for the numbers of binary STL; write it as .ply"
+    )]
+    TooFar,
     /// More elements than the format can count.
     #[error("{count} {element} are more than the format can count")]
     TooMany {

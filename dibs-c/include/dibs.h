@@ -1132,6 +1132,24 @@ typedef struct {
   float position_error;
 } dibs_tree_facts;
 
+/**
+ * A point of the mesh's file (mm), which single precision may not hold.
+ */
+typedef struct {
+  /**
+   * Along the first axis.
+   */
+  double x;
+  /**
+   * Along the second axis.
+   */
+  double y;
+  /**
+   * Along the third axis.
+   */
+  double z;
+} dibs_point;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -1619,6 +1637,14 @@ dibs_code dibs_scrub_init(void *storage, size_t size, dibs_tree *tree, dibs_scru
  */
 dibs_code dibs_scrub_step(dibs_scrub *scrub,
                           size_t most);
+
+/**
+ * The point of the mesh's file that all coordinates of the tree count from: of vertices, tools and answers. Zero unless
+ * the file's coordinates are so far from their own origin that single precision would lose them; then subtract it, in
+ * double precision, from what is in the file's coordinates.
+ */
+dibs_code dibs_tree_origin(dibs_tree *tree,
+                           dibs_point *origin);
 
 #ifdef __cplusplus
 }  // extern "C"

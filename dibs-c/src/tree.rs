@@ -155,3 +155,28 @@ pub extern "C" fn dibs_scrub_init(
 pub extern "C" fn dibs_scrub_step(scrub: *mut dibs_scrub, most: usize) -> dibs_code {
     dibs_code::of(|| Ok(scrub.open()?.0.step(most)?))
 }
+
+/// A point of the mesh's file (mm), which single precision may not hold.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct dibs_point {
+    /// Along the first axis.
+    pub x: f64,
+    /// Along the second axis.
+    pub y: f64,
+    /// Along the third axis.
+    pub z: f64,
+}
+
+/// The point of the mesh's file that all coordinates of the tree count from: of vertices, tools and answers. Zero unless
+/// the file's coordinates are so far from their own origin that single precision would lose them; then subtract it, in
+/// double precision, from what is in the file's coordinates.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_tree_origin(tree: *mut dibs_tree, origin: *mut dibs_point) -> dibs_code {
+    dibs_code::of(|| {
+        let (origin, tree) = (origin.check()?, &tree.share()?.tree);
+        let [x, y, z] = tree.origin();
+        origin.set(dibs_point { x, y, z });
+        Ok(())
+    })
+}

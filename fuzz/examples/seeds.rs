@@ -15,7 +15,11 @@ fn main() {
         fs::create_dir_all(&folder).expect("a writable folder");
         fs::write(folder.join(name), bytes).expect("a writable folder");
     };
-    let one = Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]] };
+    let one = Mesh {
+        positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+        triangles: vec![[0, 1, 2]],
+        ..Mesh::default()
+    };
     let heart = generate::heart(320).expect("a valid size").mesh;
     for (name, mesh, index) in [
         ("triangle16", &one, IndexWidth::Bits16),

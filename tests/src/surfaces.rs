@@ -65,7 +65,11 @@ pub fn ball(splits: u32) -> Mesh {
         }
         triangles = split;
     }
-    Mesh { positions: positions.into_iter().map(|p| p * 40.0).collect(), triangles }
+    Mesh {
+        positions: positions.into_iter().map(|p| p * 40.0).collect(),
+        triangles,
+        ..Mesh::default()
+    }
 }
 
 /// A band of triangles a hundred times longer than wide.
@@ -86,7 +90,7 @@ pub fn slivers(rows: u32) -> Mesh {
             }
         }
     }
-    Mesh { positions, triangles }
+    Mesh { positions, triangles, ..Mesh::default() }
 }
 
 /// A square grid around the origin, each of its squares cut in two, raised by a height function of x and y.

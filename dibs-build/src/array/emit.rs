@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use dibs_nostd::format::PathKind;
-use dibs_nostd::glam::Vec3;
+use dibs_nostd::glam::{DVec3, Vec3};
 use dibs_nostd::modes::Modes;
 use dibs_nostd::{FormatError, Index, Tree, TriangleRow};
 
@@ -16,6 +16,7 @@ pub struct BuiltTree {
     pub(super) bytes: Vec<u8>,
     pub(super) order: Vec<u32>,
     pub(super) index_bytes: usize,
+    pub(super) origin: DVec3,
     #[cfg(feature = "modes")]
     pub(super) motion: Option<crate::modes::ModalMotion>,
 }
@@ -51,6 +52,8 @@ pub struct Summary {
     pub bounding_box: Option<[[f32; 3]; 2]>,
     /// Mean length of the triangles' sides at rest.
     pub mean_edge: Option<f64>,
+    /// The point of the mesh's file (mm) that the tree's coordinates count from.
+    pub origin: [f64; 3],
     /// Identity of the mesh, as vertex packets carry it.
     pub mesh_id: u32,
     /// Flash that a query reads: nodes and triangles.
@@ -104,11 +107,12 @@ impl Summary {
 }
 
 impl BuiltTree {
-    pub(crate) fn new<I: Index>(bytes: Vec<u8>, order: Vec<u32>) -> Self {
+    pub(crate) fn new<I: Index>(bytes: Vec<u8>, order: Vec<u32>, origin: DVec3) -> Self {
         Self {
             bytes,
             order,
             index_bytes: I::BYTES,
+            origin,
             #[cfg(feature = "modes")]
             motion: None,
         }
@@ -147,6 +151,23 @@ impl BuiltTree {
     #[must_use]
     pub fn to_rows<T: Copy>(&self, of_mesh: &[T]) -> Vec<T> {
         self.order.iter().map(|&vertex| of_mesh[vertex as usize]).collect()
+    }
+
+    /// The point of the mesh's file (mm) that the tree's coordinates count from: [`Mesh::origin`](crate::Mesh::origin).
+    #[must_use]
+    pub const fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// Positions in the file's coordinates (mm), one a mesh vertex, as the tree's vertex table: less the
+    /// [origin](Self::origin), rounded to f32 only then, in the order of the rows.
+    ///
+    /// # Panics
+    /// If `of_mesh` does not have a position for each of the mesh's vertices.
+    #[must_use]
+    pub fn local_rows(&self, of_mesh: &[DVec3]) -> Vec<Vec3> {
+        let row = |&vertex: &u32| (of_mesh[vertex as usize] - self.origin).as_vec3();
+        self.order.iter().map(row).collect()
     }
 
     /// The tree's size and cost.
@@ -214,6 +235,7 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
         root_radius: tree.node(0).map_or(0.0, |(_, radius, _)| radius),
         bounding_box: bounding_box(tree),
         mean_edge: mean_edge(tree),
+        origin: tree.origin(),
         mesh_id: tree.mesh_id(),
         query_bytes: tree.query_bytes(),
         query_bytes_per_triangle: tree.query_bytes() as f64 / f64::from(tree.triangle_count()),

@@ -2,6 +2,7 @@
 
 use dibs_nostd::format::{CRC, HEADER_BYTES, Join, Link, MAGIC, PathKind, VERSION, field, section};
 use dibs_nostd::{Index, Tree};
+use glam::DVec3;
 
 use super::adjacency::adjacency;
 use super::metric::{metric, with_lowest_bit};
@@ -112,6 +113,11 @@ pub(crate) fn flatten<I: Index>(
     let mut identity = CRC.digest();
     identity.update(&triangles);
     identity.update(&rest);
+    let has_origin = mesh.origin != DVec3::ZERO;
+    let origin: Vec<u8> = mesh.origin.to_array().into_iter().flat_map(f64::to_le_bytes).collect();
+    if has_origin {
+        identity.update(&origin);
+    }
     let mut sections = vec![(section::NODES, nodes), (section::TRIANGLES, triangles)];
     if facts.with_order {
         sections.push((section::VERTEX_ORDER, numbers));
@@ -131,6 +137,9 @@ pub(crate) fn flatten<I: Index>(
     {
         sections.push((section::ADJACENCY, neighbours));
     }
+    if has_origin {
+        sections.push((section::ORIGIN, origin));
+    }
     let mut header = [0; HEADER_BYTES];
     header[..MAGIC.len()].copy_from_slice(&MAGIC);
     header[field::VERSION..][..2].copy_from_slice(&VERSION.to_le_bytes());
@@ -145,6 +154,7 @@ pub(crate) fn flatten<I: Index>(
         (field::STRETCH, facts.stretch.to_bits()),
         (field::RADIUS_UNIT, unit.to_bits()),
         (field::POSITION_ERROR, facts.position_error.to_bits()),
+        (field::ORIGIN, has_origin.into()),
     ] {
         put_word(&mut header, at, word);
     }

@@ -58,7 +58,11 @@ pub fn brain(triangles: u32) -> Result<Mesh, GenerateError> {
         mesh = spread(mesh, &shallow, (f64::from(triangles.min(60_000)) * share) as u32 & !1)?;
     }
     let (points, triangles) = spread(mesh, &cortex, triangles)?;
-    Ok(Mesh { positions: points.iter().map(|point| point.as_vec3()).collect(), triangles })
+    Ok(Mesh {
+        positions: points.iter().map(|point| point.as_vec3()).collect(),
+        triangles,
+        ..Mesh::default()
+    })
 }
 
 struct Cortex {

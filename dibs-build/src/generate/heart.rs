@@ -61,7 +61,11 @@ pub fn heart(triangles: u32) -> Result<MovingMesh, GenerateError> {
         }
     }
     let (points, triangles) = mesh;
-    let mesh = Mesh { positions: points.iter().map(|point| point.as_vec3()).collect(), triangles };
+    let mesh = Mesh {
+        positions: points.iter().map(|point| point.as_vec3()).collect(),
+        triangles,
+        ..Mesh::default()
+    };
     let motion = beat(&mesh.positions);
     Ok(MovingMesh { mesh, motion })
 }

@@ -6,26 +6,42 @@ mod series;
 
 pub use pc2::MotionMismatchError;
 
-use crate::read::{ReadError, ReadErrorKind};
+use crate::read::{Place, ReadError, ReadErrorKind};
 use crate::{Motion, Unit};
+use glam::{DVec3, Vec3};
 use std::path::Path;
 
 impl Motion {
     /// Reads a motion: a PC2 file, a NumPy array (.npy) of frames x vertices x 3, or a numbered series of mesh files,
-    /// named as `heart_%03d.vtp`. PC2 alone says how many frames a second were recorded.
+    /// named as `heart_%03d.vtp`. The mesh's [origin](crate::Mesh::origin) is zero: [`read_around`](Self::read_around)
+    /// serves others. PC2 alone says how many frames a second were recorded.
     ///
     /// # Errors
     /// [`ReadError`], one sentence that names the file, the offending element and the remedy; of a series also where
     /// a number is missing, or a frame has other triangles than the first.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, ReadError> {
+        Self::read_around(path, Unit::Millimetre, DVec3::ZERO)
+    }
+
+    /// As [`read`](Self::read), a motion whose lengths are in `unit`, of a mesh with this [origin](crate::Mesh::origin):
+    /// positions become millimetres, from the origin, and are rounded to f32 only then.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read); also for a frame so far from the origin that f32 does not hold its shape.
+    pub fn read_around(
+        path: impl AsRef<Path>,
+        unit: Unit,
+        origin: DVec3,
+    ) -> Result<Self, ReadError> {
         let path = path.as_ref();
+        let place = Place { scale: unit.millimetres(), origin };
         if let Some(series) = series::Series::named(path) {
-            return series.read();
+            return series.read(&place);
         }
         let parse = |bytes: Vec<u8>| match &bytes[..] {
             [] => Err(ReadErrorKind::Empty),
-            bytes if bytes.starts_with(pc2::MAGIC) => pc2::parse(bytes),
-            bytes if bytes.starts_with(npy::MAGIC) => npy::parse(bytes),
+            bytes if bytes.starts_with(pc2::MAGIC) => pc2::parse(bytes, &place),
+            bytes if bytes.starts_with(npy::MAGIC) => npy::parse(bytes, &place),
             _ => Err(ReadErrorKind::UnknownMotion),
         };
         std::fs::read(path)
@@ -33,24 +49,17 @@ impl Motion {
             .and_then(parse)
             .map_err(|kind| ReadError { path: path.to_path_buf(), kind })
     }
-
-    /// The same motion in millimetres, its lengths being in `unit`.
-    #[must_use]
-    pub fn in_millimetres(mut self, unit: Unit) -> Self {
-        let factor = unit.millimetres();
-        for point in self.frames.iter_mut().flatten() {
-            *point = (point.as_dvec3() * factor).as_vec3();
-        }
-        self
-    }
 }
 
-/// An error at the first coordinate of a frame that is not finite.
-fn check_finite(frame: &[glam::Vec3], number: usize) -> Result<(), ReadErrorKind> {
-    let Some(vertex) = frame.iter().position(|point| !point.is_finite()) else { return Ok(()) };
-    let value = frame[vertex].to_array().into_iter().find(|value| !value.is_finite());
-    Err(ReadErrorKind::NonFinite {
-        vertex: format!("vertex {vertex} (counted from 0) in frame {number}"),
-        value: f64::from(value.unwrap_or(f32::NAN)),
-    })
+/// The positions of frame `number` in their place; an error where one is not finite, or f32 does not hold the shape.
+fn frame(positions: &[[f64; 3]], number: usize, place: &Place) -> Result<Vec<Vec3>, ReadErrorKind> {
+    let is_finite = |value: &f64| (*value as f32).is_finite();
+    if let Some(vertex) = positions.iter().position(|position| !position.iter().all(is_finite)) {
+        let value = positions[vertex].into_iter().find(|value| !is_finite(value));
+        return Err(ReadErrorKind::NonFinite {
+            vertex: format!("vertex {vertex} (counted from 0) in frame {number}"),
+            value: value.map_or(f64::NAN, |value| (value as f32).into()),
+        });
+    }
+    place.frame(positions, || format!("frame {number}"))
 }

@@ -4,8 +4,7 @@
 //! to read one line of three keys.
 
 use crate::Motion;
-use crate::read::{Endian, ReadErrorKind, Scalar, excerpt};
-use glam::Vec3;
+use crate::read::{Endian, Place, ReadErrorKind, Scalar, excerpt};
 
 pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
 
@@ -13,7 +12,7 @@ fn wrong(what: String) -> ReadErrorKind {
     ReadErrorKind::NumPy { what }
 }
 
-pub(super) fn parse(bytes: &[u8]) -> Result<Motion, ReadErrorKind> {
+pub(super) fn parse(bytes: &[u8], place: &Place) -> Result<Motion, ReadErrorKind> {
     let cut_off = || wrong("its header is cut off".to_owned());
     let version = *bytes.get(MAGIC.len()).ok_or_else(cut_off)?;
     // From the second version on the header may be long.
@@ -37,19 +36,17 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Motion, ReadErrorKind> {
     }
     let numbers = scalar.read_all(data, order);
     // In Fortran's order the first index runs fastest.
-    let place = |frame: usize, vertex: usize, axis: usize| {
+    let index = |frame: usize, vertex: usize, axis: usize| {
         if is_fortran {
             frame + frames * (vertex + vertices * axis)
         } else {
             (frame * vertices + vertex) * 3 + axis
         }
     };
-    let point = |frame, vertex| {
-        Vec3::from([0, 1, 2].map(|axis| numbers[place(frame, vertex, axis)] as f32))
-    };
+    let point = |frame, vertex| [0, 1, 2].map(|axis| numbers[index(frame, vertex, axis)]);
     let frame = |frame| {
-        let points: Vec<Vec3> = (0..vertices).map(|vertex| point(frame, vertex)).collect();
-        super::check_finite(&points, frame).map(|()| points)
+        let points: Vec<[f64; 3]> = (0..vertices).map(|vertex| point(frame, vertex)).collect();
+        super::frame(&points, frame, place)
     };
     Ok(Motion { frames: (0..frames).map(frame).collect::<Result<_, _>>()?, rate: 0.0 })
 }

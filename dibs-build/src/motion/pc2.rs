@@ -4,10 +4,10 @@
 //! rate (frames per sample; used here as samples a second, as the field's files do), i32 samples,
 //! then samples x points x 3 f32.
 
-use crate::read::{ReadError, ReadErrorKind};
+use crate::read::{Place, ReadError, ReadErrorKind};
 use crate::write::{WriteErrorKind, write_atomically};
 use crate::{Mesh, Motion, WriteError};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::path::Path;
 use thiserror::Error;
 
@@ -30,7 +30,7 @@ pub struct MotionMismatchError {
 }
 
 impl Motion {
-    /// Reads a PC2 file.
+    /// Reads a PC2 file of a mesh whose [origin](Mesh::origin) is zero; [`read_around`](Self::read_around) serves others.
     ///
     /// # Errors
     /// [`ReadError`] for a file that is not PC2, is shorter than it claims, or has a coordinate that is not finite.
@@ -38,7 +38,7 @@ impl Motion {
         let path = path.as_ref();
         std::fs::read(path)
             .map_err(ReadErrorKind::from)
-            .and_then(|bytes| parse(&bytes))
+            .and_then(|bytes| parse(&bytes, &Place { scale: 1.0, origin: DVec3::ZERO }))
             .map_err(|kind| ReadError { path: path.to_path_buf(), kind })
     }
 
@@ -88,7 +88,7 @@ impl Motion {
     }
 }
 
-pub(super) fn parse(bytes: &[u8]) -> Result<Motion, ReadErrorKind> {
+pub(super) fn parse(bytes: &[u8], place: &Place) -> Result<Motion, ReadErrorKind> {
     if bytes.is_empty() {
         return Err(ReadErrorKind::Empty);
     }
@@ -117,10 +117,9 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Motion, ReadErrorKind> {
     for (number, frame) in data.chunks_exact(frame_bytes as usize).enumerate() {
         let (coordinates, _) = frame.as_chunks::<4>();
         let (points, _) = coordinates.as_chunks::<3>();
-        let points: Vec<Vec3> =
-            points.iter().map(|p| Vec3::from_array(p.map(f32::from_le_bytes))).collect();
-        super::check_finite(&points, number)?;
-        frames.push(points);
+        let points: Vec<[f64; 3]> =
+            points.iter().map(|p| p.map(|x| f32::from_le_bytes(x).into())).collect();
+        frames.push(super::frame(&points, number, place)?);
     }
     let rate = f32::from_le_bytes(word(3));
     Ok(Motion { frames, rate: if rate.is_finite() && rate > 0.0 { rate } else { 0.0 } })

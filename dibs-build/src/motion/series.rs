@@ -1,7 +1,7 @@
 //! A numbered series of mesh files, each a frame: `heart_%03d.vtp`.
 
 use crate::Motion;
-use crate::read::{Format, ReadError, ReadErrorKind, elements};
+use crate::read::{Format, Place, ReadError, ReadErrorKind, elements};
 use glam::Vec3;
 use std::path::{Path, PathBuf};
 
@@ -46,7 +46,7 @@ impl<'a> Series<'a> {
         Ok(numbers)
     }
 
-    pub fn read(&self) -> Result<Motion, ReadError> {
+    pub fn read(&self, place: &Place) -> Result<Motion, ReadError> {
         let fail = |path: &Path, kind| ReadError { path: path.to_path_buf(), kind };
         let numbers = self.numbers().map_err(|error| fail(self.path, error.into()))?;
         let Some(&first) = numbers.first() else {
@@ -59,7 +59,7 @@ impl<'a> Series<'a> {
             if number != *found {
                 return Err(fail(&path, ReadErrorKind::Gap { next: *found }));
             }
-            let frame = frame(&path, number - first, &mut triangles);
+            let frame = frame(&path, number - first, &mut triangles, place);
             frames.push(frame.map_err(|kind| fail(&path, kind))?);
         }
         Ok(Motion { frames, rate: 0.0 })
@@ -71,6 +71,7 @@ fn frame(
     path: &Path,
     number: u64,
     polygons: &mut Option<(Vec<u32>, Vec<usize>)>,
+    place: &Place,
 ) -> Result<Vec<Vec3>, ReadErrorKind> {
     let (format, raw) = elements(std::fs::read(path)?, path)?;
     if matches!(format, Format::StlAscii | Format::StlBinary) {
@@ -80,8 +81,5 @@ fn frame(
     if *of_first != (raw.corners, raw.ends) {
         return Err(ReadErrorKind::OtherTriangles);
     }
-    let points: Vec<Vec3> =
-        raw.positions.iter().map(|point| Vec3::from(point.map(|value| value as f32))).collect();
-    super::check_finite(&points, number as usize)?;
-    Ok(points)
+    super::frame(&raw.positions, number as usize, place)
 }

@@ -1,5 +1,6 @@
 //! Makes a checked mesh of a file's elements: every check, in order.
 
+use super::place::{Place, check_nearness, rounding};
 use super::polygon::Triangulator;
 use super::raw::Raw;
 use super::weld::first_coincident;
@@ -16,16 +17,18 @@ const LEAST_EXTENT: f64 = 1e-6;
 /// Above this, fourth powers of distances overflow f32.
 const MOST_COORDINATE: f64 = dibs_nostd::MAX_COORDINATE as f64;
 
-/// The distance between neighbouring f32 numbers of the largest coordinate's size, as a part of the mesh's
-/// extent: a mesh of 100 mm may lie 80 m from the origin.
-const MOST_RESOLUTION: f64 = 1e-4;
-
 /// Ear clipping takes quadratic time at worst: up to a second for a face below this size.
 const MOST_CORNERS: usize = 10_000;
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
-pub(crate) fn import(raw: &Raw, format: Format, options: &ReadOptions) -> Result<Import> {
+/// Checks a mesh whose positions are in their `place` already.
+pub(crate) fn import(
+    raw: &Raw,
+    format: Format,
+    options: &ReadOptions,
+    place: Place,
+) -> Result<Import> {
     let positions = positions(raw, format)?;
     let is_stl = matches!(format, Format::StlAscii | Format::StlBinary);
     let mut report = Report {
@@ -45,12 +48,15 @@ pub(crate) fn import(raw: &Raw, format: Format, options: &ReadOptions) -> Result
         non_manifold_edges: 0,
         inconsistent_edges: 0,
         extent: 0.0,
-        position_error: position_error(raw),
+        origin: place.origin.to_array(),
+        recentred: options.origin.is_none() && place.origin != DVec3::ZERO,
+        position_error: position_error(raw, place.origin),
     };
     let (faces, short) = triangles(raw, &mut report)?;
     let mut surface = Surface { positions, faces, short };
     check_scale(raw, format)?;
-    report.extent = check_distance(raw)?;
+    report.extent =
+        check_nearness(raw.corner_positions().map(DVec3::from), || "the mesh".to_owned())?;
     surface.weld(is_stl, options.weld_tolerance, &mut report);
     surface.drop_degenerate(options.strict, &mut report)?;
     surface.drop_duplicates(options.strict, &mut report)?;
@@ -62,7 +68,10 @@ pub(crate) fn import(raw: &Raw, format: Format, options: &ReadOptions) -> Result
     surface.count_vertices(&mut report);
     report.triangles = surface.faces.len();
     let triangles = surface.faces.into_iter().map(|face| face.corners).collect();
-    Ok(Import { mesh: Mesh { positions: surface.positions, triangles }, report })
+    Ok(Import {
+        mesh: Mesh { origin: place.origin, positions: surface.positions, triangles },
+        report,
+    })
 }
 
 /// A vertex's name in an error.
@@ -95,10 +104,11 @@ fn positions(raw: &Raw, format: Format) -> Result<Vec<Vec3>> {
 fn check_scale(raw: &Raw, format: Format) -> Result<()> {
     let mut low = [f64::INFINITY; 3];
     let mut high = [f64::NEG_INFINITY; 3];
-    for (row, position) in raw.positions.iter().enumerate() {
+    for &row in &raw.corners {
+        let Some(position) = raw.positions.get(row as usize) else { continue };
         for ((low, high), &value) in low.iter_mut().zip(&mut high).zip(position) {
             if value.abs() > MOST_COORDINATE {
-                let vertex = vertex_name(row, format);
+                let vertex = vertex_name(row as usize, format);
                 return Err(ReadErrorKind::TooLarge { vertex, value, most: MOST_COORDINATE });
             }
             *low = low.min(value);
@@ -113,29 +123,12 @@ fn check_scale(raw: &Raw, format: Format) -> Result<()> {
     Ok(())
 }
 
-/// Largest distance of f32 coordinates from those of the file.
-fn position_error(raw: &Raw) -> f64 {
-    let rounding = |value: f64| value - f64::from(value as f32);
-    let errors = raw.positions.iter().map(|position| position.map(rounding));
-    errors.map(|[x, y, z]| x.hypot(y).hypot(z)).fold(0.0, f64::max)
-}
-
-/// Neighbouring f32 numbers must be much closer than the mesh is large, or its shape is lost, now or when the
-/// controller gets its positions. Returns the largest extent along an axis.
-fn check_distance(raw: &Raw) -> Result<f64> {
-    let corners = || raw.corners.iter().filter_map(|&corner| raw.positions.get(corner as usize));
-    let largest = corners().flatten().fold(0.0_f64, |largest, value| largest.max(value.abs()));
-    let size = |axis: usize| {
-        let values = || corners().map(|position| position[axis]);
-        values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
-    };
-    let extent = (0..3).map(size).fold(0.0, f64::max);
-    let resolution = largest * f64::from(f32::EPSILON);
-    // If all vertices coincide, the error for degenerate triangles says more.
-    if extent > 0.0 && resolution > MOST_RESOLUTION * extent {
-        return Err(ReadErrorKind::TooFar { largest, resolution, extent });
-    }
-    Ok(extent)
+/// Largest distance of a corner from where the file has it.
+fn position_error(raw: &Raw, origin: DVec3) -> f64 {
+    let corners = raw.corner_positions().map(DVec3::from);
+    let rounded = corners.map(rounding).fold(0.0, f64::max);
+    // The file's own numbers were rounded to f64, and so are their products with the unit.
+    rounded + 4.0 * f64::EPSILON * origin.length()
 }
 
 /// A triangle, and the face (counted from 1) that it comes from.

@@ -190,17 +190,37 @@ pub enum ReadErrorKind {
         /// The largest magnitude that is accepted.
         most: f64,
     },
-    /// The mesh lies so far from the origin that f32 coordinates do not hold its shape.
+    /// The surface lies so far from the file's origin that the file's numbers do not hold its shape.
     #[error(
-        "the mesh is {extent:e} across and has coordinates up to {largest:e}, where f32 numbers are {resolution:e} apart; move it to the origin"
+        "the surface is {extent:e} across and has coordinates up to {largest:e}, where the file's numbers are {resolution:e} apart, so that its shape is lost; export it in double precision, or nearer to the origin"
     )]
     TooFar {
-        /// The largest magnitude of a coordinate.
+        /// The largest magnitude of a coordinate (mm).
+        largest: f64,
+        /// Distance between the file's numbers of that size.
+        resolution: f64,
+        /// The surface's largest extent along an axis.
+        extent: f64,
+    },
+    /// The surface lies so far from the origin that was given that f32 coordinates do not hold its shape.
+    #[error(
+        "{what} is {extent:e} across and up to {largest:e} from the origin of the mesh, where f32 numbers are {resolution:e} apart; give a file of the same mesh, or an origin near it"
+    )]
+    Elsewhere {
+        /// The mesh, or a frame.
+        what: String,
+        /// The largest magnitude of a coordinate (mm), from the origin.
         largest: f64,
         /// Distance between f32 numbers of that size.
         resolution: f64,
-        /// The mesh's largest extent along an axis.
+        /// The surface's largest extent along an axis.
         extent: f64,
+    },
+    /// The origin that was given is not a point.
+    #[error("the origin is {origin}; give three finite numbers")]
+    Origin {
+        /// The origin given.
+        origin: glam::DVec3,
     },
     /// Triangles without area, under `strict`.
     #[error(

@@ -225,6 +225,8 @@ impl Surface<'_> {
             }
             None => (first..self.raw.positions.len() as u32).collect(),
         };
+        // A mirror turns triangles over: the other way round their outer side stays outside.
+        let is_mirrored = place.determinant() < 0.0;
         for number in 0..if mode == 4 { corners.len() / 3 } else { corners.len().max(2) - 2 } {
             let triangle = match mode {
                 4 => [3 * number, 3 * number + 1, 3 * number + 2],
@@ -232,6 +234,8 @@ impl Surface<'_> {
                 5 => [number + 1, number, number + 2],
                 _ => [0, number + 1, number + 2],
             };
+            let [a, b, c] = triangle;
+            let triangle = if is_mirrored { [a, c, b] } else { triangle };
             self.raw.corners.extend(triangle.map(|corner| corners[corner]));
             self.raw.end_face();
         }

@@ -13,6 +13,7 @@ mod gmsh;
 mod inflate;
 mod obj;
 mod off;
+mod place;
 mod ply;
 mod polygon;
 mod raw;
@@ -33,6 +34,8 @@ pub use report::{Format, Report};
 use crate::mesh::{Mesh, RestSurface};
 use crate::rounding::round_up;
 use crate::unit::Unit;
+use glam::DVec3;
+pub(crate) use place::Place;
 use raw::Raw;
 pub(crate) use raw::excerpt;
 pub(crate) use scalar::{Endian, Scalar};
@@ -63,6 +66,12 @@ pub struct ReadOptions {
     pub largest_component: bool,
     /// What the file's lengths are: they become millimetres.
     pub unit: Unit,
+    /// The point of the file, in millimetres, that the mesh's positions count from: [`Mesh::origin`].
+    ///
+    /// `None` decides by the file: zero, or where f32 would round the mesh by more than 2^-20 of its extent the centre
+    /// of its bounding box, rounded to a number of few bits. A mesh of 100 mm in double precision is recentred from a
+    /// coordinate of about 2 m on.
+    pub origin: Option<DVec3>,
 }
 
 impl RestSurface for Import {
@@ -101,11 +110,18 @@ impl ReadOptions {
         {
             return Err(ReadErrorKind::Tolerance { tolerance });
         }
-        let (format, mut raw) = elements(bytes, path)?;
-        for value in raw.positions.as_flattened_mut() {
-            *value *= self.unit.millimetres();
+        if let Some(origin) = self.origin
+            && !origin.is_finite()
+        {
+            return Err(ReadErrorKind::Origin { origin });
         }
-        let mut import = check::import(&raw, format, self)?;
+        let (format, mut raw) = elements(bytes, path)?;
+        let scale = self.unit.millimetres();
+        let place = Place::of_mesh(&raw, scale, self.origin)?;
+        for position in &mut raw.positions {
+            *position = place.of(*position).to_array();
+        }
+        let mut import = check::import(&raw, format, self, place)?;
         let extension = path.extension().and_then(|extension| extension.to_str());
         import.report.extension_disagrees = extension.is_some_and(|e| !format.has_extension(e));
         Ok(import)

@@ -35,6 +35,11 @@ impl Raw {
         }
     }
 
+    /// The position of each corner of each polygon. Corners without a vertex are left to another check.
+    pub fn corner_positions(&self) -> impl Iterator<Item = [f64; 3]> {
+        self.corners.iter().filter_map(|&corner| self.positions.get(corner as usize).copied())
+    }
+
     pub fn faces(&self) -> impl Iterator<Item = &[u32]> {
         self.ends.iter().scan(0, |start, &end| {
             let face = &self.corners[*start..end];

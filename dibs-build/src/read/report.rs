@@ -106,13 +106,14 @@ pub struct Report {
     pub inconsistent_edges: usize,
     /// The surface's largest extent along an axis, in the mesh's unit.
     pub extent: f64,
+    /// The point of the file (mm) that the mesh's positions count from.
+    pub origin: [f64; 3],
+    /// Whether the reader chose that point, because f32 would lose the shape so far from the file's own origin.
+    pub recentred: bool,
     /// Largest distance of a vertex from its position in the file, by rounding to f32; in the mesh's unit, 0 for files
     /// that hold f32. The tree adds it to the accuracy of every answer.
     pub position_error: f64,
 }
-
-/// Rounding of at most this part of the extent is not reported; for a mesh around the origin it is a fourth of this.
-const MOST_SILENT: f64 = 1.0 / 4_194_304.0;
 
 impl Report {
     /// Warnings for a user, one sentence for each change and each oddity.
@@ -162,11 +163,11 @@ impl Report {
             "edge between triangles of opposite orientation",
             "edges between triangles of opposite orientation",
         );
-        if self.position_error > MOST_SILENT * self.extent {
+        if self.recentred {
+            let [x, y, z] = self.origin;
             warnings.push(format!(
-                "rounding to f32 moves vertices by up to {:.1e}, so far are they from the origin; answers count it \
-                 in their accuracy, frames from the bus may do the same again: better move the mesh to the origin",
-                self.position_error
+                "so far from the origin f32 would lose digits, so coordinates count from {x},{y},{z} mm: on the \
+                 controller those of tools and frames do too"
             ));
         }
         if self.extension_disagrees {

@@ -151,7 +151,10 @@ impl Model {
             let positions = object.positions.iter();
             raw.positions
                 .extend(positions.map(|&p| place.transform_point3(DVec3::from(p)).to_array()));
-            for triangle in &object.triangles {
+            // A mirror turns triangles over: the other way round their outer side stays outside.
+            let is_mirrored = place.determinant() < 0.0;
+            for &[a, b, c] in &object.triangles {
+                let triangle = if is_mirrored { [a, c, b] } else { [a, b, c] };
                 raw.corners.extend(triangle.map(|row| match object.positions.get(row as usize) {
                     Some(_) => first + row,
                     // Of no vertex of any object.

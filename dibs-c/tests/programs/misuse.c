@@ -352,6 +352,9 @@ int main(int argc, char **argv) {
         memcpy(positions + 3 * row, &at, sizeof at);
     }
     EXPECT(TREE_NO_REST_SHAPE, dibs_tree_rest_position(tree, facts.vertices, &(dibs_vec3){0}));
+    dibs_point origin = {1, 1, 1};
+    EXPECT(OK, dibs_tree_origin(tree, &origin));
+    EXPECT(NULL, dibs_tree_origin(tree, NULL));
 
     order();
     values(positions, facts.vertices);

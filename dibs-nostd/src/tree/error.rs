@@ -112,6 +112,11 @@ pub enum FormatError {
         /// The edge: 0 from the first corner to the second, 1 to the third, 2 back to the first.
         edge: u32,
     },
+    /// A coordinate of the origin is not finite.
+    Origin {
+        /// The axis: 0 is x.
+        axis: u8,
+    },
     /// A traversal needs more or fewer stack entries than the header states.
     Stack {
         /// Entries in the header.
@@ -157,6 +162,7 @@ impl fmt::Display for FormatError {
             Self::Neighbour { triangle, edge } => {
                 write!(f, "triangle {triangle} has a wrong neighbour across its edge {edge}")
             }
+            Self::Origin { axis } => write!(f, "coordinate {axis} of the origin is not finite"),
             Self::Stack { stated, found } => {
                 write!(f, "{found} stack entries are needed, the header states {stated}")
             }

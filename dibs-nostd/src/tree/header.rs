@@ -16,6 +16,8 @@ pub(crate) struct Header {
     pub stretch: f32,
     pub radius_unit: f32,
     pub position_error: f32,
+    /// 1 where there is an origin section, else 0.
+    pub origin: u32,
     /// Rows of the section table.
     pub sections: u32,
     pub checksum: u32,
@@ -33,6 +35,7 @@ impl Header {
             (at::STRETCH, self.stretch.to_bits()),
             (at::RADIUS_UNIT, self.radius_unit.to_bits()),
             (at::POSITION_ERROR, self.position_error.to_bits()),
+            (at::ORIGIN, self.origin),
             (at::SECTIONS, self.sections),
             (at::CHECKSUM, self.checksum),
         ] {
@@ -95,6 +98,7 @@ pub(super) const fn read<I: Index>(bytes: &[u8]) -> Result<Header, FormatError> 
         stretch: f32::from_bits(tri!(field(bytes, at::STRETCH))),
         radius_unit: f32::from_bits(tri!(field(bytes, at::RADIUS_UNIT))),
         position_error: f32::from_bits(tri!(field(bytes, at::POSITION_ERROR))),
+        origin: tri!(field(bytes, at::ORIGIN)),
         sections: tri!(field(bytes, at::SECTIONS)),
         checksum: tri!(field(bytes, at::CHECKSUM)),
     };
@@ -121,6 +125,8 @@ pub(super) const fn read<I: Index>(bytes: &[u8]) -> Result<Header, FormatError> 
         Some((at::RADIUS_UNIT, header.radius_unit.to_bits()))
     } else if !(header.position_error >= 0.0 && header.position_error <= 1e18) {
         Some((at::POSITION_ERROR, header.position_error.to_bits()))
+    } else if header.origin > 1 {
+        Some((at::ORIGIN, header.origin))
     } else if last != 0 {
         Some((at::LAST, last))
     } else {

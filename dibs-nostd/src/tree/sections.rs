@@ -3,8 +3,8 @@
 //! To add one: its kind in [`section`], a row in [`rules`], a field of [`Sections`] and of its `all`.
 
 use crate::tree::format::{
-    self, HEADER_BYTES, LIMIT_BYTES, METRIC_BYTES, SECTION_ALIGN, SECTION_BYTES, node_bytes,
-    section, triangle_bytes,
+    self, HEADER_BYTES, LIMIT_BYTES, METRIC_BYTES, ORIGIN_BYTES, SECTION_ALIGN, SECTION_BYTES,
+    node_bytes, section, triangle_bytes,
 };
 use crate::tree::header::Header;
 use crate::tree::{FormatError, Index};
@@ -20,6 +20,7 @@ pub(crate) struct Sections<'a> {
     pub limits: &'a [u8],
     pub modes: &'a [u8],
     pub adjacency: &'a [u8],
+    pub origin: &'a [u8],
 }
 
 /// A section's length, and whether it is required.
@@ -41,11 +42,11 @@ impl Rule {
     }
 }
 
-const COUNT: usize = 8;
+const COUNT: usize = 9;
 
 /// In the order of [`Sections`]' fields.
 const fn rules<I: Index>(header: &Header) -> [Rule; COUNT] {
-    let Header { vertices, triangles, nodes, .. } = *header;
+    let Header { vertices, triangles, nodes, origin, .. } = *header;
     [
         Rule::required(section::NODES, nodes, node_bytes::<I>()),
         Rule::required(section::TRIANGLES, triangles, triangle_bytes::<I>()),
@@ -56,6 +57,8 @@ const fn rules<I: Index>(header: &Header) -> [Rule; COUNT] {
         // `Modes::of` checks it.
         Rule { kind: section::MODES, length: None, required: false },
         Rule::optional(section::ADJACENCY, triangles, triangle_bytes::<I>()),
+        // Where the header has none, the section must be absent or empty.
+        Rule { required: origin == 1, ..Rule::optional(section::ORIGIN, origin, ORIGIN_BYTES) },
     ]
 }
 
@@ -111,15 +114,16 @@ pub(crate) const fn find<'a, I: Index>(
         }
         slot += 1;
     }
-    let [nodes, triangles, order, rest, metric, limits, modes, adjacency] = parts;
-    Ok(Sections { nodes, triangles, order, rest, metric, limits, modes, adjacency })
+    let [nodes, triangles, order, rest, metric, limits, modes, adjacency, origin] = parts;
+    Ok(Sections { nodes, triangles, order, rest, metric, limits, modes, adjacency, origin })
 }
 
 impl<'a> Sections<'a> {
     /// All sections, in the order of [`rules`].
     const fn all(&self) -> [&'a [u8]; COUNT] {
-        let Self { nodes, triangles, order, rest, metric, limits, modes, adjacency } = *self;
-        [nodes, triangles, order, rest, metric, limits, modes, adjacency]
+        let Self { nodes, triangles, order, rest, metric, limits, modes, adjacency, origin } =
+            *self;
+        [nodes, triangles, order, rest, metric, limits, modes, adjacency, origin]
     }
 
     /// Checks that each section is still at its place in the bytes.

@@ -165,7 +165,8 @@ const fn corners<I: Index>(parts: &Parts<'_, I>, triangle: u32) -> [u32; 3] {
     }
 }
 
-/// Checks that every index in the triangle and vertex order tables is a vertex.
+/// Checks the rows of all tables: that every index in the triangle and vertex order tables is a vertex, and that every
+/// number is possible.
 const fn tables<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
     let header = parts.header;
     let mut row = 0;
@@ -183,6 +184,15 @@ const fn tables<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
         row += 1;
     }
     let sections = parts.sections;
+    let origin = format::origin(sections.origin);
+    let mut axis = 0;
+    while axis < 3 {
+        // By its bits: a processor may compute f64 in software only.
+        if (origin[axis].to_bits() >> 52) & 0x7FF == 0x7FF {
+            return Err(FormatError::Origin { axis: axis as u8 });
+        }
+        axis += 1;
+    }
     let mut row = 0;
     while row < header.vertices && !sections.order.is_empty() {
         match format::vertex_number::<I>(sections.order, row) {

@@ -170,7 +170,11 @@ fn procedural_meshes_agree_with_exhaustive_search() {
     let heart = generate::heart(600).expect("a valid size").mesh;
     let brain = generate::brain(1_200).expect("a valid size");
     let sheet = sheet(12);
-    let one = Mesh { positions: sheet.positions[..3].to_vec(), triangles: vec![[0, 1, 2]] };
+    let one = Mesh {
+        positions: sheet.positions[..3].to_vec(),
+        triangles: vec![[0, 1, 2]],
+        ..Mesh::default()
+    };
     let mut cases = cases_of("heart 600", &heart, QUERIES);
     cases.extend(cases_of("brain 1,200", &brain, QUERIES));
     cases.extend(cases_of("irregular sheet", &sheet, QUERIES));
@@ -214,5 +218,5 @@ fn sheet(cells: u32) -> Mesh {
             triangles.extend([[a, a + 1, a + side], [a + 1, a + side + 1, a + side]]);
         }
     }
-    Mesh { positions, triangles }
+    Mesh { positions, triangles, ..Mesh::default() }
 }

@@ -62,7 +62,7 @@ fn ladder(cells: usize, length: f32, width: f32) -> Mesh {
         let a = 2 * i as u32;
         [[a, a + 2, a + 1], [a + 1, a + 2, a + 3]]
     };
-    Mesh { positions, triangles: (0..cells).flat_map(cell).collect() }
+    Mesh { positions, triangles: (0..cells).flat_map(cell).collect(), ..Mesh::default() }
 }
 
 /// Straight bands, stretched nearly to their limit, whose first edge is the closest to `end`: every sphere around it
@@ -202,7 +202,8 @@ fn planes_allow_for_a_tilt_along_the_axis() {
             let (a, b) = (2 * corner, 2 * ((corner + 1) % corners));
             [[a, b, a + 1], [b, b + 1, a + 1]]
         };
-        let mesh = Mesh { positions, triangles: (0..corners).flat_map(side).collect() };
+        let mesh =
+            Mesh { positions, triangles: (0..corners).flat_map(side).collect(), ..Mesh::default() };
         let leaf = 1 + rng.usize(..2);
         let built = Builder::new().stretch(1.1).leaf_triangles(leaf).build(&mesh).expect("valid");
         let mut searched = Searched::new(&built, &mesh.positions);
@@ -226,7 +227,7 @@ fn planes_allow_for_a_tilt_along_the_axis() {
 #[test]
 fn the_accuracy_covers_the_kernels() {
     let corners = [Vec3::ZERO, Vec3::X, Vec3::Y];
-    let mesh = Mesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2]] };
+    let mesh = Mesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2]], ..Mesh::default() };
     let built = Builder::new().stretch(1.0).build(&mesh).expect("a valid mesh");
     let tree = built.tree::<u16>().expect("valid");
     let rows = built.to_rows(&corners);

@@ -35,7 +35,7 @@ fn sheet(size: f32, cells: u32) -> Mesh {
         let corner = i / cells * side + i % cells;
         [[corner, corner + 1, corner + side], [corner + 1, corner + side + 1, corner + side]]
     };
-    Mesh { positions, triangles: (0..cells * cells).flat_map(cell).collect() }
+    Mesh { positions, triangles: (0..cells * cells).flat_map(cell).collect(), ..Mesh::default() }
 }
 
 /// One tick: the surface's frames, and the tool at both ends.

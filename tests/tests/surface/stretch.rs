@@ -92,7 +92,8 @@ fn no_triangle_is_taken_for_less_stretched_than_it_is() {
             far + x * size * along + x.any_orthonormal_vector() * size * thin,
         ];
         corners.rotate_left(rng.usize(..3));
-        let mesh = Mesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2]] };
+        let mesh =
+            Mesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2]], ..Mesh::default() };
         let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
         // A pull along or across the triangle, and noise from a millionth of its size to all of it.
         let (axis, pull) = (if rng.bool() { x } else { y }, rng.f32() * 3.0);

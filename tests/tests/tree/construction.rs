@@ -306,7 +306,7 @@ fn limits_on_triangles_that_repeat_each_other_build() {
     let positions = [[3.0, 2.0, 1.0], [2.0, 2.0, 1.0], [2.0, 3.0, 0.0], [3.0, 1.0, 0.0]];
     let positions = positions.map(Vec3::from_array).to_vec();
     let triangles = vec![[1, 2, 0], [3, 1, 0], [3, 0, 1], [2, 0, 3], [1, 2, 0]];
-    let mesh = Mesh { positions, triangles };
+    let mesh = Mesh { positions, triangles, ..Mesh::default() };
     Builder::new().limits(vec![1.85, 1.5, 1.65, 1.01, 1.0]).build(&mesh).expect("a valid mesh");
 }
 

@@ -209,7 +209,7 @@ fn grown(mut positions: Vec<Vec3>, rng: &mut Rng) -> Mesh {
         }
     }
     positions.truncate(used as usize);
-    Mesh { positions, triangles }
+    Mesh { positions, triangles, ..Mesh::default() }
 }
 
 /// A mesh's extent in two of its directions, relative to the third.
@@ -262,7 +262,7 @@ fn on_chords_from_fat_to_fat_across_flat() {
             positions.push(Vec3::new(x, 14.0 + rng.f32(), rng.f32()));
             triangles.push([2, side, positions.len() as u32 - 1]);
         }
-        Mesh { positions, triangles }
+        Mesh { positions, triangles, ..Mesh::default() }
     };
     climb_on(family, 6000, 3);
 }
@@ -282,7 +282,7 @@ fn on_fans_of_isosceles_needles() {
         positions.extend(spokes.iter().cycle().skip(start).take(count));
         let mut triangles = vec![[0, 1, 2], [0, 3, 1]];
         triangles.extend((3..count as u32 + 2).map(|spoke| [0, spoke, spoke + 1]));
-        Mesh { positions, triangles }
+        Mesh { positions, triangles, ..Mesh::default() }
     };
     climb_on(family, 6000, 4);
 }
@@ -311,7 +311,7 @@ fn on_sheets() {
                 });
             }
         }
-        Mesh { positions, triangles }
+        Mesh { positions, triangles, ..Mesh::default() }
     };
     climb_on(family, 2000, 5);
 }

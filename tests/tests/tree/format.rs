@@ -1,11 +1,11 @@
 //! The tree's bytes against their specification, `docs/format.md`, and against corruption.
 
-use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
+use dibs_build::{BuildError, Builder, BuiltTree, IndexWidth, Mesh, generate};
 use dibs_nostd::format::{CRC, Link, MAX_STACK};
 use dibs_nostd::{FormatError, Options, Query, QueryError, Sphere, Tree, TriangleRow};
 use dibs_tests::tree_bytes::{reseal, section};
 use fastrand::Rng;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 fn heart(index: IndexWidth) -> (Mesh, BuiltTree) {
     let mesh = generate::heart(320).expect("a valid size").mesh;
@@ -27,7 +27,11 @@ fn with_word(bytes: &[u8], at: usize, value: u32) -> Vec<u8> {
 
 #[test]
 fn the_example_of_the_specification_is_what_the_builder_writes() {
-    let mesh = Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]] };
+    let mesh = Mesh {
+        positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+        triangles: vec![[0, 1, 2]],
+        ..Mesh::default()
+    };
     let builder = Builder::new().stretch(1.5).with_vertex_order(false).with_rest_shape(false);
     let tree = builder.with_metric(false).with_adjacency(false).build(&mesh).expect("a valid mesh");
     let text = include_str!("../../../docs/format.md");
@@ -99,7 +103,7 @@ fn a_wrong_value_with_a_right_checksum_is_named() {
     assert!(matches!(refuse(4, 0x0102_0002), FormatError::Version { found: 2 }));
     assert!(matches!(refuse(4, 0x0702_0004), FormatError::Field { offset: 7, value: 7 }));
     for (at, value) in
-        [(12, 0), (12, 65_537), (16, 0), (20, 0), (24, 513), (40, 1), (44, 1), (56, 1)]
+        [(12, 0), (12, 65_537), (16, 0), (20, 0), (24, 513), (40, 2), (44, 1), (56, 1)]
     {
         let expected = FormatError::Field { offset: at as u8, value };
         assert_eq!(refuse(at, value), expected, "field at {at}");
@@ -111,6 +115,7 @@ fn a_wrong_value_with_a_right_checksum_is_named() {
     for wrong in [-0.5f32, f32::NAN, f32::INFINITY] {
         assert!(matches!(refuse(36, wrong.to_bits()), FormatError::Field { offset: 36, .. }));
     }
+    assert!(matches!(refuse(40, 1), FormatError::Section { kind: 9 }));
     assert!(matches!(refuse(20, word(bytes, 20) - 1), FormatError::Section { kind: 1 }));
     assert!(matches!(refuse(64, 99), FormatError::Section { kind: 1 }));
     assert!(matches!(refuse(68, 7), FormatError::Section { kind: 1 }));
@@ -323,4 +328,49 @@ fn metric_and_limits_stand_where_the_specification_says() {
         }
         assert_eq!(refuse(codes + 8, 0), Err(FormatError::Limit { triangle: 4 }));
     }
+}
+
+/// The origin is stored whole, belongs to the mesh's identity, and is checked.
+#[test]
+fn an_origin_is_stored_and_checked() {
+    let (near, built) = heart(IndexWidth::Bits16);
+    let origin = DVec3::new(4e9, -0.1, 1.0 / 3.0);
+    let moved = Mesh { origin, ..near };
+    for width in [IndexWidth::Bits16, IndexWidth::Bits32] {
+        let far = Builder::new().index(width).build(&moved).unwrap();
+        let found = match width {
+            IndexWidth::Bits16 => far.tree::<u16>().unwrap().origin(),
+            _ => far.tree::<u32>().unwrap().origin(),
+        };
+        assert_eq!((DVec3::from(found), far.origin()), (origin, origin));
+    }
+    assert_eq!(built.tree::<u16>().unwrap().origin(), [0.0; 3]);
+    let far = Builder::new().build(&moved).unwrap();
+    let tree = far.tree::<u16>().unwrap();
+    let (x, y, z) = (4e9 + 12.5, 2.0, -7.0);
+    assert_eq!(tree.local([x, y, z]), Vec3::new(12.5, 2.1, (-7.0 - 1.0_f64 / 3.0) as f32));
+    let other = Mesh { origin: origin + DVec3::X, ..moved.clone() };
+    let other = Builder::new().build(&other).unwrap();
+    let ids = [&built, &far, &other].map(|built| built.summary().mesh_id);
+    assert!(ids[0] != ids[1] && ids[1] != ids[2] && ids[0] != ids[2], "{ids:?}");
+
+    let mut bytes = far.blob().to_vec();
+    let (at, length) = section(&bytes, 9);
+    assert_eq!((length, word(&bytes, 40)), (24, 1));
+    let refuse = |at: usize, value: u32| {
+        Tree::<u16>::from_bytes(&with_word(&bytes, at, value)).expect_err("is wrong")
+    };
+    assert_eq!(refuse(40, 0), FormatError::Section { kind: 9 });
+    for (axis, top) in [(0, 0x7FF0_0000), (1, 0xFFF0_0000), (2, 0x7FF8_0000)] {
+        assert_eq!(refuse(at + 8 * axis + 4, top), FormatError::Origin { axis: axis as u8 });
+    }
+    for place in at..at + length {
+        for bit in 0..8 {
+            bytes[place] ^= 1 << bit;
+            assert!(Tree::<u16>::from_bytes(&bytes).is_err(), "byte {place} bit {bit}");
+            bytes[place] ^= 1 << bit;
+        }
+    }
+    let nowhere = Mesh { origin: DVec3::NAN, ..moved };
+    assert!(matches!(Builder::new().build(&nowhere), Err(BuildError::Origin { .. })));
 }

@@ -139,7 +139,7 @@ pub fn run(args: &Args) -> Result<()> {
 
 /// An error unless the limits cover a recorded motion: the controller would reject its frames.
 fn check_covered(args: &Args, mesh: &Mesh, path: &Path, limits: &[f32]) -> Result<()> {
-    let motion = args.reading.lengths.motion(path)?;
+    let motion = args.reading.lengths.motion(path, mesh.origin)?;
     let paths = match args.construction {
         ConstructionName::Default => Paths::default(),
         ConstructionName::Paper => Paths::Edges,

@@ -1,6 +1,7 @@
 //! Reading a mesh file on the command line.
 
-use anyhow::Result;
+use anyhow::{Result, anyhow};
+use dibs_build::glam::DVec3;
 use dibs_build::{Import, Motion, ReadOptions, Unit};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::Path;
@@ -17,6 +18,10 @@ pub struct MeshArgs {
     /// Keep the largest of several separate surfaces
     #[arg(long)]
     largest_component: bool,
+    /// The point of the mesh's file, in millimetres, that the tree's coordinates count from; by default 0,0,0, or the
+    /// mesh's centre where f32 would lose digits so far from the file's own origin
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
+    origin: Option<DVec3>,
     #[command(flatten)]
     pub lengths: Lengths,
 }
@@ -47,9 +52,18 @@ impl Lengths {
         }
     }
 
-    /// Reads a motion in this unit.
-    pub fn motion(&self, path: &Path) -> Result<Motion> {
-        Ok(Motion::read(path)?.in_millimetres(self.unit()))
+    /// Reads a motion in this unit, of a mesh with this origin.
+    pub fn motion(&self, path: &Path, origin: DVec3) -> Result<Motion> {
+        Ok(Motion::read_around(path, self.unit(), origin)?)
+    }
+}
+
+/// `X,Y,Z`.
+fn parse_point(text: &str) -> Result<DVec3> {
+    let numbers = text.split(',').map(|number| number.trim().parse::<f64>());
+    match numbers.collect::<std::result::Result<Vec<_>, _>>().as_deref() {
+        Ok(&[x, y, z]) => Ok(DVec3::new(x, y, z)),
+        _ => Err(anyhow!("expected X,Y,Z")),
     }
 }
 
@@ -60,6 +74,7 @@ pub fn read(path: &Path, args: &MeshArgs) -> Result<Import> {
         strict: args.strict,
         largest_component: args.largest_component,
         unit: args.lengths.unit(),
+        origin: args.origin,
     };
     let import = options.read(path)?;
     for warning in import.report.warnings() {

@@ -19,7 +19,7 @@ pub struct Fit {
 
 /// Fits modes to a motion file.
 pub fn fit(mesh: &Mesh, path: &Path, lengths: &Lengths) -> Result<Fit> {
-    let motion = lengths.motion(path)?;
+    let motion = lengths.motion(path, mesh.origin)?;
     let spinner = ProgressBar::new_spinner().with_message("fitting modes to the motion");
     spinner.enable_steady_tick(Duration::from_millis(100));
     let fit = ModalFit::new(mesh, &motion);

@@ -55,7 +55,7 @@ pub fn run(args: &Args) -> Result<()> {
     }
     let import = mesh_file::read(&args.mesh, &args.reading)?;
     let mesh = &import.mesh;
-    let motion = args.reading.lengths.motion(&args.motion)?;
+    let motion = args.reading.lengths.motion(&args.motion, mesh.origin)?;
     let paths = if args.edges { Paths::Edges } else { Paths::default() };
     let needed = measure(mesh, &motion, &args.motion, paths)?;
     let ranked = needed.ranked();

@@ -1,10 +1,10 @@
 //! `dibs track`: a tool on its path about a moving surface, tick by tick.
 
 use crate::mesh_file::Lengths;
-use crate::query::{STACK, ToolSpec, parse_tool, rows, side_name};
+use crate::query::{LocalTool, STACK, parse_tool, rows, side_name};
 use crate::tree_file::{self, AnyTree};
 use anyhow::{Context, Result, anyhow, bail};
-use dibs_nostd::glam::Vec3;
+use dibs_build::glam::{DVec3, Vec3};
 use dibs_nostd::{
     Fallback, Index, MeasuredStretch, MovingSurface, Odometer, Options, Proximity, Query, Step,
     Tool, Tracker, Tree, measure_stretch,
@@ -68,14 +68,16 @@ pub fn run(args: &Args) -> Result<()> {
 }
 
 /// The tool at each tick.
-fn tools(path: &Path) -> Result<Vec<ToolSpec>> {
+fn tools(path: &Path, origin: DVec3) -> Result<Vec<LocalTool>> {
     let name = path.display();
     let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot be read"))?;
-    let tools: Vec<ToolSpec> = (1..)
+    let tools: Vec<LocalTool> = (1..)
         .zip(text.lines())
         .filter(|(_, line)| !line.trim().is_empty())
         .map(|(number, line)| {
-            parse_tool(line.trim()).map_err(|error| anyhow!("{name}, line {number}: {error}"))
+            parse_tool(line.trim())
+                .and_then(|tool| tool.local(origin))
+                .map_err(|error| anyhow!("{name}, line {number}: {error}"))
         })
         .collect::<Result<_>>()?;
     if tools.is_empty() {
@@ -85,8 +87,8 @@ fn tools(path: &Path) -> Result<Vec<ToolSpec>> {
 }
 
 fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
-    let tools = tools(&args.path)?;
-    let mut motion = args.lengths.motion(&args.motion)?;
+    let tools = tools(&args.path, tree.origin().into())?;
+    let mut motion = args.lengths.motion(&args.motion, tree.origin().into())?;
     motion.rate = args.motion_rate.unwrap_or(motion.rate);
     let name = args.motion.display();
     if !(args.rate > 0.0 && args.rate.is_finite()) {
@@ -164,7 +166,7 @@ impl<I: Index> Session<'_, I> {
         surface: Surface,
         share: f32,
         stretch: MeasuredStretch,
-        tool: &ToolSpec,
+        tool: &LocalTool,
     ) -> Result<()> {
         let (proximity, fallback) = match surface {
             Surface::Held => self.ask(&step.after(), stretch, tool)?,
@@ -206,11 +208,11 @@ impl<I: Index> Session<'_, I> {
         &mut self,
         surface: &impl MovingSurface,
         stretch: MeasuredStretch,
-        tool: &ToolSpec,
+        tool: &LocalTool,
     ) -> Result<(Proximity, Option<Fallback>)> {
         match tool {
-            ToolSpec::Sphere(sphere) => self.closest(surface, sphere, stretch),
-            ToolSpec::Capsule(capsule) => self.closest(surface, capsule, stretch),
+            LocalTool::Sphere(sphere) => self.closest(surface, sphere, stretch),
+            LocalTool::Capsule(capsule) => self.closest(surface, capsule, stretch),
         }
     }
 

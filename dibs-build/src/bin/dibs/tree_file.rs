@@ -2,6 +2,7 @@
 
 use anyhow::{Result, anyhow};
 use dibs_build::Summary;
+use dibs_build::glam::DVec3;
 use dibs_nostd::{FormatError, Tree};
 use std::path::Path;
 
@@ -9,6 +10,17 @@ use std::path::Path;
 pub enum AnyTree<'a> {
     Narrow(Tree<'a, u16>),
     Wide(Tree<'a, u32>),
+}
+
+impl AnyTree<'_> {
+    /// The point that the tree's coordinates count from.
+    pub fn origin(&self) -> DVec3 {
+        match self {
+            Self::Narrow(tree) => tree.origin(),
+            Self::Wide(tree) => tree.origin(),
+        }
+        .into()
+    }
 }
 
 pub fn load(path: &Path) -> Result<Vec<u8>> {
@@ -39,6 +51,10 @@ pub fn print(summary: &Summary) {
     if let (Some([low, high]), Some(edge)) = (s.bounding_box, s.mean_edge) {
         let size: [f32; 3] = std::array::from_fn(|axis| high[axis] - low[axis]);
         println!("box      {low:.4?} to {high:.4?}: {size:.4?}; mean edge {edge:.4}");
+    }
+    if s.origin != [0.0; 3] {
+        let [x, y, z] = s.origin;
+        println!("origin   {x},{y},{z}: coordinates of the tree count from there");
     }
     println!("mesh id  {:08x}", s.mesh_id);
     println!(

@@ -133,6 +133,7 @@ fn band(squares: u32) -> Mesh {
     Mesh {
         positions: (0..2 * squares + 2).map(corner).collect(),
         triangles: (0..squares).flat_map(square).collect(),
+        ..Mesh::default()
     }
 }
 

@@ -42,6 +42,10 @@ pub const LIMIT_BYTES: usize = 2;
 #[doc(hidden)]
 pub const MAX_LIMIT_CODE: u32 = 0xFFFF;
 
+/// Bytes of the origin section: three `f64`.
+#[doc(hidden)]
+pub const ORIGIN_BYTES: usize = 24;
+
 /// Byte offsets of the header's fields. Numbers are little-endian, of four bytes unless stated otherwise.
 #[doc(hidden)]
 pub mod field {
@@ -69,8 +73,10 @@ pub mod field {
     pub const RADIUS_UNIT: usize = 32;
     /// Largest distance of a vertex from its position in the mesh's file, `f32`.
     pub const POSITION_ERROR: usize = 36;
+    /// 1 where the tree has an origin section, else 0.
+    pub const ORIGIN: usize = 40;
     /// Zeros.
-    pub const RESERVED: Range<usize> = 40..48;
+    pub const RESERVED: Range<usize> = 44..48;
     /// Rows of the section table.
     pub const SECTIONS: usize = 48;
     /// Bytes of the whole tree.
@@ -111,6 +117,8 @@ pub mod section {
     pub const MODES: u32 = 7;
     /// Three neighbours a triangle (optional: sides and contacts need it).
     pub const ADJACENCY: u32 = 8;
+    /// The tree's origin in the mesh's file, three `f64` (where the header has it).
+    pub const ORIGIN: u32 = 9;
 }
 
 /// How geodesic radii were measured, and so which stretch bounds their growth.
@@ -337,6 +345,15 @@ pub(crate) const fn rest_position(rest: &[u8], row: u32) -> Option<glam::Vec3> {
         f32::from_le_bytes([r[4], r[5], r[6], r[7]]),
         f32::from_le_bytes([r[8], r[9], r[10], r[11]]),
     ))
+}
+
+/// The origin's coordinates; zeros where the section is absent.
+pub(crate) const fn origin(section: &[u8]) -> [f64; 3] {
+    let (numbers, _) = section.as_chunks::<8>();
+    match numbers {
+        [x, y, z] => [f64::from_le_bytes(*x), f64::from_le_bytes(*y), f64::from_le_bytes(*z)],
+        _ => [0.0; 3],
+    }
 }
 
 #[inline(always)]

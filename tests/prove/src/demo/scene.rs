@@ -1,7 +1,7 @@
 //! The surface, its motion and its tree, as in the firmware.
 
 use anyhow::{Context, Result, ensure};
-use dibs_build::{Builder, BuiltTree, Mesh, Motion, generate};
+use dibs_build::{Builder, BuiltTree, Mesh, Motion, Unit, generate};
 use dibs_nostd::{Index, measure_stretch};
 use xtask::firmware::{HEART_STRETCH, Surface};
 
@@ -34,7 +34,11 @@ impl Scene {
     /// Reads or generates everything.
     pub fn load(options: &Options) -> Result<Self> {
         let (mesh, motion) = match (&options.mesh, &options.motion) {
-            (Some(mesh), Some(motion)) => (dibs_build::read(mesh)?.mesh, Motion::read_pc2(motion)?),
+            (Some(mesh), Some(motion)) => {
+                let mesh = dibs_build::read(mesh)?.mesh;
+                let motion = Motion::read_around(motion, Unit::default(), mesh.origin)?;
+                (mesh, motion)
+            }
             _ => {
                 let heart = generate::heart(HEART_TRIANGLES)?;
                 (heart.mesh, heart.motion)

@@ -52,7 +52,7 @@ static MESH: LazyLock<Mesh> = LazyLock::new(|| {
         }
         triangles.push([at(RINGS - 1, j), N as u32 - 1, at(RINGS - 1, j + 1)]);
     }
-    Mesh { positions, triangles }
+    Mesh { positions, triangles, ..Mesh::default() }
 });
 
 /// The surface's tree.

@@ -29,6 +29,7 @@ pub fn octahedron() -> Mesh {
             [4, 1, 6],
             [0, 4, 6],
         ],
+        ..Mesh::default()
     }
 }
 

@@ -1,6 +1,6 @@
 //! An answer, as JSON or for a reader.
 
-use dibs_nostd::glam::Vec3;
+use dibs_build::glam::{DVec3, Vec3};
 use dibs_nostd::{Contact, MeasuredStretch, Proximity, Side};
 use serde::Serialize;
 
@@ -9,6 +9,8 @@ pub struct Answer<'a> {
     pub proximity: Proximity,
     /// Corners of the triangle, numbered as in the mesh file.
     pub triangle: [u32; 3],
+    /// The point that the pair's coordinates count from.
+    pub origin: DVec3,
     pub tree: &'a str,
     /// The tool's number in its chain, from 0.
     pub tool: usize,
@@ -24,6 +26,7 @@ pub struct Answer<'a> {
 pub struct Touch<'a> {
     pub contact: Contact,
     pub triangle: [u32; 3],
+    pub origin: DVec3,
     pub tree: &'a str,
     pub tool: usize,
 }
@@ -84,6 +87,20 @@ fn vector(vector: Vec3) -> [f64; 3] {
     vector.as_dvec3().to_array()
 }
 
+/// A point in the coordinates of the mesh's file.
+fn point(point: Vec3, origin: DVec3) -> [f64; 3] {
+    // A sum with zero would lose the sign of -0.
+    if origin == DVec3::ZERO { vector(point) } else { (origin + point.as_dvec3()).to_array() }
+}
+
+/// The same for a reader.
+fn point_text(point: Vec3, origin: DVec3) -> String {
+    if origin == DVec3::ZERO {
+        return point.to_string();
+    }
+    format!("{:.6}", origin + point.as_dvec3())
+}
+
 impl<'a> Answer<'a> {
     pub fn record(&self, line: Option<usize>) -> Record<'a> {
         let p = &self.proximity;
@@ -97,8 +114,8 @@ impl<'a> Answer<'a> {
             side,
             side_reason,
             axis_distance: p.axis_distance.into(),
-            point_on_surface: vector(p.point_on_surface),
-            point_on_tool: vector(p.point_on_tool),
+            point_on_surface: point(p.point_on_surface, self.origin),
+            point_on_tool: point(p.point_on_tool, self.origin),
             direction: vector(p.direction),
             axis_parameter: p.axis_parameter.into(),
             tree: self.tree,
@@ -126,8 +143,8 @@ impl<'a> Answer<'a> {
         if tools > 1 {
             println!("tool              number {} from 0", self.tool);
         }
-        println!("point on surface  {}", p.point_on_surface);
-        println!("point on tool     {}", p.point_on_tool);
+        println!("point on surface  {}", point_text(p.point_on_surface, self.origin));
+        println!("point on tool     {}", point_text(p.point_on_tool, self.origin));
         println!("triangle          {:?}, weights {:?}", self.triangle, p.barycentric);
         if let Some(measured) = self.stretch {
             println!("stretch           {}", measured.sigma());
@@ -135,7 +152,8 @@ impl<'a> Answer<'a> {
         println!("tests             {} nodes, {} triangles", p.node_tests, p.triangle_tests);
         for touch in self.contacts.iter().flatten() {
             let Contact { separation, point_on_surface, normal, .. } = touch.contact;
-            println!("contact           {separation} at {point_on_surface}, normal {normal}");
+            let at = point_text(point_on_surface, touch.origin);
+            println!("contact           {separation} at {at}, normal {normal}");
         }
     }
 }
@@ -144,8 +162,8 @@ impl<'a> Touch<'a> {
     fn record(&self) -> ContactRecord<'a> {
         ContactRecord {
             separation: self.contact.separation.into(),
-            point_on_surface: vector(self.contact.point_on_surface),
-            point_on_tool: vector(self.contact.point_on_tool),
+            point_on_surface: point(self.contact.point_on_surface, self.origin),
+            point_on_tool: point(self.contact.point_on_tool, self.origin),
             normal: vector(self.contact.normal),
             triangle: self.triangle,
             tree: self.tree,

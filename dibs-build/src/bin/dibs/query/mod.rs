@@ -8,7 +8,7 @@ mod tool;
 
 pub use answer::side_name;
 pub use scene::{STACK, rows};
-pub use tool::{ToolSpec, parse_tool};
+pub use tool::{LocalTool, ToolSpec, parse_tool};
 
 use crate::mesh_file::Lengths;
 use crate::tree_file;

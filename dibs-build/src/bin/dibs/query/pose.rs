@@ -9,8 +9,8 @@ const REMEDY: &str = "give X,Y,Z,R for a sphere or X1,Y1,Z1,X2,Y2,Z2,R for a cap
 #[derive(Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum JsonTool {
-    Sphere([f32; 4]),
-    Capsule([f32; 7]),
+    Sphere([f64; 4]),
+    Capsule([f64; 7]),
 }
 
 /// The tools of a line that is not empty.
@@ -44,7 +44,7 @@ fn csv(line: &str) -> Result<ToolSpec> {
             .parse()
             .map_err(|_| anyhow!("value {number}, '{}', is not a number; {REMEDY}", cell.trim()))
     };
-    let numbers: Vec<f32> = (1..).zip(line.split(',')).map(number).collect::<Result<_>>()?;
+    let numbers: Vec<f64> = (1..).zip(line.split(',')).map(number).collect::<Result<_>>()?;
     tool(&numbers)
 }
 

@@ -1,12 +1,12 @@
 //! The surfaces of a query, each with its positions, and the closest pair between them and a chain of tools.
 
-use super::ToolSpec;
 use super::answer::{Answer, Touch};
+use super::{LocalTool, ToolSpec};
 use crate::mesh_file::Lengths;
 use crate::tree_file::{self, AnyTree};
 use anyhow::{Result, anyhow, bail};
+use dibs_build::glam::{DVec3, Vec3};
 use dibs_build::{Import, ReadOptions};
-use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
     Contact, Contacts, Index, MeasuredStretch, Options, Proximity, Query, StretchError, Tool, Tree,
     measure_stretch,
@@ -59,22 +59,23 @@ impl<'a> Surface<'a> {
     }
 
     fn ask(&self, tool: &ToolSpec, margin: Option<f32>) -> Result<Found> {
-        match &self.tree {
+        let tool = tool.local(self.tree.origin());
+        tool.and_then(|tool| match &self.tree {
             AnyTree::Narrow(tree) => self.ask_tree(tree, tool, margin),
             AnyTree::Wide(tree) => self.ask_tree(tree, tool, margin),
-        }
+        })
         .map_err(|error| anyhow!("{}: {error}", self.name))
     }
 
     fn ask_tree<I: Index>(
         &self,
         tree: &Tree<'_, I>,
-        tool: &ToolSpec,
+        tool: LocalTool,
         margin: Option<f32>,
     ) -> Result<Found> {
         let mut found = match tool {
-            ToolSpec::Sphere(sphere) => self.closest(tree, sphere, margin)?,
-            ToolSpec::Capsule(capsule) => self.closest(tree, capsule, margin)?,
+            LocalTool::Sphere(sphere) => self.closest(tree, &sphere, margin)?,
+            LocalTool::Capsule(capsule) => self.closest(tree, &capsule, margin)?,
         };
         let vertex = |row| tree.vertex_number(row).map_or(row, |vertex| vertex.0);
         found.triangle = found.proximity.corners.map(vertex);
@@ -136,6 +137,7 @@ pub fn ask<'a>(
             touches.extend(contacts.map(|(contact, triangle)| Touch {
                 contact,
                 triangle,
+                origin: surface.tree.origin(),
                 tree: &surface.name,
                 tool: number,
             }));
@@ -144,6 +146,7 @@ pub fn ask<'a>(
                 best = Some(Answer {
                     proximity: found.proximity,
                     triangle: found.triangle,
+                    origin: surface.tree.origin(),
                     tree: &surface.name,
                     tool: number,
                     stretch: surface.stretch,
@@ -175,7 +178,7 @@ fn measured<I: Index>(
             .map(|row| tree.rest_position(row))
             .collect::<Option<Vec<Vec3>>>()
             .ok_or_else(|| anyhow!("{name}: the tree has no rest shape, give --vertices"))?,
-        Some(path) => rows(tree, path, &current(path, frame, lengths)?)?,
+        Some(path) => rows(tree, path, &current(path, frame, lengths, tree.origin().into())?)?,
     };
     // A distance on a surface that is stretched beyond the limit could be wrong: none is given.
     match measure_stretch(tree, positions.as_slice()) {
@@ -187,8 +190,13 @@ fn measured<I: Index>(
     }
 }
 
-/// Positions in the order of the mesh file.
-fn current(path: &Path, frame: Option<usize>, lengths: &Lengths) -> Result<Vec<Vec3>> {
+/// Positions in the order of the mesh file, from the tree's origin.
+fn current(
+    path: &Path,
+    frame: Option<usize>,
+    lengths: &Lengths,
+    origin: DVec3,
+) -> Result<Vec<Vec3>> {
     let name = path.display();
     let is_motion = name.to_string().contains('%')
         || path
@@ -197,7 +205,7 @@ fn current(path: &Path, frame: Option<usize>, lengths: &Lengths) -> Result<Vec<V
     match (is_motion, frame) {
         (true, None) => bail!("{name}: choose a frame of the motion with --frame"),
         (true, Some(frame)) => {
-            let mut frames = lengths.motion(path)?.frames;
+            let mut frames = lengths.motion(path, origin)?.frames;
             if frame >= frames.len() {
                 bail!("{name}: no frame {frame}, the motion has {}", frames.len());
             }
@@ -209,7 +217,9 @@ fn current(path: &Path, frame: Option<usize>, lengths: &Lengths) -> Result<Vec<V
         // The tree is of the largest component: others are no error here.
         (false, None) => {
             let unit = lengths.unit();
-            let options = ReadOptions { largest_component: true, unit, ..Import::options() };
+            let origin = Some(origin);
+            let options =
+                ReadOptions { largest_component: true, unit, origin, ..Import::options() };
             Ok(options.read(path)?.mesh.positions)
         }
     }

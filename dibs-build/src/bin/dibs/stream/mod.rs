@@ -9,10 +9,10 @@ use crate::mesh_file::Lengths;
 use crate::modes;
 use crate::tree_file::{self, AnyTree};
 use anyhow::{Context, Result, anyhow, bail};
+use dibs_build::glam::{DVec3, Vec3};
 use dibs_build::stream::{Sender, Settings, SurfaceOrder};
 use dibs_build::transport::Target;
 use dibs_build::{Builder, Import, ReadOptions};
-use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::AesCmac;
 use interrupt::Interrupt;
 use player::Player;
@@ -85,8 +85,8 @@ pub struct Args {
 
 pub fn run(args: &Args) -> Result<()> {
     let key = args.key.as_deref().map(key::read).transpose()?;
-    let order = order(&args.surface, &args.lengths)?;
-    let motion = args.lengths.motion(&args.motion)?;
+    let (order, origin) = order(&args.surface, &args.lengths)?;
+    let motion = args.lengths.motion(&args.motion, origin)?;
     let name = args.motion.display();
     if motion.frames.is_empty() {
         bail!("{name}: the motion has no frame");
@@ -146,14 +146,16 @@ fn connect<const MTU: usize>(
     Player::new(args, recording, sender, interrupt).run()
 }
 
-/// The order of the vertices: the tree's, or that of the tree that the mesh gives.
-fn order(path: &Path, lengths: &Lengths) -> Result<SurfaceOrder> {
+/// The order of the vertices and the origin: the tree's, or those of the tree that the mesh gives.
+fn order(path: &Path, lengths: &Lengths) -> Result<(SurfaceOrder, DVec3)> {
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("dibs")) {
         let bytes = tree_file::load(path)?;
-        return Ok(match tree_file::validate(&bytes, path)? {
-            AnyTree::Narrow(tree) => SurfaceOrder::of(&tree),
-            AnyTree::Wide(tree) => SurfaceOrder::of(&tree),
-        });
+        let tree = tree_file::validate(&bytes, path)?;
+        let order = match &tree {
+            AnyTree::Narrow(tree) => SurfaceOrder::of(tree),
+            AnyTree::Wide(tree) => SurfaceOrder::of(tree),
+        };
+        return Ok((order, tree.origin()));
     }
     let options = ReadOptions { unit: lengths.unit(), ..Import::options() };
     let mesh = options.read(path)?.mesh;
@@ -161,8 +163,9 @@ fn order(path: &Path, lengths: &Lengths) -> Result<SurfaceOrder> {
     let built = Builder::new()
         .build(&mesh)
         .map_err(|error| anyhow!("{name}: no tree can be built: {error}"))?;
-    Ok(match built.index_bits() {
+    let order = match built.index_bits() {
         16 => SurfaceOrder::of(&built.tree::<u16>().context("the tree just built")?),
         _ => SurfaceOrder::of(&built.tree::<u32>().context("the tree just built")?),
-    })
+    };
+    Ok((order, built.origin()))
 }

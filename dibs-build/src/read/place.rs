@@ -1,0 +1,155 @@
+//! From a file's coordinates to a mesh's: in millimetres, and from an origin near the mesh, where f32 holds them.
+
+use super::ReadErrorKind;
+use super::raw::Raw;
+use glam::{DVec3, Vec3};
+
+/// Rounding by this part of a mesh's extent is about the accuracy of a query there; a mesh is recentred where f32 would
+/// round it more.
+const MOST_ROUNDING: f64 = 1.0 / 1_048_576.0;
+
+/// Distance between neighbouring numbers, as a part of the mesh's extent, above which its shape is lost.
+const MOST_RESOLUTION: f64 = 1e-4;
+
+/// Lengths beyond this are none of an organ in any unit, and their sums might overflow.
+const MOST_DISTANCE: f64 = 1e18;
+
+type Result<T> = std::result::Result<T, ReadErrorKind>;
+
+/// The place of a file's coordinates among a mesh's.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    /// Millimetres of the file's unit.
+    pub scale: f64,
+    /// The mesh's origin, in millimetres from the file's.
+    pub origin: DVec3,
+}
+
+impl Place {
+    /// A position of the file, not yet rounded.
+    pub fn of(&self, position: [f64; 3]) -> DVec3 {
+        DVec3::from(position) * self.scale - self.origin
+    }
+
+    /// The place of a mesh. Its origin is the given one; otherwise the file's own, or where f32 would spoil the mesh the
+    /// centre of its bounding box.
+    ///
+    /// The centre is rounded to a power of two of about an eighth of the extent, so that few bits hold it and f64
+    /// subtracts it exactly.
+    ///
+    /// # Errors
+    /// [`ReadErrorKind::TooFar`] where the file's numbers do not hold the shape.
+    pub fn of_mesh(raw: &Raw, scale: f64, origin: Option<DVec3>) -> Result<Self> {
+        let unmoved = Self { scale, origin: DVec3::ZERO };
+        let positions = || raw.corner_positions();
+        let bounds = Bounds::of(positions().map(|position| unmoved.of(position)));
+        let extent = bounds.extent();
+        // Later checks say more of positions that coincide, or are too large or not finite.
+        let is_surface = extent > f32::MIN_POSITIVE.into() && bounds.largest() <= MOST_DISTANCE;
+        let is_coarse = bounds.resolution(f32::EPSILON.into()) > MOST_RESOLUTION * extent;
+        if is_surface && is_coarse {
+            check_digits(&bounds, positions)?;
+        }
+        if let Some(origin) = origin {
+            return Ok(Self { scale, origin });
+        }
+        if !is_surface {
+            return Ok(unmoved);
+        }
+        let rounding = |position| rounding(unmoved.of(position));
+        let most = positions().map(rounding).fold(0.0, f64::max);
+        if !is_coarse && most <= MOST_ROUNDING * extent {
+            return Ok(unmoved);
+        }
+        let step = (extent / 8.0).log2().floor().exp2();
+        Ok(Self { origin: (bounds.centre() / step).round() * step, ..unmoved })
+    }
+
+    /// The positions of a frame, rounded to f32. `name` is the frame's in an error.
+    ///
+    /// # Errors
+    /// [`ReadErrorKind::TooFar`] where the file's numbers do not hold the shape, [`ReadErrorKind::Elsewhere`] where f32
+    /// does not hold it so far from the origin.
+    pub fn frame(&self, positions: &[[f64; 3]], name: impl Fn() -> String) -> Result<Vec<Vec3>> {
+        let in_file = Self { origin: DVec3::ZERO, ..*self };
+        let bounds = Bounds::of(positions.iter().map(|&position| in_file.of(position)));
+        if bounds.resolution(f32::EPSILON.into()) > MOST_RESOLUTION * bounds.extent() {
+            check_digits(&bounds, || positions.iter().copied())?;
+        }
+        check_nearness(positions.iter().map(|&position| self.of(position)), name)?;
+        Ok(positions.iter().map(|&position| self.of(position).as_vec3()).collect())
+    }
+}
+
+/// The distance of a position from the nearest f32 numbers.
+pub(super) fn rounding(position: DVec3) -> f64 {
+    position.distance(position.as_vec3().as_dvec3())
+}
+
+/// Neighbouring f32 numbers must be much closer than the surface is large, or its shape is lost. Returns the largest
+/// extent along an axis.
+pub(super) fn check_nearness(
+    positions: impl Iterator<Item = DVec3>,
+    name: impl Fn() -> String,
+) -> Result<f64> {
+    let bounds = Bounds::of(positions);
+    let (extent, resolution) = (bounds.extent(), bounds.resolution(f32::EPSILON.into()));
+    // If all vertices coincide, the error for degenerate triangles says more.
+    if extent > 0.0 && resolution > MOST_RESOLUTION * extent {
+        let (what, largest) = (name(), bounds.largest());
+        return Err(ReadErrorKind::Elsewhere { what, largest, resolution, extent });
+    }
+    Ok(extent)
+}
+
+/// Far from the origin the file's numbers must have more digits than f32. If each of them is an f32, and some has its
+/// last bit, then they were rounded to f32 when they were written.
+fn check_digits<P: Iterator<Item = [f64; 3]>>(
+    bounds: &Bounds,
+    positions: impl Fn() -> P,
+) -> Result<()> {
+    let extent = bounds.extent();
+    let is_f32 = |value: f64| f64::from(value as f32) == value;
+    let has_last_bit = |value: f64| (value as f32).to_bits() & 1 == 1;
+    let is_rounded = positions().flatten().all(is_f32) && positions().flatten().any(has_last_bit);
+    let epsilon = if is_rounded { f32::EPSILON.into() } else { f64::EPSILON };
+    let resolution = bounds.resolution(epsilon);
+    if extent > 0.0 && resolution > MOST_RESOLUTION * extent {
+        return Err(ReadErrorKind::TooFar { largest: bounds.largest(), resolution, extent });
+    }
+    Ok(())
+}
+
+/// A box around positions.
+struct Bounds {
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Bounds {
+    fn of(positions: impl Iterator<Item = DVec3>) -> Self {
+        let none = Self { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
+        positions.fold(none, |Self { low, high }, position| Self {
+            low: low.min(position),
+            high: high.max(position),
+        })
+    }
+
+    /// The longest side; not above 0 where there are no two positions.
+    fn extent(&self) -> f64 {
+        (self.high - self.low).max_element()
+    }
+
+    fn largest(&self) -> f64 {
+        self.low.abs().max(self.high.abs()).max_element()
+    }
+
+    fn centre(&self) -> DVec3 {
+        (self.low + self.high) / 2.0
+    }
+
+    /// Distance between neighbouring numbers of the largest coordinate's size.
+    fn resolution(&self, epsilon: f64) -> f64 {
+        self.largest() * epsilon
+    }
+}
