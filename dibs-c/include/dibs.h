@@ -1081,6 +1081,24 @@ typedef struct {
 } dibs_verdict;
 
 /**
+ * Facts about a frame.
+ */
+typedef struct {
+  /**
+   * Vertices.
+   */
+  uint32_t vertices;
+  /**
+   * No vertex is farther (mm) than this from where it is here. Part of the accuracy of every answer.
+   */
+  float position_error;
+  /**
+   * The largest stretch, 1 for none; 0 where it was not measured.
+   */
+  float stretch;
+} dibs_frame_facts;
+
+/**
  * Limits of a surface besides the tree's stretch limit. A limit that is not a number refuses every frame.
  */
 typedef struct {
@@ -1356,6 +1374,13 @@ dibs_code dibs_frame_measure(dibs_frame *frame,
                              float *stretch);
 
 /**
+ * Facts about the frame.
+ *
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, or a misuse.
+ */
+dibs_code dibs_frame_get_facts(dibs_frame *frame, dibs_frame_facts *facts);
+
+/**
  * Lets go of the vertices, or of the frame that a reader holds: the next one can then be published.
  */
 dibs_code dibs_frame_release(dibs_frame *frame);
@@ -1527,6 +1552,23 @@ dibs_code dibs_receiver_status(dibs_receiver *receiver,
                                size_t *length);
 
 /**
+ * Number of the frame that was published last, which wraps.
+ *
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, or a misuse.
+ */
+dibs_code dibs_receiver_epoch(dibs_receiver *receiver, uint32_t *epoch);
+
+/**
+ * Position (mm) of a vertex in the frame that was published last. Row after row it serves a checksum of what is in
+ * memory, or a log.
+ *
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` outside the table, or a misuse.
+ */
+dibs_code dibs_receiver_position(dibs_receiver *receiver,
+                                 uint32_t row,
+                                 dibs_vec3 *position);
+
+/**
  * The count of each event since the start, in the order of docs/wire.md: published, abandoned, duplicate,
  * heartbeat, and from the fifth on rejections by their cause.
  *
@@ -1623,6 +1665,16 @@ dibs_code dibs_tree_get_facts(dibs_tree *tree, dibs_tree_facts *facts);
 dibs_code dibs_tree_rest_position(dibs_tree *tree,
                                   uint32_t row,
                                   dibs_vec3 *position);
+
+/**
+ * Checks what was decoded of the tree against its bytes. That lies in memory, which a scrub does not read: call it once
+ * a tick.
+ *
+ * Cost: some hundred instructions.
+ *
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_TREE_CORRUPT` where the two differ: make the output safe; or a misuse.
+ */
+dibs_code dibs_tree_check(dibs_tree *tree);
 
 /**
  * Makes a check of the tree's bytes.
