@@ -49,7 +49,7 @@ fn worst_answer(import: &Import, exact: &[DVec3]) -> (f64, f64) {
         let wanted = exact[rng.usize(..exact.len())] + out;
         let local = tree.local(wanted.to_array());
         let centre = import.mesh.origin + local.as_dvec3();
-        assert!(centre.distance(wanted) < 1e-7 * (100.0 + local.length() as f64), "{wanted}");
+        assert!(centre.distance(wanted) < 1e-7 * (100.0 + f64::from(local.length())), "{wanted}");
         let tool = Sphere::new(local, 0.5).unwrap();
         let options = Options::cold().unsigned();
         let found = query.closest(rows.as_slice(), &tool, &options).unwrap();
@@ -165,7 +165,7 @@ fn a_far_motion_keeps_its_digits() {
     for (number, frame) in frames.iter().enumerate() {
         std::fs::write(folder.path().join(format!("f{number}.obj")), obj(frame, &mesh)).unwrap();
     }
-    let numbers = frames.iter().flatten().flat_map(|p| p.to_array());
+    let numbers = frames.iter().flatten().flat_map(DVec3::to_array);
     let header =
         format!("{{'descr': '<f8', 'fortran_order': False, 'shape': (3, {}, 3), }}\n", exact.len());
     let mut npy = b"\x93NUMPY\x01\x00".to_vec();
