@@ -63,8 +63,10 @@ impl<S: RestSurface> RestSurface for &S {
 /// A recorded or generated deformation of a mesh: every frame holds one position a vertex.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Motion {
-    /// The frames, in order of time. Positions count from the mesh's [origin](Mesh::origin).
+    /// The frames, in order of time. Positions count from the origin.
     pub frames: Vec<Vec<Vec3>>,
     /// Frames a second; 0 if the file does not state it.
     pub rate: f32,
+    /// The [origin](Mesh::origin) of the mesh.
+    pub origin: DVec3,
 }

@@ -40,6 +40,9 @@ pub enum WriteErrorKind {
         "the mesh lies too far from the origin for the numbers of binary STL; write it as .ply"
     )]
     TooFar,
+    /// The same for a motion.
+    #[error("the motion lies too far from the origin for the numbers of PC2")]
+    MotionTooFar,
     /// More elements than the format can count.
     #[error("{count} {element} are more than the format can count")]
     TooMany {

@@ -129,7 +129,7 @@ impl Scene {
 
     /// Positions and velocities of the vertices at a tick.
     fn surface(&self, tick: u32) -> (Vec<Vec3>, Vec<Vec3>) {
-        let Some(Motion { frames, rate }) = &self.motion else {
+        let Some(Motion { frames, rate, .. }) = &self.motion else {
             return (self.mesh.positions.clone(), vec![Vec3::ZERO; self.mesh.positions.len()]);
         };
         let time = tick as f32 * TICK * rate;

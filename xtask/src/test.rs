@@ -1,9 +1,11 @@
 //! `cargo xtask test`: everything that CI runs.
 
+use std::path::PathBuf;
 use std::process::Command;
+use std::thread;
 use std::time::Duration;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 use xtask::c_interface;
 use xtask::process::{quiet, run};
 use xtask::qemu;
@@ -54,7 +56,11 @@ pub fn test(options: &Options) -> Result<()> {
     steps.cargo("packages", &[&["package"], &packages[..]].concat(), &[]);
     steps.run("oldest compiler", oldest_compiler);
 
-    match Cross::find() {
+    // Found first, since both sides would install them. Then a thread, because the board's builds take one core.
+    let (cross, emulator) = (Cross::find(), qemu::find());
+    let demo_seconds = options.demo_seconds;
+    let checks = thread::spawn(move || checks(demo_seconds));
+    match cross.and_then(|cross| emulator.map(|_| cross)) {
         Ok(cross) => {
             println!("\nboard: {}", cross.describe());
             steps.run("core crate for the board", || core_crate(&cross));
@@ -67,25 +73,26 @@ pub fn test(options: &Options) -> Result<()> {
         }
         Err(error) => steps.run("toolchain for the board", || Err(error)),
     }
+    let list = checks.join().unwrap_or_else(|_| Err(anyhow!("the thread panicked")));
+    if let Err(error) = list.and_then(|list| steps.read(&list)) {
+        steps.run("checks of tests/prove", || Err(error));
+    }
     if options.whole {
         steps.run("mutants of changed lines", mutants::sample);
-    }
-    if let Err(error) = checks(options.demo_seconds, &mut steps) {
-        steps.run("checks of tests/prove", || Err(error));
     }
     steps.finish();
     Ok(())
 }
 
-/// Runs the checks of `tests/prove`, and adds its steps to these.
-fn checks(demo_seconds: u32, steps: &mut Steps) -> Result<()> {
+/// Runs the checks of `tests/prove`. Returns the file with the list of its steps.
+fn checks(demo_seconds: u32) -> Result<PathBuf> {
     let list = workspace::target().join("steps.txt");
     // An earlier run's list must not be taken for this run's.
     std::fs::write(&list, "")?;
     let mut prove = prove::with_workspace()?;
     prove.args(["test", "--demo-seconds", &demo_seconds.to_string(), "--steps"]).arg(&list);
     run(&mut prove)?;
-    steps.read(&list)
+    Ok(list)
 }
 
 /// `cargo check` with the compiler that `rust-version` names.

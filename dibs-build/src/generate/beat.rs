@@ -53,7 +53,7 @@ pub(super) fn beat(rest: &[Vec3]) -> Motion {
                 .collect()
         })
         .collect();
-    Motion { frames, rate: (FRAMES as f64 * RATE) as f32 }
+    Motion { frames, rate: (FRAMES as f64 * RATE) as f32, ..Motion::default() }
 }
 
 impl Control {

@@ -48,7 +48,8 @@ pub(super) fn parse(bytes: &[u8], place: &Place) -> Result<Motion, ReadErrorKind
         let points: Vec<[f64; 3]> = (0..vertices).map(|vertex| point(frame, vertex)).collect();
         super::frame(&points, frame, place)
     };
-    Ok(Motion { frames: (0..frames).map(frame).collect::<Result<_, _>>()?, rate: 0.0 })
+    let frames = (0..frames).map(frame).collect::<Result<_, _>>()?;
+    Ok(Motion { frames, rate: 0.0, origin: place.origin })
 }
 
 /// What follows a key of the header, which is a Python dictionary.

@@ -16,17 +16,31 @@ const HEADER: usize = 32;
 const POINT: usize = 12;
 
 /// A motion that does not fit a mesh.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error(
-    "frame {frame} of the motion has {found} vertices and the mesh has {expected}; use the mesh that the motion was recorded for"
-)]
-pub struct MotionMismatchError {
-    /// The first frame that does not fit, counted from 0.
-    pub frame: usize,
-    /// Vertices of the mesh.
-    pub expected: usize,
-    /// Vertices of the frame.
-    pub found: usize,
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum MotionMismatchError {
+    /// A frame has too few or too many vertices.
+    #[error(
+        "frame {frame} of the motion has {found} vertices and the mesh has {expected}; use the mesh that the motion was recorded for"
+    )]
+    Vertices {
+        /// The first frame that does not fit, counted from 0.
+        frame: usize,
+        /// Vertices of the mesh.
+        expected: usize,
+        /// Vertices of the frame.
+        found: usize,
+    },
+    /// The motion counts from another origin.
+    #[error(
+        "the motion counts from {found} and the mesh from {expected}; read the motion around the origin of the mesh"
+    )]
+    Origin {
+        /// The mesh's origin.
+        expected: DVec3,
+        /// The motion's.
+        found: DVec3,
+    },
 }
 
 impl Motion {
@@ -45,13 +59,17 @@ impl Motion {
     /// Writes a PC2 file.
     ///
     /// # Errors
-    /// [`WriteError`], also when frames differ in length; the file is complete or untouched.
+    /// [`WriteError`], also when frames differ in length, and for an origin that is not zero, since the file's numbers are
+    /// of single precision; the file is complete or untouched.
     pub fn write_pc2(&self, path: impl AsRef<Path>) -> Result<(), WriteError> {
         let path = path.as_ref();
         let fail = |kind| WriteError { path: path.to_path_buf(), kind };
         let count = |element, count: usize| {
             i32::try_from(count).map_err(|_| fail(WriteErrorKind::TooMany { element, count }))
         };
+        if self.origin != DVec3::ZERO {
+            return Err(fail(WriteErrorKind::MotionTooFar));
+        }
         let expected = self.frames.first().map_or(0, Vec::len);
         if let Some(frame) = self.frames.iter().position(|frame| frame.len() != expected) {
             let found = self.frames[frame].len();
@@ -73,16 +91,21 @@ impl Motion {
         })
     }
 
-    /// Checks that every frame has one position for each of the mesh's vertices.
+    /// Checks that every frame has one position for each of the mesh's vertices, from the mesh's origin.
     ///
     /// # Errors
-    /// [`MotionMismatchError`] for the first frame that does not.
+    /// [`MotionMismatchError`] for another origin, or the first frame that does not fit.
     pub fn check_fits(&self, mesh: &Mesh) -> Result<(), MotionMismatchError> {
+        if self.origin != mesh.origin {
+            let (expected, found) = (mesh.origin, self.origin);
+            return Err(MotionMismatchError::Origin { expected, found });
+        }
         let expected = mesh.positions.len();
         match self.frames.iter().position(|frame| frame.len() != expected) {
             None => Ok(()),
             Some(frame) => {
-                Err(MotionMismatchError { frame, expected, found: self.frames[frame].len() })
+                let found = self.frames[frame].len();
+                Err(MotionMismatchError::Vertices { frame, expected, found })
             }
         }
     }
@@ -122,5 +145,6 @@ pub(super) fn parse(bytes: &[u8], place: &Place) -> Result<Motion, ReadErrorKind
         frames.push(super::frame(&points, number, place)?);
     }
     let rate = f32::from_le_bytes(word(3));
-    Ok(Motion { frames, rate: if rate.is_finite() && rate > 0.0 { rate } else { 0.0 } })
+    let rate = if rate.is_finite() && rate > 0.0 { rate } else { 0.0 };
+    Ok(Motion { frames, rate, origin: place.origin })
 }

@@ -62,7 +62,7 @@ impl<'a> Series<'a> {
             let frame = frame(&path, number - first, &mut triangles, place);
             frames.push(frame.map_err(|kind| fail(&path, kind))?);
         }
-        Ok(Motion { frames, rate: 0.0 })
+        Ok(Motion { frames, rate: 0.0, origin: place.origin })
     }
 }
 

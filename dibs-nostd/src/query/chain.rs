@@ -16,6 +16,10 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// or crossing. That suffices for a chain, whose axes touch each other: it cannot have one tool outside and another
     /// one inside unless one of them crosses the surface. Query tools that do not touch one by one.
     ///
+    /// Only pairs whose unsigned separation is at most `separation` (mm) are looked for, as by
+    /// [`closest_within`](Self::closest_within): in a scene of several surfaces that of the closest pair so far, else
+    /// `f32::INFINITY`.
+    ///
     /// Cost: the budget at most, for all tools together.
     ///
     /// # Errors
@@ -34,7 +38,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// let joints = [200.0, 140.0, 100.0, 80.0].map(|x| Vec3::new(x, 0.0, 20.0));
     /// let [shaft, wrist, jaw] = [0, 1, 2].map(|at| Capsule::new(joints[at], joints[at + 1], 2.5));
     /// let chain = [shaft?, wrist?, jaw?];
-    /// let closest = query.closest_of(rows.as_slice(), &chain, &Options::new())?;
+    /// let closest = query.closest_of(rows.as_slice(), &chain, f32::INFINITY, &Options::new())?;
     /// assert!(closest.is_some_and(|(tool, _)| tool == 2));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -42,6 +46,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         &mut self,
         vertices: &V,
         tools: &[T],
+        separation: f32,
         options: &Options,
     ) -> Result<Option<(usize, Proximity)>, QueryError> {
         let mut chain = Chain::new(options);
@@ -51,18 +56,17 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         for number in [nearest].into_iter().chain(others) {
             let Some(tool) = tools.get(number) else { continue };
             let limit = if number < PASSED { chain.limit() } else { f32::INFINITY };
-            let limit = if limit < options.within { limit } else { options.within };
-            let found = self.closest(vertices, tool, &chain.options.within(limit))?;
+            let limit = if limit < separation { limit } else { separation };
+            let found = self.closest_within(vertices, tool, limit, &chain.options)?;
             if !(found.separation <= limit) {
                 passed |= 1_u64.checked_shl(number as u32).unwrap_or(0);
             }
             chain.add(number, found);
         }
         if !chain.is_outside {
-            chain.options = chain.options.within(options.within);
             for (number, tool) in tools.iter().enumerate().take(PASSED) {
                 if passed >> number & 1 != 0 {
-                    let found = self.closest(vertices, tool, &chain.options)?;
+                    let found = self.closest_within(vertices, tool, separation, &chain.options)?;
                     chain.add(number, found);
                 }
             }

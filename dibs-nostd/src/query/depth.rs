@@ -164,7 +164,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         options: &Options,
         meeting: &Proximity,
     ) -> Self {
-        let mut options = options.within(f32::INFINITY);
+        let mut options = *options;
         options.stretch = options.stretch.or_else(|| vertices.stretch());
         let Budget { node_tests, triangle_tests } = &mut options.budget;
         *node_tests = node_tests.saturating_sub(meeting.node_tests);

@@ -33,7 +33,6 @@ pub struct Options {
     pub(super) stretch: Option<MeasuredStretch>,
     pub(super) is_signed: bool,
     pub(super) depth_tolerance: Option<f32>,
-    pub(super) within: f32,
 }
 
 /// The triangle that a query tests first.
@@ -63,7 +62,6 @@ impl Options {
             stretch: None,
             is_signed: true,
             depth_tolerance: None,
-            within: f32::INFINITY,
         }
     }
 
@@ -112,18 +110,6 @@ impl Options {
     #[must_use]
     pub const fn depth_tolerance(mut self, tolerance: f32) -> Self {
         self.depth_tolerance = Some(tolerance);
-        self
-    }
-
-    /// Looks only for a pair whose unsigned separation is at most this (mm). Where there is none, the answer's interval
-    /// begins there, and its side is not known ([`NoSide::CutShort`](crate::NoSide::CutShort)). A far surface of a scene
-    /// costs a few tests that way.
-    ///
-    /// [`Query::closest`](crate::Query::closest) and [`Query::closest_wide`](crate::Query::closest_wide) heed it, a
-    /// tracker and the search for contacts do not.
-    #[must_use]
-    pub const fn within(mut self, separation: f32) -> Self {
-        self.within = separation;
         self
     }
 

@@ -69,8 +69,6 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     /// can be closer.
     cutoff: f32,
     cutoff_squared: f32,
-    /// What is farther than this from the axis is not looked for: [`Options::within`].
-    limit: f32,
     nearest_pin: NearestPin,
     best: Option<AxisPair>,
     best_squared: f32,
@@ -80,7 +78,7 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T> {
-    /// A search that tests the triangle `first` before anything else, if the surface can be within the limit at all.
+    /// A search that tests the triangle `first` before anything else.
     #[inline(always)]
     pub fn start(
         tree: &'s Tree<'t, I>,
@@ -150,37 +148,65 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             tilt_slack: TILT * scale * scale,
             cutoff: f32::INFINITY,
             cutoff_squared: f32::INFINITY,
-            limit: f32::INFINITY,
             nearest_pin: NearestPin { row: root.pin, distance: f32::INFINITY },
             best: None,
             best_squared: f32::INFINITY,
             best_triangle: u32::MAX,
         };
         search.lower_cutoff_to_pin(root.pin, distance);
-        let limit = options.within + tool.radius();
-        // Written so that a NaN limits nothing.
-        if limit < f32::INFINITY {
-            // With rounding to spare, so that an axis that touches the surface is always within.
-            let rounding = search.slack + header.position_error;
-            search.limit = rounding + if limit > 0.0 { limit } else { 0.0 };
-            search.lower_cutoff(search.limit);
-        }
-        if let Some(TriangleRow(triangle)) = first
-            && !(distance - radius > search.cutoff)
-            && triangle < header.triangles
-            && let Some(left) = search.left.triangle_tests.checked_sub(1)
-        {
-            search.left.triangle_tests = left;
-            let corners = search.corners(triangle)?;
-            search.test_triangle(triangle, &corners);
-        }
+        search.test_first(first)?;
         let subtree = Waiting { lower: distance - radius, link: root.link };
         search.push(0, subtree).ok_or(QueryError::Corrupt { row: 0 })?;
         Ok(search)
     }
 
+    /// Tests the triangle `first`, if there is such a triangle and a budget for it.
+    #[inline(always)]
+    fn test_first(&mut self, first: Option<TriangleRow>) -> Result<(), QueryError> {
+        if let Some(TriangleRow(triangle)) = first
+            && triangle < self.tree.triangle_count()
+            && let Some(left) = self.left.triangle_tests.checked_sub(1)
+        {
+            self.left.triangle_tests = left;
+            let corners = self.corners(triangle)?;
+            self.test_triangle(triangle, &corners);
+        }
+        Ok(())
+    }
+
     /// Visits subtrees, near ones first, until none below the cutoff is left or the budget runs out.
+    #[inline(always)]
     pub fn run(mut self) -> Result<Proximity, QueryError> {
+        let lower = self.visit()?;
+        self.finish(lower)
+    }
+
+    /// The same, where nothing farther than `limit` from the axis is looked for. The triangle `first` is tested before
+    /// anything but the root's sphere.
+    #[inline(never)]
+    pub fn run_within(
+        mut self,
+        limit: f32,
+        first: Option<TriangleRow>,
+    ) -> Result<Proximity, QueryError> {
+        // With rounding to spare, so that an axis that touches the surface is always within.
+        let rounding = self.slack + self.tree.position_error();
+        let limit = rounding + if limit < 0.0 { 0.0 } else { limit };
+        self.lower_cutoff(limit);
+        if let Some(root) = self.stack.first()
+            && !(root.lower > self.cutoff)
+        {
+            self.test_first(first)?;
+        }
+        let lower = self.visit()?;
+        let is_found = self.best.is_some_and(|pair| sqrt(pair.distance_squared) <= limit);
+        // Written so that a limit that is not a number limits nothing.
+        self.finish(if lower > limit && !is_found { limit } else { lower })
+    }
+
+    /// Visits what waits. Returns a lower bound on what was not visited.
+    #[inline(always)]
+    fn visit(&mut self) -> Result<f32, QueryError> {
         while let Some(top) = self.waiting.checked_sub(1) {
             self.waiting = top;
             let &Waiting { lower, link } =
@@ -193,10 +219,10 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
                 Link::Leaf { first, count } => self.leaf(first, count)?,
             };
             if matches!(step, Step::OutOfBudget) {
-                return self.finish(self.least_waiting(lower));
+                return Ok(self.least_waiting(lower));
             }
         }
-        self.finish(f32::INFINITY)
+        Ok(f32::INFINITY)
     }
 
     /// The least lower bound of the waiting subtrees and of one that was not finished.

@@ -193,7 +193,8 @@ fn fits_are_reproducible() {
 fn what_cannot_be_fitted_is_named() {
     let generate::MovingMesh { mesh, motion } = generate::heart(320).expect("a valid size");
     let tree = Builder::new().build(&mesh).expect("a valid mesh");
-    let fit = |frames: Vec<Vec<Vec3>>| ModalFit::new(&mesh, &Motion { frames, rate: 0.0 });
+    let fit =
+        |frames: Vec<Vec<Vec3>>| ModalFit::new(&mesh, &Motion { frames, ..Motion::default() });
     assert!(matches!(fit(vec![]), Err(ModesError::Frames { frames: 0 })));
     let still = fit(vec![mesh.positions.clone(); 3]);
     assert!(matches!(still, Err(ModesError::Still)));

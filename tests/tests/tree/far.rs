@@ -1,7 +1,9 @@
 //! Meshes far from the origin, where f32 coordinates are coarse.
 
 use dibs_build::glam::{DVec3, Vec3};
-use dibs_build::{Builder, Import, Mesh, Motion, ReadErrorKind, ReadOptions, Unit};
+use dibs_build::{
+    Builder, Import, Mesh, Motion, MotionMismatchError, ReadErrorKind, ReadOptions, Unit,
+};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Options, Query, Sphere};
 use dibs_tests::deform::unit;
@@ -183,6 +185,11 @@ fn a_far_motion_keeps_its_digits() {
             let exact: Vec<DVec3> = exact.iter().map(|p| *p * 1e3).collect();
             assert_eq!(*read, import.mesh.local(&exact), "{name}");
         }
+        motion.check_fits(&import.mesh).unwrap();
+        assert!(motion.write_pc2(folder.path().join("far.pc2")).is_err());
+        let elsewhere = Motion { origin: DVec3::ZERO, ..motion };
+        let error = elsewhere.check_fits(&import.mesh).unwrap_err();
+        assert!(matches!(error, MotionMismatchError::Origin { .. }), "{error}");
         let kind = Motion::read_around(&path, Unit::Metre, -1e6 * origin).unwrap_err().kind;
         assert!(matches!(kind, ReadErrorKind::Elsewhere { .. }), "{kind}");
     }
@@ -191,7 +198,7 @@ fn a_far_motion_keeps_its_digits() {
         frames.iter().map(|f| f.iter().map(|p| (*p * scale).as_vec3()).collect()).collect()
     };
     let path = folder.path().join("f.pc2");
-    Motion { frames: rounded(1e3), rate: 1.0 }.write_pc2(&path).unwrap();
+    Motion { frames: rounded(1e3), rate: 1.0, ..Motion::default() }.write_pc2(&path).unwrap();
     let kind = Motion::read_around(&path, Unit::Millimetre, origin).unwrap_err().kind;
     assert!(matches!(kind, ReadErrorKind::TooFar { .. }), "{kind}");
 }

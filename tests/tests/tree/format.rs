@@ -77,14 +77,16 @@ fn every_field_and_section_stands_where_the_specification_says() {
 fn every_flipped_bit_and_every_truncation_is_refused() {
     let (_, built) = heart(IndexWidth::Bits16);
     let mut bytes = built.blob().to_vec();
-    for at in 0..bytes.len() {
+    // Unoptimised builds, such as the sanitizers', take a fifth of the bytes.
+    let step = if cfg!(debug_assertions) { 5 } else { 1 };
+    for at in (0..bytes.len()).step_by(step) {
         for bit in 0..8 {
             bytes[at] ^= 1 << bit;
             assert!(Tree::<u16>::from_bytes(&bytes).is_err(), "byte {at} bit {bit}");
             bytes[at] ^= 1 << bit;
         }
     }
-    for length in 0..bytes.len() {
+    for length in (0..bytes.len()).step_by(step) {
         assert!(Tree::<u16>::from_bytes(&bytes[..length]).is_err(), "{length} bytes");
     }
     assert!(Tree::<u16>::from_bytes(&bytes).is_ok());
@@ -207,7 +209,7 @@ fn a_leaf_whose_triangles_come_too_early_is_refused() {
 
 /// A query on a validated tree whose bytes were corrupted afterwards ends, with an error or an answer.
 #[test]
-fn a_query_on_rotten_bytes_ends() {
+fn a_query_on_damaged_bytes_ends() {
     let (mesh, built) = heart(IndexWidth::Bits16);
     let bytes = built.blob();
     let tree = Tree::<u16>::from_bytes(bytes).expect("valid");
@@ -216,11 +218,11 @@ fn a_query_on_rotten_bytes_ends() {
     let mut rng = Rng::with_seed(5);
     let (mut errors, mut answers) = (0, 0);
     for _ in 0..2_000 {
-        let mut rotten = bytes.to_vec();
+        let mut damaged = bytes.to_vec();
         for _ in 0..1 + rng.usize(..8) {
-            rotten[nodes + rng.usize(..length)] ^= 1 << rng.u32(..8);
+            damaged[nodes + rng.usize(..length)] ^= 1 << rng.u32(..8);
         }
-        let view = tree.moved_to(&rotten).expect("same layout");
+        let view = tree.moved_to(&damaged).expect("same layout");
         let mut query = Query::<u16, MAX_STACK>::new(&view).expect("deep enough");
         let tool = Sphere::new(rows[rng.usize(..rows.len())] * 1.3, 1.0).expect("valid");
         let both = [

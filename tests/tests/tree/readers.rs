@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use dibs_build::{Format, Import, Motion, ReadErrorKind, ReadOptions};
+use dibs_build::{Format, Import, Motion, MotionMismatchError, ReadErrorKind, ReadOptions};
 use glam::Vec3;
 
 use crate::mesh_files::{Folder, corners, obj, octahedron, samples, stl_ascii, stl_binary};
@@ -290,7 +290,8 @@ fn motions_round_trip_and_bad_ones_are_errors() {
     let path = folder.0.path().join("a.pc2");
     let mesh = octahedron();
     let moved = mesh.positions.iter().map(|p| *p * 1.5 + Vec3::X).collect();
-    let motion = Motion { frames: vec![mesh.positions.clone(), moved], rate: 25.0 };
+    let motion =
+        Motion { frames: vec![mesh.positions.clone(), moved], rate: 25.0, ..Motion::default() };
     motion.write_pc2(&path).unwrap();
     let read = Motion::read_pc2(&path).unwrap();
     assert_eq!(read, motion);
@@ -299,7 +300,8 @@ fn motions_round_trip_and_bad_ones_are_errors() {
     let mut other = mesh.clone();
     other.positions.pop();
     let mismatch = read.check_fits(&other).unwrap_err();
-    assert_eq!((mismatch.frame, mismatch.expected, mismatch.found), (0, 6, 7));
+    let wrong = MotionMismatchError::Vertices { frame: 0, expected: 6, found: 7 };
+    assert_eq!(mismatch, wrong);
 
     let bytes = std::fs::read(&path).unwrap();
     let read = |bytes: &[u8]| Motion::read_pc2(folder.put("b.pc2", bytes)).map_err(|e| e.kind);
@@ -318,7 +320,7 @@ fn motions_round_trip_and_bad_ones_are_errors() {
     assert!(matches!(changed(28, [0xff; 4]), Err(ReadErrorKind::Count { .. })));
     assert!(matches!(changed(32, f32::NAN.to_le_bytes()), Err(ReadErrorKind::NonFinite { .. })));
 
-    let uneven = Motion { frames: vec![mesh.positions.clone(), Vec::new()], rate: 0.0 };
+    let uneven = Motion { frames: vec![mesh.positions.clone(), Vec::new()], ..Motion::default() };
     let untouched = std::fs::read(&path).unwrap();
     assert!(uneven.write_pc2(&path).is_err());
     assert_eq!(std::fs::read(&path).unwrap(), untouched);

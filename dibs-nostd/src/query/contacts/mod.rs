@@ -293,7 +293,6 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         if !self.tree.has_adjacency() {
             return Err(QueryError::NoAdjacency);
         }
-        let options = &options.within(f32::INFINITY);
         let closest = self.closest(vertices, tool, options)?;
         (found.accuracy, found.margin) = (closest.accuracy, margin);
         // The search below takes the positions as exact; the answer's accuracy has their error already.

@@ -6,7 +6,6 @@ use super::slack::{ACCURACY, FLOOR};
 use super::{NearestPin, Search};
 use crate::math::sqrt::sqrt;
 use crate::query::{NoSide, Proximity, Side};
-use crate::tool::AxisPair;
 use crate::{Index, QueryError, Tool, TriangleRow, VertexTable};
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
@@ -14,9 +13,6 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     pub(super) fn finish(&self, lower: f32) -> Result<Proximity, QueryError> {
         let NearestPin { row: pin, distance: pin_distance } = self.nearest_pin;
         let radius = self.tool.radius();
-        let is_within = |pair: AxisPair| sqrt(pair.distance_squared) <= self.limit;
-        let is_complete = lower < self.limit || self.best.is_some_and(is_within);
-        let lower = if is_complete { lower } else { self.limit };
         let cut_short = lower < f32::INFINITY;
         let (pair, triangle, corners) = match self.best {
             Some(pair) if !cut_short || sqrt(pair.distance_squared) <= pin_distance => {

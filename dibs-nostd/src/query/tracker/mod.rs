@@ -156,7 +156,6 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         tool: &T,
         options: &Options,
     ) -> Result<Tracked, QueryError> {
-        let options = &options.within(f32::INFINITY);
         let travel = surface.travel();
         let moved = self.moved(tool, travel);
         self.last = None;

@@ -127,7 +127,7 @@ fn on_one_pose(surface: &Surface, rng: &mut Rng) -> Tally {
         flip(&mut bytes, &bits);
         tally.damages += 1;
         tally.unscrubbed += u64::from(scrub(&bytes).is_ok());
-        match rotten(&sound, &bytes).map(|tree| {
+        match damaged(&sound, &bytes).map(|tree| {
             let mut query = Query::<_, MAX_STACK>::new(&tree).expect("enough for any tree");
             ask::closest(&mut query, rows.as_slice(), &tool, &Options::cold())
         }) {
@@ -151,7 +151,7 @@ fn on_one_pose(surface: &Surface, rng: &mut Rng) -> Tally {
 }
 
 /// The tree as the firmware has it: validated before, its sections read where they were.
-fn rotten<'b>(sound: &Tree<'_, u16>, bytes: &'b [u8]) -> Option<Tree<'b, u16>> {
+fn damaged<'b>(sound: &Tree<'_, u16>, bytes: &'b [u8]) -> Option<Tree<'b, u16>> {
     sound.moved_to(bytes).ok()
 }
 

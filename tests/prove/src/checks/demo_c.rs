@@ -48,7 +48,7 @@ pub const CHECK: Check = Check {
 };
 
 /// Seconds of the controller's time in a run of the tests: a frame takes one of them.
-const SHORT: u32 = 3;
+const SHORT: u32 = 2;
 
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     // Its compiler is of Debian's alone, which not every machine has.

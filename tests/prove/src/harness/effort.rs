@@ -71,8 +71,8 @@ impl Effort {
         faults: 300,
         board_faults: 1,
         demo_seconds: 5,
-        fault_seconds: 14,
-        fuzz_seconds: 20,
+        fault_seconds: 11,
+        fuzz_seconds: 15,
         is_record: false,
         share: 0,
     };

@@ -1,7 +1,5 @@
 //! The `dibs` program, as a script would run it.
 
-mod program;
-
 use std::net::UdpSocket;
 use std::process::Command;
 
@@ -9,7 +7,7 @@ use dibs_build::Format;
 use dibs_nostd::Tree;
 use serde_json::Value;
 
-use program::{dibs, fails, json, succeeds};
+use crate::program::{dibs, fails, json, succeeds};
 
 fn vector(value: &Value) -> [f64; 3] {
     serde_json::from_value(value.clone()).unwrap()

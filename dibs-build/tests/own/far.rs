@@ -1,8 +1,6 @@
 //! The program on a heart kilometres from the origin: coordinates go in and come out as the file has them, and
 //! everything between counts from the tree's origin.
 
-mod program;
-
 use std::fs;
 use std::io::Read;
 use std::net::TcpListener;
@@ -14,7 +12,7 @@ use dibs_nostd::wire::{Deframer, NoMac};
 use dibs_nostd::{Advance, Assembler, Frames, StretchMonitor, Tree, VertexTable};
 use serde_json::Value;
 
-use program::{fails, json, succeeds};
+use crate::program::{fails, json, succeeds};
 
 /// Vertices of the heart of 1,000 triangles.
 const N: usize = 502;
@@ -222,7 +220,7 @@ fn what_f32_has_spoilt_is_refused() {
     let heart = FarHeart::new(folder, DVec3::new(4e6, 0.0, 0.0), "mm");
     succeeds(folder, "build heart.obj -o h.dibs");
     let frame: Vec<Vec3> = heart.shapes[1].iter().map(|p| p.as_vec3()).collect();
-    let motion = Motion { frames: vec![frame.clone()], rate: 20.0 };
+    let motion = Motion { frames: vec![frame.clone()], rate: 20.0, ..Motion::default() };
     motion.write_pc2(folder.join("single.pc2")).unwrap();
     let spoilt = Mesh { positions: frame, triangles: heart.triangles, ..Mesh::default() };
     spoilt.write_ply(folder.join("single.ply")).unwrap();

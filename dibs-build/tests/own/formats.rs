@@ -1,6 +1,4 @@
-//! Files as other programs write them: `fixtures/make.py` says which.
-
-mod program;
+//! Files as other programs write them: `../fixtures/make.py` says which.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -9,7 +7,7 @@ use std::path::{Path, PathBuf};
 use dibs_build::glam::Vec3;
 use dibs_build::{Format, Import, Motion, ReadError, ReadErrorKind, ReadOptions};
 
-use program::{fails, json, succeeds};
+use crate::program::{fails, json, succeeds};
 
 const POINTS: [[f32; 3]; 6] = [
     [10.5, 0.0, 0.25],
@@ -252,8 +250,11 @@ fn units_scale_and_are_shown() {
     let mesh = dibs_build::read(fixture("vtk_ascii.vtp")).unwrap().mesh;
     let write = |name: &str, factor: f32| {
         let positions = mesh.positions.iter().map(|&p| p * factor).collect::<Vec<_>>();
-        let moved =
-            Motion { frames: vec![positions.iter().map(|&p| 1.1 * p).collect()], rate: 30.0 };
+        let moved = Motion {
+            frames: vec![positions.iter().map(|&p| 1.1 * p).collect()],
+            rate: 30.0,
+            ..Motion::default()
+        };
         moved.write_pc2(folder.join(format!("{name}.pc2"))).unwrap();
         let scaled = dibs_build::Mesh { positions, ..mesh.clone() };
         scaled.write_ply(folder.join(format!("{name}.ply"))).unwrap();

@@ -1,7 +1,5 @@
 //! The `dibs` program and recorded motions: modes, weights and limits.
 
-mod program;
-
 use std::net::UdpSocket;
 use std::time::Duration;
 
@@ -9,7 +7,7 @@ use dibs_nostd::modes::{ModalGate, ModalReader, Modes};
 use dibs_nostd::{Advance, Assembler, Frames, Tree, VertexTable};
 use serde_json::Value;
 
-use program::{dibs, fails, json, succeeds};
+use crate::program::{dibs, fails, json, succeeds};
 
 #[test]
 fn modes_are_fitted_shown_and_written() {

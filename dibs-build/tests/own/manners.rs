@@ -1,10 +1,8 @@
 //! What shells, scripts and `man` ask of a program.
 
-mod program;
-
 use std::process::Command;
 
-use program::{dibs, fails, json, succeeds};
+use crate::program::{dibs, fails, json, succeeds};
 
 const COMMANDS: [&str; 9] =
     ["build", "stretch", "inspect", "query", "track", "stream", "generate", "completions", "man"];

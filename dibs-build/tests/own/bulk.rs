@@ -1,7 +1,5 @@
 //! `dibs query --poses`: many poses at once.
 
-mod program;
-
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -10,7 +8,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use program::{dibs, fails, json, succeeds};
+use crate::program::{dibs, fails, json, succeeds};
 
 /// A pose in bulk, and the same as options of a single query.
 const POSES: [(&str, &str); 8] = [
