@@ -195,9 +195,6 @@ impl Control {
         let answer = self.query.closest(&frame, tool, &options);
         #[cfg(feature = "wide")]
         let answer = self.query.closest_wide(&frame, tool, &options);
-        // Linked only so that a panic path of its own would be noticed.
-        #[cfg(feature = "wide")]
-        core::hint::black_box(self.query.closest_of(&frame, &[*tool; 2], 0.0, &options)).ok();
         record.query_counts = clock().wrapping_sub(start);
         drop(frame);
 

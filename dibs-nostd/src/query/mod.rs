@@ -1,6 +1,5 @@
 //! The traversal: the closest pair between a tool and the surface as it is now.
 
-mod chain;
 mod contacts;
 mod cost;
 mod cost_m7;
@@ -86,30 +85,6 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         let first = options.first(self.triangle);
         let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options, first)?;
         let found = search.run()?;
-        self.triangle = found.triangle.or(self.triangle);
-        let error = vertices.position_error();
-        signed(&self.tree, &mut self.stack, vertices, tool, options, found, error)
-    }
-
-    /// As [`closest`](Self::closest), but looks only for a pair whose unsigned separation is at most `separation` (mm): the
-    /// farther surfaces of a scene cost a few tests that way.
-    ///
-    /// Where there is no such pair, the answer's interval begins there, and its side is not known
-    /// ([`NoSide::CutShort`]). A separation that is not a number limits nothing.
-    ///
-    /// # Errors
-    /// Those of [`closest`](Self::closest).
-    pub fn closest_within<V: VertexTable + ?Sized, T: Tool>(
-        &mut self,
-        vertices: &V,
-        tool: &T,
-        separation: f32,
-        options: &Options,
-    ) -> Result<Proximity, QueryError> {
-        let first = options.first(self.triangle);
-        let limit = separation + tool.radius();
-        let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options, None)?;
-        let found = search.run_within(limit, first)?;
         self.triangle = found.triangle.or(self.triangle);
         let error = vertices.position_error();
         signed(&self.tree, &mut self.stack, vertices, tool, options, found, error)

@@ -154,59 +154,21 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             best_triangle: u32::MAX,
         };
         search.lower_cutoff_to_pin(root.pin, distance);
-        search.test_first(first)?;
+        if let Some(TriangleRow(triangle)) = first
+            && triangle < header.triangles
+            && let Some(left) = search.left.triangle_tests.checked_sub(1)
+        {
+            search.left.triangle_tests = left;
+            let corners = search.corners(triangle)?;
+            search.test_triangle(triangle, &corners);
+        }
         let subtree = Waiting { lower: distance - radius, link: root.link };
         search.push(0, subtree).ok_or(QueryError::Corrupt { row: 0 })?;
         Ok(search)
     }
 
-    /// Tests the triangle `first`, if there is such a triangle and a budget for it.
-    #[inline(always)]
-    fn test_first(&mut self, first: Option<TriangleRow>) -> Result<(), QueryError> {
-        if let Some(TriangleRow(triangle)) = first
-            && triangle < self.tree.triangle_count()
-            && let Some(left) = self.left.triangle_tests.checked_sub(1)
-        {
-            self.left.triangle_tests = left;
-            let corners = self.corners(triangle)?;
-            self.test_triangle(triangle, &corners);
-        }
-        Ok(())
-    }
-
     /// Visits subtrees, near ones first, until none below the cutoff is left or the budget runs out.
-    #[inline(always)]
     pub fn run(mut self) -> Result<Proximity, QueryError> {
-        let lower = self.visit()?;
-        self.finish(lower)
-    }
-
-    /// The same, where nothing farther than `limit` from the axis is looked for. The triangle `first` is tested before
-    /// anything but the root's sphere.
-    #[inline(never)]
-    pub fn run_within(
-        mut self,
-        limit: f32,
-        first: Option<TriangleRow>,
-    ) -> Result<Proximity, QueryError> {
-        // With rounding to spare, so that an axis that touches the surface is always within.
-        let rounding = self.slack + self.tree.position_error();
-        let limit = rounding + if limit < 0.0 { 0.0 } else { limit };
-        self.lower_cutoff(limit);
-        if let Some(root) = self.stack.first()
-            && !(root.lower > self.cutoff)
-        {
-            self.test_first(first)?;
-        }
-        let lower = self.visit()?;
-        let is_found = self.best.is_some_and(|pair| sqrt(pair.distance_squared) <= limit);
-        // Written so that a limit that is not a number limits nothing.
-        self.finish(if lower > limit && !is_found { limit } else { lower })
-    }
-
-    /// Visits what waits. Returns a lower bound on what was not visited.
-    #[inline(always)]
-    fn visit(&mut self) -> Result<f32, QueryError> {
         while let Some(top) = self.waiting.checked_sub(1) {
             self.waiting = top;
             let &Waiting { lower, link } =
@@ -219,10 +181,10 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
                 Link::Leaf { first, count } => self.leaf(first, count)?,
             };
             if matches!(step, Step::OutOfBudget) {
-                return Ok(self.least_waiting(lower));
+                return self.finish(self.least_waiting(lower));
             }
         }
-        Ok(f32::INFINITY)
+        self.finish(f32::INFINITY)
     }
 
     /// The least lower bound of the waiting subtrees and of one that was not finished.

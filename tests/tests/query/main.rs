@@ -1,6 +1,5 @@
 //! Queries, contacts and forces against exhaustive search.
 
-mod chain;
 mod contacts;
 mod differential;
 mod flat;
