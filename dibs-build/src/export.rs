@@ -63,8 +63,8 @@ impl Mesh {
         write_atomically(path, |out| contents(self, out))
     }
 
-    /// Writes a binary little-endian PLY file, whatever its name: 32-bit vertex numbers, and f32 positions unless the
-    /// [origin](Mesh::origin) is not zero.
+    /// Writes a binary little-endian PLY file, with any name: 32-bit vertex numbers, and positions in f32, or in f64 if the
+    /// mesh has an [origin](Mesh::origin) other than zero.
     ///
     /// # Errors
     /// [`WriteError`]; the file is complete or untouched.

@@ -41,7 +41,9 @@ pub enum WriteErrorKind {
     )]
     TooFar,
     /// The same for a motion.
-    #[error("the motion lies too far from the origin for the numbers of PC2")]
+    #[error(
+        "the motion counts from an origin that PC2 cannot store; set it to zero to write positions that count from there"
+    )]
     MotionTooFar,
     /// More elements than the format can count.
     #[error("{count} {element} are more than the format can count")]

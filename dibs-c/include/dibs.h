@@ -1559,8 +1559,7 @@ dibs_code dibs_receiver_status(dibs_receiver *receiver,
 dibs_code dibs_receiver_epoch(dibs_receiver *receiver, uint32_t *epoch);
 
 /**
- * Position (mm) of a vertex in the frame that was published last. Row after row it serves a checksum of what is in
- * memory, or a log.
+ * Position (mm) of a vertex in the frame that was published last, for a checksum of the published rows, or a log.
  *
  * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` outside the table, or a misuse.
  */
@@ -1667,8 +1666,8 @@ dibs_code dibs_tree_rest_position(dibs_tree *tree,
                                   dibs_vec3 *position);
 
 /**
- * Checks what was decoded of the tree against its bytes. That lies in memory, which a scrub does not read: call it once
- * a tick.
+ * Compares the tree's header and places of sections, which are in memory, with its bytes. A scrub does not read that
+ * memory: call this once a tick.
  *
  * Cost: some hundred instructions.
  *
@@ -1693,7 +1692,7 @@ dibs_code dibs_scrub_step(dibs_scrub *scrub,
 /**
  * The point of the mesh's file that all coordinates of the tree count from: of vertices, tools and answers. Zero unless
  * the file's coordinates are so far from their own origin that single precision would lose them; then subtract it, in
- * double precision, from what is in the file's coordinates.
+ * double precision, from each point in the file's coordinates.
  */
 dibs_code dibs_tree_origin(dibs_tree *tree,
                            dibs_point *origin);

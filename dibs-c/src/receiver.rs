@@ -307,8 +307,7 @@ pub extern "C" fn dibs_receiver_epoch(receiver: *mut dibs_receiver, epoch: *mut 
     })
 }
 
-/// Position (mm) of a vertex in the frame that was published last. Row after row it serves a checksum of what is in
-/// memory, or a log.
+/// Position (mm) of a vertex in the frame that was published last, for a checksum of the published rows, or a log.
 ///
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` outside the table, or a misuse.
 #[unsafe(no_mangle)]

@@ -109,8 +109,8 @@ pub extern "C" fn dibs_tree_rest_position(
     })
 }
 
-/// Checks what was decoded of the tree against its bytes. That lies in memory, which a scrub does not read: call it once
-/// a tick.
+/// Compares the tree's header and places of sections, which are in memory, with its bytes. A scrub does not read that
+/// memory: call this once a tick.
 ///
 /// Cost: some hundred instructions.
 ///
@@ -170,7 +170,7 @@ pub struct dibs_point {
 
 /// The point of the mesh's file that all coordinates of the tree count from: of vertices, tools and answers. Zero unless
 /// the file's coordinates are so far from their own origin that single precision would lose them; then subtract it, in
-/// double precision, from what is in the file's coordinates.
+/// double precision, from each point in the file's coordinates.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tree_origin(tree: *mut dibs_tree, origin: *mut dibs_point) -> dibs_code {
     dibs_code::of(|| {

@@ -66,7 +66,7 @@ impl<'a> Series<'a> {
     }
 }
 
-/// The positions in a file; its polygons must be those of the first file.
+/// The positions in a file. An error unless its polygons are those of the first file.
 fn frame(
     path: &Path,
     number: u64,

@@ -1,4 +1,4 @@
-//! The tests of the `dibs` program, and of what it is made of: one program, which links the library once.
+//! The tests of the `dibs` program and of its parts, as one program, so that the library is linked once.
 
 mod bulk;
 mod cli;

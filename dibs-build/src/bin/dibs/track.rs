@@ -30,7 +30,7 @@ pub struct Args {
     /// The surface's motion: .pc2, .npy or a series (heart_%03d.vtp) of the built mesh
     #[arg(long)]
     motion: PathBuf,
-    /// Frame rate of the motion in frames a second, by default that of its file
+    /// Frames a second of the motion; by default the number in its file
     #[arg(long, value_name = "HZ")]
     motion_rate: Option<f32>,
     /// Ticks a second

@@ -61,7 +61,7 @@ pub const CHECKS: &[Check] = &[
     instructions::CHECK,
 ];
 
-/// Names of the checks that need no emulator, but for a few short ones: these run on the other core.
+/// Names of the checks on the other core: most without an emulator, and the demo in C.
 pub const BESIDE: [&str; 10] = [
     sanitizers::ADDRESS.name,
     sanitizers::THREAD.name,

@@ -146,7 +146,7 @@ fn connect<const MTU: usize>(
     Player::new(args, recording, sender, interrupt).run()
 }
 
-/// The order of the vertices and the origin: the tree's, or those of the tree that the mesh gives.
+/// The order and origin of a tree's vertices: of the tree file given, or of the tree built from the mesh file given.
 fn order(path: &Path, lengths: &Lengths) -> Result<(SurfaceOrder, DVec3)> {
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("dibs")) {
         let bytes = tree_file::load(path)?;
