@@ -230,7 +230,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         let options = self.options.budget(Budget { node_tests, triangle_tests });
         let (point, first) = (AxisPoint(on_axis), near.triangle);
         let search = Search::start(self.tree, self.stack, self.vertices, &point, &options, first)?;
-        let found = search.run()?;
+        let found = search.run::<false>(f32::INFINITY)?;
         self.options.budget = Budget {
             node_tests: node_tests.saturating_sub(found.node_tests.saturating_sub(1)),
             triangle_tests: triangle_tests.saturating_sub(found.triangle_tests),

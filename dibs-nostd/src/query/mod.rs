@@ -1,5 +1,6 @@
 //! The traversal: the closest pair between a tool and the surface as it is now.
 
+mod chain;
 mod contacts;
 mod cost;
 mod cost_m7;
@@ -14,6 +15,7 @@ mod side;
 mod swept;
 mod tracker;
 
+pub use chain::Closest;
 pub use contacts::{Contact, Contacts};
 pub use cost::Cost;
 pub use options::{Budget, Options};
@@ -84,7 +86,7 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     ) -> Result<Proximity, QueryError> {
         let first = options.first(self.triangle);
         let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options, first)?;
-        let found = search.run()?;
+        let found = search.run::<false>(f32::INFINITY)?;
         self.triangle = found.triangle.or(self.triangle);
         let error = vertices.position_error();
         signed(&self.tree, &mut self.stack, vertices, tool, options, found, error)

@@ -168,7 +168,10 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     }
 
     /// Visits subtrees, near ones first, until none below the cutoff is left or the budget runs out.
-    pub fn run(mut self) -> Result<Proximity, QueryError> {
+    ///
+    /// If `IS_LIMITED`, the cutoff began at the distance `limit`, which bounds what was never visited. The two kinds are
+    /// two functions, each inlined into its one caller: that keeps the loop of the plain query in registers.
+    pub fn run<const IS_LIMITED: bool>(mut self, limit: f32) -> Result<Proximity, QueryError> {
         while let Some(top) = self.waiting.checked_sub(1) {
             self.waiting = top;
             let &Waiting { lower, link } =
@@ -181,10 +184,27 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
                 Link::Leaf { first, count } => self.leaf(first, count)?,
             };
             if matches!(step, Step::OutOfBudget) {
-                return self.finish(self.least_waiting(lower));
+                let least = self.least_waiting(lower);
+                let is_beyond = IS_LIMITED && self.is_beyond(limit) && limit < least;
+                return self.finish(if is_beyond { limit } else { least });
             }
         }
-        self.finish(f32::INFINITY)
+        self.finish(if IS_LIMITED && self.is_beyond(limit) { limit } else { f32::INFINITY })
+    }
+
+    /// Lowers the cutoff to `separation` (mm) from the tool. Returns the limit on the distance from its axis, with
+    /// rounding to spare, so that an axis that touches the surface is always within.
+    pub fn limit_to(&mut self, separation: f32) -> f32 {
+        let distance = separation + self.tool.radius();
+        let rounding = self.slack + self.tree.position_error();
+        let limit = rounding + if distance < 0.0 { 0.0 } else { distance };
+        self.lower_cutoff(limit);
+        limit
+    }
+
+    /// No triangle was found within `limit` of the axis. A limit that is not a number limits nothing.
+    fn is_beyond(&self, limit: f32) -> bool {
+        self.best.is_none_or(|pair| pair.distance_squared > limit * limit)
     }
 
     /// The least lower bound of the waiting subtrees and of one that was not finished.

@@ -41,7 +41,8 @@ pub enum NoSide {
     BelowAccuracy,
     /// A triangle at the closest point has no area, or more than 256 meet there.
     Degenerate,
-    /// The budget ran out before the closest point was certain.
+    /// The budget ran out before the closest point was certain, or no point is as close as asked for
+    /// ([`Query::closest_within`](crate::Query::closest_within)).
     CutShort,
 }
 

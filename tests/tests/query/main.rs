@@ -1,5 +1,6 @@
 //! Queries, contacts and forces against exhaustive search.
 
+mod chain;
 mod contacts;
 mod differential;
 mod flat;

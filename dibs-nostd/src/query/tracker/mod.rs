@@ -209,7 +209,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         };
         let options = options.budget(budget);
         let search = Search::start(&self.tree, &mut self.stack, surface, tool, &options, first)?;
-        let mut closest = search.run()?;
+        let mut closest = search.run::<false>(f32::INFINITY)?;
         closest.node_tests = closest.node_tests.saturating_add(tests.node_tests);
         closest.triangle_tests = closest.triangle_tests.saturating_add(tests.triangle_tests);
         Ok(closest)

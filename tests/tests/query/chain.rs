@@ -1,0 +1,262 @@
+//! Several tools and several surfaces: the answers of queries one by one, for a fraction of their tests.
+
+use dibs_build::{Builder, BuiltTree, generate};
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{Budget, Capsule, NoSide, Options, Proximity, Query, Side, Sphere, Tool};
+use dibs_tests::deform::{deformed, unit};
+use fastrand::Rng;
+use glam::Vec3;
+
+/// The joints of a chain that begins near the surface and goes anywhere.
+fn chain(rows: &[Vec3], rng: &mut Rng) -> Vec<Capsule> {
+    let links = rng.usize(1..=8);
+    let size = 30.0 * rng.f32();
+    let mut joint = rows[rng.usize(..rows.len())] + unit(rng) * size * rng.f32();
+    let mut link = || {
+        let start = joint;
+        joint += unit(rng) * (1.0 + size) * rng.f32();
+        Capsule::new(start, joint, 4.0 * rng.f32()).expect("finite")
+    };
+    (0..links).map(|_| link()).collect()
+}
+
+#[test]
+fn the_answer_of_a_chain_is_that_of_its_tools_one_by_one() {
+    let mut rng = Rng::with_seed(1);
+    let (mut inside, mut crossing, mut outside, mut saved) = (0, 0, 0, [0_u64; 2]);
+    for seed in 0..4 {
+        let (_, built, frames) = deformed(4, seed);
+        let tree = built.tree::<u16>().expect("16-bit indices");
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        for positions in &frames {
+            let rows = built.to_rows(positions);
+            for _ in 0..150 {
+                let chain = chain(&rows, &mut rng);
+                let each: Vec<Proximity> = chain
+                    .iter()
+                    .map(|tool| {
+                        query.closest(&rows[..], tool, &Options::cold()).expect("an answer")
+                    })
+                    .collect();
+                let options = if rng.bool() { Options::cold() } else { Options::new() };
+                let closest = query.closest_of(&rows[..], &chain, &options);
+                let closest = closest.expect("an answer").expect("one");
+                let (number, found) = (closest.tool, closest.proximity);
+                let least = each.iter().map(|one| one.separation).fold(f32::INFINITY, f32::min);
+                let lower = each.iter().map(|one| one.lower).fold(f32::INFINITY, f32::min);
+                let length = chain.iter().map(Tool::axis_length).fold(0.0, f32::max);
+                let tolerance = if found.side == Side::Crossing { length / 512.0 } else { 0.0 };
+                let off = 2.0 * found.accuracy + tolerance;
+                assert!((found.separation - least).abs() <= off, "{found:?} {each:?}");
+                assert!((each[number].separation - least).abs() <= off, "{number} {each:?}");
+                assert!((found.lower - lower).abs() <= off, "{found:?} {each:?}");
+                match found.side {
+                    Side::Inside => inside += 1,
+                    Side::Crossing => crossing += 1,
+                    _ => outside += 1,
+                }
+                if found.side == Side::Outside {
+                    saved[0] += u64::from(found.node_tests);
+                    saved[1] += each.iter().map(|one| u64::from(one.node_tests)).sum::<u64>();
+                }
+            }
+        }
+    }
+    println!(
+        "{outside} outside, {inside} inside, {crossing} crossing; node tests outside {saved:?}"
+    );
+    assert!(outside > 300 && inside > 50 && crossing > 300);
+    assert!(saved[0] < saved[1], "{saved:?}");
+}
+
+#[test]
+fn a_budget_of_a_chain_is_kept_and_its_interval_holds() {
+    let mut rng = Rng::with_seed(2);
+    let (_, built, frames) = deformed(3, 9);
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut cut_short = 0;
+    for positions in &frames {
+        let rows = built.to_rows(positions);
+        for _ in 0..400 {
+            let chain = chain(&rows, &mut rng);
+            let unsigned = Options::cold().unsigned();
+            let ask =
+                |tool| query.closest(&rows[..], tool, &unsigned).expect("an answer").separation;
+            let least = chain.iter().map(ask).fold(f32::INFINITY, f32::min);
+            let budget = Budget { node_tests: rng.u32(..300), triangle_tests: rng.u32(..20) };
+            let found = query.closest_of(&rows[..], &chain, &unsigned.budget(budget));
+            let found = found.expect("a short budget is no error").expect("one").proximity;
+            assert!(found.node_tests <= budget.node_tests + chain.len() as u32, "{found:?}");
+            assert!(found.triangle_tests <= budget.triangle_tests, "{found:?}");
+            assert!(found.lower <= least + 2.0 * found.accuracy, "{found:?} {least}");
+            assert!(found.separation >= least - 2.0 * found.accuracy, "{found:?} {least}");
+            cut_short += u32::from(found.lower < found.separation);
+        }
+    }
+    println!("{cut_short} cut short");
+    assert!(cut_short > 200);
+}
+
+#[test]
+fn nothing_within_a_limit_is_missed() {
+    let mut rng = Rng::with_seed(3);
+    let (_, built, frames) = deformed(4, 5);
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let (mut beyond, mut within) = (0, 0);
+    for positions in &frames {
+        let rows = built.to_rows(positions);
+        for _ in 0..1_000 {
+            let near = rows[rng.usize(..rows.len())];
+            let tool = Sphere::new(near + unit(&mut rng) * 40.0 * rng.f32(), rng.f32() * 3.0);
+            let tool = tool.expect("finite");
+            let cold = Options::cold();
+            let truth = query.closest(&rows[..], &tool, &cold.unsigned()).expect("an answer");
+            let limit = truth.separation + (rng.f32() - 0.5) * 10.0_f32.powi(rng.i32(-6..2));
+            let options = if rng.bool() { cold } else { Options::new() };
+            let found = query.closest_within(&rows[..], &tool, limit, &options);
+            let found = found.expect("an answer");
+            let apart = (found.separation.abs() - truth.separation.abs()).abs();
+            if truth.separation + 2.0 * truth.accuracy < limit && limit > -tool.radius() {
+                assert!(found.side != Side::Undefined(NoSide::CutShort), "{limit} {found:?}");
+                let is_inside = found.side == Side::Inside;
+                let reach = if is_inside { 2.0 * tool.radius() } else { 0.0 };
+                assert!(apart <= reach + 2.0 * found.accuracy, "{limit} {found:?} {truth:?}");
+                within += 1;
+            } else if truth.separation - 8.0 * truth.accuracy > limit {
+                assert!(found.lower <= truth.separation + found.accuracy, "{limit} {found:?}");
+                assert!(found.separation >= truth.separation - found.accuracy, "{found:?}");
+                let least = limit.max(-tool.radius()) - found.accuracy;
+                assert!(found.lower >= least, "{limit} {found:?}");
+                beyond += 1;
+            }
+        }
+    }
+    println!("{within} within the limit, {beyond} beyond");
+    assert!(within > 500 && beyond > 500);
+    let (rows, tool) = (built.to_rows(&frames[0]), Sphere::new(Vec3::ZERO, 1.0).expect("finite"));
+    let nan = query.closest_within(&rows[..], &tool, f32::NAN, &Options::cold());
+    assert!(nan.is_ok_and(|found| found.side != Side::Undefined(NoSide::CutShort)));
+}
+
+/// A scene of organs, and an instrument of four capsules that wanders among them.
+#[test]
+fn thirteen_surfaces_and_four_capsules_cost_three_queries() {
+    let (built, organs) = organs(180.0);
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let mut rng = Rng::with_seed(4);
+    let mut queries = vec![Query::<u16, MAX_STACK>::new(&tree).expect("deep enough"); organs.len()];
+    let mut single = queries[0].clone();
+    let surfaces: Vec<&[Vec3]> = organs.iter().map(Vec::as_slice).collect();
+    let (mut at, mut heading) = (Vec3::new(150.0, 150.0, 0.0), Vec3::X);
+    let (mut whole, mut one) = (0_u64, 0_u64);
+    let cost = |found: &Proximity| u64::from(found.node_tests + 4 * found.triangle_tests);
+    for tick in 0..2_000 {
+        heading = (heading + 0.05 * unit(&mut rng)).normalize();
+        at += 0.2 * heading;
+        if at.abs().max_element() > 300.0 {
+            heading = -at.normalize();
+        }
+        let instrument = instrument(at, heading);
+        let options = Options::new().unsigned();
+        let best = Query::closest_in_scene(&mut queries, &surfaces, &instrument, &options);
+        let best = best.expect("an answer").expect("one");
+        whole += cost(&best.proximity);
+        // One query of one capsule on the surface that is closest.
+        let found = single.closest(surfaces[best.surface], &instrument[3], &options);
+        one += cost(&found.expect("an answer"));
+        if tick % 50 == 0 {
+            let all = least(&mut single, &surfaces, &instrument, &Options::cold().unsigned());
+            let found = best.proximity;
+            assert!((all - found.separation).abs() <= 2.0 * found.accuracy, "{all} {best:?}");
+        }
+    }
+    let share = whole as f64 / one as f64;
+    println!("52 pairs cost {share:.2} queries of one");
+    assert!(share <= 3.0, "{share}");
+}
+
+/// Instruments in and across organs: a tool deep inside one is far from its surface, and another may be closer.
+#[test]
+fn no_tool_inside_a_surface_of_a_scene_is_missed() {
+    let (built, organs) = organs(60.0);
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let mut rng = Rng::with_seed(5);
+    let mut queries = vec![Query::<u16, MAX_STACK>::new(&tree).expect("deep enough"); organs.len()];
+    let mut single = queries[0].clone();
+    let surfaces: Vec<&[Vec3]> = organs.iter().map(Vec::as_slice).collect();
+    let mut sides = [0; 3];
+    for _ in 0..1_000 {
+        let near = organs[rng.usize(..organs.len())][rng.usize(..tree.vertex_count() as usize)];
+        let instrument = instrument(near + 30.0 * unit(&mut rng), unit(&mut rng));
+        let options = if rng.bool() { Options::cold() } else { Options::new() };
+        let best = Query::closest_in_scene(&mut queries, &surfaces, &instrument, &options);
+        let best = best.expect("an answer").expect("one");
+        let all = least(&mut single, &surfaces, &instrument, &Options::cold());
+        let found = best.proximity;
+        let off = 2.0 * found.accuracy + 60.0 / 512.0;
+        assert!((all - found.separation).abs() <= off, "{all} {best:?}");
+        let own = single.closest(surfaces[best.surface], &instrument[best.tool], &options);
+        assert!((own.expect("an answer").separation - found.separation).abs() <= off, "{best:?}");
+        match found.side {
+            Side::Outside => sides[0] += 1,
+            Side::Inside => sides[1] += 1,
+            _ => sides[2] += 1,
+        }
+    }
+    println!("{sides:?} outside, inside, crossing");
+    assert!(sides.into_iter().all(|side| side > 20), "{sides:?}");
+}
+
+#[test]
+fn without_a_surface_or_a_tool_there_is_no_closest_pair() {
+    let (built, organs) = organs(180.0);
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let no_tools: [Sphere; 0] = [];
+    assert_eq!(query.closest_of(organs[0].as_slice(), &no_tools, &Options::new()), Ok(None));
+    let tool = [Sphere::new(Vec3::ZERO, 1.0).expect("finite")];
+    let none = Query::<u16, MAX_STACK>::closest_in_scene::<[Vec3], _>(
+        &mut [],
+        &[],
+        &tool,
+        &Options::new(),
+    );
+    assert_eq!(none, Ok(None));
+}
+
+/// Four capsules behind a tip.
+fn instrument(tip: Vec3, heading: Vec3) -> [Capsule; 4] {
+    let joints = [0.0_f32, 60.0, 75.0, 85.0, 95.0].map(|along| tip - (95.0 - along) * heading);
+    [0, 1, 2, 3].map(|link| Capsule::new(joints[link], joints[link + 1], 3.0).expect("finite"))
+}
+
+/// The least separation of all pairs, one by one.
+fn least(
+    query: &mut Query<'_, u16, MAX_STACK>,
+    surfaces: &[&[Vec3]],
+    instrument: &[Capsule],
+    options: &Options,
+) -> f32 {
+    let mut each = surfaces.iter().flat_map(|rows| instrument.iter().map(move |tool| (rows, tool)));
+    let least = each.try_fold(f32::INFINITY, |least, (rows, tool)| {
+        query.closest(*rows, tool, options).map(|found| found.separation.min(least))
+    });
+    least.expect("answers")
+}
+
+/// Thirteen hearts in a grid of this spacing (mm), each turned differently; they reach into one another below 150.
+fn organs(spacing: f32) -> (BuiltTree, Vec<Vec<Vec3>>) {
+    let mesh = generate::heart(2_000).expect("a valid size").mesh;
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
+    let place = |number: usize| {
+        let turn = glam::Quat::from_rotation_y(number as f32);
+        let [x, y, z] = [number % 3, number / 3 % 3, number / 9].map(|cell| cell as f32 - 1.0);
+        let positions: Vec<Vec3> =
+            mesh.positions.iter().map(|&p| turn * p + spacing * Vec3::new(x, y, z)).collect();
+        built.to_rows(&positions)
+    };
+    let organs = (0..13).map(place).collect();
+    (built, organs)
+}
