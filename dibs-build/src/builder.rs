@@ -35,6 +35,7 @@ pub enum IndexWidth {
 pub struct Builder<'p> {
     stretch: f32,
     limits: Option<Vec<f32>>,
+    labels: Option<Vec<u8>>,
     construction: Construction,
     paths: Option<Paths>,
     leaf_triangles: Option<usize>,
@@ -71,6 +72,7 @@ impl<'p> Builder<'p> {
         Self {
             stretch: 1.5,
             limits: None,
+            labels: None,
             construction: Construction::Geodesic,
             paths: None,
             leaf_triangles: None,
@@ -98,6 +100,15 @@ impl<'p> Builder<'p> {
     #[must_use]
     pub fn limits(mut self, limits: Vec<f32>) -> Self {
         self.limits = Some(limits);
+        self
+    }
+
+    /// A label for each of the mesh's triangles, say of its tissue: [`Tree::label`](dibs_nostd::Tree::label).
+    ///
+    /// [`read_labels`](crate::read_labels) reads them from a file. They take a byte a triangle of flash.
+    #[must_use]
+    pub fn labels(mut self, labels: Vec<u8>) -> Self {
+        self.labels = Some(labels);
         self
     }
 
@@ -217,6 +228,7 @@ impl<'p> Builder<'p> {
             with_rest: self.with_rest,
             with_metric: self.with_metric,
             with_adjacency: self.with_adjacency,
+            labels: self.labels.as_deref(),
         };
         let (bytes, order) = flatten::<I>(mesh, &root, facts)?;
         Ok(BuiltTree::new::<I>(bytes, order, mesh.origin))
@@ -263,6 +275,12 @@ impl<'p> Builder<'p> {
             return Err(BuildError::NoTriangles);
         }
         self.check_limits(mesh)?;
+        let triangles = mesh.triangles.len();
+        if let Some(labels) = self.labels.as_ref().map(Vec::len)
+            && labels != triangles
+        {
+            return Err(BuildError::Labels { labels, triangles });
+        }
         if let Some(triangles) = self.leaf_triangles
             && !(1..=MAX_LEAF_TRIANGLES as usize).contains(&triangles)
         {

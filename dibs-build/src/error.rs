@@ -71,6 +71,14 @@ pub enum BuildError {
         /// Triangles of the mesh.
         triangles: usize,
     },
+    /// The number of labels differs from that of triangles.
+    #[error("{labels} labels for a mesh of {triangles} triangles: there must be one for each")]
+    Labels {
+        /// Labels given.
+        labels: usize,
+        /// Triangles of the mesh.
+        triangles: usize,
+    },
     /// A triangle's stretch limit that is not a number of at least 1.
     #[error(
         "triangle {triangle} has a stretch limit of {limit}: it is a factor of at least 1 (at most 1e6)"

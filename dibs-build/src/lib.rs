@@ -22,6 +22,7 @@ mod export;
 pub mod faults;
 pub mod generate;
 mod geodesic;
+mod labels;
 mod leaf;
 mod mesh;
 #[cfg(feature = "modes")]
@@ -44,6 +45,7 @@ pub use array::{BuiltTree, ModesSummary, Summary, summarise};
 pub use builder::{Builder, IndexWidth};
 pub use construct::Construction;
 pub use error::BuildError;
+pub use labels::{LabelsError, LabelsErrorKind, read_labels};
 pub use mesh::{Mesh, Motion, RestSurface};
 pub use motion::MotionMismatchError;
 pub use orient::{WindingError, check_winding, orient};

@@ -3,7 +3,7 @@
 use std::env;
 use std::path::{Path, PathBuf};
 
-use crate::{Builder, BuiltTree, Mesh, ReadOptions, RestSurface, read_limits};
+use crate::{Builder, BuiltTree, Mesh, ReadOptions, RestSurface, read_labels, read_limits};
 
 /// Begins the tree of a build script, from a mesh file or a [`Mesh`]; [`TreeScript::emit`] builds it.
 ///
@@ -20,6 +20,7 @@ pub fn tree(mesh: impl Into<MeshSource>) -> TreeScript {
         mesh: mesh.into(),
         reading: ReadOptions::default(),
         limits: None,
+        labels: None,
         #[cfg(feature = "modes")]
         modes: None,
         builder: Builder::new(),
@@ -61,6 +62,7 @@ pub struct TreeScript {
     mesh: MeshSource,
     reading: ReadOptions,
     limits: Option<PathBuf>,
+    labels: Option<PathBuf>,
     #[cfg(feature = "modes")]
     modes: Option<(PathBuf, usize)>,
     builder: Builder<'static>,
@@ -70,6 +72,12 @@ impl TreeScript {
     /// The largest stretch that the tree must cover: a factor of at least 1; by default 1.5.
     pub fn stretch(mut self, limit: f32) -> Self {
         self.builder = self.builder.stretch(limit);
+        self
+    }
+
+    /// A label for each triangle, from a file of one number from 0 to 255 a line.
+    pub fn labels(mut self, file: impl Into<PathBuf>) -> Self {
+        self.labels = Some(file.into());
         self
     }
 
@@ -140,7 +148,7 @@ impl TreeScript {
         let motion = self.modes.as_ref().map(|(path, _)| path.as_path());
         #[cfg(not(feature = "modes"))]
         let motion = None;
-        [mesh, self.limits.as_deref(), motion].into_iter().flatten()
+        [mesh, self.limits.as_deref(), self.labels.as_deref(), motion].into_iter().flatten()
     }
 
     fn build(self, label: &str) -> Result<BuiltTree, Box<dyn std::error::Error>> {
@@ -155,6 +163,10 @@ impl TreeScript {
         let builder = match &self.limits {
             Some(path) => self.builder.limits(read_limits(path, surface.mesh())?),
             None => self.builder,
+        };
+        let builder = match &self.labels {
+            Some(path) => builder.labels(read_labels(path, surface.mesh())?),
+            None => builder,
         };
         let built = builder.build(&*surface).map_err(|error| format!("{label}: {error}"))?;
         warn(label, built.summary().warnings());

@@ -2,7 +2,7 @@
 
 use core::ffi::c_void;
 
-use dibs_nostd::{Scrub, Tree};
+use dibs_nostd::{Scrub, Tree, TriangleRow};
 
 use crate::border::{Handle, Input, Kind, Output, Storage};
 use crate::code::dibs_code;
@@ -105,6 +105,22 @@ pub extern "C" fn dibs_tree_rest_position(
     dibs_code::of(|| {
         let (position, tree) = (position.check()?, &tree.share()?.tree);
         position.set(tree.rest_position(row).ok_or(dibs_code::TreeNoRestShape)?.into());
+        Ok(())
+    })
+}
+
+/// Label of the triangle in a row, say of its tissue.
+///
+/// @return `DIBS_CODE_OK`, or `DIBS_CODE_ARGUMENT` outside the table or where the tree was built without labels.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_tree_label(
+    tree: *mut dibs_tree,
+    triangle: u32,
+    label: *mut u8,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (label, tree) = (label.check()?, &tree.share()?.tree);
+        label.set(tree.label(TriangleRow(triangle)).ok_or(dibs_code::Argument)?);
         Ok(())
     })
 }

@@ -1,5 +1,6 @@
 //! The built tree, and its two outputs: a blob, and a Rust module around it.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use dibs_nostd::format::PathKind;
@@ -52,6 +53,8 @@ pub struct Summary {
     pub bounding_box: Option<[[f32; 3]; 2]>,
     /// Mean length of the triangles' sides at rest.
     pub mean_edge: Option<f64>,
+    /// Different labels of the triangles; 0 if they have none.
+    pub labels: usize,
     /// The point of the mesh's file (mm) that the tree's coordinates count from.
     pub origin: [f64; 3],
     /// Identity of the mesh, as vertex packets carry it.
@@ -235,6 +238,7 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
         root_radius: tree.node(0).map_or(0.0, |(_, radius, _)| radius),
         bounding_box: bounding_box(tree),
         mean_edge: mean_edge(tree),
+        labels: labels(tree),
         origin: tree.origin(),
         mesh_id: tree.mesh_id(),
         query_bytes: tree.query_bytes(),
@@ -253,6 +257,11 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
             flash_bytes_per_vertex: modes.flash_bytes() as f64 / f64::from(vertices),
         }),
     }
+}
+
+fn labels<I: Index>(tree: &Tree<'_, I>) -> usize {
+    let labels = (0..tree.triangle_count()).filter_map(|row| tree.label(TriangleRow(row)));
+    labels.collect::<HashSet<u8>>().len()
 }
 
 fn bounding_box<I: Index>(tree: &Tree<'_, I>) -> Option<[[f32; 3]; 2]> {

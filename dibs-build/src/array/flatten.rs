@@ -74,6 +74,8 @@ pub(crate) struct Facts<'a> {
     pub with_rest: bool,
     pub with_metric: bool,
     pub with_adjacency: bool,
+    /// One for each triangle of the mesh.
+    pub labels: Option<&'a [u8]>,
 }
 
 /// The bytes of a tree, and the mesh vertex of each row.
@@ -139,6 +141,10 @@ pub(crate) fn flatten<I: Index>(
     }
     if has_origin {
         sections.push((section::ORIGIN, origin));
+    }
+    if let Some(labels) = facts.labels {
+        let labels = flat.triangles.iter().map(|placed| labels[placed.triangle as usize]);
+        sections.push((section::LABELS, labels.collect()));
     }
     let mut header = [0; HEADER_BYTES];
     header[..MAGIC.len()].copy_from_slice(&MAGIC);

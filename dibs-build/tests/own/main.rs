@@ -5,6 +5,7 @@ mod cli;
 mod cli_motion;
 mod far;
 mod formats;
+mod labels;
 mod manners;
 mod placement;
 mod program;

@@ -254,7 +254,7 @@ impl Scene {
         if matches!(side, Side::Inside | Side::Crossing | Side::Undefined(NoSide::BelowAccuracy)) {
             self.is_outside = false;
         }
-        if found.lower > self.lower {
+        if found.lower < self.lower {
             self.lower = found.lower;
         }
         if found.accuracy > self.accuracy {

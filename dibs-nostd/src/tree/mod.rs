@@ -233,6 +233,47 @@ impl<'a, I: Index> Tree<'a, I> {
         }
     }
 
+    /// Label of a triangle's tissue, by which a controller tells contacts apart: a margin and a stiffness for each
+    /// label, or none. `None` outside the table or where the tree was built without labels.
+    ///
+    /// ```
+    /// use dibs_build::{Builder, generate};
+    /// use dibs_nostd::constraint::{Proxy, SpringDamper};
+    /// use dibs_nostd::{Contacts, Options, Query, Sphere, Tree, glam::Vec3};
+    ///
+    /// const MUSCLE: u8 = 1;
+    /// const ARTERY: u8 = 2;
+    /// let heart = generate::heart(1_000)?.mesh;
+    /// let is_right = |corners: &[u32; 3]| heart.positions[corners[0] as usize].x > 0.0;
+    /// let label = |corners| if is_right(corners) { ARTERY } else { MUSCLE };
+    /// let labels = heart.triangles.iter().map(label).collect();
+    /// let built = Builder::new().labels(labels).build(&heart)?;
+    /// let tree = Tree::<u16>::from_bytes(built.blob())?;
+    /// let rows = built.to_rows(&heart.positions);
+    ///
+    /// let soft = Proxy::new(SpringDamper::stiffness(0.5).max_force(2.0), 1.0)?;
+    /// let hard = Proxy::new(SpringDamper::stiffness(2.0).max_force(8.0), 5.0)?;
+    /// let mut query = Query::<_, 32>::new(&tree)?;
+    /// let mut contacts = Contacts::<8>::new();
+    /// let tool = Sphere::new(Vec3::new(65.0, 0.0, 20.0), 2.5)?;
+    /// query.contacts(rows.as_slice(), &tool, 5.0, &Options::new(), &mut contacts)?;
+    /// let force = [(MUSCLE, soft), (ARTERY, hard)].map(|(label, wall)| {
+    ///     let of_label = contacts.within(5.0).map(|all| {
+    ///         all.filter(|contact| tree.label(contact.triangle) == Some(label))
+    ///     });
+    ///     wall.wrench(of_label, contacts.accuracy(), tool.centre(), Vec3::ZERO, Vec3::ZERO).force
+    /// });
+    /// # let _ = force;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub const fn label(&self, TriangleRow(row): TriangleRow) -> Option<u8> {
+        match format::range(self.sections.labels, row, 1) {
+            Some([label]) => Some(*label),
+            _ => None,
+        }
+    }
+
     /// Pin, geodesic radius (mm, rounded up) and link of a node, for tools that walk the tree; `None`
     /// outside the table. Row 0 is the root.
     #[must_use]

@@ -21,6 +21,7 @@ pub(crate) struct Sections<'a> {
     pub modes: &'a [u8],
     pub adjacency: &'a [u8],
     pub origin: &'a [u8],
+    pub labels: &'a [u8],
 }
 
 /// A section's length, and whether it is required.
@@ -42,7 +43,7 @@ impl Rule {
     }
 }
 
-const COUNT: usize = 9;
+const COUNT: usize = 10;
 
 /// In the order of [`Sections`]' fields.
 const fn rules<I: Index>(header: &Header) -> [Rule; COUNT] {
@@ -59,6 +60,7 @@ const fn rules<I: Index>(header: &Header) -> [Rule; COUNT] {
         Rule::optional(section::ADJACENCY, triangles, triangle_bytes::<I>()),
         // Where the header has none, the section must be absent or empty.
         Rule { required: origin == 1, ..Rule::optional(section::ORIGIN, origin, ORIGIN_BYTES) },
+        Rule::optional(section::LABELS, triangles, 1),
     ]
 }
 
@@ -114,16 +116,26 @@ pub(crate) const fn find<'a, I: Index>(
         }
         slot += 1;
     }
-    let [nodes, triangles, order, rest, metric, limits, modes, adjacency, origin] = parts;
-    Ok(Sections { nodes, triangles, order, rest, metric, limits, modes, adjacency, origin })
+    let [nodes, triangles, order, rest, metric, limits, modes, adjacency, origin, labels] = parts;
+    Ok(Sections { nodes, triangles, order, rest, metric, limits, modes, adjacency, origin, labels })
 }
 
 impl<'a> Sections<'a> {
     /// All sections, in the order of [`rules`].
     const fn all(&self) -> [&'a [u8]; COUNT] {
-        let Self { nodes, triangles, order, rest, metric, limits, modes, adjacency, origin } =
-            *self;
-        [nodes, triangles, order, rest, metric, limits, modes, adjacency, origin]
+        let Self {
+            nodes,
+            triangles,
+            order,
+            rest,
+            metric,
+            limits,
+            modes,
+            adjacency,
+            origin,
+            labels,
+        } = *self;
+        [nodes, triangles, order, rest, metric, limits, modes, adjacency, origin, labels]
     }
 
     /// Checks that each section is still at its place in the bytes.

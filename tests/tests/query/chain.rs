@@ -158,7 +158,7 @@ fn thirteen_surfaces_and_four_capsules_cost_three_queries() {
         if at.abs().max_element() > 300.0 {
             heading = -at.normalize();
         }
-        let instrument = instrument(at, heading);
+        let instrument = instrument(at, heading, 95.0);
         let options = Options::new().unsigned();
         let best = Query::closest_in_scene(&mut queries, &surfaces, &instrument, &options);
         let best = best.expect("an answer").expect("one");
@@ -189,13 +189,13 @@ fn no_tool_inside_a_surface_of_a_scene_is_missed() {
     let mut sides = [0; 3];
     for _ in 0..1_000 {
         let near = organs[rng.usize(..organs.len())][rng.usize(..tree.vertex_count() as usize)];
-        let instrument = instrument(near + 30.0 * unit(&mut rng), unit(&mut rng));
+        let instrument = instrument(near + 30.0 * unit(&mut rng), unit(&mut rng), 15.0);
         let options = if rng.bool() { Options::cold() } else { Options::new() };
         let best = Query::closest_in_scene(&mut queries, &surfaces, &instrument, &options);
         let best = best.expect("an answer").expect("one");
         let all = least(&mut single, &surfaces, &instrument, &Options::cold());
         let found = best.proximity;
-        let off = 2.0 * found.accuracy + 60.0 / 512.0;
+        let off = 2.0 * found.accuracy + 10.0 / 512.0;
         assert!((all - found.separation).abs() <= off, "{all} {best:?}");
         let own = single.closest(surfaces[best.surface], &instrument[best.tool], &options);
         assert!((own.expect("an answer").separation - found.separation).abs() <= off, "{best:?}");
@@ -226,9 +226,9 @@ fn without_a_surface_or_a_tool_there_is_no_closest_pair() {
     assert_eq!(none, Ok(None));
 }
 
-/// Four capsules behind a tip.
-fn instrument(tip: Vec3, heading: Vec3) -> [Capsule; 4] {
-    let joints = [0.0_f32, 60.0, 75.0, 85.0, 95.0].map(|along| tip - (95.0 - along) * heading);
+/// Four capsules behind a tip, together this long (mm).
+fn instrument(tip: Vec3, heading: Vec3, length: f32) -> [Capsule; 4] {
+    let joints = [1.0, 0.37, 0.21, 0.1, 0.0].map(|behind: f32| tip - behind * length * heading);
     [0, 1, 2, 3].map(|link| Capsule::new(joints[link], joints[link + 1], 3.0).expect("finite"))
 }
 

@@ -332,6 +332,46 @@ fn metric_and_limits_stand_where_the_specification_says() {
     }
 }
 
+/// Labels stand in the order of the triangles' rows, change no other bytes, and must be one for each triangle.
+#[test]
+fn labels_are_stored_by_row() {
+    let (mesh, plain) = heart(IndexWidth::Bits16);
+    let labels: Vec<u8> = (0..mesh.triangles.len()).map(|number| (number % 251) as u8).collect();
+    for index in [IndexWidth::Bits16, IndexWidth::Bits32] {
+        let built = Builder::new().index(index).labels(labels.clone()).build(&mesh).unwrap();
+        let (at, length) = section(built.blob(), 10);
+        assert_eq!(length, mesh.triangles.len());
+        for row in 0..mesh.triangles.len() {
+            let (corners, label) = match index {
+                IndexWidth::Bits16 => labelled(&built.tree::<u16>().unwrap(), row as u32),
+                _ => labelled(&built.tree::<u32>().unwrap(), row as u32),
+            };
+            let is_it = |own: &[u32; 3]| corners.iter().all(|corner| own.contains(corner));
+            let number = mesh.triangles.iter().position(is_it).expect("is there");
+            assert_eq!(label, Some(labels[number]));
+            assert_eq!(built.blob()[at + row], labels[number]);
+        }
+        let outside = TriangleRow(mesh.triangles.len() as u32);
+        assert_eq!(built.tree::<u16>().ok().and_then(|tree| tree.label(outside)), None);
+    }
+    let built = Builder::new().labels(labels).build(&mesh).unwrap();
+    assert_eq!(built.summary().mesh_id, plain.summary().mesh_id);
+    assert_eq!(plain.tree::<u16>().unwrap().label(TriangleRow(0)), None);
+    let table = 64 + 12 * (word(built.blob(), 48) - 1) as usize;
+    assert_eq!(word(built.blob(), table), 10);
+    for wrong in [0, 319, 321] {
+        let bytes = with_word(built.blob(), table + 8, wrong);
+        assert!(matches!(Tree::<u16>::from_bytes(&bytes), Err(FormatError::Section { kind: 10 })));
+    }
+}
+
+/// A triangle's corners, by the mesh's numbers, and its label.
+fn labelled<I: dibs_nostd::Index>(tree: &Tree<'_, I>, row: u32) -> ([u32; 3], Option<u8>) {
+    let corners = tree.corners(TriangleRow(row)).expect("a row");
+    let number = |vertex| tree.vertex_number(vertex).expect("has an order").0;
+    (corners.map(number), tree.label(TriangleRow(row)))
+}
+
 /// The origin is stored whole, belongs to the mesh's identity, and is checked.
 #[test]
 fn an_origin_is_stored_and_checked() {

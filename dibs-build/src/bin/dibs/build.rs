@@ -6,7 +6,7 @@ use anyhow::{Result, anyhow, bail};
 use clap::ValueEnum;
 use dibs_build::{
     Beyond, Builder, BuiltTree, Construction, Import, IndexWidth, Mesh, Needed, Paths,
-    check_winding, orient, read_limits,
+    check_winding, orient, read_labels, read_limits,
 };
 use std::path::{Path, PathBuf};
 
@@ -18,6 +18,7 @@ Examples:
   dibs build scan.obj -o scan.dibs --largest-component --json
   dibs build heart.ply -o heart.dibs --limits heart.limits --motion heart.pc2
   dibs build scan.obj -o scan.dibs --orient
+  dibs build scan.obj -o scan.dibs --labels tissues.txt
   dibs build heart.ply -o heart.dibs --motion heart.pc2 --modes 16")]
 pub struct Args {
     /// The rest shape: OBJ, STL, PLY, OFF, VTK (.vtk, .vtp), glTF (.gltf, .glb), Gmsh (.msh) or 3MF, told apart by content
@@ -31,6 +32,9 @@ pub struct Args {
     /// A limit for each triangle instead, as `dibs stretch` writes them
     #[arg(long, value_name = "FILE", conflicts_with = "stretch")]
     limits: Option<PathBuf>,
+    /// A label for each triangle, say of its tissue: text, one number from 0 to 255 a line, in the mesh's order
+    #[arg(long, value_name = "FILE")]
+    labels: Option<PathBuf>,
     /// How sections are pinned, measured and split
     #[arg(long, value_enum, default_value = "default")]
     construction: ConstructionName,
@@ -89,6 +93,7 @@ pub fn run(args: &Args) -> Result<()> {
     let Import { mesh, report } = &import;
     let winding = check_winding(mesh).err().map(|error| error.to_string());
     let limits = args.limits.as_ref().map(|path| read_limits(path, mesh)).transpose()?;
+    let labels = args.labels.as_ref().map(|path| read_labels(path, mesh)).transpose()?;
     if let Some(path) = &args.motion {
         let uniform = || vec![args.stretch; mesh.triangles.len()];
         check_covered(args, mesh, path, &limits.clone().unwrap_or_else(uniform))?;
@@ -98,7 +103,7 @@ pub fn run(args: &Args) -> Result<()> {
         (Some(path), Some(_)) => Some(modes::fit(mesh, path, &args.reading.lengths)?),
         _ => None,
     };
-    let mut tree = build(args, &import, limits)
+    let mut tree = build(args, &import, limits, labels)
         .map_err(|error| anyhow!("{name}: no tree can be built: {error}"))?;
     if let (Some(fit), Some(count)) = (&fit, args.modes) {
         tree = fit.add(&tree, count)?;
@@ -165,12 +170,17 @@ fn build(
     args: &Args,
     import: &Import,
     limits: Option<Vec<f32>>,
+    labels: Option<Vec<u8>>,
 ) -> Result<BuiltTree, dibs_build::BuildError> {
     let bar = mesh_file::progress_bar("building", import.mesh.triangles.len());
     let progress = |done: usize| bar.set_position(done as u64);
     let builder = match limits {
         Some(limits) => Builder::new().limits(limits),
         None => Builder::new().stretch(args.stretch),
+    };
+    let builder = match labels {
+        Some(labels) => builder.labels(labels),
+        None => builder,
     };
     let tree = builder
         .construction(match args.construction {

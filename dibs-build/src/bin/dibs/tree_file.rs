@@ -3,7 +3,7 @@
 use anyhow::{Result, anyhow};
 use dibs_build::Summary;
 use dibs_build::glam::DVec3;
-use dibs_nostd::{FormatError, Tree};
+use dibs_nostd::{FormatError, Tree, TriangleRow};
 use std::path::Path;
 
 /// A validated tree of either width.
@@ -20,6 +20,14 @@ impl AnyTree<'_> {
             Self::Wide(tree) => tree.origin(),
         }
         .into()
+    }
+
+    /// The label of a triangle, where the tree has labels.
+    pub fn label(&self, triangle: TriangleRow) -> Option<u8> {
+        match self {
+            Self::Narrow(tree) => tree.label(triangle),
+            Self::Wide(tree) => tree.label(triangle),
+        }
     }
 }
 
@@ -55,6 +63,9 @@ pub fn print(summary: &Summary) {
     if s.origin != [0.0; 3] {
         let [x, y, z] = s.origin;
         println!("origin   {x},{y},{z}: coordinates of the tree count from there");
+    }
+    if s.labels > 0 {
+        println!("labels   {} different", s.labels);
     }
     println!("mesh id  {:08x}", s.mesh_id);
     println!(

@@ -119,6 +119,7 @@ pub mod section {
     pub const ADJACENCY: u32 = 8;
     /// The tree's origin in the mesh's file, three `f64` (where the header has it).
     pub const ORIGIN: u32 = 9;
+    pub const LABELS: u32 = 10;
 }
 
 /// How geodesic radii were measured, and so which stretch bounds their growth.

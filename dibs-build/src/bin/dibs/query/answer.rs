@@ -9,6 +9,8 @@ pub struct Answer<'a> {
     pub proximity: Proximity,
     /// Corners of the triangle, numbered as in the mesh file.
     pub triangle: [u32; 3],
+    /// The triangle's label, where the tree has labels.
+    pub label: Option<u8>,
     /// The point that the pair's coordinates count from.
     pub origin: DVec3,
     pub tree: &'a str,
@@ -26,6 +28,7 @@ pub struct Answer<'a> {
 pub struct Touch<'a> {
     pub contact: Contact,
     pub triangle: [u32; 3],
+    pub label: Option<u8>,
     pub origin: DVec3,
     pub tree: &'a str,
     pub tool: usize,
@@ -61,6 +64,8 @@ pub struct Record<'a> {
     tree: &'a str,
     tool: usize,
     triangle: [u32; 3],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    label: Option<u8>,
     barycentric: [f64; 3],
     stretch: Option<f64>,
     node_tests: u32,
@@ -79,6 +84,8 @@ struct ContactRecord<'a> {
     point_on_tool: [f64; 3],
     normal: [f64; 3],
     triangle: [u32; 3],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    label: Option<u8>,
     tree: &'a str,
     tool: usize,
 }
@@ -121,6 +128,7 @@ impl<'a> Answer<'a> {
             tree: self.tree,
             tool: self.tool,
             triangle: self.triangle,
+            label: self.label,
             barycentric: p.barycentric.map(f64::from),
             stretch: self.stretch.map(|measured| measured.sigma().into()),
             node_tests: p.node_tests,
@@ -146,6 +154,9 @@ impl<'a> Answer<'a> {
         println!("point on surface  {}", point_text(p.point_on_surface, self.origin));
         println!("point on tool     {}", point_text(p.point_on_tool, self.origin));
         println!("triangle          {:?}, weights {:?}", self.triangle, p.barycentric);
+        if let Some(label) = self.label {
+            println!("label             {label}");
+        }
         if let Some(measured) = self.stretch {
             println!("stretch           {}", measured.sigma());
         }
@@ -166,6 +177,7 @@ impl<'a> Touch<'a> {
             point_on_tool: point(self.contact.point_on_tool, self.origin),
             normal: vector(self.contact.normal),
             triangle: self.triangle,
+            label: self.label,
             tree: self.tree,
             tool: self.tool,
         }

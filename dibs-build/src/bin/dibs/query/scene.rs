@@ -137,15 +137,18 @@ pub fn ask<'a>(
             touches.extend(contacts.map(|(contact, triangle)| Touch {
                 contact,
                 triangle,
+                label: surface.tree.label(contact.triangle),
                 origin: surface.tree.origin(),
                 tree: &surface.name,
                 tool: number,
             }));
             let separation = found.proximity.separation;
             if best.as_ref().is_none_or(|best| separation < best.proximity.separation) {
+                let label = found.proximity.triangle.and_then(|row| surface.tree.label(row));
                 best = Some(Answer {
                     proximity: found.proximity,
                     triangle: found.triangle,
+                    label,
                     origin: surface.tree.origin(),
                     tree: &surface.name,
                     tool: number,
