@@ -1666,6 +1666,15 @@ dibs_code dibs_tree_rest_position(dibs_tree *tree,
                                   dibs_vec3 *position);
 
 /**
+ * Label of the triangle in a row, say of its tissue.
+ *
+ * @return `DIBS_CODE_OK`, or `DIBS_CODE_ARGUMENT` outside the table or where the tree was built without labels.
+ */
+dibs_code dibs_tree_label(dibs_tree *tree,
+                          uint32_t triangle,
+                          uint8_t *label);
+
+/**
  * Compares the tree's header and places of sections, which are in memory, with its bytes. A scrub does not read that
  * memory: call this once a tick.
  *
