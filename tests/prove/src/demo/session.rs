@@ -12,12 +12,13 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 use controller::TICK_RATE;
-use controller::telemetry::{MAX_FRAMED, Record, Summary, Tick};
+use controller::telemetry::{MAX_FRAMED, Network, Record, Summary, Tick};
 use dibs_nostd::wire::Deframer;
 use indicatif::{ProgressBar, ProgressStyle};
 use xtask::process::shown;
 use xtask::{qemu, workspace};
 
+use super::bus::Bus;
 use super::check::{Checked, Compared, check, compare};
 use super::debugger::{Bits, flip};
 use super::faults::{Faults, Plan};
@@ -40,8 +41,12 @@ pub enum Harm {
 
 /// The results of a run.
 pub struct Outcome {
+    /// The controller's bus.
+    pub bus: Bus,
     /// The record of every tick.
     pub ticks: Vec<Tick>,
+    /// The network's part of the run, if the bus is Ethernet.
+    pub network: Option<Network>,
     /// The controller's summary.
     pub summary: Summary,
     /// The check of every answer.
@@ -78,11 +83,11 @@ pub fn run(
     };
     let ticks_asked = seconds * TICK_RATE;
     let sockets = tempfile::tempdir()?;
-    let (bus_path, telemetry_path) = (sockets.path().join("bus"), sockets.path().join("telemetry"));
-    let bus_socket = UnixListener::bind(&bus_path)?;
+    let telemetry_path = sockets.path().join("telemetry");
+    let bus = machine.bus().open(sockets.path())?;
     let telemetry_socket = UnixListener::bind(&telemetry_path)?;
 
-    let mut command = machine.command(&bus_path, &telemetry_path, ticks_asked);
+    let mut command = machine.command(&bus.end, &telemetry_path, ticks_asked);
     let debugger = match harm {
         Harm::Memory(bits) => Some((sockets.path().join("debugger"), *bits)),
         Harm::Nothing | Harm::Bus(_) => None,
@@ -97,13 +102,13 @@ pub fn run(
     command.stdout(File::create(folder.join(machine.log()))?);
     let start = Instant::now();
     let mut child = Guard(command.spawn().with_context(|| format!("cannot start `{shown}`"))?);
-    let bus = accept(&bus_socket, &mut child.0)?;
+    let link = Arc::new(Link::default());
+    let line = bus.connect(&mut child.0, &link)?;
     let telemetry = accept(&telemetry_socket, &mut child.0)?;
 
-    let link = Arc::new(Link::default());
     let (to_check, answers) = mpsc::channel::<Tick>();
     let (listened, sent, checked) = thread::scope(|scope| {
-        let sender = scope.spawn(|| send(scene, &link, bus, faults));
+        let sender = scope.spawn(|| send(scene, machine.bus(), &link, line, faults));
         let checker = scope.spawn(|| {
             answers.into_iter().map(|tick| check(scene, &link, &tick)).collect::<Result<Vec<_>>>()
         });
@@ -113,7 +118,7 @@ pub fn run(
         drop(to_check);
         (listened, joined(sender.join()), joined(checker.join()))
     });
-    let Heard { ticks, summary, flipped_at } = listened?;
+    let Heard { ticks, network, summary, flipped_at } = listened?;
     let injected = sent?;
     let mut compared = Vec::new();
     for tick in &ticks {
@@ -121,7 +126,9 @@ pub fn run(
     }
     let status = child.0.wait()?;
     Ok(Outcome {
+        bus: machine.bus(),
         ticks,
+        network,
         summary,
         checked: checked?,
         compared,
@@ -151,7 +158,7 @@ fn joined<T>(result: thread::Result<Result<T>>) -> Result<T> {
 }
 
 /// Waits until the controller connects.
-fn accept(socket: &UnixListener, child: &mut Child) -> Result<UnixStream> {
+pub fn accept(socket: &UnixListener, child: &mut Child) -> Result<UnixStream> {
     socket.set_nonblocking(true)?;
     let start = Instant::now();
     loop {
@@ -175,6 +182,7 @@ fn accept(socket: &UnixListener, child: &mut Child) -> Result<UnixStream> {
 /// A controller's telemetry.
 struct Heard {
     ticks: Vec<Tick>,
+    network: Option<Network>,
     summary: Summary,
     flipped_at: Option<u32>,
 }
@@ -193,7 +201,7 @@ fn listen(
     let bar = ProgressBar::new(ticks_asked.into()).with_style(ProgressStyle::with_template(style)?);
     let mut deframer = Deframer::<MAX_FRAMED>::new();
     let mut ticks = Vec::new();
-    let mut flipped_at = None;
+    let (mut network, mut flipped_at) = (None, None);
     let mut buffer = [0; 4096];
     loop {
         let bytes = telemetry.read(&mut buffer).context("the controller fell silent")?;
@@ -204,8 +212,9 @@ fn listen(
             match record {
                 Record::Summary(summary) => {
                     bar.finish_and_clear();
-                    return Ok(Heard { ticks, summary, flipped_at });
+                    return Ok(Heard { ticks, network, summary, flipped_at });
                 }
+                Record::Network(record) => network = Some(record),
                 Record::Tick(tick) => {
                     link.bytes.store(tick.bytes, Ordering::Relaxed);
                     link.tick.store(tick.tick, Ordering::Relaxed);
