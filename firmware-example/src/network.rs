@@ -29,8 +29,8 @@ const HEADERS: usize = 14 + 20 + 8;
 /// Largest frame that the controller sends, in bytes.
 pub const MAX_REPLY: usize = HEADERS + STATUS_MTU;
 
-/// Bytes of an answer to an ARP request.
-const ARP_ANSWER: usize = 14 + 28;
+/// Bytes of a frame of ARP.
+pub const ARP_FRAME: usize = 14 + 28;
 
 /// Hops that a status survives.
 const TIME_TO_LIVE: u8 = 64;
@@ -51,7 +51,7 @@ pub enum Content<'f> {
     /// A packet for the controller's port, not yet checked.
     Packet(&'f [u8], Peer),
     /// A question for the controller's hardware address, and the answer.
-    Question([u8; ARP_ANSWER]),
+    Question([u8; ARP_FRAME]),
     /// Anything else.
     Other,
 }
@@ -94,17 +94,30 @@ fn answer<'f>(frame: &Ethernet2Slice<'f>) -> Option<Content<'f>> {
     if question.operation != ArpOperation::REQUEST || question.target_ipv4 != ADDRESS {
         return None;
     }
-    let answer = ArpEthIpv4Packet {
-        operation: ArpOperation::REPLY,
-        sender_mac: HARDWARE,
-        sender_ipv4: ADDRESS,
-        target_mac: question.sender_mac,
-        target_ipv4: question.sender_ipv4,
-    };
-    let mut bytes = [0; ARP_ANSWER];
-    let head = head(question.sender_mac, EtherType::ARP);
-    join(&mut bytes, &[&head, &answer.to_bytes()])?;
-    Some(Content::Question(bytes))
+    let (hardware, address) = (question.sender_mac, question.sender_ipv4);
+    Some(Content::Question(arp(ArpOperation::REPLY, hardware, hardware, address)))
+}
+
+fn arp(
+    operation: ArpOperation,
+    destination: [u8; 6],
+    target_mac: [u8; 6],
+    target_ipv4: [u8; 4],
+) -> [u8; ARP_FRAME] {
+    let (sender_mac, sender_ipv4) = (HARDWARE, ADDRESS);
+    let content =
+        ArpEthIpv4Packet { operation, sender_mac, sender_ipv4, target_mac, target_ipv4 };
+    let mut frame = [0; ARP_FRAME];
+    // The sizes fit, so nothing is left out.
+    let _ = join(&mut frame, &[&head(destination, EtherType::ARP), &content.to_bytes()]);
+    frame
+}
+
+/// The frame that announces the controller's addresses to all, at its start: a network that asked before gets no other
+/// answer.
+#[must_use]
+pub fn announcement() -> [u8; ARP_FRAME] {
+    arp(ArpOperation::REQUEST, BROADCAST, [0; 6], ADDRESS)
 }
 
 /// A frame that takes a status to a peer; `None` only if the status is larger than any.

@@ -1,6 +1,6 @@
 //! The bus over Ethernet, polled by the idle loop: the control tick is above it, and interrupts it anywhere.
 
-use controller::network::{Content, HARDWARE, MAX_FRAME, MAX_REPLY, Peer, read, seal};
+use controller::network::{Content, HARDWARE, MAX_FRAME, MAX_REPLY, Peer, announcement, read, seal};
 use controller::telemetry;
 
 use crate::lan9118::Lan9118;
@@ -19,7 +19,9 @@ impl Network {
     /// Starts the chip; `None` if it is not there.
     pub fn start() -> Option<Self> {
         let so_far = telemetry::Network { kind: telemetry::Network::KIND, ..Default::default() };
-        Some(Self { chip: Lan9118::start(HARDWARE)?, peer: None, frame: [0; MAX_FRAME], so_far })
+        let mut chip = Lan9118::start(HARDWARE)?;
+        chip.send(&announcement());
+        Some(Self { chip, peer: None, frame: [0; MAX_FRAME], so_far })
     }
 
     /// Takes at most one frame: a flood slows the idle loop's other work down, and does not stop it.

@@ -107,7 +107,7 @@ impl<W: Write> Write for Paced<W> {
 pub fn send(
     scene: &Scene,
     bus: Bus,
-    link: &Link,
+    link: &Arc<Link>,
     line: Line,
     faults: Option<&Plan>,
 ) -> Result<Vec<(Fault, u64)>> {
@@ -120,7 +120,10 @@ pub fn send(
         Some(plan) => FaultyLine::new(line, plan.seed, Plan::KINDS, Plan::RATE),
         None => FaultyLine::new(line, 0, &[], 0.0),
     };
-    let mut sender = Sender::<_, MTU>::new(line, order, settings);
+    // The emulated board's time is slower than this computer's: a frame's age and heartbeats are in the board's.
+    let clock = Arc::clone(link);
+    let sender = Sender::<_, MTU>::new(line, order, settings);
+    let mut sender = sender.with_clock(move || Duration::from_millis(clock.now().into()));
     send_all(scene, bus, link, &mut sender, faults)?;
     Ok(sender.transport().counts().to_vec())
 }
