@@ -105,8 +105,7 @@ fn arp(
     target_ipv4: [u8; 4],
 ) -> [u8; ARP_FRAME] {
     let (sender_mac, sender_ipv4) = (HARDWARE, ADDRESS);
-    let content =
-        ArpEthIpv4Packet { operation, sender_mac, sender_ipv4, target_mac, target_ipv4 };
+    let content = ArpEthIpv4Packet { operation, sender_mac, sender_ipv4, target_mac, target_ipv4 };
     let mut frame = [0; ARP_FRAME];
     // The sizes fit, so nothing is left out.
     let _ = join(&mut frame, &[&head(destination, EtherType::ARP), &content.to_bytes()]);
@@ -124,8 +123,7 @@ pub fn announcement() -> [u8; ARP_FRAME] {
 #[must_use]
 pub fn seal<'b>(status: &[u8], to: &Peer, frame: &'b mut [u8; MAX_REPLY]) -> Option<&'b [u8]> {
     let length = u16::try_from(UdpHeader::LEN + status.len()).ok()?;
-    let mut ip =
-        Ipv4Header::new(length, TIME_TO_LIVE, IpNumber::UDP, ADDRESS, to.address).ok()?;
+    let mut ip = Ipv4Header::new(length, TIME_TO_LIVE, IpNumber::UDP, ADDRESS, to.address).ok()?;
     ip.header_checksum = ip.calc_header_checksum();
     let udp = UdpHeader::with_ipv4_checksum(PORT, to.port, &ip, status).ok()?;
     let head = head(to.hardware, EtherType::IPV4);

@@ -135,11 +135,7 @@ impl Receiver {
     }
 
     /// The status for the sender; `None` unless due. `tick` is the present control tick, 1 ms.
-    pub fn status<'b>(
-        &mut self,
-        tick: u32,
-        packet: &'b mut [u8; STATUS_MTU],
-    ) -> Option<&'b [u8]> {
+    pub fn status<'b>(&mut self, tick: u32, packet: &'b mut [u8; STATUS_MTU]) -> Option<&'b [u8]> {
         if !self.has_news && tick.wrapping_sub(self.reported) < REPORT_INTERVAL {
             return None;
         }

@@ -5,9 +5,7 @@ use std::sync::OnceLock;
 
 use controller::surface::{self, Surface};
 use controller::telemetry::{Tick, cause_code};
-use controller::{
-    BusStatus, Control, MTU, Receiver, Trust,
-};
+use controller::{BusStatus, Control, MTU, Receiver, Trust};
 use dibs_build::{Builder, generate};
 use dibs_nostd::Unavailable;
 use dibs_nostd::failsafe::State;

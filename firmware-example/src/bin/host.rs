@@ -64,7 +64,8 @@ fn main() -> Result<()> {
         }
     });
 
-    let mut control = Control::new(tree, reader, &BUS, &Trust::SERIAL).map_err(|error| anyhow!("{error}"))?;
+    let mut control =
+        Control::new(tree, reader, &BUS, &Trust::SERIAL).map_err(|error| anyhow!("{error}"))?;
     let mut out = BufWriter::new(telemetry);
     let mut line = [0; MAX_FRAMED];
     let period = Duration::from_secs(1) / TICK_RATE;

@@ -21,9 +21,7 @@ mod uart;
 mod vectors;
 
 use controller::telemetry::{MAX_FRAMED, Tick, frame};
-use controller::{
-    BusStatus, Control, Receiver, STATUS_FRAMED, STATUS_MTU, Trust, Upkeep, surface,
-};
+use controller::{BusStatus, Control, Receiver, STATUS_FRAMED, STATUS_MTU, Trust, Upkeep, surface};
 use cortex_m_rt::entry;
 use dibs_nostd::wire::enframe;
 use heapless::spsc::{Consumer, Queue};

@@ -13,6 +13,7 @@ use dibs_build::transport::Line;
 use glam::Vec3;
 use xtask::qemu;
 
+use super::flood::Wire;
 use super::sender::{Link, paced};
 use super::session::accept;
 
@@ -68,7 +69,10 @@ impl Bus {
         match self {
             Self::Serial => {
                 let path = folder.join("bus");
-                Ok(Opened { socket: Socket::Serial(UnixListener::bind(&path)?), end: qemu::Bus::Serial(path) })
+                Ok(Opened {
+                    socket: Socket::Serial(UnixListener::bind(&path)?),
+                    end: qemu::Bus::Serial(path),
+                })
             }
             Self::Ethernet => {
                 // The emulator listens at a port that was free a moment ago.
@@ -90,9 +94,17 @@ pub struct Opened {
 enum Socket {
     Serial(UnixListener),
     Ethernet(u16),
+    Wire(Wire),
 }
 
 impl Opened {
+    /// A network on which anybody may send raw frames, and a handle of it.
+    pub fn wire() -> Result<(Self, Wire)> {
+        let (wire, end) = Wire::new()?;
+        let handle = wire.share()?;
+        Ok((Self { socket: Socket::Wire(wire), end }, handle))
+    }
+
     /// The sender's end, once the controller has started.
     pub fn connect(self, controller: &mut Child, link: &Arc<Link>) -> Result<Line> {
         match self.socket {
@@ -104,6 +116,7 @@ impl Opened {
                 let hang_up = move || drop(handle.shutdown(std::net::Shutdown::Both));
                 Ok(Line::stream(paced(socket, link, 0), reader, hang_up))
             }
+            Socket::Wire(wire) => wire.line(link),
             Socket::Ethernet(port) => {
                 let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
                 socket.connect((Ipv4Addr::LOCALHOST, port))?;

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use controller::telemetry::Tick;
 use controller::TICK_RATE;
+use controller::telemetry::Tick;
 use dibs_build::faults::Fault;
 use dibs_nostd::failsafe::State;
 use serde::Serialize;

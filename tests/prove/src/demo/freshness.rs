@@ -87,7 +87,7 @@ impl Freshness {
 }
 
 /// Frames a second between the first publication and the last.
-fn rate(ticks: &[Tick]) -> f64 {
+pub fn rate(ticks: &[Tick]) -> f64 {
     let first = ticks.iter().find(|tick| tick.frames_published > 0);
     let (Some(first), Some(last)) = (first, ticks.last()) else { return 0.0 };
     let newest = ticks.iter().find(|tick| tick.frames_published == last.frames_published);

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use controller::telemetry::{Summary, Tick, cause_code};
 use controller::TICK_RATE;
+use controller::telemetry::{Summary, Tick, cause_code};
 use dibs_nostd::failsafe::State;
 use dibs_nostd::wire::Event;
 use dibs_nostd::{QueryError, Unavailable};

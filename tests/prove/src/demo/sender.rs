@@ -49,11 +49,13 @@ impl Link {
         self.frames.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
 
-    fn is_over(&self) -> bool {
+    /// Whether the controller has ended.
+    pub fn is_over(&self) -> bool {
         self.over.load(Ordering::Relaxed)
     }
 
-    fn now(&self) -> u32 {
+    /// The controller's tick.
+    pub fn now(&self) -> u32 {
         self.tick.load(Ordering::Relaxed)
     }
 }

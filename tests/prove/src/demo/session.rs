@@ -18,7 +18,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use xtask::process::shown;
 use xtask::{qemu, workspace};
 
-use super::bus::Bus;
+use super::bus::{Bus, Opened};
 use super::check::{Checked, Compared, check, compare};
 use super::debugger::{Bits, flip};
 use super::faults::{Faults, Plan};
@@ -37,6 +37,8 @@ pub enum Harm {
     Bus(Plan),
     /// Bits of the board's memory are flipped as soon as a frame is published.
     Memory(Bits),
+    /// A flood of Ethernet frames, drawn from this seed.
+    Flood(u64),
 }
 
 /// The results of a run.
@@ -55,6 +57,8 @@ pub struct Outcome {
     pub compared: Vec<Compared>,
     /// The faults on the bus, if any.
     pub faults: Option<Faults>,
+    /// Frames of a flood that were sent.
+    pub flood: u64,
     /// The last tick that was known when memory was changed, if it was.
     pub flipped_at: Option<u32>,
     /// Ticks requested.
@@ -79,18 +83,26 @@ pub fn run(
 ) -> Result<Outcome> {
     let faults = match harm {
         Harm::Bus(plan) => Some(plan),
-        Harm::Nothing | Harm::Memory(_) => None,
+        Harm::Nothing | Harm::Memory(_) | Harm::Flood(_) => None,
     };
     let ticks_asked = seconds * TICK_RATE;
     let sockets = tempfile::tempdir()?;
     let telemetry_path = sockets.path().join("telemetry");
-    let bus = machine.bus().open(sockets.path())?;
+    let (bus, flood) = match harm {
+        Harm::Flood(seed) => {
+            let (bus, wire) = Opened::wire()?;
+            (bus, Some((wire, *seed)))
+        }
+        Harm::Nothing | Harm::Bus(_) | Harm::Memory(_) => {
+            (machine.bus().open(sockets.path())?, None)
+        }
+    };
     let telemetry_socket = UnixListener::bind(&telemetry_path)?;
 
     let mut command = machine.command(&bus.end, &telemetry_path, ticks_asked);
     let debugger = match harm {
         Harm::Memory(bits) => Some((sockets.path().join("debugger"), *bits)),
-        Harm::Nothing | Harm::Bus(_) => None,
+        Harm::Nothing | Harm::Bus(_) | Harm::Flood(_) => None,
     };
     if let Some((socket, _)) = &debugger {
         command.arg("-gdb").arg(format!("unix:{},server=on,wait=off", socket.display()));
@@ -107,7 +119,8 @@ pub fn run(
     let telemetry = accept(&telemetry_socket, &mut child.0)?;
 
     let (to_check, answers) = mpsc::channel::<Tick>();
-    let (listened, sent, checked) = thread::scope(|scope| {
+    let (listened, sent, checked, flooded) = thread::scope(|scope| {
+        let flood = flood.as_ref().map(|(wire, seed)| scope.spawn(|| wire.flood(&link, *seed)));
         let sender = scope.spawn(|| send(scene, machine.bus(), &link, line, faults));
         let checker = scope.spawn(|| {
             answers.into_iter().map(|tick| check(scene, &link, &tick)).collect::<Result<Vec<_>>>()
@@ -116,7 +129,8 @@ pub fn run(
         let listened = listen(telemetry, &link, &to_check, ticks_asked, debugger);
         link.over.store(true, Ordering::Relaxed);
         drop(to_check);
-        (listened, joined(sender.join()), joined(checker.join()))
+        let flooded = flood.map_or(Ok(0), |flood| joined(flood.join()));
+        (listened, joined(sender.join()), joined(checker.join()), flooded)
     });
     let Heard { ticks, network, summary, flipped_at } = listened?;
     let injected = sent?;
@@ -133,6 +147,7 @@ pub fn run(
         checked: checked?,
         compared,
         faults: faults.map(|plan| Faults::new(plan, injected)),
+        flood: flooded?,
         flipped_at,
         ticks_asked,
         frames_sent: link.frames_sent.load(Ordering::Relaxed),

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Result, anyhow};
-use controller::telemetry::Tick;
 use controller::TICK_RATE;
+use controller::telemetry::Tick;
 use dibs_nostd::failsafe::State;
 use plotters::prelude::*;
 
