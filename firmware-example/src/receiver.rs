@@ -30,7 +30,7 @@ const SPEED: f32 = 0.1;
 const WORK: u32 = 32;
 
 /// Rows of the published frame read through in one slice.
-const ROWS: u32 = 8;
+const ROWS: u32 = 32;
 
 /// The receiving end of the bus.
 ///

@@ -49,7 +49,7 @@ impl Trust {
     /// degraded. The generated heart moves by at most 1.57 mm in a thirtieth of a second.
     pub const ETHERNET: Self = Self {
         age: (60, 120),
-        silence: (60, 120),
+        silence: (40, 80),
         heartbeat: (TICK_RATE, 3 * TICK_RATE),
         transit: (TICK_RATE / 5, TICK_RATE / 2),
         source_age: (TICK_RATE / 5, TICK_RATE / 2),

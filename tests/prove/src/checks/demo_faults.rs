@@ -53,7 +53,7 @@ pub const CHECK: Check = Check {
             says: "A bus that falls silent makes the output safe in time",
             criterion: FAULTS,
             // The limit of `Trust::ETHERNET`, and the tick that finds it exceeded.
-            bound: Bound::AtMost(121.0),
+            bound: Bound::AtMost(81.0),
             unit: "ms after the last good packet, {demo.faults.safe-after-frame} ms after the last good frame; \
          nominal again {demo.faults.recovered-after} ms later",
             limits: "The example's limit, for a bus of 60 frames a second.",

@@ -179,6 +179,7 @@ fn send_all(
         // A frame that was late lets the next one start sooner, but by no more than one interval.
         start = (start + interval).max(link.now().saturating_sub(interval));
         if sender.in_flight() > 0 {
+            start = link.now();
             continue;
         }
         sender.transport().set_rate(rate);
