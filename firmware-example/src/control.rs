@@ -4,7 +4,7 @@ use core::fmt;
 
 use bytemuck::Zeroable;
 use dibs_nostd::constraint::{ForbiddenRegion, GainError, SpringDamper};
-use dibs_nostd::failsafe::{FailSafe, LimitError, Limits, Observation, Watch};
+use dibs_nostd::failsafe::{FailSafe, LimitError, Observation};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
     Budget, Capsule, Cost, FrameAge, Options, Proximity, QueryError, Tool, Unavailable,
@@ -12,46 +12,7 @@ use dibs_nostd::{
 
 use crate::surface::{self, TREE};
 use crate::telemetry::{Tick, cause_code};
-use crate::{BusStatus, TICK_RATE, instrument};
-
-/// A surface older than this many ticks is acted on with a warning: the state is degraded.
-pub const SURFACE_AGE_WARNING: u32 = 4 * TICK_RATE;
-
-/// A surface older than this many ticks is not acted on: the output is safe until new ones come.
-///
-/// Six seconds, because the emulated serial line takes one to three for a whole frame, and a frame is as old as its
-/// first packet. A real bus brings tens of frames a second, so its limit is a few tens of milliseconds.
-pub const SURFACE_AGE_LIMIT: u32 = 6 * TICK_RATE;
-
-/// Ticks without any good packet after which the state is degraded.
-pub const SILENCE_WARNING: u32 = TICK_RATE;
-
-/// Ticks without any good packet after which the output is safe.
-pub const SILENCE_LIMIT: u32 = 2 * TICK_RATE;
-
-/// Ticks without a heartbeat after which the state is degraded, and after which it is safe.
-const HEARTBEAT: (u32, u32) = (TICK_RATE, 3 * TICK_RATE);
-
-/// Frames refused or damaged in a row after which the state is degraded, and after which it is safe.
-const REJECTIONS: (u32, u32) = (10, 30);
-
-/// Ticks that a frame may have been on its way, by the status that it echoes: degraded, and safe. Statuses go out every
-/// 100 ms, and the emulated line brings a begin packet in some milliseconds more.
-const TRANSIT: (u32, u32) = (TICK_RATE / 2, TICK_RATE);
-
-/// Age in ms that a frame may have when its sender sends it: a source that stands still while its sender lives.
-const SOURCE_AGE: (u32, u32) = (TICK_RATE, 2 * TICK_RATE);
-
-/// Forged packets between two published frames. This bus has no tags and so no forgeries; a receiver with a key watches
-/// the same counter.
-const FORGERIES: (u32, u32) = (0, 100);
-
-/// Largest speed of the tissue, in mm a tick. The emulated line brings a heart slowed down some fifty times; a real one
-/// reaches 0.2 mm a millisecond.
-const TISSUE_SPEED: f32 = 0.001;
-
-/// Frames in a row that recover. Nobody acknowledges here; a real robot leaves `automatic` out.
-const RECOVERY_FRAMES: u16 = 1;
+use crate::{BusStatus, TICK_RATE, Trust, instrument};
 
 /// The budget of a query: more than the heart needs, and within a tick on every admitted surface.
 pub const BUDGET: Budget = Budget { node_tests: 1_800, triangle_tests: 150 };
@@ -87,7 +48,7 @@ pub struct Control {
 }
 
 impl Control {
-    /// A controller that searches `tree` with the surface published through `surface`.
+    /// A controller that searches `tree` with the surface published through `surface`, and trusts it as far as `trust`.
     ///
     /// # Errors
     /// [`SetupError`] when a constant above is out of range, or the query's stack too small.
@@ -95,13 +56,14 @@ impl Control {
         tree: &surface::Tree,
         surface: surface::Reader,
         bus: &'static BusStatus,
+        trust: &Trust,
     ) -> Result<Self, SetupError> {
         let spring = SpringDamper::stiffness(STIFFNESS).damping(DAMPING).max_force(MAX_FORCE);
         Ok(Self {
             query: surface::Query::new(tree).map_err(SetupError::Query)?,
             surface,
             wall: ForbiddenRegion::new(spring, MARGIN).map_err(SetupError::Gain)?,
-            failsafe: FailSafe::new(limits().map_err(SetupError::Limit)?),
+            failsafe: FailSafe::new(trust.limits().map_err(SetupError::Limit)?),
             bus,
             tick: 0,
             before: None,
@@ -205,28 +167,6 @@ impl Control {
         write(&closest, record);
         (age, Ok(closest))
     }
-}
-
-/// The limits beyond which the surface is not trusted.
-const fn limits() -> Result<Limits, LimitError> {
-    macro_rules! tri {
-        ($result:expr) => {
-            match $result {
-                Ok(value) => value,
-                Err(error) => return Err(error),
-            }
-        };
-    }
-    let age = tri!(Watch::new(SURFACE_AGE_WARNING, SURFACE_AGE_LIMIT));
-    let silence = tri!(Watch::new(SILENCE_WARNING, SILENCE_LIMIT));
-    let heartbeat = tri!(Watch::new(HEARTBEAT.0, HEARTBEAT.1));
-    let rejections = tri!(Watch::new(REJECTIONS.0, REJECTIONS.1));
-    let transit = tri!(Watch::new(TRANSIT.0, TRANSIT.1));
-    let source_age = tri!(Watch::new(SOURCE_AGE.0, SOURCE_AGE.1));
-    let forgeries = tri!(Watch::new(FORGERIES.0, FORGERIES.1));
-    let limits = tri!(tri!(Limits::new(age, TISSUE_SPEED)).recovery(RECOVERY_FRAMES));
-    let limits = limits.silence(silence).heartbeat(heartbeat).rejections(rejections);
-    Ok(limits.transit(transit).source_age(source_age).forgeries(forgeries).automatic())
 }
 
 /// Velocity of the point at `along` (0 to 1) of the instrument's axis, in mm/s.

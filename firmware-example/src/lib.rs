@@ -5,7 +5,8 @@
 //!
 //! - the control tick, 1 kHz, highest priority: [`Control::tick`] poses the instrument, finds the closest pair on the
 //!   frame published last, judges the trust in that frame, and makes a force of the answer;
-//! - bus reception, any lower priority: [`Receiver::byte`] takes vertices as they come;
+//! - bus reception, any lower priority: [`Receiver::byte`] takes vertices as they come over a serial line,
+//!   [`Receiver::packet`] those that [`network`] finds in Ethernet frames;
 //! - the background: [`Receiver::work`] checks complete frames in slices and publishes them, [`Receiver::report`] makes
 //!   statuses for the sender, and [`Upkeep::step`] checks the tree in flash.
 //!
@@ -17,19 +18,21 @@
 mod control;
 mod fingerprint;
 mod instrument;
+pub mod network;
 mod receiver;
 mod status;
 pub mod telemetry;
+mod trust;
 mod upkeep;
 
 pub use control::{
-    BUDGET, Control, DAMPING, MARGIN, MAX_FORCE, SILENCE_LIMIT, SILENCE_WARNING, STIFFNESS,
-    SURFACE_AGE_LIMIT, SURFACE_AGE_WARNING, SetupError, TICK_INSTRUCTIONS,
+    BUDGET, Control, DAMPING, MARGIN, MAX_FORCE, STIFFNESS, SetupError, TICK_INSTRUCTIONS,
 };
 pub use fingerprint::fingerprint;
 pub use instrument::instrument;
-pub use receiver::{MTU, Receiver, STATUS_FRAMED};
+pub use receiver::{MTU, Receiver, STATUS_FRAMED, STATUS_MTU};
 pub use status::BusStatus;
+pub use trust::Trust;
 pub use upkeep::Upkeep;
 
 // The surface: `build.rs` emitted its tree.

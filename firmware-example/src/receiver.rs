@@ -7,13 +7,13 @@ use crate::fingerprint::Fingerprint;
 use crate::surface::{self, CENTRE, REACH};
 use crate::{BusStatus, TICK_RATE};
 
-/// Largest packet on the serial bus, in bytes: 167 quantised vertices.
+/// Largest packet on the bus, in bytes: 167 quantised vertices.
 pub const MTU: usize = 1024;
 
 /// Largest status, in bytes: ten counters, so that three statuses carry all.
-const STATUS_MTU: usize = 96;
+pub const STATUS_MTU: usize = 96;
 
-/// Largest status on the line.
+/// Largest status on a serial line.
 pub const STATUS_FRAMED: usize = framed_bytes(STATUS_MTU);
 
 /// Ticks between two statuses to the sender, unless a frame was published or refused before.
@@ -23,19 +23,19 @@ const REPORT_INTERVAL: u32 = TICK_RATE / 10;
 const ROOM: f32 = 4.0;
 
 /// Limit on a vertex's speed, in mm a tick: twice the generated heart's top speed in real time, 1.57 mm in a thirtieth
-/// of a second. Over the emulated serial line it beats in slow motion.
+/// of a second. Over the emulated serial line it beats in slow motion, over Ethernet in real time.
 const SPEED: f32 = 0.1;
 
 /// Rows and triangles checked, or rows copied, in one slice.
 const WORK: u32 = 32;
 
 /// Rows of the published frame read through in one slice.
-const ROWS: u32 = 8;
+const ROWS: u32 = 32;
 
-/// The receiving end of the serial bus.
+/// The receiving end of the bus.
 ///
-/// Two contexts use it, one at a time. The bus interrupt calls [`byte`](Self::byte), which takes O(1), and O(bytes) for
-/// the last byte of a packet. The idle loop calls [`work`](Self::work), which checks and publishes in slices, and
+/// Two contexts use it, one at a time. A serial line's interrupt calls [`byte`](Self::byte), which takes O(1), and
+/// O(bytes) for the last byte of a packet; a network's driver calls [`packet`](Self::packet). The idle loop calls [`work`](Self::work), which checks and publishes in slices, and
 /// [`report`](Self::report). Both are below the control tick's priority.
 pub struct Receiver {
     deframer: Deframer<MTU>,
@@ -72,7 +72,7 @@ impl Receiver {
 
     /// Takes one byte. `tick` is the present control tick, from which a surface's age counts.
     pub fn byte(&mut self, byte: u8, tick: u32) {
-        self.status.count_byte();
+        self.status.count_bytes(1);
         match self.deframer.push(byte) {
             None => return,
             // Rejections are counted by cause in the assembler.
@@ -82,6 +82,20 @@ impl Receiver {
             }
             Some(Err(error)) => self.assembler.count_framing(&error),
         }
+        self.share();
+    }
+
+    /// Takes one packet, from a bus that keeps packets apart. Returns whether it was a good one of this surface.
+    pub fn packet(&mut self, packet: &[u8], tick: u32) -> bool {
+        self.status.count_bytes(u32::try_from(packet.len()).unwrap_or(u32::MAX));
+        let outcome = self.assembler.accept(packet, tick);
+        self.has_news |= outcome == Ok(Progress::Hello);
+        self.share();
+        outcome.is_ok()
+    }
+
+    /// Tells the control tick.
+    fn share(&self) {
         self.status.link.set(&self.assembler.health());
         self.status.set(self.assembler.counters());
     }
@@ -120,15 +134,20 @@ impl Receiver {
         self.assembler.gate().tree().mesh_id()
     }
 
-    /// The status for the sender, framed for the line; `None` unless due. `tick` is the present control tick, 1 ms.
-    pub fn report<'b>(&mut self, tick: u32, line: &'b mut [u8; STATUS_FRAMED]) -> Option<&'b [u8]> {
+    /// The status for the sender; `None` unless due. `tick` is the present control tick, 1 ms.
+    pub fn status<'b>(&mut self, tick: u32, packet: &'b mut [u8; STATUS_MTU]) -> Option<&'b [u8]> {
         if !self.has_news && tick.wrapping_sub(self.reported) < REPORT_INTERVAL {
             return None;
         }
         (self.reported, self.has_news) = (tick, false);
         let status = self.assembler.status(tick, self.status.safety());
         let (counters, mac) = (self.assembler.counters(), self.assembler.mac());
+        Some(encode_status(self.mesh_id(), &status, counters, mac, packet))
+    }
+
+    /// The same, framed for a serial line.
+    pub fn report<'b>(&mut self, tick: u32, line: &'b mut [u8; STATUS_FRAMED]) -> Option<&'b [u8]> {
         let mut packet = [0; STATUS_MTU];
-        enframe(encode_status(self.mesh_id(), &status, counters, mac, &mut packet), line)
+        enframe(self.status(tick, &mut packet)?, line)
     }
 }

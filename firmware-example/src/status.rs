@@ -76,8 +76,8 @@ impl BusStatus {
         self.is_tree_corrupt.load(Ordering::Relaxed)
     }
 
-    pub(crate) fn count_byte(&self) {
-        self.bytes.store(self.bytes().wrapping_add(1), Ordering::Relaxed);
+    pub(crate) fn count_bytes(&self, bytes: u32) {
+        self.bytes.store(self.bytes().wrapping_add(bytes), Ordering::Relaxed);
     }
 
     pub(crate) fn set(&self, counters: &Counters) {

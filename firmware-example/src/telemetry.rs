@@ -166,16 +166,43 @@ impl Summary {
     pub const KIND: u32 = 2;
 }
 
+/// The network in the whole run; a run over a serial line has none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Network {
+    /// [`Network::KIND`].
+    pub kind: u32,
+    /// Ethernet frames taken.
+    pub frames: u32,
+    /// Of these, the ones with a packet for the controller's port.
+    pub packets: u32,
+    /// Of these, the good ones of its surface.
+    pub good: u32,
+    /// Questions for its hardware address, answered.
+    pub questions: u32,
+    /// Clock counts of the network's driver and of reading the frames, without the control ticks in their midst.
+    pub driver_counts: u32,
+    /// Clock counts of taking the packets.
+    pub packet_counts: u32,
+}
+
+impl Network {
+    /// First field.
+    pub const KIND: u32 = 3;
+}
+
 /// A record from the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Record {
     /// One control tick.
     Tick(Tick),
-    /// The whole run.
+    /// The network.
+    Network(Network),
+    /// The whole run: the last record.
     Summary(Summary),
 }
 
-/// Writes a [`Tick`] or a [`Summary`] to `out`, framed for the line; `None` only if `out` is too small.
+/// Writes a record's fields to `out`, framed for the line; `None` only if `out` is too small.
 pub fn frame<'b, T: NoUninit>(record: &T, out: &'b mut [u8; MAX_FRAMED]) -> Option<&'b [u8]> {
     const { assert!(cfg!(target_endian = "little"), "records are little-endian") };
     let mut bytes = [0; LARGEST + CHECKSUM];
@@ -199,6 +226,7 @@ impl Record {
         let kind = u32::from_le_bytes(*fields.first_chunk()?);
         match kind {
             Tick::KIND => bytemuck::try_pod_read_unaligned(fields).ok().map(Self::Tick),
+            Network::KIND => bytemuck::try_pod_read_unaligned(fields).ok().map(Self::Network),
             Summary::KIND => bytemuck::try_pod_read_unaligned(fields).ok().map(Self::Summary),
             _ => None,
         }

@@ -5,10 +5,7 @@ use std::sync::OnceLock;
 
 use controller::surface::{self, Surface};
 use controller::telemetry::{Tick, cause_code};
-use controller::{
-    BusStatus, Control, MTU, Receiver, SILENCE_LIMIT, SILENCE_WARNING, SURFACE_AGE_LIMIT,
-    SURFACE_AGE_WARNING,
-};
+use controller::{BusStatus, Control, MTU, Receiver, Trust};
 use dibs_build::{Builder, generate};
 use dibs_nostd::Unavailable;
 use dibs_nostd::failsafe::State;
@@ -19,6 +16,11 @@ use dibs_nostd::wire::{
 };
 use dibs_tests::oracle::{Instrument, exhaustive};
 use dibs_tests::sides;
+
+const SILENCE_WARNING: u32 = Trust::SERIAL.silence.0;
+const SILENCE_LIMIT: u32 = Trust::SERIAL.silence.1;
+const SURFACE_AGE_WARNING: u32 = Trust::SERIAL.age.0;
+const SURFACE_AGE_LIMIT: u32 = Trust::SERIAL.age.1;
 
 /// The firmware's tree.
 fn firmware_tree() -> &'static surface::Tree {
@@ -32,7 +34,7 @@ fn controller() -> (Receiver, Control, &'static BusStatus) {
     let bus: &'static BusStatus = Box::leak(Box::new(BusStatus::new()));
     let (writer, reader) = frames.split().unwrap();
     let receiver = Receiver::new(firmware_tree(), writer, bus).unwrap();
-    (receiver, Control::new(firmware_tree(), reader, bus).unwrap(), bus)
+    (receiver, Control::new(firmware_tree(), reader, bus, &Trust::SERIAL).unwrap(), bus)
 }
 
 /// The sending side: the generated heart, in the tree's order.

@@ -1,6 +1,7 @@
 //! `cargo xtask`: tasks that need more than cargo.
 
 mod mutants;
+mod processors;
 mod prove;
 mod test;
 
@@ -9,6 +10,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use prove::Passed;
 use xtask::nightly;
+use xtask::steps::Outcome;
 
 /// Finds or installs the cross toolchain and the emulator where a task needs them.
 /// `DIBS_CROSS=rustup|debian|none` forces one way to build for the board.
@@ -36,6 +38,8 @@ enum Task {
     Profile(Passed),
     Fuzz(nightly::FuzzOptions),
     Mutants(mutants::Options),
+    /// Builds the core crate for every row of docs/processors.md.
+    Processors,
     /// Runs the tests of frames, bus and format under the address and the thread sanitizer.
     Sanitize,
     /// Runs the tests of the frames under Miri, where it is installed.
@@ -51,6 +55,11 @@ fn main() -> ExitCode {
         Task::Profile(passed) => prove::run("profile", &passed),
         Task::Fuzz(options) => or_say(nightly::missing(), || nightly::fuzz_by_hand(&options)),
         Task::Mutants(options) => mutants::mutants(&options),
+        Task::Processors => processors::check(false).map(|outcome| {
+            if let Outcome::Skipped(reason) = outcome {
+                println!("skipped: {reason}");
+            }
+        }),
         Task::Sanitize => or_say(nightly::missing(), nightly::sanitize_by_hand),
         Task::Miri => or_say(nightly::miri_missing(), nightly::miri),
     };

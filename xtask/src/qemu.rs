@@ -1,6 +1,6 @@
 //! The emulated board.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
@@ -50,13 +50,26 @@ pub fn alone(program: &Path, time: Time, arguments: &[&str]) -> Command {
     command
 }
 
-/// The command that boots `program` for `ticks` control ticks. Its bus is UART 0, connected to the
-/// socket `bus`; its telemetry UART 1, connected to the socket `telemetry`.
-pub fn command(program: &Path, bus: &Path, telemetry: &Path, ticks: u32) -> Command {
-    // The firmware reads its run length from the arguments.
-    let mut command = boot(program, BOARD, &["board", &ticks.to_string()]);
-    for socket in [bus, telemetry] {
-        command.arg("-serial").arg(format!("unix:{}", socket.display()));
+/// The board's bus.
+pub enum Bus {
+    /// UART 0, connected to this socket.
+    Serial(PathBuf),
+    /// The LAN9118, with this backend of the emulator's `-nic`.
+    Ethernet(String),
+}
+
+/// The command that boots `program` for `ticks` control ticks. Its telemetry is UART 1, connected to the socket
+/// `telemetry`.
+pub fn command(program: &Path, bus: &Bus, telemetry: &Path, ticks: u32) -> Command {
+    // The firmware reads its bus and its run length from the arguments.
+    let (bus_word, serial) = match bus {
+        Bus::Serial(socket) => ("serial", format!("unix:{}", socket.display())),
+        Bus::Ethernet(_) => ("ethernet", "null".to_owned()),
+    };
+    let mut command = boot(program, BOARD, &["board", bus_word, &ticks.to_string()]);
+    command.args(["-serial", &serial, "-serial"]).arg(format!("unix:{}", telemetry.display()));
+    if let Bus::Ethernet(backend) = bus {
+        command.args(["-nic", &format!("{backend},model=lan9118")]);
     }
     command
 }

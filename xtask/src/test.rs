@@ -13,7 +13,7 @@ use xtask::steps::{Outcome, Steps};
 use xtask::toolchain::Cross;
 use xtask::workspace;
 
-use crate::{mutants, prove};
+use crate::{mutants, processors, prove};
 
 /// Runs every check: format, lints, documentation, tests, oldest compiler, the board's build, and a
 /// short demo on the emulated board.
@@ -64,6 +64,8 @@ pub fn test(options: &Options) -> Result<()> {
         Ok(cross) => {
             println!("\nboard: {}", cross.describe());
             steps.run("core crate for the board", || core_crate(&cross));
+            let is_sample = !options.whole;
+            steps.run("processors", || processors::check(is_sample));
             steps.run("lints of the firmware", || firmware_lints(&cross));
             steps.run("C interface for the board", || c_interface::has_no_panic_path(&cross));
             if options.whole {

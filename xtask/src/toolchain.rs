@@ -99,20 +99,28 @@ impl Cross {
 }
 
 fn rustup() -> Result<Cross> {
-    if target_installed() {
-        return Ok(Cross::Rustup);
-    }
-    eprintln!("adding the target {TARGET} ...");
-    quiet(Command::new("rustup").args(["target", "add", TARGET]), DOWNLOAD)?;
-    if !target_installed() {
-        bail!("rustup added {TARGET}, but not to the toolchain in use");
-    }
-    Ok(Cross::Rustup)
+    add_target(TARGET).map(|()| Cross::Rustup)
 }
 
-fn target_installed() -> bool {
+/// Finds a target in the toolchain in use, or adds it.
+///
+/// # Errors
+/// If it is not there and rustup cannot add it.
+pub fn add_target(target: &str) -> Result<()> {
+    if target_installed(target) {
+        return Ok(());
+    }
+    eprintln!("adding the target {target} ...");
+    quiet(Command::new("rustup").args(["target", "add", target]), DOWNLOAD)?;
+    if !target_installed(target) {
+        bail!("rustup added {target}, but not to the toolchain in use");
+    }
+    Ok(())
+}
+
+fn target_installed(target: &str) -> bool {
     let mut command = Command::new("rustc");
-    command.args(["--print", "target-libdir", "--target", TARGET]);
+    command.args(["--print", "target-libdir", "--target", target]);
     quiet(&mut command, MOMENT).is_ok_and(|folder| Path::new(folder.trim()).is_dir())
 }
 

@@ -82,23 +82,44 @@ impl Line {
     /// # Errors
     /// When the socket cannot be shared with the reading thread.
     pub fn udp(socket: UdpSocket) -> io::Result<Self> {
+        Self::udp_paced(socket, |datagrams| datagrams)
+    }
+
+    /// The same, written through a writer of your own, say one that does not overrun a small receiver: it gets one
+    /// packet a write, then a flush.
+    ///
+    /// # Errors
+    /// When the socket cannot be shared with the reading thread.
+    pub fn udp_paced<W: Write + Send + 'static>(
+        socket: UdpSocket,
+        writer: impl FnOnce(Datagrams) -> W,
+    ) -> io::Result<Self> {
         socket.set_read_timeout(Some(PATIENCE))?;
         let reader = socket.try_clone()?;
+        Ok(Self::datagrams(writer(Datagrams(socket)), move |buffer| match reader.recv(buffer) {
+            // There is no receiver yet: the sender continues, as after any lost datagram.
+            Err(error) if error.kind() == ErrorKind::ConnectionRefused => Ok(0),
+            received => received,
+        }))
+    }
+
+    /// Any line that keeps packets apart: a write is a packet, and `read` fills in the next one that came, 0 bytes if
+    /// none. A long read should time out from time to time.
+    pub fn datagrams(
+        writer: impl Write + Send + 'static,
+        mut read: impl FnMut(&mut [u8]) -> io::Result<usize> + Send + 'static,
+    ) -> Self {
         let mut buffer = vec![0; MAX_PACKET];
-        Ok(Self::new(
-            Datagrams(socket),
+        Self::new(
+            writer,
             false,
             || (),
             move |packets| {
-                match reader.recv(&mut buffer) {
-                    Ok(bytes) => packets.push(buffer[..bytes].to_vec()),
-                    // There is no receiver yet: the sender continues, as after any lost datagram.
-                    Err(error) if error.kind() == ErrorKind::ConnectionRefused => (),
-                    Err(error) => return Err(error),
-                }
+                let bytes = read(&mut buffer)?;
+                packets.extend((bytes > 0).then(|| buffer[..bytes].to_vec()));
                 Ok(())
             },
-        ))
+        )
     }
 
     /// Any byte stream with a reading and a writing end. A long read should time out from time to time, or end when
@@ -235,8 +256,9 @@ impl Write for Port {
     }
 }
 
-/// A write is a datagram.
-struct Datagrams(UdpSocket);
+/// A UDP socket to write to: a write is a datagram.
+#[derive(Debug)]
+pub struct Datagrams(UdpSocket);
 
 impl Write for Datagrams {
     fn write(&mut self, packet: &[u8]) -> io::Result<usize> {

@@ -12,7 +12,7 @@ use std::{env, thread};
 
 use anyhow::{Context, Result, anyhow};
 use controller::telemetry::{MAX_FRAMED, Summary, frame};
-use controller::{BusStatus, Control, Receiver, STATUS_FRAMED, TICK_RATE, Upkeep, surface};
+use controller::{BusStatus, Control, Receiver, STATUS_FRAMED, TICK_RATE, Trust, Upkeep, surface};
 use dibs_nostd::wire::{Counters, Event};
 
 /// Slices of background work between two looks at the bus.
@@ -64,7 +64,8 @@ fn main() -> Result<()> {
         }
     });
 
-    let mut control = Control::new(tree, reader, &BUS).map_err(|error| anyhow!("{error}"))?;
+    let mut control =
+        Control::new(tree, reader, &BUS, &Trust::SERIAL).map_err(|error| anyhow!("{error}"))?;
     let mut out = BufWriter::new(telemetry);
     let mut line = [0; MAX_FRAMED];
     let period = Duration::from_secs(1) / TICK_RATE;

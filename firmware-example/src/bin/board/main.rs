@@ -1,14 +1,17 @@
 //! The board: MPS2-AN500, a Cortex-M7 that QEMU emulates as `mps2-an500`.
 //!
 //! Three priorities share the core. The control tick (`SysTick`, 1 kHz) is the highest: only its previous run delays
-//! it. Bus reception (UART 0) is one below. The idle loop checks complete frames and the tree in flash a slice at a
-//! time, and sends statuses over UART 0 and telemetry over UART 1.
+//! it. Reception over a serial line (UART 0) is one below. The idle loop takes Ethernet frames where the bus is
+//! Ethernet, checks complete frames and the tree in flash a slice at a time, and sends statuses over the bus and
+//! telemetry over UART 1.
 #![no_std]
 #![no_main]
 
 mod clock;
 mod exclusive;
+mod lan9118;
 mod log;
+mod network;
 mod panic;
 mod registers;
 mod schedule;
@@ -18,9 +21,12 @@ mod uart;
 mod vectors;
 
 use controller::telemetry::{MAX_FRAMED, Tick, frame};
-use controller::{BusStatus, Control, Receiver, STATUS_FRAMED, Upkeep, surface};
+use controller::{BusStatus, Control, Receiver, STATUS_FRAMED, STATUS_MTU, Trust, Upkeep, surface};
 use cortex_m_rt::entry;
+use dibs_nostd::wire::enframe;
 use heapless::spsc::{Consumer, Queue};
+use network::Network;
+use semihosting::Arguments;
 
 /// Records that wait for the line.
 const QUEUE: usize = 64;
@@ -32,6 +38,7 @@ static BUS: BusStatus = BusStatus::new();
 fn main() -> ! {
     static mut RECORDS: Queue<Tick, QUEUE> = Queue::new();
     static mut TREE: Option<surface::Tree> = None;
+    static mut NETWORK: Option<Network> = None;
     let (producer, consumer) = RECORDS.split();
 
     // Validated once, before its first use; from then on `Upkeep` checks it.
@@ -49,8 +56,17 @@ fn main() -> ! {
         tree.mesh_id(),
         tree.stretch()
     );
+    let arguments = Arguments::read();
+    if arguments.is_ethernet {
+        *NETWORK = Network::start();
+        if NETWORK.is_none() {
+            defmt::error!("the board has no LAN9118");
+            semihosting::exit(false)
+        }
+    }
+    let trust = if arguments.is_ethernet { &Trust::ETHERNET } else { &Trust::SERIAL };
     let Ok((writer, reader)) = FRAMES.split() else { semihosting::exit(false) };
-    let Ok(control) = Control::new(tree, reader, &BUS) else {
+    let Ok(control) = Control::new(tree, reader, &BUS, trust) else {
         defmt::error!("the controller's constants are out of range");
         semihosting::exit(false)
     };
@@ -58,17 +74,21 @@ fn main() -> ! {
         defmt::error!("the tree has nothing to measure stretch against");
         semihosting::exit(false)
     };
-    schedule::start(control, producer, receiver);
+    schedule::start(control, producer, receiver, !arguments.is_ethernet);
     uart::TELEMETRY.start_sending();
-    idle(consumer, semihosting::run_length())
+    idle(consumer, NETWORK.as_mut(), arguments.ticks)
 }
 
-/// Sends records until the run is over; with a run length of 0 for ever.
-fn idle(mut records: Consumer<'static, Tick>, ticks: u32) -> ! {
+/// Sends records and takes frames until the run is over; with a run length of 0 for ever.
+fn idle(
+    mut records: Consumer<'static, Tick>,
+    mut network: Option<&'static mut Network>,
+    ticks: u32,
+) -> ! {
     let mut line = [0; MAX_FRAMED];
     #[cfg(feature = "planted-overflow")]
     line.fill(overflow(1));
-    let mut status = [0; STATUS_FRAMED];
+    let mut status = [0; STATUS_MTU];
     let mut upkeep = Upkeep::new(&BUS);
     #[cfg(feature = "planted-panic")]
     core::hint::black_box([0; 4][core::hint::black_box(0_usize)]);
@@ -84,13 +104,21 @@ fn idle(mut records: Consumer<'static, Tick>, ticks: u32) -> ! {
         // There is always work, so the loop does not sleep. To save power, `wfi` after a round of `upkeep`; but an
         // emulated processor that sleeps loses its exact time.
         upkeep.step();
-        for &byte in schedule::background(&mut status).unwrap_or_default() {
-            uart::BUS.write(byte);
+        if let Some(network) = &mut network {
+            network.poll();
+        }
+        match (schedule::background(&mut status), &mut network) {
+            (Some(status), Some(network)) => network.send(status),
+            (Some(status), None) => send_serial(status),
+            (None, _) => (),
         }
     }
     schedule::stop();
     while let Some(record) = records.dequeue() {
         send(frame(&record, &mut line));
+    }
+    if let Some(network) = network {
+        send(frame(network.record(), &mut line));
     }
     let summary = schedule::summary(stack::high_water(), upkeep.rounds());
     send(frame(&summary, &mut line));
@@ -115,6 +143,15 @@ fn overflow(depth: u8) -> u8 {
     overflow(depth | 1).wrapping_add(below.iter().fold(0, |sum, byte| sum ^ byte))
 }
 
+/// Sends a status over the serial bus.
+fn send_serial(status: &[u8]) {
+    let mut line = [0; STATUS_FRAMED];
+    for &byte in enframe(status, &mut line).unwrap_or_default() {
+        uart::BUS.write(byte);
+    }
+}
+
+/// Sends a record as telemetry.
 fn send(bytes: Option<&[u8]>) {
     for &byte in bytes.unwrap_or_default() {
         uart::TELEMETRY.write(byte);

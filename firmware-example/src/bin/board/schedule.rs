@@ -1,9 +1,9 @@
-//! The two interrupts, and the watch over the first one's deadline.
+//! The interrupts, and the watch over the first one's deadline.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use controller::telemetry::{Summary, Tick};
-use controller::{Control, Receiver, STATUS_FRAMED};
+use controller::{Control, Receiver, STATUS_MTU};
 use cortex_m::peripheral::scb::SystemHandler;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{NVIC, Peripherals, SYST};
@@ -42,8 +42,13 @@ struct Timeline {
     dropped: u32,
 }
 
-/// Starts the clock and both interrupts.
-pub fn start(control: Control, records: Producer<'static, Tick>, receiver: Receiver) {
+/// Starts the clock and the control tick; and the bus interrupt, if the bus is the serial line.
+pub fn start(
+    control: Control,
+    records: Producer<'static, Tick>,
+    receiver: Receiver,
+    is_serial: bool,
+) {
     clock::start();
     // The one place where this program disables interrupts: inside `take`.
     let before = clock::now();
@@ -62,7 +67,9 @@ pub fn start(control: Control, records: Producer<'static, Tick>, receiver: Recei
         });
     });
     RECEIVER.with(|place| *place = Some(receiver));
-    uart::BUS.start_receiving();
+    if is_serial {
+        uart::BUS.start_receiving();
+    }
     // SAFETY: no critical section relies on priorities, and the handlers' state is in place.
     unsafe {
         core.SCB.set_priority(SystemHandler::SysTick, CONTROL_PRIORITY);
@@ -78,13 +85,13 @@ pub fn start(control: Control, records: Producer<'static, Tick>, receiver: Recei
 
 /// Does a slice of work on complete frames. Returns the status to send, if one is due. It masks the bus interrupt: for
 /// some microseconds no byte is taken.
-pub fn background(line: &mut [u8; STATUS_FRAMED]) -> Option<&[u8]> {
+pub fn background(packet: &mut [u8; STATUS_MTU]) -> Option<&[u8]> {
     NVIC::mask(BusInterrupt);
     let before = own_time();
     let status = RECEIVER.with(|receiver| {
         let receiver = receiver.as_mut()?;
         receiver.work();
-        receiver.report(ticks(), line)
+        receiver.status(ticks(), packet)
     });
     if let (Some(before), Some(after)) = (before, own_time()) {
         BUS_MASKED.fetch_max(after.wrapping_sub(before), Ordering::Relaxed);
@@ -94,8 +101,19 @@ pub fn background(line: &mut [u8; STATUS_FRAMED]) -> Option<&[u8]> {
     status.flatten()
 }
 
+/// Takes a packet that the idle loop found in a frame. Returns whether it was a good one.
+pub fn take(packet: &[u8]) -> bool {
+    let taken = RECEIVER.with(|receiver| Some(receiver.as_mut()?.packet(packet, ticks())));
+    taken.flatten().unwrap_or(false)
+}
+
+/// Clock counts since a time, without the control ticks; 0 if a tick came during one of the two readings.
+pub fn since(start: Option<u32>) -> u32 {
+    start.and_then(|start| Some(own_time()?.wrapping_sub(start))).unwrap_or(0)
+}
+
 /// The clock less the control ticks, which delay the bus anyway; `None` if a tick came during the reading.
-fn own_time() -> Option<u32> {
+pub fn own_time() -> Option<u32> {
     let control = CONTROL_COUNTS.load(Ordering::Relaxed);
     let now = clock::now();
     (control == CONTROL_COUNTS.load(Ordering::Relaxed)).then_some(now.wrapping_sub(control))

@@ -72,6 +72,26 @@ pub const CHECK: Check = Check {
             unit: "of {demo.compared} frames, read back by a checksum of all positions in the board's memory",
             limits: "CRC-32.",
         },
+        note("demo.age"),
+        note("demo.oldest"),
+        Promise {
+            id: "demo.rate",
+            says: "Frames of all vertices, quantised, that arrive over Ethernet, are checked and published",
+            criterion: TIMING,
+            bound: Bound::AtLeast(50.0),
+            unit: "a second of the controller's own time; the surface is {demo.age} ms old on average, {demo.oldest} at most",
+            limits: "The emulated LAN9118 is as fast as the loop that polls it; the sender sends 62 a second.",
+        },
+        note("demo.packet-share"),
+        Promise {
+            id: "demo.network-share",
+            says: "Share of the instructions that the network takes: driver, ARP, IPv4 and UDP",
+            criterion: TIMING,
+            bound: Bound::AtMost(10.0),
+            unit: "% of all; another {demo.packet-share} % check and decode the packets",
+            limits: "By the clock, less the control ticks in between. Register accesses take longer on silicon than their \
+                     instruction.",
+        },
         Promise {
             id: "interrupts.masked",
             says: "Longest section with all interrupts disabled, by the clock around it: start-up takes the peripherals",
@@ -109,6 +129,14 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
         ("stack.measured", "stack_bytes"),
     ] {
         figures.note(name, number(&report[field], field)?);
+    }
+    figures.note("demo.rate", number(&report["frames_per_second"], "frames_per_second")?);
+    figures.note("demo.age", number(&report["surface_age_mean_ms"], "surface_age_mean_ms")?);
+    figures.note("demo.oldest", number(&report["surface_age_max_ms"], "surface_age_max_ms")?);
+    for (name, field) in
+        [("demo.network-share", "driver_share"), ("demo.packet-share", "packet_share")]
+    {
+        figures.note(name, number(&report["network"][field], field)? * 100.0);
     }
     Ok(Outcome::Passed)
 }

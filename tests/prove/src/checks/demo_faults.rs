@@ -52,11 +52,11 @@ pub const CHECK: Check = Check {
             id: "demo.faults.safe-after-packet",
             says: "A bus that falls silent makes the output safe in time",
             criterion: FAULTS,
-            // `SILENCE_LIMIT`, and the tick that finds it exceeded.
-            bound: Bound::AtMost(2_001.0),
+            // The limit of `Trust::ETHERNET`, and the tick that finds it exceeded.
+            bound: Bound::AtMost(81.0),
             unit: "ms after the last good packet, {demo.faults.safe-after-frame} ms after the last good frame; \
          nominal again {demo.faults.recovered-after} ms later",
-            limits: "The example's limit, for an emulated line of a frame a second; a real one is some tens of ms.",
+            limits: "The example's limit, for a bus of 60 frames a second.",
         },
     ],
 };

@@ -8,6 +8,7 @@ pub mod cost;
 mod demo;
 mod demo_c;
 mod demo_faults;
+mod flood;
 mod fuzz;
 mod hand;
 mod host_faults;
@@ -45,6 +46,7 @@ pub const CHECKS: &[Check] = &[
     stack::CHECK,
     demo::CHECK,
     demo_faults::CHECK,
+    flood::CHECK,
     demo_c::CHECK,
     rot::CHECK,
     host_faults::CHECK,

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use controller::TICK_RATE;
 use controller::telemetry::Tick;
-use controller::{SILENCE_LIMIT, TICK_RATE};
 use dibs_build::faults::Fault;
 use dibs_nostd::failsafe::State;
 use serde::Serialize;
 
+use super::bus::Bus;
 use super::session::Outcome;
 
 /// The plan of faults on the bus.
@@ -47,10 +48,12 @@ impl Plan {
     }
 
     /// Ticks for which the line is cut once: longer than the controller's limit.
-    pub const SILENCE: u32 = SILENCE_LIMIT + TICK_RATE / 2;
+    pub const fn silence(bus: Bus) -> u32 {
+        bus.trust().silence.1 + TICK_RATE / 2
+    }
 
-    /// The tick after which the line is cut, as soon as a frame has arrived. It is early, because the emulated line
-    /// brings a frame in about a second, and frames after the silence must fit too.
+    /// The tick after which the line is cut, as soon as a frame has arrived. It is early, because an emulated serial
+    /// line brings a frame in about a second, and frames after the silence must fit too.
     pub const fn silence_at(&self) -> u32 {
         self.seconds * TICK_RATE / 4
     }
@@ -101,8 +104,9 @@ impl Silence {
     pub fn of(outcome: &Outcome) -> Option<Self> {
         let ticks = &outcome.ticks;
         let safe = State::Safe as u32;
+        let limit = outcome.bus.trust().silence.1;
         let is_lost = |[before, after]: &[Tick; 2]| {
-            before.state != safe && after.state == safe && after.silence > SILENCE_LIMIT
+            before.state != safe && after.state == safe && after.silence > limit
         };
         let place = ticks.array_windows().position(is_lost)?;
         let (before, [safe, after @ ..]) = ticks.split_at(place + 1) else { return None };

@@ -9,6 +9,7 @@ use xtask::toolchain::Cross;
 use xtask::{c_firmware, firmware, qemu, workspace};
 
 use super::Options;
+use super::bus::Bus;
 use super::scene::Scene;
 use crate::footprint::Footprint;
 
@@ -26,6 +27,8 @@ pub enum Machine {
         toolchain: String,
         /// The emulator's version.
         emulator: String,
+        /// Its bus.
+        bus: Bus,
     },
     /// The same control logic as a program.
     Host {
@@ -56,7 +59,8 @@ impl Machine {
                 let footprint = Footprint::read(&program)?;
                 // In defmt's encoding: `defmt-print -e FIRMWARE < log.defmt`.
                 let (log, toolchain) = ("log.defmt", cross.describe());
-                Ok(Self::Board { program, log, footprint, toolchain, emulator })
+                let bus = if options.serial { Bus::Serial } else { Bus::Ethernet };
+                Ok(Self::Board { program, log, footprint, toolchain, emulator, bus })
             }
             Err(error) if options.board_only => Err(error),
             Err(error) => {
@@ -77,7 +81,8 @@ impl Machine {
         let program = c_firmware::build(&cross, scene.tree.blob(), vertices)?;
         let footprint = Footprint::read(&program)?;
         let toolchain = format!("{compiler}, its library by {}", cross.describe());
-        Ok(Self::Board { program, log: "log.txt", footprint, toolchain, emulator })
+        let (log, bus) = ("log.txt", Bus::Serial);
+        Ok(Self::Board { program, log, footprint, toolchain, emulator, bus })
     }
 
     fn host(scene: &Scene, reason: String) -> Result<Self> {
@@ -97,14 +102,25 @@ impl Machine {
         Ok(Self::Host { program: folder.join("release").join("host"), reason })
     }
 
-    /// The command that runs the controller for `ticks` ticks, with its bus and its telemetry on two
-    /// sockets that it connects to.
-    pub fn command(&self, bus: &Path, telemetry: &Path, ticks: u32) -> Command {
+    /// The controller's bus.
+    pub const fn bus(&self) -> Bus {
+        match self {
+            Self::Board { bus, .. } => *bus,
+            Self::Host { .. } => Bus::Serial,
+        }
+    }
+
+    /// The command that runs the controller for `ticks` ticks, with this end of its bus, and its telemetry on a socket
+    /// that it connects to.
+    pub fn command(&self, bus: &qemu::Bus, telemetry: &Path, ticks: u32) -> Command {
         let mut command = match self {
             Self::Board { program, .. } => qemu::command(program, bus, telemetry, ticks),
             Self::Host { program, .. } => {
                 let mut command = Command::new(program);
-                command.arg(bus).arg(telemetry).arg(ticks.to_string());
+                if let qemu::Bus::Serial(socket) = bus {
+                    command.arg(socket);
+                }
+                command.arg(telemetry).arg(ticks.to_string());
                 command
             }
         };
@@ -123,8 +139,12 @@ impl Machine {
     /// One line for the user.
     pub fn describe(&self) -> String {
         match self {
-            Self::Board { toolchain, emulator, .. } => {
-                format!("Cortex-M7 (mps2-an500) in {emulator}; built by {toolchain}")
+            Self::Board { toolchain, emulator, bus, .. } => {
+                let bus = match bus {
+                    Bus::Serial => "serial line",
+                    Bus::Ethernet => "UDP over Ethernet",
+                };
+                format!("Cortex-M7 (mps2-an500) in {emulator}, {bus}; built by {toolchain}")
             }
             Self::Host { reason, .. } => format!("program on this computer, {reason}"),
         }

@@ -1,8 +1,11 @@
 //! `cargo xtask demo`: a beating heart streamed to the controller, every answer checked.
 
+mod bus;
 mod check;
 pub mod debugger;
 mod faults;
+mod flood;
+pub mod freshness;
 pub mod machine;
 mod plot;
 mod push;
@@ -48,6 +51,10 @@ pub struct Options {
     /// Runs the controller in C, `examples/c/firmware`, compiled by Debian's `arm-none-eabi-gcc`.
     #[arg(long, conflicts_with = "host")]
     pub c: bool,
+    /// Takes a serial line for the bus, and not Ethernet: the heart beats in slow motion. The controllers on this
+    /// computer and in C know no other.
+    #[arg(long)]
+    pub serial: bool,
     /// Puts faults of every kind on the bus, and silences it once for a while.
     #[arg(long)]
     pub faults: bool,

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
+use controller::TICK_RATE;
 use controller::telemetry::{Summary, Tick, cause_code};
-use controller::{SILENCE_LIMIT, SURFACE_AGE_LIMIT, TICK_RATE};
 use dibs_nostd::failsafe::State;
 use dibs_nostd::wire::Event;
 use dibs_nostd::{QueryError, Unavailable};
@@ -14,6 +14,7 @@ use xtask::qemu;
 
 use super::check;
 use super::faults::{Faults, Silence};
+use super::freshness::Freshness;
 use super::machine::Machine;
 use super::push::Pushed;
 use super::scene::Scene;
@@ -30,6 +31,8 @@ pub struct Report {
     frames_sent: u32,
     frames_published: u32,
     frames_rejected: u32,
+    #[serde(flatten)]
+    freshness: Freshness,
     /// The faults on the bus.
     faults: Option<Faults>,
     /// The states that a silent line led to.
@@ -135,6 +138,7 @@ impl Report {
             frames_sent: outcome.frames_sent,
             frames_published: last.frames_published,
             frames_rejected: last.rejected,
+            freshness: Freshness::of(outcome),
             faults: outcome.faults.clone(),
             silence: Silence::of(outcome),
             bus_events: events(&summary),
@@ -237,10 +241,11 @@ impl Report {
             promise(published + 1 >= sent, format!("{published} of {sent} frames were published"));
         }
         // The rate of frames depends on this computer; the promise is the behaviour without one.
+        let trust = outcome.bus.trust();
         let acting = || outcome.ticks.iter().filter(|tick| tick.state != State::Safe as u32);
-        let too_old = acting().filter(|tick| tick.age > SURFACE_AGE_LIMIT).count();
+        let too_old = acting().filter(|tick| tick.age > trust.age.1).count();
         promise(too_old == 0, format!("{too_old} ticks acted on a surface that was too old"));
-        let silent = acting().filter(|tick| tick.silence > SILENCE_LIMIT).count();
+        let silent = acting().filter(|tick| tick.silence > trust.silence.1).count();
         promise(silent == 0, format!("{silent} ticks acted after the link was lost"));
         let lost = self.records_lost;
         promise(lost == 0, format!("{lost} telemetry records were lost"));
@@ -273,6 +278,9 @@ impl Report {
                 self.frames_sent, self.frames_published, self.frames_rejected
             ),
         );
+        for (name, value) in self.freshness.rows() {
+            row(name, value);
+        }
         let events: Vec<String> =
             self.bus_events.iter().map(|(name, count)| format!("{name} {count}")).collect();
         row("", events.join(", "));

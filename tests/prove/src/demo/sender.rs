@@ -2,8 +2,6 @@
 
 use std::collections::HashMap;
 use std::io::{self, Write};
-use std::net::Shutdown;
-use std::os::unix::net::UnixStream;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread;
@@ -16,6 +14,7 @@ use dibs_build::stream::{SendError, Sender, Settings, SurfaceOrder};
 use dibs_build::transport::Line;
 use glam::Vec3;
 
+use super::bus::Bus;
 use super::faults::Plan;
 use super::scene::Scene;
 
@@ -24,10 +23,6 @@ const PAUSE: Duration = Duration::from_micros(300);
 
 /// Real time in which a byte arrives, unless it was lost.
 const ARRIVAL: Duration = Duration::from_millis(500);
-
-/// Ticks in which the controller acknowledges a frame, longer than any check: a frame not acknowledged by then was
-/// lost.
-const ANSWER: u32 = TICK_RATE / 20;
 
 /// Messages between sender and listener.
 #[derive(Default)]
@@ -54,26 +49,35 @@ impl Link {
         self.frames.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
 
-    fn is_over(&self) -> bool {
+    /// Whether the controller has ended.
+    pub fn is_over(&self) -> bool {
         self.over.load(Ordering::Relaxed)
     }
 
-    fn now(&self) -> u32 {
+    /// The controller's tick.
+    pub fn now(&self) -> u32 {
         self.tick.load(Ordering::Relaxed)
     }
 }
 
-/// A socket that is flushed once all has arrived: an emulated serial line lets the computer run seconds
-/// ahead.
-struct Paced {
-    socket: UnixStream,
+/// A writer that is flushed once most has arrived: an emulated serial line lets the computer run seconds ahead, and an
+/// Ethernet controller drops what does not fit its buffer.
+pub struct Paced<W> {
+    writer: W,
     link: Arc<Link>,
+    /// Bytes that may be on their way after a flush.
+    window: u32,
     sent: u32,
 }
 
-impl Write for Paced {
+/// Paces a writer by the bytes that the controller has counted.
+pub fn paced<W: Write>(writer: W, link: &Arc<Link>, window: u32) -> Paced<W> {
+    Paced { writer, link: Arc::clone(link), window, sent: 0 }
+}
+
+impl<W: Write> Write for Paced<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let taken = self.socket.write(bytes)?;
+        let taken = self.writer.write(bytes)?;
         self.sent = self.sent.wrapping_add(taken as u32);
         Ok(taken)
     }
@@ -81,7 +85,7 @@ impl Write for Paced {
     fn flush(&mut self) -> io::Result<()> {
         let mut start = Instant::now();
         let mut arrived = self.link.bytes.load(Ordering::Relaxed);
-        while self.sent != arrived {
+        while self.sent.wrapping_sub(arrived) > self.window {
             if self.link.is_over() {
                 return Err(io::ErrorKind::BrokenPipe.into());
             }
@@ -98,22 +102,15 @@ impl Write for Paced {
     }
 }
 
-fn paced(socket: UnixStream, link: &Arc<Link>) -> Result<Line> {
-    // The timeout lets the reading thread check whether it is still needed.
-    socket.set_read_timeout(Some(Duration::from_millis(50)))?;
-    let (reader, handle) = (socket.try_clone()?, socket.try_clone()?);
-    let writer = Paced { socket, link: Arc::clone(link), sent: 0 };
-    Ok(Line::stream(writer, reader, move || drop(handle.shutdown(Shutdown::Both))))
-}
-
 /// Sends the motion repeatedly until the controller ends: at the recorded rate, or as fast as the line allows and the
 /// controller acknowledges.
 ///
 /// Returns the count of each fault.
 pub fn send(
     scene: &Scene,
+    bus: Bus,
     link: &Arc<Link>,
-    bus: UnixStream,
+    line: Line,
     faults: Option<&Plan>,
 ) -> Result<Vec<(Fault, u64)>> {
     let order = match scene.tree.index_bits() {
@@ -121,23 +118,27 @@ pub fn send(
         _ => SurfaceOrder::of(&scene.tree.tree::<u32>()?),
     };
     let settings = Settings { session: 1, ..Settings::default() };
-    let line = paced(bus, link)?;
     let line = match faults {
         Some(plan) => FaultyLine::new(line, plan.seed, Plan::KINDS, Plan::RATE),
         None => FaultyLine::new(line, 0, &[], 0.0),
     };
-    let mut sender = Sender::<_, MTU>::new(line, order, settings);
-    send_all(scene, link, &mut sender, faults)?;
+    // The emulated board's time is slower than this computer's: a frame's age and heartbeats are in the board's.
+    let clock = Arc::clone(link);
+    let sender = Sender::<_, MTU>::new(line, order, settings);
+    let mut sender = sender.with_clock(move || Duration::from_millis(clock.now().into()));
+    send_all(scene, bus, link, &mut sender, faults)?;
     Ok(sender.transport().counts().to_vec())
 }
 
 fn send_all(
     scene: &Scene,
+    bus: Bus,
     link: &Link,
     sender: &mut Sender<FaultyLine, MTU>,
     faults: Option<&Plan>,
 ) -> Result<()> {
-    let interval = (TICK_RATE as f32 / scene.rate) as u32;
+    let (frames, frame_rate) = bus.frames(&scene.motion, scene.rate);
+    let interval = (TICK_RATE as f32 / frame_rate) as u32;
     let rate = if faults.is_some() { Plan::RATE } else { 0.0 };
     let mut silence = faults.map(Plan::silence_at);
     // Every frame must echo a status: the controller does not trust a frame of unknown delay.
@@ -146,11 +147,11 @@ fn send_all(
             return Ok(());
         }
     }
-    for positions in scene.motion.frames.iter().cycle() {
-        let start = link.now();
+    let mut start = link.now();
+    for positions in frames.iter().cycle() {
         // The last frame before the silence and the first after it have no faults, so that only the silence is
         // measured.
-        if silence.is_some_and(|at| start >= at) {
+        if silence.is_some_and(|at| link.now() >= at) {
             sender.transport().set_rate(0.0);
         }
         let frame = sender.prepare(positions).context("the motion cannot be sent")?;
@@ -168,14 +169,17 @@ fn send_all(
         // A frame that begins while the one before is being checked would be refused.
         let is_waiting = |in_flight: u32| {
             let now = link.now();
-            now < start + interval || in_flight > 0 && now < sent + ANSWER
+            now < start + interval || in_flight > 0 && now < sent + bus.answer()
         };
         while is_waiting(sender.in_flight()) {
             if !rest(link, sender) {
                 return Ok(());
             }
         }
+        // A frame that was late lets the next one start sooner, but by no more than one interval.
+        start = (start + interval).max(link.now().saturating_sub(interval));
         if sender.in_flight() > 0 {
+            start = link.now();
             continue;
         }
         sender.transport().set_rate(rate);
@@ -183,7 +187,7 @@ fn send_all(
             let line = sender.transport();
             line.set_rate(0.0);
             line.cut(true);
-            let end = link.now() + Plan::SILENCE;
+            let end = link.now() + Plan::silence(bus);
             while link.now() < end {
                 if !rest(link, sender) {
                     return Ok(());

@@ -12,12 +12,13 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 use controller::TICK_RATE;
-use controller::telemetry::{MAX_FRAMED, Record, Summary, Tick};
+use controller::telemetry::{MAX_FRAMED, Network, Record, Summary, Tick};
 use dibs_nostd::wire::Deframer;
 use indicatif::{ProgressBar, ProgressStyle};
 use xtask::process::shown;
 use xtask::{qemu, workspace};
 
+use super::bus::{Bus, Opened};
 use super::check::{Checked, Compared, check, compare};
 use super::debugger::{Bits, flip};
 use super::faults::{Faults, Plan};
@@ -36,12 +37,18 @@ pub enum Harm {
     Bus(Plan),
     /// Bits of the board's memory are flipped as soon as a frame is published.
     Memory(Bits),
+    /// A flood of Ethernet frames, drawn from this seed.
+    Flood(u64),
 }
 
 /// The results of a run.
 pub struct Outcome {
+    /// The controller's bus.
+    pub bus: Bus,
     /// The record of every tick.
     pub ticks: Vec<Tick>,
+    /// The network's part of the run, if the bus is Ethernet.
+    pub network: Option<Network>,
     /// The controller's summary.
     pub summary: Summary,
     /// The check of every answer.
@@ -50,6 +57,8 @@ pub struct Outcome {
     pub compared: Vec<Compared>,
     /// The faults on the bus, if any.
     pub faults: Option<Faults>,
+    /// Frames of a flood that were sent.
+    pub flood: u64,
     /// The last tick that was known when memory was changed, if it was.
     pub flipped_at: Option<u32>,
     /// Ticks requested.
@@ -74,18 +83,26 @@ pub fn run(
 ) -> Result<Outcome> {
     let faults = match harm {
         Harm::Bus(plan) => Some(plan),
-        Harm::Nothing | Harm::Memory(_) => None,
+        Harm::Nothing | Harm::Memory(_) | Harm::Flood(_) => None,
     };
     let ticks_asked = seconds * TICK_RATE;
     let sockets = tempfile::tempdir()?;
-    let (bus_path, telemetry_path) = (sockets.path().join("bus"), sockets.path().join("telemetry"));
-    let bus_socket = UnixListener::bind(&bus_path)?;
+    let telemetry_path = sockets.path().join("telemetry");
+    let (bus, flood) = match harm {
+        Harm::Flood(seed) => {
+            let (bus, wire) = Opened::wire()?;
+            (bus, Some((wire, *seed)))
+        }
+        Harm::Nothing | Harm::Bus(_) | Harm::Memory(_) => {
+            (machine.bus().open(sockets.path())?, None)
+        }
+    };
     let telemetry_socket = UnixListener::bind(&telemetry_path)?;
 
-    let mut command = machine.command(&bus_path, &telemetry_path, ticks_asked);
+    let mut command = machine.command(&bus.end, &telemetry_path, ticks_asked);
     let debugger = match harm {
         Harm::Memory(bits) => Some((sockets.path().join("debugger"), *bits)),
-        Harm::Nothing | Harm::Bus(_) => None,
+        Harm::Nothing | Harm::Bus(_) | Harm::Flood(_) => None,
     };
     if let Some((socket, _)) = &debugger {
         command.arg("-gdb").arg(format!("unix:{},server=on,wait=off", socket.display()));
@@ -97,13 +114,14 @@ pub fn run(
     command.stdout(File::create(folder.join(machine.log()))?);
     let start = Instant::now();
     let mut child = Guard(command.spawn().with_context(|| format!("cannot start `{shown}`"))?);
-    let bus = accept(&bus_socket, &mut child.0)?;
+    let link = Arc::new(Link::default());
+    let line = bus.connect(&mut child.0, &link)?;
     let telemetry = accept(&telemetry_socket, &mut child.0)?;
 
-    let link = Arc::new(Link::default());
     let (to_check, answers) = mpsc::channel::<Tick>();
-    let (listened, sent, checked) = thread::scope(|scope| {
-        let sender = scope.spawn(|| send(scene, &link, bus, faults));
+    let (listened, sent, checked, flooded) = thread::scope(|scope| {
+        let flood = flood.as_ref().map(|(wire, seed)| scope.spawn(|| wire.flood(&link, *seed)));
+        let sender = scope.spawn(|| send(scene, machine.bus(), &link, line, faults));
         let checker = scope.spawn(|| {
             answers.into_iter().map(|tick| check(scene, &link, &tick)).collect::<Result<Vec<_>>>()
         });
@@ -111,9 +129,10 @@ pub fn run(
         let listened = listen(telemetry, &link, &to_check, ticks_asked, debugger);
         link.over.store(true, Ordering::Relaxed);
         drop(to_check);
-        (listened, joined(sender.join()), joined(checker.join()))
+        let flooded = flood.map_or(Ok(0), |flood| joined(flood.join()));
+        (listened, joined(sender.join()), joined(checker.join()), flooded)
     });
-    let Heard { ticks, summary, flipped_at } = listened?;
+    let Heard { ticks, network, summary, flipped_at } = listened?;
     let injected = sent?;
     let mut compared = Vec::new();
     for tick in &ticks {
@@ -121,11 +140,14 @@ pub fn run(
     }
     let status = child.0.wait()?;
     Ok(Outcome {
+        bus: machine.bus(),
         ticks,
+        network,
         summary,
         checked: checked?,
         compared,
         faults: faults.map(|plan| Faults::new(plan, injected)),
+        flood: flooded?,
         flipped_at,
         ticks_asked,
         frames_sent: link.frames_sent.load(Ordering::Relaxed),
@@ -151,7 +173,7 @@ fn joined<T>(result: thread::Result<Result<T>>) -> Result<T> {
 }
 
 /// Waits until the controller connects.
-fn accept(socket: &UnixListener, child: &mut Child) -> Result<UnixStream> {
+pub fn accept(socket: &UnixListener, child: &mut Child) -> Result<UnixStream> {
     socket.set_nonblocking(true)?;
     let start = Instant::now();
     loop {
@@ -175,6 +197,7 @@ fn accept(socket: &UnixListener, child: &mut Child) -> Result<UnixStream> {
 /// A controller's telemetry.
 struct Heard {
     ticks: Vec<Tick>,
+    network: Option<Network>,
     summary: Summary,
     flipped_at: Option<u32>,
 }
@@ -193,7 +216,7 @@ fn listen(
     let bar = ProgressBar::new(ticks_asked.into()).with_style(ProgressStyle::with_template(style)?);
     let mut deframer = Deframer::<MAX_FRAMED>::new();
     let mut ticks = Vec::new();
-    let mut flipped_at = None;
+    let (mut network, mut flipped_at) = (None, None);
     let mut buffer = [0; 4096];
     loop {
         let bytes = telemetry.read(&mut buffer).context("the controller fell silent")?;
@@ -204,8 +227,9 @@ fn listen(
             match record {
                 Record::Summary(summary) => {
                     bar.finish_and_clear();
-                    return Ok(Heard { ticks, summary, flipped_at });
+                    return Ok(Heard { ticks, network, summary, flipped_at });
                 }
+                Record::Network(record) => network = Some(record),
                 Record::Tick(tick) => {
                     link.bytes.store(tick.bytes, Ordering::Relaxed);
                     link.tick.store(tick.tick, Ordering::Relaxed);

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Result, anyhow};
+use controller::TICK_RATE;
 use controller::telemetry::Tick;
-use controller::{SURFACE_AGE_LIMIT, TICK_RATE};
 use dibs_nostd::failsafe::State;
 use plotters::prelude::*;
 
@@ -23,7 +23,7 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
     let (upper, lower) = root.split_vertically(280);
     let oldest = outcome.ticks.iter().map(|tick| tick.age).max().unwrap_or(0);
     let age = |tick: &Tick| f64::from(tick.age) / f64::from(TICK_RATE);
-    let top = f64::from(oldest.max(SURFACE_AGE_LIMIT)) / f64::from(TICK_RATE);
+    let top = f64::from(oldest.max(outcome.bus.trust().age.1)) / f64::from(TICK_RATE);
     curve(&upper, &outcome.ticks, "age of the surface (s)", top, age)?;
     let rejected = outcome.ticks.last().map_or(1, |tick| tick.rejected.max(1));
     let name = "packets and frames rejected";

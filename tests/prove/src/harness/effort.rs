@@ -29,6 +29,8 @@ pub struct Effort {
     pub demo_seconds: u32,
     /// The same, with faults on the bus.
     pub fault_seconds: u32,
+    /// The same, on a flooded network.
+    pub flood_seconds: u32,
     /// Seconds of each fuzz target.
     pub fuzz_seconds: u32,
     /// Whether the records go to the documents, unlike those of a run of the tests.
@@ -53,6 +55,7 @@ impl Effort {
         board_faults: 100,
         demo_seconds: 20,
         fault_seconds: 60,
+        flood_seconds: 20,
         fuzz_seconds: 60,
         is_record: true,
         share: 1,
@@ -72,6 +75,7 @@ impl Effort {
         board_faults: 1,
         demo_seconds: 5,
         fault_seconds: 11,
+        flood_seconds: 1,
         fuzz_seconds: 15,
         is_record: false,
         share: 0,
@@ -96,6 +100,7 @@ impl Effort {
             board_faults: (self.board_faults / u64::from(share)).max(least.board_faults),
             demo_seconds: narrow(self.demo_seconds, least.demo_seconds),
             fault_seconds: narrow(self.fault_seconds, least.fault_seconds),
+            flood_seconds: narrow(self.flood_seconds, least.flood_seconds),
             share,
             ..self
         }

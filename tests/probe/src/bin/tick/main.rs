@@ -14,7 +14,7 @@ mod exit;
 mod files;
 
 use controller::surface::{self, Surface};
-use controller::{BusStatus, Control, Receiver};
+use controller::{BusStatus, Control, Receiver, Trust};
 use cortex_m_rt::entry;
 use exit::exit;
 use probe::tick::{ANSWER_WORDS, BYTES, END, SKIP, TICK};
@@ -33,7 +33,7 @@ fn main() -> ! {
 fn run(tree: &'static surface::Tree) -> Option<()> {
     let (writer, reader) = FRAMES.split().ok()?;
     let mut receiver = Receiver::new(tree, writer, &BUS).ok()?;
-    let mut control = Control::new(tree, reader, &BUS).ok()?;
+    let mut control = Control::new(tree, reader, &BUS, &Trust::SERIAL).ok()?;
     let mut script = files::Input::open()?;
     let mut answers = files::Output::create()?;
     loop {

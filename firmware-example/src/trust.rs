@@ -1,0 +1,80 @@
+//! How far a surface is trusted, by the bus that brings it.
+
+use dibs_nostd::failsafe::{LimitError, Limits, Watch};
+
+use crate::TICK_RATE;
+
+/// Frames refused or damaged in a row after which the state is degraded, and after which it is safe.
+const REJECTIONS: (u32, u32) = (10, 30);
+
+/// Forged packets between two published frames. This bus has no tags and so no forgeries; a receiver with a key watches
+/// the same counter.
+const FORGERIES: (u32, u32) = (0, 100);
+
+/// Frames in a row that recover. Nobody acknowledges here; a real robot leaves `automatic` out.
+const RECOVERY_FRAMES: u16 = 1;
+
+/// The limits of one bus. A pair is the number of ticks after which the state is degraded, and after which the output
+/// is safe.
+#[derive(Clone, Copy, Debug)]
+pub struct Trust {
+    /// Age of the surface, which counts from its frame's first packet.
+    pub age: (u32, u32),
+    /// Ticks without any good packet.
+    pub silence: (u32, u32),
+    /// Ticks without a heartbeat.
+    pub heartbeat: (u32, u32),
+    /// Ticks that a frame may have been on its way, by the status that it echoes.
+    pub transit: (u32, u32),
+    /// Age in ms that a frame may have when its sender sends it: a source that stands still while its sender lives.
+    pub source_age: (u32, u32),
+    /// Largest speed of the tissue, in mm a tick.
+    pub tissue_speed: f32,
+}
+
+impl Trust {
+    /// The emulated serial line: it takes one to three seconds for a frame, and so brings a heart slowed down some fifty
+    /// times.
+    pub const SERIAL: Self = Self {
+        age: (4 * TICK_RATE, 6 * TICK_RATE),
+        silence: (TICK_RATE, 2 * TICK_RATE),
+        heartbeat: (TICK_RATE, 3 * TICK_RATE),
+        // Statuses go out every 100 ms, and the line brings a begin packet in some milliseconds more.
+        transit: (TICK_RATE / 2, TICK_RATE),
+        source_age: (TICK_RATE, 2 * TICK_RATE),
+        tissue_speed: 0.001,
+    };
+
+    /// Ethernet: at 60 frames a second a surface gets some 30 ms old, and one frame may be lost before the state is
+    /// degraded. The generated heart moves by at most 1.57 mm in a thirtieth of a second.
+    pub const ETHERNET: Self = Self {
+        age: (60, 120),
+        silence: (40, 80),
+        heartbeat: (TICK_RATE, 3 * TICK_RATE),
+        transit: (TICK_RATE / 5, TICK_RATE / 2),
+        source_age: (TICK_RATE / 5, TICK_RATE / 2),
+        tissue_speed: 0.05,
+    };
+
+    /// The limits beyond which the surface is not trusted.
+    pub(crate) const fn limits(&self) -> Result<Limits, LimitError> {
+        macro_rules! tri {
+            ($result:expr) => {
+                match $result {
+                    Ok(value) => value,
+                    Err(error) => return Err(error),
+                }
+            };
+        }
+        macro_rules! watch {
+            ($pair:expr) => {
+                tri!(Watch::new($pair.0, $pair.1))
+            };
+        }
+        let limits = tri!(Limits::new(watch!(self.age), self.tissue_speed));
+        let limits = tri!(limits.recovery(RECOVERY_FRAMES)).silence(watch!(self.silence));
+        let limits = limits.heartbeat(watch!(self.heartbeat)).rejections(watch!(REJECTIONS));
+        let limits = limits.transit(watch!(self.transit)).source_age(watch!(self.source_age));
+        Ok(limits.forgeries(watch!(FORGERIES)).automatic())
+    }
+}
