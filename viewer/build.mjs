@@ -2,10 +2,11 @@
 import { build } from "esbuild";
 import { readFile, writeFile } from "node:fs/promises";
 import { join } from "node:path";
+import { fileURLToPath } from "node:url";
 import { deflateSync } from "node:zlib";
 
 const folder = process.argv[2];
-const here = import.meta.dirname;
+const here = fileURLToPath(new URL(".", import.meta.url));
 
 const { outputFiles } = await build({
   entryPoints: [join(here, "page/main.js")],

@@ -40,7 +40,7 @@ function beside(positions) {
 class Viewer {
   constructor({ facts, session }) {
     const positions = session.positions();
-    Object.assign(this, { facts, session, time: 0, last: performance.now(), isPlaying: facts.frames > 1 || facts.path.length > 0 });
+    Object.assign(this, { facts, session, tick: -1, last: performance.now(), isPlaying: facts.frames > 1 || facts.path.length > 0 });
     const { extent, pose } = beside(positions);
     this.from = this.to = facts.path[0] ?? pose;
     this.origin = session.origin();
@@ -80,30 +80,35 @@ class Viewer {
     this.picture?.look({ opacity: controls.number("opacity"), wire: controls.form.elements.wire.checked });
   }
 
-  // Moves time on by so many seconds, a tick for each thousandth.
-  advance(seconds) {
-    const ticks = Math.max(1, Math.round(seconds * RATE));
-    const start = this.time;
-    const end = this.isPlaying ? start + ticks / RATE : start;
+  // Back to the first tick.
+  restart() {
+    this.session.restart();
+    this.tick = -1;
+    this.from = this.to = this.facts.path[0] ?? this.to;
+  }
+
+  // So many ticks, during which time goes on unless it is stopped.
+  advance(ticks) {
+    const start = this.tick;
+    const end = this.isPlaying ? start + ticks : start;
     const isOnPath = this.isPlaying && this.controls.value("tool") === "path";
     const before = performance.now();
     let counts = [0, 0, 0, 0];
     if (isOnPath) {
       const { path } = this.facts;
       // A line of the path is a tick.
-      for (let tick = 1; tick <= ticks; tick++) {
+      for (let tick = start + 1; tick <= end; tick++) {
         this.from = this.to;
-        this.to = path[Math.round(start * RATE + tick) % path.length];
-        const time = start + tick / RATE;
-        const one = this.session.advance(this.from, this.to, time - 1 / RATE, time, 1);
+        this.to = path[tick % path.length];
+        const one = this.session.advance(this.from, this.to, Math.max(tick - 1, 0) / RATE, tick / RATE, 1);
         counts = counts.map((count, at) => count + one[at]);
       }
     } else {
-      counts = [...this.session.advance(this.from, this.to, start, end, ticks)];
+      counts = [...this.session.advance(this.from, this.to, Math.max(start, 0) / RATE, Math.max(end, 0) / RATE, ticks)];
     }
     const milliseconds = performance.now() - before;
     this.from = this.to;
-    this.time = end;
+    this.tick = end;
     return { counts, milliseconds };
   }
 
@@ -118,16 +123,18 @@ class Viewer {
 
   // A frame of the page.
   frame(now) {
-    const seconds = Math.min((now - this.last) / 1000, 0.05);
+    // After a pause of the browser, time goes on from where it was.
+    const seconds = Math.min((now - this.last) / 1000, 0.1);
     this.last = now;
-    this.step(seconds);
+    this.step(Math.max(1, Math.round(seconds * RATE)));
     requestAnimationFrame((next) => this.frame(next));
   }
 
-  step(seconds) {
+  // Ticks, and a picture of the last.
+  step(ticks) {
     const { session, picture } = this;
     try {
-      const { counts, milliseconds } = this.advance(seconds);
+      const { counts, milliseconds } = this.advance(ticks);
       const answer = record(session, this.facts);
       const contacts = touching(session);
       this.plots.push(answer, counts, milliseconds);
@@ -148,7 +155,7 @@ class Viewer {
 
 try {
   const viewer = new Viewer(await open());
-  // For scripts: `viewer.take(pose)`, `viewer.time`, `viewer.controls.set(name, value)`.
+  // For scripts: `viewer.take(pose)`, `viewer.tick`, `viewer.step(ticks)`, `viewer.controls.set(name, value)`.
   window.viewer = viewer;
   requestAnimationFrame((now) => viewer.frame(now));
 } catch (error) {

@@ -74,7 +74,7 @@ export class Picture {
 
     this.camera = new PerspectiveCamera(35, 1, radius / 100, radius * 40);
     this.camera.up.set(0, 0, 1);
-    this.camera.position.copy(center).addScaledVector(new Vector3(0.35, -1, 0.32).normalize(), 4.4 * radius);
+    this.camera.position.copy(center).addScaledVector(new Vector3(0.35, -1, 0.32).normalize(), 3.7 * radius);
     const sun = new DirectionalLight("#fff", 2.2);
     sun.position.set(-0.5, 0.9, 1);
     this.camera.add(sun);

@@ -58,6 +58,11 @@ impl Page {
         Ok(vec![counts.ticks, counts.node_tests, counts.triangle_tests, counts.fallbacks])
     }
 
+    /// Back to the first frame, as if nothing had been asked.
+    pub fn restart(&mut self) {
+        self.session.restart();
+    }
+
     /// The last answer, in this order: separation, lower, accuracy, side (0 outside, 1 inside, 2 crossing, 3 undefined),
     /// axis distance, point on surface, point on tool, direction, axis parameter, triangle, barycentric, stretch, node
     /// tests, triangle tests.

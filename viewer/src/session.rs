@@ -97,6 +97,8 @@ pub trait Session {
         seconds: [f64; 2],
         ticks: u32,
     ) -> Result<Counts, SessionError>;
+    /// Back to the first frame, as if nothing had been asked.
+    fn restart(&mut self);
     /// The last tick's answer.
     fn answer(&self) -> Option<&Proximity>;
     /// Its triangle, numbered as in the mesh's file.
@@ -170,6 +172,7 @@ struct Running<I: 'static> {
     odometer: Odometer,
     /// From the last frame but one to the last, of those that were not refused.
     step: Step<'static, Frame, Frame>,
+    before: usize,
     last: usize,
     /// The number of the frame that arrived last.
     number: Option<u64>,
@@ -207,6 +210,7 @@ impl<I: Index> Running<I> {
             contacts: Box::default(),
             odometer,
             step,
+            before: 0,
             last: 0,
             number: None,
             refused: None,
@@ -225,23 +229,16 @@ impl<I: Index> Running<I> {
         let frame = self.motion.frame(number);
         let sigma = self.motion.stretches[frame].sigma();
         self.refused = (sigma > self.settings.limit).then_some(sigma);
-        if self.refused.is_none() {
-            let frames = self.motion.frames;
-            self.step = self.odometer.step(frames[self.last].as_slice(), frames[frame].as_slice());
-            self.now.stretch = self.stretch_of(self.last, frame);
-            self.last = frame;
+        // A change of the settings lets the same frame arrive again.
+        if self.refused.is_none() && frame != self.last {
+            self.step_to(self.last, frame);
         }
     }
 
-    /// The stretch of a frame or, where the surface is interpolated, of all between it and the one before.
-    fn stretch_of(&self, before: usize, frame: usize) -> MeasuredStretch {
-        let stretches = &self.motion.stretches;
-        match self.settings.between {
-            Between::Interpolated => {
-                stretches[before].or_larger(stretches[frame]).unwrap_or(stretches[frame])
-            }
-            _ => stretches[frame],
-        }
+    fn step_to(&mut self, before: usize, frame: usize) {
+        let frames = self.motion.frames;
+        self.step = self.odometer.step(frames[before].as_slice(), frames[frame].as_slice());
+        (self.before, self.last) = (before, frame);
     }
 
     /// Moves the surface to this time.
@@ -249,20 +246,20 @@ impl<I: Index> Running<I> {
         self.arrive(seconds);
         let share = self.motion.share(seconds);
         let held = Surface::Held(self.step.after());
-        self.now.surface = match self.settings.between {
-            _ if self.refused.is_some() => held,
-            Between::Held => held,
-            Between::Interpolated => Surface::Moving(self.step.at(share)),
+        let stretches = &self.motion.stretches;
+        let (before, last) = (stretches[self.before], stretches[self.last]);
+        (self.now.surface, self.now.stretch) = match self.settings.between {
+            _ if self.refused.is_some() => (held, last),
+            Between::Held => (held, last),
+            Between::Interpolated => {
+                (Surface::Moving(self.step.at(share)), before.or_larger(last).unwrap_or(last))
+            }
             // An extrapolated surface beyond the limit is not searched: the last frame is held.
             Between::Extrapolated => match measure_stretch(&self.tree, &self.step.beyond(share)) {
                 Ok(stretch) if stretch.sigma() <= self.settings.limit => {
-                    self.now.stretch = stretch;
-                    Surface::Moving(self.step.beyond(share))
+                    (Surface::Moving(self.step.beyond(share)), stretch)
                 }
-                _ => {
-                    self.now.stretch = self.motion.stretches[self.last];
-                    held
-                }
+                _ => (held, last),
             },
         };
     }
@@ -380,6 +377,12 @@ impl<I: Index> Session for Running<I> {
         }
         self.now.velocity = Velocity::new(from, to, end - start);
         Ok(counts)
+    }
+
+    fn restart(&mut self) {
+        (self.number, self.refused) = (None, None);
+        self.step_to(0, 0);
+        self.tracker.forget();
     }
 
     fn answer(&self) -> Option<&Proximity> {

@@ -3,6 +3,7 @@
 mod mutants;
 mod prove;
 mod test;
+mod viewer;
 
 use std::process::ExitCode;
 
@@ -34,6 +35,7 @@ enum Task {
     /// Writes docs/performance.md: where a query's instructions go on the emulated board.
     #[command(disable_help_flag = true)]
     Profile(Passed),
+    Viewer(viewer::Options),
     Fuzz(nightly::FuzzOptions),
     Mutants(mutants::Options),
     /// Runs the tests of frames, bus and format under the address and the thread sanitizer.
@@ -49,6 +51,7 @@ fn main() -> ExitCode {
         Task::Bench(passed) => prove::run("bench", &passed),
         Task::Guarantees(passed) => prove::run("guarantees", &passed),
         Task::Profile(passed) => prove::run("profile", &passed),
+        Task::Viewer(options) => viewer::viewer(&options),
         Task::Fuzz(options) => or_say(nightly::missing(), || nightly::fuzz_by_hand(&options)),
         Task::Mutants(options) => mutants::mutants(&options),
         Task::Sanitize => or_say(nightly::missing(), nightly::sanitize_by_hand),
