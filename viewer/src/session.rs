@@ -441,3 +441,6 @@ impl<I: Index> Session for Running<I> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

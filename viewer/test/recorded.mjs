@@ -18,8 +18,7 @@ export async function recordPage(measured, picture) {
     "generated heart of 10,272 triangles, 1,000 ticks a second, 1280 × 800 pixels:\n\n" +
     "| search | µs a tick | ms a frame |\n|---|---|---|\n" +
     row("tracker", measured.tracker) + row("query, warm", measured.warm) + row("query, cold", measured.cold) +
-    `\nOf a frame the page's own work with 17 ticks, which a graphics card does not shorten, and the calls to draw took ` +
-    `${measured.work.toFixed(1)} ms. The file has ${measured.size.toLocaleString("en")} bytes.\n\n`;
+    `\nWithout drawing, which a graphics card shortens, a frame with 17 ticks takes ${measured.work.toFixed(1)} ms. The file has ${measured.size.toLocaleString("en")} bytes.\n\n`;
   await writeFile(path, head + BEGIN + text + END + tail);
   await copyFile(picture, join(docs, "viewer.png"));
 }

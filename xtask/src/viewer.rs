@@ -58,8 +58,8 @@ pub fn viewer(options: &Options) -> Result<()> {
 
 /// The query compiled to WebAssembly answers as the native one, in Node.
 pub fn same_bits() -> Result<Outcome> {
-    if quiet(Command::new("node").arg("--version"), MOMENT).is_err() {
-        return Ok(Outcome::Skipped("node is not installed".to_owned()));
+    if let Err(error) = programs(&[("node", "nodejs")]) {
+        return Ok(Outcome::Skipped(format!("{error:#}")));
     }
     let folder = session()?;
     let test = workspace::root().join("viewer/test/bits.mjs");
