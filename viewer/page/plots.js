@@ -54,7 +54,7 @@ class Plot {
 
 export class Plots {
   constructor(parent) {
-    this.separation = new Plot(parent, "separation, and its certified interval", " mm", "#0072b2");
+    this.separation = new Plot(parent, "separation, interval", " mm", "#0072b2");
     this.nodes = new Plot(parent, "node tests a tick", "", "#009e73");
     this.triangles = new Plot(parent, "triangle tests a tick", "", "#d55e00");
     this.time = new Plot(parent, "time a tick, mean of the last 32 frames", " µs", "#a3407a");

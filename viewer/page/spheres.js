@@ -24,14 +24,14 @@ const material = new ShaderMaterial({
     varying vec3 towards;
     void main() {
       float rim = 1.0 - abs(dot(normalize(outward), normalize(towards)));
-      gl_FragColor = vec4(colour, strength * (0.03 + 0.75 * pow(rim, 4.0)));
+      gl_FragColor = vec4(colour, strength * (0.02 + 0.8 * pow(rim, 5.0)));
       #include <colorspace_fragment>
     }`,
 });
 
 export class Spheres extends InstancedMesh {
   constructor() {
-    super(new IcosahedronGeometry(1, 4), material, MOST);
+    super(new IcosahedronGeometry(1, 8), material, MOST);
     this.frustumCulled = false;
     this.count = 0;
     this.renderOrder = 5;
@@ -46,7 +46,7 @@ export class Spheres extends InstancedMesh {
       this.setMatrixAt(at, matrix.makeScale(radius, radius, radius).setPosition(x, y, z));
     }
     // Many overlap: each is fainter.
-    material.uniforms.strength.value = Math.min(1, 3 / Math.sqrt(1 + this.count / 8));
+    material.uniforms.strength.value = Math.min(1, 2 / Math.sqrt(1 + this.count / 12));
     this.instanceMatrix.needsUpdate = true;
   }
 }

@@ -6,6 +6,7 @@ mod faults;
 pub mod machine;
 mod plot;
 mod push;
+mod replay;
 mod report;
 pub mod scene;
 mod sender;
@@ -88,6 +89,7 @@ pub fn run(options: &Options) -> Result<()> {
         timeline::draw(&outcome, &folder)?;
     }
     report.write(&folder)?;
+    replay::write(&scene, &outcome.ticks, &folder)?;
     report.print(&folder);
     report.verdict()
 }
