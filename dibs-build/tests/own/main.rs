@@ -11,3 +11,4 @@ mod program;
 mod sender;
 mod stream;
 mod transport;
+mod view;
