@@ -45,6 +45,9 @@ pub struct Args {
     page: Option<PathBuf>,
     #[command(flatten)]
     lengths: Lengths,
+    /// Print a JSON object
+    #[arg(long)]
+    json: bool,
 }
 
 pub fn run(args: &Args) -> Result<()> {
@@ -56,7 +59,12 @@ pub fn run(args: &Args) -> Result<()> {
     };
     let page = page.replacen(MARK, &data, 1);
     write_atomically(&args.output, |out| out.write_all(page.as_bytes()))?;
-    println!("written  {}: {} bytes", args.output.display(), page.len());
+    let name = args.output.display();
+    if args.json {
+        println!("{}", json!({ "output": name.to_string(), "bytes": page.len() }));
+    } else {
+        println!("written  {name}: {} bytes", page.len());
+    }
     Ok(())
 }
 
