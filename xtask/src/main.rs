@@ -4,6 +4,7 @@ mod mutants;
 mod processors;
 mod prove;
 mod test;
+mod viewer;
 
 use std::process::ExitCode;
 
@@ -36,6 +37,7 @@ enum Task {
     /// Writes docs/performance.md: where a query's instructions go on the emulated board.
     #[command(disable_help_flag = true)]
     Profile(Passed),
+    Viewer(viewer::Options),
     Fuzz(nightly::FuzzOptions),
     Mutants(mutants::Options),
     /// Builds the core crate for every row of docs/processors.md.
@@ -53,6 +55,7 @@ fn main() -> ExitCode {
         Task::Bench(passed) => prove::run("bench", &passed),
         Task::Guarantees(passed) => prove::run("guarantees", &passed),
         Task::Profile(passed) => prove::run("profile", &passed),
+        Task::Viewer(options) => viewer::viewer(&options),
         Task::Fuzz(options) => or_say(nightly::missing(), || nightly::fuzz_by_hand(&options)),
         Task::Mutants(options) => mutants::mutants(&options),
         Task::Processors => processors::check(false).map(|outcome| {

@@ -13,7 +13,7 @@ use xtask::steps::{Outcome, Steps};
 use xtask::toolchain::Cross;
 use xtask::workspace;
 
-use crate::{mutants, processors, prove};
+use crate::{mutants, processors, prove, viewer};
 
 /// Runs every check: format, lints, documentation, tests, oldest compiler, the board's build, and a
 /// short demo on the emulated board.
@@ -75,6 +75,7 @@ pub fn test(options: &Options) -> Result<()> {
         }
         Err(error) => steps.run("toolchain for the board", || Err(error)),
     }
+    steps.run("viewer in WebAssembly", viewer::same_bits);
     let list = checks.join().unwrap_or_else(|_| Err(anyhow!("the thread panicked")));
     if let Err(error) = list.and_then(|list| steps.read(&list)) {
         steps.run("checks of tests/prove", || Err(error));

@@ -12,3 +12,4 @@ mod program;
 mod sender;
 mod stream;
 mod transport;
+mod view;

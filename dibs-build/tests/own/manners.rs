@@ -4,8 +4,18 @@ use std::process::Command;
 
 use crate::program::{dibs, fails, json, succeeds};
 
-const COMMANDS: [&str; 9] =
-    ["build", "stretch", "inspect", "query", "track", "stream", "generate", "completions", "man"];
+const COMMANDS: [&str; 10] = [
+    "build",
+    "stretch",
+    "inspect",
+    "query",
+    "track",
+    "view",
+    "stream",
+    "generate",
+    "completions",
+    "man",
+];
 
 #[test]
 fn shells_complete_every_command() {

@@ -14,6 +14,7 @@ mod stream;
 mod stretch;
 mod track;
 mod tree_file;
+mod view;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -38,6 +39,8 @@ enum Command {
     Query(query::Args),
     /// Follow a tool about a moving surface, tick by tick
     Track(track::Args),
+    /// Write a page in which the surface moves and the query runs
+    View(view::Args),
     /// Send a recorded motion to a controller, over a serial line or a socket
     Stream(stream::Args),
     /// Generate a procedural heart or brain
@@ -55,6 +58,7 @@ Examples:
   dibs stretch heart.ply heart.pc2 --limits heart.limits
   dibs inspect heart.dibs
   dibs query heart.dibs --tool capsule:0,0,60,0,0,200,4 --vertices heart.pc2 --frame 9
+  dibs view heart.dibs heart.pc2 -o heart.html
   dibs stream heart.dibs heart.pc2 --to serial:/dev/ttyUSB0@921600 --quantise --loop
 
 Lengths are in millimetres. Warnings and progress go to standard error, results to
@@ -67,6 +71,7 @@ fn main() -> ExitCode {
         Command::Inspect(args) => inspect::run(&args),
         Command::Query(args) => query::run(&args),
         Command::Track(args) => track::run(&args),
+        Command::View(args) => view::run(&args),
         Command::Stream(args) => stream::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::Completions(args) => manual::complete(&args),

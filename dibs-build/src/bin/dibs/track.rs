@@ -1,10 +1,10 @@
 //! `dibs track`: a tool on its path about a moving surface, tick by tick.
 
 use crate::mesh_file::Lengths;
-use crate::query::{LocalTool, STACK, parse_tool, rows, side_name};
+use crate::query::{LocalTool, STACK, ToolSpec, parse_tool, rows, side_name};
 use crate::tree_file::{self, AnyTree};
 use anyhow::{Context, Result, anyhow, bail};
-use dibs_build::glam::{DVec3, Vec3};
+use dibs_build::glam::Vec3;
 use dibs_nostd::{
     Fallback, Index, MeasuredStretch, MovingSurface, Odometer, Options, Proximity, Query, Step,
     Tool, Tracker, Tree, measure_stretch,
@@ -67,16 +67,16 @@ pub fn run(args: &Args) -> Result<()> {
     }
 }
 
-/// The tool at each tick.
-fn tools(path: &Path, origin: DVec3) -> Result<Vec<LocalTool>> {
+/// The tool at each tick, as `each` has it.
+pub fn tools<T>(path: &Path, each: impl Fn(ToolSpec) -> Result<T>) -> Result<Vec<T>> {
     let name = path.display();
     let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot be read"))?;
-    let tools: Vec<LocalTool> = (1..)
+    let tools: Vec<T> = (1..)
         .zip(text.lines())
         .filter(|(_, line)| !line.trim().is_empty())
         .map(|(number, line)| {
             parse_tool(line.trim())
-                .and_then(|tool| tool.local(origin))
+                .and_then(&each)
                 .map_err(|error| anyhow!("{name}, line {number}: {error}"))
         })
         .collect::<Result<_>>()?;
@@ -87,7 +87,8 @@ fn tools(path: &Path, origin: DVec3) -> Result<Vec<LocalTool>> {
 }
 
 fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
-    let tools = tools(&args.path, tree.origin().into())?;
+    let origin = tree.origin().into();
+    let tools = tools(&args.path, |tool| tool.local(origin))?;
     let mut motion = args.lengths.motion(&args.motion, tree.origin().into())?;
     motion.rate = args.motion_rate.unwrap_or(motion.rate);
     let name = args.motion.display();

@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use crate::surface::motion::FAR;
-use crate::tree::format::MAX_CHILDREN;
+use crate::tree::format::{Link, MAX_CHILDREN};
 
 /// Whether reading `a` of the odometer comes before `b`: readings wrap, and are less than half of a turn apart.
 #[inline(always)]
@@ -114,6 +114,29 @@ impl<const OPENED: usize> Front<OPENED> {
     pub fn borrow(&mut self) -> FrontMut<'_> {
         let Self { due, nodes, end, free, best, hand } = self;
         FrontMut { due, nodes, end, free, best, hand }
+    }
+}
+
+impl<const OPENED: usize> Front<OPENED> {
+    /// Rows of the nodes that have a bound, or whose triangles have.
+    pub fn rows(&self) -> impl Iterator<Item = u32> {
+        let opened = self.nodes.iter().take(self.end).filter(|opened| opened.link != UNUSED);
+        opened.flat_map(|opened| {
+            let above = self.nodes.get(usize::from(opened.parent)).map(|above| above.link);
+            let (first, bounded) = match (Link::decode(opened.link), above.map(Link::decode)) {
+                (Link::Children { first, count }, _) => {
+                    (first, !u32::from(opened.apart) & !(u32::MAX << count))
+                }
+                (Link::Leaf { .. }, Some(Link::Children { first, .. })) => {
+                    (first, 1 << opened.slot)
+                }
+                // The root is a leaf.
+                (Link::Leaf { .. }, _) => (0, 1),
+            };
+            (0..MAX_CHILDREN)
+                .filter(move |slot| bounded >> slot & 1 == 1)
+                .map(move |slot| first + slot)
+        })
     }
 }
 

@@ -136,6 +136,12 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         &self.tree
     }
 
+    /// The front, for pictures and tests: rows of the nodes ([`Tree::node`]) that have a bound or, of leaves, whose
+    /// triangles have. Every triangle is below exactly one of them. Empty until the first tick.
+    pub fn front(&self) -> impl Iterator<Item = u32> {
+        self.front.rows()
+    }
+
     /// Forgets the last tick: the next one is a whole query.
     pub fn forget(&mut self) {
         self.last = None;

@@ -9,6 +9,7 @@ pub mod freshness;
 pub mod machine;
 mod plot;
 mod push;
+mod replay;
 mod report;
 pub mod scene;
 mod sender;
@@ -95,6 +96,7 @@ pub fn run(options: &Options) -> Result<()> {
         timeline::draw(&outcome, &folder)?;
     }
     report.write(&folder)?;
+    replay::write(&scene, &outcome.ticks, &folder)?;
     report.print(&folder);
     report.verdict()
 }

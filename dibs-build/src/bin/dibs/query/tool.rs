@@ -32,6 +32,18 @@ impl ToolSpec {
         })
     }
 
+    /// The numbers of the tool for a tree with this origin: four of a sphere, seven of a capsule.
+    pub fn numbers(&self, origin: DVec3) -> Result<Vec<f32>> {
+        self.local(origin)?;
+        let local = |point: DVec3| (point - origin).as_vec3().to_array();
+        Ok(match *self {
+            Self::Sphere { centre, radius } => [&local(centre)[..], &[radius]].concat(),
+            Self::Capsule { start, end, radius } => {
+                [&local(start)[..], &local(end), &[radius]].concat()
+            }
+        })
+    }
+
     /// A point of the tool.
     fn start(&self) -> DVec3 {
         match *self {

@@ -1,0 +1,142 @@
+//! `dibs view`: one HTML file in which the real query runs.
+
+mod pack;
+
+use crate::mesh_file::Lengths;
+use crate::query::rows;
+use crate::track;
+use crate::tree_file::{self, AnyTree};
+use anyhow::{Context, Result, bail, ensure};
+use dibs_build::glam::Vec3;
+use dibs_build::write_atomically;
+use dibs_nostd::{Index, Tree, measure_stretch};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// The page without data, as `cargo xtask viewer` writes it.
+const PAGE: &str = "dibs-viewer.html";
+/// Where the data belongs in it.
+const MARK: &str = "<!--data-->";
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  dibs view heart.dibs heart.pc2 -o heart.html
+  dibs view heart.dibs heart.pc2 --path tools.csv -o replay.html
+
+The file needs nothing else and no network: a browser opens it. The query in it is the one of this program, compiled
+to WebAssembly.")]
+pub struct Args {
+    /// A tree file that `dibs build` wrote
+    tree: PathBuf,
+    /// The surface's motion: .pc2, .npy or a series (heart_%03d.vtp) of the built mesh; by default the rest shape
+    motion: Option<PathBuf>,
+    /// The HTML file to write
+    #[arg(short, long)]
+    output: PathBuf,
+    /// The instrument at each millisecond, as `dibs track` takes it; otherwise it is in the viewer's hand
+    #[arg(long, value_name = "TOOLS")]
+    path: Option<PathBuf>,
+    /// Frames a second of the motion; by default the number in its file
+    #[arg(long, value_name = "HZ", requires = "motion")]
+    motion_rate: Option<f32>,
+    /// The page without data; by default dibs-viewer.html beside this program
+    #[arg(long, value_name = "FILE")]
+    page: Option<PathBuf>,
+    #[command(flatten)]
+    lengths: Lengths,
+    /// Print a JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args) -> Result<()> {
+    let page = page(args.page.as_deref())?;
+    let bytes = tree_file::load(&args.tree)?;
+    let data = match tree_file::validate(&bytes, &args.tree)? {
+        AnyTree::Narrow(tree) => data(args, &tree, &bytes)?,
+        AnyTree::Wide(tree) => data(args, &tree, &bytes)?,
+    };
+    let page = page.replacen(MARK, &data, 1);
+    write_atomically(&args.output, |out| out.write_all(page.as_bytes()))?;
+    let name = args.output.display();
+    if args.json {
+        println!("{}", json!({ "output": name.to_string(), "bytes": page.len() }));
+    } else {
+        println!("written  {name}: {} bytes", page.len());
+    }
+    Ok(())
+}
+
+/// The page without data.
+fn page(given: Option<&Path>) -> Result<String> {
+    let beside = || std::env::current_exe().ok()?.parent().map(|folder| folder.join(PAGE));
+    let path = match given {
+        Some(path) => path.to_path_buf(),
+        None => beside().context("this program's folder is unknown; give the page with --page")?,
+    };
+    let name = path.display();
+    let page = std::fs::read_to_string(&path).with_context(|| {
+        format!("{name}: cannot be read; `cargo xtask viewer` in the repository writes it, and --page names another")
+    });
+    // One sentence, with the system's reason at its end.
+    let page = page.map_err(|error| anyhow::anyhow!("{error:#}"))?;
+    ensure!(
+        page.contains(MARK),
+        "{name}: no page without data; give the {PAGE} that `cargo xtask viewer` writes"
+    );
+    Ok(page)
+}
+
+/// The elements with the tree, the motion and the facts about them.
+fn data<I: Index>(args: &Args, tree: &Tree<'_, I>, bytes: &[u8]) -> Result<String> {
+    let (frames, rate) = match &args.motion {
+        Some(path) => motion(args, tree, path)?,
+        None => (Vec::new(), 1.0),
+    };
+    if args.motion.is_none() && tree.vertex_count() > 0 && tree.rest_position(0).is_none() {
+        bail!("{}: the tree has no rest shape, give a motion", args.tree.display());
+    }
+    let origin = tree.origin().into();
+    let path = match &args.path {
+        Some(path) => track::tools(path, |tool| tool.numbers(origin))?,
+        None => Vec::new(),
+    };
+    let facts = json!({
+        "tree": args.tree.display().to_string(),
+        "rate": rate,
+        "frames": frames.len().max(1),
+        "path": path,
+    });
+    let mut data = String::new();
+    // A `<` in a name must not end the element.
+    let facts = facts.to_string().replace('<', "\\u003c");
+    data += &format!("<script type=\"application/json\" id=\"facts\">{facts}</script>\n");
+    for (id, bytes) in [("tree", bytes), ("motion", &pack::words(&frames))] {
+        let text = pack::text(bytes)?;
+        data += &format!("<script type=\"text/plain\" id=\"{id}\">{text}</script>\n");
+    }
+    Ok(data)
+}
+
+/// The frames of a motion in the order of the tree's rows, none of them stretched too far.
+fn motion<I: Index>(args: &Args, tree: &Tree<'_, I>, path: &Path) -> Result<(Vec<Vec<Vec3>>, f32)> {
+    let name = path.display();
+    let motion = args.lengths.motion(path, tree.origin().into())?;
+    let rate = args.motion_rate.unwrap_or(motion.rate);
+    if !(rate > 0.0 && rate.is_finite()) || motion.frames.is_empty() {
+        bail!("{name}: has {} frames at {rate} a second; give --motion-rate", motion.frames.len());
+    }
+    let mut frames = Vec::with_capacity(motion.frames.len());
+    for (number, frame) in motion.frames.iter().enumerate() {
+        let frame = rows(tree, path, frame)?;
+        if let Err(error) = measure_stretch(tree, frame.as_slice()) {
+            bail!(
+                "{name}, frame {number}: {error}; build the tree with a larger --stretch, or with --limits that \
+                 allow it"
+            );
+        }
+        frames.push(frame);
+    }
+    Ok((frames, rate))
+}

@@ -1,0 +1,35 @@
+//! Packs data into a page, without the loss of a bit.
+
+use anyhow::Result;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use dibs_build::glam::Vec3;
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use std::io::Write;
+
+/// The words of a motion so that they compress: each as the difference to that of the frame before, its sign in the
+/// lowest bit; then the lowest bytes of all words, the next bytes, and so on. (`viewer/src/motion.rs` undoes it.)
+pub fn words(frames: &[Vec<Vec3>]) -> Vec<u8> {
+    let zero = vec![Vec3::ZERO; frames.first().map_or(0, Vec::len)];
+    let befores = std::iter::once(&zero).chain(frames);
+    let codes: Vec<[u8; 4]> = befores
+        .zip(frames)
+        .flat_map(|(before, frame)| before.iter().zip(frame))
+        .flat_map(|(before, now)| {
+            [0, 1, 2].map(|axis| (before[axis].to_bits(), now[axis].to_bits()))
+        })
+        .map(|(before, now)| {
+            let change = now.wrapping_sub(before).cast_signed();
+            ((change << 1) ^ (change >> 31)).to_le_bytes()
+        })
+        .collect();
+    (0..4).flat_map(|plane| codes.iter().map(move |code| code[plane])).collect()
+}
+
+/// Bytes, compressed, as text.
+pub fn text(bytes: &[u8]) -> Result<String> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
+    encoder.write_all(bytes)?;
+    Ok(STANDARD.encode(encoder.finish()?))
+}

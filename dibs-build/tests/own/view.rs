@@ -1,0 +1,38 @@
+//! The page that `dibs view` writes. Its contents are tested where they are read: `viewer/test/`.
+
+use std::fs;
+
+use crate::program::{fails, succeeds};
+
+#[test]
+fn a_page_is_written_whole_or_not_at_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeeds(folder, "generate heart --triangles 320 -o heart.ply --motion heart.pc2");
+    succeeds(folder, "build heart.ply -o <i>.dibs --stretch 2");
+    fs::write(folder.join("page.html"), "<p>before</p><!--data--><p>after</p>").unwrap();
+    fs::write(folder.join("tools.csv"), "sphere:0,0,90,2\ncapsule:0,0,90,0,0,120,2.5\n").unwrap();
+
+    let view = "view <i>.dibs heart.pc2 --page page.html -o out.html";
+    assert!(succeeds(folder, &format!("{view} --path tools.csv")).starts_with("written  out.html"));
+    let page = fs::read_to_string(folder.join("out.html")).unwrap();
+    assert!(page.starts_with("<p>before</p><script") && page.ends_with("</script>\n<p>after</p>"));
+    assert!(page.contains(r#""path":[[0.0,0.0,90.0,2.0],[0.0,0.0,90.0,0.0,0.0,120.0,2.5]]"#));
+    assert!(page.contains(r#""frames":25"#) && page.contains(r#""rate":30.0"#));
+    assert!(page.contains("\\u003ci>.dibs") && !page.contains("<i>"), "a name ends no element");
+
+    fs::remove_file(folder.join("out.html")).unwrap();
+    let error = fails(folder, "view <i>.dibs --page absent.html -o out.html");
+    assert!(error.contains("absent.html") && error.contains("cargo xtask viewer"), "{error}");
+    let error = fails(folder, "view <i>.dibs --page tools.csv -o out.html");
+    assert!(error.contains("tools.csv") && error.contains("cargo xtask viewer"), "{error}");
+    let error = fails(folder, &format!("{view} --motion-rate 0"));
+    assert!(error.contains("--motion-rate"), "{error}");
+    fs::write(folder.join("tools.csv"), "sphere:0,0,90,2\nsphere:0,0\n").unwrap();
+    let error = fails(folder, &format!("{view} --path tools.csv"));
+    assert!(error.contains("tools.csv, line 2"), "{error}");
+    succeeds(folder, "build heart.ply -o tight.dibs --stretch 1.01");
+    let error = fails(folder, "view tight.dibs heart.pc2 --page page.html -o out.html");
+    assert!(error.contains("frame ") && error.contains("--stretch"), "{error}");
+    assert!(!folder.join("out.html").exists());
+}

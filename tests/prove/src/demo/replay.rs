@@ -1,0 +1,46 @@
+//! The demo's surface, motion and instrument in the viewer: `replay.html`.
+
+use std::fmt::Write;
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+
+use anyhow::{Context, Result};
+use controller::telemetry::Tick;
+use dibs_build::glam::DVec3;
+use dibs_build::write_atomically;
+use xtask::process::quiet;
+use xtask::workspace;
+
+use super::scene::Scene;
+
+/// Writes the page, with the instrument of every tick, and the files that it is made of. Without `dibs` or its page,
+/// says how to make them.
+pub fn write(scene: &Scene, ticks: &[Tick], folder: &Path) -> Result<()> {
+    let dibs = workspace::target().join("release/dibs");
+    let page = workspace::target().join("viewer/dibs-viewer.html");
+    if !dibs.exists() || !page.exists() {
+        println!(
+            "no replay: `cargo build --release --bin dibs` and `cargo xtask viewer` make what writes it"
+        );
+        return Ok(());
+    }
+    if scene.motion.origin != DVec3::ZERO {
+        println!("no replay: the surface lies too far from the origin for its files");
+        return Ok(());
+    }
+    let mut tools = String::new();
+    for Tick { tool_start: [a, b, c], tool_end: [x, y, z], tool_radius, .. } in ticks {
+        writeln!(tools, "capsule:{a},{b},{c},{x},{y},{z},{tool_radius}")?;
+    }
+    write_atomically(folder.join("tools.csv"), |out| out.write_all(tools.as_bytes()))?;
+    write_atomically(folder.join("heart.dibs"), |out| out.write_all(scene.tree.blob()))?;
+    scene.motion.write_pc2(folder.join("heart.pc2"))?;
+    let rate = scene.rate.to_string();
+    let mut view = Command::new(&dibs);
+    view.args(["view", "heart.dibs", "heart.pc2", "--path", "tools.csv", "-o", "replay.html"]);
+    view.args(["--motion-rate", &rate, "--page"]).arg(&page).current_dir(folder);
+    let said = quiet(&mut view, Duration::from_mins(1)).context("the replay was not written")?;
+    print!("{said}");
+    Ok(())
+}

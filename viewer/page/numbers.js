@@ -1,0 +1,33 @@
+// The answer in numbers.
+
+const element = (id) => document.getElementById(id);
+
+// What is called touching is outside still: the axis is, the instrument's body overlaps.
+const WORDS = { outside: "outside", inside: "inside", crossing: "crossing", undefined: "side undefined" };
+
+export class Numbers {
+  constructor(facts, session) {
+    document.title = `${facts.tree} – dibs view`;
+    element("name").textContent = facts.tree;
+    const count = (number, noun) => `${number.toLocaleString("en")} ${noun}${number === 1 ? "" : "s"}`;
+    const frames = facts.frames > 1 ? `, ${count(facts.frames, "frame")} at ${facts.rate} Hz` : "";
+    element("facts-line").textContent = count(session.triangles().length / 3, "triangle") + frames;
+  }
+
+  show(answer, touching, refused) {
+    const { separation, lower, accuracy, side, stretch } = answer;
+    const overlaps = side === "outside" && separation <= 0;
+    element("separation").querySelector("output").value = separation.toFixed(3);
+    element("side").textContent = overlaps ? "touching" : WORDS[side];
+    element("side").className = overlaps ? "touching" : side === "crossing" ? "inside" : side;
+    element("interval").textContent = `${(lower - accuracy).toFixed(4)} to ${(separation + accuracy).toFixed(4)} mm`;
+    element("stretch").textContent = refused ? `frame refused: stretched by ${refused.toFixed(3)}` : stretch.toFixed(3);
+    element("stretch").className = refused ? "refused" : "";
+    const bound = touching.bound < Infinity && touching.bound > -Infinity ? `, all below ${touching.bound.toFixed(1)} mm` : "";
+    element("contacts").textContent = touching.contacts.length + bound;
+    const newtons = Math.hypot(...touching.force);
+    const state = touching.isSafe ? " (the wall only damps: cut short)" : touching.isSaturated ? " (the largest)" : "";
+    element("force").textContent = `${newtons.toFixed(2)} N${state}`;
+    if (element("record-box").open) element("record").textContent = JSON.stringify(answer, null, 1);
+  }
+}

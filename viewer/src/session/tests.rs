@@ -1,0 +1,106 @@
+//! The spheres to draw, against their definition.
+
+use std::collections::HashSet;
+
+use dibs_build::{Builder, generate};
+use dibs_nostd::Capsule;
+use dibs_nostd::format::Link;
+
+use super::*;
+
+/// As `dibs view` packs a motion.
+fn pack(frames: &[Vec<Vec3>]) -> Vec<u8> {
+    let mut before = vec![[0_u32; 3]; frames[0].len()];
+    let mut codes = Vec::new();
+    for frame in frames {
+        for (before, now) in before.iter_mut().zip(frame) {
+            let bits = now.to_array().map(f32::to_bits);
+            for (old, new) in before.iter().zip(bits) {
+                let change = new.wrapping_sub(*old).cast_signed();
+                codes.push(((change << 1) ^ (change >> 31)).to_le_bytes());
+            }
+            *before = bits;
+        }
+    }
+    (0..4).flat_map(|plane| codes.iter().map(move |code| code[plane])).collect()
+}
+
+/// A small heart's session, and its frames.
+fn heart() -> (Running<u16>, Vec<Vec<Vec3>>) {
+    let generate::MovingMesh { mesh, motion } = generate::heart(1_000).unwrap();
+    let built = Builder::new().stretch(2.0).build(&mesh).unwrap();
+    let frames: Vec<Vec<Vec3>> = motion.frames.iter().map(|frame| built.to_rows(frame)).collect();
+    let tree = Tree::from_bytes(built.blob().to_vec().leak()).unwrap();
+    (Running::new(tree, &pack(&frames), 30.0).unwrap(), frames)
+}
+
+/// The instrument at a tick: it comes from outside and goes through the wall.
+fn pose(tick: u32) -> [f32; 7] {
+    let x = 110.0 - 0.6 * tick as f32;
+    [x, -10.0, 40.0, x + 60.0, -20.0, 70.0, 2.5]
+}
+
+/// From the instrument's axis.
+fn distance(tool: &Capsule, point: Vec3) -> f32 {
+    let way = tool.end() - tool.start();
+    let share = (point - tool.start()).dot(way) / way.length_squared();
+    point.distance(tool.start() + way * share.clamp(0.0, 1.0))
+}
+
+fn triangles_below(tree: &Tree<'_, u16>, row: u32) -> Vec<u32> {
+    match tree.node(row).unwrap().2 {
+        Link::Leaf { first, count } => (first..first + count).collect(),
+        Link::Children { first, count } => {
+            (first..first + count).flat_map(|row| triangles_below(tree, row)).collect()
+        }
+    }
+}
+
+#[test]
+fn unpacked_motion_has_the_bits_of_the_packed() {
+    let (session, frames) = heart();
+    assert_eq!(session.motion.frames, frames);
+}
+
+#[test]
+fn every_triangle_is_below_one_node_of_the_front() {
+    let (mut session, _) = heart();
+    for tick in 0..150 {
+        let (before, now) = (f64::from(tick) / 1e3, f64::from(tick + 1) / 1e3);
+        session.advance(&pose(tick), &pose(tick + 1), [before, now], 1).unwrap();
+        let front: Vec<u32> = session.tracker.front().collect();
+        let mut below: Vec<u32> =
+            front.iter().flat_map(|&row| triangles_below(&session.tree, row)).collect();
+        below.sort_unstable();
+        assert_eq!(below, (0..session.tree.triangle_count()).collect::<Vec<_>>(), "tick {tick}");
+        assert!(front.len() > 10, "{} nodes", front.len());
+    }
+}
+
+#[test]
+fn tested_spheres_are_those_of_opened_nodes() {
+    let (mut session, _) = heart();
+    session.settings().search = Search::Cold;
+    for tick in (0..150).step_by(10) {
+        session.advance(&pose(tick), &pose(tick), [0.2, 0.2], 1).unwrap();
+        let Some(Instrument::Capsule(tool)) = session.now.tool else { panic!("a capsule") };
+        let recorder = Recorder::new(&session.now.surface);
+        let mut query = Query::<u16, STACK>::new(&session.tree).unwrap();
+        let options = session.options().unsigned();
+        let answer = query.closest(&recorder, &tool, &options).unwrap();
+        let tested = spheres::tested(&session.tree, &recorder.into_reads());
+        let set: HashSet<u32> = tested.iter().copied().collect();
+        assert_eq!(set.len(), tested.len(), "no node twice");
+        assert!(tested.len() <= answer.node_tests as usize, "{} {answer:?}", tested.len());
+        // A node whose sphere comes nearer than the answer cannot have been left closed.
+        for &row in &tested {
+            let (pin, radius, link) = session.tree.node(row).unwrap();
+            let pin = session.now.surface.position(pin).unwrap();
+            let distance = distance(&tool, pin);
+            let Link::Children { first, count } = link else { continue };
+            let is_open = (first..first + count).all(|child| set.contains(&child));
+            let bound = distance - radius * session.now.stretch.sigma();
+            assert!(is_open || bound > answer.axis_distance - 1e-3, "node {row}, tick {tick}");
+        }
+    }
+}

@@ -1,0 +1,358 @@
+// Opens pages of `dibs view` in Chromium and uses them as a hand would: `node browser.mjs HEART-FOLDER [--record]`.
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { readFile, stat, writeFile } from "node:fs/promises";
+import { join } from "node:path";
+import { pathToFileURL } from "node:url";
+import puppeteer from "puppeteer-core";
+import { answers, differences, poses, program } from "./poses.mjs";
+import { recordPage } from "./recorded.mjs";
+
+const folder = process.argv[2];
+const dibs = (...args) => execFileSync(program(folder), args, { cwd: folder, maxBuffer: 1 << 26 }).toString();
+const pictures = join(folder, "..");
+const PICTURE = join(pictures, "viewer.jpg");
+const SOFTWARE_GL = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
+
+async function launch(flags) {
+  return puppeteer.launch({ executablePath: "/usr/bin/chromium", headless: true, args: ["--no-sandbox", ...flags] });
+}
+
+const LARGE = { width: 1280, height: 800 };
+
+// A page without an error on its console. Unless it runs, it draws a frame only when it is told to: drawing in software
+// takes most of a test's time.
+async function open(browser, name, { width = 640, height = 480, hasTouch = false, runs = false } = {}) {
+  const page = await browser.newPage();
+  page.complaints = [];
+  page.on("console", (message) => message.type() === "error" && page.complaints.push(message.text()));
+  page.on("pageerror", (error) => page.complaints.push(error.message));
+  page.on("request", (request) => request.url().startsWith("http") && page.complaints.push(`asks for ${request.url()}`));
+  await page.setViewport({ width, height, hasTouch });
+  await page.goto(pathToFileURL(join(folder, name)).href);
+  await page.waitForFunction("window.viewer?.numbers && document.getElementById('separation').innerText.length > 3");
+  if (!runs) await page.evaluate(() => (viewer.frame = () => {}));
+  return page;
+}
+
+const shot = (page, name) => page.screenshot({ path: join(pictures, `${name}.png`) });
+const fresh = (page) => page.evaluate(() => viewer.step(1));
+const shown = (page, id) => page.$eval(`#${id}`, (element) => element.textContent);
+const set = (page, name, value) => page.evaluate((name, value) => viewer.controls.set(name, value), name, value);
+const pose = (page) => page.evaluate(() => [...viewer.to]);
+
+// Moves a slider as a user does, by its keys, from its lowest value on.
+async function slide(page, name, steps) {
+  await page.focus(`input[name=${name}]`);
+  await page.keyboard.press("Home");
+  for (let step = 0; step < steps; step++) await page.keyboard.press("ArrowRight");
+  await fresh(page);
+}
+
+const record = (page) =>
+  page.evaluate(() => {
+    document.getElementById("record-box").open = true;
+    viewer.step(1);
+    return JSON.parse(document.getElementById("record").textContent);
+  });
+
+const checks = {
+  async "100 poses have the numbers of `dibs query`"(page) {
+    const expected = answers(program(folder), folder);
+    await page.evaluate(() => viewer.play(false));
+    for (const [name, value] of [["between", "0"], ["search", "2"], ["measured", "0"]]) await set(page, name, value);
+    for (const [number, { frame, numbers }] of poses.entries()) {
+      await page.evaluate(
+        (frame, numbers, rate) => {
+          viewer.take(numbers);
+          // A tick within the frame's time.
+          viewer.tick = Math.ceil((frame * 1000) / rate) + 1;
+        },
+        frame, numbers, 30,
+      );
+      // JSON has no -0, and both print it as 0.
+      const zeros = (key, value) => (Object.is(value, -0) ? 0 : value);
+      const clean = (answer) => JSON.parse(JSON.stringify(answer, zeros), zeros);
+      assert.deepEqual(differences(clean(expected[number]), clean(await record(page))), [], `pose ${number}`);
+    }
+  },
+
+  async "a drag of the middle moves, of an end turns"(page) {
+    await page.evaluate(() => viewer.play(false));
+    const grip = (share) =>
+      page.evaluate((share) => {
+        const { hand } = viewer;
+        const [start, end] = [0, 3].map((at) => hand.seen(viewer.picture.tool.balls[at / 3].position));
+        return [start.x + share * (end.x - start.x), start.y + share * (end.y - start.y)];
+      }, share);
+    const drag = async (share, across, down) => {
+      const before = await pose(page);
+      const [x, y] = await grip(share);
+      await page.mouse.move(x, y);
+      await page.mouse.down();
+      await page.mouse.move(x + across, y + down, { steps: 4 });
+      await page.mouse.up();
+      await fresh(page);
+      const after = await pose(page);
+      const [moved, seen] = [after.map((value, at) => value - before[at]), await grip(share)];
+      return { moved, error: Math.hypot(seen[0] - x - across, seen[1] - y - down) };
+    };
+    const middle = await drag(0.5, -60, 30);
+    assert(Math.hypot(...middle.moved.slice(0, 3)) > 1, "the middle's drag moves");
+    for (const axis of [0, 1, 2]) assert(Math.abs(middle.moved[axis] - middle.moved[axis + 3]) < 1e-3, "as a whole");
+    assert(middle.error < 8, `it follows the mouse: off by ${middle.error} pixels`);
+    const end = await drag(1, 20, 40);
+    assert(Math.hypot(...end.moved.slice(0, 3)) === 0, "the other end stays");
+    assert(Math.hypot(...end.moved.slice(3, 6)) > 1 && end.error < 2, `the end follows: off by ${end.error} pixels`);
+    const camera = () => page.evaluate(() => viewer.picture.camera.position.toArray());
+    const [eye, still] = [await camera(), await pose(page)];
+    await page.mouse.move(80, 700);
+    await page.mouse.down();
+    await page.mouse.move(180, 700, { steps: 4 });
+    await page.mouse.up();
+    await fresh(page);
+    assert.notDeepEqual(await camera(), eye, "a drag beside it turns the view");
+    assert.deepEqual(await pose(page), still, "and leaves the instrument");
+  },
+
+  async "keys move, turn and stop"(page) {
+    await page.focus("#view");
+    for (const key of ["ArrowLeft", "ArrowUp", "PageUp", "w", "a"]) {
+      const before = await pose(page);
+      await page.keyboard.press(key);
+      assert.notDeepEqual(await pose(page), before, key);
+    }
+    const before = await page.evaluate(() => viewer.isPlaying);
+    await page.keyboard.press("Space");
+    assert.equal(await page.evaluate(() => viewer.isPlaying), !before, "Space");
+  },
+
+  async "sliders do what they say"(page) {
+    await page.evaluate(() => viewer.play(false));
+    await page.evaluate(() => viewer.take([20, -60, 40, 90, -90, 90, 3]));
+    await set(page, "search", "2");
+    let last = Infinity;
+    for (const steps of [0, 20, 60]) {
+      await slide(page, "budget", steps);
+      const { lower, separation, node_tests } = await record(page);
+      const budget = await page.evaluate(() => viewer.controls.budget);
+      assert(node_tests <= budget + 1 && separation - lower <= last, `budget ${budget}`);
+      assert(steps === 60 ? separation === lower : separation > lower, `the interval at budget ${budget}`);
+      last = separation - lower;
+    }
+    const contacts = async () => {
+      const [force, text] = [await shown(page, "force"), await shown(page, "contacts")];
+      return { force: parseFloat(force), count: parseInt(text) };
+    };
+    await page.evaluate(() => viewer.take([30, -40, 40, 90, -90, 90, 3]));
+    await slide(page, "margin", 0);
+    const { separation } = await record(page);
+    assert(separation > 0, `the instrument is outside: ${separation}`);
+    assert.deepEqual(await contacts(), { force: 0, count: 0 }, "no margin");
+    await page.focus("input[name=margin]");
+    await page.keyboard.press("End");
+    await fresh(page);
+    const far = await contacts();
+    assert(far.count > 0 && far.force > 0, `a margin beyond ${separation}: ${JSON.stringify(far)}`);
+
+    // The frames of the contraction are stretched by more than 1.1.
+    await slide(page, "limit", 0);
+    await page.evaluate(() => (viewer.tick = 420));
+    await fresh(page);
+    assert.match(await shown(page, "stretch"), /frame refused/);
+    const held = await page.evaluate(() => [...viewer.session.positions()]);
+    await page.evaluate(() => (viewer.tick = 460));
+    await fresh(page);
+    assert.deepEqual(await page.evaluate(() => [...viewer.session.positions()]), held, "the surface is held");
+    await page.focus("input[name=limit]");
+    await page.keyboard.press("End");
+    await fresh(page);
+    assert.doesNotMatch(await shown(page, "stretch"), /refused/);
+
+    await set(page, "spheres", "level");
+    const count = () => page.evaluate(() => (viewer.step(1), viewer.picture.spheres.count));
+    await slide(page, "level", 0);
+    assert.equal(await count(), 1, "the root");
+    await slide(page, "level", 2);
+    const two = await count();
+    await slide(page, "level", 3);
+    assert((await count()) > two && two > 1, "more at a deeper level");
+    await set(page, "spheres", "tested");
+    const { node_tests } = await record(page);
+    const tested = await count();
+    assert(tested > 1 && tested <= node_tests, `${tested} spheres of ${node_tests} tests`);
+    await set(page, "spheres", "front");
+    assert.equal(await count(), 0, "a cold query has no front");
+    await set(page, "search", "0");
+    assert((await count()) > 10, "a tracker has one");
+  },
+
+  async "held, interpolated and extrapolated differ"(page) {
+    await page.evaluate(() => viewer.play(false));
+    const at = async (between, tick) => {
+      await set(page, "between", between);
+      // From the frame before, so that there are two.
+      for (const time of [tick - 34, tick]) {
+        await page.evaluate((time) => (viewer.tick = time), time);
+        await fresh(page);
+      }
+      return page.evaluate(() => [...viewer.session.positions()]);
+    };
+    const distance = (one, other) => Math.max(...one.map((value, index) => Math.abs(value - other[index])));
+    const [held, later] = [await at("0", 320), await at("0", 330)];
+    assert.equal(distance(held, later), 0, "held within a frame");
+    const [way, beyond] = [await at("1", 320), await at("2", 320)];
+    assert(distance(held, way) > 0.01 && distance(held, beyond) > 0.01 && distance(way, beyond) > 0.01);
+  },
+};
+
+async function replay(browser) {
+  // Past the heart and into it, at 1 kHz.
+  const lines = Array.from({ length: 400 }, (_, tick) => {
+    const way = 110 - 0.2 * tick;
+    return `capsule:${way},-20,40,${way + 70},-50,70,3`;
+  });
+  await writeFile(join(folder, "tools.csv"), lines.join("\n"));
+  dibs("view", "heart.dibs", "heart.pc2", "--path", "tools.csv", "-o", "replay.html");
+  for (const [name, between] of [["held", "0"], ["interpolated", "1"], ["extrapolated", "2"]]) {
+    const printed = dibs("track", "heart.dibs", "--motion", "heart.pc2", "--path", "tools.csv", "--surface", name, "--full", "--json");
+    const track = printed.trim().split("\n").map((line) => JSON.parse(line));
+    const page = await open(browser, "replay.html");
+    const found = await page.evaluate((between) => {
+      for (const [name, value] of [["between", between], ["search", "2"]]) viewer.controls.set(name, value);
+      // The session of a new page has seen no frame.
+      viewer.restart();
+      const answers = [];
+      for (let tick = 0; tick < 400; tick++) {
+        viewer.advance(1);
+        const [separation, lower] = viewer.session.answer();
+        answers.push([separation, lower]);
+      }
+      return answers;
+    }, between);
+    found.forEach(([separation, lower], tick) => {
+      assert.equal(separation, track[tick].separation, `${name}, tick ${tick}`);
+      assert.equal(lower, track[tick].lower, `${name}, tick ${tick}`);
+    });
+    assert.deepEqual(page.complaints, []);
+    await page.close();
+  }
+}
+
+async function touches(browser) {
+  const page = await open(browser, "heart.html", { width: 420, height: 800, hasTouch: true });
+  await page.evaluate(() => viewer.play(false));
+  await fresh(page);
+  const before = await pose(page);
+  const { x, y } = await page.evaluate(() => {
+    const [start, end] = viewer.picture.tool.balls.map((ball) => viewer.hand.seen(ball.position));
+    return start.lerp(end, 0.5);
+  });
+  const finger = await page.touchscreen.touchStart(x, y);
+  await finger.move(x - 30, y + 20);
+  await finger.end();
+  assert.notDeepEqual(await pose(page), before, "a finger drags the instrument");
+  await fresh(page);
+  await shot(page, "narrow");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+}
+
+async function withoutWebGl() {
+  const browser = await launch(["--disable-gpu", "--disable-3d-apis"]);
+  const page = await open(browser, "heart.html");
+  assert.match(await shown(page, "message"), /no WebGL/);
+  const { separation } = await record(page);
+  await page.focus("#view");
+  for (let step = 0; step < 5; step++) await page.keyboard.press("ArrowRight");
+  await page.evaluate(() => viewer.play(false));
+  assert.notEqual((await record(page)).separation, separation, "keys and the query work");
+  await shot(page, "no-webgl");
+  await browser.close();
+}
+
+// Frame time and time a tick while the heart beats, as the page itself measures them.
+async function measure(browser) {
+  const page = await open(browser, "heart.html", { ...LARGE, runs: true });
+  const measured = await page.evaluate(async () => {
+    const next = () => new Promise(requestAnimationFrame);
+    for (let frame = 0; frame < 3; frame++) await next();
+    const start = performance.now();
+    for (let frame = 0; frame < 10; frame++) await next();
+    const frame = (performance.now() - start) / 10;
+    viewer.frame = () => {};
+    // In turns of a frame, as a running page asks.
+    const tick = (search) => {
+      viewer.controls.set("search", search);
+      let milliseconds = 0;
+      for (let turn = 0; turn < 300; turn++) milliseconds += viewer.advance(17).milliseconds;
+      return (milliseconds / 300 / 17) * 1000;
+    };
+    const ticks = { tracker: tick("0"), warm: tick("1"), cold: tick("2") };
+    viewer.controls.set("search", "0");
+    viewer.picture.renderer.render = () => {};
+    const before = performance.now();
+    for (let frame = 0; frame < 60; frame++) viewer.step(17);
+    return { frame, ticks, work: (performance.now() - before) / 60 };
+  });
+  await page.close();
+  return measured;
+}
+
+async function scenes(browser) {
+  const page = await open(browser, "heart.html", LARGE);
+  await page.evaluate(() => {
+    viewer.play(false);
+    viewer.tick = 340;
+    viewer.take([34, -40, 34, 92, -74, 74, 2.6]);
+  });
+  await set(page, "margin", "12");
+  await page.evaluate(() => {
+    viewer.play(true);
+    // The picture is drawn later: plots need the ticks alone.
+    const { picture } = viewer;
+    viewer.picture = null;
+    for (let frame = 0; frame < 320; frame++) viewer.step(17);
+    viewer.picture = picture;
+    viewer.play(false);
+  });
+  const views = { outside: {}, level: { spheres: "level" }, tested: { spheres: "tested", opacity: "0.5" }, front: { spheres: "front" } };
+  for (const [name, settings] of Object.entries(views)) {
+    for (const [key, value] of Object.entries({ spheres: "none", opacity: "1", ...settings })) await set(page, key, value);
+    await fresh(page);
+    await shot(page, name);
+    if (name === "front") await page.screenshot({ path: PICTURE, type: "jpeg", quality: 82 });
+  }
+  await set(page, "spheres", "none");
+  await page.evaluate(() => viewer.take([20, -20, 34, 92, -74, 74, 2.6]));
+  await set(page, "opacity", "0.6");
+  await fresh(page);
+  await shot(page, "crossing");
+  await page.close();
+}
+
+dibs("view", "heart.dibs", "heart.pc2", "-o", "heart.html");
+const { size } = await stat(join(folder, "heart.html"));
+assert(size <= 3e6, `heart.html has ${size} bytes`);
+const browser = await launch(SOFTWARE_GL);
+try {
+  for (const [name, check] of Object.entries(checks)) {
+    const page = await open(browser, "heart.html");
+    await check(page);
+    assert.deepEqual(page.complaints, [], name);
+    await page.close();
+    console.log(`passed: ${name}`);
+  }
+  await touches(browser);
+  console.log("passed: a finger");
+  await replay(browser);
+  console.log("passed: a replay has the separations of `dibs track`");
+  await withoutWebGl();
+  console.log("passed: without WebGL the page says so, and answers");
+  await scenes(browser);
+  const measured = { size, version: await browser.version(), ...(await measure(browser)) };
+  console.log(measured);
+  if (process.argv.includes("--record")) await recordPage(measured, PICTURE);
+} finally {
+  await browser.close();
+}
