@@ -35,8 +35,9 @@ const ROWS: u32 = 32;
 /// The receiving end of the bus.
 ///
 /// Two contexts use it, one at a time. A serial line's interrupt calls [`byte`](Self::byte), which takes O(1), and
-/// O(bytes) for the last byte of a packet; a network's driver calls [`packet`](Self::packet). The idle loop calls [`work`](Self::work), which checks and publishes in slices, and
-/// [`report`](Self::report). Both are below the control tick's priority.
+/// O(bytes) for the last byte of a packet; a network's driver calls [`packet`](Self::packet). The idle loop calls
+/// [`work`](Self::work), which checks and publishes in slices, and [`report`](Self::report). Both are below the control
+/// tick's priority.
 pub struct Receiver {
     deframer: Deframer<MTU>,
     assembler: surface::Receiver<'static>,

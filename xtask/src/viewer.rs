@@ -56,6 +56,16 @@ pub fn viewer(options: &Options) -> Result<()> {
     Ok(())
 }
 
+/// The session compiles for WebAssembly: CI's sample of the viewer, whose tests on this computer are among the others.
+pub fn compiles() -> Result<Outcome> {
+    if let Err(error) = add_target() {
+        return Ok(Outcome::Skipped(format!("{error:#}")));
+    }
+    let mut cargo = Command::new("cargo");
+    cargo.args(["check", "--quiet", "--package", "dibs-view", "--lib", "--target", TARGET]);
+    run(cargo.current_dir(workspace::root())).map(|()| Outcome::Passed)
+}
+
 /// The query compiled to WebAssembly answers as the native one, in Node.
 pub fn same_bits() -> Result<Outcome> {
     if let Err(error) = programs(&[("node", "nodejs")]) {

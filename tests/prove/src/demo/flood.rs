@@ -112,9 +112,11 @@ impl Wire {
     }
 }
 
+/// Makes a frame of one kind; `None` if it needs one that was sent before.
+type Kind = fn(&mut Rng, &Wire) -> Option<Vec<u8>>;
+
 /// The kinds of frames in the flood.
-const KINDS: [fn(&mut Rng, &Wire) -> Option<Vec<u8>>; 9] =
-    [noise, garbage, cut, repeat, repeat, fragment, question, broadcast, lie];
+const KINDS: [Kind; 9] = [noise, garbage, cut, repeat, repeat, fragment, question, broadcast, lie];
 
 /// Random bytes after the controller's hardware address.
 fn noise(rng: &mut Rng, _: &Wire) -> Option<Vec<u8>> {
