@@ -74,9 +74,9 @@ impl Effort {
         faults: 300,
         board_faults: 1,
         demo_seconds: 5,
-        fault_seconds: 11,
+        fault_seconds: 4,
         flood_seconds: 1,
-        fuzz_seconds: 15,
+        fuzz_seconds: 8,
         is_record: false,
         share: 0,
     };
