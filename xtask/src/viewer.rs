@@ -100,7 +100,8 @@ fn subject() -> Result<PathBuf> {
     let folder = workspace::target().join("viewer/heart");
     fs::create_dir_all(&folder)?;
     let mut cargo = Command::new("cargo");
-    cargo.args(["build", "--quiet", "--release", "--package", "dibs-build", "--bin", "dibs"]);
+    // With the features of the whole workspace, so that what the tests built serves.
+    cargo.args(["build", "--quiet", "--release", "--workspace", "--bin", "dibs"]);
     run(cargo.current_dir(workspace::root()))?;
     let dibs = workspace::target().join("release/dibs");
     let tasks = [
