@@ -8,7 +8,7 @@ use crate::program::{fails, json, succeeds};
 
 /// Every tenth triangle of a heart has the label 7, the others 0 to 4.
 fn label(triangle: usize) -> u8 {
-    if triangle % 10 == 0 { 7 } else { (triangle % 5) as u8 }
+    if triangle.is_multiple_of(10) { 7 } else { (triangle % 5) as u8 }
 }
 
 #[test]
