@@ -21,7 +21,7 @@ const AREAS: [(&str, &[&str], &[&str]); 6] = [
     (
         "dibs-nostd/src/query",
         &["query"],
-        &["refusals", "slack", "wide", "positions", "tracker", "differential"],
+        &["refusals", "slack", "wide", "positions", "tracker", "differential", "chain"],
     ),
     ("dibs-nostd/src/tree", &["tree", "query"], &["format", "refusals"]),
     ("dibs-nostd/src/stretch", &["surface"], &["stretch", "plausible"]),
