@@ -2,7 +2,9 @@
 
 use dibs_build::{Builder, BuiltTree, generate};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Budget, Capsule, NoSide, Options, Proximity, Query, Side, Sphere, Tool};
+use dibs_nostd::{
+    Budget, Capsule, NoSide, Options, Proximity, Query, Side, Sphere, Tool, TriangleRow,
+};
 use dibs_tests::deform::{deformed, unit};
 use fastrand::Rng;
 use glam::Vec3;
@@ -138,6 +140,28 @@ fn nothing_within_a_limit_is_missed() {
     let (rows, tool) = (built.to_rows(&frames[0]), Sphere::new(Vec3::ZERO, 1.0).expect("finite"));
     let nan = query.closest_within(&rows[..], &tool, f32::NAN, &Options::cold());
     assert!(nan.is_ok_and(|found| found.side != Side::Undefined(NoSide::CutShort)));
+}
+
+#[test]
+fn a_warm_triangle_beyond_the_limit_is_not_tested() {
+    let mut rng = Rng::with_seed(6);
+    let (_, built, frames) = deformed(3, 7);
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let rows = built.to_rows(&frames[0]);
+    let budget = Budget { node_tests: 0, triangle_tests: 1 };
+    for _ in 0..1_000 {
+        let row = TriangleRow(rng.u32(..tree.triangle_count()));
+        let corner = rows[tree.corners(row).expect("a row")[0] as usize];
+        let (distance, radius) = (5.0 + 20.0 * rng.f32(), 0.5 + 4.0 * rng.f32());
+        let tool = Sphere::new(corner + distance * unit(&mut rng), radius).expect("finite");
+        let options = Options::new().unsigned().warm_start(Some(row)).budget(budget);
+        for (beyond, tests) in [(-0.01, 0), (0.01, 1)] {
+            let limit = distance - radius + beyond;
+            let found = query.closest_within(&rows[..], &tool, limit, &options);
+            assert_eq!(found.expect("an answer").triangle_tests, tests, "{distance} {radius}");
+        }
+    }
 }
 
 /// A scene of organs, and an instrument of four capsules that wanders among them.
