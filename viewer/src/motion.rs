@@ -72,8 +72,8 @@ impl Motion {
     }
 }
 
-/// Undoes the packing by `dibs view`, which makes a motion compressible without changing a bit: each number's word is
-/// the difference to that of the frame before, its sign in the lowest bit; and all words' lowest bytes come first.
+/// Undoes the packing by `dibs view`, to the bit. Each word was replaced by its difference from the frame before, with the
+/// sign in the lowest bit. The lowest bytes of all words come first, then the next bytes.
 ///
 /// # Errors
 /// [`SessionError::Motion`] for a wrong number of bytes.

@@ -40,7 +40,7 @@ pub struct Settings {
     pub between: Between,
     /// The way to an answer.
     pub search: Search,
-    /// Whether spheres have the radius of the measured stretch instead of that of the tree's limit.
+    /// Spheres are scaled by the measured stretch, not by the tree's limit.
     pub is_measured: bool,
 }
 

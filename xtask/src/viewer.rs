@@ -100,7 +100,7 @@ fn subject() -> Result<PathBuf> {
     let folder = workspace::target().join("viewer/heart");
     fs::create_dir_all(&folder)?;
     let mut cargo = Command::new("cargo");
-    // With the features of the whole workspace, so that what the tests built serves.
+    // The features of the whole workspace are those of the tests' build, so cargo rebuilds nothing.
     cargo.args(["build", "--quiet", "--release", "--workspace", "--bin", "dibs"]);
     run(cargo.current_dir(workspace::root()))?;
     let dibs = workspace::target().join("release/dibs");

@@ -66,7 +66,7 @@ impl<'a> Series<'a> {
     }
 }
 
-/// The positions in a file. An error unless its polygons are those of the first file.
+/// Reads the positions in a file. Polygons that differ from the first file's are an error.
 fn frame(
     path: &Path,
     number: u64,

@@ -94,7 +94,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         Ok(scene.finish())
     }
 
-    /// The closest pair between the surfaces of a scene, a query for each, and a chain of tools; `None` without either.
+    /// The closest pair between a chain of tools and the surfaces of a scene, each with its query; `None` without either.
     ///
     /// Signed options search each surface at least once without a limit, since a tool deep inside it is far from it.
     /// Unsigned ones search no surface farther than the closest pair so far, nearest surface of the last answers first.
@@ -104,21 +104,20 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// # Errors
     /// Those of [`closest`](Self::closest), of any surface.
     pub fn closest_in_scene<V: VertexTable + ?Sized, T: Tool>(
-        queries: &mut [Self],
-        surfaces: &[&V],
+        surfaces: &mut [(&mut Self, &V)],
         tools: &[T],
         options: &Options,
     ) -> Result<Option<Closest>, QueryError> {
         let mut scene = Scene::new(options);
         let (mut nearest, mut least) = (0, f32::INFINITY);
-        for (at, (query, vertices)) in queries.iter().zip(surfaces).enumerate() {
+        for (at, (query, vertices)) in surfaces.iter().enumerate() {
             let (_, squared) = query.nearest(*vertices, tools, options);
             if squared < least {
                 (nearest, least) = (at, squared);
             }
         }
-        for at in nearest_first(nearest, queries.len()) {
-            if let (Some(query), Some(vertices)) = (queries.get_mut(at), surfaces.get(at)) {
+        for at in nearest_first(nearest, surfaces.len()) {
+            if let Some((query, vertices)) = surfaces.get_mut(at) {
                 query.add_to(&mut scene, at, *vertices, tools)?;
             }
         }

@@ -169,8 +169,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
 
     /// Visits subtrees, near ones first, until none below the cutoff is left or the budget runs out.
     ///
-    /// If `IS_LIMITED`, the cutoff began at the distance `limit`, which bounds what was never visited. The two kinds are
-    /// two functions, each inlined into its one caller: that keeps the loop of the plain query in registers.
+    /// A limited search began with the cutoff at `limit`, which bounds the subtrees that it never visited. Each kind is a
+    /// function with one caller, into which it is inlined: this keeps the plain query's loop in registers.
     pub fn run<const IS_LIMITED: bool>(mut self, limit: f32) -> Result<Proximity, QueryError> {
         while let Some(top) = self.waiting.checked_sub(1) {
             self.waiting = top;

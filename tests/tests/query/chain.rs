@@ -184,7 +184,8 @@ fn thirteen_surfaces_and_four_capsules_cost_three_queries() {
         }
         let instrument = instrument(at, heading, 95.0);
         let options = Options::new().unsigned();
-        let best = Query::closest_in_scene(&mut queries, &surfaces, &instrument, &options);
+        let mut scene: Vec<_> = queries.iter_mut().zip(surfaces.iter().copied()).collect();
+        let best = Query::closest_in_scene(&mut scene, &instrument, &options);
         let best = best.expect("an answer").expect("one");
         whole += cost(&best.proximity);
         // One query of one capsule on the surface that is closest.
@@ -215,7 +216,8 @@ fn no_tool_inside_a_surface_of_a_scene_is_missed() {
         let near = organs[rng.usize(..organs.len())][rng.usize(..tree.vertex_count() as usize)];
         let instrument = instrument(near + 30.0 * unit(&mut rng), unit(&mut rng), 15.0);
         let options = if rng.bool() { Options::cold() } else { Options::new() };
-        let best = Query::closest_in_scene(&mut queries, &surfaces, &instrument, &options);
+        let mut scene: Vec<_> = queries.iter_mut().zip(surfaces.iter().copied()).collect();
+        let best = Query::closest_in_scene(&mut scene, &instrument, &options);
         let best = best.expect("an answer").expect("one");
         let all = least(&mut single, &surfaces, &instrument, &Options::cold());
         let found = best.proximity;
@@ -241,12 +243,8 @@ fn without_a_surface_or_a_tool_there_is_no_closest_pair() {
     let no_tools: [Sphere; 0] = [];
     assert_eq!(query.closest_of(organs[0].as_slice(), &no_tools, &Options::new()), Ok(None));
     let tool = [Sphere::new(Vec3::ZERO, 1.0).expect("finite")];
-    let none = Query::<u16, MAX_STACK>::closest_in_scene::<[Vec3], _>(
-        &mut [],
-        &[],
-        &tool,
-        &Options::new(),
-    );
+    let none =
+        Query::<u16, MAX_STACK>::closest_in_scene::<[Vec3], _>(&mut [], &tool, &Options::new());
     assert_eq!(none, Ok(None));
 }
 

@@ -47,7 +47,7 @@ const WHOLE: u32 = 1 << 13 | 1 << 12;
 /// Bytes of the Ethernet checksum.
 const CHECKSUM: usize = 4;
 
-/// Reads of a register within which the chip has done what it was told.
+/// Most reads of a register while the chip executes a command.
 const PATIENCE: u32 = 100_000;
 
 /// A register by its offset.

@@ -61,7 +61,7 @@ impl Link {
 }
 
 /// A writer that is flushed once most has arrived: an emulated serial line lets the computer run seconds ahead, and an
-/// Ethernet controller drops what does not fit its buffer.
+/// Ethernet controller drops packets that do not fit its buffer.
 pub struct Paced<W> {
     writer: W,
     link: Arc<Link>,

@@ -8,8 +8,8 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use std::io::Write;
 
-/// The words of a motion so that they compress: each as the difference to that of the frame before, its sign in the
-/// lowest bit; then the lowest bytes of all words, the next bytes, and so on. (`viewer/src/motion.rs` undoes it.)
+/// Rearranges a motion's words for the compressor. Each word becomes its difference from the frame before, with the sign
+/// in the lowest bit. The lowest bytes of all words come first, then the next bytes. `viewer/src/motion.rs` undoes it.
 pub fn words(frames: &[Vec<Vec3>]) -> Vec<u8> {
     let zero = vec![Vec3::ZERO; frames.first().map_or(0, Vec::len)];
     let befores = std::iter::once(&zero).chain(frames);
