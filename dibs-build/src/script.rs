@@ -81,6 +81,12 @@ impl TreeScript {
         self
     }
 
+    /// Labels of the mesh file's own groups: [`ReadOptions::groups`].
+    pub fn labels_from_groups(mut self) -> Self {
+        self.reading.groups = true;
+        self
+    }
+
     /// A limit for each triangle instead, from a file that `dibs stretch --limits` has written.
     pub fn limits(mut self, file: impl Into<PathBuf>) -> Self {
         self.limits = Some(file.into());
@@ -96,7 +102,7 @@ impl TreeScript {
 
     /// How the mesh file is read.
     pub fn reading(mut self, options: ReadOptions) -> Self {
-        self.reading = options;
+        self.reading = ReadOptions { groups: options.groups || self.reading.groups, ..options };
         self
     }
 
@@ -152,17 +158,21 @@ impl TreeScript {
     }
 
     fn build(self, label: &str) -> Result<BuiltTree, Box<dyn std::error::Error>> {
+        let mut builder = self.builder;
         let surface: Box<dyn RestSurface> = match self.mesh {
             MeshSource::File(path) => {
-                let import = self.reading.read(path)?;
+                let mut import = self.reading.read(path)?;
                 warn(label, import.report.warnings());
+                if let Some(groups) = import.groups.take() {
+                    builder = builder.labels(groups.labels);
+                }
                 Box::new(import)
             }
             MeshSource::Mesh(mesh) => Box::new(mesh),
         };
         let builder = match &self.limits {
-            Some(path) => self.builder.limits(read_limits(path, surface.mesh())?),
-            None => self.builder,
+            Some(path) => builder.limits(read_limits(path, surface.mesh())?),
+            None => builder,
         };
         let builder = match &self.labels {
             Some(path) => builder.labels(read_labels(path, surface.mesh())?),

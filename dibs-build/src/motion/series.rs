@@ -73,7 +73,7 @@ fn frame(
     polygons: &mut Option<(Vec<u32>, Vec<usize>)>,
     place: &Place,
 ) -> Result<Vec<Vec3>, ReadErrorKind> {
-    let (format, raw) = elements(std::fs::read(path)?, path)?;
+    let (format, raw) = elements(std::fs::read(path)?, path, false)?;
     if matches!(format, Format::StlAscii | Format::StlBinary) {
         return Err(ReadErrorKind::UnnumberedFrame);
     }

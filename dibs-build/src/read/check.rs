@@ -7,6 +7,7 @@ use super::weld::first_coincident;
 use super::{Format, Import, ReadErrorKind, ReadOptions, Report};
 use crate::Mesh;
 use crate::components::connected_by_vertices;
+use dibs_nostd::format::MAX_ROOTS;
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
 
@@ -63,14 +64,18 @@ pub(crate) fn import(
     if surface.faces.is_empty() {
         return Err(ReadErrorKind::NoTriangles { degenerate: report.dropped_degenerate });
     }
-    surface.keep_one_component(options.largest_component, &mut report)?;
+    surface.keep_components(options.largest_component, &mut report)?;
     surface.count_edges(&mut report);
     surface.count_vertices(&mut report);
     report.triangles = surface.faces.len();
+    let faces = surface.faces.iter().map(|triangle| triangle.face);
+    let groups = raw.groups.as_ref();
+    let groups = groups.map(|groups| groups.labels(faces, format == Format::Obj)).transpose()?;
     let triangles = surface.faces.into_iter().map(|face| face.corners).collect();
     Ok(Import {
         mesh: Mesh { origin: place.origin, positions: surface.positions, triangles },
         report,
+        groups,
     })
 }
 
@@ -264,15 +269,15 @@ impl Surface {
         Ok(())
     }
 
-    /// Keeps one component; triangles that share a vertex are connected.
-    fn keep_one_component(&mut self, largest: bool, report: &mut Report) -> Result<()> {
+    /// Keeps the largest component, or all if a tree can; triangles that share a vertex are connected.
+    fn keep_components(&mut self, largest: bool, report: &mut Report) -> Result<()> {
         let corners: Vec<[u32; 3]> = self.faces.iter().map(|face| face.corners).collect();
         let components = connected_by_vertices(&corners);
         let sizes: Vec<usize> = components.iter().map(Vec::len).collect();
-        if let [kept, _, ..] = &components[..] {
-            if !largest {
-                return Err(ReadErrorKind::Components { sizes, coincident: report.coincident });
-            }
+        if !largest && components.len() > MAX_ROOTS as usize {
+            return Err(ReadErrorKind::Components { sizes, coincident: report.coincident });
+        }
+        if largest && let [kept, _, ..] = &components[..] {
             let (mut at, mut kept) = (0, kept.iter().peekable());
             self.faces.retain(|_| {
                 let is_kept = kept.next_if_eq(&&at).is_some();

@@ -6,6 +6,7 @@ use super::{Format, ReadErrorKind};
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
+#[derive(Clone)]
 pub(super) struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,

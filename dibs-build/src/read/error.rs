@@ -1,6 +1,7 @@
 //! Errors of reading a file: one sentence that names the file, the element and the remedy.
 
 use super::Format;
+use dibs_nostd::format::MAX_ROOTS;
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -242,9 +243,9 @@ pub enum ReadErrorKind {
         /// The face of the first, counted from 1.
         face: usize,
     },
-    /// Several surfaces: they are several trees.
+    /// More connected components than a tree has roots.
     #[error(
-        "{} surfaces that share no vertex ({} triangles); build one tree for each, or keep the largest with --largest-component{}",
+        "{} surfaces that share no vertex ({} triangles), and a tree holds {MAX_ROOTS} at most; keep the largest with --largest-component{}",
         .sizes.len(), list(.sizes), weld_hint(*.coincident)
     )]
     Components {
@@ -253,12 +254,40 @@ pub enum ReadErrorKind {
         /// Vertices that coincide with another one and were not welded.
         coincident: usize,
     },
+    /// Labels were to be made of the groups of a file that has none.
+    #[error("no groups of triangles: {}; give labels in a file of their own", super::groups::expected(*.format))]
+    NoGroups {
+        /// The format.
+        format: Format,
+    },
+    /// A face's group is not a label.
+    #[error("face {face} has {}, and labels are whole numbers from 0 to 255; number the groups so", group(*.value))]
+    Label {
+        /// The face, counted from 1.
+        face: usize,
+        /// Its group's number; NaN where it has none.
+        value: f64,
+    },
+    /// More groups than labels.
+    #[error(
+        "{groups} groups, and there are {most} labels; join some, or give labels in a file of their own"
+    )]
+    ManyGroups {
+        /// Groups in the file.
+        groups: usize,
+        /// Labels that there are.
+        most: usize,
+    },
     /// The weld tolerance is not a length.
     #[error("the weld tolerance is {tolerance}; give a finite length of at least 0")]
     Tolerance {
         /// The tolerance given.
         tolerance: f32,
     },
+}
+
+fn group(value: f64) -> String {
+    if value.is_nan() { "no group".to_owned() } else { format!("the group {value}") }
 }
 
 fn at(line: Option<usize>) -> String {

@@ -4,6 +4,7 @@
 //! widths than it expects.
 
 use super::cursor::Cursor;
+use super::groups::FaceGroups;
 use super::raw::{Raw, excerpt};
 use super::scalar::{Endian, Scalar};
 use super::{Format, ReadErrorKind};
@@ -11,7 +12,7 @@ use std::collections::HashMap;
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
-pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
+pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
     let mut file = Cursor::new(bytes, Format::Gmsh);
     file.skip_to("$MeshFormat")?;
     let version = file.needed("version")?;
@@ -35,13 +36,16 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
         }
     }
     file.skip_to("$EndMeshFormat")?;
-    let mut mesh = Mesh { raw: Raw::new(0), row: HashMap::new() };
+    let mut mesh = Mesh { raw: Raw::new(0), row: HashMap::new(), physical: HashMap::new() };
+    mesh.raw.groups = groups.then(FaceGroups::default);
     let (mut has_nodes, mut has_elements) = (false, false);
     while let Some(section) = file.word() {
         let Some(name) = section.strip_prefix('$') else {
             return Err(file.malformed(format!("'{}' is no section", excerpt(section))));
         };
         match (name, is_old) {
+            ("PhysicalNames", _) if groups => mesh.names(&mut file)?,
+            ("Entities", false) if groups => mesh.entities(&mut file)?,
             ("Nodes", true) => mesh.old_nodes(&mut file)?,
             ("Nodes", false) => mesh.nodes(&mut file)?,
             ("Elements", true) => mesh.old_elements(&mut file)?,
@@ -55,6 +59,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
     if !(has_nodes && has_elements) {
         return Err(file.truncated("no '$Nodes' or no '$Elements'".to_owned()));
     }
+    // Without physical groups all numbers are 0.
+    mesh.raw.groups = mesh.raw.groups.filter(|groups| groups.of_face.iter().any(|&n| n != 0.0));
     Ok(mesh.raw)
 }
 
@@ -62,9 +68,54 @@ struct Mesh {
     raw: Raw,
     /// The row of each node's number.
     row: HashMap<u64, u32>,
+    /// The physical group of each surface that has one.
+    physical: HashMap<i64, f64>,
 }
 
 impl Mesh {
+    /// The names of physical groups: text, also among binary sections.
+    fn names(&mut self, file: &mut Cursor<'_>) -> Result<()> {
+        for _ in 0..file.text_index()? {
+            let (dimension, number) = (file.text_index()?, file.text_number()?);
+            let name = file.line().trim_matches('"').to_owned();
+            if let Some(groups) = self.raw.groups.as_mut().filter(|_| dimension == 2) {
+                groups.names.push((number, name));
+            }
+        }
+        Ok(())
+    }
+
+    /// The physical groups of surfaces, which stand behind those of points and curves.
+    fn entities(&mut self, file: &mut Cursor<'_>) -> Result<()> {
+        skip_line(file);
+        let counts = file.numbers(4, Scalar::U64, "numbers of entities")?;
+        for (dimension, &count) in counts[..3].iter().enumerate() {
+            for _ in 0..file.whole(count)? {
+                let entity = file.number(Scalar::I32)?;
+                // A point's place, or the corners of a box.
+                file.numbers(if dimension == 0 { 3 } else { 6 }, Scalar::F64, "coordinates")?;
+                let physical = file.index(Scalar::U64)?;
+                let physical = file.numbers(physical, Scalar::I32, "physical groups")?;
+                if dimension > 0 {
+                    let borders = file.index(Scalar::U64)?;
+                    file.numbers(borders, Scalar::I32, "borders")?;
+                }
+                let &[number, ref others @ ..] = &physical[..] else { continue };
+                if dimension < 2 {
+                    continue;
+                }
+                if !others.is_empty() {
+                    return Err(file.malformed(format!(
+                        "surface {entity} is in several physical groups, and a triangle has one label"
+                    )));
+                }
+                // Its sign turns the surface, which the elements show.
+                self.physical.insert(entity as i64, number.abs());
+            }
+        }
+        Ok(())
+    }
+
     fn nodes(&mut self, file: &mut Cursor<'_>) -> Result<()> {
         skip_line(file);
         let blocks = file.index(Scalar::U64)?;
@@ -114,13 +165,15 @@ impl Mesh {
         let blocks = file.index(Scalar::U64)?;
         file.numbers(3, Scalar::U64, "numbers")?;
         for _ in 0..blocks {
-            let (_dimension, _entity) = (file.number(Scalar::I32)?, file.number(Scalar::I32)?);
+            let (dimension, entity) = (file.number(Scalar::I32)?, file.number(Scalar::I32)?);
+            let group = self.physical.get(&(entity as i64)).filter(|_| dimension == 2.0);
+            let group = group.copied().unwrap_or(0.0);
             let kind = file.index(Scalar::I32)?;
             let nodes = nodes_of(kind, file)?;
             for _ in 0..file.index(Scalar::U64)? {
                 let tag = file.index(Scalar::U64)?;
                 let nodes = file.numbers(nodes, Scalar::U64, "nodes")?;
-                self.element(file, kind, tag, &nodes)?;
+                self.element(file, kind, tag, &nodes, group)?;
             }
         }
         Ok(())
@@ -144,9 +197,11 @@ impl Mesh {
             let nodes = nodes_of(kind, file)?;
             for _ in 0..block {
                 let tag = tag.map_or_else(|| file.index(Scalar::I32), Ok)?;
-                file.numbers(tags, Scalar::I32, "tags")?;
+                // The first is the physical group, 0 for none.
+                let tags = file.numbers(tags, Scalar::I32, "tags")?;
+                let group = tags.first().copied().unwrap_or(0.0);
                 let nodes = file.numbers(nodes, Scalar::I32, "nodes")?;
-                self.element(file, kind, tag, &nodes)?;
+                self.element(file, kind, tag, &nodes, group.abs())?;
             }
             done += block.max(1);
         }
@@ -154,7 +209,14 @@ impl Mesh {
     }
 
     /// Triangles and quads are kept.
-    fn element(&mut self, file: &Cursor<'_>, kind: u64, tag: u64, nodes: &[f64]) -> Result<()> {
+    fn element(
+        &mut self,
+        file: &Cursor<'_>,
+        kind: u64,
+        tag: u64,
+        nodes: &[f64],
+        group: f64,
+    ) -> Result<()> {
         if !matches!(kind, 2 | 3) {
             return Ok(());
         }
@@ -165,6 +227,9 @@ impl Mesh {
             self.raw.corners.push(row.ok_or_else(missing)?);
         }
         self.raw.end_face();
+        if let Some(groups) = &mut self.raw.groups {
+            groups.of_face.push(group);
+        }
         Ok(())
     }
 }

@@ -9,6 +9,7 @@ mod foreign;
 #[cfg(feature = "formats")]
 mod gltf;
 mod gmsh;
+mod groups;
 #[cfg(feature = "formats")]
 mod inflate;
 mod obj;
@@ -24,11 +25,13 @@ mod stl;
 #[cfg(feature = "formats")]
 mod three_mf;
 mod vtk;
+mod vtk_data;
 #[cfg(feature = "formats")]
 mod vtp;
 mod weld;
 
 pub use error::{ReadError, ReadErrorKind};
+pub use groups::{Group, Groups};
 pub use report::{Format, Report};
 
 use crate::mesh::{Mesh, RestSurface};
@@ -44,10 +47,12 @@ use std::path::Path;
 /// A mesh that passed every check, and the report of findings and repairs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Import {
-    /// The surface: one connected component without degenerate or duplicate triangles.
+    /// The surface: at most 64 connected components without degenerate or duplicate triangles.
     pub mesh: Mesh,
     /// Counts of the elements read, welded, dropped and found.
     pub report: Report,
+    /// The labels that the file's groups give its triangles, where [`ReadOptions::groups`] asks for them.
+    pub groups: Option<Groups>,
 }
 
 /// How to read a mesh file. [`read`] uses the defaults.
@@ -62,7 +67,7 @@ pub struct ReadOptions {
     pub weld_tolerance: Option<f32>,
     /// Make degenerate and duplicate triangles an error, instead of dropping and counting them.
     pub strict: bool,
-    /// Keep the component with the most triangles, instead of failing when there are several.
+    /// Keep only the connected component with the most triangles.
     pub largest_component: bool,
     /// What the file's lengths are: they become millimetres.
     pub unit: Unit,
@@ -72,6 +77,10 @@ pub struct ReadOptions {
     /// of its bounding box, rounded to a number of few bits. A mesh of 100 mm in double precision is recentred from a
     /// coordinate of about 2 m on.
     pub origin: Option<DVec3>,
+    /// Make labels of the file's groups ([`Import::groups`]), or fail where it has none: the names of OBJ's `g` and
+    /// `usemtl`, numbered from 0 in the order of their first face; the numbers of Gmsh's physical groups, 0 for none;
+    /// the values of VTK's cell data named `label`, `labels` or `RegionId`.
+    pub groups: bool,
 }
 
 impl RestSurface for Import {
@@ -105,6 +114,43 @@ impl ReadOptions {
     }
 
     fn read_bytes(&self, bytes: Vec<u8>, path: &Path) -> Result<Import, ReadErrorKind> {
+        self.check_options()?;
+        let (format, raw) = elements(bytes, path, self.groups)?;
+        let mut import = self.import(format, raw)?;
+        let extension = path.extension().and_then(|extension| extension.to_str());
+        import.report.extension_disagrees = extension.is_some_and(|e| !format.has_extension(e));
+        Ok(import)
+    }
+
+    /// Checks a mesh in memory as [`read`](Self::read) checks that of a file: with the same repairs, and the same report.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    ///
+    /// ```
+    /// use dibs_build::{Import, glam::DVec3};
+    /// let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
+    /// let import = Import::options().check(&corners, &[[0, 1, 2]])?;
+    /// assert_eq!(import.report.border_edges, 3);
+    /// assert!(Import::options().check(&corners, &[[0, 1, 3]]).is_err());
+    /// # Ok::<(), dibs_build::ReadErrorKind>(())
+    /// ```
+    pub fn check(
+        &self,
+        positions: &[DVec3],
+        triangles: &[[u32; 3]],
+    ) -> Result<Import, ReadErrorKind> {
+        self.check_options()?;
+        let mut raw = Raw::new(0);
+        raw.positions = positions.iter().map(DVec3::to_array).collect();
+        for corners in triangles {
+            raw.corners.extend(corners);
+            raw.end_face();
+        }
+        self.import(Format::Memory, raw)
+    }
+
+    fn check_options(&self) -> Result<(), ReadErrorKind> {
         if let Some(tolerance) = self.weld_tolerance
             && !(tolerance.is_finite() && tolerance >= 0.0)
         {
@@ -115,32 +161,41 @@ impl ReadOptions {
         {
             return Err(ReadErrorKind::Origin { origin });
         }
-        let (format, mut raw) = elements(bytes, path)?;
+        Ok(())
+    }
+
+    fn import(&self, format: Format, mut raw: Raw) -> Result<Import, ReadErrorKind> {
+        if self.groups && raw.groups.is_none() {
+            return Err(ReadErrorKind::NoGroups { format });
+        }
         let scale = self.unit.millimetres();
         let place = Place::of_mesh(&raw, scale, self.origin)?;
         for position in &mut raw.positions {
             *position = place.of(*position).to_array();
         }
-        let mut import = check::import(&raw, format, self, place)?;
-        let extension = path.extension().and_then(|extension| extension.to_str());
-        import.report.extension_disagrees = extension.is_some_and(|e| !format.has_extension(e));
-        Ok(import)
+        check::import(&raw, format, self, place)
     }
 }
 
-/// The format of a file, and its vertices and polygons.
-pub(crate) fn elements(bytes: Vec<u8>, path: &Path) -> Result<(Format, Raw), ReadErrorKind> {
+/// The format of a file, and its vertices and polygons, with their groups if asked for.
+pub(crate) fn elements(
+    bytes: Vec<u8>,
+    path: &Path,
+    groups: bool,
+) -> Result<(Format, Raw), ReadErrorKind> {
     let format = sniff::format(&bytes, path)?;
     let raw = match format {
-        Format::Obj => obj::read(&bytes),
+        Format::Obj => obj::read(&bytes, groups),
         Format::StlAscii => stl::read_ascii(&bytes),
         Format::StlBinary => stl::read_binary(&bytes),
         Format::Ply => ply::read(bytes),
         Format::Off => off::read(&bytes),
-        Format::Vtk => vtk::read(&bytes),
-        Format::Gmsh => gmsh::read(&bytes),
+        Format::Vtk => vtk::read(&bytes, groups),
+        Format::Gmsh => gmsh::read(&bytes, groups),
+        // No content is taken for it.
+        Format::Memory => Err(ReadErrorKind::UnknownFormat),
         #[cfg(feature = "formats")]
-        Format::Vtp => vtp::read(&bytes),
+        Format::Vtp => vtp::read(&bytes, groups),
         #[cfg(feature = "formats")]
         Format::Gltf => gltf::read(&bytes, path.parent().unwrap_or(Path::new(""))),
         #[cfg(feature = "formats")]

@@ -4,11 +4,13 @@
 //! motion would no longer fit. It also has no continued lines, stops at names that are not UTF-8, and reports no line.
 //! Tests compare the two.
 
+use super::groups::FaceGroups;
 use super::raw::{Raw, excerpt, lines, position};
 use super::{Format, ReadErrorKind};
 
-pub(super) fn read(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
+pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw, ReadErrorKind> {
     let mut raw = Raw::new(1);
+    let mut names = groups.then(Names::default);
     let mut continued = String::new();
     for (number, line) in lines(bytes) {
         let line = line.trim();
@@ -22,9 +24,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
             continue;
         }
         if continued.is_empty() {
-            statement(line, number, &mut raw)?;
+            statement(line, number, &mut raw, &mut names)?;
         } else {
-            statement(&(std::mem::take(&mut continued) + line), number, &mut raw)?;
+            let line = std::mem::take(&mut continued) + line;
+            statement(&line, number, &mut raw, &mut names)?;
         }
     }
     if !continued.is_empty() {
@@ -33,10 +36,48 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
             missing: "its last line is to be continued".to_owned(),
         });
     }
+    raw.groups = names.filter(|names| names.were_given).map(|names| names.groups);
     Ok(raw)
 }
 
-fn statement(line: &str, number: usize, raw: &mut Raw) -> Result<(), ReadErrorKind> {
+/// The groups of faces: each pair of a group's and a material's name that occurs is one.
+#[derive(Default)]
+struct Names {
+    group: String,
+    material: String,
+    /// The number of that pair, once a face has it.
+    number: Option<f64>,
+    were_given: bool,
+    groups: FaceGroups,
+}
+
+impl Names {
+    fn set(&mut self, keyword: &str, name: String) {
+        if keyword == "g" {
+            self.group = name;
+        } else {
+            self.material = name;
+        }
+        (self.number, self.were_given) = (None, true);
+    }
+
+    fn push_face(&mut self) {
+        let number = self.number.unwrap_or_else(|| {
+            let names = [&self.group, &self.material].map(String::as_str);
+            let given: Vec<&str> = names.into_iter().filter(|name| !name.is_empty()).collect();
+            self.groups.number(&given.join(" / "))
+        });
+        self.number = Some(number);
+        self.groups.of_face.push(number);
+    }
+}
+
+fn statement(
+    line: &str,
+    number: usize,
+    raw: &mut Raw,
+    names: &mut Option<Names>,
+) -> Result<(), ReadErrorKind> {
     let malformed =
         |what| ReadErrorKind::Malformed { format: Format::Obj, line: Some(number), what };
     let line = line.split_once('#').map_or(line, |(before, _)| before);
@@ -71,6 +112,14 @@ fn statement(line: &str, number: usize, raw: &mut Raw) -> Result<(), ReadErrorKi
                 return Err(malformed("a face without vertices".to_owned()));
             }
             raw.end_face();
+            if let Some(names) = names {
+                names.push_face();
+            }
+        }
+        Some(keyword @ ("g" | "usemtl")) => {
+            if let Some(names) = names {
+                names.set(keyword, words.collect::<Vec<_>>().join(" "));
+            }
         }
         _ => {}
     }

@@ -1,9 +1,11 @@
 //! A file's vertices and polygons, as written; and the lines and numbers of the text formats.
 
+use super::groups::FaceGroups;
 use super::{Format, ReadErrorKind};
 use std::borrow::Cow;
 
 /// The contents of a file, before the checks that need all of it.
+#[derive(Default)]
 pub(crate) struct Raw {
     /// f64, so that the rounding to f32 is known, and a coordinate too large for f32 differs from an infinite one.
     pub positions: Vec<[f64; 3]>,
@@ -13,11 +15,19 @@ pub(crate) struct Raw {
     pub ends: Vec<usize>,
     /// The number that the file gives to its first vertex.
     pub first_vertex: u32,
+    /// The group of each polygon, where groups are asked for and the file has them.
+    pub groups: Option<FaceGroups>,
 }
 
 impl Raw {
     pub fn new(first_vertex: u32) -> Self {
-        Self { positions: Vec::new(), corners: Vec::new(), ends: Vec::new(), first_vertex }
+        Self {
+            positions: Vec::new(),
+            corners: Vec::new(),
+            ends: Vec::new(),
+            first_vertex,
+            groups: None,
+        }
     }
 
     /// Ends a polygon whose corners were pushed.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use std::fmt;
 
-/// A mesh file format.
+/// The format of a mesh: of a file, or none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -28,6 +28,8 @@ pub enum Format {
     Gmsh,
     /// 3D Manufacturing Format.
     ThreeMf,
+    /// No file: arrays of positions and triangles.
+    Memory,
 }
 
 impl Format {
@@ -37,7 +39,7 @@ impl Format {
         other || extension.eq_ignore_ascii_case(self.extension())
     }
 
-    /// The usual file name extension, in lower case.
+    /// The usual file name extension, in lower case; none in memory.
     #[must_use]
     pub fn extension(self) -> &'static str {
         match self {
@@ -50,6 +52,7 @@ impl Format {
             Self::Gltf => "gltf",
             Self::Gmsh => "msh",
             Self::ThreeMf => "3mf",
+            Self::Memory => "",
         }
     }
 }
@@ -67,6 +70,7 @@ impl fmt::Display for Format {
             Self::Gltf => "glTF",
             Self::Gmsh => "Gmsh",
             Self::ThreeMf => "3MF",
+            Self::Memory => "mesh in memory",
         })
     }
 }
@@ -96,7 +100,7 @@ pub struct Report {
     pub dropped_degenerate: usize,
     /// Triangles dropped because an earlier one has the same three vertices.
     pub dropped_duplicates: usize,
-    /// Triangles of each connected component, largest first; only the first is in the mesh.
+    /// Triangles of each connected component, largest first; with `largest_component` only the first is in the mesh.
     pub components: Vec<usize>,
     /// Edges of exactly one triangle: the surface is open there.
     pub border_edges: usize,
@@ -131,8 +135,8 @@ impl Report {
         );
         warn(
             self.coincident,
-            "vertex coincides with another and was left apart",
-            "vertices coincide with another and were left apart",
+            "vertex coincides with another and was left apart; --weld 0 joins it",
+            "vertices coincide with another and were left apart; --weld 0 joins them",
         );
         warn(
             self.dropped_degenerate,
@@ -140,13 +144,12 @@ impl Report {
             "degenerate triangles dropped",
         );
         warn(self.dropped_duplicates, "duplicate triangle dropped", "duplicate triangles dropped");
-        let dropped = self.components.get(1..).unwrap_or_default();
-        let triangles: usize = dropped.iter().sum();
-        warn(
-            dropped.len(),
-            &format!("smaller surface dropped, {}", counted(triangles, "triangle")),
-            &format!("smaller surfaces dropped, {}", counted(triangles, "triangle")),
-        );
+        let others = self.components.get(1..).unwrap_or_default();
+        let triangles: usize = others.iter().sum();
+        let is_kept = self.components.first() != Some(&self.triangles);
+        let fate = if is_kept { "kept: each has a root of its own" } else { "dropped" };
+        let fate = format!("{fate}, {}", counted(triangles, "triangle"));
+        warn(others.len(), &format!("smaller surface {fate}"), &format!("smaller surfaces {fate}"));
         warn(
             self.unreferenced_vertices - self.welded_rows(),
             "vertex belongs to no triangle",

@@ -7,11 +7,11 @@
 use super::cursor::Cursor;
 use super::raw::{Raw, excerpt};
 use super::scalar::{Endian, Scalar};
-use super::{Format, ReadErrorKind};
+use super::{Format, ReadErrorKind, vtk_data};
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
-pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
+pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
     let mut file = Cursor::new(bytes, Format::Vtk);
     let version = file.line();
     let version = version.rsplit(' ').next().and_then(|v| v.split('.').next());
@@ -27,6 +27,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
     }
     let mut raw = Raw::new(0);
     let (mut cells, mut types) = (Vec::new(), Vec::new());
+    // Values at cells are in this order, whatever the order of the file.
+    let (mut lines, mut polygons, mut bands) = (0, Vec::new(), Vec::new());
+    let mut labels = None;
     while let Some(keyword) = file.word() {
         match keyword {
             "DATASET" => {
@@ -41,9 +44,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
                 let numbers = file.numbers(count.saturating_mul(3), scalar, "coordinates")?;
                 raw.positions.extend(numbers.as_chunks::<3>().0);
             }
-            "POLYGONS" => faces(&read_cells(&mut file, has_offsets)?, &mut raw),
-            "TRIANGLE_STRIPS" => strips(&read_cells(&mut file, has_offsets)?, &mut raw),
-            "VERTICES" | "LINES" => drop(read_cells(&mut file, has_offsets)?),
+            "POLYGONS" => polygons = read_cells(&mut file, has_offsets)?,
+            "TRIANGLE_STRIPS" => bands = read_cells(&mut file, has_offsets)?,
+            "VERTICES" | "LINES" => lines += read_cells(&mut file, has_offsets)?.len(),
             "CELLS" => cells = read_cells(&mut file, has_offsets)?,
             "CELL_TYPES" => {
                 let count = file.text_index()?;
@@ -51,12 +54,13 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
                 types = file.numbers(count, Scalar::I32, "cell types")?;
             }
             // Ends with an empty line.
-            "METADATA" => {
-                file.line();
-                while !file.line().is_empty() {}
-            }
-            "FIELD" => skip_field(&mut file)?,
+            "METADATA" => skip_metadata(&mut file),
+            "FIELD" => drop(field(&mut file, |_| false)?),
             // Values at points and cells, after the surface.
+            "POINT_DATA" | "CELL_DATA" if groups => {
+                labels = vtk_data::labels(&mut file, keyword)?;
+                break;
+            }
             "POINT_DATA" | "CELL_DATA" => break,
             other => return Err(file.malformed(format!("'{}' was not expected", excerpt(other)))),
         }
@@ -65,17 +69,21 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
         let (cells, types) = (cells.len(), types.len());
         return Err(file.malformed(format!("{cells} cells and {types} cell types")));
     }
+    let mut labelled = Labelled { raw, labels, cell: 0 };
+    labelled.skip(lines);
+    labelled.faces(&polygons);
+    labelled.strips(&bands);
     for (cell, kind) in cells.into_iter().zip(types) {
         match kind as u32 {
             // Points and lines.
-            0..=4 => {}
+            0..=4 => labelled.skip(1),
             // Triangle, polygon, quad.
-            5 | 7 | 9 => faces(&[cell], &mut raw),
-            6 => strips(&[cell], &mut raw),
+            5 | 7 | 9 => labelled.faces(&[cell]),
+            6 => labelled.strips(&[cell]),
             _ => return Err(not_a_surface("UNSTRUCTURED_GRID")),
         }
     }
-    Ok(raw)
+    labelled.end().map_err(|what| file.malformed(what))
 }
 
 pub(super) fn not_a_surface(kind: &str) -> ReadErrorKind {
@@ -86,9 +94,16 @@ pub(super) fn not_a_surface(kind: &str) -> ReadErrorKind {
     }
 }
 
-fn scalar(file: &mut Cursor<'_>) -> Result<Scalar> {
+/// The type of numbers that ends a line.
+pub(super) fn scalar(file: &mut Cursor<'_>) -> Result<Scalar> {
     let name = file.needed("type of numbers")?;
-    let scalar = match name.to_ascii_lowercase().as_str() {
+    let scalar = scalar_named(name, file)?;
+    file.line();
+    Ok(scalar)
+}
+
+pub(super) fn scalar_named(name: &str, file: &Cursor<'_>) -> Result<Scalar> {
+    Ok(match name.to_ascii_lowercase().as_str() {
         "char" | "signed_char" | "vtktypeint8" => Scalar::I8,
         "unsigned_char" | "vtktypeuint8" => Scalar::U8,
         "short" | "vtktypeint16" => Scalar::I16,
@@ -100,9 +115,7 @@ fn scalar(file: &mut Cursor<'_>) -> Result<Scalar> {
         "float" | "vtktypefloat32" => Scalar::F32,
         "double" | "vtktypefloat64" => Scalar::F64,
         _ => return Err(file.malformed(format!("'{}' is no type of numbers", excerpt(name)))),
-    };
-    file.line();
-    Ok(scalar)
+    })
 }
 
 /// The points of each cell.
@@ -164,32 +177,89 @@ fn clamped(point: u64) -> u32 {
     u32::try_from(point).unwrap_or(u32::MAX)
 }
 
-pub(super) fn faces(cells: &[Vec<u32>], raw: &mut Raw) {
-    for cell in cells {
-        raw.corners.extend(cell);
-        raw.end_face();
-    }
+/// Faces, with a label for each cell where there are labels.
+pub(super) struct Labelled {
+    pub raw: Raw,
+    /// One for each cell.
+    pub labels: Option<Vec<f64>>,
+    /// Cells so far.
+    pub cell: usize,
 }
 
-/// Strips of triangles: every second one is wound the other way.
-pub(super) fn strips(cells: &[Vec<u32>], raw: &mut Raw) {
-    for cell in cells {
-        for (number, corners) in cell.windows(3).enumerate() {
-            let [a, b, c] = [corners[0], corners[1], corners[2]];
-            raw.corners.extend(if number % 2 == 0 { [a, b, c] } else { [b, a, c] });
-            raw.end_face();
+impl Labelled {
+    /// Cells that are no surface.
+    pub fn skip(&mut self, cells: usize) {
+        self.cell += cells;
+    }
+
+    pub fn faces(&mut self, cells: &[Vec<u32>]) {
+        for cell in cells {
+            self.raw.corners.extend(cell);
+            self.end_face();
+            self.cell += 1;
+        }
+    }
+
+    /// Strips of triangles: every second one is wound the other way.
+    pub fn strips(&mut self, cells: &[Vec<u32>]) {
+        for cell in cells {
+            for (number, corners) in cell.windows(3).enumerate() {
+                let [a, b, c] = [corners[0], corners[1], corners[2]];
+                self.raw.corners.extend(if number % 2 == 0 { [a, b, c] } else { [b, a, c] });
+                self.end_face();
+            }
+            self.cell += 1;
+        }
+    }
+
+    fn end_face(&mut self) {
+        self.raw.end_face();
+        if let Some(labels) = &self.labels {
+            let label = labels.get(self.cell).copied().unwrap_or(f64::NAN);
+            let groups = self.raw.groups.get_or_insert_default();
+            // Faces of an earlier piece may have none.
+            groups.of_face.resize(self.raw.ends.len() - 1, f64::NAN);
+            groups.of_face.push(label);
+        }
+    }
+
+    /// The faces, if there is a label for each cell.
+    pub fn end(self) -> std::result::Result<Raw, String> {
+        match self.labels {
+            Some(labels) if labels.len() != self.cell => {
+                Err(format!("{} labels for {} cells", labels.len(), self.cell))
+            }
+            _ => Ok(self.raw),
         }
     }
 }
 
-/// Arrays that belong to the file as a whole.
-fn skip_field(file: &mut Cursor<'_>) -> Result<()> {
+/// Ends with an empty line.
+pub(super) fn skip_metadata(file: &mut Cursor<'_>) {
+    file.line();
+    while !file.line().is_empty() {}
+}
+
+/// A field's arrays: returns the last whose name is wanted.
+pub(super) fn field(
+    file: &mut Cursor<'_>,
+    is_wanted: impl Fn(&str) -> bool,
+) -> Result<Option<Vec<f64>>> {
     let _name = file.needed("name of a field")?;
+    let mut found = None;
     for _ in 0..file.text_index()? {
-        let _name = file.needed("name of an array")?;
-        let count = file.text_index()?.saturating_mul(file.text_index()?);
+        let mut name = file.needed("name of an array")?;
+        // Information about the array before.
+        if name == "METADATA" {
+            skip_metadata(file);
+            name = file.needed("name of an array")?;
+        }
+        let (components, count) = (file.text_index()?, file.text_index()?);
         let scalar = scalar(file)?;
-        file.numbers(count, scalar, "values of a field")?;
+        let values = file.numbers(components.saturating_mul(count), scalar, "values of a field")?;
+        if components == 1 && is_wanted(name) {
+            found = Some(values);
+        }
     }
-    Ok(())
+    Ok(found)
 }

@@ -2,24 +2,26 @@
 //!
 //! Our own reader of what `quick-xml` finds; `vtk.rs` says why not `vtkio`.
 
+use super::groups::is_name;
 use super::raw::{Raw, coordinate, excerpt};
 use super::scalar::{Endian, Scalar, index};
-use super::vtk::{faces, not_a_surface, split, strips};
+use super::vtk::{Labelled, not_a_surface, split};
 use super::{Format, ReadErrorKind, base64, inflate};
 use flate2::read::ZlibDecoder;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
+use std::mem::take;
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
 /// The element whose content may be no XML.
 const APPENDED: &[u8] = b"<AppendedData";
 
-pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
+pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
     let end = bytes.windows(APPENDED.len()).position(|window| window == APPENDED);
     let (head, appended) = bytes.split_at(end.unwrap_or(bytes.len()));
     let head = String::from_utf8_lossy(head);
-    let mut file = File { appended, ..File::default() };
+    let mut file = File { appended, has_groups: groups, ..File::default() };
     let mut xml = Reader::from_str(&head);
     // Only the end of the whole is cut off.
     xml.config_mut().check_end_names = false;
@@ -69,13 +71,20 @@ struct File<'a> {
     is_compressed: bool,
     /// From the element `AppendedData` on.
     appended: &'a [u8],
-    /// Points, Polys, Strips, or others.
+    /// Whether labels of cells are wanted.
+    has_groups: bool,
+    /// Points, Polys, Strips, `CellData`, or others.
     section: String,
     array: Option<Array>,
     connectivity: Vec<u64>,
     offsets: Vec<u64>,
     /// Vertices of the pieces before.
     first: u32,
+    /// The cells of a piece, the number of those that are no surface, and their labels.
+    polygons: Vec<Vec<u32>>,
+    strips: Vec<Vec<u32>>,
+    others: usize,
+    labels: Option<Vec<f64>>,
     is_complete: bool,
 }
 
@@ -109,8 +118,15 @@ impl File<'_> {
                     }
                 };
             }
-            "Piece" => self.first = raw.positions.len() as u32,
-            "DataArray" if self.section == "Points" || self.is_surface() => {
+            "Piece" => {
+                self.first = raw.positions.len() as u32;
+                self.others = 0;
+                for name in ["NumberOfVerts", "NumberOfLines"] {
+                    let count = attribute(name)?.and_then(|count| count.trim().parse().ok());
+                    self.others += count.unwrap_or(0);
+                }
+            }
+            "DataArray" if self.is_read(&attribute("Name")?.unwrap_or_default()) => {
                 let kind = attribute("type")?.unwrap_or_default();
                 let offset = attribute("offset")?.and_then(|offset| offset.trim().parse().ok());
                 self.array = Some(Array {
@@ -128,8 +144,30 @@ impl File<'_> {
         Ok(())
     }
 
-    fn is_surface(&self) -> bool {
-        self.section == "Polys" || self.section == "Strips"
+    /// Whether an array of this name is needed.
+    fn is_read(&self, name: &str) -> bool {
+        match self.section.as_str() {
+            "Points" | "Polys" | "Strips" => true,
+            "CellData" => self.has_groups && is_name(name),
+            _ => false,
+        }
+    }
+
+    /// Adds the cells of a piece.
+    fn end_piece(&mut self, raw: &mut Raw) -> Result<()> {
+        let (polygons, bands) = (take(&mut self.polygons), take(&mut self.strips));
+        let labels = self.labels.take();
+        if labels.is_some() && !polygons.is_empty() && !bands.is_empty() {
+            return Err(ReadErrorKind::Foreign {
+                what: "VTK data with labels of polygons and strips together".to_owned(),
+                remedy: "save it as triangles: in ParaView, the filter Triangulate".to_owned(),
+            });
+        }
+        let mut labelled = Labelled { raw: take(raw), labels, cell: self.others };
+        labelled.faces(&polygons);
+        labelled.strips(&bands);
+        *raw = labelled.end().map_err(malformed)?;
+        Ok(())
     }
 
     fn text(&mut self, text: &str) {
@@ -158,6 +196,7 @@ impl File<'_> {
                     }
                     raw.positions.extend(points);
                 }
+                _ if self.section == "CellData" => self.labels = Some(numbers),
                 "connectivity" => self.connectivity = indices()?,
                 "offsets" => self.offsets = indices()?,
                 _ => {}
@@ -166,14 +205,18 @@ impl File<'_> {
         }
         match tag {
             "Polys" | "Strips" => {
-                let points = std::mem::take(&mut self.connectivity);
-                let mut cells =
-                    split(&std::mem::take(&mut self.offsets), &points).map_err(malformed)?;
+                let points = take(&mut self.connectivity);
+                let mut cells = split(&take(&mut self.offsets), &points).map_err(malformed)?;
                 for point in cells.iter_mut().flatten() {
                     *point = point.saturating_add(self.first);
                 }
-                if tag == "Polys" { faces(&cells, raw) } else { strips(&cells, raw) }
+                if tag == "Polys" {
+                    self.polygons = cells;
+                } else {
+                    self.strips = cells;
+                }
             }
+            "Piece" => self.end_piece(raw)?,
             "PolyData" => self.is_complete = true,
             _ => {}
         }

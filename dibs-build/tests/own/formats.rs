@@ -69,7 +69,7 @@ fn sorted(triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
 #[test]
 fn meshes_of_other_programs_are_read() {
     for (name, format) in MESHES {
-        let Import { mesh, report } = dibs_build::read(fixture(name)).unwrap();
+        let Import { mesh, report, .. } = dibs_build::read(fixture(name)).unwrap();
         assert_eq!(report.format, format, "{name}");
         assert_eq!(mesh.positions, POINTS.map(Vec3::from_array), "{name}");
         assert_eq!(report.warnings().collect::<Vec<_>>(), [""; 0], "{name}");

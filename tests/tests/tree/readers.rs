@@ -159,12 +159,11 @@ fn indexed_files_are_welded_on_request_only_and_keep_their_numbers() {
     let with = |weld_tolerance| {
         folder.read_with(ReadOptions { weld_tolerance, ..Import::options() }, SEAM)
     };
-    let kind = with(None).unwrap_err();
-    assert!(
-        matches!(&kind, ReadErrorKind::Components { sizes, coincident: 1 } if sizes == &[2, 1]),
-        "{kind}"
-    );
-    assert!(kind.to_string().contains("--weld 0"), "{kind}");
+    let apart = with(None).unwrap().report;
+    assert_eq!((&apart.components[..], apart.coincident), (&[2, 1][..], 1));
+    let warnings: Vec<String> = apart.warnings().collect();
+    assert!(warnings[0].contains("--weld 0 joins it"), "{warnings:?}");
+    assert!(warnings[1].contains("1 smaller surface kept"), "{warnings:?}");
 
     let exact = with(Some(0.0)).unwrap();
     assert_eq!(exact.mesh.triangles, [[0, 1, 2], [3, 5, 2], [5, 3, 6]]);
@@ -186,8 +185,7 @@ fn dropping_joins_and_parts_nothing_unnoticed() {
     let folder = Folder::new();
     // The degenerate second face must not connect the others.
     let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 0 0\nv 6 0 0\nv 5 1 0\nf 1 2 3\nf 3 4 4\nf 4 5 6\n";
-    let kind = folder.read("a.obj", text).unwrap_err();
-    assert!(matches!(&kind, ReadErrorKind::Components { sizes, .. } if sizes == &[1, 1]), "{kind}");
+    assert_eq!(folder.read("a.obj", text).unwrap().report.components, [1, 1]);
 
     let strict = ReadOptions { strict: true, ..Import::options() };
     let kind = folder.read_with(strict, text).unwrap_err();

@@ -15,7 +15,7 @@ pub struct MeshArgs {
     /// Weld vertices at most this far apart (0: equal ones); by default only soup is welded, exactly
     #[arg(long, value_name = "TOLERANCE")]
     weld: Option<f32>,
-    /// Keep the largest of several separate surfaces
+    /// Keep only the largest of several separate surfaces
     #[arg(long)]
     largest_component: bool,
     /// The point of the mesh's file, in millimetres, that the tree's coordinates count from; by default 0,0,0, or the
@@ -67,14 +67,15 @@ fn parse_point(text: &str) -> Result<DVec3> {
     }
 }
 
-/// Reads a mesh, and prints its warnings on standard error.
-pub fn read(path: &Path, args: &MeshArgs) -> Result<Import> {
+/// Reads a mesh, with labels of its file's groups if asked for, and prints its warnings on standard error.
+pub fn read(path: &Path, args: &MeshArgs, groups: bool) -> Result<Import> {
     let options = ReadOptions {
         weld_tolerance: args.weld,
         strict: args.strict,
         largest_component: args.largest_component,
         unit: args.lengths.unit(),
         origin: args.origin,
+        groups,
     };
     let import = options.read(path)?;
     for warning in import.report.warnings() {

@@ -53,7 +53,7 @@ pub fn run(args: &Args) -> Result<()> {
             args.margin
         );
     }
-    let import = mesh_file::read(&args.mesh, &args.reading)?;
+    let import = mesh_file::read(&args.mesh, &args.reading, false)?;
     let mesh = &import.mesh;
     let motion = args.reading.lengths.motion(&args.motion, mesh.origin)?;
     let paths = if args.edges { Paths::Edges } else { Paths::default() };

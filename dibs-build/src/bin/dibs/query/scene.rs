@@ -217,7 +217,7 @@ fn current(
         (false, Some(_)) => {
             bail!("{name}: --frame needs a motion: .pc2, .npy or a series heart_%03d.ply")
         }
-        // The tree is of the largest component: others are no error here.
+        // Only the vertices count: the tree may be of the largest of many components.
         (false, None) => {
             let unit = lengths.unit();
             let origin = Some(origin);
