@@ -218,7 +218,7 @@ impl<'p> Builder<'p> {
             Some(limits) => Shares::of(limits),
             None => (self.stretch, Shares::default()),
         };
-        let root = self.construct(mesh, paths, &shares)?;
+        let roots = self.construct(mesh, paths, &shares)?;
         let facts = Facts {
             paths: paths.kind(),
             stretch,
@@ -230,11 +230,16 @@ impl<'p> Builder<'p> {
             with_adjacency: self.with_adjacency,
             labels: self.labels.as_deref(),
         };
-        let (bytes, order) = flatten::<I>(mesh, &root, facts)?;
+        let (bytes, order) = flatten::<I>(mesh, &roots, facts)?;
         Ok(BuiltTree::new::<I>(bytes, order, mesh.origin))
     }
 
-    fn construct(&self, mesh: &Mesh, paths: Paths, shares: &Shares) -> Result<Cluster, BuildError> {
+    fn construct(
+        &self,
+        mesh: &Mesh,
+        paths: Paths,
+        shares: &Shares,
+    ) -> Result<Vec<Cluster>, BuildError> {
         let leaf_triangles = self.leaf_triangles.unwrap_or(match self.construction {
             Construction::Paper => 1,
             _ => DEFAULT_LEAF,
@@ -249,7 +254,7 @@ impl<'p> Builder<'p> {
             Construction::Paper => 2,
             _ => MAX_CHILDREN as usize,
         };
-        Ok(widen(constructor.run()?, children))
+        Ok(constructor.run()?.into_iter().map(|root| widen(root, children)).collect())
     }
 
     fn check_limits(&self, mesh: &Mesh) -> Result<(), BuildError> {

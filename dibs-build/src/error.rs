@@ -1,5 +1,7 @@
 //! Why a tree cannot be built or written.
 
+use dibs_nostd::format::MAX_ROOTS;
+
 /// Why a tree cannot be built or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -95,14 +97,13 @@ pub enum BuildError {
         /// The size asked for.
         triangles: usize,
     },
-    /// The mesh has several components.
+    /// The mesh has more components than a tree has roots.
     #[error(
-        "no path over the surface reaches vertex {vertex}: the mesh has several components, \
-         build a tree for each"
+        "the mesh has {components} surfaces that share no vertex, and a tree holds {MAX_ROOTS} at most: drop the smallest"
     )]
-    NotConnected {
-        /// A vertex without a path to another one.
-        vertex: u32,
+    Components {
+        /// Their number.
+        components: usize,
     },
     /// The tree does not pass its own validation: a defect of the builder.
     #[error("the builder made a tree that its own checker rejects ({0}); please report this mesh")]

@@ -49,7 +49,9 @@ pub use labels::{LabelsError, LabelsErrorKind, read_labels};
 pub use mesh::{Mesh, Motion, RestSurface};
 pub use motion::MotionMismatchError;
 pub use orient::{WindingError, check_winding, orient};
-pub use read::{Format, Import, ReadError, ReadErrorKind, ReadOptions, Report, read};
+pub use read::{
+    Format, Group, Groups, Import, ReadError, ReadErrorKind, ReadOptions, Report, read,
+};
 pub use rest::Paths;
 pub use script::{MeshSource, TreeScript, tree};
 pub use stretch::{

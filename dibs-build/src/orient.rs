@@ -1,8 +1,9 @@
 //! Winding: checks that a surface has an outer side, and turns triangles until it has.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec3;
+use petgraph::unionfind::UnionFind;
 
 use crate::Mesh;
 
@@ -47,17 +48,21 @@ pub enum WindingError {
         /// The other one.
         other: usize,
     },
-    /// The surface is closed and its normals point inwards.
+    /// A closed part of the surface, in no other closed part, has normals that point inwards.
     #[error(
-        "the closed surface faces inwards, so what it encloses counts as outside: turn it with --orient, unless the \
-         tool works inside"
+        "the closed surface with triangle {triangle} faces inwards, so what it encloses counts as outside: turn it with \
+         --orient, unless the tool works inside"
     )]
-    Inward,
+    Inward {
+        /// A triangle of that part.
+        triangle: usize,
+    },
 }
 
-/// Checks that a surface has an outer side, and that a closed surface faces outwards.
+/// Checks that a surface has an outer side, and that its closed parts face outwards. One inside another may face either
+/// way: it may be a cavity, or an organ inside an organ.
 ///
-/// Cost: linear in the triangles.
+/// Cost: linear in the triangles, times the closed parts that face inwards.
 ///
 /// # Errors
 /// [`WindingError`] names the first conflicting triangles.
@@ -72,10 +77,17 @@ pub fn check_winding(mesh: &Mesh) -> Result<(), WindingError> {
             others,
         });
     }
-    if edges.border == 0 && volume(mesh, 0..mesh.triangles.len()) < 0.0 {
-        return Err(WindingError::Inward);
+    let closed = edges.closed_parts();
+    let is_inside = |row: usize| {
+        let vertex = mesh.triangles[closed[row][0]][0];
+        let point = mesh.positions[vertex as usize].as_dvec3();
+        (0..closed.len()).any(|other| other != row && winds(mesh, &closed[other], point))
+    };
+    let faces_inwards = |row: usize| volume(mesh, closed[row].iter().copied()) < 0.0;
+    match (0..closed.len()).find(|&row| faces_inwards(row) && !is_inside(row)) {
+        Some(row) => Err(WindingError::Inward { triangle: closed[row][0] }),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 /// Turns triangles until the surface has an outer side. Open parts turn as few triangles as possible; closed parts face
@@ -168,8 +180,6 @@ struct Edges {
     pairs: Vec<Pair>,
     /// Triangles across the edges of each triangle.
     neighbours: Vec<u8>,
-    /// Edges of one triangle.
-    border: usize,
 }
 
 impl Edges {
@@ -182,12 +192,11 @@ impl Edges {
                 users.entry(edge).or_default().push((triangle, from < to));
             }
         }
-        let mut edges =
-            Self { pairs: Vec::new(), neighbours: vec![0; mesh.triangles.len()], border: 0 };
+        let mut edges = Self { pairs: Vec::new(), neighbours: vec![0; mesh.triangles.len()] };
         let mut crowded: Option<((u32, u32), usize)> = None;
         for (&edge, of) in &users {
             match of[..] {
-                [_] => edges.border += 1,
+                [_] => (),
                 [(triangle, forward), (other, other_forward)] => {
                     edges.neighbours[triangle] += 1;
                     edges.neighbours[other] += 1;
@@ -205,6 +214,21 @@ impl Edges {
         // The map's order is not deterministic.
         edges.pairs.sort_unstable_by_key(|pair| (pair.triangle, pair.other));
         Ok(edges)
+    }
+
+    /// The sets of triangles that edges connect and that have no border, in order of their first triangle.
+    fn closed_parts(&self) -> Vec<Vec<usize>> {
+        let mut sets = UnionFind::<usize>::new(self.neighbours.len());
+        for pair in &self.pairs {
+            sets.union(pair.triangle, pair.other);
+        }
+        let mut parts: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        let mut row_of = HashMap::new();
+        for (triangle, set) in sets.into_labeling().into_iter().enumerate() {
+            parts.entry(*row_of.entry(set).or_insert(triangle)).or_default().push(triangle);
+        }
+        let is_closed = |part: &Vec<usize>| part.iter().all(|&row| self.neighbours[row] == 3);
+        parts.into_values().filter(is_closed).collect()
     }
 }
 
@@ -253,7 +277,7 @@ mod tests {
         assert_eq!(orient(&mut mesh), Ok(3));
         assert_eq!(mesh, good);
         mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
-        assert_eq!(check_winding(&mesh), Err(WindingError::Inward));
+        assert_eq!(check_winding(&mesh), Err(WindingError::Inward { triangle: 0 }));
         assert_eq!(orient(&mut mesh), Ok(good.triangles.len()));
         assert_eq!(check_winding(&mesh), Ok(()));
     }

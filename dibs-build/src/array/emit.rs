@@ -30,7 +30,7 @@ pub struct Summary {
     pub triangles: u32,
     /// Vertices.
     pub vertices: u32,
-    /// Nodes, inner ones, leaves and the root.
+    /// Nodes: inner ones, leaves and the roots.
     pub nodes: u32,
     /// Stack entries that a query needs.
     pub stack: u32,
@@ -47,7 +47,9 @@ pub struct Summary {
     pub first_unmeasurable: Option<[u32; 3]>,
     /// Whether radii were measured across triangles (else along edges).
     pub surface_paths: bool,
-    /// Radius of the root at rest, in the mesh's unit.
+    /// Roots: surfaces that share no vertex.
+    pub roots: u32,
+    /// Radius of the largest root's sphere at rest, in the mesh's unit.
     pub root_radius: f32,
     /// The corners of the box around the vertices at rest, least and largest; `None` without the rest shape.
     pub bounding_box: Option<[[f32; 3]; 2]>,
@@ -221,6 +223,7 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
     let vertices = tree.vertex_count();
     let unmeasurable = || (0..tree.triangle_count()).filter(|&row| !is_measurable(tree, row));
     let number = |vertex| tree.vertex_number(vertex).map_or(Some(vertex), |number| Some(number.0));
+    let roots = tree.roots();
     let in_mesh = |row| row_of(tree.corners(TriangleRow(row))?, number);
     Summary {
         triangles: tree.triangle_count(),
@@ -235,7 +238,10 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
         unmeasurable: unmeasurable().count() as u32,
         first_unmeasurable: unmeasurable().next().and_then(in_mesh),
         surface_paths: tree.paths() == PathKind::Surface,
-        root_radius: tree.node(0).map_or(0.0, |(_, radius, _)| radius),
+        roots,
+        root_radius: (0..roots)
+            .filter_map(|row| tree.node(row).map(|(_, radius, _)| radius))
+            .fold(0.0, f32::max),
         bounding_box: bounding_box(tree),
         mean_edge: mean_edge(tree),
         labels: labels(tree),
@@ -245,7 +251,7 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
         query_bytes_per_triangle: tree.query_bytes() as f64 / f64::from(tree.triangle_count()),
         adjacency_bytes: tree.adjacency_bytes(),
         flash_bytes: length,
-        ram_bytes: (24 * vertices as usize + 117).next_multiple_of(4),
+        ram_bytes: (24 * vertices as usize + 149).next_multiple_of(4),
         stack_bytes: 8 * tree.stack() as usize,
         modes: Modes::of(tree).ok().map(|modes| ModesSummary {
             count: modes.count(),

@@ -27,14 +27,21 @@ struct Flat {
 impl Flat {
     /// Nodes breadth first, so that children follow their parents and siblings are one run; leaves
     /// depth first, so that neighbours on the surface are neighbours in the tables.
-    fn new(mesh: &Mesh, root: &Cluster) -> Self {
+    fn new(mesh: &Mesh, roots: &[Cluster]) -> Self {
         let mut flat = Self { nodes: Vec::new(), triangles: Vec::new(), stack: 1 };
         let mut leaves = Vec::new();
-        let mut level = vec![(root, 0)];
-        let mut placed = 1;
+        let mut level = Vec::new();
+        let mut triangle = 0;
+        for root in roots {
+            level.push((root, triangle));
+            triangle += root.triangles();
+        }
+        let mut placed = roots.len() as u32;
+        let mut most_siblings = placed;
         while !level.is_empty() {
+            flat.stack += most_siblings - 1;
+            most_siblings = 1;
             let mut below = Vec::new();
-            let mut most_siblings = 1;
             for (cluster, mut triangle) in level {
                 let link = match &cluster.content {
                     Content::Leaf(triangles) => {
@@ -54,7 +61,6 @@ impl Flat {
                 };
                 flat.nodes.push((cluster.pin, cluster.radius, link));
             }
-            flat.stack += most_siblings - 1;
             level = below;
         }
         leaves.sort_unstable_by_key(|&(first, _)| first);
@@ -81,10 +87,10 @@ pub(crate) struct Facts<'a> {
 /// The bytes of a tree, and the mesh vertex of each row.
 pub(crate) fn flatten<I: Index>(
     mesh: &Mesh,
-    root: &Cluster,
+    roots: &[Cluster],
     facts: Facts<'_>,
 ) -> Result<(Vec<u8>, Vec<u32>), BuildError> {
-    let flat = Flat::new(mesh, root);
+    let flat = Flat::new(mesh, roots);
     let order = vertex_order(mesh, &flat.triangles);
     let mut row_of = vec![u32::MAX; mesh.positions.len()];
     for (row, &vertex) in order.iter().enumerate() {
@@ -161,6 +167,7 @@ pub(crate) fn flatten<I: Index>(
         (field::RADIUS_UNIT, unit.to_bits()),
         (field::POSITION_ERROR, facts.position_error.to_bits()),
         (field::ORIGIN, has_origin.into()),
+        (field::OTHER_ROOTS, roots.len() as u32 - 1),
     ] {
         put_word(&mut header, at, word);
     }

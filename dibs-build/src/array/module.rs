@@ -79,7 +79,10 @@ pub mod {name} {{
     /// A query with the stack that this tree needs.
     pub type Query = ::dibs_nostd::Query<'static, Index, STACK>;
 
-    /// The same with the longer stack of the wide search, for large processors.
+    /// A tracker with the same stack and room for so many opened nodes.
+    pub type Tracker<const OPENED: usize> = ::dibs_nostd::Tracker<'static, Index, STACK, OPENED>;
+
+    /// A query with the longer stack of the wide search, for large processors.
     pub type WideQuery = ::dibs_nostd::Query<'static, Index, {{ STACK + 128 }}>;
 {extent}{origin}{modal}}}
 "#

@@ -1,4 +1,4 @@
-//! Top-down construction: one section of all triangles becomes the tree of sections.
+//! Top-down construction: the triangles of each component become a tree of sections.
 
 mod paper;
 mod pin;
@@ -9,6 +9,9 @@ mod widen;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use dibs_nostd::format::MAX_ROOTS;
+
+use crate::components::connected_by_vertices;
 use crate::error::BuildError;
 use crate::leaf;
 use pin::Pin;
@@ -87,12 +90,19 @@ impl<'a> Constructor<'a> {
         Self { surface, construction, leaf_triangles, progress, done, idle }
     }
 
-    /// The tree of the whole mesh.
-    pub fn run(&self) -> Result<Cluster, BuildError> {
-        let all = (0..self.surface.mesh.triangles.len() as u32).collect();
-        let section = Section::new(self.surface.mesh, all);
-        let start = section.vertices[0];
-        self.cluster(&section, None, start, 0)
+    /// A tree for each component of the mesh, the largest first.
+    pub fn run(&self) -> Result<Vec<Cluster>, BuildError> {
+        let mesh = self.surface.mesh;
+        let components = connected_by_vertices(&mesh.triangles);
+        if components.len() > MAX_ROOTS as usize {
+            return Err(BuildError::Components { components: components.len() });
+        }
+        let tree = |component: Vec<usize>| {
+            let triangles = component.into_iter().map(|triangle| triangle as u32).collect();
+            let section = Section::new(mesh, triangles);
+            self.cluster(&section, None, section.vertices[0], 0)
+        };
+        components.into_iter().map(tree).collect()
     }
 
     /// The tree of a section, which is part of the section `around` it.
@@ -106,9 +116,6 @@ impl<'a> Constructor<'a> {
         let mut searches = self.take_searches();
         searches.enter(section, around);
         let pin = self.pin(section, &mut searches, start);
-        if !pin.radius.is_finite() {
-            return Err(BuildError::NotConnected { vertex: pin.vertex });
-        }
         if section.triangles.len() <= self.leaf_triangles {
             self.give_back(searches);
             return self.leaves(section, pin, depth);

@@ -158,7 +158,7 @@ fn malformed_files_end_as_the_library_says() {
             }
         }
     }
-    assert_eq!((meshes, errors), (2, 6));
+    assert_eq!((meshes, errors), (3, 5));
 }
 
 /// Nobody need read the results to the end, and where they cannot be printed that is an error, not a panic.
@@ -295,6 +295,17 @@ fn a_tracked_path_is_answered_as_whole_queries_are() {
     assert_ne!(lines("--full"), lines("--full --surface held"));
 
     std::fs::write(folder.join("bad.csv"), "sphere:1,2,3,4\nsphere:1,2\n").unwrap();
+    let path = "track heart.dibs --motion heart.pc2 --path tools.csv";
+    let said = dibs(folder, &format!("{path} --json"));
+    let summary: Value = serde_json::from_slice(&said.stderr).unwrap();
+    let ticks = String::from_utf8(said.stdout).unwrap();
+    let ticks = ticks.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let nodes: f64 = ticks.map(|tick| tick["node_tests"].as_f64().unwrap()).sum();
+    assert!((summary["node_tests"].as_f64().unwrap() * 120.0 - nodes).abs() < 1e-6, "{summary}");
+    assert_eq!((&summary["ticks"], &summary["fallbacks"]), (&120.into(), &1.into()));
+    assert!(summary["triangle_tests"].as_f64().unwrap() > 0.0);
+    let plain = String::from_utf8(dibs(folder, path).stderr).unwrap();
+    assert!(plain.starts_with("120 ticks: ") && plain.ends_with(", 1 fallbacks\n"), "{plain}");
     let error = fails(folder, "track heart.dibs --motion heart.pc2 --path bad.csv");
     assert!(error.starts_with("bad.csv, line 2: "), "{error}");
 }

@@ -3,8 +3,10 @@
 mod bulk;
 mod cli;
 mod cli_motion;
+mod components;
 mod far;
 mod formats;
+mod groups;
 mod labels;
 mod manners;
 mod placement;

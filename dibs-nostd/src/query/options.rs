@@ -13,7 +13,7 @@ use crate::{MeasuredStretch, TriangleRow};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Budget {
-    /// Most tests of spheres, and of leaves' and triangles' planes. The root's sphere is always tested and not counted.
+    /// Most tests of spheres, and of leaves' and triangles' planes. The roots' spheres are always tested and not counted.
     pub node_tests: u32,
     /// Most exact tool-triangle tests.
     pub triangle_tests: u32,

@@ -2,6 +2,7 @@
 
 mod finish;
 mod near;
+mod roots;
 mod slack;
 mod tick;
 mod wide;
@@ -11,6 +12,7 @@ use glam::Vec3;
 pub(super) use tick::{Outcome, Tick};
 pub(super) use wide::WideSearch;
 
+use roots::Roots;
 use slack::{COORDINATES, FLOOR, SLACK, TILT};
 
 use super::plane::Plane;
@@ -117,8 +119,17 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         let radius = root.radius_code as f32 * radius_scale;
         let pin = vertices.position(root.pin).ok_or(QueryError::Corrupt { row: root.pin })?;
         let distance = sqrt(tool.axis_distance_squared(pin));
-        let scale = distance + radius + 2.0 * tool.axis_length() + tool.radius();
-        let coordinates = 2.0 * pin.abs().max_element() + scale;
+        let mut all = Roots {
+            waiting: 0,
+            reach: distance + radius,
+            coordinate: pin.abs().max_element(),
+            nearest: NearestPin { row: root.pin, distance },
+        };
+        if header.other_roots > 0 {
+            all = all.with_others(tree, stack, vertices, tool, radius_scale)?;
+        }
+        let scale = all.reach + 2.0 * tool.axis_length() + tool.radius();
+        let coordinates = 2.0 * all.coordinate + scale;
         if !(coordinates < 1e18) {
             return Err(QueryError::Position { vertex: root.pin });
         }
@@ -138,7 +149,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             vertices,
             tool,
             stack,
-            waiting: 0,
+            waiting: all.waiting,
             budget,
             left: budget,
             radius_scale,
@@ -153,7 +164,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             best_squared: f32::INFINITY,
             best_triangle: u32::MAX,
         };
-        search.lower_cutoff_to_pin(root.pin, distance);
+        search.lower_cutoff_to_pin(all.nearest.row, all.nearest.distance);
         if let Some(TriangleRow(triangle)) = first
             && triangle < header.triangles
             && let Some(left) = search.left.triangle_tests.checked_sub(1)

@@ -1,7 +1,9 @@
 //! The header: its fields, read and checked.
 
 use crate::tree::format::field as at;
-use crate::tree::format::{CRC, HEADER_BYTES, MAGIC, MAX_STACK, PathKind, VERSION, u32_at};
+use crate::tree::format::{
+    CRC, HEADER_BYTES, MAGIC, MAX_ROOTS, MAX_STACK, PathKind, VERSION, u32_at,
+};
 use crate::tree::{FormatError, Index};
 
 /// The header's fields that a query needs.
@@ -18,6 +20,8 @@ pub(crate) struct Header {
     pub position_error: f32,
     /// 1 where there is an origin section, else 0.
     pub origin: u32,
+    /// Roots besides the first. The roots are the first rows of the node table.
+    pub other_roots: u32,
     /// Rows of the section table.
     pub sections: u32,
     pub checksum: u32,
@@ -36,6 +40,7 @@ impl Header {
             (at::RADIUS_UNIT, self.radius_unit.to_bits()),
             (at::POSITION_ERROR, self.position_error.to_bits()),
             (at::ORIGIN, self.origin),
+            (at::OTHER_ROOTS, self.other_roots),
             (at::SECTIONS, self.sections),
             (at::CHECKSUM, self.checksum),
         ] {
@@ -99,17 +104,10 @@ pub(super) const fn read<I: Index>(bytes: &[u8]) -> Result<Header, FormatError> 
         radius_unit: f32::from_bits(tri!(field(bytes, at::RADIUS_UNIT))),
         position_error: f32::from_bits(tri!(field(bytes, at::POSITION_ERROR))),
         origin: tri!(field(bytes, at::ORIGIN)),
+        other_roots: tri!(field(bytes, at::OTHER_ROOTS)),
         sections: tri!(field(bytes, at::SECTIONS)),
         checksum: tri!(field(bytes, at::CHECKSUM)),
     };
-    let mut reserved = at::RESERVED.start;
-    while reserved < at::RESERVED.end {
-        let value = tri!(field(bytes, reserved));
-        if value != 0 {
-            return Err(FormatError::Field { offset: reserved as u8, value });
-        }
-        reserved += 4;
-    }
     let last = tri!(field(bytes, at::LAST));
     let wrong = if header.vertices == 0 || header.vertices > I::MAX_VERTICES {
         Some((at::VERTICES, header.vertices))
@@ -127,6 +125,8 @@ pub(super) const fn read<I: Index>(bytes: &[u8]) -> Result<Header, FormatError> 
         Some((at::POSITION_ERROR, header.position_error.to_bits()))
     } else if header.origin > 1 {
         Some((at::ORIGIN, header.origin))
+    } else if header.other_roots >= MAX_ROOTS || header.other_roots >= header.nodes {
+        Some((at::OTHER_ROOTS, header.other_roots))
     } else if last != 0 {
         Some((at::LAST, last))
     } else {

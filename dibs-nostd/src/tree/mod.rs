@@ -122,10 +122,17 @@ impl<'a, I: Index> Tree<'a, I> {
         self.header.triangles
     }
 
-    /// Number of nodes: inner ones, leaves and the root.
+    /// Number of nodes: inner ones, leaves and the roots.
     #[must_use]
     pub const fn node_count(&self) -> u32 {
         self.header.nodes
+    }
+
+    /// Number of roots, 1 to 64: of surfaces that share no vertex. They are the first nodes.
+    #[must_use]
+    #[doc(hidden)]
+    pub const fn roots(&self) -> u32 {
+        self.header.other_roots + 1
     }
 
     /// Entries that a traversal's stack must hold: one, and for every level of the tree one less than the most siblings

@@ -154,7 +154,7 @@ mod tests {
         let flip = |value: f32, bit| f32::from_bits(value.to_bits() ^ bit);
         let mut flips = 0;
         for bit in (0..32).map(|shift| 1_u32 << shift) {
-            for field in 0..11 {
+            for field in 0..12 {
                 let mut tree = sound;
                 let header = &mut tree.header;
                 match field {
@@ -168,13 +168,14 @@ mod tests {
                     7 => header.position_error = flip(header.position_error, bit),
                     8 => header.sections ^= bit,
                     9 => header.origin ^= bit,
+                    10 => header.other_roots ^= bit,
                     _ => header.checksum ^= bit,
                 }
                 assert!(tree.check(bytes).is_err(), "field {field}, bit {bit:x}");
                 flips += 1;
             }
         }
-        assert_eq!(flips, 352);
+        assert_eq!(flips, 384);
         let mut other = sound;
         other.header.paths = crate::format::PathKind::EdgePath;
         assert!(other.check(bytes).is_err());

@@ -44,9 +44,10 @@ pub(super) const fn well_formed<I: Index>(
 /// rows that no earlier link has. This proves a tree that includes every node.
 const fn nodes<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
     let header = parts.header;
-    // The first level is the root alone.
-    let (mut level_end, mut next_node) = (1, 1);
-    let (mut stack, mut most_siblings) = (1, 1);
+    // The first level is the roots.
+    let roots = header.other_roots + 1;
+    let (mut level_end, mut next_node) = (roots, roots);
+    let (mut stack, mut most_siblings) = (roots, 1);
     let mut row = 0;
     while row < header.nodes {
         if row >= next_node {
@@ -92,7 +93,11 @@ const fn leaves<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
     // The mask keeps the index from panicking.
     const MASK: usize = MAX_STACK - 1;
     let mut stack = [0u32; MAX_STACK];
-    let mut waiting = 1;
+    let mut waiting = 0;
+    while waiting <= header.other_roots as usize {
+        stack[waiting & MASK] = header.other_roots - waiting as u32;
+        waiting += 1;
+    }
     let mut next_triangle = 0;
     while waiting > 0 {
         waiting -= 1;

@@ -11,6 +11,7 @@ mod paper_search;
 mod positions;
 mod proxy;
 mod refusals;
+mod roots;
 mod shown_budgets;
 mod side;
 mod slack;

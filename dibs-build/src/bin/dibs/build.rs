@@ -5,7 +5,7 @@ use crate::{modes, stretch, tree_file};
 use anyhow::{Result, anyhow, bail};
 use clap::ValueEnum;
 use dibs_build::{
-    Beyond, Builder, BuiltTree, Construction, Import, IndexWidth, Mesh, Needed, Paths,
+    Beyond, Builder, BuiltTree, Construction, Group, Import, IndexWidth, Mesh, Needed, Paths,
     check_winding, orient, read_labels, read_limits,
 };
 use std::path::{Path, PathBuf};
@@ -19,6 +19,7 @@ Examples:
   dibs build heart.ply -o heart.dibs --limits heart.limits --motion heart.pc2
   dibs build scan.obj -o scan.dibs --orient
   dibs build scan.obj -o scan.dibs --labels tissues.txt
+  dibs build organs.msh -o organs.dibs --labels-from-groups
   dibs build heart.ply -o heart.dibs --motion heart.pc2 --modes 16")]
 pub struct Args {
     /// The rest shape: OBJ, STL, PLY, OFF, VTK (.vtk, .vtp), glTF (.gltf, .glb), Gmsh (.msh) or 3MF, told apart by content
@@ -35,6 +36,10 @@ pub struct Args {
     /// A label for each triangle, say of its tissue: text, one number from 0 to 255 a line, in the mesh's order
     #[arg(long, value_name = "FILE")]
     labels: Option<PathBuf>,
+    /// Labels from the file's own groups: OBJ's g and usemtl, numbered from 0; Gmsh's physical groups by their numbers; VTK's
+    /// cell data `label`, `labels` or `RegionId`
+    #[arg(long, conflicts_with = "labels")]
+    labels_from_groups: bool,
     /// How sections are pinned, measured and split
     #[arg(long, value_enum, default_value = "default")]
     construction: ConstructionName,
@@ -83,17 +88,22 @@ pub fn run(args: &Args) -> Result<()> {
         Some("dibs") => false,
         _ => bail!("{}: the output's name must end in .dibs or .rs", args.output.display()),
     };
-    let mut import = mesh_file::read(&args.mesh, &args.reading)?;
+    let mut import = mesh_file::read(&args.mesh, &args.reading, args.labels_from_groups)?;
     let name = args.mesh.display();
     let turned = if args.orient {
         Some(orient(&mut import.mesh).map_err(|error| anyhow!("{name}: {error}"))?)
     } else {
         None
     };
-    let Import { mesh, report } = &import;
+    let Import { mesh, report, groups } = &import;
     let winding = check_winding(mesh).err().map(|error| error.to_string());
     let limits = args.limits.as_ref().map(|path| read_limits(path, mesh)).transpose()?;
-    let labels = args.labels.as_ref().map(|path| read_labels(path, mesh)).transpose()?;
+    let labels = match (&args.labels, groups) {
+        (Some(path), _) => Some(read_labels(path, mesh)?),
+        (None, Some(groups)) => Some(groups.labels.clone()),
+        (None, None) => None,
+    };
+    let groups = groups.as_ref().map(|groups| &groups.groups);
     if let Some(path) = &args.motion {
         let uniform = || vec![args.stretch; mesh.triangles.len()];
         check_covered(args, mesh, path, &limits.clone().unwrap_or_else(uniform))?;
@@ -125,11 +135,14 @@ pub fn run(args: &Args) -> Result<()> {
             "{:#}",
             serde_json::json!({
                 "output": output, "mesh": report, "turned": turned, "warnings": warnings, "tree": summary,
-                "mode_errors": fit.as_ref().map(modes::Fit::errors),
+                "mode_errors": fit.as_ref().map(modes::Fit::errors), "groups": groups,
             })
         );
     } else {
         println!("read     {name}: {report}");
+        for Group { label, name, triangles } in groups.into_iter().flatten() {
+            println!("label    {label}: {triangles} triangles {name}");
+        }
         if let Some(turned) = turned {
             println!("turned   {turned} triangles");
         }

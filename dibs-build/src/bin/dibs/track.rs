@@ -47,7 +47,7 @@ pub struct Args {
     full: bool,
     #[command(flatten)]
     lengths: Lengths,
-    /// Print a JSON object a line
+    /// Print a JSON object a line, and another one of the means on standard error
     #[arg(long)]
     json: bool,
 }
@@ -236,10 +236,17 @@ impl<I: Index> Session<'_, I> {
     fn finish(mut self, ticks: usize) -> Result<()> {
         self.out.flush()?;
         let [nodes, triangles] = self.sums.map(|sum| sum as f64 / ticks as f64);
-        eprintln!(
-            "{ticks} ticks: {nodes:.1} node tests and {triangles:.1} triangle tests each, {} fallbacks",
-            self.fallbacks
-        );
+        let fallbacks = self.fallbacks;
+        if self.json {
+            let summary = serde_json::json!({
+                "ticks": ticks, "node_tests": nodes, "triangle_tests": triangles, "fallbacks": fallbacks,
+            });
+            eprintln!("{summary}");
+        } else {
+            eprintln!(
+                "{ticks} ticks: {nodes:.1} node tests and {triangles:.1} triangle tests each, {fallbacks} fallbacks"
+            );
+        }
         Ok(())
     }
 }

@@ -56,6 +56,9 @@ pub fn print(summary: &Summary) {
         format!("limit {}", s.stretch)
     };
     println!("stretch  {limit} {paths}, root radius {}", s.root_radius);
+    if s.roots > 1 {
+        println!("roots    {}, of surfaces that share no vertex", s.roots);
+    }
     if let (Some([low, high]), Some(edge)) = (s.bounding_box, s.mean_edge) {
         let size: [f32; 3] = std::array::from_fn(|axis| high[axis] - low[axis]);
         println!("box      {low:.4?} to {high:.4?}: {size:.4?}; mean edge {edge:.4}");

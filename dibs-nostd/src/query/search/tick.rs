@@ -124,9 +124,16 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             self.front.clear();
         }
         if self.front.is_empty() {
-            let root = self.search.tree.record(0).ok_or(corrupt)?;
-            let nowhere = Place { node: NOWHERE, slot: 0 };
-            self.front.open(root.link, nowhere, self.now).ok_or(corrupt)?;
+            for row in 0..=self.search.tree.header().other_roots {
+                let root = self.search.tree.record(row).ok_or(corrupt)?;
+                let nowhere = Place { node: NOWHERE, slot: 0 };
+                if self.front.open(root.link, nowhere, self.now).is_none() {
+                    self.front.clear();
+                    return Ok(Outcome::Full {
+                        tests: Budget { node_tests: 0, triangle_tests: 0 },
+                    });
+                }
+            }
         }
         // Nodes opened from now on are tested at once.
         let (mut from, end) = (0, self.front.used());

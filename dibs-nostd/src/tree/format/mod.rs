@@ -27,6 +27,8 @@ pub const SECTION_BYTES: usize = 12;
 pub const SECTION_ALIGN: usize = 16;
 /// Most stack entries that a traversal of any tree may need.
 pub const MAX_STACK: usize = 512;
+/// Most roots of a tree: surfaces that share no vertex.
+pub const MAX_ROOTS: u32 = 64;
 /// Most children of one node.
 pub const MAX_CHILDREN: u32 = 8;
 /// Most triangles in one leaf.
@@ -49,8 +51,6 @@ pub const ORIGIN_BYTES: usize = 24;
 /// Byte offsets of the header's fields. Numbers are little-endian, of four bytes unless stated otherwise.
 #[doc(hidden)]
 pub mod field {
-    use core::ops::Range;
-
     /// [`VERSION`](super::VERSION), two bytes, after the [`MAGIC`](super::MAGIC).
     pub const VERSION: usize = 4;
     /// Bytes of an index, one byte.
@@ -75,8 +75,8 @@ pub mod field {
     pub const POSITION_ERROR: usize = 36;
     /// 1 where the tree has an origin section, else 0.
     pub const ORIGIN: usize = 40;
-    /// Zeros.
-    pub const RESERVED: Range<usize> = 44..48;
+    /// Roots besides the first.
+    pub const OTHER_ROOTS: usize = 44;
     /// Rows of the section table.
     pub const SECTIONS: usize = 48;
     /// Bytes of the whole tree.
@@ -100,7 +100,7 @@ pub static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 /// Kinds of sections.
 #[doc(hidden)]
 pub mod section {
-    /// One record a node, breadth first from the root.
+    /// One record a node, breadth first from the roots.
     pub const NODES: u32 = 1;
     /// Three vertex rows a triangle, leaf by leaf, depth first.
     pub const TRIANGLES: u32 = 2;
@@ -119,6 +119,7 @@ pub mod section {
     pub const ADJACENCY: u32 = 8;
     /// The tree's origin in the mesh's file, three `f64` (where the header has it).
     pub const ORIGIN: u32 = 9;
+    /// A label of every triangle, one byte (optional).
     pub const LABELS: u32 = 10;
 }
 
