@@ -109,7 +109,7 @@
 /**
  * Bytes of a surface's storage besides its vertices.
  */
-#define DIBS_SURFACE_BASE 384
+#define DIBS_SURFACE_BASE 416
 
 /**
  * Bytes of a surface's storage for each vertex: two positions.

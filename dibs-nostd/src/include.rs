@@ -11,6 +11,7 @@
 /// | `Receiver` | the bus's end of it (feature `bus`), an [`Assembler`](crate::Assembler) that measures stretch in slices; `receiver` makes one |
 /// | `Reader` | the control loop's end of it |
 /// | `Query` | a [`Query`](crate::Query) with the stack that the tree needs; `WideQuery` for large processors |
+/// | `Tracker` | a [`Tracker`](crate::Tracker) with that stack; its front is yours to choose |
 /// | `VERTICES`, `STACK`, `Index` | the sizes, for types of your own |
 /// | `CENTRE`, `REACH` | the rest shape's bounding box, where the tree carries its rest shape |
 ///

@@ -11,6 +11,8 @@ use dibs_nostd::{
 };
 
 use crate::surface::{self, TREE};
+#[cfg(not(feature = "wide"))]
+use crate::telemetry::fallback_code;
 use crate::telemetry::{Tick, cause_code};
 use crate::{BusStatus, TICK_RATE, Trust, instrument};
 
@@ -35,9 +37,17 @@ pub const MAX_FORCE: f32 = 5.0;
 /// How far it reaches from the surface, in mm.
 pub const MARGIN: f32 = 5.0;
 
+/// A search that keeps what it found from tick to tick, with room for so many opened nodes.
+#[cfg(not(feature = "wide"))]
+type Search = surface::Tracker<184>;
+
+/// A search from the root at every tick, to show that the wide one has no panic path either.
+#[cfg(feature = "wide")]
+type Search = surface::Query;
+
 /// The controller's state from tick to tick.
 pub struct Control {
-    query: surface::Query,
+    search: Search,
     surface: surface::Reader,
     wall: ForbiddenRegion,
     failsafe: FailSafe,
@@ -60,7 +70,7 @@ impl Control {
     ) -> Result<Self, SetupError> {
         let spring = SpringDamper::stiffness(STIFFNESS).damping(DAMPING).max_force(MAX_FORCE);
         Ok(Self {
-            query: surface::Query::new(tree).map_err(SetupError::Query)?,
+            search: Search::new(tree).map_err(SetupError::Query)?,
             surface,
             wall: ForbiddenRegion::new(spring, MARGIN).map_err(SetupError::Gain)?,
             failsafe: FailSafe::new(trust.limits().map_err(SetupError::Limit)?),
@@ -106,7 +116,7 @@ impl Control {
                 _ => None,
             },
             is_tree_corrupt: self.bus.is_tree_corrupt()
-                || self.query.tree().check(TREE.bytes()).is_err(),
+                || self.search.tree().check(TREE.bytes()).is_err(),
         });
         self.bus.set_state(verdict.state);
         let admitted = answer.and_then(|closest| verdict.admit(closest));
@@ -154,9 +164,13 @@ impl Control {
         let options = Options::new().budget(BUDGET);
         let start = clock();
         #[cfg(not(feature = "wide"))]
-        let answer = self.query.closest(&frame, tool, &options);
+        let answer = self.search.closest(&frame, tool, &options).map(|tracked| {
+            record.front = tracked.opened;
+            record.fallback = fallback_code(tracked.fallback);
+            tracked.closest
+        });
         #[cfg(feature = "wide")]
-        let answer = self.query.closest_wide(&frame, tool, &options);
+        let answer = self.search.closest_wide(&frame, tool, &options);
         record.query_counts = clock().wrapping_sub(start);
         drop(frame);
 

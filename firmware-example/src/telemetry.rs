@@ -4,8 +4,8 @@
 //! a zero byte. The first field is the kind of record.
 
 use bytemuck::{NoUninit, Pod, Zeroable};
-use dibs_nostd::Unavailable;
 use dibs_nostd::wire::{Event, enframe, framed_bytes};
+use dibs_nostd::{Fallback, Unavailable};
 
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
@@ -78,6 +78,23 @@ pub struct Tick {
     pub read_epoch: u32,
     /// The CRC-32 of its positions: [`fingerprint`](crate::fingerprint).
     pub read_digest: u32,
+    /// Nodes that the tracker's front had open after the tick.
+    pub front: u32,
+    /// Why the front did not serve: [`fallback_code`]; 0 if it did.
+    pub fallback: u32,
+}
+
+/// A fallback as a number.
+#[must_use]
+pub const fn fallback_code(fallback: Option<Fallback>) -> u32 {
+    match fallback {
+        None => 0,
+        Some(Fallback::Start) => 1,
+        Some(Fallback::Surface) => 2,
+        Some(Fallback::Jump) => 3,
+        Some(Fallback::Full) => 4,
+        Some(_) => 5,
+    }
 }
 
 /// A cause as a number.

@@ -14,7 +14,8 @@ use super::Budget;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Cost {
-    /// The cost of every query: setting it up, the root, a warm start's bookkeeping, and the answer.
+    /// The cost of every query: setting it up, the root, a warm start's bookkeeping, and the answer. Of a tree over
+    /// surfaces that share no vertex, each further root adds about a node test.
     pub base: u32,
     /// The cost of a node test: of a sphere, or of a leaf's or triangle's plane.
     pub node_test: u32,

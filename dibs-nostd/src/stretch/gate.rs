@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use super::{StretchError, measure_stretch};
-use crate::surface::{MeasuredStretch, VertexTable};
+use crate::surface::{MeasuredStretch, TravelUnit, VertexTable};
 use crate::tree::{Index, Tree};
 
 /// The part of the published surface that a frame changes.
@@ -87,6 +87,12 @@ pub trait Gate {
         f32::INFINITY
     }
 
+    /// The unit in which the motion from one published frame to the next is counted; `None` if it is not measured.
+    #[doc(hidden)]
+    fn travel_unit(&self) -> Option<TravelUnit> {
+        None
+    }
+
     /// The error (mm) of making the surface from the frame's rows: added to the frame's position error.
     fn position_error(&self) -> f32 {
         0.0
@@ -124,5 +130,9 @@ impl<I: Index> Gate for &Tree<'_, I> {
             return Ok(Verdict::Pending);
         }
         measure_stretch(self, surface).map(|stretch| Verdict::Admitted(Some(stretch)))
+    }
+
+    fn travel_unit(&self) -> Option<TravelUnit> {
+        Some(TravelUnit::of(self))
     }
 }

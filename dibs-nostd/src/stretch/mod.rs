@@ -19,6 +19,8 @@ pub use limits::SurfaceLimits;
 pub use monitor::StretchMonitor;
 #[cfg(feature = "modes")]
 pub(crate) use motion::farthest;
+#[cfg(feature = "bus")]
+pub(crate) use motion::largest_step;
 use regions::{of_regions, region_rows};
 
 /// Why a stretch could not be measured, or the limit that it exceeds.

@@ -7,7 +7,7 @@ use super::motion::{farthest, largest_step, too_fast};
 use super::regions::{of_regions, region_rows};
 use super::rows::Room;
 use super::{Arriving, Changed, Gate, StretchError, SurfaceLimits, Verdict, check_tables, rows};
-use crate::surface::{REGIONS, VertexTable};
+use crate::surface::{REGIONS, TravelUnit, VertexTable};
 use crate::tree::{Index, Tree, TriangleRow};
 
 /// Blocks of vertex rows, at most: they mark the rows that a partial frame moved.
@@ -287,6 +287,10 @@ impl<I: Index> Gate for StretchMonitor<'_, I> {
         }
         let measured = of_regions(self.tree, &self.regions, surface.epoch());
         Ok(Verdict::Admitted(Some(measured)))
+    }
+
+    fn travel_unit(&self) -> Option<TravelUnit> {
+        Some(TravelUnit::of(self.tree))
     }
 
     fn speed_limit(&self) -> f32 {

@@ -6,6 +6,7 @@ use glam::Vec3;
 
 use super::MeasuredStretch;
 use super::atomic::{AtomicU32, Ordering};
+use super::motion::Travel;
 
 /// The facts about a published frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,6 +82,8 @@ pub struct Buffer<P: ?Sized> {
     position_error: AtomicU32,
     /// Measured stretch; the first word is a NaN if there is none.
     stretch: [AtomicU32; MeasuredStretch::WORDS],
+    /// The odometer's reading, all zero if there is none.
+    travel: [AtomicU32; Travel::WORDS],
     positions: P,
 }
 
@@ -92,6 +95,7 @@ impl<const N: usize> Buffer<[Position; N]> {
             received: AtomicU32::new(0),
             position_error: AtomicU32::new(0),
             stretch: [const { AtomicU32::new(0) }; MeasuredStretch::WORDS],
+            travel: [const { AtomicU32::new(0) }; Travel::WORDS],
             positions: [const { Position([const { AtomicU32::new(0) }; 3]) }; N],
         }
     }
@@ -104,6 +108,7 @@ impl<const N: usize> Buffer<[Position; N]> {
             received: AtomicU32::new(0),
             position_error: AtomicU32::new(0),
             stretch: from_fn(|_| AtomicU32::new(0)),
+            travel: from_fn(|_| AtomicU32::new(0)),
             positions: from_fn(|_| Position(from_fn(|_| AtomicU32::new(0)))),
         }
     }
@@ -120,7 +125,7 @@ impl<P: Rows + ?Sized> Buffer<P> {
         self.rows().get(vertex as usize).map(Position::get)
     }
 
-    pub(super) fn set_label(&self, label: FrameLabel) {
+    pub(super) fn set_label(&self, label: FrameLabel, travel: Option<Travel>) {
         self.epoch.store(label.epoch, Ordering::Relaxed);
         self.received.store(label.received, Ordering::Relaxed);
         self.position_error.store(label.position_error.to_bits(), Ordering::Relaxed);
@@ -129,6 +134,10 @@ impl<P: Rows + ?Sized> Buffer<P> {
             None => [f32::NAN.to_bits(); MeasuredStretch::WORDS],
         };
         for (at, word) in self.stretch.iter().zip(words) {
+            at.store(word, Ordering::Relaxed);
+        }
+        let words = travel.map_or([0; Travel::WORDS], Travel::to_words);
+        for (at, word) in self.travel.iter().zip(words) {
             at.store(word, Ordering::Relaxed);
         }
     }
@@ -140,6 +149,10 @@ impl<P: Rows + ?Sized> Buffer<P> {
             position_error: self.position_error(),
             stretch: self.stretch(),
         }
+    }
+
+    pub(super) fn travel(&self) -> Option<Travel> {
+        Travel::from_words(self.travel.each_ref().map(|word| word.load(Ordering::Relaxed)))
     }
 
     pub(super) fn position_error(&self) -> f32 {

@@ -37,6 +37,7 @@ use super::age::elapsed;
 use super::atomic::{AtomicBool, AtomicU32, Ordering};
 use super::buffer::{Buffer, FrameLabel, Position, Rows};
 use super::error::{OutOfTableError, PublishError, SplitError};
+use super::motion::{MovingSurface, Travel};
 use super::{Ageing, FrameAge, Latest, MeasuredStretch, VertexTable};
 
 /// State word, bit 0: index of the front buffer.
@@ -48,7 +49,7 @@ const PUBLISHED: u32 = 4;
 
 /// A double buffer of `N` vertex positions, meant for a `static`.
 ///
-/// RAM: 24 bytes a vertex (two positions), plus a little over a hundred. All zero at start, so it lies in `.bss`.
+/// RAM: 24 bytes a vertex (two positions), plus some 150. All zero at start, so it lies in `.bss`.
 ///
 /// ```
 /// use dibs_nostd::{FrameLabel, Frames, VertexTable, glam::Vec3};
@@ -271,13 +272,13 @@ impl<const N: usize, F: Buffers> FrameWriter<'_, N, F> {
         if self.missing() != 0 {
             return Err(PublishError::Incomplete { missing: self.missing() });
         }
-        self.set_label(label);
+        self.set_label(label, None);
         self.publish_complete()
     }
 
-    /// Labels the frame being written.
-    pub(crate) fn set_label(&mut self, label: FrameLabel) {
-        self.back.set_label(label);
+    /// Labels the frame being written, with its odometer's reading if its motion since the published one is measured.
+    pub(crate) fn set_label(&mut self, label: FrameLabel, travel: Option<Travel>) {
+        self.back.set_label(label, travel);
     }
 
     /// Publishes a labelled frame that the caller has proven complete.
@@ -382,6 +383,13 @@ impl<const N: usize, F: Buffers> VertexTable for FrameGuard<'_, N, F> {
     }
 }
 
+/// Its motion since other frames is known if an [`Assembler`](crate::Assembler) with a tree's gate published them all.
+impl<const N: usize, F: Buffers> MovingSurface for FrameGuard<'_, N, F> {
+    fn travel(&self) -> Option<Travel> {
+        self.view.buffer.travel()
+    }
+}
+
 /// The writer's view of one buffer: a [`VertexTable`].
 #[derive(Debug)]
 pub struct FrameView<'f, const N: usize, F: Buffers = Frames<N>> {
@@ -401,6 +409,11 @@ impl<const N: usize, F: Buffers> FrameView<'_, N, F> {
     /// The facts about the frame; arbitrary for a frame not yet labelled.
     pub(crate) fn label(&self) -> FrameLabel {
         self.buffer.label()
+    }
+
+    /// Its odometer's reading.
+    pub(crate) fn travel(&self) -> Option<Travel> {
+        self.buffer.travel()
     }
 
     /// Time from this frame to one with the stamp `received`.

@@ -20,6 +20,6 @@ pub use frames::{
 pub use latest::{FrameAge, Latest};
 pub(crate) use measured::share;
 pub use measured::{MeasuredStretch, REGIONS};
-pub use motion::{Moved, MovingSurface, Odometer, Travel};
+pub use motion::{Moved, MovingSurface, Odometer, Travel, TravelUnit};
 pub use moving::{Between, Step};
 pub use vertices::{QuantisedVertices, VertexTable};

@@ -24,6 +24,7 @@ mod sealed {
     pub trait Sealed {}
     impl<V: super::VertexTable + ?Sized> Sealed for super::Moved<'_, V> {}
     impl<S: super::MovingSurface + ?Sized> Sealed for &S {}
+    impl<const N: usize, F: crate::surface::Buffers> Sealed for crate::FrameGuard<'_, N, F> {}
     impl<W, V> Sealed for crate::surface::moving::Between<'_, W, V>
     where
         W: super::VertexTable + ?Sized,
@@ -69,14 +70,41 @@ impl Travel {
         Some(along.saturating_add(aside))
     }
 
+    /// The reading at the start of an unbroken run of measurements.
+    pub(crate) fn start(tree: u32) -> Self {
+        Self { tree, chain: next_chain(), reading: 0, aside: 0 }
+    }
+
+    /// The reading of a frame as words, for its label.
+    pub(super) fn to_words(self) -> [u32; Travel::WORDS] {
+        [self.tree, self.chain, self.reading as u32, (self.reading >> 32) as u32]
+    }
+
+    /// The inverse of [`to_words`](Self::to_words). Memory that was never written has no reading.
+    pub(super) fn from_words([tree, chain, low, high]: [u32; Travel::WORDS]) -> Option<Self> {
+        let reading = u64::from(high) << 32 | u64::from(low);
+        (chain != NO_CHAIN).then_some(Self { tree, chain, reading, aside: 0 })
+    }
+
+    /// Words that a frame's reading takes.
+    pub(super) const WORDS: usize = 4;
+
+    /// The reading after a step in which no vertex moved farther than `farthest` (squared, rounded to nearest); `None`
+    /// if that is not finite.
+    #[cfg(feature = "bus")]
+    pub(crate) fn after_step(self, unit: &TravelUnit, farthest: f32) -> Option<Self> {
+        let units = unit.unit.units_of_step(farthest)?;
+        (self.tree == unit.tree).then(|| self.beyond(units, 0))
+    }
+
     /// This reading, `along` units farther on the path and `aside` units off it.
-    pub(super) fn beyond(self, along: u64, aside: i64) -> Self {
+    pub(crate) fn beyond(self, along: u64, aside: i64) -> Self {
         let reading = self.reading.saturating_add(along);
         Self { reading, aside: self.aside.saturating_add(aside), ..self }
     }
 }
 
-/// The unit of the odometer: a power of two times 2^-24, at most 2^-24 of the root sphere's radius.
+/// The unit of the odometer: a power of two times 2^-24, at most 2^-24 of the largest root sphere's radius.
 ///
 /// Integers add without rounding, and wrap.
 #[derive(Clone, Copy, Debug)]
@@ -88,10 +116,16 @@ pub(crate) struct Unit {
 impl Unit {
     pub(crate) const fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
         const EXPONENT: u32 = 0xFF << 23;
-        let radius = match tree.node(0) {
-            Some((_, radius, _)) => radius,
-            None => 0.0,
-        };
+        let mut radius = 0.0_f32;
+        let mut root = 0;
+        while root < tree.roots() {
+            if let Some((_, own, _)) = tree.node(root)
+                && own > radius
+            {
+                radius = own;
+            }
+            root += 1;
+        }
         // Clamped, so that no product underflows or overflows. Written so that NaN becomes a number.
         let radius = if radius > 1e-20 { radius } else { 1e-20 };
         let radius = if radius < 1e20 { radius } else { 1e20 };
@@ -113,11 +147,37 @@ impl Unit {
         self.down(length).wrapping_add(1)
     }
 
+    /// The units of a step whose square was rounded to nearest, rounded up; `None` if it is not finite.
+    fn units_of_step(self, squared: f32) -> Option<u64> {
+        let units = ((length_of_step(squared) * self.inverse) as u64).saturating_add(1);
+        (squared < f32::INFINITY).then_some(units)
+    }
+
     /// The length of so many units, to the nearest f32.
     #[inline(always)]
     pub(crate) fn length(self, units: i32) -> f32 {
         units as f32 * self.length
     }
+}
+
+/// The unit in which the motion of one tree's surfaces is counted. Only a tree makes one.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(not(feature = "bus"), allow(dead_code, reason = "only a receiver counts with it"))]
+pub struct TravelUnit {
+    pub(crate) tree: u32,
+    unit: Unit,
+}
+
+impl TravelUnit {
+    pub(crate) const fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
+        Self { tree: tree.checksum(), unit: Unit::of(tree) }
+    }
+}
+
+/// A length that is not below that of a step with this square, rounded to nearest.
+fn length_of_step(squared: f32) -> f32 {
+    // Differences and squares are rounded by a few parts in 2^24, and underflow below 1e-22.
+    sqrt(squared) * (1.0 + 4.0 * f32::EPSILON) + 1e-20
 }
 
 /// Largest number of units counted for a length: more than 32 times the root sphere's radius.
@@ -246,10 +306,9 @@ impl Odometer {
             // False for NaN too.
             is_measured &= squared < f32::INFINITY;
         }
-        // Differences and squares are rounded by a few parts in 2^24, and underflow below 1e-22.
-        let length = sqrt(largest) * (1.0 + 4.0 * f32::EPSILON) + 1e-20;
-        let units = ((length * self.unit.inverse) as u64).saturating_add(1);
-        let start = || Travel { tree: self.tree, chain: next_chain(), reading: 0, aside: 0 };
+        let length = length_of_step(largest);
+        let units = self.unit.units_of_step(largest).unwrap_or(0);
+        let start = || Travel::start(self.tree);
         let from_last = self.travel.filter(|_| self.digest == from.0).unwrap_or_else(start);
         let (from, units) = if is_measured { (from_last, units) } else { (start(), 0) };
         let travel = from.beyond(units, 0);
@@ -259,9 +318,12 @@ impl Odometer {
     }
 }
 
+/// The number of no run.
+const NO_CHAIN: u32 = 0;
+
 /// A new number for a run of measurements.
 fn next_chain() -> u32 {
-    static NEXT: AtomicU32 = AtomicU32::new(0);
+    static NEXT: AtomicU32 = AtomicU32::new(NO_CHAIN + 1);
     NEXT.fetch_add(1, Ordering::Relaxed)
 }
 

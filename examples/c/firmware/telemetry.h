@@ -41,6 +41,9 @@ typedef struct {
     uint32_t rejected;
     uint32_t read_epoch;
     uint32_t read_digest;
+    /* Of a tracker; a query has neither. */
+    uint32_t front;
+    uint32_t fallback;
 } tick_record;
 
 #define TICK_KIND 1u

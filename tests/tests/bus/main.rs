@@ -10,4 +10,5 @@ mod order;
 mod partial;
 mod properties;
 mod specification;
+mod travel;
 mod weights;

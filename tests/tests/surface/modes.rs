@@ -406,6 +406,7 @@ fn the_real_heart_is_driven_by_its_modes() {
             tree.vertex_count(),
         );
         for (ratios, noise) in above.iter().zip([0.0, 0.02, 0.1]) {
+            assert!(2 * ratios.len() > recorded.weights.len(), "{} shapes compared", ratios.len());
             let mean = ratios.iter().sum::<f32>() / ratios.len() as f32;
             let most = ratios.iter().copied().fold(0.0, f32::max);
             println!(

@@ -5,6 +5,7 @@ mod collector;
 mod error;
 mod health;
 mod packets;
+mod step;
 
 use crate::MAX_COORDINATE;
 use crate::bus::wire::{
@@ -19,6 +20,7 @@ pub use collector::LastHeartbeat;
 pub use error::ReceiveError;
 pub use health::BusHealth;
 use health::FrameName;
+use step::Step;
 
 /// Assembles frames of `N` vertices from packets, and publishes the complete and admitted ones.
 ///
@@ -37,7 +39,7 @@ use health::FrameName;
 ///
 /// RAM: less than half a kilobyte besides [`Frames`](crate::Frames) and gate, for any `N`. A surface's buffers with
 /// both ends, the assembler and the [`StretchMonitor`](crate::StretchMonitor) together take 24 bytes a vertex and at
-/// most 1,024 bytes.
+/// most 1,100 bytes.
 ///
 /// ```
 /// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
@@ -69,6 +71,7 @@ pub struct Assembler<'f, G, const N: usize, M = NoMac, F: Buffers = Frames<N>> {
     /// Leading rows of the back buffer that equal the published ones, except where the partial frame in work has
     /// changed them.
     copied: u32,
+    step: Step,
     /// Rows were stored since the copying began. If their frame is not published, the copy starts again.
     is_dirty: bool,
     /// A partial frame has come, so each published frame is copied for the next one.
@@ -171,6 +174,7 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
             max_coordinate,
             collector: Collector::new(mesh_id),
             is_admitted: false,
+            step: Step::new(),
             copied: 0,
             is_dirty: false,
             takes_partial: false,
@@ -213,8 +217,8 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
         outcome
     }
 
-    /// Does a slice of work: checks at most `work` triangles or copies at most `work` rows, and publishes an admitted
-    /// frame.
+    /// Does a slice of work: compares rows with the published ones and checks triangles, or copies rows, at most `work`
+    /// in all, and publishes an admitted frame.
     ///
     /// Call it after each packet, so that the check keeps up with the frame, and from time to time when the bus is
     /// quiet. Cost: O(`work`), with a gate that is sliced.
@@ -322,6 +326,14 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
     fn check(&mut self, ready: u32, work: u32) -> Result<Advance, ReceiveError> {
         let Some(frame) = &self.collector.frame else { return Ok(Advance::Idle) };
         let (back, front) = (self.writer.back(), self.writer.front());
+        let unit = self.gate.travel_unit();
+        let mut work = work;
+        if let (Some(front), Some(_)) = (&front, &unit) {
+            work = self.step.compare(&back, front, ready, work);
+            if frame.is_complete && self.step.compared() < ready {
+                return Ok(Advance::Pending);
+            }
+        }
         let before = front.as_ref().map(|front| (front, front.time_to(frame.captured())));
         let verdict = self.gate.advance(Arriving { surface: &back, ready, before }, work);
         match verdict {
@@ -335,12 +347,15 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
             Ok(_) if !frame.is_complete => Ok(Advance::Idle),
             Ok(Verdict::Pending) => Ok(Advance::Pending),
             Ok(Verdict::Admitted(stretch)) => {
-                self.writer.set_label(FrameLabel {
+                let label = FrameLabel {
                     epoch: frame.id.epoch,
                     received: frame.captured(),
                     position_error: frame.begin.encoding.error() + self.gate.position_error(),
                     stretch,
-                });
+                };
+                let before = front.and_then(|front| front.travel());
+                let travel = unit.map(|unit| self.step.travel(&unit, before));
+                self.writer.set_label(label, travel);
                 self.is_admitted = true;
                 Ok(self.publish())
             }

@@ -4,6 +4,7 @@ use core::ops::Range;
 
 use glam::Vec3;
 
+use super::step::Step;
 use super::{Assembler, Progress, ReceiveError, arrivals};
 use crate::bus::wire::{
     Begin, Body, Content, Encoding, Mac, Packet, Rows, Vertices, Weights, float_position,
@@ -68,6 +69,7 @@ impl<G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'_, G, N, M, F> {
                 corners.into_iter().all(|corner| is_within(corner, self.max_coordinate))
             }
         };
+        self.step = Step::new();
         self.gate.begin(if is_partial { Changed::Partial } else { Changed::Whole });
         Ok(Progress::Begun { epoch: frame.id.epoch })
     }

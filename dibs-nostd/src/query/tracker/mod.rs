@@ -26,7 +26,9 @@ const FARTHEST: u32 = 1 << 29;
 /// (Fronts of bounding volume trees: Klosowski et al. 1998, Tang et al. 2010. Bounds that expire: kinetic data
 /// structures; Barbič & James 2010.)
 ///
-/// The surface carries its motion, as [`MovingSurface::travel`]; where it was not measured, the tick is a whole query.
+/// The surface carries its motion, as [`MovingSurface::travel`]; where it was not measured, the tick is a whole query. An
+/// [`Assembler`](crate::Assembler) with a tree's gate measures it for the frames that it publishes, and an
+/// [`Odometer`](crate::Odometer) for other tables.
 /// Another tool counts as a step to its position. The stretch in the options may change from tick to tick: remembered
 /// bounds hold for any.
 ///

@@ -72,6 +72,10 @@ pub struct Report {
     instructions_max: Option<u64>,
     node_tests_mean: f64,
     triangle_tests_mean: f64,
+    /// Most nodes that the tracker's front had open.
+    front_max: u32,
+    /// Answered ticks in which the front did not serve, the first among them.
+    fallbacks: usize,
     deadline_misses: Option<u32>,
     /// Longest time from a tick's due moment to its first instruction, in microseconds.
     latency_max_us: Option<f64>,
@@ -164,6 +168,8 @@ impl Report {
             instructions_max: on_board.then_some(u64::from(counts_max) * scale),
             node_tests_mean: mean(|tick| tick.node_tests),
             triangle_tests_mean: mean(|tick| tick.triangle_tests),
+            front_max: outcome.ticks.iter().map(|tick| tick.front).max().unwrap_or_default(),
+            fallbacks: outcome.ticks.iter().filter(|tick| tick.fallback != 0).count(),
             deadline_misses: on_board.then_some(summary.deadline_misses),
             latency_max_us: on_board.then(|| microseconds(summary.latency_counts)),
             tick_max_us: on_board.then(|| microseconds(summary.tick_counts)),
@@ -343,6 +349,7 @@ impl Report {
             "tests a query",
             format!("{:.0} nodes, {:.0} triangles", self.node_tests_mean, self.triangle_tests_mean),
         );
+        row("front", format!("{} nodes at most, {} fallbacks", self.front_max, self.fallbacks));
         if let (Some(mean), Some(max)) = (self.instructions_mean, self.instructions_max) {
             row("instructions a query", format!("{mean:.0} mean, {max} max"));
             row(
