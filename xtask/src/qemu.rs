@@ -18,6 +18,18 @@ const SHIFT: u32 = 1;
 /// Instructions that the processor executes while the board's 25 MHz clock counts one.
 pub const INSTRUCTIONS_A_COUNT: u32 = 40 >> SHIFT;
 
+/// Arguments of a machine that has nothing but semihosting.
+pub const HEADLESS: [&str; 8] = [
+    "-display",
+    "none",
+    "-monitor",
+    "none",
+    "-serial",
+    "none",
+    "-semihosting-config",
+    "enable=on,target=native",
+];
+
 /// Finds QEMU, or installs it. Returns its version line.
 pub fn find() -> Result<String> {
     version().or_else(|_| apt::install(&[PROGRAM]).and_then(|()| version())).map_err(|error| {
@@ -47,6 +59,13 @@ pub const BOARD: Time = Time::Counted(SHIFT);
 pub fn alone(program: &Path, time: Time, arguments: &[&str]) -> Command {
     let mut command = boot(program, time, arguments);
     command.args(["-serial", "none"]);
+    command
+}
+
+/// The command that boots a program in real time, with its UART 0 connected to this socket.
+pub fn with_serial(program: &Path, socket: &Path) -> Command {
+    let mut command = boot(program, Time::Real, &[]);
+    command.arg("-serial").arg(format!("unix:{}", socket.display()));
     command
 }
 

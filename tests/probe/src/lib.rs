@@ -13,8 +13,8 @@ pub mod track;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::modes::{MAX_MODES, Memo, ModalSurface, Modes};
 use dibs_nostd::{
-    Budget, Capsule, Contacts, MeasuredStretch, Options, Proximity, Query, QueryError, Sphere,
-    Tool, Tree, TriangleRow, VertexTable, measure_stretch,
+    Budget, Capsule, Contacts, MeasuredStretch, NoSide, Options, Proximity, Query, QueryError,
+    Side, Sphere, Tool, Tree, TriangleRow, VertexTable, measure_stretch,
 };
 
 /// The meanings of the word at the start of a record.
@@ -49,14 +49,14 @@ pub mod how {
 /// Words of a query: the axis' ends, the radius, 1 for a capsule and 0 for a sphere, the options ([`how`]), the warm
 /// start or `u32::MAX`, and the budget's node and triangle tests.
 pub const QUERY_WORDS: usize = 12;
-/// Words of an answer: its counts on the clock, then the fields of a [`Proximity`], except for its side.
-pub const ANSWER_WORDS: usize = 24;
+/// Words of an answer: its counts on the clock, then the fields of a [`Proximity`].
+pub const ANSWER_WORDS: usize = 25;
 /// Margin of the contacts, in mm.
 pub const MARGIN: f32 = 5.0;
-/// Largest tree, in bytes.
-pub const TREE_BYTES: usize = 1 << 20;
+/// Largest tree, in bytes. A Cortex-M55's board has RAM for the heart and no more.
+pub const TREE_BYTES: usize = if cfg!(m55) { 368 << 10 } else { 1 << 20 };
 /// Most vertices.
-pub const VERTICES: usize = 1 << 15;
+pub const VERTICES: usize = if cfg!(m55) { 5_400 } else { 1 << 15 };
 
 /// Entries of the query's stack: more than the scripts' trees need.
 const STACK: usize = 128;
@@ -318,7 +318,27 @@ fn words(took: u32, answer: &Proximity) -> [u32; ANSWER_WORDS] {
         u,
         v,
         w,
+        side(answer.side),
     ]
+}
+
+/// A number for each side, and for each reason that there is none.
+fn side(side: Side) -> u32 {
+    match side {
+        Side::Outside => 0,
+        Side::Inside => 1,
+        Side::Crossing => 2,
+        Side::Undefined(reason) => match reason {
+            NoSide::NotAsked => 3,
+            NoSide::NoAdjacency => 4,
+            NoSide::OpenBoundary => 5,
+            NoSide::BelowAccuracy => 6,
+            NoSide::Degenerate => 7,
+            NoSide::CutShort => 8,
+            _ => u32::MAX,
+        },
+        _ => u32::MAX,
+    }
 }
 
 fn word(machine: &mut impl Machine) -> Result<u32, Fault> {

@@ -105,10 +105,18 @@ pub const COUNTING: Time = Time::Counted(6);
 
 /// Runs a program on the emulated board that reads a script, and returns the words that it answers.
 pub fn run_on_board(program: &Path, script: &[u8], time: Time) -> Result<Vec<u32>> {
+    run_emulated(&mut qemu::alone(program, time, &[]), script)
+}
+
+/// Answers on another emulated machine.
+pub fn on_machine(emulator: &mut Command, script: &Script) -> Result<Answers> {
+    Answers::new(run_emulated(emulator, &script.bytes())?, script)
+}
+
+fn run_emulated(emulator: &mut Command, script: &[u8]) -> Result<Vec<u32>> {
     let folder = tempfile::tempdir()?;
     fs::write(folder.path().join("script.bin"), script)?;
-    let mut qemu = qemu::alone(program, time, &[]);
-    run(qemu.current_dir(folder.path()).stdin(Stdio::null()))?;
+    run(emulator.current_dir(folder.path()).stdin(Stdio::null()))?;
     words(&folder.path().join("answers.bin"))
 }
 

@@ -53,7 +53,7 @@ const FRAMES_OF_POSES: usize = 10;
 pub enum Draw {
     /// Every option at random.
     Any,
-    /// The same, half of the queries wide.
+    /// The same, half of the queries wide, and half of them signed.
     EitherWay,
     /// Without a budget: the whole search.
     Exhausting,
@@ -316,6 +316,9 @@ impl Script {
                 }
                 _ => Budget::UNLIMITED,
             };
+            if matches!(draw, Draw::EitherWay) {
+                self.how = if number % 2 == 1 { how::SIGNED } else { 0 };
+            }
             if matches!(draw, Draw::EitherWay) && rng.bool() {
                 self.words.push(command::QUERY_IN_ROUNDS);
             } else {

@@ -1,5 +1,8 @@
 //! Files of the computer that runs the emulator, by semihosting.
 
+#[cfg(target_arch = "riscv32")]
+use crate::semihosting::{nr, syscall};
+#[cfg(target_arch = "arm")]
 use cortex_m_semihosting::{nr, syscall};
 
 const BUFFER: usize = 2 * 1024;

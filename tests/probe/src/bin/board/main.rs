@@ -3,6 +3,10 @@
 #![no_std]
 #![no_main]
 
+#[cfg(not(m55))]
+mod clock;
+#[cfg(m55)]
+#[path = "clock_m55.rs"]
 mod clock;
 mod exit;
 mod files;

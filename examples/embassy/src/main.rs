@@ -1,0 +1,118 @@
+//! The smallest loop in Embassy, on the emulated board: the control task runs on an executor in an interrupt, above
+//! the bus's task in the main thread. It ends with the first force that comes from a received surface.
+#![no_std]
+#![no_main]
+
+#[path = "../../board.rs"]
+mod board;
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use board::end;
+use cortex_m::peripheral::{NVIC, Peripherals};
+use cortex_m_rt::exception;
+use cortex_m_semihosting::hprintln;
+use dibs_nostd::constraint::{ForbiddenRegion, SpringDamper};
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::wire::Deframer;
+use dibs_nostd::{Advance, Budget, Capsule, Cost, Error, Options, SurfaceLimits};
+use embassy_executor::{InterruptExecutor, Spawner};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::pipe::Pipe;
+use embassy_sync::signal::Signal;
+
+dibs_nostd::include_tree!("heart");
+static SURFACE: heart::Surface = heart::Surface::new();
+
+const OPTIONS: Options =
+    Options::new().budget(Budget::for_instructions(400_000, &Cost::M7_CAPSULE));
+
+static CONTROL: InterruptExecutor = InterruptExecutor::new();
+static TICK: Signal<CriticalSectionRawMutex, u32> = Signal::new();
+static BYTES: Pipe<CriticalSectionRawMutex, 4096> = Pipe::new();
+/// Control ticks so far: the time, in ms.
+static NOW: AtomicU32 = AtomicU32::new(0);
+
+#[embassy_executor::main]
+async fn main(_spawner: Spawner) {
+    // Anything wrong here is wrong before the robot moves: stop.
+    end(bus().await.is_ok())
+}
+
+/// Starts the control task, and takes the bus's packets.
+async fn bus() -> Result<(), Error> {
+    let tree = heart::TREE.validate()?;
+    let (writer, reader) = SURFACE.split()?;
+    let farthest = heart::CENTRE.abs().max_element() + 2.0 * heart::REACH;
+    let mut receiver = heart::receiver(&tree, writer, SurfaceLimits::reach_mm(farthest))?;
+    let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
+    start(reader, heart::Query::new(&tree)?, ForbiddenRegion::new(spring, 5.0)?);
+    let (mut deframer, mut bytes) = (Deframer::<1024>::new(), [0; 64]);
+    loop {
+        let count = BYTES.read(&mut bytes).await;
+        for &byte in &bytes[..count] {
+            if let Some(Ok(packet)) = deframer.push(byte) {
+                let _counted = receiver.accept(packet, NOW.load(Ordering::Relaxed));
+            }
+        }
+        while receiver.advance(100) == Ok(Advance::Pending) {}
+    }
+}
+
+fn start(reader: heart::Reader, query: heart::Query, wall: ForbiddenRegion) {
+    let Some(mut core) = Peripherals::take() else { end(false) };
+    // SAFETY: no critical section relies on priorities; lower values are more urgent.
+    unsafe {
+        core.NVIC.set_priority(board::Interrupt::Spare, 0x40);
+        core.NVIC.set_priority(board::Interrupt::UART0, 0x80);
+    }
+    match control(reader, query, wall) {
+        Ok(task) => CONTROL.start(board::Interrupt::Spare).spawn(task),
+        Err(_) => end(false),
+    }
+    board::start_bus();
+    // SAFETY: the handler's state is static.
+    unsafe { NVIC::unmask(board::Interrupt::UART0) };
+    board::start_ticks(&mut core.SYST);
+}
+
+#[embassy_executor::task]
+async fn control(mut reader: heart::Reader, mut query: heart::Query, wall: ForbiddenRegion) {
+    loop {
+        let now = TICK.wait().await;
+        let (tip, top) = (Vec3::new(32.0, 0.0, 60.0), Vec3::new(32.0, 0.0, 150.0));
+        let Ok(tool) = Capsule::new(tip, top, 2.5) else { end(false) };
+        let surface = reader.latest(now).within(2_000);
+        let closest = surface.and_then(|surface| Ok(query.closest(&surface, &tool, &OPTIONS)?));
+        let force = wall.force(&closest, Vec3::ZERO).force;
+        if let Ok(closest) = closest {
+            hprintln!("{} mm, {} N", closest.separation, force.length());
+            end(true)
+        }
+        if now > board::PATIENCE {
+            end(false)
+        }
+    }
+}
+
+#[exception]
+fn SysTick() {
+    TICK.signal(NOW.fetch_add(1, Ordering::Relaxed));
+}
+
+extern "C" fn uart() {
+    board::acknowledge();
+    while let Some(byte) = board::byte() {
+        let _full = BYTES.try_write(&[byte]);
+    }
+}
+
+extern "C" fn control_executor() {
+    // SAFETY: called from the interrupt that the executor was started with.
+    unsafe { CONTROL.on_interrupt() };
+}
+
+/// Follows the exceptions in the vector table.
+#[unsafe(link_section = ".vector_table.interrupts")]
+#[unsafe(no_mangle)]
+pub static __INTERRUPTS: [extern "C" fn(); 2] = [uart, control_executor];

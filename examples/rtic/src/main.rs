@@ -1,0 +1,106 @@
+//! The smallest loop in RTIC, on the emulated board: the bus interrupt fills one buffer, the control interrupt of higher
+//! priority reads the other, and neither waits. It ends with the first force that comes from a received surface.
+#![no_std]
+#![no_main]
+
+#[path = "../../board.rs"]
+mod board;
+
+// Linked for its vectors and its start.
+use cortex_m_rt as _;
+
+dibs_nostd::include_tree!("heart");
+static SURFACE: heart::Surface = heart::Surface::new();
+
+unsafe extern "C" {
+    fn UART0();
+}
+
+/// Follows the exceptions in the vector table.
+#[unsafe(link_section = ".vector_table.interrupts")]
+#[unsafe(no_mangle)]
+pub static __INTERRUPTS: [unsafe extern "C" fn(); 1] = [UART0];
+
+#[rtic::app(device = crate::board, peripherals = false)]
+mod app {
+    use core::sync::atomic::{AtomicU32, Ordering};
+
+    use cortex_m_semihosting::hprintln;
+    use dibs_nostd::constraint::{ForbiddenRegion, SpringDamper};
+    use dibs_nostd::glam::Vec3;
+    use dibs_nostd::wire::Deframer;
+    use dibs_nostd::{Budget, Capsule, Cost, Error, Options, SurfaceLimits};
+
+    use crate::board::{self, end};
+    use crate::{SURFACE, heart};
+
+    const OPTIONS: Options =
+        Options::new().budget(Budget::for_instructions(400_000, &Cost::M7_CAPSULE));
+
+    /// Control ticks so far: the time, in ms.
+    static NOW: AtomicU32 = AtomicU32::new(0);
+
+    #[shared]
+    struct Shared {}
+
+    #[local]
+    struct Local {
+        deframer: Deframer<1024>,
+        receiver: heart::Receiver<'static>,
+        reader: heart::Reader,
+        query: heart::Query,
+        wall: ForbiddenRegion,
+    }
+
+    #[init(local = [tree: Option<heart::Tree> = None])]
+    fn init(mut cx: init::Context) -> (Shared, Local) {
+        // Anything wrong here is wrong before the robot moves: stop.
+        let Ok(local) = start(cx.local.tree) else { end(false) };
+        board::start_bus();
+        board::start_ticks(&mut cx.core.SYST);
+        (Shared {}, local)
+    }
+
+    fn start(tree: &'static mut Option<heart::Tree>) -> Result<Local, Error> {
+        let tree: &'static heart::Tree = tree.insert(heart::TREE.validate()?);
+        let (writer, reader) = SURFACE.split()?;
+        let farthest = heart::CENTRE.abs().max_element() + 2.0 * heart::REACH;
+        let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
+        Ok(Local {
+            deframer: Deframer::new(),
+            receiver: heart::receiver(tree, writer, SurfaceLimits::reach_mm(farthest))?,
+            reader,
+            query: heart::Query::new(tree)?,
+            wall: ForbiddenRegion::new(spring, 5.0)?,
+        })
+    }
+
+    #[task(binds = UART0, priority = 1, local = [deframer, receiver])]
+    fn bus(cx: bus::Context) {
+        board::acknowledge();
+        while let Some(byte) = board::byte() {
+            if let Some(Ok(packet)) = cx.local.deframer.push(byte) {
+                let _counted = cx.local.receiver.accept(packet, NOW.load(Ordering::Relaxed));
+            }
+            let _pending = cx.local.receiver.advance(100);
+        }
+    }
+
+    #[task(binds = SysTick, priority = 2, local = [reader, query, wall])]
+    fn control(cx: control::Context) {
+        let now = NOW.fetch_add(1, Ordering::Relaxed);
+        let (tip, top) = (Vec3::new(32.0, 0.0, 60.0), Vec3::new(32.0, 0.0, 150.0));
+        let Ok(tool) = Capsule::new(tip, top, 2.5) else { end(false) };
+        let surface = cx.local.reader.latest(now).within(2_000);
+        let closest =
+            surface.and_then(|surface| Ok(cx.local.query.closest(&surface, &tool, &OPTIONS)?));
+        let force = cx.local.wall.force(&closest, Vec3::ZERO).force;
+        if let Ok(closest) = closest {
+            hprintln!("{} mm, {} N", closest.separation, force.length());
+            end(true)
+        }
+        if now > board::PATIENCE {
+            end(false)
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! The same bits on an emulated Cortex-M55 and on an emulated RISC-V, and their instructions.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use anyhow::{Result, ensure};
+use xtask::process::{quiet, run};
+use xtask::steps::Outcome;
+use xtask::toolchain::add_target;
+use xtask::{apt, qemu, workspace};
+
+use super::bits::differences;
+use crate::harness::figures::Figures;
+use crate::harness::promise::{Bound, Promise, criteria::FLOW, golden, note};
+use crate::harness::{Check, Effort, record};
+use crate::probe::script::{Asks, Draw, Record, Script, Start};
+use crate::probe::{Answers, Build, on_machine};
+
+pub const CHECK: Check = Check {
+    name: "the same bits on other processors",
+    run: check,
+    promises: &[
+        note("processors.queries"),
+        note("processors.ticks"),
+        Promise {
+            id: "processors.m55.different",
+            says: "The same bits on a Cortex-M55 and on x86-64",
+            criterion: FLOW,
+            bound: Bound::Is(0.0),
+            unit: "of {processors.queries} answers, half of them with their side",
+            limits: "An emulated processor, without its vector unit.",
+        },
+        Promise {
+            id: "processors.riscv.different",
+            says: "The same bits on a RISC-V with F and A and on x86-64",
+            criterion: FLOW,
+            bound: Bound::Is(0.0),
+            unit: "of {processors.queries} answers, half of them with their side",
+            limits: "An emulated processor.",
+        },
+        golden("processors.m55.mean"),
+        golden("processors.riscv.mean"),
+    ],
+};
+
+/// Longest time of a look at the emulator.
+const MOMENT: Duration = Duration::from_secs(20);
+
+/// An emulated machine that answers scripts.
+struct Machine {
+    /// In the figures.
+    name: &'static str,
+    target: &'static str,
+    feature: &'static str,
+    program: &'static str,
+    emulator: &'static str,
+    package: &'static str,
+    arguments: &'static [&'static str],
+    /// Instructions of a difference of its clock.
+    instructions: fn(u32) -> f64,
+}
+
+const MACHINES: [Machine; 2] = [
+    Machine {
+        name: "m55",
+        target: "thumbv8m.main-none-eabihf",
+        feature: "board",
+        program: "probe",
+        emulator: "qemu-system-arm",
+        package: "qemu-system-arm",
+        arguments: &["-machine", "mps3-an547", "-icount", "shift=6"],
+        // The upper 24 bits count 32 MHz, and an instruction takes 64 ns.
+        instructions: |clock| f64::from(clock >> 8) / (32e6 * 64e-9),
+    },
+    Machine {
+        name: "riscv",
+        target: "riscv32imafc-unknown-none-elf",
+        feature: "riscv",
+        program: "riscv",
+        emulator: "qemu-system-riscv32",
+        package: "qemu-system-misc",
+        arguments: &["-machine", "virt", "-bios", "none", "-icount", "shift=0"],
+        instructions: f64::from,
+    },
+];
+
+fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
+    for machine in &MACHINES {
+        if let Err(error) = add_target(machine.target).and_then(|()| machine.find()) {
+            return Ok(Outcome::Skipped(format!("{}: {error:#}", machine.name)));
+        }
+    }
+    let script = Script::adversarial(effort.bits, Draw::EitherWay, 2);
+    let path = Script::beating(effort.ticks.min(MOST_TICKS), Start::Warm, Asks::Distance);
+    let [here, there] = [&script, &path].map(|script| Build::Release.answers(script));
+    let (here, there) = (here?, there?);
+    figures.note("processors.queries", script.queries() as f64);
+    figures.note("processors.ticks", path.queries() as f64);
+    for machine in &MACHINES {
+        let program = machine.build()?;
+        let name = machine.name;
+        let answers = on_machine(&mut machine.boot(&program), &script)?;
+        let on_path = on_machine(&mut machine.boot(&program), &path)?;
+        let different = differences(&here, &answers, name) + differences(&there, &on_path, name);
+        figures.note(&format!("processors.{name}.different"), different as f64);
+        figures.note(&format!("processors.{name}.mean"), machine.mean(&on_path)?);
+    }
+    Ok(Outcome::Passed)
+}
+
+/// Ticks on the path, as many in every run, because their mean is a golden figure.
+const MOST_TICKS: u32 = Effort::TEST.ticks;
+
+impl Machine {
+    /// Finds the emulator, or installs it.
+    fn find(&self) -> Result<()> {
+        let version = || quiet(Command::new(self.emulator).arg("--version"), MOMENT);
+        version().or_else(|_| apt::install(&[self.package]).and_then(|()| version())).map(drop)
+    }
+
+    fn build(&self) -> Result<PathBuf> {
+        let mut cargo = Command::new("cargo");
+        cargo.args(["build", "--quiet", "--package", "dibs-probe", "--features", self.feature]);
+        cargo.args(["--bin", self.program, "--profile", "firmware", "--target", self.target]);
+        cargo.arg("--target-dir").arg(workspace::target()).current_dir(workspace::root());
+        run(&mut cargo)?;
+        Ok(workspace::target().join(self.target).join("firmware").join(self.program))
+    }
+
+    fn boot(&self, program: &Path) -> Command {
+        let mut emulator = Command::new(self.emulator);
+        emulator.args(self.arguments).args(qemu::HEADLESS).arg("-kernel").arg(program);
+        emulator
+    }
+
+    /// Instructions of a query in the mean.
+    fn mean(&self, answers: &Answers) -> Result<f64> {
+        let queries = answers.iter().filter(|answer| matches!(answer.record, Record::Query { .. }));
+        let counts: Vec<f64> = queries.map(|answer| (self.instructions)(answer.words[0])).collect();
+        ensure!(!counts.is_empty(), "no query was asked");
+        Ok((counts.iter().sum::<f64>() / counts.len() as f64).round())
+    }
+}
+
+/// The table of docs/processors.md, from the records.
+pub fn table() -> Result<String> {
+    let figure = |name: &str| record::figure(name);
+    let mut text = format!(
+        "The emulated processors answer {} adversarial queries with the bits of x86-64, and the {} ticks of table 3's path \
+         with a warm start. Nothing is flushed to zero: their scalar units keep subnormals. Instructions are not cycles.\n\n\
+         | emulated processor | answers that differ | instructions a query in the mean |\n|---|---:|---:|\n",
+        figure("processors.queries")?,
+        figure("processors.ticks")?,
+    );
+    for (processor, different, mean) in [
+        ("Cortex-M7 (`mps2-an500`)", "bits.different", "m7.warm.mean"),
+        ("Cortex-M55 (`mps3-an547`)", "processors.m55.different", "processors.m55.mean"),
+        ("RISC-V, `riscv32imafc` (`virt`)", "processors.riscv.different", "processors.riscv.mean"),
+    ] {
+        text += &format!("| {processor} | {} | {} |\n", figure(different)?, figure(mean)?);
+    }
+    Ok(text)
+}
