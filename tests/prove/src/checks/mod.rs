@@ -8,6 +8,7 @@ pub mod cost;
 mod demo;
 mod demo_c;
 mod demo_faults;
+mod examples;
 mod flood;
 mod fuzz;
 mod hand;
@@ -17,7 +18,9 @@ mod interleavings;
 mod link;
 mod miri;
 mod modes;
+pub mod other_processors;
 mod path;
+mod python;
 mod receive;
 mod rot;
 mod sanitizers;
@@ -42,12 +45,14 @@ pub const CHECKS: &[Check] = &[
     ticks::CHECK,
     signed::CHECK,
     bits::CHECK,
+    other_processors::CHECK,
     link::CHECK,
     stack::CHECK,
     demo::CHECK,
     demo_faults::CHECK,
     flood::CHECK,
     demo_c::CHECK,
+    examples::CHECK,
     rot::CHECK,
     host_faults::CHECK,
     board_faults::CHECK,
@@ -61,18 +66,21 @@ pub const CHECKS: &[Check] = &[
     corruption::CHECK,
     fuzz::CHECK,
     instructions::CHECK,
+    python::CHECK,
 ];
 
-/// Names of the checks on the other core: most without an emulator, and the demo in C.
-pub const BESIDE: [&str; 10] = [
+/// Names of the checks on the other core: most without an emulator, the demo in C, and the other processors.
+pub const BESIDE: [&str; 12] = [
     sanitizers::ADDRESS.name,
     sanitizers::THREAD.name,
     interleavings::CHECK.name,
     demo_c::CHECK.name,
+    other_processors::CHECK.name,
     miri::CHECK.name,
     fuzz::CHECK.name,
     cost::HOST.name,
     instructions::CHECK.name,
     host_faults::CHECK.name,
     corruption::CHECK.name,
+    python::CHECK.name,
 ];

@@ -1,0 +1,41 @@
+"""Closest points on a deforming mesh: build a tree once, ask while the surface moves.
+
+    import dibs
+
+    tree = dibs.build("heart.ply", stretch=1.5)
+    answers = tree.query([[0, 0, 150, 5]])          # a sphere: x, y, z, radius
+    answers = tree.query(capsules, surface=positions)
+    answers["separation"], answers["point_on_surface"], answers["triangle"]
+
+Lengths are in millimetres, in the coordinates of the mesh's file. Wrong values raise `ValueError`, wrong types
+`TypeError`, each with one sentence; files and lines that fail raise `OSError`.
+"""
+
+from ._mesh import Mesh, MeshWarning, build, generate, read
+from ._motion import Motion, MotionStretch, read_motion
+from ._stream import Sender, Sent, Totals
+from ._tools import capsules, spheres
+from ._tree import ANSWER, CONTACT, SIDE_REASONS, Contacts, Side, Surface, Tree
+
+__all__ = [
+    "ANSWER",
+    "CONTACT",
+    "SIDE_REASONS",
+    "Contacts",
+    "Mesh",
+    "MeshWarning",
+    "Motion",
+    "MotionStretch",
+    "Sender",
+    "Sent",
+    "Side",
+    "Surface",
+    "Totals",
+    "Tree",
+    "build",
+    "capsules",
+    "generate",
+    "read",
+    "read_motion",
+    "spheres",
+]

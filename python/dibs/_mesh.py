@@ -1,0 +1,181 @@
+"""Meshes and trees of them."""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from typing import Any, Optional, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _arrays, _dibs
+from ._arrays import Floats
+from ._motion import Motion, frames_of
+from ._tree import Tree
+
+Path = Union[str, "os.PathLike[str]"]
+
+
+class MeshWarning(UserWarning):
+    """Something unusual of a mesh, or a repair."""
+
+
+class Mesh:
+    """A mesh that passed the library's checks.
+
+    `vertices` keep their numbers, even of vertices that were welded or belong to no triangle, so a motion still fits.
+    """
+
+    vertices: Floats
+    """Positions in millimetres."""
+    triangles: npt.NDArray[np.uint32]
+    """Three vertex numbers each."""
+    report: dict[str, Any]
+    """Counts of what was read, welded, dropped and found."""
+    warnings: list[str]
+    """A sentence for each oddity and each repair."""
+    labels: Optional[npt.NDArray[np.uint8]] = None
+    """A label for each triangle from the file's groups, where `read` was asked for them. `build` takes them."""
+    groups: list[dict[str, Any]]
+    """`label`, `name` and number of `triangles` of each group."""
+
+    def __init__(
+        self,
+        vertices: npt.ArrayLike,
+        triangles: npt.ArrayLike,
+        *,
+        unit: str = "mm",
+        weld: Optional[float] = None,
+        strict: bool = False,
+        largest_component: bool = False,
+        origin: Optional[npt.ArrayLike] = None,
+        orient: bool = False,
+    ) -> None:
+        points = _arrays.points("vertices", vertices)
+        corners = _arrays.triangles(triangles, len(points))
+        reading = _reading(unit, weld, strict, largest_component, origin, orient, False)
+        self._take(_dibs.Mesh.of(points.tobytes(), corners.tobytes(), reading))
+
+    def _take(self, native: _dibs.Mesh) -> None:
+        self._native = native
+        self.vertices = np.frombuffer(native.positions(), "<f8").reshape(-1, 3)
+        self.triangles = np.frombuffer(native.triangles(), "<u4").reshape(-1, 3)
+        self.report = json.loads(native.report())
+        self.warnings = native.warnings()
+        self.groups = []
+        groups = native.groups()
+        if groups is not None:
+            self.labels = np.frombuffer(groups[0], np.uint8)
+            self.groups = json.loads(groups[1])
+
+    @classmethod
+    def _of(cls, native: _dibs.Mesh) -> Mesh:
+        mesh = cls.__new__(cls)
+        mesh._take(native)
+        return mesh
+
+    @property
+    def origin(self) -> Floats:
+        """The point that a tree's coordinates count from: zero, unless the mesh is far from it."""
+        return np.array(self._native.origin())
+
+    def __repr__(self) -> str:
+        return f"Mesh({len(self.vertices)} vertices, {len(self.triangles)} triangles)"
+
+
+def _reading(
+    unit: str,
+    weld: Optional[float],
+    strict: bool,
+    largest_component: bool,
+    origin: Optional[npt.ArrayLike],
+    orient: bool,
+    groups: bool,
+) -> tuple[str, Optional[float], bool, bool, Optional[list[float]], bool, bool]:
+    place: Optional[list[float]] = None
+    if origin is not None:
+        place = _arrays.points("origin", _arrays.numbers("origin", origin)[np.newaxis])[0].tolist()
+    if weld is not None:
+        weld = _arrays.number("weld", weld)
+    return unit, weld, strict, largest_component, place, orient, groups
+
+
+def read(
+    path: Path,
+    *,
+    unit: str = "mm",
+    weld: Optional[float] = None,
+    strict: bool = False,
+    largest_component: bool = False,
+    origin: Optional[npt.ArrayLike] = None,
+    orient: bool = False,
+    groups: bool = False,
+) -> Mesh:
+    """Reads a mesh file: OBJ, STL, PLY, OFF, VTK (.vtk, .vtp), glTF, Gmsh or 3MF, told apart by content.
+
+    `weld` joins vertices that are at most so far apart; without it only triangle soup is welded. `strict` refuses
+    degenerate and duplicate triangles instead of dropping them. `orient` turns triangles until the surface faces
+    outwards. `groups` makes labels of the file's groups: OBJ's g and usemtl, Gmsh's physical groups, VTK's cell data label,
+    labels or RegionId.
+    """
+    reading = _reading(unit, weld, strict, largest_component, origin, orient, groups)
+    return Mesh._of(_dibs.Mesh.read(os.fspath(path), reading))
+
+
+def build(
+    source: Union[Path, Mesh, npt.ArrayLike],
+    triangles: Optional[npt.ArrayLike] = None,
+    *,
+    stretch: float = 1.5,
+    limits: Optional[npt.ArrayLike] = None,
+    labels: Optional[npt.ArrayLike] = None,
+    **reading: Any,
+) -> Tree:
+    """Builds the tree of a mesh: of a file, a `Mesh`, or arrays of vertices and triangles.
+
+    `stretch` is the largest factor by which the surface may be stretched along itself; `limits` are one for each
+    triangle instead (`MotionStretch.limits`). `labels` are numbers from 0 to 255, one for each triangle, which answers
+    then carry. Other arguments are those of `read`. What is unusual of the mesh is warned of (`MeshWarning`).
+    """
+    if isinstance(source, Mesh):
+        if triangles is not None or reading:
+            raise TypeError("a Mesh has its triangles, and was read with its options")
+        mesh = source
+    elif triangles is not None:
+        mesh = Mesh(source, triangles, **reading)  # type: ignore[arg-type]
+    elif isinstance(source, (str, os.PathLike)):
+        mesh = read(source, **reading)
+    else:
+        raise TypeError("build: give a file, a Mesh, or vertices and triangles")
+    count = len(mesh.triangles)
+    each = None
+    if limits is not None:
+        each = np.asarray(_arrays.one_each("limits", limits, count), dtype="<f4").tobytes()
+    if labels is None:
+        labels = mesh.labels
+    marks = None if labels is None else _labels(labels, count)
+    native = mesh._native.build(_arrays.number("stretch", stretch), each, marks)
+    tree = Tree._of(native, len(mesh.vertices))
+    for sentence in mesh.warnings + native.warnings():
+        warnings.warn(sentence, MeshWarning, stacklevel=2)
+    return tree
+
+
+def _labels(labels: npt.ArrayLike, triangles: int) -> bytes:
+    array = _arrays.one_each("labels", labels, triangles)
+    if array.dtype.kind == "f":
+        raise TypeError(f"labels: labels are integers, not {array.dtype}")
+    wrong = (array < 0) | (array > 255)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise ValueError(f"labels: {array[row]} of triangle {row} is not a label: a number from 0 to 255")
+    return array.astype(np.uint8).tobytes()
+
+
+def generate(kind: str, triangles: int) -> tuple[Mesh, Optional[Motion]]:
+    """A procedural "heart" with a beat of its motion, or a "brain", which has none."""
+    native, motion = _dibs.generate(kind, triangles)
+    mesh = Mesh._of(native)
+    return mesh, None if motion is None else frames_of(motion)

@@ -1,0 +1,124 @@
+//! A mesh that passed the library's checks.
+
+use std::path::PathBuf;
+
+use dibs_build::glam::DVec3;
+use dibs_build::{Builder, Import, ReadOptions, Unit, check_winding, orient};
+use pyo3::prelude::*;
+use pyo3::types::PyByteArray;
+
+use crate::tree::Tree;
+use crate::{bytes, error, invalid};
+
+/// A mesh, and the report of its checks.
+#[pyclass(frozen, module = "dibs._dibs")]
+pub struct Mesh {
+    pub import: Import,
+    turned: Option<usize>,
+}
+
+/// `unit`, `weld`, `strict`, `largest_component`, `origin`, `orient`, `groups`.
+type Reading = (String, Option<f32>, bool, bool, Option<[f64; 3]>, bool, bool);
+
+#[pymethods]
+impl Mesh {
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf, reading: Reading) -> PyResult<Self> {
+        let (options, is_to_turn) = options(reading)?;
+        let import = py.detach(|| options.read(path)).map_err(|error| error::read(&error))?;
+        Self::new(import, is_to_turn)
+    }
+
+    #[staticmethod]
+    fn of(py: Python<'_>, positions: &[u8], triangles: &[u8], reading: Reading) -> PyResult<Self> {
+        let (options, is_to_turn) = options(reading)?;
+        let check = || options.check(&bytes::points(positions), &bytes::triangles(triangles));
+        Self::new(py.detach(check).map_err(invalid)?, is_to_turn)
+    }
+
+    /// Positions in the coordinates of the file.
+    fn positions<'py>(&self, py: Python<'py>) -> Bound<'py, PyByteArray> {
+        let mesh = &self.import.mesh;
+        let positions = mesh.positions.iter().map(|position| mesh.origin + position.as_dvec3());
+        PyByteArray::new(py, &bytes::of_points(positions))
+    }
+
+    fn triangles<'py>(&self, py: Python<'py>) -> Bound<'py, PyByteArray> {
+        let corners = self.import.mesh.triangles.iter().flatten();
+        let bytes: Vec<u8> = corners.flat_map(|corner| corner.to_le_bytes()).collect();
+        PyByteArray::new(py, &bytes)
+    }
+
+    fn origin(&self) -> [f64; 3] {
+        self.import.mesh.origin.to_array()
+    }
+
+    /// The report in JSON.
+    fn report(&self) -> PyResult<String> {
+        serde_json::to_string(&self.import.report).map_err(invalid)
+    }
+
+    /// The labels of the file's groups, and the groups in JSON, where they were asked for.
+    fn groups<'py>(&self, py: Python<'py>) -> PyResult<Option<(Bound<'py, PyByteArray>, String)>> {
+        let Some(groups) = &self.import.groups else { return Ok(None) };
+        let named = serde_json::to_string(&groups.groups).map_err(invalid)?;
+        Ok(Some((PyByteArray::new(py, &groups.labels), named)))
+    }
+
+    fn turned(&self) -> Option<usize> {
+        self.turned
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let winding = check_winding(&self.import.mesh).err().map(|error| error.to_string());
+        self.import.report.warnings().chain(winding).collect()
+    }
+
+    fn build(
+        &self,
+        py: Python<'_>,
+        stretch: f32,
+        limits: Option<&[u8]>,
+        labels: Option<&[u8]>,
+    ) -> PyResult<Tree> {
+        let builder = match limits {
+            Some(limits) => Builder::new().limits(bytes::floats(limits)),
+            None => Builder::new().stretch(stretch),
+        };
+        let builder = match labels {
+            Some(labels) => builder.labels(labels.to_vec()),
+            None => builder,
+        };
+        let built = py.detach(|| builder.build(&self.import));
+        Tree::from_blob(built.map_err(|error| error::build(&error))?.blob().to_vec())
+    }
+}
+
+impl Mesh {
+    /// A mesh, turned outwards where that is asked for.
+    pub fn new(mut import: Import, is_to_turn: bool) -> PyResult<Self> {
+        let turned =
+            if is_to_turn { Some(orient(&mut import.mesh).map_err(invalid)?) } else { None };
+        Ok(Self { import, turned })
+    }
+}
+
+/// How to read, and whether to turn the mesh outwards.
+fn options(reading: Reading) -> PyResult<(ReadOptions, bool)> {
+    let (unit, weld_tolerance, strict, largest_component, origin, is_to_turn, groups) = reading;
+    let unit = self::unit(&unit)?;
+    let origin = origin.map(DVec3::from_array);
+    let options = ReadOptions { weld_tolerance, strict, largest_component, unit, origin, groups };
+    Ok((options, is_to_turn))
+}
+
+/// A unit by its name on the command line.
+pub fn unit(name: &str) -> PyResult<Unit> {
+    match name {
+        "mm" => Ok(Unit::Millimetre),
+        "cm" => Ok(Unit::Centimetre),
+        "m" => Ok(Unit::Metre),
+        "in" => Ok(Unit::Inch),
+        _ => Err(invalid(format!("unit is '{name}'; give 'mm', 'cm', 'm' or 'in'"))),
+    }
+}

@@ -1,0 +1,159 @@
+//! A tree with its bytes.
+
+use std::sync::Arc;
+
+use dibs_build::glam::{DVec3, Vec3};
+use dibs_build::summarise;
+use dibs_nostd::{FormatError, Index, StretchError, TriangleRow, measure_stretch};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::surface::Surface;
+use crate::{bytes, invalid};
+
+/// A view of either width.
+pub enum View<'a> {
+    Narrow(dibs_nostd::Tree<'a, u16>),
+    Wide(dibs_nostd::Tree<'a, u32>),
+}
+
+/// `$body` with `$tree` of either width.
+macro_rules! of_any_width {
+    ($view:expr, $tree:ident => $body:expr) => {
+        match $view {
+            $crate::tree::View::Narrow($tree) => $body,
+            $crate::tree::View::Wide($tree) => $body,
+        }
+    };
+}
+pub(crate) use of_any_width;
+
+self_cell::self_cell!(
+    /// The bytes of a tree, and the validated view of them.
+    pub struct Validated {
+        owner: Vec<u8>,
+        #[covariant]
+        dependent: View,
+    }
+);
+
+/// A tree, and the numbers of its vertices.
+pub struct Owned {
+    validated: Validated,
+    /// The mesh's vertex of each row.
+    pub order: Vec<u32>,
+    pub origin: DVec3,
+}
+
+impl Owned {
+    pub fn view(&self) -> &View<'_> {
+        self.validated.borrow_dependent()
+    }
+
+    /// Vertices that a mesh of this tree has at least.
+    pub fn vertices(&self) -> usize {
+        self.order.iter().max().map_or(0, |&last| last as usize + 1)
+    }
+
+    /// Positions of the mesh's vertices in the order of the rows, from the origin; `None` where some are missing.
+    pub fn rows(&self, of_mesh: &[DVec3]) -> Option<Vec<Vec3>> {
+        let row = |&vertex: &u32| Some((of_mesh.get(vertex as usize)? - self.origin).as_vec3());
+        self.order.iter().map(row).collect()
+    }
+
+    pub fn label(&self, triangle: TriangleRow) -> Option<u8> {
+        of_any_width!(self.view(), tree => tree.label(triangle))
+    }
+}
+
+/// A tree.
+#[pyclass(frozen, module = "dibs._dibs")]
+pub struct Tree(pub Arc<Owned>);
+
+#[pymethods]
+impl Tree {
+    #[new]
+    fn new(py: Python<'_>, blob: &[u8]) -> PyResult<Self> {
+        py.detach(|| Self::from_blob(blob.to_vec()))
+    }
+
+    fn blob<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, self.0.validated.borrow_owner())
+    }
+
+    fn origin(&self) -> [f64; 3] {
+        self.0.origin.to_array()
+    }
+
+    fn vertices(&self) -> usize {
+        self.0.vertices()
+    }
+
+    /// Size and cost in JSON.
+    fn summary(&self) -> PyResult<String> {
+        let bytes = self.0.validated.borrow_owner().len();
+        let summary = of_any_width!(self.0.view(), tree => summarise(tree, bytes));
+        // By way of f64, as `dibs inspect` prints it.
+        serde_json::to_value(summary).map(|summary| summary.to_string()).map_err(invalid)
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let bytes = self.0.validated.borrow_owner().len();
+        of_any_width!(self.0.view(), tree => summarise(tree, bytes)).warnings().collect()
+    }
+
+    /// The surface with these positions, or at rest.
+    fn surface(&self, py: Python<'_>, positions: Option<&[u8]>) -> PyResult<Surface> {
+        py.detach(|| {
+            let rows = match positions {
+                Some(positions) => self.0.rows(&bytes::points(positions)).ok_or_else(|| {
+                    let (needed, found) = (self.0.vertices(), positions.len() / 24);
+                    invalid(format!(
+                        "{found} positions and the tree uses {needed} vertices; give those of the mesh that the tree \
+                         was built from"
+                    ))
+                })?,
+                None => of_any_width!(self.0.view(), tree => at_rest(tree)?),
+            };
+            let measured = of_any_width!(self.0.view(), tree => measure_stretch(tree, rows.as_slice()));
+            let stretch = match measured {
+                Ok(measured) => Some(measured),
+                Err(StretchError::NoMetric) => None,
+                // A distance on a surface that is stretched beyond the limit could be wrong: none is given.
+                Err(error) => {
+                    return Err(invalid(format!(
+                        "{error}; build the tree with a larger stretch, or with limits that allow it"
+                    )));
+                }
+            };
+            Ok(Surface { tree: Arc::clone(&self.0), rows, stretch })
+        })
+    }
+}
+
+impl Tree {
+    /// Validates the bytes of a tree.
+    pub fn from_blob(blob: Vec<u8>) -> PyResult<Self> {
+        let validated = Validated::try_new(blob, |bytes| view(bytes))
+            .map_err(|error| invalid(format!("not a valid tree: {error}; build it again")))?;
+        let (order, origin) = of_any_width!(validated.borrow_dependent(), tree => {
+            let number = |row| tree.vertex_number(row).map_or(row, |number| number.0);
+            ((0..tree.vertex_count()).map(number).collect(), tree.origin().into())
+        });
+        Ok(Self(Arc::new(Owned { validated, order, origin })))
+    }
+}
+
+fn view(bytes: &[u8]) -> Result<View<'_>, FormatError> {
+    match dibs_nostd::Tree::<u16>::from_bytes(bytes) {
+        Err(FormatError::Width { .. }) => {
+            dibs_nostd::Tree::<u32>::from_bytes(bytes).map(View::Wide)
+        }
+        narrow => narrow.map(View::Narrow),
+    }
+}
+
+fn at_rest<I: Index>(tree: &dibs_nostd::Tree<'_, I>) -> PyResult<Vec<Vec3>> {
+    let rows = (0..tree.vertex_count()).map(|row| tree.rest_position(row));
+    rows.collect::<Option<_>>().ok_or_else(|| invalid("the tree has no rest shape; give positions"))
+}

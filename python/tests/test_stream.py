@@ -1,0 +1,80 @@
+"""Packets, collected and over UDP."""
+
+import socket
+import unittest
+
+import numpy as np
+
+import dibs
+from subjects import BEAT, TREE
+
+
+def receive(line):
+    packets = []
+    try:
+        while True:
+            packets.append(line.recv(2_048))
+    except socket.timeout:
+        return packets
+
+
+class Streams(unittest.TestCase):
+    def test_packets_hold_the_positions(self):
+        sender = dibs.Sender(TREE, quantised=False, heartbeat=None)
+        sent = sender.send(BEAT.frames[4])
+        packets = sender.packets()
+        self.assertEqual((sent.content, sent.rows, sent.error), ("whole", 502, 0))
+        self.assertEqual((sent.packets, sent.bytes), (len(packets), sum(map(len, packets))))
+        self.assertTrue(all(len(packet) <= 1_024 for packet in packets))
+        every = b"".join(packets)
+        rows = BEAT.frames[4].astype("<f4")
+        self.assertTrue(all(row.tobytes() in every for row in rows))
+        self.assertEqual(sender.packets(), [])
+
+    def test_partial_frames_are_shorter(self):
+        sender = dibs.Sender(TREE, partial=0.5, mtu=64)
+        whole, partial = sender.send(BEAT.frames[0]), sender.send(BEAT.frames[1])
+        self.assertEqual((whole.content, partial.content), ("whole", "partial"))
+        self.assertLess(partial.rows, whole.rows)
+        self.assertLess(partial.error, 0.6)
+        self.assertTrue(all(len(packet) <= 64 for packet in sender.packets()))
+        self.assertEqual(sender.totals.frames, 2)
+        self.assertEqual(sender.totals.partial, 1)
+
+    def test_udp_carries_what_is_collected(self):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
+            line.bind(("127.0.0.1", 0))
+            line.settimeout(0.5)
+            choices = {"heartbeat": None, "session": 7}
+            over = dibs.Sender(TREE, f"udp:127.0.0.1:{line.getsockname()[1]}", **choices)
+            here = dibs.Sender(TREE, **choices)
+            totals = over.play(BEAT.frames[:5], rate=200)
+            for frame in BEAT.frames[:5]:
+                here.send(frame, age=0)
+            received = receive(line)
+        self.assertEqual(received, here.packets())
+        self.assertEqual(totals, here.totals)
+        self.assertEqual((over.in_flight, over.acknowledged), (here.in_flight, None))
+
+    def test_a_frame_is_as_old_as_is_said(self):
+        begins = []
+        for age in [0, 5]:
+            sender = dibs.Sender(TREE, heartbeat=None, session=7)
+            sender.send(BEAT.frames[0], age=age)
+            begins.append(sender.packets()[0])
+        self.assertIn((5_000).to_bytes(2, "little"), begins[1])
+        self.assertNotEqual(*begins)
+
+    def test_far_from_the_origin_the_same_frame_is_sent(self):
+        far = np.array([4e6, 0, 0])
+        mesh = dibs.Mesh(BEAT.frames[0] + far, dibs.generate("heart", 1_000)[0].triangles)
+        sender = dibs.Sender(dibs.build(mesh), quantised=False, heartbeat=None)
+        sender.send(BEAT.frames[4] + far)
+        every = b"".join(sender.packets())
+        local = (BEAT.frames[4] + far - mesh.origin).astype("<f4")
+        self.assertTrue(all(row.tobytes() in every for row in local))
+
+
+if __name__ == "__main__":
+    unittest.main()
