@@ -46,6 +46,22 @@ fn main() {
     for (name, text) in [("obj", obj), ("off", off), ("ply", ply), ("stl", stl)] {
         write("mesh", name, text.as_bytes());
     }
+    // What other programs write, small and large.
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../dibs-build/tests/fixtures");
+    for (target, name) in [
+        ("mesh", "labels_42.vtk"),
+        ("mesh", "labels_51.vtk"),
+        ("mesh", "labels_22.msh"),
+        ("mesh", "labels_41_binary.msh"),
+        ("formats", "labels.vtp"),
+        ("formats", "vtk_ascii.vtp"),
+        ("formats", "vtk_inline_zlib.vtp"),
+        ("formats", "scene.glb"),
+        ("formats", "trimesh.3mf"),
+    ] {
+        write(target, name, &fs::read(fixtures.join(name)).expect("a file"));
+    }
+    write("mesh", "groups", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\ng a\nf 1 2 3\nusemtl b\nf 1 2 4\n");
     // No damage, no moved vertex, no option, and a capsule beside the heart.
     let capsule = [60.0_f32, 0.0, 0.0, 90.0, 10.0, 0.0, 2.5];
     let words = [0_u32; 5].into_iter().chain(capsule.map(f32::to_bits));
