@@ -136,7 +136,7 @@ class Viewer {
     try {
       const { counts, milliseconds } = this.advance(ticks);
       const answer = record(session, this.facts);
-      const contacts = touching(session);
+      const contacts = (this.touching = touching(session));
       this.plots.push(answer, counts, milliseconds);
       this.numbers.show(answer, contacts, session.refused());
       if (picture) {

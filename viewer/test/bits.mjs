@@ -5,8 +5,8 @@ import { readFile, writeFile } from "node:fs/promises";
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
 import { inflateSync } from "node:zlib";
-import { record } from "../page/record.js";
-import { answers, differences, poses, program, RATE } from "./poses.mjs";
+import { record, touching } from "../page/record.js";
+import { answers, contacts, differences, otherContacts, poses, program, RATE } from "./poses.mjs";
 
 const [sessionFolder, folder] = process.argv.slice(2);
 const { initSync, Session } = await import(pathToFileURL(join(sessionFolder, "session.js")));
@@ -22,16 +22,23 @@ const bytes = (id) => inflateSync(Buffer.from(text(id), "base64"));
 const facts = JSON.parse(text("facts"));
 const session = new Session(bytes("tree"), bytes("motion"), facts.rate);
 
+const MARGIN = 10;
 // Held surface, cold query, the tree's limit: what `dibs query` asks.
-session.set(session.limit(), 10, 0xffffffff, Uint8Array.of(0, 2, 0));
+session.set(session.limit(), MARGIN, 0xffffffff, Uint8Array.of(0, 2, 0));
 const expected = answers(program(folder), folder);
+const expectedContacts = contacts(program(folder), folder, MARGIN);
 const sides = new Set();
+let touched = 0;
 poses.forEach(({ frame, numbers }, number) => {
   const time = (frame + 0.25) / RATE;
   session.advance(numbers, numbers, time, time, 1);
   const found = record(session, facts);
   sides.add(found.side);
   assert.deepEqual(differences(expected[number], found), [], `pose ${number}: ${JSON.stringify(found)}`);
+  const contacts = touching(session);
+  touched += contacts.contacts.length;
+  assert.deepEqual(otherContacts(expectedContacts[number], contacts), [], `contacts of pose ${number}`);
 });
 for (const side of ["outside", "inside", "crossing"]) assert(sides.has(side), `no pose is ${side}`);
-console.log(`${poses.length} poses: WebAssembly and the program agree to the bit`);
+assert(touched > poses.length, `${touched} contacts`);
+console.log(`${poses.length} poses, ${touched} contacts: WebAssembly and the program agree to the bit`);

@@ -5,7 +5,7 @@ import { readFile, stat, writeFile } from "node:fs/promises";
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
 import puppeteer from "puppeteer-core";
-import { answers, differences, poses, program } from "./poses.mjs";
+import { answers, contacts, differences, otherContacts, poses, program } from "./poses.mjs";
 import { recordPage } from "./recorded.mjs";
 
 const folder = process.argv[2];
@@ -57,10 +57,13 @@ const record = (page) =>
   });
 
 const checks = {
-  async "100 poses have the numbers of `dibs query`"(page) {
+  async "100 poses have the numbers and contacts of `dibs query`"(page) {
     const expected = answers(program(folder), folder);
     await page.evaluate(() => viewer.play(false));
-    for (const [name, value] of [["between", "0"], ["search", "2"], ["measured", "0"]]) await set(page, name, value);
+    for (const [name, value] of [["between", "0"], ["search", "2"], ["measured", "0"], ["margin", "10"]]) await set(page, name, value);
+    // A slider has steps.
+    const margin = await page.evaluate(() => viewer.controls.number("margin"));
+    const touches = contacts(program(folder), folder, margin);
     for (const [number, { frame, numbers }] of poses.entries()) {
       await page.evaluate(
         (frame, numbers, rate) => {
@@ -74,6 +77,8 @@ const checks = {
       const zeros = (key, value) => (Object.is(value, -0) ? 0 : value);
       const clean = (answer) => JSON.parse(JSON.stringify(answer, zeros), zeros);
       assert.deepEqual(differences(clean(expected[number]), clean(await record(page))), [], `pose ${number}`);
+      const found = await page.evaluate(() => viewer.touching);
+      assert.deepEqual(otherContacts(clean(touches[number]), clean(found)), [], `contacts of pose ${number}`);
     }
   },
 

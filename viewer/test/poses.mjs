@@ -19,11 +19,19 @@ export const poses = Array.from({ length: 100 }, (_, number) => {
   return { frame: FRAMES[Math.floor(number / 25)], numbers: [...numbers, between(0, 4)] };
 });
 
+// Contacts that a session keeps.
+const ROOM = 16;
+
 // The records of the program, pose by pose.
-export function answers(program, folder) {
+export const answers = (program, folder) => ask(program, folder, []);
+
+// Its contacts within a margin, pose by pose.
+export const contacts = (program, folder, margin) => ask(program, folder, ["--contacts", String(margin)]);
+
+function ask(program, folder, options) {
   return FRAMES.flatMap((frame) => {
     const lines = poses.filter((pose) => pose.frame === frame).map(({ numbers }) => numbers.join(","));
-    const args = ["query", "heart.dibs", "--vertices", "heart.pc2", "--frame", String(frame), "--poses", "-"];
+    const args = ["query", "heart.dibs", "--vertices", "heart.pc2", "--frame", String(frame), "--poses", "-", ...options];
     const input = lines.join("\n") + "\n";
     const printed = execFileSync(program, args, { cwd: folder, input, maxBuffer: 1 << 26 });
     return printed.toString().trim().split("\n").map((line) => {
@@ -33,12 +41,25 @@ export function answers(program, folder) {
   });
 }
 
+const same = (one, other) =>
+  Array.isArray(one) ? Array.isArray(other) && one.length === other.length && one.every((value, at) => same(value, other[at])) : Object.is(one, other);
+
 // The names of the fields that differ in a bit.
 export function differences(expected, found) {
-  const same = (one, other) =>
-    Array.isArray(one) ? Array.isArray(other) && one.length === other.length && one.every((value, at) => same(value, other[at])) : Object.is(one, other);
   const names = new Set([...Object.keys(expected), ...Object.keys(found)]);
   return [...names].filter((name) => !same(expected[name], found[name]));
+}
+
+// The contacts that differ in a bit: the program's record, and what the page draws.
+export function otherContacts({ contacts, contacts_bound }, found) {
+  const wrong = [];
+  if (found.contacts.length !== Math.min(contacts.length, ROOM)) wrong.push(`${found.contacts.length} of ${contacts.length}`);
+  if (contacts.length <= ROOM && !same(contacts_bound, found.bound)) wrong.push(`bound ${found.bound}, not ${contacts_bound}`);
+  found.contacts.forEach(({ separation, on_surface, on_tool, normal }, at) => {
+    const { separation: distance, point_on_surface, point_on_tool, normal: outward } = contacts[at] ?? {};
+    if (!same([separation, on_surface, on_tool, normal], [distance, point_on_surface, point_on_tool, outward])) wrong.push(at);
+  });
+  return wrong;
 }
 
 export const program = (folder) => join(folder, "../../release/dibs");

@@ -1,7 +1,5 @@
 //! `cargo xtask`: tasks that need more than cargo.
 
-mod mutants;
-mod processors;
 mod prove;
 mod test;
 mod viewer;
@@ -11,7 +9,6 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use prove::Passed;
 use xtask::nightly;
-use xtask::steps::Outcome;
 
 /// Finds or installs the cross toolchain and the emulator where a task needs them.
 /// `DIBS_CROSS=rustup|debian|none` forces one way to build for the board.
@@ -39,9 +36,12 @@ enum Task {
     Profile(Passed),
     Viewer(viewer::Options),
     Fuzz(nightly::FuzzOptions),
-    Mutants(mutants::Options),
+    /// Changes operators of the core one by one, and lists the changes that no test notices.
+    #[command(disable_help_flag = true)]
+    Mutants(Passed),
     /// Builds the core crate for every row of docs/processors.md.
-    Processors,
+    #[command(disable_help_flag = true)]
+    Processors(Passed),
     /// Runs the tests of frames, bus and format under the address and the thread sanitizer.
     Sanitize,
     /// Runs the tests of the frames under Miri, where it is installed.
@@ -57,12 +57,8 @@ fn main() -> ExitCode {
         Task::Profile(passed) => prove::run("profile", &passed),
         Task::Viewer(options) => viewer::viewer(&options),
         Task::Fuzz(options) => or_say(nightly::missing(), || nightly::fuzz_by_hand(&options)),
-        Task::Mutants(options) => mutants::mutants(&options),
-        Task::Processors => processors::check(false).map(|outcome| {
-            if let Outcome::Skipped(reason) = outcome {
-                println!("skipped: {reason}");
-            }
-        }),
+        Task::Mutants(passed) => prove::run("mutants", &passed),
+        Task::Processors(passed) => prove::run("processors", &passed),
         Task::Sanitize => or_say(nightly::missing(), nightly::sanitize_by_hand),
         Task::Miri => or_say(nightly::miri_missing(), nightly::miri),
     };

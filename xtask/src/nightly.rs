@@ -17,6 +17,9 @@ const DOWNLOAD: Duration = Duration::from_secs(300);
 /// The fuzz targets in `fuzz/`.
 pub const TARGETS: [&str; 4] = ["tree", "packets", "mesh", "query"];
 
+/// A target that runs only when it is named: its readers compile for long.
+const FORMATS: &str = "formats";
+
 /// Runs every fuzz target, two at a time.
 #[derive(clap::Args)]
 pub struct FuzzOptions {
@@ -80,10 +83,18 @@ pub fn fuzz(options: &FuzzOptions) -> Result<Vec<Fuzzed>> {
     let folder = workspace::root().join("fuzz");
     let built = workspace::target().join("fuzz");
     let mut build = nightly(&["fuzz", "build", "--release", "--target-dir"]);
-    run(build.arg(&built)).context("the fuzz targets do not build")?;
-    let wanted = |target: &&str| options.target.as_ref().is_none_or(|only| only == target);
-    let targets: Vec<&'static str> = TARGETS.into_iter().filter(|target| wanted(target)).collect();
-    ensure!(!targets.is_empty(), "the targets are {}", TARGETS.join(", "));
+    build.arg(&built);
+    if options.target.as_deref() == Some(FORMATS) {
+        build.args(["--features", FORMATS]);
+    }
+    run(&mut build).context("the fuzz targets do not build")?;
+    let wanted = |target: &&str| match &options.target {
+        Some(only) => only == target,
+        None => *target != FORMATS,
+    };
+    let all = TARGETS.into_iter().chain([FORMATS]);
+    let targets: Vec<&'static str> = all.filter(|target| wanted(target)).collect();
+    ensure!(!targets.is_empty(), "the targets are {} and {FORMATS}", TARGETS.join(", "));
     let mut fuzzed = Vec::new();
     for pair in targets.chunks(2) {
         let started = pair.iter().map(|&target| {

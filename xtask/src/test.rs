@@ -13,7 +13,7 @@ use xtask::steps::{Outcome, Steps};
 use xtask::toolchain::Cross;
 use xtask::workspace;
 
-use crate::{mutants, processors, prove, viewer};
+use crate::{prove, viewer};
 
 /// Runs every check: format, lints, documentation, tests, oldest compiler, the board's build, and a
 /// short demo on the emulated board.
@@ -58,14 +58,12 @@ pub fn test(options: &Options) -> Result<()> {
 
     // Found first, since both sides would install them. Then a thread, because the board's builds take one core.
     let (cross, emulator) = (Cross::find(), qemu::find());
-    let demo_seconds = options.demo_seconds;
-    let checks = thread::spawn(move || checks(demo_seconds));
+    let (seconds, is_whole) = (options.demo_seconds, options.whole);
+    let checks = thread::spawn(move || checks(seconds, is_whole));
     match cross.and_then(|cross| emulator.map(|_| cross)) {
         Ok(cross) => {
             println!("\nboard: {}", cross.describe());
             steps.run("core crate for the board", || core_crate(&cross));
-            let is_sample = !options.whole;
-            steps.run("processors", || processors::check(is_sample));
             steps.run("lints of the firmware", || firmware_lints(&cross));
             steps.run("C interface for the board", || c_interface::has_no_panic_path(&cross));
             if options.whole {
@@ -83,20 +81,20 @@ pub fn test(options: &Options) -> Result<()> {
     if let Err(error) = list.and_then(|list| steps.read(&list)) {
         steps.run("checks of tests/prove", || Err(error));
     }
-    if options.whole {
-        steps.run("mutants of changed lines", mutants::sample);
-    }
     steps.finish();
     Ok(())
 }
 
 /// Runs the checks of `tests/prove`. Returns the file with the list of its steps.
-fn checks(demo_seconds: u32) -> Result<PathBuf> {
+fn checks(demo_seconds: u32, is_whole: bool) -> Result<PathBuf> {
     let list = workspace::target().join("steps.txt");
     // An earlier run's list must not be taken for this run's.
     std::fs::write(&list, "")?;
     let mut prove = prove::with_workspace()?;
     prove.args(["test", "--demo-seconds", &demo_seconds.to_string(), "--steps"]).arg(&list);
+    if is_whole {
+        prove.arg("--whole");
+    }
     run(&mut prove)?;
     Ok(list)
 }

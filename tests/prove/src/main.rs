@@ -1,4 +1,5 @@
-//! Measures and proves: `cargo xtask demo | guarantees | profile | bench` run this, and `test` its checks.
+//! Measures and proves: `cargo xtask demo | guarantees | profile | bench | mutants | processors` run this, and `test` its
+//! checks.
 //! docs/proofs.md lists the file for each promise.
 
 use std::path::PathBuf;
@@ -6,8 +7,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use dibs_prove::harness::{self, Effort};
-use dibs_prove::{demo, profile};
-use xtask::steps::Steps;
+use dibs_prove::{demo, mutants, processors, profile};
+use xtask::steps::{Outcome, Steps};
 
 /// `cargo xtask` passes its arguments on to this.
 #[derive(Parser)]
@@ -25,12 +26,18 @@ enum Task {
     Profile,
     #[cfg(feature = "peers")]
     Bench(dibs_prove::paper::Options),
+    Mutants(mutants::Options),
+    /// Builds the core crate for every row of docs/processors.md.
+    Processors,
     /// Runs the checks of `cargo xtask test`.
     #[command(hide = true)]
     Test {
         /// Seconds of the controller's time in the demo.
         #[arg(long)]
         demo_seconds: u32,
+        /// Also every processor, and a few mutants of the lines that changed.
+        #[arg(long)]
+        whole: bool,
         /// Where to list the steps.
         #[arg(long)]
         steps: PathBuf,
@@ -50,9 +57,19 @@ fn main() -> ExitCode {
         Task::Profile => profile::run(),
         #[cfg(feature = "peers")]
         Task::Bench(options) => dibs_prove::paper::bench(&options),
-        Task::Test { demo_seconds, steps: file } => {
+        Task::Mutants(options) => mutants::mutants(&options),
+        Task::Processors => processors::check(false).map(|outcome| {
+            if let Outcome::Skipped(reason) = outcome {
+                println!("skipped: {reason}");
+            }
+        }),
+        Task::Test { demo_seconds, whole, steps: file } => {
             let mut steps = Steps::default();
             harness::test(&Effort { demo_seconds, ..Effort::TEST }, &mut steps);
+            steps.run("processors", || processors::check(!whole));
+            if whole {
+                steps.run("mutants of changed lines", mutants::sample);
+            }
             steps.write(&file)
         }
         Task::Beside { folder } => harness::lanes::run(&folder),

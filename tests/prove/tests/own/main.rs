@@ -2,6 +2,7 @@
 
 mod benchmark;
 mod path;
+mod processors;
 mod proofs;
 mod records;
 mod statistics;
