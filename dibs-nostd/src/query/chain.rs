@@ -2,8 +2,9 @@
 
 use glam::Vec3;
 
+use super::contacts::Pair;
 use super::search::Search;
-use super::{Budget, NoSide, Options, Proximity, Query, Side, signed};
+use super::{Contacts, NoSide, Options, Proximity, Query, Side, signed};
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, TriangleRow, VertexTable};
 
@@ -20,7 +21,7 @@ pub struct Closest {
     /// The tool's index in its slice.
     pub tool: usize,
     /// The pair. Its interval begins at the least lower end of all pairs, its accuracy is the worst, its tests are
-    /// those of all.
+    /// those of all. Its side is not known ([`NoSide::CutShort`]) if the budget left that of any pair open.
     pub proximity: Proximity,
 }
 
@@ -40,6 +41,17 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         separation: f32,
         options: &Options,
     ) -> Result<Proximity, QueryError> {
+        self.within(vertices, tool, separation, options).map(|(found, _)| found)
+    }
+
+    /// [`closest_within`](Self::closest_within), and whether every pair is certain to be farther.
+    fn within<V: VertexTable + ?Sized, T: Tool>(
+        &mut self,
+        vertices: &V,
+        tool: &T,
+        separation: f32,
+        options: &Options,
+    ) -> Result<(Proximity, bool), QueryError> {
         // A corner beyond the limit would lower no cutoff.
         let limit = separation + tool.radius();
         let first = self.first_corner(vertices, options);
@@ -51,8 +63,11 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         let limit = search.limit_to(separation);
         let found = search.run::<true>(limit)?;
         self.triangle = found.triangle.or(self.triangle);
+        // A search that its budget ended has a lower bound below the limit.
+        let is_farther = !(found.separation <= separation) && found.lower >= limit - tool.radius();
         let error = vertices.position_error();
-        signed(&self.tree, &mut self.stack, vertices, tool, options, found, error)
+        let found = signed(&self.tree, &mut self.stack, vertices, tool, options, found, error)?;
+        Ok((found, is_farther))
     }
 
     /// The closest pair between the surface and a chain of tools; `None` for an empty slice.
@@ -90,7 +105,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         options: &Options,
     ) -> Result<Option<Closest>, QueryError> {
         let mut scene = Scene::new(options);
-        self.add_to(&mut scene, 0, vertices, tools)?;
+        self.add_to(&mut scene, 0, vertices, tools, |_, _, _, _| Ok(()))?;
         Ok(scene.finish())
     }
 
@@ -109,6 +124,98 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         options: &Options,
     ) -> Result<Option<Closest>, QueryError> {
         let mut scene = Scene::new(options);
+        for at in Self::nearest_surface_first(surfaces, tools, options) {
+            if let Some((query, vertices)) = surfaces.get_mut(at) {
+                query.add_to(&mut scene, at, *vertices, tools, |_, _, _, _| Ok(()))?;
+            }
+        }
+        Ok(scene.finish())
+    }
+
+    /// The closest pair as [`closest_in_scene`](Self::closest_in_scene), and the contacts of all pairs in one list:
+    /// [`Contact::surface`](crate::Contact::surface) and [`tool`](crate::Contact::tool) tell them apart. A chain and one
+    /// surface are a scene too.
+    ///
+    /// Pairs are searched as far as the closest pair so far or the margin, whichever is farther. The contacts of each
+    /// are those of [`contacts`](Self::contacts), and the list's bound holds for all pairs.
+    ///
+    /// Cost: the budget at most, for all pairs together, and a node test a pair.
+    ///
+    /// # Errors
+    /// Those of [`contacts`](Self::contacts), of any surface.
+    ///
+    /// ```
+    /// use dibs_build::{Builder, generate};
+    /// use dibs_nostd::{Capsule, Contacts, Options, Query, Tree, glam::Vec3};
+    ///
+    /// let heart = generate::heart(1_000)?.mesh;
+    /// let built = Builder::new().build(&heart)?;
+    /// let tree = Tree::<u16>::from_bytes(built.blob())?;
+    /// let rows = built.to_rows(&heart.positions);
+    /// let beside: Vec<Vec3> = rows.iter().map(|row| *row + Vec3::new(160.0, 0.0, 0.0)).collect();
+    ///
+    /// let (mut one, mut other) = (Query::<_, 32>::new(&tree)?, Query::<_, 32>::new(&tree)?);
+    /// let tool = Capsule::new(Vec3::new(80.0, 0.0, -40.0), Vec3::new(80.0, 0.0, 40.0), 2.5)?;
+    /// let mut contacts = Contacts::<8>::new();
+    /// let mut scene = [(&mut one, rows.as_slice()), (&mut other, beside.as_slice())];
+    /// Query::contacts_in_scene(&mut scene, &[tool], 40.0, &Options::new(), &mut contacts)?;
+    /// for surface in 0..2 {
+    ///     assert!(contacts.iter().any(|contact| contact.surface == surface));
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn contacts_in_scene<
+        V: VertexTable + ?Sized,
+        T: Tool,
+        const N: usize,
+        const NEAR: usize,
+    >(
+        surfaces: &mut [(&mut Self, &V)],
+        tools: &[T],
+        margin: f32,
+        options: &Options,
+        contacts: &mut Contacts<N, NEAR>,
+    ) -> Result<Option<Closest>, QueryError> {
+        contacts.begin(margin, surfaces.iter().all(|(query, _)| query.tree.has_adjacency()))?;
+        let found = Self::add_scene_contacts(surfaces, tools, margin, options, contacts);
+        contacts.unless_failed(found)
+    }
+
+    fn add_scene_contacts<V: VertexTable + ?Sized, T: Tool, const N: usize, const NEAR: usize>(
+        surfaces: &mut [(&mut Self, &V)],
+        tools: &[T],
+        margin: f32,
+        options: &Options,
+        contacts: &mut Contacts<N, NEAR>,
+    ) -> Result<Option<Closest>, QueryError> {
+        let mut scene = Scene { margin, ..Scene::new(options) };
+        for surface in Self::nearest_surface_first(surfaces, tools, options) {
+            let Some((query, vertices)) = surfaces.get_mut(surface) else { continue };
+            query.add_to(
+                &mut scene,
+                surface,
+                *vertices,
+                tools,
+                |query, scene, number, closest| {
+                    let Some(tool) = tools.get(number) else { return Ok(()) };
+                    let Query { tree, stack, .. } = query;
+                    let pair = Pair { tree, vertices: *vertices, tool, closest, surface, number };
+                    let made = contacts.add(&pair, stack, &scene.options)?;
+                    let left = scene.options.budget.less(made.node_tests, made.triangle_tests);
+                    scene.options.budget = left;
+                    Ok(())
+                },
+            )?;
+        }
+        Ok(scene.finish())
+    }
+
+    /// Numbers of the surfaces, that of the nearest of the last answers first.
+    fn nearest_surface_first<V: VertexTable + ?Sized, T: Tool>(
+        surfaces: &[(&mut Self, &V)],
+        tools: &[T],
+        options: &Options,
+    ) -> impl Iterator<Item = usize> + use<I, V, T, STACK> {
         let (mut nearest, mut least) = (0, f32::INFINITY);
         for (at, (query, vertices)) in surfaces.iter().enumerate() {
             let (_, squared) = query.nearest(*vertices, tools, options);
@@ -116,21 +223,18 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
                 (nearest, least) = (at, squared);
             }
         }
-        for at in nearest_first(nearest, surfaces.len()) {
-            if let Some((query, vertices)) = surfaces.get_mut(at) {
-                query.add_to(&mut scene, at, *vertices, tools)?;
-            }
-        }
-        Ok(scene.finish())
+        nearest_first(nearest, surfaces.len())
     }
 
-    /// Adds this surface, number `surface` of the scene.
+    /// Adds this surface, number `surface` of the scene. Calls back with each tool's number and closest pair, where it
+    /// is as close as the scene's margin, inside or crossing.
     fn add_to<V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         scene: &mut Scene,
         surface: usize,
         vertices: &V,
         tools: &[T],
+        mut near: impl FnMut(&mut Self, &mut Scene, usize, &Proximity) -> Result<(), QueryError>,
     ) -> Result<(), QueryError> {
         scene.enter();
         let (nearest, _) = self.nearest(vertices, tools, &scene.options);
@@ -138,11 +242,15 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         for number in nearest_first(nearest, tools.len()) {
             let Some(tool) = tools.get(number) else { continue };
             let limit = if number < PASSED { scene.limit() } else { f32::INFINITY };
-            let found = self.closest_within(vertices, tool, limit, &scene.options)?;
-            if !(found.separation <= limit) {
-                passed |= 1_u64.checked_shl(number as u32).unwrap_or(0);
-            }
+            let (found, is_farther) = self.within(vertices, tool, limit, &scene.options)?;
             scene.add(surface, number, found, &mut best);
+            if is_farther {
+                // Outside if the chain is.
+                passed |= 1_u64.checked_shl(number as u32).unwrap_or(0);
+            } else {
+                scene.is_cut_short |= found.side == Side::Undefined(NoSide::CutShort);
+                near(self, scene, number, &found)?;
+            }
         }
         if !scene.is_outside {
             for (number, tool) in tools.iter().enumerate().take(PASSED) {
@@ -150,6 +258,8 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
                     let found =
                         self.closest_within(vertices, tool, f32::INFINITY, &scene.options)?;
                     scene.add(surface, number, found, &mut best);
+                    scene.is_cut_short |= found.side == Side::Undefined(NoSide::CutShort);
+                    near(self, scene, number, &found)?;
                 }
             }
         }
@@ -204,10 +314,14 @@ struct Scene {
     triangle_tests: u32,
     /// With the rest of the budget.
     options: Options,
+    /// Pairs as close as this are searched, even if another one is closer.
+    margin: f32,
     /// A tool of the chain was searched on the present surface.
     is_entered: bool,
     /// No tool was found inside or crossing the present surface.
     is_outside: bool,
+    /// The budget ended before the side of a tool was known.
+    is_cut_short: bool,
 }
 
 impl Scene {
@@ -219,8 +333,10 @@ impl Scene {
             node_tests: 0,
             triangle_tests: 0,
             options: *options,
+            margin: f32::NEG_INFINITY,
             is_entered: false,
             is_outside: true,
+            is_cut_short: false,
         }
     }
 
@@ -234,7 +350,10 @@ impl Scene {
     /// another tool may be deeper.
     fn limit(&self) -> f32 {
         match &self.best {
-            Some(best) if self.is_entered && self.is_outside => best.proximity.separation,
+            Some(best) if self.is_entered && self.is_outside => {
+                let closest = best.proximity.separation;
+                if closest > self.margin { closest } else { self.margin }
+            }
             _ => f32::INFINITY,
         }
     }
@@ -242,11 +361,7 @@ impl Scene {
     /// Adds a pair, and keeps the surface's closest in `own`.
     fn add(&mut self, surface: usize, tool: usize, found: Proximity, own: &mut Option<Proximity>) {
         self.is_entered = true;
-        let Budget { node_tests, triangle_tests } = self.options.budget;
-        self.options.budget = Budget {
-            node_tests: node_tests.saturating_sub(found.node_tests),
-            triangle_tests: triangle_tests.saturating_sub(found.triangle_tests),
-        };
+        self.options.budget = self.options.budget.less(found.node_tests, found.triangle_tests);
         self.node_tests = self.node_tests.saturating_add(found.node_tests);
         self.triangle_tests = self.triangle_tests.saturating_add(found.triangle_tests);
         let side = found.side;
@@ -269,7 +384,10 @@ impl Scene {
 
     fn finish(self) -> Option<Closest> {
         let Self { lower, accuracy, node_tests, triangle_tests, .. } = self;
-        let Closest { surface, tool, proximity } = self.best?;
+        let Closest { surface, tool, mut proximity } = self.best?;
+        if self.is_cut_short {
+            proximity.side = Side::Undefined(NoSide::CutShort);
+        }
         let proximity = Proximity { lower, accuracy, node_tests, triangle_tests, ..proximity };
         Some(Closest { surface, tool, proximity })
     }

@@ -22,6 +22,14 @@ pub struct Budget {
 impl Budget {
     /// No limit.
     pub const UNLIMITED: Self = Self { node_tests: u32::MAX, triangle_tests: u32::MAX };
+
+    /// The rest after so many tests.
+    pub(super) const fn less(self, node_tests: u32, triangle_tests: u32) -> Self {
+        Self {
+            node_tests: self.node_tests.saturating_sub(node_tests),
+            triangle_tests: self.triangle_tests.saturating_sub(triangle_tests),
+        }
+    }
 }
 
 /// Prior knowledge for a query, and its budget. Prior knowledge changes an answer's cost, not the answer, except

@@ -4,11 +4,11 @@
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
-    Capsule, Fallback, MeasuredStretch, MovingSurface, Odometer, Options, Query, Step, Tracker,
-    Tree, TriangleRow, measure_stretch,
+    Capsule, Contacts, Fallback, MeasuredStretch, MovingSurface, Odometer, Options, Proximity,
+    Query, Step, Tool, Tracker, Tree, TriangleRow, measure_stretch,
 };
 
-use crate::{Fault, Machine, point, put, word};
+use crate::{Fault, MARGIN, Machine, point, put, word};
 
 /// The meanings of the word at the start of a record.
 pub mod command {
@@ -16,14 +16,32 @@ pub mod command {
     pub const END: u32 = 0;
     /// The next frame: three `f32` for each of the tree's vertices.
     pub const FRAME: u32 = 1;
-    /// A tick: the surface (0 held, 1 interpolated), its share of the way between frames, the axis' ends and the
-    /// capsule's radius. Answered by [`ANSWER_WORDS`](super::ANSWER_WORDS).
+    /// A tick: the surface and the question ([`tick`](super::tick)), the surface's share of the way between frames, the
+    /// axis' ends, of a chain all [`JOINTS`](super::JOINTS), and the capsules' radius. Answered by
+    /// [`ANSWER_WORDS`](super::ANSWER_WORDS).
     pub const TICK: u32 = 2;
 }
 
+/// Bits of a tick's word.
+pub mod tick {
+    /// The surface is interpolated; without this bit it is held.
+    pub const INTERPOLATED: u32 = 1 << 0;
+    /// With the side, and the depth where the axis crosses.
+    pub const SIGNED: u32 = 1 << 1;
+    /// With the contacts within [`MARGIN`](crate::MARGIN).
+    pub const CONTACTS: u32 = 1 << 2;
+    /// A chain of [`LINKS`](super::LINKS) capsules, each with its tracker.
+    pub const CHAIN: u32 = 1 << 3;
+}
+
+/// Capsules of a chain.
+pub const LINKS: usize = 8;
+/// Their ends.
+pub const JOINTS: usize = LINKS + 1;
+
 /// Words of an answer: the clock's counts for the tracker and for a whole query (warm, with measured stretch), the
-/// tracker's node and triangle tests, its [`Fallback`] (0 for none), its used places of [`OPENED`], its separation, and
-/// the difference from the query's separation in units of both accuracies.
+/// tracker's node and triangle tests, its [`Fallback`] (0 for none), the pairs that it searched, its separation, and
+/// the difference from the query's separation in units of both accuracies, and of the tolerance of a depth.
 pub const ANSWER_WORDS: usize = 8;
 /// Largest tree, in bytes.
 pub const TREE_BYTES: usize = 1 << 20;
@@ -65,10 +83,19 @@ pub fn run(memory: &mut Memory, machine: &mut impl Machine) -> Result<(), Fault>
     let count = tree.vertex_count() as usize;
     let [before, after] = frames.each_mut().map(|rows| rows.get_mut(..count));
     let (mut before, mut after) = (before.ok_or(Fault)?, after.ok_or(Fault)?);
-    // The tracker is not moved: the board's stack has no room for a second one.
-    let Ok(mut tracker) = Tracker::new(&tree) else { return Err(Fault) };
+    let tracker = || Tracker::new(&tree).map_err(|_| Fault);
+    let mut trackers = [
+        tracker()?,
+        tracker()?,
+        tracker()?,
+        tracker()?,
+        tracker()?,
+        tracker()?,
+        tracker()?,
+        tracker()?,
+    ];
     let query = Query::new(&tree).map_err(|_| Fault)?;
-    let mut session = Session { query, tracker: &mut tracker, last: None };
+    let mut session = Session { query, trackers: &mut trackers, last: None };
     let mut odometer = Odometer::new(&tree);
     let mut stretch: Option<MeasuredStretch> = None;
     let mut next = word(machine)?;
@@ -89,8 +116,15 @@ pub fn run(memory: &mut Memory, machine: &mut impl Machine) -> Result<(), Fault>
 /// The state from frame to frame.
 struct Session<'s, 't> {
     query: Query<'t, u16, STACK>,
-    tracker: &'s mut Tracker<'t, u16, STACK, OPENED>,
+    trackers: &'s mut [Tracker<'t, u16, STACK, OPENED>; LINKS],
     last: Option<TriangleRow>,
+}
+
+/// A tracker's answer, or that of a chain's trackers.
+struct Found {
+    closest: Proximity,
+    fallback: Option<Fallback>,
+    searched: u32,
 }
 
 impl Session<'_, '_> {
@@ -109,13 +143,16 @@ impl Session<'_, '_> {
             }
             let kind = word(machine)?;
             let share = f32::from_bits(word(machine)?);
-            let (start, end) = (point(machine)?, point(machine)?);
+            let links = if kind & tick::CHAIN == 0 { 1 } else { LINKS };
+            let mut joints = [Vec3::ZERO; JOINTS];
+            for joint in joints.iter_mut().take(links + 1) {
+                *joint = point(machine)?;
+            }
             let radius = f32::from_bits(word(machine)?);
-            let tool = Capsule::new(start, end, radius).map_err(|_| Fault)?;
-            let answer = match kind {
-                0 => self.ask(&step.after(), &tool, measured, machine),
-                1 => self.ask(&step.at(share), &tool, both, machine),
-                _ => return Err(Fault),
+            let answer = if kind & tick::INTERPOLATED == 0 {
+                self.ask(&step.after(), joints, radius, kind, measured, machine)
+            } else {
+                self.ask(&step.at(share), joints, radius, kind, both, machine)
             }?;
             put(machine, &answer)?;
         }
@@ -124,38 +161,117 @@ impl Session<'_, '_> {
     fn ask(
         &mut self,
         surface: &impl MovingSurface,
-        tool: &Capsule,
+        joints: [Vec3; JOINTS],
+        radius: f32,
+        kind: u32,
         stretch: MeasuredStretch,
         machine: &impl Machine,
     ) -> Result<[u32; ANSWER_WORDS], Fault> {
-        let options = Options::cold().unsigned().stretch(stretch);
-        let before = machine.clock();
-        let tracked = self.tracker.closest(surface, tool, &options).map_err(|_| Fault)?;
-        let took = machine.clock().wrapping_sub(before);
+        let [a, b, c, d, e, f, g, h, i] = joints;
+        let link = |from, to| Capsule::new(from, to, radius).map_err(|_| Fault);
+        let first = link(a, b)?;
+        let options = Options::cold().stretch(stretch);
+        let options = if kind & tick::SIGNED == 0 { options.unsigned() } else { options };
+        let mut contacts = Contacts::<8>::new();
+        let (took, found) = if kind & tick::CHAIN != 0 {
+            let chain = [
+                first,
+                link(b, c)?,
+                link(c, d)?,
+                link(d, e)?,
+                link(e, f)?,
+                link(f, g)?,
+                link(g, h)?,
+                link(h, i)?,
+            ];
+            let before = machine.clock();
+            let found = self.closest_of(surface, &chain, &options)?;
+            let took = machine.clock().wrapping_sub(before);
+            let mut closest = f32::INFINITY;
+            for capsule in &chain {
+                let whole = self.query.closest(surface, capsule, &options).map_err(|_| Fault)?;
+                closest = if whole.separation < closest { whole.separation } else { closest };
+            }
+            return Ok(answer(took, 0, &found, closest, found.closest.accuracy, &chain[0]));
+        } else {
+            let [tracker, ..] = &mut *self.trackers;
+            let before = machine.clock();
+            let tracked = if kind & tick::CONTACTS == 0 {
+                tracker.closest(surface, &first, &options)
+            } else {
+                tracker.contacts(surface, &first, MARGIN, &options, &mut contacts)
+            };
+            let took = machine.clock().wrapping_sub(before);
+            let tracked = tracked.map_err(|_| Fault)?;
+            let found = Found { closest: tracked.closest, fallback: tracked.fallback, searched: 1 };
+            (took, found)
+        };
         let options = options.warm_start(self.last);
         let before = machine.clock();
-        let whole = self.query.closest(surface, tool, &options).map_err(|_| Fault)?;
-        let whole_took = machine.clock().wrapping_sub(before);
-        self.last = whole.triangle;
-        let found = &tracked.closest;
-        let apart = found.separation - whole.separation;
-        let apart = if apart < 0.0 { -apart } else { apart } / (found.accuracy + whole.accuracy);
-        let fallback = match tracked.fallback {
-            None => 0,
-            Some(Fallback::Start) => 1,
-            Some(Fallback::Surface) => 2,
-            Some(Fallback::Jump) => 3,
-            Some(_) => 4,
+        let whole = if kind & tick::CONTACTS == 0 {
+            self.query.closest(surface, &first, &options)
+        } else {
+            self.query.contacts(surface, &first, MARGIN, &options, &mut contacts)
         };
-        Ok([
-            took,
-            whole_took,
-            found.node_tests,
-            found.triangle_tests,
-            fallback,
-            tracked.opened,
-            found.separation.to_bits(),
-            apart.to_bits(),
-        ])
+        let whole_took = machine.clock().wrapping_sub(before);
+        let whole = whole.map_err(|_| Fault)?;
+        self.last = whole.triangle;
+        Ok(answer(took, whole_took, &found, whole.separation, whole.accuracy, &first))
     }
+
+    fn closest_of(
+        &mut self,
+        surface: &impl MovingSurface,
+        chain: &[Capsule; LINKS],
+        options: &Options,
+    ) -> Result<Found, Fault> {
+        let [a, b, c, d, e, f, g, h] = &mut *self.trackers;
+        let [i, j, k, l, m, n, o, p] = chain;
+        let mut pairs = [
+            (a, surface, i),
+            (b, surface, j),
+            (c, surface, k),
+            (d, surface, l),
+            (e, surface, m),
+            (f, surface, n),
+            (g, surface, o),
+            (h, surface, p),
+        ];
+        let found = Tracker::closest_of(&mut pairs, options).map_err(|_| Fault)?.ok_or(Fault)?;
+        Ok(Found { closest: found.closest, fallback: found.fallback, searched: found.searched })
+    }
+}
+
+fn answer(
+    took: u32,
+    whole_took: u32,
+    found: &Found,
+    whole: f32,
+    accuracy: f32,
+    tool: &Capsule,
+) -> [u32; ANSWER_WORDS] {
+    let closest = &found.closest;
+    let is_deep = closest.separation < -tool.radius();
+    // Of a crossing axis each search finds a depth within the tolerance.
+    let tolerance = if is_deep { Tool::axis_length(tool) / 512.0 } else { 0.0 };
+    let apart = closest.separation - whole;
+    let apart = if apart < 0.0 { -apart } else { apart };
+    let apart = apart / (closest.accuracy + accuracy + 2.0 * tolerance);
+    let fallback = match found.fallback {
+        None => 0,
+        Some(Fallback::Start) => 1,
+        Some(Fallback::Surface) => 2,
+        Some(Fallback::Jump) => 3,
+        Some(_) => 4,
+    };
+    [
+        took,
+        whole_took,
+        closest.node_tests,
+        closest.triangle_tests,
+        fallback,
+        found.searched,
+        closest.separation.to_bits(),
+        apart.to_bits(),
+    ]
 }

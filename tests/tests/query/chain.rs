@@ -3,7 +3,8 @@
 use dibs_build::{Builder, BuiltTree, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
-    Budget, Capsule, NoSide, Options, Proximity, Query, Side, Sphere, Tool, TriangleRow,
+    Budget, Capsule, Contact, Contacts, NoSide, Options, Proximity, Query, QueryError, Side,
+    Sphere, Tool, TriangleRow, Unavailable,
 };
 use dibs_tests::deform::{deformed, unit};
 use fastrand::Rng;
@@ -98,6 +99,38 @@ fn a_budget_of_a_chain_is_kept_and_its_interval_holds() {
     }
     println!("{cut_short} cut short");
     assert!(cut_short > 200);
+}
+
+/// An interval that a budget left open holds with its sign too, or the answer says that no side is known.
+#[test]
+fn a_side_that_a_budget_left_open_is_not_stated() {
+    let mut rng = Rng::with_seed(8);
+    let (_, built, frames) = deformed(3, 9);
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let (mut open, mut stated) = (0, 0);
+    for positions in &frames {
+        let rows = built.to_rows(positions);
+        for _ in 0..400 {
+            let chain = chain(&rows, &mut rng);
+            let cold = Options::cold();
+            let ask = |tool| query.closest(&rows[..], tool, &cold).expect("an answer").lower;
+            let least = chain.iter().map(ask).fold(f32::INFINITY, f32::min);
+            let longest = chain.iter().map(Tool::axis_length).fold(0.0, f32::max);
+            let budget = Budget { node_tests: rng.u32(..3_000), triangle_tests: rng.u32(..300) };
+            let found = query.closest_of(&rows[..], &chain, &cold.budget(budget));
+            let found = found.expect("a short budget is no error").expect("one").proximity;
+            if found.side == Side::Undefined(NoSide::CutShort) {
+                open += 1;
+            } else {
+                let off = 2.0 * found.accuracy + longest / 256.0;
+                assert!(found.lower <= least + off, "{least} {found:?}");
+                stated += 1;
+            }
+        }
+    }
+    println!("{open} sides left open, {stated} stated");
+    assert!(open > 200 && stated > 200);
 }
 
 #[test]
@@ -246,6 +279,140 @@ fn without_a_surface_or_a_tool_there_is_no_closest_pair() {
     let none =
         Query::<u16, MAX_STACK>::closest_in_scene::<[Vec3], _>(&mut [], &tool, &Options::new());
     assert_eq!(none, Ok(None));
+}
+
+/// Contacts of pairs, each with its surface and its tool, deepest first for each pair.
+type Found = Vec<(usize, usize, f32)>;
+
+fn in_order(mut found: Found) -> Found {
+    found.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2)));
+    found
+}
+
+fn listed(contacts: &Contacts<256, 4096>) -> Found {
+    let at = |contact: &Contact| (contact.surface, contact.tool, contact.separation);
+    in_order(contacts.iter().map(at).collect())
+}
+
+/// One call has the contacts of every pair, also of a tool that is inside a far surface.
+#[test]
+fn the_contacts_of_a_scene_are_those_of_its_pairs() {
+    const MARGIN: f32 = 20.0;
+    let (built, organs) = organs(120.0);
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let mut rng = Rng::with_seed(6);
+    let mut queries = vec![Query::<u16, MAX_STACK>::new(&tree).expect("deep enough"); organs.len()];
+    let mut single = queries[0].clone();
+    let surfaces: Vec<&[Vec3]> = organs.iter().map(Vec::as_slice).collect();
+    let (mut contacts, mut own) = (Contacts::<256, 4096>::new(), Contacts::<256, 4096>::new());
+    let (mut compared, mut of_several, mut beyond) = (0, 0, 0);
+    for _ in 0..if cfg!(debug_assertions) { 20 } else { 400 } {
+        let near = organs[rng.usize(..organs.len())][rng.usize(..tree.vertex_count() as usize)];
+        let instrument = instrument(near + 40.0 * unit(&mut rng), unit(&mut rng), 25.0);
+        let options = Options::cold();
+        let mut scene: Vec<_> = queries.iter_mut().zip(surfaces.iter().copied()).collect();
+        let best =
+            Query::contacts_in_scene(&mut scene, &instrument, MARGIN, &options, &mut contacts);
+        let best = best.expect("an answer").expect("one");
+        let mut expected = Found::new();
+        let mut least = f32::INFINITY;
+        for (surface, rows) in surfaces.iter().enumerate() {
+            for (tool, capsule) in instrument.iter().enumerate() {
+                let closest = single.contacts(*rows, capsule, MARGIN, &options, &mut own);
+                least = least.min(closest.expect("an answer").separation);
+                expected.extend(own.iter().map(|contact| (surface, tool, contact.separation)));
+            }
+        }
+        let off = (least - best.proximity.separation).abs();
+        assert!(off < 2.0 * best.proximity.accuracy + 0.1, "{least} {best:?}");
+        beyond += usize::from(least > MARGIN);
+        let (found, expected) = (listed(&contacts), in_order(expected));
+        assert_eq!(found.len(), expected.len(), "{found:?} {expected:?}");
+        for (one, other) in found.iter().zip(&expected) {
+            // Two searches may find the depth of a crossing axis at two points.
+            let is_same = (one.0, one.1) == (other.0, other.1) && (one.2 - other.2).abs() < 0.1;
+            assert!(is_same, "{one:?} {other:?}");
+        }
+        let bound = contacts.bound();
+        assert!(bound >= MARGIN * 0.999 && contacts.within(MARGIN * 0.99).is_ok(), "{bound}");
+        compared += found.len();
+        of_several += usize::from(found.windows(2).any(|pair| pair[0].0 != pair[1].0));
+    }
+    println!(
+        "{compared} contacts; {of_several} scenes with several surfaces, {beyond} with none near"
+    );
+    if !cfg!(debug_assertions) {
+        assert!(compared > 1_500 && of_several > 50 && beyond > 10);
+    }
+}
+
+/// A budget for all pairs together: every contact below the stated bound is in the list.
+#[test]
+fn a_budget_of_a_scenes_contacts_is_kept_and_their_bound_holds() {
+    const MARGIN: f32 = 15.0;
+    let (built, organs) = organs(120.0);
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let mut rng = Rng::with_seed(7);
+    let mut queries = vec![Query::<u16, MAX_STACK>::new(&tree).expect("deep enough"); 4];
+    let surfaces: Vec<&[Vec3]> = organs.iter().take(4).map(Vec::as_slice).collect();
+    let (mut whole, mut part) = (Contacts::<256, 4096>::new(), Contacts::<256, 4096>::new());
+    let (mut cut_short, mut bounded) = (0, 0);
+    for round in 0..if cfg!(debug_assertions) { 20 } else { 600 } {
+        let near = organs[rng.usize(..4)][rng.usize(..tree.vertex_count() as usize)];
+        let instrument = instrument(near + 20.0 * unit(&mut rng), unit(&mut rng), 25.0);
+        let most = 1 << rng.u32(4..20);
+        let tests = rng.u32(..most);
+        let budget = Budget { node_tests: tests, triangle_tests: tests };
+        let mut scene: Vec<_> = queries.iter_mut().zip(surfaces.iter().copied()).collect();
+        let mut ask = |options: &Options, contacts: &mut Contacts<256, 4096>| {
+            Query::contacts_in_scene(&mut scene, &instrument, MARGIN, options, contacts)
+        };
+        ask(&Options::cold(), &mut whole).expect("an answer");
+        ask(&Options::cold().budget(budget), &mut part).expect("an answer");
+        let error = whole.accuracy() + part.accuracy() + 0.1;
+        let found = listed(&part);
+        for contact in listed(&whole).into_iter().filter(|it| it.2 < part.bound() - error) {
+            let is_listed = found.iter().any(|it| {
+                (it.0, it.1) == (contact.0, contact.1) && (it.2 - contact.2).abs() < error
+            });
+            assert!(is_listed, "{round}: {contact:?} {} {found:?}", part.bound());
+            bounded += 1;
+        }
+        if part.bound() < MARGIN * 0.99 {
+            assert_eq!(part.within(MARGIN).err(), Some(Unavailable::CutShort));
+            cut_short += 1;
+        }
+    }
+    println!("{cut_short} cut short, {bounded} contacts below their bounds");
+    if !cfg!(debug_assertions) {
+        assert!(cut_short > 100 && bounded > 300);
+    }
+}
+
+#[test]
+fn contacts_of_a_scene_refuse_what_those_of_a_pair_do() {
+    let (built, organs) = organs(180.0);
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut contacts = Contacts::<8>::new();
+    let tools = [Sphere::new(organs[0][0], 1.0).expect("finite")];
+    let mut scene = [(&mut query, organs[0].as_slice())];
+    let mut ask = |margin, contacts: &mut Contacts<8>| {
+        Query::contacts_in_scene(&mut scene, &tools, margin, &Options::new(), contacts)
+    };
+    ask(5.0, &mut contacts).expect("an answer");
+    assert!(!contacts.is_empty());
+    let refused = ask(f32::NAN, &mut contacts);
+    assert!(matches!(refused, Err(QueryError::Margin { .. })), "{refused:?}");
+    assert!(contacts.is_empty() && contacts.within(0.0).is_err());
+    // An error in the middle leaves no contact of the surfaces before.
+    let mut broken = organs[0].clone();
+    broken.truncate(7);
+    let mut other = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut scene = [(&mut query, organs[0].as_slice()), (&mut other, broken.as_slice())];
+    let refused = Query::contacts_in_scene(&mut scene, &tools, 5.0, &Options::new(), &mut contacts);
+    assert!(matches!(refused, Err(QueryError::VertexCount { .. })), "{refused:?}");
+    assert!(contacts.is_empty() && contacts.within(0.0).is_err());
 }
 
 /// Four capsules behind a tip, together this long (mm).

@@ -16,5 +16,6 @@ mod shown_budgets;
 mod side;
 mod slack;
 mod swept;
+mod tracked_chain;
 mod tracker;
 mod wide;

@@ -1,6 +1,7 @@
 //! All triangles within a distance, instead of the closest.
 
 use super::{Search, Waiting};
+use crate::Budget;
 use crate::math::sqrt::sqrt;
 use crate::tool::Tool;
 use crate::tree::format::Link;
@@ -9,12 +10,12 @@ use crate::{Index, VertexTable};
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// Visits every triangle within `limit` of the axis, with the square of its distance. A visit returns the next
-    /// limit. Unvisited triangles are at least as far as the distance returned.
+    /// limit. Unvisited triangles are at least as far as the distance returned; the budget is the tests made.
     pub fn each_within(
         mut self,
         limit: f32,
         mut visit: impl FnMut(u32, f32) -> f32,
-    ) -> Result<f32, QueryError> {
+    ) -> Result<(f32, Budget), QueryError> {
         self.set_limit(limit);
         while let Some(top) = self.waiting.checked_sub(1) {
             self.waiting = top;
@@ -28,7 +29,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 Link::Leaf { first, count } => (first, count, true),
             };
             let Some(left) = self.left.node_tests.checked_sub(count) else {
-                return Ok(self.least_waiting(lower));
+                return Ok((self.least_waiting(lower), self.made()));
             };
             self.left.node_tests = left;
             let is_done = if is_leaf {
@@ -38,10 +39,15 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 true
             };
             if !is_done {
-                return Ok(self.least_waiting(lower));
+                return Ok((self.least_waiting(lower), self.made()));
             }
         }
-        Ok(f32::INFINITY)
+        Ok((f32::INFINITY, self.made()))
+    }
+
+    /// The tests made so far.
+    fn made(&self) -> Budget {
+        self.budget.less(self.left.node_tests, self.left.triangle_tests)
     }
 
     fn set_limit(&mut self, limit: f32) {

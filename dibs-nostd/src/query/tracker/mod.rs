@@ -1,18 +1,21 @@
 //! The closest pair from tick to tick: a tick costs in proportion to the change.
 
 pub(super) mod front;
+mod several;
 #[cfg(test)]
 mod tests;
 
 use glam::Vec3;
 
+use super::contacts::Pair;
 use super::search::{Outcome, Search, Tick, Waiting};
-use super::{Budget, Options, Proximity, signed};
+use super::{Budget, Contacts, NoSide, Options, Proximity, Side, signed};
 use crate::math::sqrt::sqrt;
 use crate::surface::motion::Unit;
 use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Tool, Travel, Tree, TriangleRow};
 use front::Front;
+pub use several::ClosestTracked;
 
 /// Most units that the odometer may count between two tests of a bound: half of the range that it can tell apart.
 const FARTHEST: u32 = 1 << 29;
@@ -80,6 +83,10 @@ struct Last {
     span: Vec3,
     length: f32,
     travel: Travel,
+    /// No point of the surface is closer to the axis, unless the tool may be inside: then negative infinity.
+    clear: f32,
+    /// The side was asked for.
+    is_signed: bool,
 }
 
 /// The answer of a tick.
@@ -197,8 +204,44 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         let error = surface.position_error();
         let closest = signed(&self.tree, &mut self.stack, surface, tool, options, closest, error)?;
         self.behind = if is_complete { 0 } else { self.behind.saturating_add(moved) };
-        self.last = travel.map(|travel| Last::new(tool, travel));
+        self.last = travel.map(|travel| Last::new(tool, travel, &closest));
         Ok(Tracked { closest, fallback, opened: self.front.borrow().used() as u32 })
+    }
+
+    /// The closest pair, and all contacts within `margin` (mm): those of [`Query::contacts`](crate::Query::contacts).
+    ///
+    /// Cost: that of [`closest`](Self::closest), and within the margin that of a range search, which keeps no front.
+    ///
+    /// # Errors
+    /// Those of [`Query::contacts`](crate::Query::contacts).
+    pub fn contacts<S: MovingSurface + ?Sized, T: Tool, const N: usize, const NEAR: usize>(
+        &mut self,
+        surface: &S,
+        tool: &T,
+        margin: f32,
+        options: &Options,
+        contacts: &mut Contacts<N, NEAR>,
+    ) -> Result<Tracked, QueryError> {
+        contacts.begin(margin, self.tree.has_adjacency())?;
+        let found = self.add_contacts(surface, tool, options, contacts);
+        contacts.unless_failed(found)
+    }
+
+    fn add_contacts<S: MovingSurface + ?Sized, T: Tool, const N: usize, const NEAR: usize>(
+        &mut self,
+        surface: &S,
+        tool: &T,
+        options: &Options,
+        contacts: &mut Contacts<N, NEAR>,
+    ) -> Result<Tracked, QueryError> {
+        let tracked = self.closest(surface, tool, options)?;
+        let closest = &tracked.closest;
+        let options =
+            options.budget(options.budget.less(closest.node_tests, closest.triangle_tests));
+        let pair =
+            Pair { tree: &self.tree, vertices: surface, tool, closest, surface: 0, number: 0 };
+        contacts.add(&pair, &mut self.stack, &options)?;
+        Ok(tracked)
     }
 
     /// A whole query, with the budget less the `tests` already made.
@@ -211,11 +254,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         first: Option<TriangleRow>,
         tests: Budget,
     ) -> Result<Proximity, QueryError> {
-        let budget = Budget {
-            node_tests: options.budget.node_tests.saturating_sub(tests.node_tests),
-            triangle_tests: options.budget.triangle_tests.saturating_sub(tests.triangle_tests),
-        };
-        let options = options.budget(budget);
+        let options = options.budget(options.budget.less(tests.node_tests, tests.triangle_tests));
         let search = Search::start(&self.tree, &mut self.stack, surface, tool, &options, first)?;
         let mut closest = search.run::<false>(f32::INFINITY)?;
         closest.node_tests = closest.node_tests.saturating_add(tests.node_tests);
@@ -238,9 +277,19 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
 }
 
 impl Last {
-    fn new(tool: &impl Tool, travel: Travel) -> Self {
+    fn new(tool: &impl Tool, travel: Travel, closest: &Proximity) -> Self {
         let (start, span) = (tool.axis_start(), tool.axis_span());
-        Self { start, span, length: tool.axis_length(), travel }
+        let clear = closest.lower + tool.radius() - closest.accuracy;
+        let (clear, is_signed) = match closest.side {
+            Side::Inside
+            | Side::Crossing
+            | Side::Undefined(NoSide::BelowAccuracy | NoSide::CutShort) => {
+                (f32::NEG_INFINITY, true)
+            }
+            Side::Undefined(NoSide::NotAsked) => (clear, false),
+            _ => (clear, true),
+        };
+        Self { start, span, length: tool.axis_length(), travel, clear, is_signed }
     }
 
     /// Most that a point of the axis has moved, in units: the larger of the ends' steps. For another tool, the distance

@@ -2,11 +2,11 @@
 
 use anyhow::{Result, ensure};
 use dibs_build::{Builder, IndexWidth, generate};
-use dibs_nostd::Tool;
+use dibs_nostd::{Capsule, Tool};
 use dibs_tests::method::Probe;
 use dibs_tests::streams::{Beat, TICK_RATE};
-use glam::Vec3;
-use probe::track::{ANSWER_WORDS, command};
+use glam::{Quat, Vec3};
+use probe::track::{ANSWER_WORDS, JOINTS, command, tick};
 use xtask::steps::Outcome;
 
 use crate::harness::figures::Figures;
@@ -53,21 +53,55 @@ pub const CHECK: Check = Check {
         },
         golden("m7.track.held.mean"),
         golden("m7.track.held.largest"),
+        Promise {
+            id: "m7.track.signed.mean",
+            says: "The mean tick with the side, and with the depth where the axis crosses",
+            criterion: TIMING,
+            bound: Bound::Golden,
+            unit: "instructions; 99 % below {m7.track.signed.99}, at most {m7.track.signed.largest}",
+            limits: "As above.",
+        },
+        note("m7.track.signed.99"),
+        golden("m7.track.signed.largest"),
+        Promise {
+            id: "m7.track.contacts.mean",
+            says: "The mean tick with the side and all contacts within 5 mm",
+            criterion: TIMING,
+            bound: Bound::Golden,
+            unit: "instructions; 99 % below {m7.track.contacts.99}, at most {m7.track.contacts.largest}",
+            limits: "As above. Contacts within the margin take a range search at every tick.",
+        },
+        note("m7.track.contacts.99"),
+        golden("m7.track.contacts.largest"),
+        Promise {
+            id: "m7.track.chain.mean",
+            says: "The mean tick of a chain of eight capsules, each with its tracker",
+            criterion: TIMING,
+            bound: Bound::Golden,
+            unit: "instructions; 99 % below {m7.track.chain.99}, at most {m7.track.chain.largest}; \
+                   {m7.track.chain.searched} of the eight are searched in the mean",
+            limits: "As above, without the side of the surface; the first capsule is table 3's.",
+        },
+        note("m7.track.chain.99"),
+        golden("m7.track.chain.largest"),
+        note("m7.track.chain.searched"),
     ],
 };
 
 /// The tool goes once through the middle of the heart and back. The number is fixed, since golden figures are compared.
 const TICKS: u32 = 7_000;
 
-/// The surface between frames.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Surface {
-    Held,
-    Interpolated,
-}
+/// A run over the path: the end of its figures' names, and the bits of its ticks.
+const RUNS: [(&str, u32); 5] = [
+    ("", tick::INTERPOLATED),
+    (".held", 0),
+    (".signed", tick::INTERPOLATED | tick::SIGNED),
+    (".contacts", tick::INTERPOLATED | tick::SIGNED | tick::CONTACTS),
+    (".chain", tick::INTERPOLATED | tick::CHAIN),
+];
 
 /// The heart as it beats, and the tool of table 3 at each tick.
-fn script(surface: Surface) -> Vec<u8> {
+fn script(bits: u32) -> Vec<u8> {
     let generate::MovingMesh { mesh, motion } = generate::heart(10_272).expect("a valid size");
     let builder = Builder::new().index(IndexWidth::Bits16).stretch(1.5);
     let built = builder.build(&mesh).expect("a valid mesh");
@@ -94,12 +128,24 @@ fn script(surface: Surface) -> Vec<u8> {
             put_frame(&mut bytes, frame + 1);
         }
         let Probe::Capsule(tool) = beat.tool(tick) else { panic!("a capsule") };
-        put(&mut bytes, &[command::TICK, surface as u32, time.fract().to_bits()]);
-        put_points(&mut bytes, &[tool.start(), tool.end()]);
+        put(&mut bytes, &[command::TICK, bits, time.fract().to_bits()]);
+        let joints = joints(&tool);
+        put_points(&mut bytes, if bits & tick::CHAIN == 0 { &joints[..2] } else { &joints });
         put(&mut bytes, &[tool.radius().to_bits()]);
     }
     put(&mut bytes, &[command::END]);
     bytes
+}
+
+/// The ends of a chain whose first link is the tool, each link turned by a tenth of a radian against the one before.
+fn joints(tool: &Capsule) -> [Vec3; JOINTS] {
+    let mut link = tool.end() - tool.start();
+    let mut joints = [tool.start(); JOINTS];
+    for at in 1..JOINTS {
+        joints[at] = joints[at - 1] + link;
+        link = Quat::from_rotation_y(0.1) * link;
+    }
+    joints
 }
 
 /// One answer of the probe.
@@ -107,6 +153,7 @@ struct Tick {
     instructions: u32,
     whole: u32,
     tests: [u32; 2],
+    searched: u32,
     is_fallback: bool,
     apart: f32,
 }
@@ -118,10 +165,11 @@ fn read(words: &[u32]) -> Result<Vec<Tick>> {
     ensure!(rest.is_empty(), "an answer is not whole");
     Ok(answers
         .iter()
-        .map(|&[took, whole, nodes, triangles, fallback, _, _, apart]| Tick {
+        .map(|&[took, whole, nodes, triangles, fallback, searched, _, apart]| Tick {
             instructions: instructions(took),
             whole: instructions(whole),
             tests: [nodes, triangles],
+            searched,
             is_fallback: fallback != 0,
             apart: f32::from_bits(apart),
         })
@@ -131,8 +179,8 @@ fn read(words: &[u32]) -> Result<Vec<Tick>> {
 fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let program = build_for_board(&board()?, "track")?;
     let (mut apart, mut fallbacks) = (0.0_f32, 0);
-    for (name, surface) in [("", Surface::Interpolated), (".held", Surface::Held)] {
-        let ticks = read(&run_on_board(&program, &script(surface), COUNTING)?)?;
+    for (name, bits) in RUNS {
+        let ticks = read(&run_on_board(&program, &script(bits), COUNTING)?)?;
         ensure!(ticks.len() == TICKS as usize, "{} ticks of {TICKS} answered", ticks.len());
         let ticks = &ticks[1..];
         let mut taken: Vec<u32> = ticks.iter().map(|tick| tick.instructions).collect();
@@ -143,8 +191,14 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
         let at = |share: f64| f64::from(taken[((taken.len() - 1) as f64 * share) as usize]);
         figures.note(&format!("m7.track{name}.mean"), mean(&|tick| tick.instructions).round());
         figures.note(&format!("m7.track{name}.largest"), at(1.0));
-        if surface == Surface::Interpolated {
-            figures.note("m7.track.99", at(0.99));
+        if bits != 0 {
+            figures.note(&format!("m7.track{name}.99"), at(0.99));
+        }
+        if bits & tick::CHAIN != 0 {
+            let searched = mean(&|tick| tick.searched);
+            figures.note("m7.track.chain.searched", (searched * 100.0).round() / 100.0);
+        }
+        if name.is_empty() {
             for (kind, row) in [("node", 0), ("triangle", 1)] {
                 let tests = mean(&|tick| tick.tests[row]);
                 figures.note(&format!("m7.track.{kind}-tests"), (tests * 10.0).round() / 10.0);
@@ -153,7 +207,9 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
             figures.note("m7.track.ticks", f64::from(TICKS));
         }
         apart = ticks.iter().fold(apart, |apart, tick| apart.max(tick.apart));
-        fallbacks += ticks.iter().filter(|tick| tick.is_fallback).count();
+        // A capsule of a chain that was far for long may have moved too far.
+        let counted = if bits & tick::CHAIN == 0 { ticks } else { &[] };
+        fallbacks += counted.iter().filter(|tick| tick.is_fallback).count();
     }
     figures.note("m7.track.apart", f64::from((apart * 1e4).round() / 1e4));
     figures.note("m7.track.fallbacks", fallbacks as f64);

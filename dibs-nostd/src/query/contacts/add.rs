@@ -1,0 +1,188 @@
+//! The contacts of one tool and one surface, whose closest pair is known.
+
+use glam::Vec3;
+
+use super::basins::Near;
+use super::{Contact, Contacts};
+use crate::math::sqrt::sqrt;
+use crate::query::search::{Search, Waiting};
+use crate::query::side::{self, Side};
+use crate::query::{NoSide, Options, Proximity};
+use crate::unavailable::QueryError;
+use crate::{Budget, Index, Tool, Tree, TriangleRow, VertexTable};
+
+/// Ridges of this part of the margin do not part two contacts.
+const RIDGE: f32 = 1.0 / 64.0;
+
+/// A tool and a surface, with their numbers in a scene.
+pub(in crate::query) struct Pair<'a, I, V: ?Sized, T> {
+    pub tree: &'a Tree<'a, I>,
+    pub vertices: &'a V,
+    pub tool: &'a T,
+    pub closest: &'a Proximity,
+    pub surface: usize,
+    /// The tool's number.
+    pub number: usize,
+}
+
+impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
+    /// Empties the list for the contacts within `margin` (mm).
+    pub(in crate::query) fn begin(
+        &mut self,
+        margin: f32,
+        has_adjacency: bool,
+    ) -> Result<(), QueryError> {
+        self.found.clear();
+        if N == 0 || NEAR == 0 || NEAR >= usize::from(u16::MAX) {
+            return Err(QueryError::Contacts { capacity: N as u32, near: NEAR as u32 });
+        }
+        // Written so that NaN fails.
+        let is_possible = margin >= 0.0 && margin.is_finite();
+        if !is_possible {
+            return Err(QueryError::Margin { bits: margin.to_bits() });
+        }
+        if !has_adjacency {
+            return Err(QueryError::NoAdjacency);
+        }
+        self.found.begin(margin);
+        Ok(())
+    }
+
+    /// The result, with an empty list if it is an error.
+    pub(in crate::query) fn unless_failed<R>(
+        &mut self,
+        result: Result<R, QueryError>,
+    ) -> Result<R, QueryError> {
+        if result.is_err() {
+            self.found.clear();
+        }
+        result
+    }
+
+    /// Adds the contacts of a pair. Returns the tests made.
+    pub(in crate::query) fn add<I: Index, V: VertexTable + ?Sized, T: Tool>(
+        &mut self,
+        pair: &Pair<'_, I, V, T>,
+        stack: &mut [Waiting],
+        options: &Options,
+    ) -> Result<Budget, QueryError> {
+        let Self { found, basins } = self;
+        let &Pair { tree, vertices, tool, closest, .. } = pair;
+        let margin = found.margin;
+        if closest.accuracy > found.accuracy {
+            found.accuracy = closest.accuracy;
+        }
+        // The search below takes the positions as exact; the answer's accuracy has their error already.
+        let accuracy = closest.accuracy - vertices.position_error();
+        let has_side = closest.side != Side::Undefined(NoSide::CutShort);
+        if closest.side == Side::Inside || (closest.lower > margin && has_side) {
+            if let Some(contact) = pair.contact(closest).filter(|at| at.separation <= margin) {
+                found.insert(contact);
+            }
+            return Ok(Budget { node_tests: 0, triangle_tests: 0 });
+        }
+        basins.clear();
+        let limit = tool.radius() + margin;
+        let mut complete = limit;
+        let search = Search::start(tree, stack, vertices, tool, options, None)?;
+        let (beyond, made) = search.each_within(limit, |row, square| {
+            if let Some(farthest) = basins.push(Near { square, row }) {
+                complete = sqrt(farthest);
+            }
+            complete
+        })?;
+        let least = if beyond < complete { beyond } else { complete };
+        found.is_cut_short |= !has_side || beyond < limit;
+        // Without a side the tool may be inside, deeper than every pair seen.
+        found.lower_bound(if has_side { least - tool.radius() } else { f32::NEG_INFINITY });
+        let is_crossing = closest.side == Side::Crossing;
+        if is_crossing && let Some(contact) = pair.contact(closest) {
+            found.insert(contact);
+        }
+        let ridge = (margin * RIDGE) + 2.0 * accuracy;
+        let mut failed = None;
+        basins.each_valley(tree, ridge, |near| {
+            let is_on = sqrt(near.square) <= accuracy;
+            // The crossing pair, inserted above, stands for these triangles.
+            if is_crossing && is_on {
+                return;
+            }
+            match pair_at(tree, vertices, tool, near, accuracy) {
+                Ok(other) if other.side == Side::Inside || other.separation > margin => (),
+                Ok(other) => {
+                    if let Some(contact) = pair.contact(&other) {
+                        found.insert(contact);
+                    }
+                }
+                Err(error) => failed = Some(error),
+            }
+        });
+        failed.map_or(Ok(made), Err)
+    }
+}
+
+impl<I, V: ?Sized, T> Pair<'_, I, V, T> {
+    /// The contact at two points, if a direction leads out.
+    fn contact(&self, at: &Proximity) -> Option<Contact> {
+        let is_unit = (at.direction.length_squared() - 1.0).abs() < 1e-3;
+        let triangle = at.triangle.filter(|_| is_unit)?;
+        Some(Contact {
+            separation: at.lower,
+            normal: at.direction,
+            point_on_surface: at.point_on_surface,
+            point_on_tool: at.point_on_tool,
+            axis_parameter: at.axis_parameter,
+            surface: self.surface,
+            tool: self.number,
+            triangle,
+            corners: at.corners,
+            barycentric: at.barycentric,
+            velocity: Vec3::ZERO,
+        })
+    }
+}
+
+/// The pair of a tool and the lowest triangle of a valley.
+fn pair_at<I: Index, V: VertexTable + ?Sized, T: Tool>(
+    tree: &Tree<'_, I>,
+    vertices: &V,
+    tool: &T,
+    near: Near,
+    accuracy: f32,
+) -> Result<Proximity, QueryError> {
+    let row = near.row;
+    let corners = tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
+    let [a, b, c] = corners;
+    let position = |vertex| vertices.position(vertex).ok_or(QueryError::Corrupt { row: vertex });
+    let positions = [position(a)?, position(b)?, position(c)?];
+    let found = tool.closest_on_triangle(&positions, f32::INFINITY);
+    let found = found.ok_or(QueryError::Position { vertex: a })?;
+    let axis_distance = sqrt(found.distance_squared);
+    let towards = found.on_axis - found.on_surface;
+    let length = sqrt(towards.length_squared());
+    let direction = if length > 0.0 { towards / length } else { Vec3::ZERO };
+    let separation = axis_distance - tool.radius();
+    let mut pair = Proximity {
+        separation,
+        lower: separation,
+        accuracy,
+        side: Side::Undefined(NoSide::NotAsked),
+        axis_distance,
+        point_on_surface: found.on_surface,
+        point_on_tool: found.on_axis,
+        direction,
+        axis_parameter: found.axis_parameter,
+        triangle: Some(TriangleRow(row)),
+        corners,
+        barycentric: found.barycentric,
+        node_tests: 0,
+        triangle_tests: 0,
+    };
+    let at = side::of_point(tree, vertices, &pair, found.on_axis)?;
+    pair.side = at.side;
+    if at.outward != Vec3::ZERO {
+        pair.direction = at.outward;
+    }
+    pair.point_on_tool = found.on_axis - pair.direction * tool.radius();
+    Ok(pair)
+}

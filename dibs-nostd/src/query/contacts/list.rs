@@ -1,0 +1,82 @@
+//! The contacts found so far, deepest first, and a bound on the others.
+
+use super::Contact;
+
+/// Up to `N` contacts.
+#[derive(Clone, Debug)]
+pub(super) struct List<const N: usize> {
+    pub list: [Contact; N],
+    pub count: usize,
+    pub bound: f32,
+    pub accuracy: f32,
+    pub is_full: bool,
+    /// The margin that was asked for.
+    pub margin: f32,
+    pub is_cut_short: bool,
+}
+
+impl<const N: usize> List<N> {
+    pub const fn new() -> Self {
+        Self {
+            list: [Contact::NONE; N],
+            count: 0,
+            bound: f32::NEG_INFINITY,
+            accuracy: 0.0,
+            is_full: false,
+            margin: f32::NEG_INFINITY,
+            is_cut_short: true,
+        }
+    }
+
+    /// Empties the list, of which nothing is known then.
+    pub fn clear(&mut self) {
+        self.count = 0;
+        self.bound = f32::NEG_INFINITY;
+        self.accuracy = 0.0;
+        self.is_full = false;
+        self.margin = f32::NEG_INFINITY;
+        self.is_cut_short = true;
+    }
+
+    /// Empties the list for the contacts within `margin`.
+    pub fn begin(&mut self, margin: f32) {
+        self.clear();
+        (self.bound, self.margin, self.is_cut_short) = (margin, margin, false);
+    }
+
+    /// Contacts beyond `bound` may be missing.
+    pub fn lower_bound(&mut self, bound: f32) {
+        if bound < self.bound {
+            self.bound = bound;
+        }
+    }
+
+    /// Inserts a contact in order, and drops the farthest if there is no room.
+    pub fn insert(&mut self, contact: Contact) {
+        let mut at = self.count;
+        if at < N {
+            self.count += 1;
+        } else {
+            self.is_full = true;
+            let farthest = self.list.last().map_or(f32::NEG_INFINITY, |last| last.separation);
+            let dropped = if contact.separation > farthest { contact.separation } else { farthest };
+            self.lower_bound(dropped);
+            if !(contact.separation < farthest) {
+                return;
+            }
+            at = at.saturating_sub(1);
+        }
+        while let Some(before) = at.checked_sub(1)
+            && let Some(&other) = self.list.get(before)
+            && other.separation > contact.separation
+        {
+            if let Some(place) = self.list.get_mut(at) {
+                *place = other;
+            }
+            at = before;
+        }
+        if let Some(place) = self.list.get_mut(at) {
+            *place = contact;
+        }
+    }
+}

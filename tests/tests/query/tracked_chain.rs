@@ -1,0 +1,213 @@
+//! Several trackers and a tracker's contacts against whole queries: the same answers, most pairs not looked at.
+
+use dibs_build::{Builder, generate};
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{
+    Budget, Capsule, Contacts, Moved, NoSide, Odometer, Options, Query, QueryError, Side, Tracker,
+};
+use dibs_tests::deform::unit;
+use dibs_tests::surfaces::ball;
+use fastrand::Rng;
+use glam::Vec3;
+
+type Tracked<'t> = Tracker<'t, u16, MAX_STACK, 256>;
+
+/// A chain of eight capsules that bends, and wanders through two hearts beside each other.
+struct Wanderer {
+    joints: [Vec3; 9],
+    rng: Rng,
+    time: f32,
+}
+
+impl Wanderer {
+    fn new(seed: u64) -> Self {
+        let joints = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|at| Vec3::new(14.0 * at as f32, 80.0, 30.0));
+        Self { joints, rng: Rng::with_seed(seed), time: 0.0 }
+    }
+
+    /// Steps as a rule, rests or leaps now and then. Returns the capsules.
+    fn step(&mut self) -> [Capsule; 8] {
+        let rng = &mut self.rng;
+        let far = match rng.u32(..200) {
+            0 => 60.0,
+            1..20 => 0.0,
+            _ => 0.4,
+        };
+        self.time += 0.002;
+        let wave = |rate: f32, size: f32| size * (rate * self.time).sin();
+        let goal = Vec3::new(85.0 + wave(1.0, 120.0), wave(1.7, 60.0), 30.0 + wave(2.3, 60.0));
+        let centre = self.joints.iter().sum::<Vec3>() / 9.0;
+        let all = far * ((goal - centre).normalize_or_zero() + 0.3 * unit(rng));
+        for joint in &mut self.joints {
+            *joint += all + 0.1 * far.min(1.0) * unit(rng);
+        }
+        let joints = self.joints;
+        [0, 1, 2, 3, 4, 5, 6, 7]
+            .map(|at| Capsule::new(joints[at], joints[at + 1], 2.0).expect("finite"))
+    }
+}
+
+#[test]
+fn the_closest_of_tracked_pairs_is_that_of_whole_queries() {
+    let generate::MovingMesh { mesh, motion } = generate::heart(2_000).expect("a valid size");
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let ticks = if cfg!(debug_assertions) { 200 } else { 6_000 };
+    for is_signed in [false, true] {
+        let options = Options::new();
+        let options = if is_signed { options } else { options.unsigned() };
+        let mut trackers: Vec<Tracked> =
+            (0..16).map(|_| Tracked::new(&tree).expect("deep enough")).collect();
+        let mut single = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        let mut chain = Wanderer::new(1);
+        let mut odometers = [Odometer::new(&tree), Odometer::new(&tree)];
+        let one: Vec<_> = motion.frames.iter().map(|frame| built.to_rows(frame)).collect();
+        let beside = |rows: &Vec<Vec3>| rows.iter().map(|&row| row + Vec3::X * 170.0).collect();
+        let other: Vec<Vec<Vec3>> = one.iter().map(beside).collect();
+        let mut steps = None;
+        let (mut searched, mut inside, mut cut_short, mut undefined) = (0_u64, 0, 0, 0);
+        for tick in 0..ticks {
+            let capsules = chain.step();
+            let frame = tick / 30 % one.len();
+            let next = (frame + 1) % one.len();
+            if tick % 600 == 599 {
+                // Its next step starts anew.
+                odometers[1].start(one[next].as_slice());
+            }
+            if tick % 30 == 0 {
+                let [first, second] = &mut odometers;
+                steps = Some([
+                    first.step(one[frame].as_slice(), one[next].as_slice()),
+                    second.step(other[frame].as_slice(), other[next].as_slice()),
+                ]);
+            }
+            let steps = steps.as_ref().expect("the first tick has a frame");
+            let share = (tick % 30) as f32 / 30.0;
+            let surfaces = steps.each_ref().map(|step| step.at(share));
+            let mut pairs: Vec<_> = trackers
+                .iter_mut()
+                .enumerate()
+                .map(|(at, tracker)| (tracker, &surfaces[at / 8], &capsules[at % 8]))
+                .collect();
+            let budget = (tick % 11 == 10).then_some(Budget { node_tests: 90, triangle_tests: 9 });
+            let asked = budget.map_or(options, |budget| options.budget(budget));
+            let found = Tracker::closest_of(&mut pairs, &asked).expect("an answer");
+            let found = found.expect("sixteen pairs");
+            searched += u64::from(found.searched);
+            let whole = |at: usize, single: &mut Query<'_, u16, MAX_STACK>| {
+                let closest = single.closest(&surfaces[at / 8], &capsules[at % 8], &options);
+                closest.expect("an answer")
+            };
+            let least =
+                (0..16).map(|at| whole(at, &mut single).separation).fold(f32::INFINITY, f32::min);
+            // The depth of a crossing axis is found to a 512th of its length.
+            let off = 2.0 * found.closest.accuracy + if least < 0.0 { 0.06 } else { 0.0 };
+            let is_open = found.closest.side == Side::Undefined(NoSide::CutShort);
+            if budget.is_some() && is_open {
+                undefined += 1;
+                continue;
+            }
+            if budget.is_some() {
+                assert!(found.closest.lower <= least + off, "{tick}: {least} {found:?}");
+                let upper = found.closest.separation;
+                assert!(least <= upper + off, "{tick}: {least} {found:?}");
+                assert!(found.closest.node_tests <= 90 + 16, "{found:?}");
+                cut_short += usize::from(found.closest.lower < found.closest.separation);
+                continue;
+            }
+            assert!((found.closest.separation - least).abs() <= off, "{tick}: {least} {found:?}");
+            let own = whole(found.pair, &mut single).separation;
+            assert!((own - found.closest.separation).abs() <= off, "{tick}: {own} {found:?}");
+            inside += usize::from(matches!(found.closest.side, Side::Inside | Side::Crossing));
+        }
+        let mean = searched as f64 / ticks as f64;
+        println!(
+            "{mean:.2} of 16 pairs searched, {inside} ticks inside or crossing, {cut_short} cut short"
+        );
+        if !cfg!(debug_assertions) {
+            assert!(mean < 8.0 && cut_short + undefined > 100, "{mean} {cut_short}");
+            assert!(!is_signed || (inside > 500 && undefined > 100), "{inside} {undefined}");
+        }
+    }
+}
+
+#[test]
+fn no_pairs_have_no_closest() {
+    let none = Tracked::closest_of::<Moved<'_, [Vec3]>, Capsule>(&mut [], &Options::new());
+    assert_eq!(none, Ok(None));
+}
+
+/// A pair that was asked without its side may be inside: with sides it is searched again.
+#[test]
+fn a_pair_whose_side_was_not_asked_for_is_not_passed_over() {
+    let mesh = ball(3);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut odometer = Odometer::new(&tree);
+    let surface = odometer.start(rows.as_slice());
+    let centre = rows.iter().sum::<Vec3>() / rows.len() as f32;
+    let capsule = |from: Vec3| Capsule::new(from, from + Vec3::X, 1.0).expect("finite");
+    let outside = rows.iter().copied().max_by(|a, b| a.x.total_cmp(&b.x)).expect("rows");
+    let tools = [capsule(outside + Vec3::X * 4.0), capsule(centre)];
+    let mut trackers = [0, 1].map(|_| Tracked::new(&tree).expect("deep enough"));
+    let mut ask = |options: &Options| {
+        let [one, other] = &mut trackers;
+        let mut pairs = [(one, &surface, &tools[0]), (other, &surface, &tools[1])];
+        Tracker::closest_of(&mut pairs, options).expect("an answer").expect("two pairs")
+    };
+    assert_eq!(ask(&Options::new().unsigned()).pair, 0);
+    assert_eq!(ask(&Options::new().unsigned()).searched, 1);
+    let found = ask(&Options::new());
+    assert_eq!((found.pair, found.closest.side), (1, Side::Inside), "{found:?}");
+    // Inside, it is asked at every tick.
+    assert_eq!(ask(&Options::new()).pair, 1);
+}
+
+#[test]
+fn contacts_of_a_tracker_are_those_of_a_query() {
+    let generate::MovingMesh { mesh, motion } = generate::heart(2_000).expect("a valid size");
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let mut tracker = Tracked::new(&tree).expect("deep enough");
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut chain = Wanderer::new(2);
+    let frames: Vec<_> = motion.frames.iter().map(|frame| built.to_rows(frame)).collect();
+    let mut odometer = Odometer::new(&tree);
+    let (mut own, mut whole) = (Contacts::<64, 2048>::new(), Contacts::<64, 2048>::new());
+    let mut step = None;
+    let (mut compared, mut fronts) = (0, 0);
+    for tick in 0..if cfg!(debug_assertions) { 100 } else { 3_000 } {
+        let tool = chain.step()[0];
+        let frame = tick / 30 % frames.len();
+        let next = (frame + 1) % frames.len();
+        if tick % 30 == 0 {
+            step = Some(odometer.step(frames[frame].as_slice(), frames[next].as_slice()));
+        }
+        let step = step.as_ref().expect("the first tick has a frame");
+        let surface = step.at((tick % 30) as f32 / 30.0);
+        let options = Options::new();
+        let found = tracker.contacts(&surface, &tool, 8.0, &options, &mut own);
+        let found = found.expect("an answer");
+        let closest = query.contacts(&surface, &tool, 8.0, &Options::cold(), &mut whole);
+        let closest = closest.expect("an answer");
+        assert_eq!(found.closest.side, closest.side, "{tick}");
+        assert_eq!(own.len(), whole.len(), "{tick}: {own:?} {whole:?}");
+        for (one, other) in own.iter().zip(whole.iter()) {
+            assert!((one.separation - other.separation).abs() < 0.05, "{tick}: {one:?} {other:?}");
+        }
+        compared += own.len();
+        fronts += usize::from(found.fallback.is_none());
+    }
+    println!("{compared} contacts, {fronts} ticks by the front");
+    if !cfg!(debug_assertions) {
+        assert!(compared > 400 && fronts > 2_000, "{compared} {fronts}");
+    }
+    let refused = {
+        let surface = odometer.start(frames[0].as_slice());
+        let tool = chain.step()[0];
+        tracker.contacts(&surface, &tool, -1.0, &Options::new(), &mut own)
+    };
+    assert!(matches!(refused, Err(QueryError::Margin { .. })), "{refused:?}");
+    assert!(own.is_empty());
+}
