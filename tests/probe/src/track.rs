@@ -71,11 +71,35 @@ impl Default for Memory {
     }
 }
 
-/// Follows a script to its end.
+/// The trackers of a chain, in a static: they are larger than the board's stack.
+pub struct Trackers([Option<Follower>; LINKS]);
+
+type Follower = Tracker<'static, u16, STACK, OPENED>;
+
+impl Trackers {
+    /// None yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self([const { None }; LINKS])
+    }
+}
+
+impl Default for Trackers {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Follows a script to its end: with `EVERY`, one of any ticks. Without it, ticks with no bit but
+/// [`INTERPOLATED`](tick::INTERPOLATED), so that the tracker is in the program once, as in a controller.
 ///
 /// # Errors
 /// [`Fault`] where the script makes no sense, or a query fails.
-pub fn run(memory: &mut Memory, machine: &mut impl Machine) -> Result<(), Fault> {
+pub fn run<const EVERY: bool>(
+    memory: &'static mut Memory,
+    Trackers(trackers): &mut Trackers,
+    machine: &mut impl Machine,
+) -> Result<(), Fault> {
     let length = word(machine)? as usize;
     let Memory { tree, frames } = memory;
     machine.read(tree.get_mut(..length.next_multiple_of(4)).ok_or(Fault)?)?;
@@ -83,19 +107,11 @@ pub fn run(memory: &mut Memory, machine: &mut impl Machine) -> Result<(), Fault>
     let count = tree.vertex_count() as usize;
     let [before, after] = frames.each_mut().map(|rows| rows.get_mut(..count));
     let (mut before, mut after) = (before.ok_or(Fault)?, after.ok_or(Fault)?);
-    let tracker = || Tracker::new(&tree).map_err(|_| Fault);
-    let mut trackers = [
-        tracker()?,
-        tracker()?,
-        tracker()?,
-        tracker()?,
-        tracker()?,
-        tracker()?,
-        tracker()?,
-        tracker()?,
-    ];
+    for tracker in &mut *trackers {
+        *tracker = Some(Tracker::new(&tree).map_err(|_| Fault)?);
+    }
     let query = Query::new(&tree).map_err(|_| Fault)?;
-    let mut session = Session { query, trackers: &mut trackers, last: None };
+    let mut session = Session { query, trackers, last: None };
     let mut odometer = Odometer::new(&tree);
     let mut stretch: Option<MeasuredStretch> = None;
     let mut next = word(machine)?;
@@ -107,7 +123,7 @@ pub fn run(memory: &mut Memory, machine: &mut impl Machine) -> Result<(), Fault>
         let measured = measure_stretch(&tree, &*after).map_err(|_| Fault)?;
         let both = stretch.unwrap_or(measured).or_larger(measured).ok_or(Fault)?;
         let step = odometer.step(&*before, &*after);
-        next = session.ticks(&step, both, measured, machine)?;
+        next = session.ticks::<EVERY>(&step, both, measured, machine)?;
         stretch = Some(measured);
     }
     if next == command::END { Ok(()) } else { Err(Fault) }
@@ -116,7 +132,7 @@ pub fn run(memory: &mut Memory, machine: &mut impl Machine) -> Result<(), Fault>
 /// The state from frame to frame.
 struct Session<'s, 't> {
     query: Query<'t, u16, STACK>,
-    trackers: &'s mut [Tracker<'t, u16, STACK, OPENED>; LINKS],
+    trackers: &'s mut [Option<Follower>; LINKS],
     last: Option<TriangleRow>,
 }
 
@@ -129,7 +145,7 @@ struct Found {
 
 impl Session<'_, '_> {
     /// Runs the ticks of a frame. Returns the first other command.
-    fn ticks(
+    fn ticks<const EVERY: bool>(
         &mut self,
         step: &Step<'_, [Vec3], [Vec3]>,
         both: MeasuredStretch,
@@ -142,6 +158,7 @@ impl Session<'_, '_> {
                 other => return Ok(other),
             }
             let kind = word(machine)?;
+            let kind = if EVERY { kind } else { kind & tick::INTERPOLATED };
             let share = f32::from_bits(word(machine)?);
             let links = if kind & tick::CHAIN == 0 { 1 } else { LINKS };
             let mut joints = [Vec3::ZERO; JOINTS];
@@ -150,15 +167,15 @@ impl Session<'_, '_> {
             }
             let radius = f32::from_bits(word(machine)?);
             let answer = if kind & tick::INTERPOLATED == 0 {
-                self.ask(&step.after(), joints, radius, kind, measured, machine)
+                self.ask::<EVERY>(&step.after(), joints, radius, kind, measured, machine)
             } else {
-                self.ask(&step.at(share), joints, radius, kind, both, machine)
+                self.ask::<EVERY>(&step.at(share), joints, radius, kind, both, machine)
             }?;
             put(machine, &answer)?;
         }
     }
 
-    fn ask(
+    fn ask<const EVERY: bool>(
         &mut self,
         surface: &impl MovingSurface,
         joints: [Vec3; JOINTS],
@@ -171,9 +188,9 @@ impl Session<'_, '_> {
         let link = |from, to| Capsule::new(from, to, radius).map_err(|_| Fault);
         let first = link(a, b)?;
         let options = Options::cold().stretch(stretch);
-        let options = if kind & tick::SIGNED == 0 { options.unsigned() } else { options };
+        let options = if !EVERY || kind & tick::SIGNED == 0 { options.unsigned() } else { options };
         let mut contacts = Contacts::<8>::new();
-        let (took, found) = if kind & tick::CHAIN != 0 {
+        let (took, found) = if EVERY && kind & tick::CHAIN != 0 {
             let chain = [
                 first,
                 link(b, c)?,
@@ -194,9 +211,9 @@ impl Session<'_, '_> {
             }
             return Ok(answer(took, 0, &found, closest, found.closest.accuracy, &chain[0]));
         } else {
-            let [tracker, ..] = &mut *self.trackers;
+            let [Some(tracker), ..] = &mut *self.trackers else { return Err(Fault) };
             let before = machine.clock();
-            let tracked = if kind & tick::CONTACTS == 0 {
+            let tracked = if !EVERY || kind & tick::CONTACTS == 0 {
                 tracker.closest(surface, &first, &options)
             } else {
                 tracker.contacts(surface, &first, MARGIN, &options, &mut contacts)
@@ -208,7 +225,7 @@ impl Session<'_, '_> {
         };
         let options = options.warm_start(self.last);
         let before = machine.clock();
-        let whole = if kind & tick::CONTACTS == 0 {
+        let whole = if !EVERY || kind & tick::CONTACTS == 0 {
             self.query.closest(surface, &first, &options)
         } else {
             self.query.contacts(surface, &first, MARGIN, &options, &mut contacts)
@@ -225,7 +242,11 @@ impl Session<'_, '_> {
         chain: &[Capsule; LINKS],
         options: &Options,
     ) -> Result<Found, Fault> {
-        let [a, b, c, d, e, f, g, h] = &mut *self.trackers;
+        let [Some(a), Some(b), Some(c), Some(d), Some(e), Some(f), Some(g), Some(h)] =
+            &mut *self.trackers
+        else {
+            return Err(Fault);
+        };
         let [i, j, k, l, m, n, o, p] = chain;
         let mut pairs = [
             (a, surface, i),
@@ -251,8 +272,8 @@ fn answer(
     tool: &Capsule,
 ) -> [u32; ANSWER_WORDS] {
     let closest = &found.closest;
-    let is_deep = closest.separation < -tool.radius();
-    // Of a crossing axis each search finds a depth within the tolerance.
+    // Of an axis that crosses or touches each search finds a depth within the tolerance.
+    let is_deep = closest.separation <= -tool.radius() || whole <= -tool.radius();
     let tolerance = if is_deep { Tool::axis_length(tool) / 512.0 } else { 0.0 };
     let apart = closest.separation - whole;
     let apart = if apart < 0.0 { -apart } else { apart };

@@ -1,6 +1,6 @@
 //! A tracker's instructions on the board: the paper's moving tool around a heart that moves at every tick.
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use dibs_build::{Builder, IndexWidth, generate};
 use dibs_nostd::{Capsule, Tool};
 use dibs_tests::method::Probe;
@@ -177,10 +177,13 @@ fn read(words: &[u32]) -> Result<Vec<Tick>> {
 }
 
 fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
-    let program = build_for_board(&board()?, "track")?;
+    let [plain, every] =
+        [build_for_board(&board()?, "track")?, build_for_board(&board()?, "chain")?];
     let (mut apart, mut fallbacks) = (0.0_f32, 0);
     for (name, bits) in RUNS {
-        let ticks = read(&run_on_board(&program, &script(bits), COUNTING)?)?;
+        let program = if bits & !tick::INTERPOLATED == 0 { &plain } else { &every };
+        let ticks = run_on_board(program, &script(bits), COUNTING);
+        let ticks = read(&ticks.with_context(|| format!("the run \"{name}\""))?)?;
         ensure!(ticks.len() == TICKS as usize, "{} ticks of {TICKS} answered", ticks.len());
         let ticks = &ticks[1..];
         let mut taken: Vec<u32> = ticks.iter().map(|tick| tick.instructions).collect();

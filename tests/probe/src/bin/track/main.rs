@@ -12,21 +12,12 @@ mod files;
 #[path = "../board/machine.rs"]
 mod machine;
 
-use core::cell::RefCell;
-
-use cortex_m::interrupt::{self, Mutex};
 use cortex_m_rt::entry;
-use probe::Fault;
-use probe::track::{Memory, run};
-
-static MEMORY: Mutex<RefCell<Memory>> = Mutex::new(RefCell::new(Memory::new()));
+use probe::track::{Memory, Trackers, run};
 
 #[entry]
 fn main() -> ! {
-    machine::answer(|board| {
-        interrupt::free(|section| {
-            let mut memory = MEMORY.borrow(section).try_borrow_mut().map_err(|_| Fault)?;
-            run(&mut memory, board)
-        })
-    })
+    static mut MEMORY: Memory = Memory::new();
+    static mut TRACKERS: Trackers = Trackers::new();
+    machine::answer(|board| run::<false>(MEMORY, TRACKERS, board))
 }
