@@ -37,6 +37,42 @@ pub(super) struct Pseudonormal {
     pub vector: Vec3,
     /// Sum of the weights of the unit normals; rounding is relative to it.
     pub weight: f32,
+    /// Of a vertex: the point is above a triangle that may be as close as the vertex.
+    pub is_above: bool,
+    /// Of a vertex: the point is below such a triangle.
+    pub is_below: bool,
+}
+
+/// A point, and the error of its distance from the surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Off {
+    pub point: Vec3,
+    pub error: f32,
+}
+
+impl Pseudonormal {
+    fn new(vector: Vec3, weight: f32) -> Self {
+        Self { vector, weight, is_above: false, is_below: false }
+    }
+
+    /// Adds a triangle around a vertex, the first of its corners, with its unit normal.
+    fn add(&mut self, [centre, from, to]: [Vec3; 3], unit: Vec3, area: f32, off: Off) {
+        let weight = angle(area, (from - centre).dot(to - centre));
+        self.vector += weight * unit;
+        self.weight += weight;
+        let towards = off.point - centre;
+        // If the point is over the triangle, it leans over one of its edges at least.
+        let leans = |end: Vec3| {
+            let edge = end - centre;
+            let over = towards.dot(edge);
+            !(over < 0.0 && over * over > off.error * off.error * edge.length_squared())
+        };
+        if leans(from) || leans(to) {
+            let height = towards.dot(unit);
+            self.is_above |= height > 0.0;
+            self.is_below |= height < 0.0;
+        }
+    }
 }
 
 /// Why there is no pseudonormal.
@@ -74,7 +110,7 @@ impl Feature {
         feature
     }
 
-    /// The pseudonormal of a feature of a triangle.
+    /// The pseudonormal of a feature of a triangle, for a point to whose distance the feature's comes near.
     ///
     /// Cost: one normal of a face, two of an edge, at most [`MAX_RING`] of a vertex.
     pub fn pseudonormal<I: Index, V: VertexTable + ?Sized>(
@@ -82,25 +118,23 @@ impl Feature {
         tree: &Tree<'_, I>,
         vertices: &V,
         triangle: u32,
+        off: Off,
     ) -> Result<Pseudonormal, NoNormal> {
         let at = |row| corners(tree, vertices, row);
         match self {
-            Self::Face => Ok(Pseudonormal { vector: normal(&at(triangle)?)?.0, weight: 1.0 }),
+            Self::Face => Ok(Pseudonormal::new(normal(&at(triangle)?)?.0, 1.0)),
             Self::Edge(edge) => {
                 let (other, _) = tree.across(triangle, edge).ok_or(NoNormal::Open)?;
                 let vector = normal(&at(triangle)?)?.0 + normal(&at(other)?)?.0;
-                Ok(Pseudonormal { vector, weight: 2.0 })
+                Ok(Pseudonormal::new(vector, 2.0))
             }
             Self::Vertex(corner) => {
-                let mut sum = Pseudonormal { vector: Vec3::ZERO, weight: 0.0 };
+                let mut sum = Pseudonormal::new(Vec3::ZERO, 0.0);
                 let (mut row, mut corner) = (triangle, corner);
                 for _ in 0..MAX_RING {
                     let fan = turned(at(row)?, corner);
                     let (unit, area) = normal(&fan)?;
-                    let [centre, from, to] = fan;
-                    let weight = angle(area, (from - centre).dot(to - centre));
-                    sum.vector += weight * unit;
-                    sum.weight += weight;
+                    sum.add(fan, unit, area, off);
                     let (next, back) = tree.across(row, corner).ok_or(NoNormal::Open)?;
                     if next == triangle {
                         return Ok(sum);

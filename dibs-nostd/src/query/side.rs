@@ -5,7 +5,7 @@ use core::fmt;
 use glam::Vec3;
 
 use super::Proximity;
-use super::normal::{Feature, NoNormal, corners};
+use super::normal::{Feature, NoNormal, Off, corners};
 use crate::math::sqrt::sqrt;
 use crate::unavailable::QueryError;
 use crate::{Index, Tree, TriangleRow, VertexTable};
@@ -80,9 +80,17 @@ pub(super) struct PointSide {
 /// # Why a near tie is no wrong side
 /// Let the distance `d` be within `e` of the truth. A ball of radius `d - e` around the point holds no point of the
 /// surface, so along any straight line of the surface from the closest point found, the direction to the point is
-/// within an angle of `sqrt(2 e / d)` of the normal cone, whichever of several features within `e` of equally close was
-/// found. A pseudonormal has no negative product with any direction of its feature's normal cone. So a product farther
-/// from zero than that angle's has the right sign; any other leaves the side undefined.
+/// within an angle of `sqrt(2 e / d)` of being perpendicular.
+///
+/// On a face or an edge it is then within that angle of the normal cone, and a pseudonormal has no negative product with
+/// any direction of its feature's normal cone: a product farther from zero than that angle's has the right sign.
+///
+/// A vertex may have no normal cone (a saddle), and is never the closest point then, only nearly. If a triangle there is
+/// closer, the point leans over one of its edges from the vertex, and the point is on its own side of that triangle or,
+/// over an edge, of one of the two next to it. So the side is that of the pseudonormal only if no triangle that the
+/// point leans over says otherwise.
+///
+/// Any other product leaves the side undefined.
 pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     vertices: &V,
@@ -96,7 +104,8 @@ pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
     let point = pair.point_on_surface;
     let error = pair.accuracy + COORDINATES * point.abs().max_element();
     let found = corners(tree, vertices, triangle).and_then(|corners| {
-        Feature::of(&corners, point, error).pseudonormal(tree, vertices, triangle)
+        let off = Off { point: on_axis, error };
+        Feature::of(&corners, point, error).pseudonormal(tree, vertices, triangle, off)
     });
     let normal = match found {
         Ok(normal) => normal,
@@ -115,9 +124,9 @@ pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
     let towards = on_axis - point;
     let height = towards.dot(normal.vector);
     let doubt = sqrt(2.0 * error * distance) * length + NORMAL * distance * normal.weight;
-    let side = if height > doubt {
+    let side = if height > doubt && !normal.is_below {
         Side::Outside
-    } else if height < -doubt {
+    } else if height < -doubt && !normal.is_above {
         Side::Inside
     } else {
         return undefined(NoSide::BelowAccuracy, unit);

@@ -15,7 +15,7 @@ use dibs_tests::sides;
 use dibs_tests::surfaces::{self, ball, slivers};
 use dibs_tests::tree_bytes::{reseal, section};
 use fastrand::Rng;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// The number of poses of all surfaces together.
 fn poses() -> usize {
@@ -259,4 +259,62 @@ fn a_tree_with_adjacency_takes_at_most_16_bytes_a_triangle() {
             }
         }
     }
+}
+
+/// A vertex whose triangles form a saddle is never the closest point, but nearly: its pseudonormal is no proof. Here a
+/// tooth hangs over a point, and the triangles around it look the other way.
+#[test]
+fn no_side_is_wrong_next_to_a_saddle() {
+    let mut rng = Rng::with_seed(21);
+    let (mut stated, mut undefined, mut wrong) = (0, 0, 0);
+    for _ in 0..if cfg!(debug_assertions) { 20 } else { 4_000 } {
+        let apex = Vec3::new(40.0, -17.0, 16.0);
+        let mut between = |from: f32, to: f32| from + (to - from) * rng.f32();
+        let flat = [between(-1e-3, 1e-3), between(-1e-3, 1e-3)];
+        let steep = [between(-0.95, -0.2), between(-0.95, -0.2)];
+        let tooth = -between(0.2, 1.0);
+        let ring = [
+            (0.0, flat[0]),
+            (tooth, flat[1]),
+            (between(1.5, 3.1), steep[0]),
+            (between(-1.2, 0.2), steep[1]),
+        ];
+        let mut positions: Vec<Vec3> = ring
+            .iter()
+            .map(|&(angle, sine): &(f32, f32)| {
+                let level = (1.0 - sine * sine).sqrt();
+                let along = Vec3::new(level * angle.cos(), level * angle.sin(), sine);
+                apex + between(3.0, 10.0) * along
+            })
+            .collect();
+        positions.extend([apex, apex - 40.0 * Vec3::Z]);
+        let around = [(0, 1), (1, 2), (2, 3), (3, 0)];
+        let triangles: Vec<[u32; 3]> =
+            around.iter().flat_map(|&(a, b)| [[4, a, b], [5, b, a]]).collect();
+        let mesh = Mesh { positions, triangles, origin: DVec3::ZERO };
+        let built = Builder::new().stretch(4.0).build(&mesh).expect("a valid mesh");
+        let rows = built.to_rows(&mesh.positions);
+        let tree = built.tree::<u16>().expect("16-bit indices");
+        let triangles = surfaces::triangles(&tree);
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        for _ in 0..20 {
+            let distance = 10_f32.powf(-3.3 + 1.5 * rng.f32());
+            let point = apex + distance * (Vec3::Z + 0.01 * unit(&mut rng));
+            let sphere = Sphere::new(point, 0.0).expect("finite");
+            let found = query.closest(rows.as_slice(), &sphere, &Options::cold());
+            let pair = exhaustive(&rows, &triangles, &Instrument::sphere(point, 0.0));
+            // Such a surface may cut itself, so the nearest sheet decides.
+            let inside = sides::is_below(&rows, &triangles, &pair.expect("it has triangles"));
+            match found.expect("an answer").side {
+                Side::Undefined(_) => undefined += 1,
+                side => {
+                    stated += 1;
+                    wrong += usize::from((side == Side::Inside) != inside);
+                }
+            }
+        }
+    }
+    println!("{stated} sides stated, {undefined} undefined, {wrong} wrong");
+    assert_eq!(wrong, 0);
+    assert!(cfg!(debug_assertions) || stated > 2_000, "{stated}");
 }
