@@ -16,6 +16,7 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 fn colour(method: &str) -> RGBColor {
     match method {
         DIBS | TRACKER => RGBColor(0, 114, 178),
+        TRACKER_AT_LIMIT => RGBColor(0, 60, 110),
         MEASURED | MEASURED_WARM => RGBColor(0, 158, 115),
         PAPER | WARM => RGBColor(86, 180, 233),
         SWEPT => RGBColor(120, 120, 120),
@@ -115,8 +116,18 @@ fn total_against_size(area: &Area<'_>, records: &Records, tool: &str) -> Result<
 
 /// Table 4 as lines: the time of a tick with all work, against the size of the mesh.
 fn control_loop(area: &Area<'_>, records: &Records, condition: &str) -> Result<()> {
-    let methods =
-        [TRACKER, MEASURED_WARM, WARM, REFIT, HYBRID, SWEPT, OBVHS, PARRY_BVH, PARRY_TRIMESH];
+    let methods = [
+        TRACKER,
+        TRACKER_AT_LIMIT,
+        MEASURED_WARM,
+        WARM,
+        REFIT,
+        HYBRID,
+        SWEPT,
+        OBVHS,
+        PARRY_BVH,
+        PARRY_TRIMESH,
+    ];
     let lines = |condition: &str| {
         methods.map(|m| (m, line(records, imaging::EXPERIMENT, condition, m, "total")))
     };

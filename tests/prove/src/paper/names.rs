@@ -8,6 +8,8 @@ pub const MEASURED: &str = "dibs-measured";
 pub const WARM: &str = "dibs-warm";
 pub const MEASURED_WARM: &str = "dibs-measured-warm";
 pub const TRACKER: &str = "dibs-tracker";
+/// The tracker without measured stretch.
+pub const TRACKER_AT_LIMIT: &str = "dibs-tracker-limit";
 pub const REFIT: &str = "aabb-refit";
 pub const HYBRID: &str = "aabb-hybrid";
 /// Boxes over two frames, for a surface that moves between them.
@@ -30,6 +32,7 @@ pub fn title(method: &str) -> &str {
         WARM => "DIBS, warm start",
         MEASURED_WARM => "DIBS, measured stretch, warm start",
         TRACKER => "DIBS, measured stretch, tracker",
+        TRACKER_AT_LIMIT => "DIBS, tracker",
         SWEPT => "AABB, boxes over both frames",
         REFIT => "AABB, bottom-up refit",
         HYBRID => "AABB, hybrid refit",

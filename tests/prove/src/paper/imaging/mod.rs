@@ -45,8 +45,15 @@ const BEAT: f32 = 1.0;
 const TRAINING: u32 = 4;
 /// The motion's seed.
 const SEED: u64 = 3_000;
-/// Triangles from which parry3d takes part in a tenth of the turns where it refits at every tick.
-const LARGE: usize = 400_000;
+
+/// The turns of which parry3d takes part in one: its queries and refits at every tick would dominate the time of a run.
+const fn rarely(triangles: usize) -> usize {
+    match triangles {
+        400_000.. => 40,
+        40_000.. => 10,
+        _ => 1,
+    }
+}
 
 /// The name of a cell's rate and surface in the records.
 pub fn condition(rate: u32, surface: Surface) -> String {
@@ -146,15 +153,19 @@ impl Scene<'_> {
         for surface in SURFACES {
             let hybrid = || Hybrid::new(boxes.clone(), levels[surface as usize]).warm();
             contenders.extend([
-                Contender::new(TRACKER, surface, Tracking::new(built, tree, surface)),
+                Contender::new(TRACKER, surface, Tracking::new(built, tree, surface, true)),
+                Contender::new(
+                    TRACKER_AT_LIMIT,
+                    surface,
+                    Tracking::new(built, tree, surface, false),
+                ),
                 Contender::new(MEASURED_WARM, surface, Warm::new(built, tree, surface, true)),
                 Contender::new(WARM, surface, Warm::new(built, tree, surface, false)),
                 of_boxes(REFIT, surface, Refit::new(boxes.clone()).warm()),
                 of_boxes(HYBRID, surface, hybrid()),
                 of_boxes(OBVHS, surface, Obvhs::new(self.mesh).warm()),
             ]);
-            let slow = size >= LARGE && surface == Surface::Continuous;
-            let every = if slow { 10 } else { 1 };
+            let every = rarely(size);
             let by_hand = of_boxes(PARRY_BVH, surface, ParryBvh::new(self.mesh).warm());
             let stock = of_boxes(PARRY_TRIMESH, surface, ParryTriMesh::new(self.mesh));
             contenders.push(Contender { every, ..by_hand });
@@ -225,8 +236,6 @@ impl Scene<'_> {
             let condition = condition(rate, surface);
             let size = self.mesh.triangles.len();
             let cell = Cell::new(self.experiment, &self.name, size, &condition);
-            let level = f64::from(levels[surface as usize]);
-            records.push(Record::number(&cell, HYBRID, "split_level", level, "levels"));
             let of_surface = || contenders.iter().filter(|c| c.surface == surface);
             for Contender { name, samples, .. } in of_surface() {
                 let mut push = |metric: &str, values: &[f64], unit: &str| {
@@ -241,10 +250,12 @@ impl Scene<'_> {
                 push("node_tests", &samples.node_tests, "tests");
                 push("triangle_tests", &samples.triangle_tests, "tests");
                 push("disagreement", &[f64::from(samples.disagreement)], "mm");
-                if *name == TRACKER {
+                if *name == TRACKER || *name == TRACKER_AT_LIMIT {
                     push("fallbacks", &[f64::from(samples.fallbacks)], "ticks");
                 }
             }
+            let level = f64::from(levels[surface as usize]);
+            records.push(Record::number(&cell, HYBRID, "split_level", level, "levels"));
             let find = |name: &str| of_surface().find(|c| c.name == name);
             for ours in OURS {
                 let Some(ours) = find(ours) else { continue };
@@ -270,7 +281,7 @@ impl Scene<'_> {
 const FIRST: u32 = 2;
 
 /// Methods of this library that take part.
-pub const OURS: [&str; 3] = [TRACKER, MEASURED_WARM, WARM];
+pub const OURS: [&str; 4] = [TRACKER, TRACKER_AT_LIMIT, MEASURED_WARM, WARM];
 
 /// Refits a tree of boxes once a frame, or at every tick, as the surface asks for.
 fn of_boxes<'a, M: dibs_tests::method::Layout + 'a>(

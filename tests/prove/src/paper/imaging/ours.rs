@@ -81,7 +81,7 @@ impl<'t, I: Index> Frames<'t, I> {
     }
 }
 
-/// A tracker: stretch and motion are measured once a frame.
+/// A tracker: the motion is measured once a frame, and the stretch too unless the tree's limit is assumed.
 pub struct Tracking<'t, I> {
     tracker: Box<Tracker<'t, I, MAX_STACK, OPENED>>,
     odometer: Odometer,
@@ -90,11 +90,16 @@ pub struct Tracking<'t, I> {
 }
 
 impl<'t, I: Index> Tracking<'t, I> {
-    pub fn new(built: &'t BuiltTree, tree: &'t Tree<'t, I>, surface: Surface) -> Self {
+    pub fn new(
+        built: &'t BuiltTree,
+        tree: &'t Tree<'t, I>,
+        surface: Surface,
+        is_measured: bool,
+    ) -> Self {
         Self {
             tracker: Box::new(Tracker::new(tree).expect("enough for any tree")),
             odometer: Odometer::new(tree),
-            frames: Frames::new(built, tree, true),
+            frames: Frames::new(built, tree, is_measured),
             surface,
         }
     }
