@@ -126,10 +126,10 @@ impl Scene<'_> {
         for rate in RATES {
             match built.index_bits() {
                 16 => {
-                    self.at(rate, &built, &built.tree::<u16>()?, &boxes, levels, &beat, records)?
+                    self.at(rate, &built, &built.tree::<u16>()?, &boxes, levels, &beat, records)?;
                 }
                 _ => {
-                    self.at(rate, &built, &built.tree::<u32>()?, &boxes, levels, &beat, records)?
+                    self.at(rate, &built, &built.tree::<u32>()?, &boxes, levels, &beat, records)?;
                 }
             }
         }

@@ -105,7 +105,7 @@ impl<'a> Race<'a> {
         let count = self.contenders.len();
         for place in 0..count {
             let contender = &mut self.contenders[(place + self.turns) % count];
-            if self.turns % contender.every != 0 {
+            if !self.turns.is_multiple_of(contender.every) {
                 continue;
             }
             contender.controller.receive(&self.before);
