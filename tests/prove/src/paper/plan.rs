@@ -34,7 +34,7 @@ pub struct Options {
 /// A part that is measured by itself.
 #[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Only {
-    /// The control loop at imaging rates: five minutes on a quiet machine.
+    /// The control loop at imaging rates: ten minutes on a quiet machine.
     Imaging,
 }
 

@@ -11,7 +11,7 @@ use glam::Vec3;
 
 use super::controller::{Controller, Tick, Times};
 
-/// Nodes that a tracker remembers with their children: more than any run here needs, so that none falls back.
+/// Nodes that a tracker remembers with their children: enough here, so that none falls back for want of places.
 const OPENED: usize = 1_024;
 
 /// The surface between two frames.
