@@ -1,5 +1,7 @@
 //! The benchmark's interface to all methods, this library's and others'.
 
+use std::ops::{Add, Mul, Sub};
+
 use dibs_nostd::{Capsule, Sphere};
 use glam::Vec3;
 
@@ -35,4 +37,16 @@ pub trait Method {
 
     /// The closest pair between the tool and the current surface.
     fn find(&mut self, tool: &Probe) -> Found;
+}
+
+/// A method whose positions another may write, in the method's own order and layout.
+pub trait Layout: Method {
+    /// A position as the method stores it.
+    type Position: Copy
+        + Add<Output = Self::Position>
+        + Sub<Output = Self::Position>
+        + Mul<f32, Output = Self::Position>;
+
+    /// The positions loaded last. A change counts from the next `update`.
+    fn positions_mut(&mut self) -> &mut [Self::Position];
 }

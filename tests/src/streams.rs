@@ -1,4 +1,5 @@
-//! The benchmark's seeded streams: deformed surfaces with tools around them, and the beating heart.
+//! The benchmark's seeded streams: deformed surfaces with tools around them, a surface that pulses, and the beating
+//! heart.
 
 use std::f32::consts::TAU;
 
@@ -44,12 +45,7 @@ impl<'m> Stream<'m> {
     pub fn deform(&mut self, positions: &mut Vec<Vec3>) {
         let (rng, middle, size) = (&mut self.rng, self.middle, self.size);
         let scale = Vec3::ONE + signed(rng) * 0.06;
-        let waves: [Wave; 3] = std::array::from_fn(|_| Wave {
-            // In turns a mm. The shortest wave is somewhat less than a third of the surface's diagonal.
-            along: unit(rng) * unit(rng) * (20.0 / TAU / size),
-            push: unit(rng) * size * 0.009,
-            phase: rng.f32(),
-        });
+        let waves: [Wave; 3] = std::array::from_fn(|_| Wave::new(rng, size));
         let bump = self.rest[rng.usize(..self.rest.len())] - middle;
         let height = unit(rng) * size * 0.016 * rng.f32();
         let narrow = 1.0 / (size * 0.24);
@@ -91,10 +87,58 @@ impl<'m> Stream<'m> {
     }
 }
 
+/// A surface with long waves that run over it, as the heartbeat and the breath move a brain.
+///
+/// The waves are as high and as long as those of a [`Stream`]'s frames.
+pub struct Pulse<'m> {
+    rest: &'m [Vec3],
+    middle: Vec3,
+    waves: [Wave; 3],
+}
+
+/// Turns a second of each wave: heartbeat, breath, and one between them.
+const PULSES: [f32; 3] = [1.0, 0.25, 0.6];
+
+impl<'m> Pulse<'m> {
+    /// A surface with these positions at rest.
+    #[must_use]
+    pub fn new(rest: &'m [Vec3], seed: u64) -> Self {
+        let low = rest.iter().copied().fold(Vec3::INFINITY, Vec3::min);
+        let high = rest.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
+        let mut rng = Rng::with_seed(seed);
+        let waves = std::array::from_fn(|_| Wave::new(&mut rng, (high - low).length()));
+        Self { rest, middle: (low + high) / 2.0, waves }
+    }
+
+    /// The positions after so many seconds.
+    pub fn deform(&self, seconds: f32, positions: &mut Vec<Vec3>) {
+        positions.clear();
+        positions.extend(self.rest.iter().map(|&rest| {
+            let from_middle = rest - self.middle;
+            self.waves.iter().zip(PULSES).fold(rest, |moved, (wave, pulse)| {
+                let turns = from_middle.dot(wave.along) + wave.phase + pulse * seconds;
+                moved + wave.push * smooth_wave(turns)
+            })
+        }));
+    }
+}
+
 struct Wave {
     along: Vec3,
     push: Vec3,
     phase: f32,
+}
+
+impl Wave {
+    /// A wave over a surface whose diagonal is `size`. Lengths are in turns a mm: the shortest wave is somewhat less
+    /// than a third of the diagonal.
+    fn new(rng: &mut Rng, size: f32) -> Self {
+        Self {
+            along: unit(rng) * unit(rng) * (20.0 / TAU / size),
+            push: unit(rng) * size * 0.009,
+            phase: rng.f32(),
+        }
+    }
 }
 
 fn signed(rng: &mut Rng) -> Vec3 {
@@ -137,9 +181,14 @@ impl<'m> Beat<'m> {
 
     /// The positions at a tick, interpolated between the two frames around it.
     pub fn deform(&self, tick: u32, positions: &mut Vec<Vec3>) {
+        self.deform_at(tick as f32 / TICK_RATE, positions);
+    }
+
+    /// The same after so many seconds.
+    pub fn deform_at(&self, seconds: f32, positions: &mut Vec<Vec3>) {
         let rate = if self.motion.rate > 0.0 { self.motion.rate } else { 25.0 };
         let frames = &self.motion.frames;
-        let time = (tick as f32 / TICK_RATE * rate).rem_euclid(frames.len() as f32);
+        let time = (seconds * rate).rem_euclid(frames.len() as f32);
         let first = time as usize % frames.len();
         let second = (first + 1) % frames.len();
         let share = time - time.floor();

@@ -21,9 +21,10 @@
 //! The builder avoids products that overflow or underflow; where it cannot, it stores a metric of zeros, which no
 //! triangle passes.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 use crate::math::sqrt::sqrt;
+use crate::math::vec3x4::Vec3x4;
 
 /// Half a unit in the last place of 1.
 pub(super) const U: f32 = 1.0 / 16_777_216.0;
@@ -70,6 +71,9 @@ pub(super) trait Measure {
     /// (`second`); `between` is the limit times the rest square. It may be false if `first` is 0. If it is true,
     /// `second` is positive.
     fn is_within(first: f32, second: f32, between: f32, now: Edges) -> bool;
+
+    /// The same of four triangles with the edges `now`, one bit each.
+    fn are_within(first: Vec4, second: Vec4, between: Vec4, now: [Vec3x4; 2]) -> u32;
 }
 
 /// The largest singular value.
@@ -105,6 +109,12 @@ impl Measure for SingularValue {
         let between = between - now.first.dot(now.second);
         first * second > between * between
     }
+
+    #[inline(always)]
+    fn are_within(first: Vec4, second: Vec4, between: Vec4, now: [Vec3x4; 2]) -> u32 {
+        let between = between - now[0].dot(now[1]);
+        (first * second).cmpgt(between * between).bitmask()
+    }
 }
 
 /// The largest ratio of an edge to its rest length.
@@ -136,6 +146,12 @@ impl Measure for LongestEdge {
     #[inline(always)]
     fn is_within(_: f32, second: f32, between: f32, now: Edges) -> bool {
         second > 0.0 && between >= (now.second - now.first).length_squared()
+    }
+
+    #[inline(always)]
+    fn are_within(_: Vec4, second: Vec4, between: Vec4, now: [Vec3x4; 2]) -> u32 {
+        let third = now[1].minus(now[0]);
+        (second.cmpgt(Vec4::ZERO) & between.cmpge(third.dot(third))).bitmask()
     }
 }
 

@@ -256,7 +256,7 @@ pub struct Odometer {
     vertices: usize,
     travel: Option<Travel>,
     /// Digest of the frame measured last.
-    digest: u32,
+    digest: [u32; 3],
 }
 
 impl Odometer {
@@ -268,7 +268,7 @@ impl Odometer {
             tree: tree.checksum(),
             vertices: tree.vertex_count() as usize,
             travel: None,
-            digest: 0,
+            digest: [0; 3],
         }
     }
 
@@ -327,18 +327,19 @@ fn next_chain() -> u32 {
     NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
-/// Digest of a frame: FNV-1a of the positions' bits, word by word.
-struct Digest(u32);
+/// Digest of a frame: FNV-1a of the positions' bits, word by word and each axis by itself, because a multiplication
+/// waits for the one before.
+struct Digest([u32; 3]);
 
 impl Digest {
     const fn new() -> Self {
-        Self(0x811C_9DC5)
+        Self([0x811C_9DC5; 3])
     }
 
     #[inline(always)]
     fn add(&mut self, position: Vec3) {
-        for axis in position.to_array() {
-            self.0 = (self.0 ^ axis.to_bits()).wrapping_mul(0x0100_0193);
+        for (digest, axis) in self.0.iter_mut().zip(position.to_array()) {
+            *digest = (*digest ^ axis.to_bits()).wrapping_mul(0x0100_0193);
         }
     }
 }

@@ -6,7 +6,7 @@ use dibs_build::Mesh;
 use glam::{Vec3, Vec3A};
 
 use super::bounds::Axis;
-use super::boxes::{self, BoxTree, Node, Rows, each_once};
+use super::boxes::{self, BoxTree, Node, Rows, Start, each_once};
 use crate::method::Found;
 
 /// Most triangles of a leaf.
@@ -15,7 +15,7 @@ const LEAF: usize = 6;
 const BINS: usize = 16;
 const BOX_COST: f32 = 1.0;
 /// Entries of the traversal's stack; `new` checks the tree's depth against them.
-const STACK: usize = 96;
+pub(super) const STACK: usize = 96;
 
 /// A box: its lowest and highest corner.
 pub type Bounds = [Vec3A; 2];
@@ -91,16 +91,28 @@ impl AabbTree {
         tree
     }
 
-    /// Refits a range of nodes that includes all their descendants. Leaves are first; inner nodes follow from the last
-    /// to the first, so that children come before parents.
+    /// Refits a range of nodes that includes all their descendants.
     pub(super) fn refit(&mut self, nodes: Range<usize>) {
+        self.refit_to(nodes, |positions, bounds, row| grown(bounds, positions[row]));
+    }
+
+    /// Refits all nodes to two frames, the one loaded and `before`. A box holds every position between the two.
+    pub(super) fn refit_over(&mut self, before: &[Vec3A]) {
+        self.refit_to(0..self.links.len(), |positions, bounds, row| {
+            grown(grown(bounds, positions[row]), before[row])
+        });
+    }
+
+    /// Leaves are first; inner nodes follow from the last to the first, so that children come before parents.
+    #[inline(always)]
+    fn refit_to(&mut self, nodes: Range<usize>, grow: impl Fn(&[Vec3A], Bounds, usize) -> Bounds) {
         let leaves = within(&self.leaves, &nodes);
         let mut start = self.leaf_start[leaves.start] as usize;
         let ends = &self.leaf_start[leaves.start + 1..=leaves.end];
         for (&leaf, &end) in self.leaves[leaves].iter().zip(ends) {
             let of_leaf = &self.leaf_vertices[start..end as usize];
             let positions = self.rows.positions();
-            let bounds = of_leaf.iter().fold(NOTHING, |b, &v| grown(b, positions[v as usize]));
+            let bounds = of_leaf.iter().fold(NOTHING, |b, &v| grow(positions, b, v as usize));
             self.boxes[leaf as usize] = bounds;
             start = end as usize;
         }
@@ -134,9 +146,10 @@ impl AabbTree {
     pub(super) fn closest<A: Axis>(
         &mut self,
         tool: &A,
+        start: &mut Start,
         refresh: impl FnMut(&mut Self, usize) -> u32,
     ) -> Found {
-        boxes::closest::<_, _, STACK>(&mut Refreshed { tree: self, refresh }, tool)
+        boxes::closest::<_, _, STACK>(&mut Refreshed { tree: self, refresh }, tool, start)
     }
 }
 

@@ -29,12 +29,32 @@ pub trait BoxTree {
     fn corners(&self, triangle: usize) -> [Vec3; 3];
 }
 
+/// A search's start, and the triangle that it ends with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Start {
+    /// Nothing is known.
+    #[default]
+    Cold,
+    /// A warm start from the last answer's triangle, if there is one.
+    Last(Option<usize>),
+}
+
 /// The closest pair. `STACK` must be at least the tree's depth.
 #[inline(always)]
-pub fn closest<A: Axis, T: BoxTree, const STACK: usize>(tree: &mut T, tool: &A) -> Found {
+pub fn closest<A: Axis, T: BoxTree, const STACK: usize>(
+    tree: &mut T,
+    tool: &A,
+    start: &mut Start,
+) -> Found {
     let axis = tool.prepare();
     let mut best = f32::INFINITY;
     let (mut node_tests, mut triangle_tests) = (1, 0);
+    if let Start::Last(Some(triangle)) = *start {
+        triangle_tests += 1;
+        if let Some(pair) = tool.closest_on_triangle(&tree.corners(triangle), best) {
+            best = pair.distance_squared;
+        }
+    }
     let mut stack = [(0.0_f32, 0_u32); STACK];
     let mut waiting = 0;
     let mut node = 0_u32;
@@ -63,6 +83,9 @@ pub fn closest<A: Axis, T: BoxTree, const STACK: usize>(tree: &mut T, tool: &A) 
                     triangle_tests += 1;
                     if let Some(pair) = tool.closest_on_triangle(&tree.corners(triangle), best) {
                         best = pair.distance_squared;
+                        if let Start::Last(last) = start {
+                            *last = Some(triangle);
+                        }
                     }
                 }
             }
@@ -119,6 +142,18 @@ impl Rows {
     #[must_use]
     pub fn positions(&self) -> &[Vec3A] {
         &self.positions
+    }
+
+    /// The positions by row, to be written.
+    pub fn positions_mut(&mut self) -> &mut [Vec3A] {
+        &mut self.positions
+    }
+
+    /// The rows of a triangle's corners.
+    #[inline(always)]
+    #[must_use]
+    pub fn triangle(&self, triangle: usize) -> [u32; 3] {
+        self.triangles[triangle]
     }
 
     /// The corners of a triangle.

@@ -3,10 +3,11 @@
 //! The boxes of the top levels are refitted bottom-up, starting at a *cut* of the tree, where each box is computed from
 //! the vertices below it. Each subtree below the cut is refitted when a query first enters it.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 use super::aabb_tree::{AabbTree, Bounds, DEFERRED, Link, grown, joined};
-use crate::method::{Found, Method, Probe};
+use super::boxes::Start;
+use crate::method::{Found, Layout, Method, Probe};
 
 /// A tree of boxes with a cut.
 pub struct Hybrid {
@@ -15,6 +16,7 @@ pub struct Hybrid {
     top: Vec<u32>,
     cut: Vec<Cut>,
     frame: u64,
+    start: Start,
 }
 
 /// A subtree below the cut.
@@ -52,7 +54,13 @@ impl Hybrid {
                 link.count = DEFERRED | number as u32;
             }
         }
-        Self { tree, top, cut, frame: 0 }
+        Self { tree, top, cut, frame: 0, start: Start::Cold }
+    }
+
+    /// The same, with every search started from the last answer's triangle.
+    #[must_use]
+    pub fn warm(self) -> Self {
+        Self { start: Start::Last(None), ..self }
     }
 }
 
@@ -110,8 +118,16 @@ impl Method for Hybrid {
             cut.first_child
         };
         match tool {
-            Probe::Sphere(sphere) => self.tree.closest(sphere, refresh),
-            Probe::Capsule(capsule) => self.tree.closest(capsule, refresh),
+            Probe::Sphere(sphere) => self.tree.closest(sphere, &mut self.start, refresh),
+            Probe::Capsule(capsule) => self.tree.closest(capsule, &mut self.start, refresh),
         }
+    }
+}
+
+impl Layout for Hybrid {
+    type Position = Vec3A;
+
+    fn positions_mut(&mut self) -> &mut [Vec3A] {
+        self.tree.rows.positions_mut()
     }
 }

@@ -8,9 +8,11 @@ mod exhaustive;
 mod hybrid;
 mod paper;
 mod refit;
+mod swept;
 
 pub use aabb_tree::AabbTree;
 pub use exhaustive::Exhaustive;
 pub use hybrid::Hybrid;
 pub use paper::Paper;
 pub use refit::Refit;
+pub use swept::Swept;

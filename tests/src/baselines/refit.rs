@@ -1,20 +1,28 @@
 //! The AABB tree refitted bottom-up at every frame (van den Bergen 1997).
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 use super::aabb_tree::AabbTree;
-use crate::method::{Found, Method, Probe};
+use super::boxes::Start;
+use crate::method::{Found, Layout, Method, Probe};
 
 /// A tree of boxes, all of them refitted before the first query of a frame.
 pub struct Refit {
     tree: AabbTree,
+    start: Start,
 }
 
 impl Refit {
     /// Refits this tree.
     #[must_use]
     pub fn new(tree: AabbTree) -> Self {
-        Self { tree }
+        Self { tree, start: Start::Cold }
+    }
+
+    /// The same, with every search started from the last answer's triangle.
+    #[must_use]
+    pub fn warm(self) -> Self {
+        Self { start: Start::Last(None), ..self }
     }
 }
 
@@ -30,8 +38,16 @@ impl Method for Refit {
     fn find(&mut self, tool: &Probe) -> Found {
         let never = |_: &mut AabbTree, _| unreachable!("no node is deferred");
         match tool {
-            Probe::Sphere(sphere) => self.tree.closest(sphere, never),
-            Probe::Capsule(capsule) => self.tree.closest(capsule, never),
+            Probe::Sphere(sphere) => self.tree.closest(sphere, &mut self.start, never),
+            Probe::Capsule(capsule) => self.tree.closest(capsule, &mut self.start, never),
         }
+    }
+}
+
+impl Layout for Refit {
+    type Position = Vec3A;
+
+    fn positions_mut(&mut self) -> &mut [Vec3A] {
+        self.tree.rows.positions_mut()
     }
 }

@@ -7,12 +7,17 @@ use serde::Deserialize;
 
 use super::measure::clock;
 use super::names::DIBS;
-use super::plan::{Options, Plan};
+use super::plan::{Only, Options, Plan};
 use super::record::{Cell, Record, Records};
 use crate::data::real;
 use crate::harness::run::Run;
 
 pub fn run(plan: &Plan, options: &Options, records: &mut Records) {
+    of("run", plan, options, records);
+}
+
+/// The facts of an experiment that may be recorded by itself.
+pub fn of(experiment: &str, plan: &Plan, options: &Options, records: &mut Records) {
     let Run { date, commit, compiler, machine, .. } = Run::now(plan.name.to_owned());
     let mut command = "cargo xtask bench".to_owned();
     if options.quick {
@@ -20,6 +25,9 @@ pub fn run(plan: &Plan, options: &Options, records: &mut Records) {
     }
     if let Some(queries) = options.queries {
         command += &format!(" --queries {queries}");
+    }
+    if options.only == Some(Only::Imaging) {
+        command += " --only imaging";
     }
     let meshes = match real() {
         Some(_) => "real anatomy (human brains and a human heart, beside the repository)",
@@ -34,9 +42,9 @@ pub fn run(plan: &Plan, options: &Options, records: &mut Records) {
         ("compiler", compiler),
         ("meshes", meshes.to_owned()),
     ] {
-        records.push(Record::fact(metric, note));
+        records.push(Record::fact(experiment, metric, note));
     }
-    let cell = Cell { experiment: "run".to_owned(), ..Cell::default() };
+    let cell = Cell { experiment: experiment.to_owned(), ..Cell::default() };
     records.push(Record::number(&cell, "", "clock", clock(), "us"));
 }
 

@@ -6,6 +6,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::brain::TOOLS;
+use super::imaging;
 use super::names::*;
 use super::record::{Cell, Record, Records};
 
@@ -14,9 +15,11 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 /// A colour that the colour-blind can distinguish from the others (Okabe and Ito).
 fn colour(method: &str) -> RGBColor {
     match method {
-        DIBS => RGBColor(0, 114, 178),
-        MEASURED => RGBColor(0, 158, 115),
-        PAPER => RGBColor(86, 180, 233),
+        DIBS | TRACKER => RGBColor(0, 114, 178),
+        TRACKER_AT_LIMIT => RGBColor(0, 60, 110),
+        MEASURED | MEASURED_WARM => RGBColor(0, 158, 115),
+        PAPER | WARM => RGBColor(86, 180, 233),
+        SWEPT => RGBColor(120, 120, 120),
         REFIT => RGBColor(213, 94, 0),
         HYBRID => RGBColor(230, 159, 0),
         OBVHS => RGBColor(204, 121, 167),
@@ -42,7 +45,7 @@ pub fn all(records: &Records) -> Result<Vec<(String, String)>> {
         }
         Ok::<_, anyhow::Error>((format!("figures/{name}.svg"), svg))
     };
-    Ok(vec![
+    let mut figures = vec![
         sheet("figure4", (1_080, 560), &|area| {
             for (area, tool) in area.split_evenly((1, 2)).iter().zip(TOOLS) {
                 total_against_size(area, records, tool)?;
@@ -63,7 +66,19 @@ pub fn all(records: &Records) -> Result<Vec<(String, String)>> {
             }
             Ok(())
         })?,
-    ])
+    ];
+    if !records.meshes(imaging::EXPERIMENT).is_empty() {
+        figures.push(sheet("imaging", (1_080, 960), &|area| {
+            let panels = imaging::SURFACES
+                .into_iter()
+                .flat_map(|surface| imaging::RATES.map(|rate| imaging::condition(rate, surface)));
+            for (area, condition) in area.split_evenly((2, 2)).iter().zip(panels) {
+                control_loop(area, records, &condition)?;
+            }
+            Ok(())
+        })?);
+    }
+    Ok(figures)
 }
 
 /// Points of a line: a mesh's size and a value, where it is above 0.
@@ -97,6 +112,32 @@ fn total_against_size(area: &Area<'_>, records: &Records, tool: &str) -> Result<
     let caption = format!("Refit and one query, {tool}");
     let axes = Axes::of(&TOOLS.map(lines).concat(), sizes(records, "brain"), "median total, µs");
     chart(area, &caption, &axes, &lines(tool), &[], SeriesLabelPosition::UpperLeft)
+}
+
+/// Table 4 as lines: the time of a tick with all work, against the size of the mesh.
+fn control_loop(area: &Area<'_>, records: &Records, condition: &str) -> Result<()> {
+    let methods = [
+        TRACKER,
+        TRACKER_AT_LIMIT,
+        MEASURED_WARM,
+        WARM,
+        REFIT,
+        HYBRID,
+        SWEPT,
+        OBVHS,
+        PARRY_BVH,
+        PARRY_TRIMESH,
+    ];
+    let lines = |condition: &str| {
+        methods.map(|m| (m, line(records, imaging::EXPERIMENT, condition, m, "total")))
+    };
+    let all = imaging::SURFACES.into_iter().flat_map(|surface| {
+        imaging::RATES.into_iter().flat_map(move |rate| lines(&imaging::condition(rate, surface)))
+    });
+    let sizes = sizes(records, imaging::EXPERIMENT);
+    let axes = Axes::of(&all.collect::<Vec<_>>(), sizes, "all work, µs a tick");
+    let lines: Vec<_> = lines(condition).into_iter().filter(|(_, l)| !l.is_empty()).collect();
+    chart(area, condition, &axes, &lines, &[], SeriesLabelPosition::UpperLeft)
 }
 
 /// Figure 6: the rate of motion above which not refitting is faster.

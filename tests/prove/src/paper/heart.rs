@@ -104,7 +104,7 @@ fn one(plan: &Plan, heart: &Heart, records: &mut Records) -> Result<()> {
 }
 
 /// The limit that a recorded motion needs, with a margin.
-fn sufficient_stretch(heart: &Heart) -> Result<f32> {
+pub fn sufficient_stretch(heart: &Heart) -> Result<f32> {
     let tree: BuiltTree = Builder::new().stretch(ANY_STRETCH).build(&heart.mesh)?;
     let stretch_of = stretch(&tree);
     let mut largest = 1.0_f32;

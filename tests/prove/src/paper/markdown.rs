@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::brain::TOOLS;
+use super::imaging;
 use super::names::*;
 use super::record::{Cell, Record, Records};
 
@@ -20,6 +21,7 @@ pub fn benchmarks(records: &Records) -> String {
     page.push_str(FIGURE_4);
     hearts(&mut page, records);
     cortex_m7(&mut page, records);
+    control_loop(&mut page, records);
     ratios(&mut page, records);
     crossovers(&mut page, records);
     page.push_str(FIGURE_6);
@@ -210,6 +212,144 @@ fn cortex_m7(page: &mut String, records: &Records) {
         value("frequency_mean"),
         value("frequency_worst")
     );
+}
+
+/// Table 4.
+fn control_loop(page: &mut String, records: &Records) {
+    let of_experiment = |experiment: &'static str| {
+        let meshes = records.meshes(experiment).into_iter();
+        meshes.map(move |(mesh, triangles)| (experiment, mesh, triangles))
+    };
+    let mut meshes: Vec<_> =
+        of_experiment(imaging::EXPERIMENT).chain(of_experiment(imaging::HEART)).collect();
+    if meshes.is_empty() {
+        return;
+    }
+    meshes.sort_by_key(|(.., triangles)| *triangles);
+    page.push_str(CONTROL_LOOP);
+    let fact = |metric| records.note_of(imaging::RUN, metric);
+    let _ = writeln!(
+        page,
+        "Recorded by `{}` on {}, commit {}, {}.\n",
+        fact("command"),
+        fact("machine"),
+        fact("commit"),
+        fact("date")
+    );
+    page.push_str(
+        "| surface | triangles | best peer | its total | tracker | ratio | of each period \
+         | tracker at the limit: ratio \
+         | warm query: ratio | warm query at the limit: ratio | boxes over both frames / tracker |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    let conditions: Vec<String> = imaging::SURFACES
+        .iter()
+        .flat_map(|&surface| imaging::RATES.map(|rate| imaging::condition(rate, surface)))
+        .collect();
+    for condition in &conditions {
+        for (experiment, mesh, triangles) in &meshes {
+            let of = Of(records, experiment, mesh, *triangles, condition);
+            let total = |method: &str| of.get(method, "total").map(|r| r.mean);
+            let peers = OTHERS.into_iter().filter_map(|peer| Some((peer, total(peer)?)));
+            let Some((best, theirs)) = peers.min_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
+            let Some(ours) = total(TRACKER) else { continue };
+            let each = of.get(TRACKER, &format!("total {best}"));
+            let ratio = |a: f64, b: Option<f64>| b.map_or("–".to_owned(), |b| number(a / b));
+            let _ = writeln!(
+                page,
+                "| {condition} | {mesh}, {triangles} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+                title(best),
+                number(theirs),
+                number(ours),
+                number(theirs / ours),
+                each.map_or("–".to_owned(), median),
+                ratio(theirs, total(TRACKER_AT_LIMIT)),
+                ratio(theirs, total(MEASURED_WARM)),
+                ratio(theirs, total(WARM)),
+                total(SWEPT).map_or("–".to_owned(), |swept| number(swept / ours)),
+            );
+        }
+    }
+    page.push_str("\n![imaging](figures/imaging.svg)\n");
+    for (experiment, mesh, triangles) in &meshes {
+        for condition in &conditions {
+            let of = Of(records, experiment, mesh, *triangles, condition);
+            periods(page, &of, &records.methods(experiment, mesh));
+        }
+    }
+    page.push_str(
+        "\n**The query alone**: a whole query with a warm start (`closest_wide`) against a tick of \
+         the tracker, both with measured stretch, µs a tick. The last column is the median over the \
+         imaging periods with its 95 % interval.\n\n\
+         | surface | triangles | warm query | tracker | ratio | of each period |\n\
+         |---|---|---|---|---|---|\n",
+    );
+    for (experiment, mesh, triangles) in &meshes {
+        for condition in &conditions {
+            let of = Of(records, experiment, mesh, *triangles, condition);
+            let query = |method| of.get(method, "query").map(|r| r.mean);
+            let (Some(warm), Some(tracker)) = (query(MEASURED_WARM), query(TRACKER)) else {
+                continue;
+            };
+            let each = of.get(TRACKER, &format!("query {MEASURED_WARM}"));
+            let _ = writeln!(
+                page,
+                "| {condition} | {mesh}, {triangles} | {} | {} | {} | {} |",
+                number(warm),
+                number(tracker),
+                number(warm / tracker),
+                each.map_or("–".to_owned(), median),
+            );
+        }
+    }
+}
+
+const CONTROL_LOOP: &str = "\n## Table 4: a control loop at imaging rates\n\n\
+    Frames come 30 or 60 times a second; the tool of table 3 is asked for 1,000 times a second, and all \
+    work counts: the mean time a tick, over whole imaging periods. Not in it is the arrival of the \
+    vertices, in each method's own order and layout: it is the same for all. The brain's surface pulses \
+    in long waves; the heart beats once a second. Where the surface is *held*, it stays as the last frame \
+    has it: trees of boxes are refitted once a frame. Where it is *continuous*, it is interpolated between \
+    the last two frames: trees of boxes have all their positions moved and are refitted at every tick. \
+    DIBS measures the stretch of each frame, and for the tracker its motion too, and interpolates the \
+    vertices that it reads. *At the limit* it measures no stretch, and relies on the tissue keeping to the \
+    tree's limit, as the paper does. All searches start from the last answer's triangle, except those of \
+    parry3d's `TriMesh`, which has no way to say so. parry3d, which is slow on large meshes, takes part there \
+    in fewer turns. Loops take turns of five periods in one process, in changing order, after \
+    one untimed period. Answers on the same surface are compared at every tick, and the run stops if two \
+    exact methods differ by more than 0.001 mm. The peer's and the tracker's total are in µs a tick; \
+    *ratio* is that of these means, and *of each period* the median of each period's ratio with its 95 % \
+    interval. *Boxes over both frames* is not what a library offers: its boxes hold \
+    both ends of each vertex's way, so that one refit a frame serves a continuous surface.\n\n";
+
+/// One surface and imaging rate of table 4.
+fn periods(page: &mut String, of: &Of<'_>, methods: &[String]) {
+    let Of(_, _, mesh, triangles, condition) = *of;
+    let level = of.get(HYBRID, "split_level").map_or(0.0, |r| r.mean);
+    let _ = writeln!(
+        page,
+        "\n**{mesh}, {triangles} triangles, {condition}**, split level of the hybrid {level}.\n\n\
+         | method | periods | refit or measuring | query | total | total, median | node tests | \
+         polygon tests | tracker's gain, median |\n|---|---|---|---|---|---|---|---|---|"
+    );
+    for method in methods {
+        let Some(total) = of.get(method, "total") else { continue };
+        let mean = |metric| of.get(method, metric).map_or("–".to_owned(), |r| number(r.mean));
+        let gain = of.get(TRACKER, &format!("total {method}"));
+        let _ = writeln!(
+            page,
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            title(method),
+            total.n,
+            mean("update"),
+            mean("query"),
+            mean("total"),
+            median(total),
+            mean("node_tests"),
+            mean("triangle_tests"),
+            gain.map_or("–".to_owned(), median),
+        );
+    }
 }
 
 fn ratios(page: &mut String, records: &Records) {

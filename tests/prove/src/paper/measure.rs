@@ -232,7 +232,7 @@ impl Samples {
     }
 }
 
-fn microseconds(start: Instant) -> f64 {
+pub fn microseconds(start: Instant) -> f64 {
     start.elapsed().as_nanos() as f64 / 1e3
 }
 

@@ -6,6 +6,7 @@ mod claims;
 mod facts;
 mod figures;
 mod heart;
+pub mod imaging;
 mod markdown;
 mod measure;
 mod names;
@@ -22,7 +23,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 
 pub use plan::Options;
-use plan::Plan;
+use plan::{Only, Plan};
 use record::Records;
 use xtask::workspace;
 
@@ -35,6 +36,13 @@ pub fn bench(options: &Options) -> Result<()> {
     let folder = options.out.clone().unwrap_or(default);
     let records = if options.render {
         Records::read(&folder.join("benchmarks.json"))?
+    } else if options.only == Some(Only::Imaging) {
+        let path = folder.join("benchmarks.json");
+        let mut records = if path.is_file() { Records::read(&path)? } else { Records::default() };
+        let start = Instant::now();
+        imaging::run(&Plan::of(options), options, &mut records)?;
+        println!("measured in {:.0} s", start.elapsed().as_secs_f64());
+        records
     } else if options.paper_search {
         let mut records = Records::read(&folder.join("benchmarks.json"))?;
         search::run(&Plan::of(options), &mut records)?;
@@ -71,6 +79,7 @@ pub fn run(plan: &Plan, options: &Options) -> Result<Records> {
     heart::run(plan, &mut records)?;
     ablation::run(plan, &mut records)?;
     search::run(plan, &mut records)?;
+    imaging::run(plan, options, &mut records)?;
     Ok(records)
 }
 

@@ -7,8 +7,13 @@ pub const DIBS: &str = "dibs";
 pub const MEASURED: &str = "dibs-measured";
 pub const WARM: &str = "dibs-warm";
 pub const MEASURED_WARM: &str = "dibs-measured-warm";
+pub const TRACKER: &str = "dibs-tracker";
+/// The tracker without measured stretch.
+pub const TRACKER_AT_LIMIT: &str = "dibs-tracker-limit";
 pub const REFIT: &str = "aabb-refit";
 pub const HYBRID: &str = "aabb-hybrid";
+/// Boxes over two frames, for a surface that moves between them.
+pub const SWEPT: &str = "aabb-swept";
 pub const EXHAUSTIVE: &str = "exhaustive";
 pub const OBVHS: &str = "obvhs";
 pub const PARRY_TRIMESH: &str = "parry-trimesh";
@@ -26,6 +31,9 @@ pub fn title(method: &str) -> &str {
         MEASURED => "DIBS, measured stretch",
         WARM => "DIBS, warm start",
         MEASURED_WARM => "DIBS, measured stretch, warm start",
+        TRACKER => "DIBS, measured stretch, tracker",
+        TRACKER_AT_LIMIT => "DIBS, tracker",
+        SWEPT => "AABB, boxes over both frames",
         REFIT => "AABB, bottom-up refit",
         HYBRID => "AABB, hybrid refit",
         EXHAUSTIVE => "exhaustive",

@@ -23,9 +23,19 @@ pub struct Options {
     /// Only counts the paper's own search anew, into the folder's benchmarks.json.
     #[arg(long)]
     pub paper_search: bool,
+    /// Measures only this part anew, into the folder's benchmarks.json; the other records stay as they are.
+    #[arg(long, value_enum, conflicts_with_all = ["render", "paper_search"])]
+    pub only: Option<Only>,
     /// Leaves out the emulated Cortex-M7.
     #[arg(long)]
     pub no_board: bool,
+}
+
+/// A part that is measured by itself.
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Only {
+    /// The control loop at imaging rates: ten minutes on a quiet machine.
+    Imaging,
 }
 
 /// The size of a run.
@@ -43,6 +53,9 @@ pub struct Plan {
     /// Brains of the ablation, and queries of each of its cells.
     pub ablation_brains: Vec<u32>,
     pub ablation_queries: usize,
+    /// Brains in the control loop at imaging rates, and its ticks.
+    pub imaging_brains: Vec<u32>,
+    pub imaging_ticks: u32,
 }
 
 impl Plan {
@@ -57,6 +70,8 @@ impl Plan {
             repetitions: 3,
             ablation_brains: vec![5_000, 50_000],
             ablation_queries: 1_000,
+            imaging_brains: vec![5_000, 50_000, 500_000],
+            imaging_ticks: 7_000,
         }
     }
 
@@ -78,6 +93,7 @@ impl Plan {
             repetitions: 3,
             ablation_brains: vec![5_000],
             ablation_queries: 200,
+            imaging_ticks: 1_000,
             ..Self::full()
         }
     }
@@ -93,6 +109,8 @@ impl Plan {
             repetitions: 2,
             ablation_brains: vec![500],
             ablation_queries: 5,
+            imaging_brains: vec![500],
+            imaging_ticks: 200,
         }
     }
 

@@ -11,7 +11,7 @@ use super::statistics::Summary;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// `run` (facts about the run), `brain` (tables 1 and 2), `heart` (table 3), `compare`, `crossover`,
-    /// `ablation`, `histogram`.
+    /// `ablation`, `histogram`, `imaging`, `imaging-heart` and `imaging-run` (their facts).
     pub experiment: String,
     pub mesh: String,
     pub triangles: u64,
@@ -62,8 +62,8 @@ impl Record {
     }
 
     /// A fact about the run.
-    pub fn fact(metric: &str, note: impl Into<String>) -> Self {
-        let cell = Cell { experiment: "run".to_owned(), ..Cell::default() };
+    pub fn fact(experiment: &str, metric: &str, note: impl Into<String>) -> Self {
+        let cell = Cell { experiment: experiment.to_owned(), ..Cell::default() };
         Self { note: note.into(), ..Self::number(&cell, "", metric, 0.0, "text") }
     }
 }
@@ -124,7 +124,12 @@ impl Records {
 
     /// The note of a fact, or nothing.
     pub fn note(&self, metric: &str) -> &str {
-        let found = self.0.iter().find(|r| r.experiment == "run" && r.metric == metric);
+        self.note_of("run", metric)
+    }
+
+    /// The note of a fact about an experiment that was recorded by itself, or nothing.
+    pub fn note_of(&self, experiment: &str, metric: &str) -> &str {
+        let found = self.0.iter().find(|r| r.experiment == experiment && r.metric == metric);
         found.map_or("", |r| &r.note)
     }
 

@@ -2,15 +2,22 @@
 
 use std::path::Path;
 
+use dibs_nostd::Sphere;
+use dibs_nostd::glam::Vec3;
+use dibs_prove::paper::imaging::controller::{Controller, Tick, Times};
+use dibs_prove::paper::imaging::ours::Surface;
+use dibs_prove::paper::imaging::race::{Contender, Period, Race};
 use dibs_prove::paper::plan::{Options, Plan};
-use dibs_prove::paper::record::Records;
-use dibs_prove::paper::{documents, run, write};
+use dibs_prove::paper::record::{Record, Records};
+use dibs_prove::paper::{documents, imaging, run, write};
+use dibs_tests::method::{Found, Probe};
 use xtask::workspace;
 
 #[test]
 fn every_experiment_runs_and_all_methods_agree() {
     let records = run(&Plan::smoke(), &Options::default()).expect("methods agree");
-    for experiment in ["brain", "heart", "ablation", "compare", "crossover", "histogram"] {
+    for experiment in ["brain", "heart", "ablation", "compare", "crossover", "histogram", "imaging"]
+    {
         let count = records.0.iter().filter(|r| r.experiment == experiment).count();
         assert!(count > 10, "{experiment}: {count} records");
     }
@@ -36,4 +43,50 @@ fn check(folder: &Path) {
         let found = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert!(found == expected, "{name} is not made from benchmarks.json: run with --render");
     }
+}
+
+/// A part that is recorded by itself replaces its own records, and leaves the others as they are.
+#[test]
+fn the_control_loop_is_recorded_apart_from_the_rest() {
+    let mut records = Records(vec![
+        Record::fact("run", "kind", "another run"),
+        Record::fact("imaging", "an older run", "to be replaced"),
+        Record::fact("brain", "total", "another run"),
+    ]);
+    let others = [records.0[0].clone(), records.0[2].clone()];
+    imaging::run(&Plan::smoke(), &Options::default(), &mut records).expect("methods agree");
+    assert_eq!(records.0[..2], others);
+    assert!(records.0[2..].iter().all(|r| r.experiment.starts_with("imaging")));
+    assert!(records.0.iter().all(|r| r.metric != "an older run"));
+}
+
+/// Answers the same to every tick.
+struct Fixed(f32);
+
+impl Controller for Fixed {
+    fn receive(&mut self, _: &[Vec3]) {}
+
+    fn run(&mut self, ticks: &[Tick], times: &mut Times) {
+        for _ in ticks {
+            times.query(|| Found { separation: self.0, tests: None });
+        }
+    }
+}
+
+#[test]
+fn a_control_loop_that_answers_otherwise_stops_the_run() {
+    let run = |other: Surface, separation: f32| {
+        let loops = vec![
+            Contender::new("first", Surface::Held, Fixed(1.0)),
+            Contender::new("other", other, Fixed(separation)),
+        ];
+        let tool = Probe::Sphere(Sphere::new(Vec3::ZERO, 1.0).expect("a sphere"));
+        let period = || Period { frame: Vec::new(), ticks: vec![Tick { tool, share: 0.0 }; 3] };
+        let mut race = Race::new(loops, Vec::new(), period());
+        race.period(period()).and_then(|()| race.finish())
+    };
+    assert!(run(Surface::Held, 1.0005).is_ok());
+    assert!(run(Surface::Held, 1.01).is_err());
+    assert!(run(Surface::Held, f32::NAN).is_err());
+    assert!(run(Surface::Continuous, 1.01).is_ok(), "answers on another surface");
 }

@@ -4,8 +4,8 @@
 use std::time::Duration;
 
 use dibs_build::Mesh;
-use dibs_tests::baselines::boxes::{BoxTree, Node, Rows, closest};
-use dibs_tests::method::{Found, Method, Probe};
+use dibs_tests::baselines::boxes::{BoxTree, Node, Rows, Start, closest};
+use dibs_tests::method::{Found, Layout, Method, Probe};
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
@@ -24,6 +24,7 @@ pub struct Obvhs {
     /// The vertices of each leaf, each once, and the end of each leaf's.
     leaf_vertices: Vec<u32>,
     leaf_end: Vec<u32>,
+    start: Start,
 }
 
 impl Obvhs {
@@ -50,7 +51,12 @@ impl Obvhs {
             leaf_vertices.extend(rows.vertices(range));
             leaf_end.push(leaf_vertices.len() as u32);
         }
-        Self { tree, rows, leaves, leaf_vertices, leaf_end }
+        Self { tree, rows, leaves, leaf_vertices, leaf_end, start: Start::Cold }
+    }
+
+    /// The same, with every search started from the last answer's triangle.
+    pub fn warm(self) -> Self {
+        Self { start: Start::Last(None), ..self }
     }
 }
 
@@ -98,9 +104,20 @@ impl Method for Obvhs {
     }
 
     fn find(&mut self, tool: &Probe) -> Found {
-        match tool {
-            Probe::Sphere(sphere) => closest::<_, _, STACK>(self, sphere),
-            Probe::Capsule(capsule) => closest::<_, _, STACK>(self, capsule),
-        }
+        let mut start = self.start;
+        let found = match tool {
+            Probe::Sphere(sphere) => closest::<_, _, STACK>(self, sphere, &mut start),
+            Probe::Capsule(capsule) => closest::<_, _, STACK>(self, capsule, &mut start),
+        };
+        self.start = start;
+        found
+    }
+}
+
+impl Layout for Obvhs {
+    type Position = Vec3A;
+
+    fn positions_mut(&mut self) -> &mut [Vec3A] {
+        self.rows.positions_mut()
     }
 }

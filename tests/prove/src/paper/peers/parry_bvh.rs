@@ -4,7 +4,8 @@ use std::cell::Cell;
 
 use dibs_build::Mesh;
 use dibs_tests::baselines::bounds::Axis;
-use dibs_tests::method::{Found, Method, Probe};
+use dibs_tests::baselines::boxes::Start;
+use dibs_tests::method::{Found, Layout, Method, Probe};
 use glam::{Vec3, Vec3A};
 use parry3d::bounding_volume::Aabb;
 use parry3d::math::Vector;
@@ -16,6 +17,7 @@ pub struct ParryBvh {
     tree: Bvh,
     triangles: Vec<[u32; 3]>,
     positions: Vec<Vec3>,
+    start: Start,
 }
 
 impl ParryBvh {
@@ -25,25 +27,46 @@ impl ParryBvh {
             tree: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes),
             triangles: mesh.triangles.clone(),
             positions: mesh.positions.clone(),
+            start: Start::Cold,
         }
     }
 
-    fn closest<A: Axis>(&self, tool: &A) -> Found {
+    /// The same, with every search started from the last answer's triangle.
+    pub fn warm(self) -> Self {
+        Self { start: Start::Last(None), ..self }
+    }
+
+    fn corners(&self, triangle: u32) -> [Vec3; 3] {
+        self.triangles[triangle as usize].map(|v| self.positions[v as usize])
+    }
+
+    fn closest<A: Axis>(&mut self, tool: &A) -> Found {
         let axis = tool.prepare();
+        let first = match self.start {
+            Start::Last(Some(triangle)) => {
+                tool.closest_on_triangle(&self.corners(triangle as u32), f32::INFINITY)
+            }
+            _ => None,
+        };
+        let first = first.map(|pair| pair.distance_squared);
         let [node_tests, triangle_tests] = [Cell::new(0), Cell::new(0)];
         let found = self.tree.find_best(
-            f32::MAX,
+            first.unwrap_or(f32::MAX),
             |node, best| {
                 node_tests.set(node_tests.get() + 1);
                 A::bound(&axis, from_parry(node.mins()), from_parry(node.maxs()), best)
             },
             |triangle, best| {
                 triangle_tests.set(triangle_tests.get() + 1);
-                let corners = self.triangles[triangle as usize].map(|v| self.positions[v as usize]);
-                tool.closest_on_triangle(&corners, best).map(|pair| pair.distance_squared)
+                tool.closest_on_triangle(&self.corners(triangle), best)
+                    .map(|pair| pair.distance_squared)
             },
         );
-        let squared = found.map_or(f32::INFINITY, |(_, squared)| squared);
+        if let (Start::Last(last), Some((triangle, _))) = (&mut self.start, found) {
+            *last = Some(triangle as usize);
+        }
+        triangle_tests.set(triangle_tests.get() + u32::from(first.is_some()));
+        let squared = found.map(|(_, squared)| squared).or(first).unwrap_or(f32::INFINITY);
         let separation = (squared.sqrt() - tool.radius()).max(0.0);
         Found { separation, tests: Some([node_tests.get(), triangle_tests.get()]) }
     }
@@ -77,5 +100,13 @@ impl Method for ParryBvh {
             Probe::Sphere(sphere) => self.closest(sphere),
             Probe::Capsule(capsule) => self.closest(capsule),
         }
+    }
+}
+
+impl Layout for ParryBvh {
+    type Position = Vec3;
+
+    fn positions_mut(&mut self) -> &mut [Vec3] {
+        &mut self.positions
     }
 }

@@ -2,7 +2,7 @@
 
 use dibs_build::Mesh;
 use dibs_nostd::Tool;
-use dibs_tests::method::{Found, Method, Probe};
+use dibs_tests::method::{Found, Layout, Method, Probe};
 use glam::Vec3;
 use parry3d::math::{Pose, Vector};
 use parry3d::query::distance;
@@ -49,5 +49,13 @@ impl Method for ParryTriMesh {
             }
         };
         Found { separation: found.expect("supported shapes").distance, tests: None }
+    }
+}
+
+impl Layout for ParryTriMesh {
+    type Position = Vector;
+
+    fn positions_mut(&mut self) -> &mut [Vector] {
+        &mut self.positions
     }
 }

@@ -1,0 +1,230 @@
+//! This library in a control loop.
+
+use dibs_build::BuiltTree;
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{
+    Arriving, Changed, Gate, Index, MeasuredStretch, MovingSurface, Odometer, Options, Proximity,
+    Query, StretchMonitor, Tracked, Tracker, Tree, Verdict, VertexTable,
+};
+use dibs_tests::method::{Found, Probe};
+use glam::Vec3;
+
+use super::controller::{Controller, Tick, Times};
+
+/// Nodes that a tracker remembers with their children: enough here, so that none falls back for want of places.
+const OPENED: usize = 1_024;
+
+/// The surface between two frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Surface {
+    /// As the last frame has it.
+    Held,
+    /// Interpolated between the last two frames: exact, and late by one.
+    Continuous,
+}
+
+/// A frame in the tree's order, with its stretch once that is measured.
+#[derive(Default)]
+struct Frame {
+    rows: Vec<Vec3>,
+    stretch: Option<MeasuredStretch>,
+}
+
+impl VertexTable for Frame {
+    fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    #[inline(always)]
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.rows.get(vertex as usize).copied()
+    }
+
+    fn stretch(&self) -> Option<MeasuredStretch> {
+        self.stretch
+    }
+}
+
+/// The last two frames, as they come from imaging.
+struct Frames<'t, I> {
+    order: &'t [u32],
+    monitor: Option<StretchMonitor<'t, I>>,
+    before: Frame,
+    after: Frame,
+}
+
+impl<'t, I: Index> Frames<'t, I> {
+    fn new(built: &'t BuiltTree, tree: &'t Tree<'t, I>, is_measured: bool) -> Self {
+        let monitor = is_measured.then(|| StretchMonitor::new(tree).expect("has a metric"));
+        let order = built.vertex_order();
+        Self { order, monitor, before: Frame::default(), after: Frame::default() }
+    }
+
+    fn receive(&mut self, frame: &[Vec3]) {
+        std::mem::swap(&mut self.before, &mut self.after);
+        let Frame { rows, stretch } = &mut self.after;
+        rows.clear();
+        rows.extend(self.order.iter().map(|&vertex| frame[vertex as usize]));
+        *stretch = None;
+    }
+
+    /// Measures the last frame.
+    fn measure(&mut self) {
+        let Some(monitor) = &mut self.monitor else { return };
+        let count = self.after.rows.len() as u32;
+        monitor.begin(Changed::Whole);
+        monitor.moved(0..count);
+        let verdict = monitor.advance(Arriving::new(&self.after, count), u32::MAX);
+        let Ok(Verdict::Admitted(stretch)) = verdict else { panic!("{verdict:?}") };
+        monitor.published();
+        self.after.stretch = stretch;
+    }
+}
+
+/// A tracker: the motion is measured once a frame, and the stretch too unless the tree's limit is assumed.
+pub struct Tracking<'t, I> {
+    tracker: Box<Tracker<'t, I, MAX_STACK, OPENED>>,
+    odometer: Odometer,
+    frames: Frames<'t, I>,
+    surface: Surface,
+}
+
+impl<'t, I: Index> Tracking<'t, I> {
+    pub fn new(
+        built: &'t BuiltTree,
+        tree: &'t Tree<'t, I>,
+        surface: Surface,
+        is_measured: bool,
+    ) -> Self {
+        Self {
+            tracker: Box::new(Tracker::new(tree).expect("enough for any tree")),
+            odometer: Odometer::new(tree),
+            frames: Frames::new(built, tree, is_measured),
+            surface,
+        }
+    }
+}
+
+impl<I: Index> Controller for Tracking<'_, I> {
+    fn receive(&mut self, frame: &[Vec3]) {
+        self.frames.receive(frame);
+    }
+
+    fn run(&mut self, ticks: &[Tick], times: &mut Times) {
+        let Self { tracker, odometer, frames, surface } = self;
+        times.update(|| frames.measure());
+        let step = times.update(|| odometer.step(&frames.before, &frames.after));
+        for tick in ticks {
+            let mut is_fallback = false;
+            times.query(|| {
+                let tracked = match surface {
+                    Surface::Held => track(tracker, &step.after(), &tick.tool),
+                    Surface::Continuous => track(tracker, &step.at(tick.share), &tick.tool),
+                };
+                is_fallback = tracked.fallback.is_some();
+                found(&tracked.closest)
+            });
+            times.fallbacks += u32::from(is_fallback);
+        }
+    }
+}
+
+fn track<I: Index, S: MovingSurface>(
+    tracker: &mut Tracker<'_, I, MAX_STACK, OPENED>,
+    surface: &S,
+    tool: &Probe,
+) -> Tracked {
+    let options = Options::new().unsigned();
+    let tracked = match tool {
+        Probe::Sphere(sphere) => tracker.closest(surface, sphere, &options),
+        Probe::Capsule(capsule) => tracker.closest(surface, capsule, &options),
+    };
+    tracked.expect("finite positions")
+}
+
+/// A whole query at every tick, from the last answer's triangle.
+pub struct Warm<'t, I> {
+    query: Query<'t, I, MAX_STACK>,
+    frames: Frames<'t, I>,
+    surface: Surface,
+}
+
+impl<'t, I: Index> Warm<'t, I> {
+    pub fn new(
+        built: &'t BuiltTree,
+        tree: &'t Tree<'t, I>,
+        surface: Surface,
+        is_measured: bool,
+    ) -> Self {
+        let query = Query::new(tree).expect("enough for any tree");
+        Self { query, frames: Frames::new(built, tree, is_measured), surface }
+    }
+}
+
+impl<I: Index> Controller for Warm<'_, I> {
+    fn receive(&mut self, frame: &[Vec3]) {
+        self.frames.receive(frame);
+    }
+
+    fn run(&mut self, ticks: &[Tick], times: &mut Times) {
+        let Self { query, frames, surface } = self;
+        times.update(|| frames.measure());
+        for tick in ticks {
+            times.query(|| match surface {
+                Surface::Held => ask(query, &frames.after, &tick.tool),
+                Surface::Continuous => ask(query, &Between::new(frames, tick.share), &tick.tool),
+            });
+        }
+    }
+}
+
+/// The surface between two frames whose motion is not measured.
+struct Between<'f> {
+    before: &'f Frame,
+    after: &'f Frame,
+    share: f32,
+    stretch: Option<MeasuredStretch>,
+}
+
+impl<'f> Between<'f> {
+    fn new<I>(frames: &'f Frames<'_, I>, share: f32) -> Self {
+        let Frames { before, after, .. } = frames;
+        let both = before.stretch.zip(after.stretch);
+        let stretch = both.and_then(|(before, after)| before.or_larger(after));
+        Self { before, after, share, stretch }
+    }
+}
+
+impl VertexTable for Between<'_> {
+    fn len(&self) -> usize {
+        self.after.len()
+    }
+
+    #[inline(always)]
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        let (before, after) = (self.before.position(vertex)?, self.after.position(vertex)?);
+        Some(before + (after - before) * self.share)
+    }
+
+    fn stretch(&self) -> Option<MeasuredStretch> {
+        self.stretch
+    }
+}
+
+fn ask<I: Index>(
+    query: &mut Query<'_, I, MAX_STACK>,
+    surface: &impl VertexTable,
+    tool: &Probe,
+) -> Found {
+    let options = Options::new().unsigned();
+    let closest = match tool {
+        Probe::Sphere(sphere) => query.closest_wide(surface, sphere, &options),
+        Probe::Capsule(capsule) => query.closest_wide(surface, capsule, &options),
+    };
+    found(&closest.expect("finite positions"))
+}
+
+fn found(closest: &Proximity) -> Found {
+    let tests = Some([closest.node_tests, closest.triangle_tests]);
+    Found { separation: closest.separation.max(0.0), tests }
+}

@@ -1,0 +1,74 @@
+//! The AABB tree refitted once a frame to that frame and the one before, for a surface that moves between the two.
+//!
+//! A box around both ends of a vertex's way holds all of the way, so one refit serves every tick of the period. Corners
+//! are interpolated as they are read.
+
+use glam::{Vec3, Vec3A};
+
+use super::aabb_tree::{AabbTree, Bounds, Link, STACK};
+use super::boxes::{BoxTree, Node, Start, closest};
+use crate::method::{Found, Probe};
+
+/// A tree of boxes over two frames.
+pub struct Swept {
+    tree: AabbTree,
+    before: Vec<Vec3A>,
+    share: f32,
+    start: Start,
+}
+
+impl Swept {
+    /// Refits this tree. Searches start from the last answer's triangle.
+    #[must_use]
+    pub fn new(tree: AabbTree) -> Self {
+        Self { tree, before: Vec::new(), share: 0.0, start: Start::Last(None) }
+    }
+
+    /// Loads the next frame. The one loaded last becomes the one before.
+    pub fn load(&mut self, positions: &[Vec3]) {
+        self.before.clear();
+        self.before.extend_from_slice(self.tree.rows.positions());
+        self.tree.rows.load(positions);
+    }
+
+    /// All work of a frame before its first query.
+    pub fn update(&mut self) {
+        self.tree.refit_over(&self.before);
+    }
+
+    /// The closest pair between the tool and the surface at `share` of the way between the two frames.
+    pub fn find(&mut self, tool: &Probe, share: f32) -> Found {
+        self.share = share;
+        let mut start = self.start;
+        let found = match tool {
+            Probe::Sphere(sphere) => closest::<_, _, STACK>(self, sphere, &mut start),
+            Probe::Capsule(capsule) => closest::<_, _, STACK>(self, capsule, &mut start),
+        };
+        self.start = start;
+        found
+    }
+}
+
+impl BoxTree for Swept {
+    #[inline(always)]
+    fn node(&mut self, node: u32) -> Node {
+        match self.tree.links[node as usize] {
+            Link { first, count: 0 } => Node::Inner(first),
+            Link { first, count } => Node::Leaf(first as usize..(first + count) as usize),
+        }
+    }
+
+    #[inline(always)]
+    fn bounds(&self, node: u32) -> Bounds {
+        self.tree.boxes[node as usize]
+    }
+
+    #[inline(always)]
+    fn corners(&self, triangle: usize) -> [Vec3; 3] {
+        self.tree.rows.triangle(triangle).map(|row| {
+            let (before, after) =
+                (self.before[row as usize], self.tree.rows.positions()[row as usize]);
+            Vec3::from(before + (after - before) * self.share)
+        })
+    }
+}
