@@ -9,7 +9,9 @@ use dibs_build::generate;
 fn main() -> Result<()> {
     let out = PathBuf::from(env::var("OUT_DIR")?);
     surface()?;
-    if env::var("CARGO_CFG_TARGET_OS")? == "none" {
+    // A board that takes only the library has a memory map of its own.
+    let has_program = ["CARGO_FEATURE_BOARD", "CARGO_FEATURE_CYCLES"].map(env::var_os);
+    if env::var("CARGO_CFG_TARGET_OS")? == "none" && has_program.iter().any(Option::is_some) {
         link(&out)?;
     }
     Ok(())

@@ -135,8 +135,12 @@ impl Receiver {
         self.assembler.gate().tree().mesh_id()
     }
 
-    /// The status for the sender; `None` unless due. `tick` is the present control tick, 1 ms.
-    pub fn status<'b>(&mut self, tick: u32, packet: &'b mut [u8; STATUS_MTU]) -> Option<&'b [u8]> {
+    /// The status for the sender, of at most `N` bytes; `None` unless due. `tick` is the present control tick, 1 ms.
+    pub fn status<'b, const N: usize>(
+        &mut self,
+        tick: u32,
+        packet: &'b mut [u8; N],
+    ) -> Option<&'b [u8]> {
         if !self.has_news && tick.wrapping_sub(self.reported) < REPORT_INTERVAL {
             return None;
         }

@@ -32,6 +32,8 @@ pub struct Options {
 pub fn test(options: &Options) -> Result<()> {
     let mut steps = Steps::default();
     steps.cargo("format", &["fmt", "--all", "--check"], &[]);
+    let board = ["fmt", "--check", "--manifest-path", "examples/stm32h743/Cargo.toml"];
+    steps.cargo("format of the board apart", &board, &[]);
     // Lints and documentation take the tests' profile, so that common dependencies are built once.
     let lints = ["clippy", "--release", "--workspace", "--all-targets", "--", "-D", "warnings"];
     steps.cargo("lints", &lints, &[]);
@@ -64,7 +66,7 @@ pub fn test(options: &Options) -> Result<()> {
         Ok(cross) => {
             println!("\nboard: {}", cross.describe());
             steps.run("core crate for the board", || core_crate(&cross));
-            steps.run("lints of the firmware", || firmware_lints(&cross));
+            steps.run("lints of the firmware", || firmware_lints(&cross, is_whole));
             steps.run("C interface for the board", || c_interface::has_no_panic_path(&cross));
             if options.whole {
                 steps.run("a new user", || new_user(&cross));
@@ -142,7 +144,7 @@ fn core_crate(cross: &Cross) -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-fn firmware_lints(cross: &Cross) -> Result<Outcome> {
+fn firmware_lints(cross: &Cross, is_whole: bool) -> Result<Outcome> {
     if !matches!(cross, Cross::Rustup) {
         return Ok(Outcome::Skipped("Debian's compiler comes without clippy".to_owned()));
     }
@@ -151,6 +153,12 @@ fn firmware_lints(cross: &Cross) -> Result<Outcome> {
         command.args(["--quiet", "--package", "firmware-example", "--bin", program]);
         command.args(["--features", program, "--profile", "firmware", "--", "-D", "warnings"]);
         run(&mut command)?;
+    }
+    // The drivers take as long again to check as to build.
+    let buses: &[&[&str]] = &[&[], &["--features", "fdcan"]];
+    for bus in buses.iter().filter(|_| is_whole) {
+        let mut command = cross.cargo_apart("examples/stm32h743", "clippy");
+        run(command.args(["--quiet", "--release"]).args(*bus).args(["--", "-D", "warnings"]))?;
     }
     Ok(Outcome::Passed)
 }

@@ -50,6 +50,29 @@ impl Cross {
     /// `cargo SUBCOMMAND` for the board. Each toolchain has its own target folder, so that two compilers do not
     /// discard each other's output.
     pub fn cargo(&self, subcommand: &str) -> Command {
+        let mut command = self.cargo_in(&self.target_dir(), subcommand);
+        command.current_dir(workspace::root());
+        command
+    }
+
+    /// `cargo SUBCOMMAND` for a board whose crate is apart from the workspace. With a target folder of its own it does not
+    /// wait for other builds.
+    pub fn cargo_apart(&self, folder: &str, subcommand: &str) -> Command {
+        let mut command = self.cargo_in(&self.target_dir_apart(folder), subcommand);
+        command.current_dir(workspace::root().join(folder));
+        command
+    }
+
+    /// The path of a program of [`cargo_apart`](Self::cargo_apart).
+    pub fn program_apart(&self, folder: &str, name: &str) -> PathBuf {
+        self.target_dir_apart(folder).join(TARGET).join("release").join(name)
+    }
+
+    fn target_dir_apart(&self, folder: &str) -> PathBuf {
+        self.target_dir().join("apart").join(folder)
+    }
+
+    fn cargo_in(&self, target_dir: &Path, subcommand: &str) -> Command {
         let mut command = match self {
             Self::Rustup => {
                 let mut command = Command::new("cargo");
@@ -69,8 +92,7 @@ impl Cross {
                 command
             }
         };
-        command.args(["--target", TARGET, "--target-dir"]).arg(self.target_dir());
-        command.current_dir(workspace::root());
+        command.args(["--target", TARGET, "--target-dir"]).arg(target_dir);
         command
     }
 

@@ -13,14 +13,15 @@ use anyhow::{Context, Result, bail, ensure};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 
 /// Stack of an exception's entry: 26 words with the FPU's registers, and alignment.
-const EXCEPTION_FRAME: u32 = 26 * 4 + 8;
+pub const EXCEPTION_FRAME: u32 = 26 * 4 + 8;
 
 /// One function of the binary.
 #[derive(Default)]
 struct Function {
     name: String,
     frame: u32,
-    calls: BTreeSet<u32>,
+    /// Targets of branches out of it, and where they are.
+    calls: BTreeMap<u32, Vec<u32>>,
     /// Branches to an address in a register.
     indirect: u32,
 }
@@ -104,10 +105,7 @@ impl Binary {
     pub fn worst(&self) -> Result<Worst> {
         // Vectors after the initial stack pointer: reset, NMI, hard fault, ...; SysTick is the 15th,
         // the bus the first interrupt.
-        let vector =
-            |number: usize| self.vectors.get(number - 1).copied().context("vector missing");
-        let (idle, bus, control) = (vector(1)?, vector(16)?, vector(15)?);
-        for root in [bus, control] {
+        for root in [self.handler(16)?, self.handler(15)?] {
             let indirect = self.indirect(root);
             ensure!(
                 indirect.is_empty(),
@@ -115,25 +113,75 @@ impl Binary {
                 indirect.join(", ")
             );
         }
-        let fault = self.deepest(vector(3)?, &mut Vec::new())?;
-        let depth = |root| self.deepest(root, &mut Vec::new());
-        let (idle, bus, control) = (depth(idle)?, depth(bus)?, depth(control)?);
+        let fault = self.depth(3)?;
+        let (idle, bus, control) = (self.depth(1)?, self.depth(16)?, self.depth(15)?);
         let total = idle + bus + control + fault + 3 * EXCEPTION_FRAME;
         Ok(Worst { idle, bus, control, total })
     }
 
-    /// Functions below `root` that branch to an address in a register.
-    pub fn indirect(&self, root: u32) -> Vec<String> {
+    /// The handler of an exception, by its number: `SysTick` is the 15th.
+    pub fn handler(&self, exception: usize) -> Result<u32> {
+        self.vectors.get(exception - 1).copied().context("vector missing")
+    }
+
+    /// The number of the exception whose handler has this name.
+    pub fn exception(&self, name: &str) -> Result<usize> {
+        let place = self.vectors.iter().position(|&vector| self.name(vector) == Some(name));
+        Ok(place.with_context(|| format!("no vector leads to {name}"))? + 1)
+    }
+
+    /// The name of the function at an address.
+    pub fn name(&self, address: u32) -> Option<&str> {
+        self.functions.get(&address).map(|function| &*function.name)
+    }
+
+    /// Functions below `root`, itself included, by address.
+    pub fn below(&self, root: u32) -> BTreeSet<u32> {
         let mut seen = BTreeSet::from([root]);
         let mut next = vec![root];
-        let mut found = Vec::new();
         while let Some(function) = next.pop().and_then(|address| self.functions.get(&address)) {
-            if function.indirect > 0 {
-                found.push(function.name.clone());
-            }
-            next.extend(function.calls.iter().filter(|&&call| seen.insert(call)));
+            next.extend(function.calls.keys().filter(|&&call| seen.insert(call)));
         }
-        found
+        seen
+    }
+
+    /// The deepest stack of an exception's handler, by its number.
+    pub fn depth(&self, exception: usize) -> Result<u32> {
+        self.deepest(self.handler(exception)?, &mut Vec::new())
+    }
+
+    /// Functions below `root` that branch to an address in a register.
+    pub fn indirect(&self, root: u32) -> Vec<String> {
+        let below = self.below(root);
+        let functions = below.iter().filter_map(|address| self.functions.get(address));
+        let found = functions.filter(|function| function.indirect > 0);
+        found.map(|function| function.name.clone()).collect()
+    }
+
+    /// Functions that panic: the handler, and those of `core` that lead to it.
+    pub fn panicking(&self) -> BTreeSet<u32> {
+        let is_start = |name: &str| name.contains("begin_unwind") || name.contains("panicking::");
+        let named = self.functions.iter().filter(|(_, function)| is_start(&function.name));
+        let mut found: BTreeSet<u32> = named.map(|(&address, _)| address).collect();
+        loop {
+            let leads = |function: &Function| function.calls.keys().any(|c| found.contains(c));
+            let more = self.functions.iter().filter(|(address, function)| {
+                function.name.starts_with("core::") && !found.contains(address) && leads(function)
+            });
+            let more: Vec<u32> = more.map(|(&address, _)| address).collect();
+            if more.is_empty() {
+                return found;
+            }
+            found.extend(more);
+        }
+    }
+
+    /// Branches to one of these functions from any other function, by address.
+    pub fn branches_to(&self, targets: &BTreeSet<u32>) -> Vec<u32> {
+        let others = self.functions.iter().filter(|(address, _)| !targets.contains(address));
+        let calls = others.flat_map(|(_, function)| &function.calls);
+        let wanted = calls.filter(|(target, _)| targets.contains(target));
+        wanted.flat_map(|(_, places)| places).copied().collect()
     }
 
     /// Indirect calls of start-up and the idle loop.
@@ -148,7 +196,7 @@ impl Binary {
         ensure!(!above.contains(&address), "recursion through {}", function.name);
         above.push(address);
         let mut below = 0;
-        for &call in &function.calls {
+        for &call in function.calls.keys() {
             below = below.max(self.deepest(call, above)?);
         }
         above.pop();
@@ -191,6 +239,10 @@ fn decode(
         let at = (address - start) as usize;
         body.get(at..at + 2).map_or(0, |b| u32::from(u16::from_le_bytes([b[0], b[1]])))
     };
+    if let Some(target) = long_branch([0, 2, 4, 6, 8].map(|offset| half(start + offset))) {
+        function.calls.entry(target).or_default().push(start);
+        return;
+    }
     let mut at = start;
     while at + 1 < end {
         if marks.range(..=at).next_back().is_some_and(|(_, &is_code)| !is_code) {
@@ -201,7 +253,7 @@ fn decode(
         let is_wide = first >> 11 >= 0b11101;
         let mut leave = |target: u32, is_call: bool| {
             if is_call || target < start || target >= end {
-                function.calls.insert(target);
+                function.calls.entry(target).or_default().push(at);
             }
         };
         if is_wide {
@@ -250,6 +302,20 @@ fn decode(
         }
         at += if is_wide { 4 } else { 2 };
     }
+}
+
+/// Target of a branch that the linker put in because it is far, from flash to the TCM: MOVW ip, MOVT ip, BX ip.
+fn long_branch(halves: [u32; 5]) -> Option<u32> {
+    let [first, second, third, fourth, last] = halves;
+    let half = |first: u32, second: u32| {
+        (first & 15) << 12 | (first >> 10 & 1) << 11 | (second >> 12 & 7) << 8 | second & 0xFF
+    };
+    let loads_ip = first & 0xFBF0 == 0xF240
+        && third & 0xFBF0 == 0xF2C0
+        && second >> 8 & 15 == 12
+        && fourth >> 8 & 15 == 12;
+    let target = half(third, fourth) << 16 | half(first, second);
+    (loads_ip && last == 0x4760).then_some(target & !1)
 }
 
 /// Bytes by which a wide instruction lowers the stack pointer.

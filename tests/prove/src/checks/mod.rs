@@ -3,6 +3,7 @@
 mod anytime;
 pub mod bits;
 mod board_faults;
+pub mod boards;
 mod corruption;
 pub mod cost;
 mod demo;
@@ -53,6 +54,7 @@ pub const CHECKS: &[Check] = &[
     flood::CHECK,
     demo_c::CHECK,
     examples::CHECK,
+    boards::CHECK,
     rot::CHECK,
     host_faults::CHECK,
     board_faults::CHECK,
@@ -69,13 +71,15 @@ pub const CHECKS: &[Check] = &[
     python::CHECK,
 ];
 
-/// Names of the checks on the other core: most without an emulator, the demo in C, and the other processors.
-pub const BESIDE: [&str; 12] = [
+/// Names of the checks on the other core: most without an emulator, the demo in C, the other processors,
+/// and the boards.
+pub const BESIDE: [&str; 13] = [
     sanitizers::ADDRESS.name,
     sanitizers::THREAD.name,
     interleavings::CHECK.name,
     demo_c::CHECK.name,
     other_processors::CHECK.name,
+    boards::CHECK.name,
     miri::CHECK.name,
     fuzz::CHECK.name,
     cost::HOST.name,

@@ -93,16 +93,20 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     }
     let script = Script::adversarial(effort.bits, Draw::EitherWay, 2);
     let path = Script::beating(effort.ticks.min(MOST_TICKS), Start::Warm, Asks::Distance);
-    let [here, there] = [&script, &path].map(|script| Build::Release.answers(script));
-    let (here, there) = (here?, there?);
-    figures.note("processors.queries", script.queries() as f64);
+    let tiny = Script::subnormal();
+    let [here, there, near] = [&script, &path, &tiny].map(|script| Build::Release.answers(script));
+    let (here, there, near) = (here?, there?, near?);
+    figures.note("processors.queries", (script.queries() + tiny.queries()) as f64);
     figures.note("processors.ticks", path.queries() as f64);
     for machine in &MACHINES {
         let program = machine.build()?;
         let name = machine.name;
         let answers = on_machine(&mut machine.boot(&program), &script)?;
         let on_path = on_machine(&mut machine.boot(&program), &path)?;
-        let different = differences(&here, &answers, name) + differences(&there, &on_path, name);
+        let on_tiny = on_machine(&mut machine.boot(&program), &tiny)?;
+        let different = differences(&here, &answers, name)
+            + differences(&there, &on_path, name)
+            + differences(&near, &on_tiny, name);
         figures.note(&format!("processors.{name}.different"), different as f64);
         figures.note(&format!("processors.{name}.mean"), machine.mean(&on_path)?);
     }

@@ -62,6 +62,14 @@ pub fn figure(id: &str) -> Result<f64> {
         .with_context(|| format!("no figure {id}: `cargo xtask guarantees` measures it"))
 }
 
+/// A committed text.
+pub fn text(id: &str) -> Result<String> {
+    let records = committed()?;
+    let record = records.iter().find(|record| record.id == id);
+    let text = record.and_then(|record| record.figure.as_str());
+    text.map(str::to_owned).with_context(|| format!("no text {id}"))
+}
+
 /// Every promise, and its check, in the order of the document.
 pub fn promises() -> impl Iterator<Item = (&'static Check, &'static Promise)> {
     CHECKS.iter().flat_map(|check| check.promises.iter().map(move |promise| (check, promise)))

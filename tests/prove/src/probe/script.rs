@@ -263,6 +263,26 @@ impl Script {
         script
     }
 
+    /// Capsules beside a ball, with one coordinate that is subnormal: a processor that flushes those to zero answers with
+    /// another point of the axis.
+    pub fn subnormal() -> Self {
+        let mesh = surfaces::ball(1);
+        let built = build(&mesh, 8);
+        let tree = built.tree::<u16>().expect("16-bit indices");
+        let mut script = Self::default();
+        script.tree(&built);
+        script.rows(&built.to_rows(&mesh.positions), tree.triangle_count());
+        for number in 0..64 {
+            let tiny = f32::from_bits(1 << (number % 23));
+            let height = 45.0 + 0.1 * number as f32;
+            let (start, end) = (Vec3::new(tiny, -60.0, height), Vec3::new(tiny, 50.0, height));
+            let tool = Instrument::capsule(start, end, 2.5);
+            script.query(&tool, true, true, u32::MAX, Budget::UNLIMITED, None);
+        }
+        script.words.push(command::END);
+        script
+    }
+
     /// The script's bytes.
     pub fn bytes(&self) -> Vec<u8> {
         self.words.iter().flat_map(|word| word.to_le_bytes()).collect()

@@ -1,0 +1,84 @@
+//! The controller on a NUCLEO-H743ZI2: `docs/boards.md`.
+//!
+//! The control tick (`SysTick`, 1 kHz) runs above everything else, from memory without wait states. The idle loop takes
+//! packets from Ethernet, or from FDCAN with the feature `fdcan`, checks complete frames and the tree in flash a slice
+//! at a time, and sends statuses.
+#![no_std]
+#![no_main]
+
+#[cfg(not(feature = "fdcan"))]
+#[path = "ethernet.rs"]
+mod bus;
+#[cfg(feature = "fdcan")]
+#[path = "fdcan.rs"]
+mod bus;
+mod clocks;
+#[path = "../../../firmware-example/src/bin/board/exclusive.rs"]
+mod exclusive;
+mod memory;
+mod tick;
+
+use core::panic::PanicInfo;
+
+use bus::Bus;
+use controller::{BusStatus, Control, Receiver, Upkeep, surface};
+use cortex_m::Peripherals;
+use cortex_m::peripheral::SCB;
+use cortex_m_rt::entry;
+
+static FRAMES: surface::Surface = surface::Surface::new();
+static BUS: BusStatus = BusStatus::new();
+
+#[entry]
+fn main() -> ! {
+    static mut TREE: Option<surface::Tree> = None;
+    match start(TREE) {
+        Some((receiver, bus)) => idle(receiver, bus),
+        // Anything wrong here is wrong before the robot moves.
+        None => loop {
+            cortex_m::asm::wfi();
+        },
+    }
+}
+
+/// Starts the control tick and the bus; `None` if the tree is damaged or a constant out of range.
+fn start(tree: &'static mut Option<surface::Tree>) -> Option<(Receiver, Bus)> {
+    let mut core = Peripherals::take()?;
+    memory::protect(&mut core);
+    let parts = clocks::start();
+    memory::start_sram3();
+    // Validated once, before its first use; from then on `Upkeep` checks it.
+    let tree: &'static surface::Tree = tree.insert(surface::TREE.validate().ok()?);
+    let (writer, reader) = FRAMES.split().ok()?;
+    let control = Control::new(tree, reader, &BUS, &bus::TRUST).ok()?;
+    let receiver = Receiver::new(tree, writer, &BUS).ok()?;
+    let bus = Bus::start(parts)?;
+    tick::start(&mut core, control);
+    Some((receiver, bus))
+}
+
+fn idle(mut receiver: Receiver, mut bus: Bus) -> ! {
+    let mut status = [0; bus::STATUS_MTU];
+    let mut upkeep = Upkeep::new(&BUS);
+    loop {
+        bus.poll(tick::now(), |packet| take(&mut receiver, packet));
+        receiver.work();
+        upkeep.step();
+        if let Some(status) = receiver.status(tick::now(), &mut status) {
+            bus.send(status);
+        }
+    }
+}
+
+/// Takes a packet. Returns whether it was a good one.
+// Not inlined, so that the panic paths of the driver that calls it are not mixed with code of the controller.
+#[inline(never)]
+fn take(receiver: &mut Receiver, packet: &[u8]) -> bool {
+    receiver.packet(packet, tick::now())
+}
+
+/// The drivers have panic paths: `docs/boards.md`. A reset makes the output zero.
+#[panic_handler]
+fn panic(_: &PanicInfo) -> ! {
+    SCB::sys_reset()
+}

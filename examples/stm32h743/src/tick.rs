@@ -1,0 +1,84 @@
+//! The control tick: `SysTick`, 1 kHz, above all other interrupts.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use controller::{Control, TICK_RATE};
+use cortex_m::Peripherals;
+use cortex_m::peripheral::scb::SystemHandler;
+use cortex_m::peripheral::syst::SystClkSource;
+use cortex_m::peripheral::{DWT, SYST};
+
+use crate::clocks;
+use crate::exclusive::Exclusive;
+
+/// Cycles between two ticks.
+const PERIOD: u32 = clocks::HERTZ / TICK_RATE;
+
+#[unsafe(link_section = ".dtcm.control")]
+static CONTROL: Exclusive<Option<Control>> = Exclusive::new(None);
+
+/// What a debugger reads, in words. In the TCM, where no cache is between.
+#[repr(C)]
+pub struct Watch {
+    /// Control ticks run so far.
+    ticks: AtomicU32,
+    /// Most cycles from the moment a tick was due to its first instruction.
+    latest_start: AtomicU32,
+    /// Most cycles from the moment a tick was due to its end.
+    latest_end: AtomicU32,
+    /// Ticks that were due before the one before had ended.
+    deadlines_missed: AtomicU32,
+    /// The force on the instrument in N, as bits of `f32`. Here a robot has its actuators.
+    force: [AtomicU32; 3],
+}
+
+/// The run so far.
+#[unsafe(no_mangle)]
+#[unsafe(link_section = ".dtcm.watch")]
+pub static WATCH: Watch = Watch {
+    ticks: AtomicU32::new(0),
+    latest_start: AtomicU32::new(0),
+    latest_end: AtomicU32::new(0),
+    deadlines_missed: AtomicU32::new(0),
+    force: [const { AtomicU32::new(0) }; 3],
+};
+
+/// Ticks so far: the controller's time in ms.
+pub fn now() -> u32 {
+    WATCH.ticks.load(Ordering::Relaxed)
+}
+
+/// Starts the ticks.
+pub fn start(core: &mut Peripherals, control: Control) {
+    CONTROL.with(|place| *place = Some(control));
+    core.DCB.enable_trace();
+    DWT::unlock(); // the M7's lock access register
+    core.DWT.enable_cycle_counter();
+    // SAFETY: no critical section relies on priorities, and the handler's state is in place.
+    unsafe { core.SCB.set_priority(SystemHandler::SysTick, 0) };
+    core.SYST.set_clock_source(SystClkSource::Core);
+    core.SYST.set_reload(PERIOD - 1);
+    core.SYST.clear_current();
+    core.SYST.enable_counter();
+    core.SYST.enable_interrupt();
+}
+
+/// The vector leads here without a step through flash.
+#[unsafe(no_mangle)]
+#[unsafe(link_section = ".itcm.tick")]
+extern "C" fn SysTick() {
+    // It has counted down since this tick was due.
+    let late = PERIOD.wrapping_sub(SYST::get_current()) % PERIOD;
+    let start = DWT::cycle_count();
+    let record = CONTROL.with(|control| Some(control.as_mut()?.tick(DWT::cycle_count))).flatten();
+    if let Some(record) = record {
+        for (part, newton) in WATCH.force.iter().zip(record.force) {
+            part.store(newton.to_bits(), Ordering::Relaxed);
+        }
+    }
+    WATCH.ticks.fetch_add(1, Ordering::Relaxed);
+    let end = late.wrapping_add(DWT::cycle_count().wrapping_sub(start));
+    WATCH.latest_start.fetch_max(late, Ordering::Relaxed);
+    WATCH.latest_end.fetch_max(end, Ordering::Relaxed);
+    WATCH.deadlines_missed.fetch_add(end / PERIOD, Ordering::Relaxed);
+}
