@@ -78,8 +78,8 @@ pub use bus::{Advance, Assembler, BusHealth, LastHeartbeat, Progress, ReceiveErr
 pub use control::{constraint, failsafe};
 pub use error::Error;
 pub use query::{
-    Budget, Closest, ClosestTracked, Contact, Contacts, Cost, Fallback, NoSide, Options, Proximity,
-    Query, Side, Sweep, Swept, Tracked, Tracker,
+    Budget, Closest, Contact, Contacts, Cost, Fallback, NoSide, Options, Proximity, Query, Side,
+    Sweep, Swept, Tracked, Tracker,
 };
 pub use stretch::{
     Arriving, Changed, Gate, StretchError, StretchMonitor, SurfaceLimits, Unchecked, Verdict,

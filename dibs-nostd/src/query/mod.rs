@@ -22,7 +22,7 @@ pub use options::{Budget, Options};
 pub use proximity::Proximity;
 pub use side::{NoSide, Side};
 pub use swept::{Sweep, Swept};
-pub use tracker::{ClosestTracked, Fallback, Tracked, Tracker};
+pub use tracker::{Fallback, Tracked, Tracker};
 
 use glam::Vec3;
 

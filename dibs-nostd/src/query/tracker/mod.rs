@@ -15,7 +15,6 @@ use crate::surface::motion::Unit;
 use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Tool, Travel, Tree, TriangleRow};
 use front::Front;
-pub use several::ClosestTracked;
 
 /// Most units that the odometer may count between two tests of a bound: half of the range that it can tell apart.
 const FARTHEST: u32 = 1 << 29;
@@ -100,6 +99,10 @@ pub struct Tracked {
     pub fallback: Option<Fallback>,
     /// Places of the tracker's `OPENED` used since the front last started.
     pub opened: u32,
+    /// Of [`Tracker::closest_of`], the closest pair's index; else 0.
+    pub pair: usize,
+    /// Pairs that were searched; the others were certain to be farther.
+    pub searched: u32,
 }
 
 /// Why a tick was a whole query.
@@ -205,7 +208,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         let closest = signed(&self.tree, &mut self.stack, surface, tool, options, closest, error)?;
         self.behind = if is_complete { 0 } else { self.behind.saturating_add(moved) };
         self.last = travel.map(|travel| Last::new(tool, travel, &closest));
-        Ok(Tracked { closest, fallback, opened: self.front.borrow().used() as u32 })
+        let opened = self.front.borrow().used() as u32;
+        Ok(Tracked { closest, fallback, opened, pair: 0, searched: 1 })
     }
 
     /// The closest pair, and all contacts within `margin` (mm): those of [`Query::contacts`](crate::Query::contacts).

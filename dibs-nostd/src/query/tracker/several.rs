@@ -1,25 +1,9 @@
 //! Several trackers: the closest of all pairs. A pair that is certain to be farther is not looked at.
 
-use super::{Fallback, Tracker};
+use super::{Tracked, Tracker};
 use crate::query::{NoSide, Options, Proximity, Side};
 use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Tool};
-
-/// The closest of several tracked pairs of a tool and a surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[non_exhaustive]
-pub struct ClosestTracked {
-    /// The pair's index in the slice.
-    pub pair: usize,
-    /// The pair. Its interval begins at the least lower end of all pairs, its accuracy is the worst, its tests are
-    /// those of all. Its side is not known ([`NoSide::CutShort`]) if the budget left that of any pair open.
-    pub closest: Proximity,
-    /// Pairs that were searched; the others were certain to be farther.
-    pub searched: u32,
-    /// The reason of the first of them that was a whole query.
-    pub fallback: Option<Fallback>,
-}
 
 impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OPENED> {
     /// The closest of several pairs of a surface and a tool, each with a tracker of its own; `None` for an empty slice. A
@@ -28,6 +12,9 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
     /// A pair is passed over while it is certain to be farther than the closest one: its distance when it was last
     /// searched, less the motion since. A tool that was outside a closed surface then is outside still. Pairs inside or
     /// crossing are searched at every tick.
+    ///
+    /// The interval begins at the least lower end of all pairs, the accuracy is the worst, the tests are those of all. The
+    /// side is not known ([`NoSide::CutShort`]) if the budget left that of any pair open.
     ///
     /// Cost: the budget at most, for all pairs together.
     ///
@@ -63,9 +50,9 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
     pub fn closest_of<S: MovingSurface + ?Sized, T: Tool>(
         pairs: &mut [(&mut Self, &S, &T)],
         options: &Options,
-    ) -> Result<Option<ClosestTracked>, QueryError> {
+    ) -> Result<Option<Tracked>, QueryError> {
         let Some(first) = Self::nearest(pairs, options) else { return Ok(None) };
-        let mut found: Option<ClosestTracked> = None;
+        let mut found: Option<Tracked> = None;
         let mut rest = *options;
         let others = (0..pairs.len()).filter(|&at| at != first);
         for at in [first].into_iter().chain(others) {
@@ -76,10 +63,9 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
                 continue;
             }
             let tracked = tracker.closest(*surface, *tool, &rest)?;
-            let own = tracked.closest;
+            let own = &tracked.closest;
             rest = rest.budget(rest.budget.less(own.node_tests, own.triangle_tests));
-            let own =
-                ClosestTracked { pair: at, closest: own, searched: 1, fallback: tracked.fallback };
+            let own = Tracked { pair: at, ..tracked };
             found = Some(found.map_or(own, |found| found.and(own)));
         }
         Ok(found)
@@ -116,28 +102,27 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
     }
 }
 
-impl ClosestTracked {
+impl Tracked {
     /// The closer of two pairs, with what was found out of both.
     fn and(self, other: Self) -> Self {
         let (one, two) = (self.closest, other.closest);
-        let is_closer = two.separation < one.separation;
-        let (pair, closest) = if is_closer { (other.pair, two) } else { (self.pair, one) };
+        let closer = if two.separation < one.separation { other } else { self };
+        // A pair whose side the budget left open may be inside.
+        let cut_short = Side::Undefined(NoSide::CutShort);
+        let is_open = one.side == cut_short || two.side == cut_short;
         let closest = Proximity {
             lower: if two.lower < one.lower { two.lower } else { one.lower },
             accuracy: if two.accuracy > one.accuracy { two.accuracy } else { one.accuracy },
             node_tests: one.node_tests.saturating_add(two.node_tests),
             triangle_tests: one.triangle_tests.saturating_add(two.triangle_tests),
-            ..closest
+            side: if is_open { cut_short } else { closer.closest.side },
+            ..closer.closest
         };
-        // A pair whose side the budget left open may be inside.
-        let cut_short = Side::Undefined(NoSide::CutShort);
-        let side = if self.closest.side == cut_short || other.closest.side == cut_short {
-            cut_short
-        } else {
-            closest.side
-        };
-        let closest = Proximity { side, ..closest };
-        let searched = self.searched.saturating_add(other.searched);
-        Self { pair, closest, searched, fallback: self.fallback.or(other.fallback) }
+        Self {
+            closest,
+            fallback: self.fallback.or(other.fallback),
+            searched: self.searched.saturating_add(other.searched),
+            ..closer
+        }
     }
 }
