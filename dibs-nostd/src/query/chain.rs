@@ -152,13 +152,13 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// let built = Builder::new().build(&heart)?;
     /// let tree = Tree::<u16>::from_bytes(built.blob())?;
     /// let rows = built.to_rows(&heart.positions);
-    /// let beside: Vec<Vec3> = rows.iter().map(|row| *row + Vec3::new(160.0, 0.0, 0.0)).collect();
+    /// let beside: Vec<Vec3> = rows.iter().map(|row| *row + Vec3::new(130.0, 0.0, 0.0)).collect();
     ///
     /// let (mut one, mut other) = (Query::<_, 32>::new(&tree)?, Query::<_, 32>::new(&tree)?);
     /// let tool = Capsule::new(Vec3::new(80.0, 0.0, -40.0), Vec3::new(80.0, 0.0, 40.0), 2.5)?;
-    /// let mut contacts = Contacts::<8>::new();
+    /// let mut contacts = Contacts::<32>::new();
     /// let mut scene = [(&mut one, rows.as_slice()), (&mut other, beside.as_slice())];
-    /// Query::contacts_in_scene(&mut scene, &[tool], 40.0, &Options::new(), &mut contacts)?;
+    /// Query::contacts_in_scene(&mut scene, &[tool], 60.0, &Options::new(), &mut contacts)?;
     /// for surface in 0..2 {
     ///     assert!(contacts.iter().any(|contact| contact.surface == surface));
     /// }
