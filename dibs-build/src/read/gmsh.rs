@@ -85,7 +85,7 @@ impl Mesh {
         Ok(())
     }
 
-    /// The physical groups of surfaces, which stand behind those of points and curves.
+    /// The physical groups of surfaces. In the file they follow the groups of points and of curves.
     fn entities(&mut self, file: &mut Cursor<'_>) -> Result<()> {
         skip_line(file);
         let counts = file.numbers(4, Scalar::U64, "numbers of entities")?;

@@ -27,7 +27,7 @@ pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
     }
     let mut raw = Raw::new(0);
     let (mut cells, mut types) = (Vec::new(), Vec::new());
-    // Values at cells are in this order, whatever the order of the file.
+    // A file may have these in any order; its cells' values count lines, polygons and bands in this one.
     let (mut lines, mut polygons, mut bands) = (0, Vec::new(), Vec::new());
     let mut labels = None;
     while let Some(keyword) = file.word() {

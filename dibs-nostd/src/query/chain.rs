@@ -210,7 +210,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         Ok(scene.finish())
     }
 
-    /// Numbers of the surfaces, that of the nearest of the last answers first.
+    /// Indices of the surfaces. The first is the one whose last answer is nearest to a tool now.
     fn nearest_surface_first<V: VertexTable + ?Sized, T: Tool>(
         surfaces: &[(&mut Self, &V)],
         tools: &[T],

@@ -85,10 +85,10 @@ pub(super) struct PointSide {
 /// On a face or an edge it is then within that angle of the normal cone, and a pseudonormal has no negative product with
 /// any direction of its feature's normal cone: a product farther from zero than that angle's has the right sign.
 ///
-/// A vertex may have no normal cone (a saddle), and is never the closest point then, only nearly. If a triangle there is
-/// closer, the point leans over one of its edges from the vertex, and the point is on its own side of that triangle or,
-/// over an edge, of one of the two next to it. So the side is that of the pseudonormal only if no triangle that the
-/// point leans over says otherwise.
+/// A vertex may have no normal cone (a saddle). It is then never the closest point, only nearly. If a triangle at the
+/// vertex is closer, the point leans over one of that triangle's edges. If the closest point is inside the triangle, the
+/// triangle's normal has the right sign; if it is on the edge, the normal of one of the edge's two triangles has. So the
+/// pseudonormal's sign counts only if no triangle that the point leans over has the other one.
 ///
 /// Any other product leaves the side undefined.
 pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(

@@ -214,7 +214,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
 
     /// The closest pair, and all contacts within `margin` (mm): those of [`Query::contacts`](crate::Query::contacts).
     ///
-    /// Cost: that of [`closest`](Self::closest), and within the margin that of a range search, which keeps no front.
+    /// Cost: that of [`closest`](Self::closest), and a range search where the surface is within the margin. The range search
+    /// has no memory of the last tick.
     ///
     /// # Errors
     /// Those of [`Query::contacts`](crate::Query::contacts).
