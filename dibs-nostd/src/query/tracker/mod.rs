@@ -214,8 +214,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
 
     /// The closest pair, and all contacts within `margin` (mm): those of [`Query::contacts`](crate::Query::contacts).
     ///
-    /// Cost: that of [`closest`](Self::closest), and a range search where the surface is within the margin. The range search
-    /// has no memory of the last tick.
+    /// Cost: that of [`closest`](Self::closest), and where the surface is within the margin a range search, which has no
+    /// memory of the last tick.
     ///
     /// # Errors
     /// Those of [`Query::contacts`](crate::Query::contacts).
