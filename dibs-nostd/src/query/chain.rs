@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::contacts::Pair;
-use super::search::Search;
+use super::search::{Search, WITHIN};
 use super::{Contacts, NoSide, Options, Proximity, Query, Side, signed};
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, TriangleRow, VertexTable};
@@ -61,12 +61,11 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         let mut search =
             Search::start(&self.tree, &mut self.stack, vertices, tool, options, first)?;
         let limit = search.limit_to(separation);
-        let found = search.run::<true>(limit)?;
+        let found = search.run::<WITHIN>(limit)?;
         self.triangle = found.triangle.or(self.triangle);
         // A search that its budget ended has a lower bound below the limit.
         let is_farther = !(found.separation <= separation) && found.lower >= limit - tool.radius();
-        let error = vertices.position_error();
-        let found = signed(&self.tree, &mut self.stack, vertices, tool, options, found, error)?;
+        let found = signed(&self.tree, &mut self.stack, vertices, tool, options, found, None)?;
         Ok((found, is_farther))
     }
 

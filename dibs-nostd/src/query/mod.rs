@@ -28,8 +28,8 @@ use glam::Vec3;
 
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
-use depth::Depth;
-use search::{Search, Waiting, WideSearch};
+use depth::{Depth, Known};
+use search::{Search, WHOLE, Waiting, WideSearch};
 
 /// A query on one tree, with the fixed stack that its traversal needs: 8 bytes an entry.
 ///
@@ -86,10 +86,9 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     ) -> Result<Proximity, QueryError> {
         let first = options.first(self.triangle);
         let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options, first)?;
-        let found = search.run::<false>(f32::INFINITY)?;
+        let found = search.run::<WHOLE>(f32::INFINITY)?;
         self.triangle = found.triangle.or(self.triangle);
-        let error = vertices.position_error();
-        signed(&self.tree, &mut self.stack, vertices, tool, options, found, error)
+        signed(&self.tree, &mut self.stack, vertices, tool, options, found, None)
     }
 
     /// As [`closest`](Self::closest), in batches of up to seven subtrees: for processors that overlap instructions
@@ -111,13 +110,12 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options, first)?;
         let found = WideSearch::new(search).run()?;
         self.triangle = found.triangle.or(self.triangle);
-        let error = vertices.position_error();
-        signed(&self.tree, &mut self.stack, vertices, tool, options, found, error)
+        signed(&self.tree, &mut self.stack, vertices, tool, options, found, None)
     }
 }
 
-/// Adds the side, and the signed separation that follows from it. Both take the table's positions as exact; `error`,
-/// their position error, is added to the accuracy last.
+/// Adds the side, and the signed separation that follows from it. Both take the table's positions as exact; their
+/// position error is added to the accuracy last. `known` is a tracker's memory of the last tick's depth.
 #[inline(never)]
 fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     tree: &Tree<'_, I>,
@@ -126,8 +124,9 @@ fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     tool: &T,
     options: &Options,
     mut found: Proximity,
-    error: f32,
+    known: Option<&mut Known>,
 ) -> Result<Proximity, QueryError> {
+    let error = vertices.position_error();
     // No triangle is closer than one that is touched, so its side is certain without the rest of the budget.
     let touches = found.triangle.is_some() && found.axis_distance <= found.accuracy;
     let reason = if !options.is_signed {
@@ -145,9 +144,12 @@ fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
         return Ok(found);
     }
     if touches && tool.axis_length() > 0.0 {
-        let mut found = Depth::new(tree, stack, vertices, tool, options, &found).run()?;
+        let mut found = Depth::new(tree, stack, vertices, tool, options, &found).run(known)?;
         found.accuracy += error;
         return Ok(found);
+    }
+    if let Some(known) = known {
+        known.forget();
     }
     let on_axis = tool.axis_point(found.axis_parameter);
     let at = side::of_point(tree, vertices, &found, on_axis)?;

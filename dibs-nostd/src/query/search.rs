@@ -35,6 +35,13 @@ pub(super) struct Waiting {
 /// Weight of each corner in the mean that a triangle's plane faces.
 const THIRD: f32 = 1.0 / 3.0;
 
+/// A search with its limit at infinity.
+pub(super) const WHOLE: u8 = 0;
+/// A search that began with the cutoff at its limit, which bounds the subtrees that it never visited.
+pub(super) const WITHIN: u8 = 1;
+/// A search that ends once a point of the surface is found within its limit.
+pub(super) const UNTIL: u8 = 2;
+
 /// The outcome of a visit to a subtree.
 enum Step {
     /// Finished; any children that remain wait on the stack.
@@ -180,9 +187,9 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
 
     /// Visits subtrees, near ones first, until none below the cutoff is left or the budget runs out.
     ///
-    /// A limited search began with the cutoff at `limit`, which bounds the subtrees that it never visited. Each kind is a
-    /// function with one caller, into which it is inlined: this keeps the plain query's loop in registers.
-    pub fn run<const IS_LIMITED: bool>(mut self, limit: f32) -> Result<Proximity, QueryError> {
+    /// Each kind is a function with one caller, into which it is inlined: this keeps the plain query's loop in
+    /// registers.
+    pub fn run<const KIND: u8>(mut self, limit: f32) -> Result<Proximity, QueryError> {
         while let Some(top) = self.waiting.checked_sub(1) {
             self.waiting = top;
             let &Waiting { lower, link } =
@@ -190,17 +197,20 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             if lower > self.cutoff {
                 continue;
             }
+            if KIND == UNTIL && self.cutoff <= limit {
+                return self.finish(self.least_waiting(lower));
+            }
             let step = match Link::decode(link) {
                 Link::Children { first, count } => self.expand(lower, first, count)?,
                 Link::Leaf { first, count } => self.leaf(first, count)?,
             };
             if matches!(step, Step::OutOfBudget) {
                 let least = self.least_waiting(lower);
-                let is_beyond = IS_LIMITED && self.is_beyond(limit) && limit < least;
+                let is_beyond = KIND == WITHIN && self.is_beyond(limit) && limit < least;
                 return self.finish(if is_beyond { limit } else { least });
             }
         }
-        self.finish(if IS_LIMITED && self.is_beyond(limit) { limit } else { f32::INFINITY })
+        self.finish(if KIND == WITHIN && self.is_beyond(limit) { limit } else { f32::INFINITY })
     }
 
     /// Lowers the cutoff to `separation` (mm) from the tool. Returns the limit on the distance from its axis, with

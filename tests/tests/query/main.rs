@@ -17,5 +17,6 @@ mod side;
 mod slack;
 mod swept;
 mod tracked_chain;
+mod tracked_depth;
 mod tracker;
 mod wide;

@@ -8,7 +8,8 @@ mod tests;
 use glam::Vec3;
 
 use super::contacts::Pair;
-use super::search::{Outcome, Search, Tick, Waiting};
+use super::depth::Known;
+use super::search::{Outcome, Search, Tick, WHOLE, Waiting};
 use super::{Budget, Contacts, NoSide, Options, Proximity, Side, signed};
 use crate::math::sqrt::sqrt;
 use crate::surface::motion::Unit;
@@ -38,7 +39,10 @@ const FARTHEST: u32 = 1 << 29;
 /// as a rule; the repository's `docs/guarantees.md` has the most that a beating heart took. If `OPENED` is too small,
 /// ticks are whole queries. Keep it in a `static`: it can be larger than a controller's stack.
 ///
-/// RAM: 8 bytes for each entry of the stack, 44 for each opened node.
+/// Where the axis crosses the surface, it remembers which parts of the axis cannot be deepest, and searches those points
+/// that may have become so.
+///
+/// RAM: 8 bytes for each entry of the stack, 44 for each opened node, and 600.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -72,6 +76,7 @@ pub struct Tracker<'t, I, const STACK: usize, const OPENED: usize> {
     now: u32,
     /// Units since every bound due was tested.
     behind: u32,
+    known: Known,
     triangle: Option<TriangleRow>,
 }
 
@@ -138,6 +143,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
             last: None,
             now: 0,
             behind: 0,
+            known: Known::new(Unit::of(tree)),
             triangle: None,
         })
     }
@@ -182,10 +188,12 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
             Err(fallback) => {
                 self.front.borrow().clear();
                 self.behind = 0;
+                self.known.forget();
                 (0, Some(fallback))
             }
         };
         self.now = self.now.wrapping_add(moved);
+        self.known.add_motion(moved);
         let first = self.triangle.or(options.first(None));
         let search = Search::start(&self.tree, &mut self.stack, surface, tool, options, first)?;
         let tick = Tick::new(search, self.front.borrow(), self.unit, self.now, options.budget);
@@ -204,8 +212,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
                 (self.whole(surface, tool, options, best, tests)?, false)
             }
         };
-        let error = surface.position_error();
-        let closest = signed(&self.tree, &mut self.stack, surface, tool, options, closest, error)?;
+        let known = Some(&mut self.known);
+        let closest = signed(&self.tree, &mut self.stack, surface, tool, options, closest, known)?;
         self.behind = if is_complete { 0 } else { self.behind.saturating_add(moved) };
         self.last = travel.map(|travel| Last::new(tool, travel, &closest));
         let opened = self.front.borrow().used() as u32;
@@ -261,7 +269,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
     ) -> Result<Proximity, QueryError> {
         let options = options.budget(options.budget.less(tests.node_tests, tests.triangle_tests));
         let search = Search::start(&self.tree, &mut self.stack, surface, tool, &options, first)?;
-        let mut closest = search.run::<false>(f32::INFINITY)?;
+        let mut closest = search.run::<WHOLE>(f32::INFINITY)?;
         closest.node_tests = closest.node_tests.saturating_add(tests.node_tests);
         closest.triangle_tests = closest.triangle_tests.saturating_add(tests.triangle_tests);
         Ok(closest)

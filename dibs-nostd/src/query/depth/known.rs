@@ -1,0 +1,91 @@
+//! The proof of a depth, kept from tick to tick.
+//!
+//! A depth changes by at most the motion of tool and surface. So every bound of the last tick still holds, plus that
+//! motion: only parts of the axis whose bounds have come above the deepest point are looked at again.
+
+use super::part::{Part, Parts, larger};
+use crate::TriangleRow;
+use crate::surface::motion::Unit;
+
+/// Most points remembered, so that the next search has room for more.
+const KEPT: usize = 20;
+
+/// A point of the axis, and the part from there to the next one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Point {
+    /// 0 at the axis' start, 1 at its end.
+    pub parameter: f32,
+    /// Upper bound on its depth.
+    pub depth: f32,
+    /// No point of the part is deeper.
+    pub bound: f32,
+    /// A triangle near it.
+    pub triangle: TriangleRow,
+}
+
+/// The points of the last depth.
+#[derive(Clone, Debug)]
+pub(in crate::query) struct Known {
+    points: [Point; KEPT],
+    count: usize,
+    /// Depth of the deepest point; 0 if no point was inside.
+    deepest: f32,
+    /// Its parameter; not a number if no point was inside.
+    at: f32,
+    unit: Unit,
+    /// Motion of tool and surface since then, in units.
+    moved: u32,
+}
+
+impl Known {
+    pub const fn new(unit: Unit) -> Self {
+        let none = Point { parameter: 0.0, depth: 0.0, bound: 0.0, triangle: TriangleRow(0) };
+        Self { points: [none; KEPT], count: 0, deepest: 0.0, at: f32::NAN, unit, moved: 0 }
+    }
+
+    pub fn forget(&mut self) {
+        self.count = 0;
+    }
+
+    /// Tool and surface have moved.
+    pub fn add_motion(&mut self, units: u32) {
+        self.moved = self.moved.saturating_add(units);
+        if self.moved > i32::MAX as u32 {
+            self.forget();
+        }
+    }
+
+    /// The points from the axis' start to its end, with their bounds as of now, and a depth and the parameter of
+    /// the point that has it.
+    pub(super) fn now(&mut self) -> Option<(&[Point], (f32, f32))> {
+        if self.moved > 0 {
+            let moved = self.unit.length(self.moved as i32) * (1.0 + 4.0 * f32::EPSILON);
+            for point in &mut self.points {
+                point.depth = raised(point.depth, moved);
+                point.bound = raised(point.bound, moved);
+            }
+            self.deepest = (self.deepest - moved) * (1.0 - f32::EPSILON);
+            self.moved = 0;
+        }
+        let points = self.points.get(..self.count)?;
+        (points.len() > 1).then_some((points, (larger(self.deepest, 0.0), self.at)))
+    }
+
+    /// Remembers the parts of a search, of which the point at the parameter `at` is deepest.
+    pub(super) fn keep(&mut self, parts: &mut Parts, deepest: f32, at: f32) {
+        while parts.count() > KEPT && parts.join(at, f32::INFINITY) {}
+        (self.count, self.moved, self.deepest, self.at) = (0, 0, deepest, at);
+        for (place, part) in self.points.iter_mut().zip(parts.in_order()) {
+            let Part { from, bound, .. } = part;
+            let Some(triangle) = from.triangle else { return self.forget() };
+            *place = Point { parameter: from.parameter, depth: from.depth, bound, triangle };
+            self.count += 1;
+        }
+    }
+}
+
+/// A bound after a motion, rounded up.
+fn raised(bound: f32, moved: f32) -> f32 {
+    let sum = bound + moved;
+    sum + sum.abs() * f32::EPSILON
+}

@@ -1,0 +1,330 @@
+//! The depth of a capsule's axis below the surface that it crosses.
+//!
+//! The depth along the axis, positive inside and negative outside, changes by at most the length moved, and is at most
+//! the distance to any one triangle of the surface. That distance is convex along the axis, so the triangles closest to
+//! two points bound the depth between them. The search divides the part of the axis with the highest bound (Piyavskii
+//! and Shubert, with this second bound added) until no part can be deeper than the deepest point found by more than the
+//! tolerance.
+//!
+//! A tracker keeps the bounds. Tool and surface change a depth by at most their motion, so the next tick looks only at
+//! the parts whose bounds have come above the deepest point by more than the tolerance.
+
+mod known;
+mod part;
+
+use glam::Vec3;
+
+use super::search::{Search, UNTIL, Waiting};
+use super::side::{self, NoSide, Side};
+use super::{Budget, Options, Proximity};
+use crate::math::sqrt::sqrt;
+use crate::tool::{AxisPoint, Tool};
+use crate::unavailable::QueryError;
+use crate::{Index, Tree, TriangleRow, VertexTable};
+pub(super) use known::Known;
+use known::Point;
+use part::{Part, Parts, Sample, larger};
+
+/// A limit that no search reaches before its end.
+const EXACT: f32 = f32::NEG_INFINITY;
+
+/// The default tolerance, as a part of the axis' length.
+const TOLERANCE: f32 = 1.0 / 512.0;
+
+/// The least default tolerance, in units of the accuracy: about a hundredth of a millimetre on a heart.
+const LEAST_TOLERANCE: f32 = 32.0;
+
+/// Most points of the axis that are searched.
+const LOOKS: u32 = 27;
+
+/// Most steps from a remembered triangle to a closer neighbour.
+const STEPS: u32 = 4;
+
+/// The search for the deepest point of a tool's axis.
+pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
+    tree: &'s Tree<'t, I>,
+    stack: &'s mut [Waiting],
+    vertices: &'s V,
+    tool: &'s T,
+    /// With the rest of the query's budget.
+    options: Options,
+    /// The pair in which the axis meets the surface.
+    meeting: Proximity,
+    /// The deepest point so far.
+    answer: Proximity,
+    deepest: f32,
+    /// Its parameter; not a number if no point is inside.
+    deepest_at: f32,
+    /// Points searched.
+    looks: u32,
+}
+
+impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> {
+    /// A search for a tool whose axis meets the surface in the pair `meeting`.
+    pub fn new(
+        tree: &'s Tree<'t, I>,
+        stack: &'s mut [Waiting],
+        vertices: &'s V,
+        tool: &'s T,
+        options: &Options,
+        meeting: &Proximity,
+    ) -> Self {
+        let mut options = *options;
+        options.stretch = options.stretch.or_else(|| vertices.stretch());
+        let Budget { node_tests, triangle_tests } = &mut options.budget;
+        *node_tests = node_tests.saturating_sub(meeting.node_tests);
+        *triangle_tests = triangle_tests.saturating_sub(meeting.triangle_tests);
+        let (meeting, answer) = (*meeting, *meeting);
+        let (deepest, deepest_at) = (0.0, f32::NAN);
+        Self {
+            tree,
+            stack,
+            vertices,
+            tool,
+            options,
+            meeting,
+            answer,
+            deepest,
+            deepest_at,
+            looks: 0,
+        }
+    }
+
+    /// The answer with side, signed separation, and the deepest point's pair. `known` is the last tick's search, and
+    /// then this one.
+    pub fn run(mut self, mut known: Option<&mut Known>) -> Result<Proximity, QueryError> {
+        let least = LEAST_TOLERANCE * self.meeting.accuracy;
+        let default = larger(self.tool.axis_length() * TOLERANCE, least);
+        let tolerance = self.options.depth_tolerance.unwrap_or(default);
+        let (mut parts, deepest) = match known.as_deref_mut().and_then(Known::now) {
+            Some((points, deepest)) => (self.resume(points)?, Some(deepest)),
+            None => (self.begin(tolerance)?, None),
+        };
+        let bound = self.divide(&mut parts, tolerance, deepest)?;
+        if let Some(known) = known {
+            known.keep(&mut parts, self.deepest, self.deepest_at);
+        }
+        self.finish(bound)
+    }
+
+    /// The parts before and after the point where the axis meets the surface.
+    fn begin(&mut self, tolerance: f32) -> Result<Parts, QueryError> {
+        let meeting = self.meeting;
+        let depth = meeting.axis_distance + meeting.accuracy;
+        let crossing =
+            self.sample(meeting.axis_parameter, depth, meeting.triangle, meeting.corners)?;
+        let start = self.look(0.0, &crossing, EXACT)?;
+        let end = self.look(1.0, &crossing, EXACT)?;
+        let enough = self.deepest + tolerance;
+        let mut parts = Parts::new();
+        parts.push(Part::new(start, &crossing, 1, enough));
+        parts.push(Part::new(crossing, &end, 2, enough));
+        parts.push(Part::remembered(end, 0, 0.0));
+        parts.end();
+        Ok(parts)
+    }
+
+    /// The parts of the last tick.
+    fn resume(&self, points: &[Point]) -> Result<Parts, QueryError> {
+        let mut parts = Parts::new();
+        for point in points {
+            let Point { parameter, depth, bound, triangle } = *point;
+            let row = triangle.0;
+            let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
+            let from = self.sample(parameter, depth, Some(triangle), corners)?;
+            let from = Sample { is_new: false, ..from };
+            parts.push(Part::remembered(from, parts.count() + 1, bound));
+        }
+        parts.end();
+        Ok(parts)
+    }
+
+    /// Divides the part with the highest bound until none is above the deepest point by more than the tolerance.
+    /// Returns the highest bound. At least one point is searched. Until then a depth and the parameter of the point that
+    /// has it may be known.
+    fn divide(
+        &mut self,
+        parts: &mut Parts,
+        tolerance: f32,
+        mut known: Option<(f32, f32)>,
+    ) -> Result<f32, QueryError> {
+        loop {
+            let enough = known.map_or(self.deepest, |(depth, _)| depth) + tolerance;
+            let (row, part) = parts.highest();
+            let is_enough = !(part.bound > enough);
+            if let Some((_, at)) = known.filter(|_| is_enough) {
+                known = None;
+                if let Some(row) = parts.row_of(at) {
+                    self.look_again(parts, row)?;
+                }
+                continue;
+            }
+            if is_enough {
+                return Ok(part.bound);
+            }
+            let Some(split) = part.split else {
+                self.walk(parts, row)?;
+                self.walk(parts, part.next)?;
+                parts.renew(row, enough);
+                continue;
+            };
+            let Some(place) = self.room(parts, enough) else { return Ok(part.bound) };
+            let (from, to) = (part.from, parts.sample(part.next));
+            let is_first = known.take().is_some();
+            if is_first && larger(from.depth, to.depth) >= part.bound {
+                let row = if from.depth >= part.bound { row } else { part.next };
+                self.look_again(parts, row)?;
+                continue;
+            }
+            let near = if split - from.along < to.along - split { &from } else { &to };
+            let until = if is_first { EXACT } else { enough };
+            let middle = self.look(split / self.tool.axis_length(), near, until)?;
+            let enough = self.deepest + tolerance;
+            parts.set(row, Part::new(from, &middle, place, enough).below(part.bound));
+            parts.push(Part::new(middle, &to, part.next, enough).below(part.bound));
+        }
+    }
+
+    /// Searches a sample's point to the end.
+    fn look_again(&mut self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
+        let sample = parts.sample(row);
+        let sample = self.look(sample.parameter, &sample, EXACT)?;
+        parts.set_sample(row, sample);
+        Ok(())
+    }
+
+    /// The row of another part, if one may be divided.
+    fn room(&self, parts: &mut Parts, enough: f32) -> Option<usize> {
+        if self.looks >= LOOKS || self.options.budget.node_tests == 0 {
+            return None;
+        }
+        if parts.free().is_none() {
+            parts.join(self.deepest_at, enough);
+        }
+        parts.free()
+    }
+
+    /// Moves a remembered sample's triangle to neighbours that are closer now.
+    fn walk(&self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
+        let mut sample = parts.sample(row);
+        if sample.is_new {
+            return Ok(());
+        }
+        sample.is_new = true;
+        let mut least = sample.square(sample.on_axis);
+        for _ in 0..STEPS {
+            let Some(TriangleRow(from)) = sample.triangle else { break };
+            let mut closest = sample;
+            for (row, _) in (0..3).filter_map(|edge| self.tree.across(from, edge)) {
+                let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
+                let (triangle, corners) = (Some(TriangleRow(row)), self.corners(corners)?);
+                let other = Sample { triangle, corners, ..sample };
+                let square = other.square(sample.on_axis);
+                if square < least {
+                    (least, closest) = (square, other);
+                }
+            }
+            if closest.triangle == sample.triangle {
+                break;
+            }
+            sample = closest;
+        }
+        let distance = sqrt(least);
+        if distance < sample.depth {
+            sample.depth = distance;
+        }
+        parts.set_sample(row, sample);
+        Ok(())
+    }
+
+    /// Samples one point of the axis, near another sample. Out of budget, derives its bound from that sample. A point
+    /// that is no deeper than `enough` is not searched to the end.
+    fn look(&mut self, parameter: f32, near: &Sample, enough: f32) -> Result<Sample, QueryError> {
+        self.looks += 1;
+        let on_axis = self.tool.axis_point(parameter);
+        let Budget { node_tests, triangle_tests } = self.options.budget;
+        // The root's test is one of them.
+        let Some(node_tests) = node_tests.checked_sub(1) else {
+            let along = parameter * self.tool.axis_length();
+            let depth = near.depth + (along - near.along).abs();
+            return Ok(Sample { parameter, along, on_axis, depth, ..*near });
+        };
+        let options = self.options.budget(Budget { node_tests, triangle_tests });
+        let (point, first) = (AxisPoint(on_axis), near.triangle);
+        let search = Search::start(self.tree, self.stack, self.vertices, &point, &options, first)?;
+        let found = search.run::<UNTIL>(enough)?;
+        self.options.budget = Budget {
+            node_tests: node_tests.saturating_sub(found.node_tests.saturating_sub(1)),
+            triangle_tests: triangle_tests.saturating_sub(found.triangle_tests),
+        };
+        let answer = &mut self.answer;
+        answer.node_tests = answer.node_tests.saturating_add(found.node_tests);
+        answer.triangle_tests = answer.triangle_tests.saturating_add(found.triangle_tests);
+        let distance = found.axis_distance;
+        let at = if found.is_cut_short() {
+            None
+        } else {
+            Some(side::of_point(self.tree, self.vertices, &found, on_axis)?)
+        };
+        let depth = match at {
+            Some(at) if at.side == Side::Outside => -distance,
+            Some(at) if at.side == Side::Inside && distance > self.deepest => {
+                (self.deepest, self.deepest_at) = (distance, parameter);
+                *answer = Proximity {
+                    point_on_surface: found.point_on_surface,
+                    point_on_tool: on_axis - at.outward * self.tool.radius(),
+                    direction: at.outward,
+                    axis_parameter: parameter,
+                    triangle: found.triangle,
+                    corners: found.corners,
+                    barycentric: found.barycentric,
+                    ..*answer
+                };
+                distance
+            }
+            _ => distance,
+        };
+        if found.accuracy > answer.accuracy {
+            answer.accuracy = found.accuracy;
+        }
+        // Without a triangle of its own, its corners are a pin.
+        let triangle = found.triangle.or(near.triangle);
+        self.sample(parameter, depth, triangle, found.corners)
+    }
+
+    /// The sample of the axis' point at a parameter, with the corners closest to it.
+    fn sample(
+        &self,
+        parameter: f32,
+        depth: f32,
+        triangle: Option<TriangleRow>,
+        corners: [u32; 3],
+    ) -> Result<Sample, QueryError> {
+        let on_axis = self.tool.axis_point(parameter);
+        let along = parameter * self.tool.axis_length();
+        let corners = self.corners(corners)?;
+        Ok(Sample { parameter, along, on_axis, depth, triangle, corners, is_new: true })
+    }
+
+    fn corners(&self, [a, b, c]: [u32; 3]) -> Result<[Vec3; 3], QueryError> {
+        let position = |row| self.vertices.position(row).ok_or(QueryError::Corrupt { row });
+        Ok([position(a)?, position(b)?, position(c)?])
+    }
+
+    /// The answer, where no point of the axis is deeper than `bound`.
+    fn finish(self, bound: f32) -> Result<Proximity, QueryError> {
+        let Self { mut answer, meeting, .. } = self;
+        if self.deepest <= 0.0 {
+            let on_axis = self.tool.axis_point(meeting.axis_parameter);
+            let at = side::of_point(self.tree, self.vertices, &meeting, on_axis)?;
+            answer.direction = at.outward;
+            answer.point_on_tool = on_axis - at.outward * self.tool.radius();
+        }
+        let crosses = meeting.axis_distance <= 0.0 || self.deepest > answer.accuracy;
+        answer.side = if crosses { Side::Crossing } else { Side::Undefined(NoSide::BelowAccuracy) };
+        let most = if bound > self.deepest { bound } else { self.deepest };
+        answer.separation = -self.tool.radius() - self.deepest;
+        answer.lower = -self.tool.radius() - most;
+        Ok(answer)
+    }
+}

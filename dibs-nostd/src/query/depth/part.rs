@@ -1,0 +1,278 @@
+//! Parts of the axis, and the bounds on the depth in them.
+
+use glam::Vec3;
+
+use crate::TriangleRow;
+use crate::math::sqrt::sqrt;
+use crate::tool::{AxisPoint, Tool};
+
+/// Most points of the axis in a list, including its ends and the point where it meets the surface.
+pub(super) const POINTS: usize = 28;
+
+/// Least distance of a split from an end of its part, as a share of the part's length.
+const NEAREST_SPLIT: f32 = 0.125;
+
+/// Most steps towards the point at which two triangles are equally far.
+const ROUNDS: u32 = 3;
+
+/// A point of the axis and the triangle found closest to it; where the budget ended, one pin as all three corners.
+#[derive(Clone, Copy)]
+pub(super) struct Sample {
+    /// Its parameter: 0 at the axis' start, 1 at its end.
+    pub parameter: f32,
+    /// Length along the axis from its start.
+    pub along: f32,
+    pub on_axis: Vec3,
+    /// Upper bound on its depth.
+    pub depth: f32,
+    pub triangle: Option<TriangleRow>,
+    pub corners: [Vec3; 3],
+    /// Its triangle was looked for at this tick.
+    pub is_new: bool,
+}
+
+impl Sample {
+    const NONE: Self = Self {
+        parameter: 0.0,
+        along: 0.0,
+        on_axis: Vec3::ZERO,
+        depth: 0.0,
+        triangle: None,
+        corners: [Vec3::ZERO; 3],
+        is_new: false,
+    };
+
+    /// Square of the distance from a point to the triangle.
+    pub fn square(&self, point: Vec3) -> f32 {
+        let pair = AxisPoint(point).closest_on_triangle(&self.corners, f32::INFINITY);
+        pair.map_or(f32::INFINITY, |pair| pair.distance_squared)
+    }
+}
+
+/// A sample, and the part of the axis from there to another one.
+#[derive(Clone, Copy)]
+pub(super) struct Part {
+    pub from: Sample,
+    /// Row of the part that the other one begins; 0 at the axis' end.
+    pub next: usize,
+    /// No point of the part is deeper.
+    pub bound: f32,
+    /// Length along the axis at which it is divided next; `None` if the bound is an earlier tick's.
+    pub split: Option<f32>,
+}
+
+impl Part {
+    const NONE: Self = Self { from: Sample::NONE, next: 0, bound: 0.0, split: None };
+
+    /// A remembered part.
+    pub fn remembered(from: Sample, next: usize, bound: f32) -> Self {
+        Self { from, next, bound, split: None }
+    }
+
+    /// The part, which is within one that is no deeper than `bound`.
+    pub fn below(self, bound: f32) -> Self {
+        Self { bound: smaller(self.bound, bound), ..self }
+    }
+
+    /// The part up to `to`. A bound that is no higher than `enough` is not lowered further.
+    pub fn new(mut from: Sample, to: &Sample, next: usize, enough: f32) -> Self {
+        let (length, mut to) = (to.along - from.along, *to);
+        // A depth changes by at most the length moved.
+        from.depth = smaller(from.depth, to.depth + length);
+        to.depth = smaller(to.depth, from.depth + length);
+        let part = |bound, split| Self { from, next, bound, split: Some(split) };
+        // Points nearer to an outside sample than its distance are outside too.
+        let first = from.along + above_zero(-from.depth);
+        let last = to.along - above_zero(-to.depth);
+        if !(first < last) {
+            let middle = (from.along + to.along) * 0.5;
+            return part(above_zero(larger(from.depth, to.depth)), middle);
+        }
+        let slope = (from.depth + to.depth + length) * 0.5;
+        let middle = (first + last) * 0.5;
+        if slope <= enough {
+            return part(slope, middle);
+        }
+        let span = to.on_axis - from.on_axis;
+        let squares = |along: f32| {
+            let point = from.on_axis + span * ((along - from.along) / length);
+            [from.square(point), to.square(point)]
+        };
+        let (at_first, at_last) = (squares(first), squares(last));
+        // The first triangle's lead over the second: linear along the axis where both are points.
+        let lead = |[one, other]: [f32; 2]| other - one;
+        let (mut low, mut high) = ((first, lead(at_first)), (last, lead(at_last)));
+        let (mut least, mut peak) = (f32::INFINITY, middle);
+        for _ in 0..ROUNDS {
+            let equal = low.0 + (high.0 - low.0) * (low.1 / (low.1 - high.1));
+            let is_between = equal > low.0 && equal < high.0;
+            let along = if is_between { equal } else { (low.0 + high.0) * 0.5 };
+            let here = squares(along);
+            let highest = larger(convex(at_first, here), convex(here, at_last));
+            if highest < least {
+                (least, peak) = (highest, along);
+            }
+            if least <= enough * enough {
+                break;
+            }
+            let side = (along, lead(here));
+            if side.1 > 0.0 {
+                low = side;
+            } else {
+                high = side;
+            }
+        }
+        let convex = sqrt(least);
+        let margin = (last - first) * NEAREST_SPLIT;
+        let split = if peak < first + margin {
+            first + margin
+        } else if peak > last - margin {
+            last - margin
+        } else {
+            peak
+        };
+        part(smaller(convex, slope), split)
+    }
+}
+
+/// The parts of the axis in a list from its start, in row 0, to its end.
+pub(super) struct Parts {
+    rows: [Part; POINTS],
+    /// Rows from here on are unused.
+    end: usize,
+    /// Row of a part that was joined to the one before it.
+    free: Option<usize>,
+    count: usize,
+}
+
+impl Parts {
+    pub fn new() -> Self {
+        Self { rows: [Part::NONE; POINTS], end: 0, free: None, count: 0 }
+    }
+
+    /// Number of parts, the empty one at the end included.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The row of the next part to be pushed, if there is room.
+    pub fn free(&self) -> Option<usize> {
+        self.free.or((self.end < POINTS).then_some(self.end))
+    }
+
+    pub fn push(&mut self, part: Part) {
+        let Some(row) = self.free() else { return };
+        if self.free.take().is_none() {
+            self.end += 1;
+        }
+        self.count += 1;
+        self.set(row, part);
+    }
+
+    /// Makes the last row the empty part at the axis' end.
+    pub fn end(&mut self) {
+        if let Some(last) = self.end.checked_sub(1).and_then(|last| self.rows.get_mut(last)) {
+            (last.next, last.bound) = (0, 0.0);
+        }
+    }
+
+    /// Joins the two neighbouring parts that are shortest together, of those that are no deeper than `enough`, but not at
+    /// the parameter `deepest`. Returns whether there are any.
+    pub fn join(&mut self, deepest: f32, enough: f32) -> bool {
+        let (mut least, mut joined) = (f32::INFINITY, None);
+        let mut row = 0;
+        for _ in 0..self.count {
+            let left = self.part(row);
+            let right = self.part(left.next);
+            if left.next == 0 || right.next == 0 {
+                break;
+            }
+            let length = self.sample(right.next).along - left.from.along;
+            let bound = larger(left.bound, right.bound);
+            if length < least && bound <= enough && right.from.parameter != deepest {
+                (least, joined) = (length, Some((row, Part { next: right.next, bound, ..left })));
+            }
+            row = left.next;
+        }
+        let Some((row, part)) = joined else { return false };
+        let free = self.part(row).next;
+        self.set(free, Part { bound: f32::NEG_INFINITY, ..Part::NONE });
+        self.set(row, part);
+        self.free = Some(free);
+        self.count -= 1;
+        true
+    }
+
+    fn part(&self, row: usize) -> Part {
+        self.rows.get(row).copied().unwrap_or(Part::NONE)
+    }
+
+    pub fn set(&mut self, row: usize, part: Part) {
+        if let Some(place) = self.rows.get_mut(row) {
+            *place = part;
+        }
+    }
+
+    /// The part with the highest bound, and its row.
+    pub fn highest(&self) -> (usize, Part) {
+        let [mut part, ..] = self.rows;
+        let mut highest = 0;
+        for (row, other) in self.rows.iter().enumerate().take(self.end) {
+            if other.bound > part.bound {
+                (highest, part) = (row, *other);
+            }
+        }
+        (highest, part)
+    }
+
+    /// The row of the sample with a parameter.
+    pub fn row_of(&self, parameter: f32) -> Option<usize> {
+        self.rows.iter().take(self.end).position(|part| part.from.parameter == parameter)
+    }
+
+    /// The sample that a part begins with.
+    pub fn sample(&self, row: usize) -> Sample {
+        self.part(row).from
+    }
+
+    pub fn set_sample(&mut self, row: usize, sample: Sample) {
+        if let Some(part) = self.rows.get_mut(row) {
+            part.from = sample;
+        }
+    }
+
+    /// Bounds a remembered part anew.
+    pub fn renew(&mut self, row: usize, enough: f32) {
+        let Part { from, next, bound, .. } = self.part(row);
+        let new = Part::new(from, &self.sample(next), next, enough);
+        self.set(row, new.below(bound));
+    }
+
+    /// The parts from the axis' start to its end.
+    pub fn in_order(&self) -> impl Iterator<Item = Part> {
+        let mut row = 0;
+        (0..self.count).map(move |_| {
+            let part = self.part(row);
+            row = part.next;
+            part
+        })
+    }
+}
+
+/// Upper bound, between two places, on the smaller of two convex functions, from their values there.
+fn convex([one, other]: [f32; 2], [one_next, other_next]: [f32; 2]) -> f32 {
+    let (most, other_most) = (larger(one, one_next), larger(other, other_next));
+    smaller(most, other_most)
+}
+
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+pub(super) fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+fn above_zero(x: f32) -> f32 {
+    if x > 0.0 { x } else { 0.0 }
+}
