@@ -197,3 +197,44 @@ fn warn(label: &str, warnings: impl Iterator<Item = String>) {
         println!("cargo::warning={label}: {warning}");
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Four triangles of two groups.
+    const OBJ: &str = "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\n\
+        g base\nf 1 3 2\ng walls\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+
+    /// Each triangle's corners, as numbers of the file's vertices, and its label.
+    fn labels(script: TreeScript) -> Vec<([u32; 3], Option<u8>)> {
+        let built = script.build("tetra").unwrap();
+        let tree = built.tree::<u16>().unwrap();
+        let rows = (0..tree.triangle_count()).map(dibs_nostd::TriangleRow);
+        let mut labels: Vec<_> = rows
+            .map(|row| {
+                let corners = tree.corners(row).unwrap();
+                let mut corners = corners.map(|corner| tree.vertex_number(corner).unwrap().0);
+                corners.sort_unstable();
+                (corners, tree.label(row))
+            })
+            .collect();
+        labels.sort_unstable();
+        labels
+    }
+
+    #[test]
+    fn a_files_groups_are_labels_if_the_script_says_so() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("tetra.obj");
+        std::fs::write(&path, OBJ).unwrap();
+        let corners = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];
+        let with = |of: [Option<u8>; 4]| corners.into_iter().zip(of).collect::<Vec<_>>();
+        let grouped = with([Some(0), Some(1), Some(1), Some(1)]);
+        assert_eq!(labels(tree(&path).labels_from_groups()), grouped);
+        assert_eq!(labels(tree(&path)), with([None; 4]));
+        // Reading options that come later keep the switch.
+        let options = ReadOptions { weld_tolerance: Some(0.0), ..ReadOptions::default() };
+        assert_eq!(labels(tree(&path).labels_from_groups().reading(options)), grouped);
+    }
+}

@@ -43,6 +43,9 @@ class Sender:
     `to` is `udp:HOST:PORT`, `tcp:HOST:PORT`, `serial:PORT@BAUD` or `unix:PATH`; without it `packets` collects what would
     be sent. `quantised` takes 6 bytes a vertex instead of 12. `partial` sends only vertices that moved by more than that
     many millimetres. `heartbeat` are seconds between two heartbeats, or `None`. `mtu` is 1024, or 64 for CAN-FD.
+
+    `key`, 16 bytes, puts a tag on every packet, for the receiver with the id `receiver`. Frames can then be sent once the
+    receiver has reported its challenge: `wait`. For one without a way back give its `challenge`.
     """
 
     def __init__(
@@ -56,6 +59,9 @@ class Sender:
         heartbeat: Optional[float] = 0.1,
         mtu: int = 1024,
         session: Optional[int] = None,
+        key: Optional[bytes] = None,
+        receiver: int = 0,
+        challenge: Optional[int] = None,
     ) -> None:
         if partial is not None:
             partial = _arrays.number("partial", partial)
@@ -63,7 +69,7 @@ class Sender:
                 raise ValueError(f"partial: a tolerance is a length of at least 0, not {partial}")
         choices = (quantised, partial, whole_every, heartbeat, session)
         self._tree = tree
-        self._native = _dibs.Sender(tree._native, to, mtu, choices)
+        self._native = _dibs.Sender(tree._native, to, mtu, choices, _tags(key, receiver, challenge))
 
     def send(self, positions: npt.ArrayLike, *, age: Optional[float] = None) -> Sent:
         """Sends a frame: positions of the mesh's vertices, captured `age` seconds ago.
@@ -80,12 +86,31 @@ class Sender:
         """Sends a heartbeat if one is due, and takes the receiver's statuses. Does not block."""
         self._native.poll()
 
+    @property
+    def is_ready(self) -> bool:
+        """Whether frames can be sent: with a key, once the receiver's challenge is known."""
+        return self._native.is_ready()
+
+    def wait(self, seconds: float = 2.0) -> None:
+        """Waits until frames can be sent. Raises `ConnectionError` where no genuine status comes in time."""
+        end = time.monotonic() + _arrays.number("seconds", seconds)
+        self.poll()
+        while not self.is_ready:
+            if time.monotonic() > end:
+                raise ConnectionError(
+                    f"no genuine status came within {seconds} s: is the receiver on, and has it the same key? "
+                    "One that cannot report needs challenge="
+                )
+            time.sleep(_GLANCE)
+            self.poll()
+
     def play(self, frames: npt.ArrayLike, rate: float) -> Totals:
         """Sends frames at `rate` a second, with heartbeats between."""
         points = _arrays.points("frames", frames, 3)
         rate = _arrays.number("rate", rate)
         if not rate > 0:
             raise ValueError(f"rate: {rate} frames a second are none; give more than 0")
+        self.wait()
         due = time.monotonic()
         for frame in points:
             while time.monotonic() < due:
@@ -114,3 +139,16 @@ class Sender:
     def acknowledged(self) -> Optional[int]:
         """The last frame that the receiver reported as published."""
         return self._native.way()[1]
+
+
+def _tags(key: Optional[bytes], receiver: int, challenge: Optional[int]) -> Optional[tuple[bytes, int, Optional[int]]]:
+    if key is None:
+        if receiver or challenge is not None:
+            raise TypeError("receiver and challenge are of tags; give key, too")
+        return None
+    if not isinstance(key, (bytes, bytearray)):
+        raise TypeError(f"key: bytes are needed, not {type(key).__name__}")
+    if len(key) != 16:
+        # Not its content: it may be a key.
+        raise ValueError(f"key: {len(key)} bytes; give 16")
+    return bytes(key), receiver, challenge

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -37,15 +39,29 @@ def _rows(parts: list[Floats], radius: npt.ArrayLike) -> Floats:
     return np.concatenate([np.broadcast_to(part, (*count, part.shape[1])) for part in columns], axis=1)
 
 
-def rows(value: npt.ArrayLike) -> tuple[Floats, bool]:
-    """Checked rows, and whether there was one that is no row of several."""
+class Poses(NamedTuple):
+    """Checked tools: a chain for each pose."""
+
+    rows: Floats
+    """(poses, tools, numbers of a tool)."""
+    is_single: bool
+    """Given as one tool, not as an array of one pose."""
+
+    @property
+    def native(self) -> tuple[bytes, int, int]:
+        """Bytes, numbers of a tool, tools of a pose."""
+        _, tools, numbers = self.rows.shape
+        return self.rows.tobytes(), numbers, tools
+
+
+def poses(value: npt.ArrayLike) -> Poses:
+    """Checks tools."""
     array = _arrays.numbers("tools", value)
-    is_single = array.ndim == 1
-    if is_single:
-        array = array[np.newaxis]
-    if array.ndim != 2 or array.shape[1] not in (4, 7):
+    if array.ndim not in (1, 2, 3) or array.shape[-1] not in (4, 7) or (array.ndim == 3 and array.shape[1] == 0):
         raise ValueError(
-            f"tools: the shape is {array.shape}; give (poses, 4) for spheres (x, y, z, radius) "
-            "or (poses, 7) for capsules (x1, y1, z1, x2, y2, z2, radius)"
+            f"tools: the shape is {array.shape}; give (poses, 4) for spheres (x, y, z, radius), "
+            "(poses, 7) for capsules (x1, y1, z1, x2, y2, z2, radius), or (poses, tools, 4 or 7) for chains"
         )
-    return _arrays.finite("tools", array), is_single
+    array = _arrays.finite("tools", array)
+    chain = array.shape[1] if array.ndim == 3 else 1
+    return Poses(array.reshape(-1, chain, array.shape[-1]), array.ndim == 1)

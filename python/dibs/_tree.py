@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import operator
 import os
+from collections.abc import Iterable
 from enum import IntEnum
 from typing import Any, NamedTuple, Optional, Union
 
@@ -41,39 +43,95 @@ class Contacts(NamedTuple):
     found: npt.NDArray[Any]
     """Records of `CONTACT`, in the order of the poses, deepest first."""
     bound: npt.NDArray[np.float32]
-    """For each pose: every contact with a separation below is listed. The margin, unless there were too many."""
+    """For each pose: every contact with a separation below is listed. The margin, unless there were too many, or the
+    budget ended."""
+
+
+class Budget(NamedTuple):
+    """The most work of a pair of a tool and a surface; an answer that is cut short has a `lower` below its `separation`."""
+
+    node_tests: int = 0xFFFF_FFFF
+    """Most tests of spheres, and of leaves' and triangles' planes; the root's sphere comes on top."""
+    triangle_tests: int = 0xFFFF_FFFF
+    """Most exact tests of triangles."""
+
+
+def _tests(budget: tuple[int, int]) -> tuple[int, int]:
+    """The checked numbers of a budget."""
+    try:
+        nodes, triangles = (operator.index(tests) for tests in budget)
+    except (TypeError, ValueError):
+        raise TypeError(f"budget: give (node_tests, triangle_tests), not {budget!r}") from None
+    if min(nodes, triangles) < 0:
+        raise ValueError(f"budget: {min(nodes, triangles)} tests are below 0")
+    return min(nodes, Budget().node_tests), min(triangles, Budget().triangle_tests)
+
+
+class Scene:
+    """Several surfaces, whose closest pair with a tool is wanted: of organs, or of the parts of one.
+
+    `surfaces` are `Surface`s, or `Tree`s, at rest. Field `surface` of a record counts them, from 0.
+    """
+
+    def __init__(self, surfaces: Iterable[Union[Surface, Tree]]) -> None:
+        self.surfaces = tuple(each.rest if isinstance(each, Tree) else each for each in surfaces)
+        if not self.surfaces:
+            raise ValueError("surfaces: a scene has at least one")
+        for number, surface in enumerate(self.surfaces):
+            if not isinstance(surface, Surface):
+                raise TypeError(f"surfaces: number {number} is no Surface and no Tree")
+        self._natives = [surface._native for surface in self.surfaces]
+
+    def query(self, tools: npt.ArrayLike, *, budget: tuple[int, int] = Budget()) -> npt.NDArray[Any]:
+        """The closest pair of each pose and the scene: as `Tree.query`."""
+        poses = _tools.poses(tools)
+        answers = np.frombuffer(_dibs.query(self._natives, poses.native, _tests(budget)), ANSWER)
+        return answers[0] if poses.is_single else answers
+
+    def contacts(self, tools: npt.ArrayLike, margin: float, *, budget: tuple[int, int] = Budget()) -> Contacts:
+        """All locally closest pairs of each pose and the scene: as `Tree.contacts`."""
+        margin = _arrays.number("margin", margin)
+        native = _dibs.contacts(self._natives, _tools.poses(tools).native, margin, _tests(budget))
+        found, bound = native
+        return Contacts(np.frombuffer(found, CONTACT), np.frombuffer(bound, "<f4"))
 
 
 class Surface:
     """The surface of a tree at one moment, measured once for any number of queries: `Tree.surface`."""
 
-    def __init__(self, tree: Tree, positions: Optional[npt.ArrayLike] = None) -> None:
-        given = None
-        if positions is not None:
-            points = _arrays.points("surface", positions)
-            if tree._vertices is not None and len(points) != tree._vertices:
-                raise ValueError(f"surface: {len(points)} positions, and the mesh has {tree._vertices} vertices")
-            given = points.tobytes()
+    def __init__(
+        self,
+        tree: Tree,
+        positions: Optional[npt.ArrayLike] = None,
+        velocities: Optional[npt.ArrayLike] = None,
+    ) -> None:
         self.tree = tree
-        self._native = tree._native.surface(given)
+        given = [_of_vertices(tree, *each) for each in [("surface", positions), ("velocities", velocities)]]
+        self._native = tree._native.surface(*given)
 
     @property
     def stretch(self) -> Optional[float]:
         """The largest stretch of any triangle, against the rest shape; `None` where the tree cannot measure it."""
         return self._native.stretch()
 
-    def query(self, tools: npt.ArrayLike) -> npt.NDArray[Any]:
-        """The closest pair of each tool and the surface: an array of `ANSWER`."""
-        rows, is_single = _tools.rows(tools)
-        answers = np.frombuffer(self._native.query(rows.tobytes(), rows.shape[1]), ANSWER)
-        return answers[0] if is_single else answers
+    def query(self, tools: npt.ArrayLike, *, budget: tuple[int, int] = Budget()) -> npt.NDArray[Any]:
+        """The closest pair of each pose and the surface: as `Tree.query`."""
+        return Scene([self]).query(tools, budget=budget)
 
-    def contacts(self, tools: npt.ArrayLike, margin: float) -> Contacts:
-        """All locally closest pairs of each tool and the surface whose separation is at most `margin`."""
-        rows, _ = _tools.rows(tools)
-        native = self._native.contacts(rows.tobytes(), rows.shape[1], _arrays.number("margin", margin))
-        found, bound = native
-        return Contacts(np.frombuffer(found, CONTACT), np.frombuffer(bound, "<f4"))
+    def contacts(self, tools: npt.ArrayLike, margin: float, *, budget: tuple[int, int] = Budget()) -> Contacts:
+        """All locally closest pairs of each pose and the surface: as `Tree.contacts`."""
+        return Scene([self]).contacts(tools, margin, budget=budget)
+
+
+def _of_vertices(tree: Tree, name: str, value: Optional[npt.ArrayLike]) -> Optional[bytes]:
+    """The bytes of three numbers for each vertex of the mesh."""
+    if value is None:
+        return None
+    points = _arrays.points(name, value)
+    if tree._vertices is not None and len(points) != tree._vertices:
+        what = "positions" if name == "surface" else name
+        raise ValueError(f"{name}: {len(points)} {what}, and the mesh has {tree._vertices} vertices")
+    return points.tobytes()
 
 
 class Tree:
@@ -128,36 +186,49 @@ class Tree:
             self._rest = Surface(self)
         return self._rest
 
-    def surface(self, positions: Optional[npt.ArrayLike] = None) -> Surface:
+    def surface(
+        self, positions: Optional[npt.ArrayLike] = None, *, velocities: Optional[npt.ArrayLike] = None
+    ) -> Surface:
         """The surface with these positions, one for each vertex of the mesh; without, at rest.
+
+        `velocities`, in mm/s and one for each vertex, give contacts the field `velocity`, which is zero without.
 
         Raises `ValueError` where it is stretched beyond the tree's limits: distances on it could be wrong.
         """
-        return self.rest if positions is None else Surface(self, positions)
+        return self.rest if positions is None and velocities is None else Surface(self, positions, velocities)
 
     def stretch(self, positions: npt.ArrayLike) -> Optional[float]:
         """The largest stretch of any triangle of a surface, against the rest shape."""
         return Surface(self, positions).stretch
 
     def query(
-        self, tools: npt.ArrayLike, surface: Union[Surface, npt.ArrayLike, None] = None
+        self,
+        tools: npt.ArrayLike,
+        surface: Union[Surface, npt.ArrayLike, None] = None,
+        *,
+        budget: tuple[int, int] = Budget(),
     ) -> npt.NDArray[Any]:
-        """The closest pair of each tool and a surface: an array of `ANSWER`.
+        """The closest pair of each pose and a surface: an array of `ANSWER`.
 
-        `tools` has a row for each pose: x, y, z, radius of a sphere, or x1, y1, z1, x2, y2, z2, radius of a capsule.
-        `surface` is an array of positions, or a `Surface`, which is measured once for several calls; by default the rest
-        shape. The poses are answered on all cores, without Python's lock.
+        `tools` has a row for each pose: x, y, z, radius of a sphere, or x1, y1, z1, x2, y2, z2, radius of a capsule. With
+        three dimensions, (poses, tools, 4 or 7), each pose is a chain of tools, which field `tool` counts from 0: its
+        answer is the closest pair of any, its interval that of all. `surface` is an array of positions, or a `Surface`,
+        which is measured once for several calls; by default the rest shape. `budget` bounds the tests of each tool. The
+        poses are answered on all cores, without Python's lock.
         """
-        return self._surface(surface).query(tools)
+        return self._surface(surface).query(tools, budget=budget)
 
     def contacts(
         self,
         tools: npt.ArrayLike,
         margin: float,
         surface: Union[Surface, npt.ArrayLike, None] = None,
+        *,
+        budget: tuple[int, int] = Budget(),
     ) -> Contacts:
-        """All locally closest pairs of each tool and a surface whose separation is at most `margin`."""
-        return self._surface(surface).contacts(tools, margin)
+        """All locally closest pairs of each pose and a surface whose separation is at most `margin`: up to 64 of each
+        tool. The arguments are those of `query`."""
+        return self._surface(surface).contacts(tools, margin, budget=budget)
 
     def _surface(self, surface: Union[Surface, npt.ArrayLike, None]) -> Surface:
         if not isinstance(surface, Surface):

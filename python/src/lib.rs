@@ -6,8 +6,10 @@ mod error;
 mod mesh;
 mod motion;
 mod record;
+mod scene;
 mod sender;
 mod surface;
+mod tool;
 mod tree;
 
 use pyo3::prelude::*;
@@ -21,6 +23,8 @@ mod _dibs {
     use crate::mesh::Mesh;
     #[pymodule_export]
     use crate::motion::{MotionStretch, generate, read_motion};
+    #[pymodule_export]
+    use crate::scene::{contacts, query};
     #[pymodule_export]
     use crate::sender::Sender;
     #[pymodule_export]

@@ -22,6 +22,8 @@ pub const ANSWER: &Fields = &[
     ("triangle", "<u4", 3),
     ("node_tests", "<u4", 1),
     ("triangle_tests", "<u4", 1),
+    ("surface", "<u4", 1),
+    ("tool", "<u4", 1),
     ("label", "<i2", 1),
     ("side", "u1", 1),
     ("side_reason", "u1", 1),
@@ -30,11 +32,14 @@ pub const ANSWER: &Fields = &[
 /// A contact. [`push_contact`] writes it.
 pub const CONTACT: &Fields = &[
     ("pose", "<u4", 1),
+    ("surface", "<u4", 1),
+    ("tool", "<u4", 1),
     ("separation", "<f4", 1),
     ("axis_parameter", "<f4", 1),
     ("point_on_surface", "<f8", 3),
     ("point_on_tool", "<f8", 3),
     ("normal", "<f4", 3),
+    ("velocity", "<f4", 3),
     ("barycentric", "<f4", 3),
     ("triangle", "<u4", 3),
     ("label", "<i2", 1),
@@ -58,8 +63,8 @@ pub fn reasons() -> Vec<String> {
     [String::new()].into_iter().chain(REASONS.map(|reason| reason.to_string())).collect()
 }
 
-/// Appends an answer.
-pub fn push_answer(out: &mut Vec<u8>, found: &Proximity, tree: &Owned) {
+/// Appends an answer, of a pair of these numbers: the surface's and the tool's.
+pub fn push_answer(out: &mut Vec<u8>, found: &Proximity, tree: &Owned, pair: [usize; 2]) {
     let (side, reason) = match found.side {
         Side::Outside => (0, 0),
         Side::Inside => (1, 0),
@@ -80,6 +85,7 @@ pub fn push_answer(out: &mut Vec<u8>, found: &Proximity, tree: &Owned) {
     corners(out, found.corners, tree);
     out.extend(found.node_tests.to_le_bytes());
     out.extend(found.triangle_tests.to_le_bytes());
+    numbers(out, pair);
     label(out, found.triangle.and_then(|row| tree.label(row)));
     out.extend([side, reason]);
 }
@@ -87,13 +93,19 @@ pub fn push_answer(out: &mut Vec<u8>, found: &Proximity, tree: &Owned) {
 /// Appends a contact of a pose.
 pub fn push_contact(out: &mut Vec<u8>, pose: u32, found: &Contact, tree: &Owned) {
     out.extend(pose.to_le_bytes());
+    numbers(out, [found.surface, found.tool]);
     floats(out, &[found.separation, found.axis_parameter]);
     point(out, found.point_on_surface, tree.origin);
     point(out, found.point_on_tool, tree.origin);
     floats(out, &found.normal.to_array());
+    floats(out, &found.velocity.to_array());
     floats(out, &found.barycentric);
     corners(out, found.corners, tree);
     label(out, tree.label(found.triangle));
+}
+
+fn numbers(out: &mut Vec<u8>, numbers: [usize; 2]) {
+    out.extend(numbers.into_iter().flat_map(|number| (number as u32).to_le_bytes()));
 }
 
 fn floats(out: &mut Vec<u8>, numbers: &[f32]) {

@@ -8,7 +8,7 @@ use dibs_build::glam::DVec3;
 use dibs_build::stream::{self, SendError, Sent, Settings, SurfaceOrder, Totals};
 use dibs_build::transport::{Line, Target, Transport};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::wire::Content;
+use dibs_nostd::wire::{AesCmac, Content, Mac};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -42,12 +42,14 @@ trait AnySender: Send {
     fn send(&mut self, positions: &[Vec3], age: Option<Duration>) -> Result<Sent, SendError>;
     fn poll(&mut self) -> Result<(), SendError>;
     fn totals(&self) -> Totals;
+    /// Whether frames can be sent.
+    fn is_ready(&self) -> bool;
     /// Frames on their way, and the last that the receiver acknowledged.
     fn way(&self) -> (u32, Option<u32>);
     fn outlet(&mut self) -> &mut Outlet;
 }
 
-impl<const MTU: usize> AnySender for stream::Sender<Outlet, MTU> {
+impl<const MTU: usize, M: Mac + Send> AnySender for stream::Sender<Outlet, MTU, M> {
     fn send(&mut self, positions: &[Vec3], age: Option<Duration>) -> Result<Sent, SendError> {
         match age {
             Some(age) => self.send_captured(positions, age),
@@ -61,6 +63,10 @@ impl<const MTU: usize> AnySender for stream::Sender<Outlet, MTU> {
 
     fn totals(&self) -> Totals {
         *self.totals()
+    }
+
+    fn is_ready(&self) -> bool {
+        self.is_ready()
     }
 
     fn way(&self) -> (u32, Option<u32>) {
@@ -82,6 +88,9 @@ pub struct Sender {
 /// `quantised`, `partial`, `whole_every`, `heartbeat` (s), `session`.
 type Choices = (bool, Option<f32>, u32, Option<f64>, Option<u32>);
 
+/// `key`, `receiver`, `challenge`: of the packets' tags.
+type Tags = ([u8; 16], u32, Option<u32>);
+
 #[pymethods]
 impl Sender {
     #[new]
@@ -91,6 +100,7 @@ impl Sender {
         to: Option<&str>,
         mtu: usize,
         choices: Choices,
+        tags: Option<Tags>,
     ) -> PyResult<Self> {
         let order = of_any_width!(tree.0.view(), tree => SurfaceOrder::of(tree));
         let (quantised, partial, whole_every, heartbeat, session) = choices;
@@ -110,9 +120,9 @@ impl Sender {
             }
             None => Outlet::Packets(Vec::new()),
         };
-        let sender: Box<dyn AnySender> = match mtu {
-            64 => Box::new(stream::Sender::<_, 64>::new(outlet, order, settings)),
-            1024 => Box::new(stream::Sender::<_, 1024>::new(outlet, order, settings)),
+        let sender = match mtu {
+            64 => sender_of::<64>(outlet, order, settings, tags),
+            1024 => sender_of::<1024>(outlet, order, settings, tags),
             _ => return Err(invalid(format!("mtu is {mtu}; give 64 (CAN-FD) or 1024"))),
         };
         Ok(Self { sender: Mutex::new(sender), origin: tree.0.origin })
@@ -144,6 +154,10 @@ impl Sender {
         py.detach(|| self.lock().poll()).map_err(|error| error::send(&error))
     }
 
+    fn is_ready(&self) -> bool {
+        self.lock().is_ready()
+    }
+
     /// Frames, partial ones, packets, bytes, statuses.
     fn totals(&self) -> [u64; 5] {
         let Totals { frames, partial, packets, bytes, statuses } = self.lock().totals();
@@ -169,6 +183,24 @@ impl Sender {
     fn lock(&self) -> MutexGuard<'_, Box<dyn AnySender>> {
         self.sender.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// A sender without tags, or with them once the receiver's challenge is known.
+fn sender_of<const MTU: usize>(
+    outlet: Outlet,
+    order: SurfaceOrder,
+    settings: Settings,
+    tags: Option<Tags>,
+) -> Box<dyn AnySender> {
+    let Some((key, receiver, challenge)) = tags else {
+        return Box::new(stream::Sender::<_, MTU>::new(outlet, order, settings));
+    };
+    let keyed_mac = move |challenge| AesCmac::new(&key, receiver, challenge);
+    let mut sender = stream::Sender::<_, MTU, _>::with_mac(outlet, order, settings, keyed_mac);
+    if let Some(challenge) = challenge {
+        sender.challenge(challenge);
+    }
+    Box::new(sender)
 }
 
 fn seconds(seconds: f64) -> PyResult<Duration> {

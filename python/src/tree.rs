@@ -102,9 +102,15 @@ impl Tree {
         of_any_width!(self.0.view(), tree => summarise(tree, bytes)).warnings().collect()
     }
 
-    /// The surface with these positions, or at rest.
-    fn surface(&self, py: Python<'_>, positions: Option<&[u8]>) -> PyResult<Surface> {
+    /// The surface with these positions, or at rest, whose vertices move at these velocities.
+    fn surface(
+        &self,
+        py: Python<'_>,
+        positions: Option<&[u8]>,
+        velocities: Option<&[u8]>,
+    ) -> PyResult<Surface> {
         py.detach(|| {
+            let velocities = velocities.map(|each| self.velocities(each)).transpose()?;
             let rows = match positions {
                 Some(positions) => self.0.rows(&bytes::points(positions)).ok_or_else(|| {
                     let (needed, found) = (self.0.vertices(), positions.len() / 24);
@@ -126,12 +132,22 @@ impl Tree {
                     )));
                 }
             };
-            Ok(Surface { tree: Arc::clone(&self.0), rows, stretch })
+            Ok(Surface { tree: Arc::clone(&self.0), rows, velocities, stretch })
         })
     }
 }
 
 impl Tree {
+    /// Velocities of the mesh's vertices in the order of the rows.
+    fn velocities(&self, of_mesh: &[u8]) -> PyResult<Vec<Vec3>> {
+        let of_mesh = bytes::points(of_mesh);
+        let row = |&vertex: &u32| of_mesh.get(vertex as usize).map(|velocity| velocity.as_vec3());
+        self.0.order.iter().map(row).collect::<Option<_>>().ok_or_else(|| {
+            let (needed, found) = (self.0.vertices(), of_mesh.len());
+            invalid(format!("{found} velocities and the tree uses {needed} vertices"))
+        })
+    }
+
     /// Validates the bytes of a tree.
     pub fn from_blob(blob: Vec<u8>) -> PyResult<Self> {
         let validated = Validated::try_new(blob, |bytes| view(bytes))

@@ -17,6 +17,10 @@ PROGRAM = pathlib.Path(os.environ.get("DIBS_PROGRAM", ROOT / "target/release/dib
 HEART, BEAT = dibs.generate("heart", 1_000)
 TREE = dibs.build(HEART, stretch=1.5)
 
+# A second heart beside it, whose coordinates count from a point of its own.
+ASIDE = np.array([130.0, 20.0, -5.0])
+OTHER = dibs.build(dibs.Mesh(HEART.vertices + ASIDE, HEART.triangles, origin=ASIDE))
+
 
 def poses(count, seed=1):
     """Points in and around the heart."""
@@ -33,6 +37,14 @@ def capsules(count, seed=2):
     starts = poses(count, seed)
     ways = np.random.default_rng(seed).normal(0, 30, (count, 3))
     return dibs.capsules(starts, starts + ways, 2.5)
+
+
+def chains(count, tools, seed=4):
+    """Capsules in a row, each from the end of the one before."""
+    ways = np.random.default_rng(seed).normal(0, 20, (count, tools, 3))
+    joints = np.concatenate([poses(count, seed)[:, np.newaxis], ways], axis=1).cumsum(axis=1)
+    chain = dibs.capsules(joints[:, :-1].reshape(-1, 3), joints[:, 1:].reshape(-1, 3), 2.5)
+    return chain.reshape(count, tools, 7)
 
 
 class WithProgram(unittest.TestCase):

@@ -14,7 +14,7 @@ from unittest import mock
 import numpy as np
 
 import dibs
-from subjects import BEAT, HEART, ROOT, TREE, WithProgram, capsules, spheres
+from subjects import BEAT, HEART, OTHER, ROOT, TREE, WithProgram, capsules, chains, spheres
 
 
 def lines_of(tools):
@@ -62,6 +62,26 @@ class Program(WithProgram):
             self.compare(found, contacts, ["separation", "point_on_surface", "point_on_tool", "normal", "triangle"])
             counts = [len(answer["contacts"]) for answer in answers]
             np.testing.assert_array_equal(np.bincount(found["pose"], minlength=len(tools)), counts)
+
+    def test_chains_in_scenes(self):
+        OTHER.save(self.folder / "other.dibs")
+        tools = chains(60, 3)
+        lines = [" ".join(f"capsule:{line}" for line in lines_of(chain).split("\n")) for chain in tools]
+        (self.folder / "poses.txt").write_text("\n".join(lines))
+        answers = self.lines("query", "heart.dibs", "other.dibs", "--poses", "poses.txt", "--stretch", "1.5", "--contacts", "30")
+        scene = dibs.Scene([TREE, OTHER])
+        mine = scene.query(tools)
+        self.overlap(mine, answers)
+        exact = np.flatnonzero(mine["side"] != dibs.Side.CROSSING)
+        self.assertGreater(len(exact), 10)
+        self.compare(mine[exact], [answers[pose] for pose in exact], ["separation", "lower", "accuracy", "tool"])
+        names = np.array(["heart.dibs", "other.dibs"])
+        self.assertEqual(names[mine["surface"]].tolist(), [answer["tree"] for answer in answers])
+        found, bound = scene.contacts(tools, 30)
+        self.compare({"contacts_bound": bound}, answers, ["contacts_bound"])
+        contacts = [contact for answer in answers for contact in answer["contacts"]]
+        self.compare(found, contacts, ["separation", "point_on_surface", "tool"])
+        self.assertEqual(names[found["surface"]].tolist(), [contact["tree"] for contact in contacts])
 
     def test_files_are_shared(self):
         self.dibs("generate", "heart", "--triangles", "1000", "-o", "heart.ply", "--motion", "heart.pc2")

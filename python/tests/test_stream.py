@@ -1,9 +1,14 @@
 """Packets, collected and over UDP."""
 
 import socket
+import struct
+import time
 import unittest
+import zlib
 
 import numpy as np
+from cryptography.hazmat.primitives.ciphers.algorithms import AES
+from cryptography.hazmat.primitives.cmac import CMAC
 
 import dibs
 from subjects import BEAT, TREE
@@ -74,6 +79,63 @@ class Streams(unittest.TestCase):
         every = b"".join(sender.packets())
         local = (BEAT.frames[4] + far - mesh.origin).astype("<f4")
         self.assertTrue(all(row.tobytes() in every for row in local))
+
+
+KEY = bytes(range(16))
+RECEIVER = 3
+CHALLENGE = 0xC0FFEE
+TO_RECEIVER, TO_SENDER = b"dibs to receiver", b"dibs to sender"
+
+
+def cmac(key, message):
+    """AES-CMAC, RFC 4493."""
+    code = CMAC(AES(key))
+    code.update(message)
+    return code.finalize()
+
+
+def tag(message, direction, session):
+    """The tag of all bytes before it, as docs/wire.md has it under *Authenticity*."""
+    label = bytes([1]) + direction + bytes([0]) + RECEIVER.to_bytes(4, "little") + (128).to_bytes(4, "big")
+    names = CHALLENGE.to_bytes(4, "little") + session.to_bytes(4, "little")
+    return cmac(cmac(KEY, label), names + message)[:6]
+
+
+class Tags(unittest.TestCase):
+    def test_every_packet_carries_the_keys_tag(self):
+        sender = dibs.Sender(TREE, heartbeat=None, session=7, key=KEY, receiver=RECEIVER, challenge=CHALLENGE)
+        self.assertTrue(sender.is_ready)
+        sender.send(BEAT.frames[4], age=0)
+        packets = sender.packets()
+        self.assertGreater(len(packets), 3)
+        for packet in packets:
+            self.assertEqual(packet[-10:-4], tag(packet[:-10], TO_RECEIVER, 7))
+        sender = dibs.Sender(TREE, heartbeat=None, session=7, challenge=CHALLENGE, key=KEY)
+        sender.send(BEAT.frames[4], age=0)
+        self.assertNotEqual(sender.packets(), packets, "for another receiver")
+
+    def test_a_sender_asks_for_the_challenge(self):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+            line.bind(("127.0.0.1", 0))
+            line.settimeout(5)
+            to = f"udp:127.0.0.1:{line.getsockname()[1]}"
+            sender = dibs.Sender(TREE, to, heartbeat=None, session=7, key=KEY, receiver=RECEIVER)
+            self.assertFalse(sender.is_ready)
+            sender.poll()
+            hello, address = line.recvfrom(2_048)
+            self.assertEqual(hello[1], 8)
+            for is_forged in [True, False]:
+                # Nothing is published yet, a whole frame is needed.
+                body = struct.pack("<HBBIIfIII", 0, 2, 0, 1, 0, 0, CHALLENGE, 0, *struct.unpack("<I", hello[22:26]))
+                status = bytes([3, 128 + 7, 0, 0]) + hello[4:8] + bytes(10) + body + bytes(8)
+                status += bytes(6) if is_forged else tag(status, TO_SENDER, 0)
+                line.sendto(status + zlib.crc32(status).to_bytes(4, "little"), address)
+                time.sleep(0.05)
+                sender.poll()
+                self.assertEqual(sender.is_ready, not is_forged)
+            sender.wait()
+            totals = sender.play(BEAT.frames[:2], rate=200)
+            self.assertEqual((totals.frames, totals.statuses), (2, 1))
 
 
 if __name__ == "__main__":

@@ -23,22 +23,19 @@ const OLDEST: &str = "import sys; assert sys.version_info >= (3, 9), 'older than
 
 fn check(effort: &Effort, _: &mut Figures) -> Result<Outcome> {
     let folder = workspace::target().join("python");
-    let mut packages = vec!["numpy", "scipy", "trimesh"];
-    if effort.is_record {
-        packages.extend(["maturin", "mypy"]);
-    }
+    let mut packages = vec!["numpy", "scipy", "trimesh", "cryptography", "mypy"];
+    packages.extend(effort.is_record.then_some("maturin"));
     let python = match environment(&folder.join("venv"), &packages) {
         Ok(python) => python,
         Err(error) => return Ok(Outcome::Skipped(format!("{error:#}"))),
     };
     let source = workspace::root().join("python");
+    let mut types = Command::new(&python);
+    types.args(["-m", "mypy", "--strict", "--cache-dir"]).arg(folder.join("mypy"));
+    run(types.arg(source.join("dibs")))?;
     let mut tests = Command::new(&python);
     if effort.is_record {
         install_wheel(&python, &folder, &source)?;
-        run(Command::new(&python)
-            .args(["-m", "mypy", "--strict", "--cache-dir"])
-            .arg(folder.join("mypy"))
-            .arg(source.join("dibs")))?;
     } else {
         tests.env("PYTHONPATH", package(&folder.join("package"), &source)?);
     }
