@@ -9,8 +9,9 @@ export const UNKNOWN = new Color("#666666");
 export const FORCE = new Color("#a3407a");
 export const SPHERE = new Color("#009e73");
 
-// Blue outside, darker the nearer; orange from contact on, redder the deeper. `range` is a distance in mm.
+// Blue outside, darker the nearer; orange from contact on, redder the deeper. `range` is a distance in mm, and a quarter of
+// it is deep: walls are thinner than the room about them.
 export function ofSeparation(separation, range) {
-  const share = Math.min(Math.abs(separation) / range, 1);
-  return separation > 0 ? NEAR.clone().lerp(FAR, share) : TOUCHING.clone().lerp(DEEP, share);
+  const share = (distance) => Math.min(Math.abs(separation) / distance, 1);
+  return separation > 0 ? NEAR.clone().lerp(FAR, share(range)) : TOUCHING.clone().lerp(DEEP, share(range / 4));
 }

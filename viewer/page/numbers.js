@@ -25,9 +25,19 @@ export class Numbers {
     element("stretch").className = refused ? "refused" : "";
     const bound = touching.bound < Infinity && touching.bound > -Infinity ? `, all below ${touching.bound.toFixed(1)} mm` : "";
     element("contacts").textContent = touching.contacts.length + bound;
+    element("speed").textContent = moving(touching.contacts[0]);
     const newtons = Math.hypot(...touching.force);
     const state = touching.isSafe ? " (the wall only damps: cut short)" : touching.isSaturated ? " (the largest)" : "";
     element("force").textContent = `${newtons.toFixed(2)} N${state}`;
     if (element("record-box").open) element("record").textContent = JSON.stringify(answer, null, 1);
   }
+}
+
+// The surface's velocity at a contact: its length, and its part along the normal, which leads out.
+function moving(contact) {
+  if (!contact) return "no contact";
+  const speed = Math.hypot(...contact.velocity);
+  const outwards = contact.velocity.reduce((sum, axis, at) => sum + axis * contact.normal[at], 0);
+  if (speed === 0) return "still at the contact";
+  return `${speed.toFixed(1)} mm/s, ${Math.abs(outwards).toFixed(1)} ${outwards < 0 ? "inwards" : "outwards"}`;
 }

@@ -33,8 +33,9 @@ export function touching(session) {
   const numbers = session.touching();
   const vector = (at) => [...numbers.slice(at, at + 3)];
   const contacts = [];
-  for (let at = 6; at < numbers.length; at += 10) {
-    contacts.push({ separation: numbers[at], on_surface: vector(at + 1), on_tool: vector(at + 4), normal: vector(at + 7) });
+  for (let at = 6; at < numbers.length; at += 13) {
+    const [on_surface, on_tool, normal, velocity] = [1, 4, 7, 10].map((place) => vector(at + place));
+    contacts.push({ separation: numbers[at], on_surface, on_tool, normal, velocity });
   }
   return { force: vector(0), isSaturated: numbers[3] !== 0, isSafe: numbers[4] !== 0, bound: numbers[5], contacts };
 }

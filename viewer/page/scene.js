@@ -113,6 +113,8 @@ export class Picture {
 
   move(positions) {
     const attribute = this.geometry.attributes.position;
+    // A surface that stands still keeps its normals, and what the graphics card has of it.
+    if (positions.every((axis, at) => axis === attribute.array[at])) return;
     attribute.array.set(positions);
     attribute.needsUpdate = true;
     this.geometry.computeVertexNormals();

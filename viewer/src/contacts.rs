@@ -2,7 +2,7 @@
 
 use dibs_nostd::constraint::{ConstraintState, Proxy, SpringDamper};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Contact, Contacts};
+use dibs_nostd::{Contact, Contacts, VertexTable};
 
 /// Room for contacts, and for triangles to compare.
 pub type Found = Contacts<16, 4_096>;
@@ -54,6 +54,28 @@ impl Velocity {
                 axis.cross(axis - old) * (rate / axis.length_squared().max(f32::MIN_POSITIVE));
         }
         Self { origin, linear: (origin - before) * rate, angular }
+    }
+}
+
+/// The velocities (mm/s) of a surface on its way from one frame to the next.
+#[derive(Clone, Copy, Debug)]
+pub struct Speeds<'a> {
+    /// Positions of the frame before.
+    pub before: &'a [Vec3],
+    /// Positions of the last frame.
+    pub last: &'a [Vec3],
+    /// Frames a second; 0 while the surface stands still.
+    pub rate: f32,
+}
+
+impl VertexTable for Speeds<'_> {
+    fn len(&self) -> usize {
+        self.before.len()
+    }
+
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        let at = |frame: &[Vec3]| frame.get(vertex as usize).copied();
+        Some((at(self.last)? - at(self.before)?) * self.rate)
     }
 }
 

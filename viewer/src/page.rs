@@ -100,7 +100,7 @@ impl Page {
     }
 
     /// The force, whether it is saturated, whether the wall only damps, the bound on contacts; then of each contact
-    /// separation, point on surface, point on tool, normal. Points are in the tree's coordinates.
+    /// separation, point on surface, point on tool, normal, and the surface's velocity there (mm/s). Points are in the tree's coordinates.
     ///
     /// # Errors
     /// A query without an answer.
@@ -112,9 +112,9 @@ impl Page {
         );
         numbers.push(touching.bound.into());
         for contact in &touching.contacts {
-            let Contact { separation, point_on_surface, point_on_tool, normal, .. } = *contact;
-            numbers.push(separation.into());
-            for vector in [point_on_surface, point_on_tool, normal] {
+            let Contact { point_on_surface, point_on_tool, normal, velocity, .. } = *contact;
+            numbers.push(contact.separation.into());
+            for vector in [point_on_surface, point_on_tool, normal, velocity] {
                 numbers.extend(vector.to_array().map(f64::from));
             }
         }

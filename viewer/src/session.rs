@@ -6,7 +6,7 @@ use dibs_nostd::{
     Query, Step, Tool, Tracker, Tree, TriangleRow, VertexTable, format, measure_stretch,
 };
 
-use crate::contacts::{Found, Touching, Velocity};
+use crate::contacts::{Found, Speeds, Touching, Velocity};
 use crate::spheres::{self, Recorder};
 use crate::{Between, Instrument, Motion, SessionError};
 
@@ -186,6 +186,8 @@ struct Now {
     stretch: MeasuredStretch,
     tool: Option<Instrument>,
     velocity: Velocity,
+    /// Frames a second at which the surface moves; 0 while it stands still.
+    rate: f32,
     answer: Option<Proximity>,
 }
 
@@ -200,6 +202,7 @@ impl<I: Index> Running<I> {
             stretch: motion.stretches[0],
             tool: None,
             velocity: Velocity::default(),
+            rate: 0.0,
             answer: None,
         };
         Ok(Self {
@@ -376,6 +379,8 @@ impl<I: Index> Session for Running<I> {
             self.now.tool = Some(tool);
         }
         self.now.velocity = Velocity::new(from, to, end - start);
+        let moves = end > start && matches!(self.now.surface, Surface::Moving(_));
+        self.now.rate = if moves { self.motion.rate as f32 } else { 0.0 };
         Ok(counts)
     }
 
@@ -414,6 +419,9 @@ impl<I: Index> Session for Running<I> {
             }
             None => (),
         }
+        let [before, last] =
+            [self.before, self.last].map(|frame| self.motion.frames[frame].as_slice());
+        contacts.move_with(&Speeds { before, last, rate: self.now.rate })?;
         Ok(Touching::new(&self.contacts, margin, self.now.velocity))
     }
 

@@ -169,6 +169,8 @@ fn results_that_nobody_reads_or_no_disk_holds() {
     let folder = folder.path();
     succeeds(folder, "generate heart --triangles 320 -o heart.ply --motion heart.pc2");
     succeeds(folder, "build heart.ply -o heart.dibs --stretch 3");
+    // More than a buffer holds.
+    std::fs::write(folder.join("path.csv"), "sphere:90,10,20,3\n".repeat(5_000)).unwrap();
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     let to = format!("--to udp:{}", socket.local_addr().unwrap());
     for line in [
@@ -179,6 +181,13 @@ fn results_that_nobody_reads_or_no_disk_holds() {
         "inspect heart.dibs",
         "inspect heart.dibs --json",
         "query heart.dibs --tool sphere:0,0,150,5 --json",
+        "query heart.dibs --poses path.csv",
+        "track heart.dibs --motion heart.pc2 --path path.csv",
+        "track heart.dibs --motion heart.pc2 --path path.csv --json",
+        "completions zsh",
+        "man",
+        "--version",
+        "query --help",
         &format!("stream heart.dibs heart.pc2 {to} --frames 3 --json"),
     ] {
         let run = |stdout: std::process::Stdio| {
@@ -349,6 +358,11 @@ fn sides_contacts_chains_and_scenes() {
         "query box.dibs far.dibs --tool sphere:0,0,21,1 --tool capsule:20,0,9,27.5,0,9,1 --json";
     let scene = json(folder, &format!("{line} --contacts 5"));
     assert_eq!((&scene["tree"], &scene["tool"]), (&"box.dibs".into(), &0.into()), "{scene}");
+    // Accuracy and tests are those of all pairs.
+    let far = json(folder, "query far.dibs --tool capsule:20,0,9,27.5,0,9,1 --json");
+    assert!(far["accuracy"].as_f64() > ask("sphere:0,0,21,1")["accuracy"].as_f64());
+    assert!(scene["accuracy"].as_f64() >= far["accuracy"].as_f64(), "{scene}");
+    assert!(scene["node_tests"].as_u64() > far["node_tests"].as_u64(), "{scene}");
     let contacts = scene["contacts"].as_array().unwrap();
     let found: Vec<f64> = contacts.iter().map(|c| c["separation"].as_f64().unwrap()).collect();
     assert!(

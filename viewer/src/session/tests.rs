@@ -104,3 +104,41 @@ fn tested_spheres_are_those_of_opened_nodes() {
         }
     }
 }
+
+#[test]
+fn contacts_move_as_the_surface_does() {
+    let (mut session, frames) = heart();
+    // Beside the wall, in the contraction.
+    let pose = [75.0, -10.0, 40.0, 135.0, -20.0, 70.0, 2.5];
+    session.settings().margin = 60.0;
+    for between in [Between::Interpolated, Between::Extrapolated] {
+        session.settings().between = between;
+        session.restart();
+        let seconds = |tick: u32| f64::from(tick) / 1e3;
+        // From the third frame's time to the fourth's, so that both have come.
+        session.advance(&pose, &pose, [seconds(100), seconds(110)], 10).unwrap();
+        let touching = session.touching().unwrap();
+        assert!(!touching.contacts.is_empty());
+        for contact in &touching.contacts {
+            let at = |surface: &Surface| {
+                let corner = |row| surface.position(row).unwrap();
+                let corners = contact.corners.map(corner).into_iter().zip(contact.barycentric);
+                corners.map(|(corner, weight)| weight * corner).sum::<Vec3>()
+            };
+            let before = at(&session.now.surface);
+            session.advance(&pose, &pose, [seconds(110), seconds(111)], 1).unwrap();
+            let moved = (at(&session.now.surface) - before) * 1e3;
+            assert!(moved.length() > 1.0, "{between:?}: {moved}");
+            assert!(
+                moved.distance(contact.velocity) < 0.1 + 0.01 * moved.length(),
+                "{between:?}: {moved}"
+            );
+            session.advance(&pose, &pose, [seconds(110), seconds(110)], 1).unwrap();
+            assert!(session.touching().unwrap().contacts.iter().all(|c| c.velocity == Vec3::ZERO));
+        }
+    }
+    session.settings().between = Between::Held;
+    session.advance(&pose, &pose, [0.110, 0.111], 1).unwrap();
+    assert!(session.touching().unwrap().contacts.iter().all(|c| c.velocity == Vec3::ZERO));
+    assert!(frames.len() > 4);
+}

@@ -1,5 +1,6 @@
 //! `dibs generate`: procedural surfaces.
 
+use crate::mesh_file::spinner;
 use anyhow::Result;
 use clap::Subcommand;
 use dibs_build::{Format, generate};
@@ -58,7 +59,12 @@ pub fn run(args: &Args) -> Result<()> {
             }
             mesh
         }
-        Surface::Brain { triangles, .. } => generate::brain(*triangles)?,
+        Surface::Brain { triangles, .. } => {
+            let spinner = spinner("folding a cortex");
+            let made = generate::brain(*triangles);
+            spinner.finish_and_clear();
+            made?
+        }
     };
     mesh.write(output, format)?;
     let (vertices, triangles) = (mesh.positions.len(), mesh.triangles.len());

@@ -65,7 +65,11 @@ Lengths are in millimetres. Warnings and progress go to standard error, results 
 standard output; --json makes them one JSON object. Bad input ends with exit code 1.";
 
 fn main() -> ExitCode {
-    let outcome = match Cli::parse().command {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(answer) => return output::answer(&answer),
+    };
+    let outcome = match cli.command {
         Command::Build(args) => build::run(&args),
         Command::Stretch(args) => stretch::run(&args),
         Command::Inspect(args) => inspect::run(&args),

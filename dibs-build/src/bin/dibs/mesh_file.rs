@@ -5,6 +5,7 @@ use dibs_build::glam::DVec3;
 use dibs_build::{Import, Motion, ReadOptions, Unit};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::Path;
+use std::time::Duration;
 
 /// How a mesh file is read.
 #[derive(clap::Args)]
@@ -92,4 +93,11 @@ pub fn progress_bar(doing: &str, triangles: usize) -> ProgressBar {
         bar.set_style(style);
     }
     bar
+}
+
+/// A sign of life during work without a measure.
+pub fn spinner(doing: &'static str) -> ProgressBar {
+    let spinner = ProgressBar::new_spinner().with_message(doing);
+    spinner.enable_steady_tick(Duration::from_millis(100));
+    spinner
 }

@@ -1,15 +1,13 @@
 //! Displacement modes for `dibs build` and `dibs stream`.
 
-use crate::mesh_file::Lengths;
+use crate::mesh_file::{Lengths, spinner};
 use crate::tree_file::{self, AnyTree};
 use anyhow::{Result, anyhow};
 use dibs_build::modes::{ModalError, ModalFit, Projector};
 use dibs_build::stream::SurfaceOrder;
 use dibs_build::{BuiltTree, Mesh, Motion};
 use dibs_nostd::modes::Modes;
-use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 /// The modes of a motion file.
 pub struct Fit {
@@ -20,8 +18,7 @@ pub struct Fit {
 /// Fits modes to a motion file.
 pub fn fit(mesh: &Mesh, path: &Path, lengths: &Lengths) -> Result<Fit> {
     let motion = lengths.motion(path, mesh.origin)?;
-    let spinner = ProgressBar::new_spinner().with_message("fitting modes to the motion");
-    spinner.enable_steady_tick(Duration::from_millis(100));
+    let spinner = spinner("fitting modes to the motion");
     let fit = ModalFit::new(mesh, &motion);
     spinner.finish_and_clear();
     let fit = fit.map_err(|error| anyhow!("{}: {error}", path.display()))?;

@@ -4,6 +4,7 @@
 
 use std::fmt;
 use std::io::{self, ErrorKind, Write};
+use std::process::ExitCode;
 use std::sync::OnceLock;
 
 /// As the standard macro, but keeps a failure for [`finish`].
@@ -37,6 +38,18 @@ pub fn write(bytes: &[u8]) -> bool {
         let _ = FAILURE.set(error);
     }
     FAILURE.get().is_none()
+}
+
+/// Prints what clap answers in place of a command: an error of usage, or the help or version that was asked for.
+pub fn answer(error: &clap::Error) -> ExitCode {
+    let printed = error.print();
+    if let Err(error) = printed
+        && error.kind() != ErrorKind::BrokenPipe
+    {
+        warn(format_args!("error: the results cannot be printed ({error})"));
+        return ExitCode::FAILURE;
+    }
+    u8::try_from(error.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from)
 }
 
 /// Prints a line on standard error.

@@ -1,6 +1,7 @@
 //! `dibs track`: a tool on its path about a moving surface, tick by tick.
 
 use crate::mesh_file::Lengths;
+use crate::output;
 use crate::query::{LocalTool, STACK, ToolSpec, parse_tool, rows, side_name};
 use crate::tree_file::{self, AnyTree};
 use anyhow::{Context, Result, anyhow, bail};
@@ -9,11 +10,14 @@ use dibs_nostd::{
     Fallback, Index, MeasuredStretch, MovingSurface, Odometer, Options, Proximity, Query, Step,
     Tool, Tracker, Tree, measure_stretch,
 };
-use std::io::{BufWriter, Write, stdout};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Opened nodes that are remembered: more than any tool needs.
 const OPENED: usize = 4_096;
+
+/// Bytes that are printed at once.
+const BUFFER: usize = 1 << 16;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -119,7 +123,7 @@ fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
         tree,
         query: Query::new(tree)?,
         tracker: (!args.full).then(|| Tracker::new(tree)).transpose()?,
-        out: BufWriter::new(stdout().lock()),
+        out: Vec::new(),
         json: args.json,
         sums: [0; 2],
         fallbacks: 0,
@@ -141,6 +145,9 @@ fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
             let stretch =
                 if args.surface == Surface::Interpolated { both } else { stretches[current] };
             session.tick(tick, &step, args.surface, share, stretch, tool)?;
+            if session.out.len() >= BUFFER && !session.print() {
+                return Ok(());
+            }
         }
         last = current;
     }
@@ -152,7 +159,8 @@ struct Session<'t, I> {
     query: Query<'t, I, STACK>,
     /// `None` with `--full`.
     tracker: Option<Tracker<'t, I, STACK, OPENED>>,
-    out: BufWriter<std::io::StdoutLock<'static>>,
+    /// Lines that are not printed yet.
+    out: Vec<u8>,
     json: bool,
     /// Node and triangle tests.
     sums: [u64; 2],
@@ -233,8 +241,17 @@ impl<I: Index> Session<'_, I> {
         })
     }
 
+    /// Prints the lines that wait. Returns whether more are wanted.
+    fn print(&mut self) -> bool {
+        let wants_more = output::write(&self.out);
+        self.out.clear();
+        wants_more
+    }
+
     fn finish(mut self, ticks: usize) -> Result<()> {
-        self.out.flush()?;
+        if !self.print() {
+            return Ok(());
+        }
         let [nodes, triangles] = self.sums.map(|sum| sum as f64 / ticks as f64);
         let fallbacks = self.fallbacks;
         if self.json {

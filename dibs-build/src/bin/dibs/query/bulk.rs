@@ -1,7 +1,8 @@
 //! Many poses, answered as fast as they come.
 
 use super::pose;
-use super::scene::{self, Surface};
+use super::scene::{self, Room, Surface};
+use crate::mesh_file::spinner;
 use crate::output;
 use anyhow::{Result, anyhow, bail};
 use dibs_build::write_atomically;
@@ -36,6 +37,7 @@ pub fn run(
         return lines.answer(surfaces, margin, &mut |bytes| Ok(output::write(bytes)));
     }
     let mut failure = Ok(());
+    let spinner = spinner("answering");
     let written = write_atomically(output, |file| {
         failure = lines.answer(surfaces, margin, &mut |bytes| {
             file.write_all(bytes)?;
@@ -44,6 +46,7 @@ pub fn run(
         // Whatever ends here, the file keeps its old content.
         if failure.is_err() { Err(io::Error::other("incomplete")) } else { Ok(()) }
     });
+    spinner.finish_and_clear();
     failure.and(written.map_err(Into::into))
 }
 
@@ -66,8 +69,8 @@ impl Lines {
             let (batch, end) = self.batch();
             let answers: Vec<Result<Vec<u8>>> = batch
                 .par_iter()
-                .map(|(number, line)| {
-                    answer(surfaces, margin, *number, line)
+                .map_init(Room::default, |room, (number, line)| {
+                    answer(surfaces, margin, room, *number, line)
                         .map_err(|error| anyhow!("{}, line {number}: {error}", self.name))
                 })
                 .collect();
@@ -131,10 +134,11 @@ impl Lines {
 fn answer(
     surfaces: &[Surface<'_>],
     margin: Option<f32>,
+    room: &mut Room,
     number: usize,
     line: &str,
 ) -> Result<Vec<u8>> {
-    let answer = scene::ask(surfaces, &pose::parse(line)?, margin)?;
+    let answer = scene::ask(surfaces, &pose::parse(line)?, margin, room)?;
     let mut bytes = serde_json::to_vec(&answer.record(Some(number)))?;
     bytes.push(b'\n');
     Ok(bytes)

@@ -13,7 +13,7 @@ pub use tool::{LocalTool, ToolSpec, parse_tool};
 use crate::mesh_file::Lengths;
 use crate::tree_file;
 use anyhow::{Result, bail};
-use scene::Surface;
+use scene::{Room, Surface};
 use std::path::PathBuf;
 
 /// Most tools of a chain.
@@ -93,7 +93,7 @@ pub fn run(args: &Args) -> Result<()> {
     if let Some(poses) = &args.poses {
         return bulk::run(&surfaces, args.contacts, poses, &args.output);
     }
-    let answer = scene::ask(&surfaces, &args.tool, args.contacts)?;
+    let answer = scene::ask(&surfaces, &args.tool, args.contacts, &mut Room::default())?;
     if let Some(margin) = args.contacts
         && answer.bound < margin
     {

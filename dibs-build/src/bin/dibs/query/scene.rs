@@ -58,11 +58,11 @@ impl<'a> Surface<'a> {
         Ok(Self { name: name.to_string(), tree, positions, stretch, options })
     }
 
-    fn ask(&self, tool: &ToolSpec, margin: Option<f32>) -> Result<Found> {
+    fn ask(&self, tool: &ToolSpec, margin: Option<f32>, room: &mut Room) -> Result<Found> {
         let tool = tool.local(self.tree.origin());
         tool.and_then(|tool| match &self.tree {
-            AnyTree::Narrow(tree) => self.ask_tree(tree, tool, margin),
-            AnyTree::Wide(tree) => self.ask_tree(tree, tool, margin),
+            AnyTree::Narrow(tree) => self.ask_tree(tree, tool, margin, room),
+            AnyTree::Wide(tree) => self.ask_tree(tree, tool, margin, room),
         })
         .map_err(|error| anyhow!("{}: {error}", self.name))
     }
@@ -72,10 +72,11 @@ impl<'a> Surface<'a> {
         tree: &Tree<'_, I>,
         tool: LocalTool,
         margin: Option<f32>,
+        room: &mut Room,
     ) -> Result<Found> {
         let mut found = match tool {
-            LocalTool::Sphere(sphere) => self.closest(tree, &sphere, margin)?,
-            LocalTool::Capsule(capsule) => self.closest(tree, &capsule, margin)?,
+            LocalTool::Sphere(sphere) => self.closest(tree, &sphere, margin, room)?,
+            LocalTool::Capsule(capsule) => self.closest(tree, &capsule, margin, room)?,
         };
         let vertex = |row| tree.vertex_number(row).map_or(row, |vertex| vertex.0);
         found.triangle = found.proximity.corners.map(vertex);
@@ -89,18 +90,22 @@ impl<'a> Surface<'a> {
         tree: &Tree<'_, I>,
         tool: &impl Tool,
         margin: Option<f32>,
+        Room(contacts): &mut Room,
     ) -> Result<Found> {
         let positions = self.positions.as_slice();
         let mut query = Query::<I, STACK>::new(tree)?;
         let Some(margin) = margin else {
             return Ok(Found::new(query.closest(positions, tool, &self.options)?));
         };
-        let mut contacts = Box::new(Contacts::<64, 16_384>::new());
-        let closest = query.contacts(positions, tool, margin, &self.options, &mut contacts)?;
+        let closest = query.contacts(positions, tool, margin, &self.options, contacts)?;
         let bound = contacts.bound();
         Ok(Found { contacts: contacts.iter().copied().collect(), bound, ..Found::new(closest) })
     }
 }
+
+/// Room for the contacts of a pair: a quarter of a megabyte, for any number of poses.
+#[derive(Default)]
+pub struct Room(Box<Contacts<64, 16_384>>);
 
 /// What one tool finds on one surface.
 struct Found {
@@ -122,16 +127,23 @@ impl Found {
 }
 
 /// The closest of all pairs of a tool and a surface, and with a margin all contacts, nearest first.
+///
+/// The pairs are searched one by one: `Query::closest_in_scene` would pass over a far tool, which it may only if the tools
+/// of a chain touch each other, and takes surfaces of one index width and one origin.
 pub fn ask<'a>(
     surfaces: &'a [Surface<'a>],
     tools: &[ToolSpec],
     margin: Option<f32>,
+    room: &mut Room,
 ) -> Result<Answer<'a>> {
     let mut best: Option<Answer<'a>> = None;
     let (mut touches, mut bound) = (Vec::new(), f32::INFINITY);
+    // Interval, accuracy and tests are those of all pairs.
+    let (mut lower, mut accuracy, mut node_tests, mut triangle_tests) =
+        (f32::INFINITY, 0_f32, 0, 0);
     for surface in surfaces {
         for (number, tool) in tools.iter().enumerate() {
-            let found = surface.ask(tool, margin)?;
+            let found = surface.ask(tool, margin, room)?;
             bound = bound.min(found.bound);
             let contacts = found.contacts.into_iter().zip(found.triangles);
             touches.extend(contacts.map(|(contact, triangle)| Touch {
@@ -142,7 +154,11 @@ pub fn ask<'a>(
                 tree: &surface.name,
                 tool: number,
             }));
-            let separation = found.proximity.separation;
+            let Proximity { separation, .. } = found.proximity;
+            lower = lower.min(found.proximity.lower);
+            accuracy = accuracy.max(found.proximity.accuracy);
+            node_tests += found.proximity.node_tests;
+            triangle_tests += found.proximity.triangle_tests;
             if best.as_ref().is_none_or(|best| separation < best.proximity.separation) {
                 let label = found.proximity.triangle.and_then(|row| surface.tree.label(row));
                 best = Some(Answer {
@@ -160,6 +176,9 @@ pub fn ask<'a>(
         }
     }
     let mut answer = best.ok_or_else(|| anyhow!("no tool"))?;
+    let closest = &mut answer.proximity;
+    (closest.lower, closest.accuracy) = (lower, accuracy);
+    (closest.node_tests, closest.triangle_tests) = (node_tests, triangle_tests);
     if margin.is_some() {
         touches.sort_by(|a, b| a.contact.separation.total_cmp(&b.contact.separation));
         (answer.contacts, answer.bound) = (Some(touches), bound);
