@@ -141,6 +141,13 @@ fn send_all(
     let interval = (TICK_RATE as f32 / frame_rate) as u32;
     let rate = if faults.is_some() { Plan::RATE } else { 0.0 };
     let mut silence = faults.map(Plan::silence_at);
+    // A board that starts has no network yet: the emulator would report the first packet as one that it cannot deliver.
+    while link.now() == 0 {
+        if link.is_over() {
+            return Ok(());
+        }
+        thread::sleep(PAUSE);
+    }
     // Every frame must echo a status: the controller does not trust a frame of unknown delay.
     while sender.status().is_none() {
         if !rest(link, sender) {
