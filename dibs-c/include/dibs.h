@@ -107,6 +107,11 @@
 #define DIBS_EVENTS 26
 
 /**
+ * Most surfaces of a scene.
+ */
+#define DIBS_SURFACES 8
+
+/**
  * Bytes of a surface's storage besides its vertices.
  */
 #define DIBS_SURFACE_BASE 416
@@ -115,6 +120,11 @@
  * Bytes of a surface's storage for each vertex: two positions.
  */
 #define DIBS_SURFACE_VERTEX 24
+
+/**
+ * Most tools of a chain.
+ */
+#define DIBS_TOOLS 16
 
 /**
  * Bytes of a tracker's storage besides its vertices.
@@ -887,6 +897,14 @@ typedef struct {
    */
   float axis_parameter;
   /**
+   * The surface's number in a scene; 0 for a single surface.
+   */
+  uint32_t surface;
+  /**
+   * The tool's number in a chain; 0 for a single tool.
+   */
+  uint32_t tool;
+  /**
    * Row of the triangle.
    */
   uint32_t triangle;
@@ -1115,6 +1133,74 @@ typedef struct {
    */
   float shrinkage;
 } dibs_surface_limits;
+
+/**
+ * A chain of tools, whose axes touch each other, and the surfaces around it. A chain and one surface are a scene too.
+ */
+typedef struct {
+  /**
+   * Addresses of queries, one for each surface, on the surface's tree. No query is there twice.
+   */
+  dibs_query *const *queries;
+  /**
+   * Addresses of the surfaces' frames, in the same order. No frame is there twice.
+   */
+  dibs_frame *const *frames;
+  /**
+   * Surfaces: 1 to `DIBS_SURFACES`.
+   */
+  uint32_t surface_count;
+  /**
+   * The chain's tools.
+   */
+  const dibs_tool *tools;
+  /**
+   * Tools: 1 to `DIBS_TOOLS`.
+   */
+  uint32_t tool_count;
+} dibs_scene;
+
+/**
+ * The closest pair of a scene.
+ */
+typedef struct {
+  /**
+   * The surface's number in the scene.
+   */
+  uint32_t surface;
+  /**
+   * The tool's number in the chain.
+   */
+  uint32_t tool;
+  /**
+   * The pair. Its interval begins at the least lower end of all pairs, its accuracy is the worst, its tests are those
+   * of all. Its side is `DIBS_SIDE_CUT_SHORT` if the budget left that of any pair open.
+   */
+  dibs_proximity proximity;
+} dibs_closest;
+
+/**
+ * The answer of several trackers.
+ */
+typedef struct {
+  /**
+   * The closest pair. Its interval begins at the least lower end of all pairs, its accuracy is the worst, its tests are
+   * those of all. Its side is `DIBS_SIDE_CUT_SHORT` if the budget left that of any pair open.
+   */
+  dibs_proximity proximity;
+  /**
+   * That pair's number.
+   */
+  uint32_t pair;
+  /**
+   * Pairs that were searched; the others were certain to be farther.
+   */
+  uint32_t searched;
+  /**
+   * The first reason for a whole query, of those that were searched.
+   */
+  dibs_fallback fallback;
+} dibs_tracked;
 
 /**
  * Facts about a tree.
@@ -1577,6 +1663,42 @@ dibs_code dibs_receiver_position(dibs_receiver *receiver,
 dibs_code dibs_receiver_counters(dibs_receiver *receiver, uint32_t *counters);
 
 /**
+ * The closest pair of a chain of tools and the surfaces of a scene.
+ *
+ * Exact within its accuracy, as `dibs_query_closest`. Query tools whose axes do not touch each other one by one: of such
+ * tools, one deep inside a surface may be missed.
+ *
+ * Cost: the budget at most, for all pairs together, and a node test a pair.
+ *
+ * @param scene    The scene.
+ * @param options  Options, or null.
+ * @param closest  Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
+ * @return As `dibs_query_closest`, of any surface; `DIBS_CODE_ARGUMENT` for no surface, no tool, or too many.
+ */
+dibs_code dibs_scene_closest(const dibs_scene *scene,
+                             const dibs_options *options,
+                             dibs_closest *closest);
+
+/**
+ * Fills the list with the contacts of all pairs of a tool and a surface, deepest first, and finds the closest pair:
+ * `surface` and `tool` of a `dibs_contact` tell the pairs apart.
+ *
+ * Cost: that of `dibs_scene_closest`, and for each pair within the margin that of `dibs_query_contacts`.
+ *
+ * @param scene     The scene.
+ * @param margin    In mm, at least 0.
+ * @param options   Options, or null. A budget that runs out shows in the list's bound, which holds for all pairs.
+ * @param contacts  The list; empty after an error.
+ * @param closest   Receives the closest pair, or null.
+ * @return As `dibs_scene_closest`, `DIBS_CODE_MARGIN`, or `DIBS_CODE_TREE_NO_ADJACENCY`.
+ */
+dibs_code dibs_scene_contacts(const dibs_scene *scene,
+                              float margin,
+                              const dibs_options *options,
+                              dibs_contacts *contacts,
+                              dibs_closest *closest);
+
+/**
  * Makes a surface without a frame.
  *
  * @param storage   `DIBS_SURFACE_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`. Needs no initial value. For as long as
@@ -1631,6 +1753,49 @@ dibs_code dibs_tracker_closest(dibs_tracker *tracker,
                                const dibs_options *options,
                                dibs_proximity *proximity,
                                dibs_fallback *fallback);
+
+/**
+ * Fills the list with all locally closest pairs whose separation is at most `margin`, deepest first: that of
+ * `dibs_query_contacts`.
+ *
+ * Cost: that of `dibs_tracker_closest`, and where the surface is within the margin a range search, which has no memory of
+ * the last tick.
+ *
+ * @param tracker    The tracker.
+ * @param tool       The tool.
+ * @param margin     In mm, at least 0.
+ * @param options    Options, or null. A budget that runs out shows in the list's bound.
+ * @param contacts   The list; empty after an error.
+ * @param proximity  Receives the closest pair, or null.
+ * @param fallback   Receives the reason for a whole query; or null.
+ * @return As `dibs_query_contacts`.
+ */
+dibs_code dibs_tracker_contacts(dibs_tracker *tracker,
+                                const dibs_tool *tool,
+                                float margin,
+                                const dibs_options *options,
+                                dibs_contacts *contacts,
+                                dibs_proximity *proximity,
+                                dibs_fallback *fallback);
+
+/**
+ * The closest pair of several, each a tracker, on its surface, with a tool: of a chain of tools, of several surfaces, or of
+ * both. A pair that is certain to be farther than the closest is not searched.
+ *
+ * Cost: the budget at most, for all pairs together.
+ *
+ * @param trackers  Addresses of the trackers, one for each pair. No tracker is there twice.
+ * @param tools     The tool of each pair, in the same order.
+ * @param count     Pairs: 1 to `DIBS_TOOLS`.
+ * @param options   Options, or null.
+ * @param tracked   Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
+ * @return As `dibs_tracker_closest`, of any pair; `DIBS_CODE_ARGUMENT` for no pair or too many.
+ */
+dibs_code dibs_tracker_closest_of(dibs_tracker *const *trackers,
+                                  const dibs_tool *tools,
+                                  uint32_t count,
+                                  const dibs_options *options,
+                                  dibs_tracked *tracked);
 
 /**
  * Validates the bytes of a tree, and makes the tree that every other object is made with.

@@ -11,11 +11,21 @@ use core::slice;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use bytemuck::AnyBitPattern;
+use heapless::Vec;
 
 use crate::code::dibs_code;
 
 /// Alignment, in bytes, of the storage of every object.
 pub const DIBS_ALIGNMENT: usize = 8;
+
+/// A value that any bits make.
+///
+/// # Safety
+/// Any bits are a value of the type.
+pub unsafe trait AnyBits: Copy {}
+
+// SAFETY: the trait's own promise.
+unsafe impl<T: AnyBitPattern> AnyBits for T {}
 
 /// A pointer to a value, or to the first of several, that is read.
 pub trait Input<T>: Sized {
@@ -26,10 +36,12 @@ pub trait Input<T>: Sized {
     fn get_if_any(self) -> Result<Option<T>, dibs_code>;
 
     /// So many values, which stay as long as the header says.
-    fn slice(self, count: usize) -> Result<&'static [T], dibs_code>;
+    fn slice(self, count: usize) -> Result<&'static [T], dibs_code>
+    where
+        T: 'static;
 }
 
-impl<T: AnyBitPattern> Input<T> for *const T {
+impl<T: AnyBits> Input<T> for *const T {
     fn get(self) -> Result<T, dibs_code> {
         check(self)?;
         // SAFETY: neither null nor misaligned, so the caller promises a value; any bits are one of this type.
@@ -40,7 +52,10 @@ impl<T: AnyBitPattern> Input<T> for *const T {
         if self.is_null() { Ok(None) } else { self.get().map(Some) }
     }
 
-    fn slice(self, count: usize) -> Result<&'static [T], dibs_code> {
+    fn slice(self, count: usize) -> Result<&'static [T], dibs_code>
+    where
+        T: 'static,
+    {
         check(self)?;
         if count > isize::MAX as usize / size_of::<T>().max(1) {
             return Err(dibs_code::Argument);
@@ -91,7 +106,7 @@ impl<T> Place<T> {
     /// The value there.
     pub fn get(&self) -> T
     where
-        T: AnyBitPattern,
+        T: AnyBits,
     {
         // SAFETY: checked, and the function takes a value there; any bits are one of this type.
         unsafe { self.0.read() }
@@ -134,6 +149,9 @@ pub trait Storage {
         offset: usize,
         words: usize,
     ) -> Result<&'static mut [u32], dibs_code>;
+
+    /// A value after the first `offset` bytes, a multiple of [`DIBS_ALIGNMENT`].
+    fn keep<T>(self, size: usize, offset: usize, value: T) -> Result<&'static T, dibs_code>;
 }
 
 /// The start of the memory, if it is large enough and aligned.
@@ -188,6 +206,19 @@ impl Storage for *mut c_void {
             Ok(slice::from_raw_parts_mut(start, words))
         }
     }
+
+    fn keep<T>(self, size: usize, offset: usize, value: T) -> Result<&'static T, dibs_code> {
+        const { assert!(align_of::<T>() <= DIBS_ALIGNMENT) };
+        let needed = size_of::<T>().checked_add(offset);
+        let needed = needed.filter(|_| offset.is_multiple_of(DIBS_ALIGNMENT));
+        let start = memory(self, size, needed.ok_or(dibs_code::Argument)?)?;
+        // SAFETY: inside the caller's memory, aligned, and this object's alone from now on.
+        unsafe {
+            let place = start.byte_add(offset).cast::<T>();
+            place.write(value);
+            Ok(&*place)
+        }
+    }
 }
 
 /// A kind of object.
@@ -240,6 +271,31 @@ impl<T: Kind> Handle<T> for *mut T {
         // SAFETY: its mark says that it was made here, and the caller keeps its storage. Nothing of this kind is opened.
         Ok(unsafe { &*(*object).body.get() })
     }
+}
+
+/// The addresses of several objects, one after the other.
+pub trait Handles<T: Kind> {
+    /// The objects, each this call's alone: one at least, and at most `N`. One that is there twice is in use.
+    fn open_all<const N: usize>(self, count: u32) -> Result<Vec<Open<T>, N>, dibs_code>;
+}
+
+impl<T: Kind> Handles<T> for *const *mut T {
+    fn open_all<const N: usize>(self, count: u32) -> Result<Vec<Open<T>, N>, dibs_code> {
+        check(self)?;
+        let count = some_of::<N>(count)?;
+        let mut objects = Vec::new();
+        for at in 0..count {
+            // SAFETY: neither null nor misaligned, so the caller promises `count` addresses.
+            let object = unsafe { self.add(at).read() };
+            objects.push(object.open()?).map_err(|_| dibs_code::Argument)?;
+        }
+        Ok(objects)
+    }
+}
+
+/// A number of things that a call takes: one at least, and at most `N`.
+pub fn some_of<const N: usize>(count: u32) -> Result<usize, dibs_code> {
+    Some(count as usize).filter(|count| (1..=N).contains(count)).ok_or(dibs_code::Argument)
 }
 
 /// The mark of an object, or of storage in which none was made.

@@ -24,7 +24,23 @@ pub const DIBS_NEAR: usize = 512;
 /// A list of contacts.
 ///
 /// One context at a time.
-pub struct dibs_contacts(pub(crate) Contacts<DIBS_CONTACTS, DIBS_NEAR>);
+pub struct dibs_contacts(pub(crate) List);
+
+type List = Contacts<DIBS_CONTACTS, DIBS_NEAR>;
+
+impl dibs_contacts {
+    /// Fills the list. After an error it is empty: the contacts of the last pose are none of this one.
+    pub(crate) fn fill<R>(
+        &mut self,
+        call: impl FnOnce(&mut List) -> Result<R, dibs_code>,
+    ) -> Result<R, dibs_code> {
+        let filled = call(&mut self.0);
+        if filled.is_err() {
+            self.0 = List::new();
+        }
+        filled
+    }
+}
 
 impl Kind for dibs_contacts {
     const MARK: u32 = 0x6462_630A;
@@ -45,6 +61,10 @@ pub struct dibs_contact {
     pub point_on_tool: dibs_vec3,
     /// Place of the pair along the tool's axis: 0 at its start, 1 at its end.
     pub axis_parameter: f32,
+    /// The surface's number in a scene; 0 for a single surface.
+    pub surface: u32,
+    /// The tool's number in a chain; 0 for a single tool.
+    pub tool: u32,
     /// Row of the triangle.
     pub triangle: u32,
     /// That triangle's corners: rows of vertices.
@@ -64,6 +84,8 @@ impl From<&Contact> for dibs_contact {
             point_on_surface: found.point_on_surface.into(),
             point_on_tool: found.point_on_tool.into(),
             axis_parameter: found.axis_parameter,
+            surface: found.surface as u32,
+            tool: found.tool as u32,
             triangle,
             corners: found.corners,
             barycentric: found.barycentric,
@@ -124,32 +146,16 @@ pub extern "C" fn dibs_query_contacts(
 ) -> dibs_code {
     dibs_code::of(|| {
         let proximity = proximity.check_if_any()?;
-        let mut list = contacts.open()?;
-        let list = &mut list.0;
-        let found = fill(query, frame, tool, margin, options, list);
-        if found.is_err() {
-            // Those of the last pose are none of this one.
-            *list = Contacts::new();
-        }
-        let found = found?;
+        let found: Proximity = contacts.open()?.fill(|list| {
+            let (shape, options) = (Shape::try_from(tool.get()?)?, dibs_options::of(options)?);
+            let (mut query, frame) = (query.open()?, frame.open()?);
+            ask!(frame, shape, |table, tool| query.0.contacts(table, tool, margin, &options, list))
+        })?;
         if let Some(proximity) = proximity {
             proximity.set(found.into());
         }
         Ok(())
     })
-}
-
-fn fill(
-    query: *mut dibs_query,
-    frame: *mut dibs_frame,
-    tool: *const dibs_tool,
-    margin: f32,
-    options: *const dibs_options,
-    list: &mut Contacts<DIBS_CONTACTS, DIBS_NEAR>,
-) -> Result<Proximity, dibs_code> {
-    let (shape, options) = (Shape::try_from(tool.get()?)?, dibs_options::of(options)?);
-    let (mut query, frame) = (query.open()?, frame.open()?);
-    ask!(frame, shape, |table, tool| query.0.contacts(table, tool, margin, &options, list))
 }
 
 /// Facts that hold for the list.

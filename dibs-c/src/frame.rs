@@ -32,6 +32,49 @@ pub(crate) enum Table {
     Held(Held),
 }
 
+/// For calls that take several frames, each of either kind.
+impl VertexTable for Table {
+    fn len(&self) -> usize {
+        match self {
+            Self::Empty => 0,
+            Self::Vertices(vertices) => vertices.len(),
+            Self::Held(held) => held.len(),
+        }
+    }
+
+    #[inline(always)]
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        match self {
+            Self::Empty => None,
+            Self::Vertices(vertices) => vertices.position(vertex),
+            Self::Held(held) => held.position(vertex),
+        }
+    }
+
+    fn epoch(&self) -> Option<u32> {
+        match self {
+            Self::Empty | Self::Vertices(_) => None,
+            Self::Held(held) => held.epoch(),
+        }
+    }
+
+    fn stretch(&self) -> Option<MeasuredStretch> {
+        match self {
+            Self::Empty => None,
+            Self::Vertices(vertices) => vertices.stretch(),
+            Self::Held(held) => held.stretch(),
+        }
+    }
+
+    fn position_error(&self) -> f32 {
+        match self {
+            Self::Empty => 0.0,
+            Self::Vertices(vertices) => vertices.position_error(),
+            Self::Held(held) => held.position_error(),
+        }
+    }
+}
+
 /// Vertices of the caller's.
 pub(crate) struct Vertices {
     rows: &'static [[f32; 3]],

@@ -27,6 +27,7 @@ mod panic;
 mod query;
 mod reader;
 mod receiver;
+mod scene;
 mod surface;
 mod tool;
 mod tracker;

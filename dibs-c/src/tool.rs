@@ -1,9 +1,11 @@
-//! Points and tools.
+//! Points, tools and chains of tools.
 
 use bytemuck::AnyBitPattern;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{Capsule, Sphere};
+use heapless::Vec;
 
+use crate::border::{Input, some_of};
 use crate::code::dibs_code;
 
 /// A point, a direction, a force or a velocity.
@@ -60,4 +62,20 @@ impl TryFrom<dibs_tool> for Shape {
             Self::Capsule(Capsule::new(start, end, tool.radius)?)
         })
     }
+}
+
+/// Most tools of a chain.
+pub const DIBS_TOOLS: usize = 16;
+
+/// So many tools of one type: a sphere is a capsule without length.
+pub(crate) fn chain(
+    tools: *const dibs_tool,
+    count: u32,
+) -> Result<Vec<Capsule, DIBS_TOOLS>, dibs_code> {
+    let mut chain = Vec::new();
+    for tool in tools.slice(some_of::<DIBS_TOOLS>(count)?)? {
+        let tool = Capsule::new(tool.start.into(), tool.end.into(), tool.radius)?;
+        chain.push(tool).map_err(|_| dibs_code::Argument)?;
+    }
+    Ok(chain)
 }

@@ -3,15 +3,16 @@
 use core::cell::Cell;
 use core::ffi::c_void;
 
-use bytemuck::TransparentWrapper;
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Fallback, MeasuredStretch, Moved, Odometer, Tool, Tracked, Tracker, VertexTable};
+use dibs_nostd::{Fallback, MeasuredStretch, Moved, Odometer, Tracked, Tracker, VertexTable};
+use heapless::Vec;
 
-use crate::border::{Handle, Input, Kind, Output, Storage};
+use crate::border::{DIBS_ALIGNMENT, Handle, Handles, Input, Kind, Output, Storage};
 use crate::code::dibs_code;
+use crate::contacts::dibs_contacts;
 use crate::frame::{Table, dibs_frame};
 use crate::query::{STACK, dibs_options, dibs_proximity};
-use crate::tool::{Shape, dibs_tool};
+use crate::tool::{DIBS_TOOLS, Shape, chain, dibs_tool};
 use crate::tree::dibs_tree;
 
 /// Bytes of a tracker's storage besides its vertices.
@@ -33,7 +34,7 @@ pub struct dibs_tracker {
     odometer: Odometer,
     /// The copies: the surface's, and the one to be written next.
     copies: [&'static Copied; 2],
-    surface: Option<Surface>,
+    surface: Option<Moved<'static, Copied>>,
 }
 
 impl Kind for dibs_tracker {
@@ -41,21 +42,27 @@ impl Kind for dibs_tracker {
     const SIZE: usize = DIBS_TRACKER_BASE;
 }
 
-/// The surface that is searched.
-struct Surface {
-    moved: Moved<'static, Copied>,
-    stretch: Option<MeasuredStretch>,
-    position_error: f32,
+/// Offset of the copies' heads, at the end of the tracker's own storage.
+const HEADS: usize = (DIBS_TRACKER_BASE - 2 * size_of::<Copied>()) & !(DIBS_ALIGNMENT - 1);
+
+const _: () = assert!(size_of::<dibs_tracker>() + DIBS_ALIGNMENT <= HEADS);
+
+/// A copy of a frame.
+struct Copied {
+    /// Bits of x, y and z of each vertex.
+    words: &'static [Cell<u32>],
+    stretch: Cell<Option<MeasuredStretch>>,
+    position_error: Cell<f32>,
 }
 
-/// Bits of x, y and z of each vertex.
-#[derive(TransparentWrapper)]
-#[repr(transparent)]
-struct Copied([Cell<u32>]);
-
 impl Copied {
+    fn new(words: &'static mut [u32]) -> Self {
+        let words = Cell::from_mut(words).as_slice_of_cells();
+        Self { words, stretch: Cell::new(None), position_error: Cell::new(0.0) }
+    }
+
     fn copy<V: VertexTable>(&self, from: &V) -> Result<(), dibs_code> {
-        let (rows, _) = self.0.as_chunks::<3>();
+        let (rows, _) = self.words.as_chunks::<3>();
         if from.len() != rows.len() {
             return Err(dibs_code::VertexCount);
         }
@@ -65,21 +72,31 @@ impl Copied {
                 to.set(axis.to_bits());
             }
         }
+        self.stretch.set(from.stretch());
+        self.position_error.set(from.position_error());
         Ok(())
     }
 }
 
 impl VertexTable for Copied {
     fn len(&self) -> usize {
-        self.0.len() / 3
+        self.words.len() / 3
     }
 
     #[inline(always)]
     fn position(&self, vertex: u32) -> Option<Vec3> {
-        let (rows, _) = self.0.as_chunks::<3>();
+        let (rows, _) = self.words.as_chunks::<3>();
         let [x, y, z] = rows.get(vertex as usize)?;
         let axis = |bits: &Cell<u32>| f32::from_bits(bits.get());
         Some(Vec3::new(axis(x), axis(y), axis(z)))
+    }
+
+    fn stretch(&self) -> Option<MeasuredStretch> {
+        self.stretch.get()
+    }
+
+    fn position_error(&self) -> f32 {
+        self.position_error.get()
     }
 }
 
@@ -103,11 +120,13 @@ pub extern "C" fn dibs_tracker_init(
             let both = each.checked_mul(2).ok_or(dibs_code::Argument)?;
             let words = storage.words(size, DIBS_TRACKER_BASE, both)?;
             let (first, second) = words.split_at_mut_checked(each).ok_or(dibs_code::Argument)?;
-            let copied = |words| Copied::wrap_ref(Cell::from_mut(words).as_slice_of_cells());
             Ok(dibs_tracker {
                 tracker: Tracker::new(tree)?,
                 odometer: Odometer::new(tree),
-                copies: [copied(first), copied(second)],
+                copies: [
+                    storage.keep(size, HEADS, Copied::new(first))?,
+                    storage.keep(size, HEADS + size_of::<Copied>(), Copied::new(second))?,
+                ],
                 surface: None,
             })
         })
@@ -142,29 +161,12 @@ impl dibs_tracker {
     fn set<V: VertexTable>(&mut self, from: &V) -> Result<(), dibs_code> {
         let [now, next] = self.copies;
         next.copy(from)?;
-        let moved = match self.surface {
+        self.surface = Some(match self.surface {
             Some(_) => self.odometer.step(now, next).after(),
             None => self.odometer.start(next),
-        };
-        let (stretch, position_error) = (from.stretch(), from.position_error());
-        self.surface = Some(Surface { moved, stretch, position_error });
+        });
         self.copies = [next, now];
         Ok(())
-    }
-
-    fn closest(
-        &mut self,
-        tool: &impl Tool,
-        options: *const dibs_options,
-    ) -> Result<Tracked, dibs_code> {
-        let mut options = dibs_options::of(options)?;
-        let surface = self.surface.as_ref().ok_or(dibs_code::NoSurface)?;
-        if let Some(stretch) = surface.stretch {
-            options = options.stretch(stretch);
-        }
-        let mut found = self.tracker.closest(&surface.moved, tool, &options)?;
-        found.closest = found.closest.widened(surface.position_error);
-        Ok(found)
     }
 }
 
@@ -182,6 +184,33 @@ pub enum dibs_fallback {
     Jump = 3,
     /// More nodes had to be opened than there are places.
     Full = 4,
+}
+
+impl From<Option<Fallback>> for dibs_fallback {
+    fn from(fallback: Option<Fallback>) -> Self {
+        match fallback {
+            None => Self::None,
+            Some(Fallback::Start) => Self::Start,
+            Some(Fallback::Surface) => Self::Surface,
+            Some(Fallback::Full) => Self::Full,
+            Some(_) => Self::Jump,
+        }
+    }
+}
+
+/// The answer of several trackers.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct dibs_tracked {
+    /// The closest pair. Its interval begins at the least lower end of all pairs, its accuracy is the worst, its tests are
+    /// those of all. Its side is `DIBS_SIDE_CUT_SHORT` if the budget left that of any pair open.
+    pub proximity: dibs_proximity,
+    /// That pair's number.
+    pub pair: u32,
+    /// Pairs that were searched; the others were certain to be farther.
+    pub searched: u32,
+    /// The first reason for a whole query, of those that were searched.
+    pub fallback: dibs_fallback,
 }
 
 /// The closest pair of the tool and the tracker's surface: the answer of `dibs_query_closest`, within its accuracy.
@@ -205,20 +234,106 @@ pub extern "C" fn dibs_tracker_closest(
     dibs_code::of(|| {
         let (proximity, fallback) = (proximity.check()?, fallback.check_if_any()?);
         let (shape, mut tracker) = (Shape::try_from(tool.get()?)?, tracker.open()?);
-        let found = match &shape {
-            Shape::Sphere(sphere) => tracker.closest(sphere, options)?,
-            Shape::Capsule(capsule) => tracker.closest(capsule, options)?,
+        let options = dibs_options::of(options)?;
+        let dibs_tracker { tracker, surface, .. } = &mut *tracker;
+        let surface = surface.as_ref().ok_or(dibs_code::NoSurface)?;
+        let found: Tracked = match &shape {
+            Shape::Sphere(sphere) => tracker.closest(surface, sphere, &options)?,
+            Shape::Capsule(capsule) => tracker.closest(surface, capsule, &options)?,
         };
         proximity.set(found.closest.into());
         if let Some(fallback) = fallback {
-            fallback.set(match found.fallback {
-                None => dibs_fallback::None,
-                Some(Fallback::Start) => dibs_fallback::Start,
-                Some(Fallback::Surface) => dibs_fallback::Surface,
-                Some(Fallback::Full) => dibs_fallback::Full,
-                Some(_) => dibs_fallback::Jump,
-            });
+            fallback.set(found.fallback.into());
         }
+        Ok(())
+    })
+}
+
+/// Fills the list with all locally closest pairs whose separation is at most `margin`, deepest first: that of
+/// `dibs_query_contacts`.
+///
+/// Cost: that of `dibs_tracker_closest`, and where the surface is within the margin a range search, which has no memory of
+/// the last tick.
+///
+/// @param tracker    The tracker.
+/// @param tool       The tool.
+/// @param margin     In mm, at least 0.
+/// @param options    Options, or null. A budget that runs out shows in the list's bound.
+/// @param contacts   The list; empty after an error.
+/// @param proximity  Receives the closest pair, or null.
+/// @param fallback   Receives the reason for a whole query; or null.
+/// @return As `dibs_query_contacts`.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_tracker_contacts(
+    tracker: *mut dibs_tracker,
+    tool: *const dibs_tool,
+    margin: f32,
+    options: *const dibs_options,
+    contacts: *mut dibs_contacts,
+    proximity: *mut dibs_proximity,
+    fallback: *mut dibs_fallback,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (proximity, fallback) = (proximity.check_if_any()?, fallback.check_if_any()?);
+        let found: Tracked = contacts.open()?.fill(|list| {
+            let (shape, mut tracker) = (Shape::try_from(tool.get()?)?, tracker.open()?);
+            let options = dibs_options::of(options)?;
+            let dibs_tracker { tracker, surface, .. } = &mut *tracker;
+            let surface = surface.as_ref().ok_or(dibs_code::NoSurface)?;
+            Ok(match &shape {
+                Shape::Sphere(sphere) => {
+                    tracker.contacts(surface, sphere, margin, &options, list)?
+                }
+                Shape::Capsule(capsule) => {
+                    tracker.contacts(surface, capsule, margin, &options, list)?
+                }
+            })
+        })?;
+        if let Some(proximity) = proximity {
+            proximity.set(found.closest.into());
+        }
+        if let Some(fallback) = fallback {
+            fallback.set(found.fallback.into());
+        }
+        Ok(())
+    })
+}
+
+/// The closest pair of several, each a tracker, on its surface, with a tool: of a chain of tools, of several surfaces, or of
+/// both. A pair that is certain to be farther than the closest is not searched.
+///
+/// Cost: the budget at most, for all pairs together.
+///
+/// @param trackers  Addresses of the trackers, one for each pair. No tracker is there twice.
+/// @param tools     The tool of each pair, in the same order.
+/// @param count     Pairs: 1 to `DIBS_TOOLS`.
+/// @param options   Options, or null.
+/// @param tracked   Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
+/// @return As `dibs_tracker_closest`, of any pair; `DIBS_CODE_ARGUMENT` for no pair or too many.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_tracker_closest_of(
+    trackers: *const *mut dibs_tracker,
+    tools: *const dibs_tool,
+    count: u32,
+    options: *const dibs_options,
+    tracked: *mut dibs_tracked,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (tracked, options) = (tracked.check()?, dibs_options::of(options)?);
+        let (tools, mut trackers) = (chain(tools, count)?, trackers.open_all::<DIBS_TOOLS>(count)?);
+        let mut pairs = Vec::<_, DIBS_TOOLS>::new();
+        for (tracker, tool) in trackers.iter_mut().zip(&tools) {
+            let dibs_tracker { tracker, surface, .. } = &mut **tracker;
+            let surface = surface.as_ref().ok_or(dibs_code::NoSurface)?;
+            pairs.push((tracker, surface, tool)).map_err(|_| dibs_code::Argument)?;
+        }
+        let found = Tracker::closest_of(&mut pairs, &options)?.ok_or(dibs_code::Argument)?;
+        tracked.set(dibs_tracked {
+            proximity: found.closest.into(),
+            pair: found.pair as u32,
+            searched: found.searched,
+            fallback: found.fallback.into(),
+        });
         Ok(())
     })
 }

@@ -35,7 +35,8 @@ fn c_and_rust_answer_a_script_with_the_same_bits() {
     let expected = script.answers();
     assert!(expected.len() >= 1_000, "{} answers", expected.len());
     // Ticks before the first frame, nominal, degraded and with a frame too old; a damaged packet and one without a
-    // frame; a tracker's later answers and its first.
+    // frame; a tracker's later answers and its first; contacts; chains with tools passed over and not; both surfaces of
+    // a scene.
     for start in [
         "tick 300 2",
         "tick 0 0",
@@ -43,8 +44,13 @@ fn c_and_rust_answer_a_script_with_the_same_bits() {
         "tick 301 2",
         "packet 400",
         "packet 406",
-        "track 0 0",
-        "track 0 1",
+        "track 0",
+        "track 1",
+        "touch 0",
+        "chain 1 1 0",
+        "chain 1 2 ",
+        "scene 0 0 0",
+        "scene 0 1 1",
     ] {
         assert!(expected.iter().any(|line| line.starts_with(start)), "nothing is {start}");
     }

@@ -10,13 +10,18 @@ use programs::{include, library, run, tool, tree_and_stream};
 #[test]
 fn misuse_is_a_code_under_the_sanitizers() {
     let folder = tempfile::tempdir().expect("a folder");
-    let program = folder.path().join("misuse");
-    let mut gcc = tool("gcc", "gcc");
-    gcc.args(["-std=c11", "-g", "-Wall", "-Wextra", "-Werror", "-pthread"]);
-    gcc.args(["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-I"]).arg(include());
-    gcc.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs/misuse.c"));
-    run(gcc.arg(library()).args(["-ldl", "-lm", "-o"]).arg(&program));
+    let files = tree_and_stream(folder.path());
+    for name in ["misuse", "misuse_scene"] {
+        let program = folder.path().join(name);
+        let mut gcc = tool("gcc", "gcc");
+        gcc.args(["-std=c11", "-g", "-Wall", "-Wextra", "-Werror", "-pthread"]);
+        gcc.args(["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-I"])
+            .arg(include());
+        let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs");
+        gcc.arg(sources.join(name).with_extension("c"));
+        run(gcc.arg(library()).args(["-ldl", "-lm", "-o"]).arg(&program));
 
-    let said = run(Command::new(program).args(tree_and_stream(folder.path())));
-    assert!(said.contains(" checks, 0 failures"), "{said}");
+        let said = run(Command::new(program).args(&files));
+        assert!(said.contains(" checks, 0 failures"), "{name}: {said}");
+    }
 }

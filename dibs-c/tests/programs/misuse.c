@@ -5,32 +5,13 @@
  *
  * STREAM is two frames in the bytes of a serial line.
  */
-#include <dibs.h>
+#include "expect.h"
 
 #include <pthread.h>
-#include <stdalign.h>
 #include <stdatomic.h>
 #include <stdbool.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
-static unsigned failures;
-static unsigned checks;
-
-static void expect(dibs_code expected, dibs_code found, const char *call, int line) {
-    checks++;
-    if (expected != found) {
-        failures++;
-        printf("line %d: %s\n    is %u (%s), not %u\n", line, call, found, dibs_code_text(found), expected);
-    }
-}
-
-#define EXPECT_THAT(is_so) expect(DIBS_CODE_OK, (is_so) ? DIBS_CODE_OK : DIBS_CODE_ARGUMENT, #is_so, __LINE__)
-#define EXPECT(code, call) expect(DIBS_CODE_##code, call, #call, __LINE__)
-
-/* Each object has an array of its own: the sanitizer sees a write behind its end. */
-#define MEMORY(name, size) static alignas(DIBS_ALIGNMENT) unsigned char name[size]
 MEMORY(tree_memory, DIBS_TREE_SIZE);
 MEMORY(frame_memory, DIBS_FRAME_SIZE);
 MEMORY(other_frame_memory, DIBS_FRAME_SIZE);
@@ -42,11 +23,9 @@ MEMORY(small_surface_memory, DIBS_SURFACE_SIZE(10));
 MEMORY(receiver_memory, DIBS_RECEIVER_SIZE);
 MEMORY(reader_memory, DIBS_READER_SIZE);
 MEMORY(failsafe_memory, DIBS_FAILSAFE_SIZE);
-MEMORY(tracker_memory, DIBS_TRACKER_SIZE(502));
 MEMORY(scrub_memory, DIBS_SCRUB_SIZE);
 MEMORY(unmade, 64);
 
-static const dibs_tool tool = {{100.0f, 0.0f, 20.0f}, {140.0f, 0.0f, 50.0f}, 2.5f};
 static const dibs_wall wall = {1.0f, 0.002f, 0.002f, 5.0f, 5.0f};
 static const dibs_surface_limits surface_limits = {300.0f, 1e9f, 0.25f};
 
@@ -54,18 +33,6 @@ static dibs_tree *tree;
 static dibs_frame *frame;
 static dibs_query *query;
 static dibs_contacts *contacts;
-
-static unsigned char *read_file(const char *path, size_t *length) {
-    FILE *file = fopen(path, "rb");
-    unsigned char *bytes = malloc(1 << 20);
-    if (file == NULL || bytes == NULL) {
-        exit(2);
-    }
-    *length = fread(bytes, 1, 1 << 20, file);
-    fclose(file);
-    /* The exact length: the sanitizer finds a read behind it. */
-    return realloc(bytes, *length);
-}
 
 /* Null, small or misaligned storage, of each kind of object. */
 static void storage(const unsigned char *bytes, size_t length) {
@@ -345,12 +312,7 @@ int main(int argc, char **argv) {
 
     dibs_tree_facts facts;
     EXPECT(OK, dibs_tree_get_facts(tree, &facts));
-    float *positions = malloc(facts.vertices * 3 * sizeof(float));
-    for (uint32_t row = 0; row < facts.vertices; row++) {
-        dibs_vec3 at;
-        EXPECT(OK, dibs_tree_rest_position(tree, row, &at));
-        memcpy(positions + 3 * row, &at, sizeof at);
-    }
+    float *positions = rest_shape(tree, facts.vertices);
     EXPECT(TREE_NO_REST_SHAPE, dibs_tree_rest_position(tree, facts.vertices, &(dibs_vec3){0}));
     dibs_point origin = {1, 1, 1};
     EXPECT(OK, dibs_tree_origin(tree, &origin));
@@ -363,17 +325,6 @@ int main(int argc, char **argv) {
     held(argv[2], positions, facts.vertices);
     failsafe();
     texts();
-
-    dibs_tracker *tracker;
-    EXPECT(STORAGE_SIZE, dibs_tracker_init(tracker_memory, sizeof tracker_memory - 1, tree, &tracker));
-    EXPECT(OK, dibs_tracker_init(tracker_memory, sizeof tracker_memory, tree, &tracker));
-    EXPECT(NO_SURFACE, dibs_tracker_closest(tracker, &tool, NULL, &found, NULL));
-    EXPECT(NO_SURFACE, dibs_tracker_set_frame(tracker, frame));
-    EXPECT(OK, dibs_frame_set_vertices(frame, positions, facts.vertices - 1, 0.0f));
-    EXPECT(VERTEX_COUNT, dibs_tracker_set_frame(tracker, frame));
-    EXPECT(OK, dibs_frame_set_vertices(frame, positions, facts.vertices, 0.0f));
-    EXPECT(OK, dibs_tracker_set_frame(tracker, frame));
-    EXPECT(OK, dibs_tracker_closest(tracker, &tool, NULL, &found, NULL));
 
     dibs_scrub *scrub;
     EXPECT(OK, dibs_scrub_init(scrub_memory, sizeof scrub_memory, tree, &scrub));
@@ -389,6 +340,5 @@ int main(int argc, char **argv) {
 
     free(positions);
     free(bytes);
-    printf("%u checks, %u failures\n", checks, failures);
-    return failures == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return summary();
 }

@@ -1,5 +1,5 @@
-/* Tests dibs.hpp: a query, a frame held and released by scope, and codes instead of exceptions. Run by
-* tests/wrapper.rs. */
+/* Tests dibs.hpp: queries, scenes and trackers, a frame held and released by scope, and codes instead of exceptions.
+ * Run by tests/wrapper.rs. */
 #include <dibs.hpp>
 
 #include <cstdio>
@@ -42,6 +42,10 @@ int main(int argc, char **argv) {
     static dibs::Surface<502> surface;
     static dibs::Receiver receiver;
     static dibs::Reader reader;
+    static dibs::Query other_query;
+    static dibs::Tracker<502> trackers[2];
+    static dibs::FailSafe failsafe;
+    const dibs_surface_limits surface_limits = {300.0f, std::numeric_limits<float>::infinity(), 0.25f};
     dibs_proximity on_bus, at_rest;
 
     EXPECT(DIBS_CODE_NULL, query.init(tree));
@@ -49,7 +53,7 @@ int main(int argc, char **argv) {
     MUST(query.init(tree));
     MUST(contacts.init());
     MUST(surface.init());
-    MUST(receiver.init(surface, tree, {300.0f, std::numeric_limits<float>::infinity(), 0.25f}));
+    MUST(receiver.init(surface, tree, &surface_limits));
     MUST(reader.init(surface));
     EXPECT(DIBS_CODE_TAKEN, dibs::Reader().init(surface));
 
@@ -87,6 +91,50 @@ int main(int argc, char **argv) {
     MUST(query.contacts(frame, tool, 60.0f, contacts));
     MUST(contacts.rows(tool.start, 1.0f, 20.0f, room, rows));
     EXPECT(true, !rows.empty());
+
+    /* A chain of two tools, and a second surface beside the first. */
+    const dibs_tool chain[] = {tool, {tool.start, {100.0f, -40.0f, 20.0f}, 2.5f}};
+    auto moved = positions;
+    for (std::size_t x = 0; x < moved.size(); x += 3) {
+        moved[x] += 250.0f;
+    }
+    dibs::Frame beside;
+    MUST(beside.init());
+    MUST(beside.set(moved));
+    MUST(other_query.init(tree));
+    dibs_query *queries[] = {query, other_query};
+    dibs_frame *frames[] = {frame, beside};
+    const dibs::Scene scene(queries, frames, chain);
+    dibs_closest of_scene;
+    MUST(scene.closest(of_scene));
+    EXPECT(true, of_scene.proximity.separation <= at_rest.separation);
+    MUST(scene.contacts(60.0f, contacts));
+    MUST(contacts.rows(tool.start, 1.0f, 20.0f, room, rows));
+    EXPECT(true, !rows.empty());
+    EXPECT(DIBS_CODE_ARGUMENT, dibs::Scene(queries, std::span(frames, 1), chain).closest(of_scene));
+    EXPECT(DIBS_CODE_ARGUMENT, dibs::Scene(queries, frames, {}).closest(of_scene));
+
+    /* The same by trackers, on the first surface. */
+    dibs_proximity tracked;
+    dibs_tracked of_chain;
+    for (auto &tracker : trackers) {
+        MUST(tracker.init(tree));
+        MUST(tracker.set(frame));
+        MUST(tracker.closest(tool, tracked));
+        EXPECT(true, tracked.separation == at_rest.separation);
+    }
+    MUST(trackers[0].contacts(tool, 60.0f, contacts));
+    dibs_tracker *both[] = {trackers[0], trackers[1]};
+    MUST(dibs::closest_of(both, chain, of_chain));
+    EXPECT(true, of_chain.proximity.separation <= at_rest.separation);
+    EXPECT(DIBS_CODE_ARGUMENT, dibs::closest_of(both, std::span(chain, 1), of_chain));
+
+    const dibs_watch off = {DIBS_UNLIMITED, DIBS_UNLIMITED};
+    const dibs_limits limits = {{20, 60}, off, off, off, off, off, off, 0.1f, 1, 0};
+    dibs_verdict verdict;
+    MUST(failsafe.init(&limits));
+    MUST(failsafe.step({}, verdict));
+    EXPECT(true, verdict.cause == DIBS_CODE_NO_SURFACE);
     std::printf("%a mm, %zu rows\n", static_cast<double>(at_rest.separation), rows.size());
     return EXIT_SUCCESS;
 }

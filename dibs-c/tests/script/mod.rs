@@ -2,6 +2,7 @@
 
 mod bus;
 mod print;
+mod scene;
 mod track;
 
 use std::fmt::Write;
@@ -18,6 +19,7 @@ use print::Line;
 /// Margin of contacts and wall, in mm.
 const MARGIN: f32 = 8.0;
 const POSES: usize = 100;
+const SCENES: usize = 20;
 const FRAMES: usize = 12;
 
 /// A script, and the files that it refers to.
@@ -31,6 +33,7 @@ pub struct Script {
     pub lines: String,
     surfaces: Vec<Vec<Vec3>>,
     poses: Vec<Pose>,
+    scenes: Vec<scene::Scene>,
     events: Vec<bus::Event>,
 }
 
@@ -48,7 +51,7 @@ impl Script {
         let generate::MovingMesh { mesh, motion } = generate::heart(1_000).expect("a size");
         let built = Builder::new().stretch(1.5).build(&mesh).expect("a tree");
         let mut random = fastrand::Rng::with_seed(17);
-        let (mut surfaces, mut poses) = (Vec::new(), Vec::new());
+        let (mut surfaces, mut poses, mut scenes) = (Vec::new(), Vec::new(), Vec::new());
         let (mut frames, mut lines) = (Vec::new(), String::new());
         for frame in 0..FRAMES {
             let rows = built.to_rows(&motion.frames[frame * 3 % motion.frames.len()]);
@@ -59,30 +62,40 @@ impl Script {
                 pose.write(&mut lines);
                 poses.push(pose);
             }
+            for _ in 0..SCENES {
+                let scene = scene::Scene::new(&rows, &mut random);
+                scene.write(&mut lines);
+                scenes.push(scene);
+            }
             surfaces.push(rows);
         }
         let events = bus::events(&built, &surfaces, &mut lines);
-        Self { tree: built.blob().to_vec(), built, frames, lines, surfaces, poses, events }
+        Self { tree: built.blob().to_vec(), built, frames, lines, surfaces, poses, scenes, events }
     }
 
     /// The answers that a program must give, line by line.
     pub fn answers(&self) -> Vec<String> {
         let tree = Tree::<u16>::from_bytes(self.built.blob()).expect("a tree");
-        let mut query = Query::<_, 512>::new(&tree).expect("a stack");
+        let query = || Query::<_, 512>::new(&tree).expect("a stack");
+        let (mut query, mut other) = (query(), query());
         let mut contacts = Contacts::<16>::new();
         let mut answers = Vec::new();
-        for (rows, poses) in self.surfaces.iter().zip(self.poses.chunks(POSES)) {
-            let rows = rows.as_slice();
-            let stretch = measure_stretch(&tree, rows).expect("a surface within its limit");
-            let surface = Surface { rows, stretch };
+        let surfaces = self.surfaces.iter().map(|rows| Surface::new(&tree, rows));
+        let surfaces: Vec<_> = surfaces.collect();
+        let poses = self.poses.chunks(POSES).zip(self.scenes.chunks(SCENES));
+        for (surface, (poses, scenes)) in surfaces.iter().zip(poses) {
             answers.extend(poses.iter().map(|pose| {
                 if pose.start == pose.end {
                     let tool = Sphere::new(pose.start, pose.radius).expect("a tool");
-                    answer(&mut query, &mut contacts, &surface, &tool, pose)
+                    answer(&mut query, &mut contacts, surface, &tool, pose)
                 } else {
                     let tool = Capsule::new(pose.start, pose.end, pose.radius).expect("a tool");
-                    answer(&mut query, &mut contacts, &surface, &tool, pose)
+                    answer(&mut query, &mut contacts, surface, &tool, pose)
                 }
+            }));
+            answers.extend(scenes.iter().map(|scene| {
+                let mut both = [(&mut query, surface), (&mut other, &surfaces[scene.other])];
+                scene.answer(&mut both, &mut contacts)
             }));
         }
         answers.extend(bus::answers(&self.built, &self.events));
@@ -127,6 +140,12 @@ impl Pose {
 struct Surface<'s> {
     rows: &'s [Vec3],
     stretch: MeasuredStretch,
+}
+
+impl<'s> Surface<'s> {
+    fn new(tree: &Tree<'_, u16>, rows: &'s [Vec3]) -> Self {
+        Self { rows, stretch: measure_stretch(tree, rows).expect("a surface within its limit") }
+    }
 }
 
 impl VertexTable for Surface<'_> {

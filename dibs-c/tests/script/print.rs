@@ -27,7 +27,7 @@ impl Line {
         }
     }
 
-    fn numbers(&mut self, values: &[u32]) {
+    pub fn numbers(&mut self, values: &[u32]) {
         for value in values {
             write!(self.0, " {value}").expect("a string");
         }
@@ -75,6 +75,7 @@ impl Line {
         self.numbers(&[contacts.len() as u32, contacts.is_full().into()]);
         self.floats(&[contacts.bound(), contacts.accuracy()]);
         for contact in contacts.iter() {
+            self.numbers(&[contact.surface as u32, contact.tool as u32]);
             self.floats(&[contact.separation]);
             self.vec3(contact.normal);
             self.vec3(contact.point_on_tool);

@@ -6,9 +6,8 @@
 #include <stdlib.h>
 
 #include "print.h"
+#include "track.h"
 
-/* Vertices of the largest surface. */
-#define VERTICES 10000
 /* Rows and triangles that are checked after each packet. */
 #define WORK 200
 
@@ -16,14 +15,10 @@ static alignas(DIBS_ALIGNMENT) uint8_t surface_memory[DIBS_SURFACE_SIZE(VERTICES
 static alignas(DIBS_ALIGNMENT) uint8_t receiver_memory[DIBS_RECEIVER_SIZE];
 static alignas(DIBS_ALIGNMENT) uint8_t reader_memory[DIBS_READER_SIZE];
 static alignas(DIBS_ALIGNMENT) uint8_t failsafe_memory[DIBS_FAILSAFE_SIZE];
-static alignas(DIBS_ALIGNMENT) uint8_t tracker_memory[DIBS_TRACKER_SIZE(VERTICES)];
 
 static dibs_receiver *receiver;
 static dibs_reader *reader;
 static dibs_failsafe *failsafe;
-static dibs_tracker *tracker;
-/* Epoch of the tracker's frame. */
-static uint32_t tracked;
 
 static const dibs_wall wall = {
     .stiffness = 1.0f, .damping = 0.002f, .hold_damping = 0.002f, .max_force = 5.0f, .margin = 5.0f};
@@ -47,7 +42,7 @@ void bus_init(dibs_tree *tree, uint32_t vertices) {
     must(dibs_receiver_init(receiver_memory, sizeof receiver_memory, surface, tree, &surface_limits, &receiver));
     must(dibs_reader_init(reader_memory, sizeof reader_memory, surface, &reader));
     must(dibs_failsafe_init(failsafe_memory, sizeof failsafe_memory, &limits, &failsafe));
-    must(dibs_tracker_init(tracker_memory, sizeof tracker_memory, tree, &tracker));
+    track_init(tree);
 }
 
 void bus_packet(const uint8_t *bytes, size_t length, uint32_t now) {
@@ -61,24 +56,6 @@ void bus_packet(const uint8_t *bytes, size_t length, uint32_t now) {
     printf("packet %u %u %u %u\n", accepted, progress, checked, advance);
 }
 
-/* Prints the same pair from a tracker, which takes each frame only once. */
-static dibs_code track(dibs_frame *frame, const dibs_age *age, const dibs_tool *tool) {
-    dibs_proximity found;
-    dibs_fallback fallback;
-    if (tracked != age->epoch) {
-        must(dibs_tracker_set_frame(tracker, frame));
-        tracked = age->epoch;
-    }
-    const dibs_code code = dibs_tracker_closest(tracker, tool, NULL, &found, &fallback);
-    printf("track %u", code);
-    if (code == DIBS_CODE_OK) {
-        printf(" %u", fallback);
-        print_proximity(&found);
-    }
-    printf("\n");
-    return code;
-}
-
 void bus_tick(dibs_frame *frame, dibs_query *query, const dibs_tool *tool, uint32_t now) {
     const dibs_vec3 velocity = {10.0f, -20.0f, 5.0f};
     dibs_observation seen = {.query = DIBS_CODE_OK, .is_tree_corrupt = 0};
@@ -90,7 +67,7 @@ void bus_tick(dibs_frame *frame, dibs_query *query, const dibs_tool *tool, uint3
     if (code == DIBS_CODE_OK) {
         code = dibs_query_closest(query, frame, tool, NULL, &found);
         seen.query = code;
-        must(track(frame, &seen.age, tool));
+        track(frame, &seen.age, tool);
         must(dibs_frame_release(frame));
     }
     must(dibs_reader_link(reader, now, &seen.link));

@@ -4,6 +4,9 @@
 
 #include <dibs.h>
 
+/* Vertices of the largest surface. */
+#define VERTICES 10000
+
 /* Ends the program unless the call succeeded. */
 void must(dibs_code code);
 

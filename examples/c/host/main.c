@@ -9,6 +9,8 @@
  *     frame NUMBER                       the surface is this frame of FRAMES
  *     pose START END RADIUS NODES TRIANGLES FLAGS
  *                                        a capsule, a budget, the options' flags
+ *     scene NUMBER NODES TRIANGLES FLAGS TOOL...
+ *                                        a chain of capsules, this surface and that of another frame
  *     packet NOW BYTES                   a packet from the bus, in hexadecimal
  *     tick NOW START END RADIUS          a control tick, with the surface from the bus
  *
@@ -31,11 +33,14 @@
 static alignas(DIBS_ALIGNMENT) uint8_t tree_memory[DIBS_TREE_SIZE];
 static alignas(DIBS_ALIGNMENT) uint8_t frame_memory[DIBS_FRAME_SIZE];
 static alignas(DIBS_ALIGNMENT) uint8_t query_memory[DIBS_QUERY_SIZE];
+static alignas(DIBS_ALIGNMENT) uint8_t other_frame_memory[DIBS_FRAME_SIZE];
+static alignas(DIBS_ALIGNMENT) uint8_t other_query_memory[DIBS_QUERY_SIZE];
 static alignas(DIBS_ALIGNMENT) uint8_t contacts_memory[DIBS_CONTACTS_SIZE];
 
 static dibs_tree *tree;
-static dibs_frame *frame;
-static dibs_query *query;
+/* The surface, and the second one of a scene. */
+static dibs_frame *frame, *other_frame;
+static dibs_query *query, *other_query;
 static dibs_contacts *contacts;
 
 static const dibs_wall wall = {
@@ -49,18 +54,8 @@ void must(dibs_code code) {
 }
 
 /* All contacts, their rows, and their joint force on the tool. */
-static void print_contacts(dibs_code code, const dibs_tool *tool, dibs_vec3 velocity) {
-    dibs_contacts_facts facts;
-    must(dibs_contacts_get_facts(contacts, &facts));
-    printf(" %u %u", facts.count, facts.is_full);
-    print_floats((float[]){facts.bound, facts.accuracy}, 2);
-    for (uint32_t number = 0; number < facts.count; number++) {
-        dibs_contact contact;
-        must(dibs_contacts_get(contacts, number, &contact));
-        print_floats(&contact.separation, 1);
-        print_vec3(contact.normal);
-        print_vec3(contact.point_on_tool);
-    }
+static void print_touch(dibs_code code, const dibs_tool *tool, dibs_vec3 velocity) {
+    print_contacts(contacts);
     dibs_row rows[DIBS_CONTACTS];
     size_t count;
     must(dibs_contacts_rows(contacts, tool->start, 1.0f, 20.0f, DIBS_CONTACTS, rows, &count));
@@ -90,31 +85,64 @@ static void answer(const dibs_tool *tool, const dibs_options *options) {
 
     code = dibs_query_contacts(query, frame, tool, MARGIN, options, contacts, NULL);
     printf(" contacts %u", code);
-    print_contacts(code, tool, velocity);
+    print_touch(code, tool, velocity);
     printf("\n");
 }
 
-static bool take_tool(char **text, dibs_tool *tool) {
-    float numbers[7];
-    if (!take_floats(text, numbers, 7)) {
+static bool take_options(char **text, dibs_options *options) {
+    uint32_t words[3];
+    if (!take_words(text, words, 3)) {
         return false;
     }
-    tool->start = (dibs_vec3){numbers[0], numbers[1], numbers[2]};
-    tool->end = (dibs_vec3){numbers[3], numbers[4], numbers[5]};
-    tool->radius = numbers[6];
+    options->budget = (dibs_budget){.node_tests = words[0], .triangle_tests = words[1]};
+    options->flags = words[2];
     return true;
 }
 
 static bool pose(char *text) {
     dibs_tool tool;
     dibs_options options = {.depth_tolerance = 0.0f};
-    uint32_t words[3];
-    if (!take_tool(&text, &tool) || !take_words(&text, words, 3)) {
+    if (!take_tool(&text, &tool) || !take_options(&text, &options)) {
         return false;
     }
-    options.budget = (dibs_budget){.node_tests = words[0], .triangle_tests = words[1]};
-    options.flags = words[2];
     answer(&tool, &options);
+    return true;
+}
+
+/* Makes a frame of the file the surface in `into`. */
+static bool surface(char **text, dibs_frame *into, const float *frames, size_t length, uint32_t vertices) {
+    uint32_t number;
+    const size_t floats = 3 * (size_t)vertices;
+    if (!take_words(text, &number, 1) || (number + 1) * floats * sizeof(float) > length) {
+        return false;
+    }
+    must(dibs_frame_set_vertices(into, frames + number * floats, vertices, 0.0f));
+    must(dibs_frame_measure(into, tree, NULL));
+    return true;
+}
+
+/* The closest pair and the contacts of a chain, this surface and that of another frame. */
+static bool scene(char *text, const float *frames, size_t length, uint32_t vertices) {
+    dibs_query *queries[] = {query, other_query};
+    dibs_frame *surfaces[] = {frame, other_frame};
+    dibs_tool tools[DIBS_TOOLS];
+    dibs_scene scene = {.queries = queries, .frames = surfaces, .surface_count = 2, .tools = tools};
+    dibs_options options = {.depth_tolerance = 0.0f};
+    if (!surface(&text, other_frame, frames, length, vertices) || !take_options(&text, &options)) {
+        return false;
+    }
+    while (scene.tool_count < DIBS_TOOLS && take_tool(&text, &tools[scene.tool_count])) {
+        scene.tool_count++;
+    }
+    dibs_closest closest;
+    const dibs_code code = dibs_scene_closest(&scene, &options, &closest);
+    printf("scene %u %u %u", code, closest.surface, closest.tool);
+    print_proximity(&closest.proximity);
+    printf(" contacts %u", dibs_scene_contacts(&scene, MARGIN, &options, contacts, &closest));
+    printf(" %u %u", closest.surface, closest.tool);
+    print_proximity(&closest.proximity);
+    print_contacts(contacts);
+    printf("\n");
     return true;
 }
 
@@ -138,18 +166,6 @@ static bool tick(char *text) {
     return true;
 }
 
-/* Makes a frame of the file the surface. */
-static bool surface(char *text, const float *frames, size_t length, uint32_t vertices) {
-    uint32_t number;
-    const size_t floats = 3 * (size_t)vertices;
-    if (!take_words(&text, &number, 1) || (number + 1) * floats * sizeof(float) > length) {
-        return false;
-    }
-    must(dibs_frame_set_vertices(frame, frames + number * floats, vertices, 0.0f));
-    must(dibs_frame_measure(frame, tree, NULL));
-    return true;
-}
-
 int main(int argc, char **argv) {
     if (argc != 4) {
         fprintf(stderr, "dibs-host TREE FRAMES SCRIPT\n");
@@ -165,6 +181,8 @@ int main(int argc, char **argv) {
     must(dibs_tree_get_facts(tree, &facts));
     must(dibs_frame_init(frame_memory, sizeof frame_memory, &frame));
     must(dibs_query_init(query_memory, sizeof query_memory, tree, &query));
+    must(dibs_frame_init(other_frame_memory, sizeof other_frame_memory, &other_frame));
+    must(dibs_query_init(other_query_memory, sizeof other_query_memory, tree, &other_query));
     must(dibs_contacts_init(contacts_memory, sizeof contacts_memory, &contacts));
 
     bus_init(tree, facts.vertices);
@@ -172,8 +190,10 @@ int main(int argc, char **argv) {
     for (char *line = strtok(script, "\n"); line != NULL; line = strtok(NULL, "\n")) {
         const size_t word = strcspn(line, " ");
         char *rest = line + word;
-        bool is_known = (strncmp(line, "frame", word) == 0 && surface(rest, frames, frames_length, facts.vertices))
+        bool is_known = (strncmp(line, "frame", word) == 0
+                         && surface(&rest, frame, frames, frames_length, facts.vertices))
             || (strncmp(line, "pose", word) == 0 && pose(rest))
+            || (strncmp(line, "scene", word) == 0 && scene(rest, frames, frames_length, facts.vertices))
             || (strncmp(line, "packet", word) == 0 && packet(rest))
             || (strncmp(line, "tick", word) == 0 && tick(rest));
         if (!is_known) {

@@ -7,6 +7,8 @@
 void print_floats(const float *values, size_t count);
 void print_vec3(dibs_vec3 value);
 void print_proximity(const dibs_proximity *found);
+/* Facts of a list, and its contacts. */
+void print_contacts(dibs_contacts *contacts);
 void print_force(const dibs_force *force);
 
 #endif

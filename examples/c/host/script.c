@@ -33,6 +33,17 @@ bool take_floats(char **text, float *out, size_t count) {
     return true;
 }
 
+bool take_tool(char **text, dibs_tool *tool) {
+    float numbers[7];
+    if (!take_floats(text, numbers, 7)) {
+        return false;
+    }
+    tool->start = (dibs_vec3){numbers[0], numbers[1], numbers[2]};
+    tool->end = (dibs_vec3){numbers[3], numbers[4], numbers[5]};
+    tool->radius = numbers[6];
+    return true;
+}
+
 bool take_words(char **text, uint32_t *out, size_t count) {
     for (size_t at = 0; at < count; at++) {
         char *end = *text;
