@@ -14,6 +14,7 @@ use crate::{MeasuredStretch, TriangleRow};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Budget {
     /// Most tests of spheres, and of leaves' and triangles' planes. The roots' spheres are always tested and not counted.
+    /// The depth of a crossing axis counts its work besides the searches as the node tests that take as long.
     pub node_tests: u32,
     /// Most exact tool-triangle tests.
     pub triangle_tests: u32,

@@ -37,6 +37,13 @@ const LEAST_TOLERANCE: f32 = 32.0;
 /// Most points of the axis that are searched.
 const LOOKS: u32 = 27;
 
+/// Node tests that take as long as the work for a point of the axis besides its search. Without them a budget would not
+/// bound a tracker's tick, which may look at many points and triangles without a search.
+const LOOK_COST: u32 = 16;
+
+/// Node tests that take as long as a point's distance to one triangle.
+const DISTANCE_COST: u32 = 3;
+
 /// Most steps from a remembered triangle to a closer neighbour.
 const STEPS: u32 = 4;
 
@@ -117,8 +124,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         let end = self.look(1.0, &crossing, EXACT)?;
         let enough = self.deepest + tolerance;
         let mut parts = Parts::new();
-        parts.push(Part::new(start, &crossing, 1, enough));
-        parts.push(Part::new(crossing, &end, 2, enough));
+        parts.push(self.part(start, &crossing, 1, enough));
+        parts.push(self.part(crossing, &end, 2, enough));
         parts.push(Part::remembered(end, 0, 0.0));
         parts.end();
         Ok(parts)
@@ -163,9 +170,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
                 return Ok(part.bound);
             }
             let Some(split) = part.split else {
+                if self.is_spent() {
+                    return Ok(part.bound);
+                }
                 self.walk(parts, row)?;
                 self.walk(parts, part.next)?;
-                parts.renew(row, enough);
+                let distances = parts.renew(row, enough);
+                self.spend(distances * DISTANCE_COST);
                 continue;
             };
             let Some(place) = self.room(parts, enough) else { return Ok(part.bound) };
@@ -180,9 +191,30 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             let until = if is_first { EXACT } else { enough };
             let middle = self.look(split / self.tool.axis_length(), near, until)?;
             let enough = self.deepest + tolerance;
-            parts.set(row, Part::new(from, &middle, place, enough).below(part.bound));
-            parts.push(Part::new(middle, &to, part.next, enough).below(part.bound));
+            let before = self.part(from, &middle, place, enough);
+            let after = self.part(middle, &to, part.next, enough);
+            parts.set(row, before.below(part.bound));
+            parts.push(after.below(part.bound));
         }
+    }
+
+    /// The part between two samples.
+    fn part(&mut self, from: Sample, to: &Sample, next: usize, enough: f32) -> Part {
+        let part = Part::new(from, to, next, enough);
+        self.spend(part.distances * DISTANCE_COST);
+        part
+    }
+
+    /// Counts work that is no test as so many node tests.
+    fn spend(&mut self, node_tests: u32) {
+        let rest = &mut self.options.budget.node_tests;
+        let spent = (*rest).min(node_tests);
+        *rest -= spent;
+        self.answer.node_tests = self.answer.node_tests.saturating_add(spent);
+    }
+
+    const fn is_spent(&self) -> bool {
+        self.options.budget.node_tests == 0
     }
 
     /// Searches a sample's point to the end.
@@ -195,7 +227,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
 
     /// The row of another part, if one may be divided.
     fn room(&self, parts: &mut Parts, enough: f32) -> Option<usize> {
-        if self.looks >= LOOKS || self.options.budget.node_tests == 0 {
+        if self.looks >= LOOKS || self.is_spent() {
             return None;
         }
         if parts.free().is_none() {
@@ -205,13 +237,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     }
 
     /// Moves a remembered sample's triangle to neighbours that are closer now.
-    fn walk(&self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
+    fn walk(&mut self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
         let mut sample = parts.sample(row);
         if sample.is_new {
             return Ok(());
         }
         sample.is_new = true;
-        let mut least = sample.square(sample.on_axis);
+        let (mut least, mut distances) = (sample.square(sample.on_axis), 1);
         for _ in 0..STEPS {
             let Some(TriangleRow(from)) = sample.triangle else { break };
             let mut closest = sample;
@@ -220,6 +252,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
                 let (triangle, corners) = (Some(TriangleRow(row)), self.corners(corners)?);
                 let other = Sample { triangle, corners, ..sample };
                 let square = other.square(sample.on_axis);
+                distances += 1;
                 if square < least {
                     (least, closest) = (square, other);
                 }
@@ -234,6 +267,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             sample.depth = distance;
         }
         parts.set_sample(row, sample);
+        self.spend(distances * DISTANCE_COST);
         Ok(())
     }
 
@@ -241,6 +275,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     /// that is no deeper than `enough` is not searched to the end.
     fn look(&mut self, parameter: f32, near: &Sample, enough: f32) -> Result<Sample, QueryError> {
         self.looks += 1;
+        self.spend(LOOK_COST);
         let on_axis = self.tool.axis_point(parameter);
         let Budget { node_tests, triangle_tests } = self.options.budget;
         // The root's test is one of them.

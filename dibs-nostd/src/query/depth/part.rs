@@ -59,14 +59,16 @@ pub(super) struct Part {
     pub bound: f32,
     /// Length along the axis at which it is divided next; `None` if the bound is an earlier tick's.
     pub split: Option<f32>,
+    /// Distances to triangles that the bound took.
+    pub distances: u32,
 }
 
 impl Part {
-    const NONE: Self = Self { from: Sample::NONE, next: 0, bound: 0.0, split: None };
+    const NONE: Self = Self::remembered(Sample::NONE, 0, 0.0);
 
     /// A remembered part.
-    pub fn remembered(from: Sample, next: usize, bound: f32) -> Self {
-        Self { from, next, bound, split: None }
+    pub const fn remembered(from: Sample, next: usize, bound: f32) -> Self {
+        Self { from, next, bound, split: None, distances: 0 }
     }
 
     /// The part, which is within one that is no deeper than `bound`.
@@ -80,18 +82,19 @@ impl Part {
         // A depth changes by at most the length moved.
         from.depth = smaller(from.depth, to.depth + length);
         to.depth = smaller(to.depth, from.depth + length);
-        let part = |bound, split| Self { from, next, bound, split: Some(split) };
+        let part =
+            |bound, split, distances| Self { from, next, bound, split: Some(split), distances };
         // Points nearer to an outside sample than its distance are outside too.
         let first = from.along + above_zero(-from.depth);
         let last = to.along - above_zero(-to.depth);
         if !(first < last) {
             let middle = (from.along + to.along) * 0.5;
-            return part(above_zero(larger(from.depth, to.depth)), middle);
+            return part(above_zero(larger(from.depth, to.depth)), middle, 0);
         }
         let slope = (from.depth + to.depth + length) * 0.5;
         let middle = (first + last) * 0.5;
         if slope <= enough {
-            return part(slope, middle);
+            return part(slope, middle, 0);
         }
         let span = to.on_axis - from.on_axis;
         let squares = |along: f32| {
@@ -102,12 +105,13 @@ impl Part {
         // The first triangle's lead over the second: linear along the axis where both are points.
         let lead = |[one, other]: [f32; 2]| other - one;
         let (mut low, mut high) = ((first, lead(at_first)), (last, lead(at_last)));
-        let (mut least, mut peak) = (f32::INFINITY, middle);
+        let (mut least, mut peak, mut distances) = (f32::INFINITY, middle, 4);
         for _ in 0..ROUNDS {
             let equal = low.0 + (high.0 - low.0) * (low.1 / (low.1 - high.1));
             let is_between = equal > low.0 && equal < high.0;
             let along = if is_between { equal } else { (low.0 + high.0) * 0.5 };
             let here = squares(along);
+            distances += 2;
             let highest = larger(convex(at_first, here), convex(here, at_last));
             if highest < least {
                 (least, peak) = (highest, along);
@@ -131,7 +135,7 @@ impl Part {
         } else {
             peak
         };
-        part(smaller(convex, slope), split)
+        part(smaller(convex, slope), split, distances)
     }
 }
 
@@ -241,11 +245,12 @@ impl Parts {
         }
     }
 
-    /// Bounds a remembered part anew.
-    pub fn renew(&mut self, row: usize, enough: f32) {
+    /// Bounds a remembered part anew. Returns the distances to triangles that it took.
+    pub fn renew(&mut self, row: usize, enough: f32) -> u32 {
         let Part { from, next, bound, .. } = self.part(row);
         let new = Part::new(from, &self.sample(next), next, enough);
         self.set(row, new.below(bound));
+        new.distances
     }
 
     /// The parts from the axis' start to its end.
