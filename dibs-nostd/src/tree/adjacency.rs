@@ -29,6 +29,17 @@ impl<I: Index> Tree<'_, I> {
         }
     }
 
+    /// The triangle across an edge.
+    #[inline]
+    pub(crate) fn row_across(&self, triangle: u32, edge: u32) -> Option<u32> {
+        // A code that no two rows share is the row itself.
+        if self.header.triangles <= u32::from(u16::MAX) {
+            let code = format::neighbour_code::<I>(self.sections.adjacency, triangle, edge);
+            return code.filter(|&row| row < self.header.triangles);
+        }
+        self.across(triangle, edge).map(|(row, _)| row)
+    }
+
     /// The triangle across an edge, and the number of that edge in it.
     #[inline]
     pub(crate) const fn across(&self, triangle: u32, edge: u32) -> Option<(u32, u32)> {

@@ -4,6 +4,7 @@
 //! valleys from the lowest triangle on and merges two that only a low ridge parts: a flat wall along a capsule is one
 //! valley, however many triangles are equally far.
 
+use crate::math::sqrt::sqrt;
 use crate::{Index, Tree};
 
 /// A triangle, and the square of its distance.
@@ -13,13 +14,37 @@ pub(super) struct Near {
     pub row: u32,
 }
 
+/// The same as a number that sorts by the distance, then by the row: bits of floats above zero sort as integers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Key(u64);
+
+impl Key {
+    fn of(near: Near) -> Self {
+        Self(u64::from(near.square.to_bits()) << 32 | u64::from(near.row))
+    }
+
+    fn square(self) -> f32 {
+        f32::from_bits((self.0 >> 32) as u32)
+    }
+
+    fn row(self) -> u32 {
+        self.0 as u32
+    }
+
+    fn near(self) -> Near {
+        Near { square: self.square(), row: self.row() }
+    }
+}
+
 /// No entry.
 const NONE: u16 = u16::MAX;
 
 /// The nearest triangles, at most `N`; then their valleys.
 #[derive(Clone, Debug)]
 pub(super) struct Basins<const N: usize> {
-    near: [Near; N],
+    near: [Key; N],
+    /// Whether they are a heap, the farthest first.
+    is_heap: bool,
     /// For each entry one that is not higher: a chain that ends at the lowest of its valley.
     lower: [u16; N],
     /// Hash table of the flooded entries: the first for each remainder of rows by `N`, and the next with the same one.
@@ -32,7 +57,8 @@ pub(super) struct Basins<const N: usize> {
 impl<const N: usize> Basins<N> {
     pub const fn new() -> Self {
         Self {
-            near: [Near { square: 0.0, row: 0 }; N],
+            near: [Key(0); N],
+            is_heap: false,
             lower: [NONE; N],
             heads: [NONE; N],
             next: [NONE; N],
@@ -42,23 +68,25 @@ impl<const N: usize> Basins<N> {
     }
 
     pub fn clear(&mut self) {
-        self.count = 0;
+        (self.count, self.is_heap) = (0, false);
     }
 
     /// Keeps a triangle, and drops the farthest if there is no room. Returns the largest square kept, once full.
     pub fn push(&mut self, near: Near) -> Option<f32> {
+        let key = Key::of(near);
         if let Some(place) = self.near.get_mut(self.count) {
-            *place = near;
+            *place = key;
             self.count += 1;
-            self.rise(self.count - 1);
             return None;
         }
-        let farthest = self.near.first_mut()?;
-        if near.square < farthest.square {
-            *farthest = near;
-            self.sink(self.count);
+        if !self.is_heap {
+            self.is_heap = true;
+            heap(&mut self.near);
         }
-        self.near.first().map(|farthest| farthest.square)
+        if key < *self.near.first()? {
+            sink(&mut self.near, 0, key);
+        }
+        self.near.first().map(|farthest| farthest.square())
     }
 
     /// Finds the valleys: ridges of at most `ridge` above the higher valley do not count. Calls back with the lowest
@@ -69,7 +97,8 @@ impl<const N: usize> Basins<N> {
         ridge: f32,
         mut visit: impl FnMut(Near),
     ) {
-        self.sort();
+        sort(self.near.get_mut(..self.count).unwrap_or_default(), self.is_heap);
+        self.is_heap = false;
         self.heads.fill(NONE);
         for entry in 0..self.count {
             self.flood(tree, entry, ridge);
@@ -77,20 +106,20 @@ impl<const N: usize> Basins<N> {
         for entry in 0..self.count {
             let is_lowest = self.lower.get(entry).is_some_and(|&lower| usize::from(lower) == entry);
             let was_cut_off = self.is_contact.get(entry).is_some_and(|&is| is);
-            if let Some(&near) = self.near.get(entry).filter(|_| is_lowest || was_cut_off) {
-                visit(near);
+            if let Some(key) = self.near.get(entry).filter(|_| is_lowest || was_cut_off) {
+                visit(key.near());
             }
         }
     }
 
     /// Joins an entry with the valleys next to it, all of them lower.
     fn flood<I: Index>(&mut self, tree: &Tree<'_, I>, entry: usize, ridge: f32) {
-        let Some(&Near { square, row }) = self.near.get(entry) else { return };
-        let height = crate::math::sqrt::sqrt(square);
+        let Some(&key) = self.near.get(entry) else { return };
+        let row = key.row();
         let mut valleys = [NONE; 3];
         let mut lowest = entry as u16;
         for (valley, edge) in valleys.iter_mut().zip(0..) {
-            if let Some(known) = tree.across(row, edge).and_then(|(across, _)| self.find(across)) {
+            if let Some(known) = tree.row_across(row, edge).and_then(|across| self.find(across)) {
                 *valley = self.bottom(known);
                 if *valley < lowest {
                     lowest = *valley;
@@ -98,8 +127,8 @@ impl<const N: usize> Basins<N> {
             }
         }
         for valley in valleys.into_iter().filter(|&valley| valley != NONE && valley != lowest) {
-            let bottom = self.near.get(usize::from(valley)).map_or(0.0, |near| near.square);
-            if height - crate::math::sqrt::sqrt(bottom) > ridge
+            let bottom = self.near.get(usize::from(valley)).map_or(0.0, |key| key.square());
+            if sqrt(key.square()) - sqrt(bottom) > ridge
                 && let Some(is_contact) = self.is_contact.get_mut(usize::from(valley))
             {
                 *is_contact = true;
@@ -129,7 +158,7 @@ impl<const N: usize> Basins<N> {
         let mut entry = *self.heads.get(bucket)?;
         for _ in 0..N {
             let near = self.near.get(usize::from(entry))?;
-            if near.row == row {
+            if near.row() == row {
                 return Some(entry);
             }
             entry = *self.next.get(usize::from(entry))?;
@@ -150,54 +179,47 @@ impl<const N: usize> Basins<N> {
         }
         entry
     }
+}
 
-    /// Nearest first; of equally near ones, the lower row.
-    fn sort(&mut self) {
-        let mut end = self.count;
-        while let Some(last) = end.checked_sub(1) {
-            self.swap(0, last);
-            end = last;
-            self.sink(end);
+/// Sorts the nearest to the front, through a heap.
+fn sort(keys: &mut [Key], is_heap: bool) {
+    if !is_heap {
+        heap(keys);
+    }
+    let mut end = keys.len();
+    while let Some(last) = end.checked_sub(1)
+        && let Some((key, heap)) = keys.get_mut(..end).and_then(<[_]>::split_last_mut)
+        && let Some(&farthest) = heap.first()
+    {
+        let key = core::mem::replace(key, farthest);
+        sink(heap, 0, key);
+        end = last;
+    }
+}
+
+/// Makes a heap of keys, the farthest first.
+fn heap(keys: &mut [Key]) {
+    for at in (0..keys.len() / 2).rev() {
+        if let Some(&key) = keys.get(at) {
+            sink(keys, at, key);
         }
     }
+}
 
-    fn is_farther(&self, one: usize, other: usize) -> bool {
-        match (self.near.get(one), self.near.get(other)) {
-            (Some(a), Some(b)) => a.square > b.square || (a.square == b.square && a.row > b.row),
-            _ => false,
+/// Puts a key in the place of another, above or among what is below that.
+fn sink(heap: &mut [Key], mut at: usize, key: Key) {
+    while let Some(&left) = heap.get(2 * at + 1) {
+        let right = heap.get(2 * at + 2).copied().filter(|&right| right > left);
+        let (child, farther) = right.map_or((2 * at + 1, left), |right| (2 * at + 2, right));
+        if farther <= key {
+            break;
         }
+        if let Some(place) = heap.get_mut(at) {
+            *place = farther;
+        }
+        at = child;
     }
-
-    fn swap(&mut self, one: usize, other: usize) {
-        if let (Some(&a), Some(&b)) = (self.near.get(one), self.near.get(other)) {
-            if let Some(place) = self.near.get_mut(one) {
-                *place = b;
-            }
-            if let Some(place) = self.near.get_mut(other) {
-                *place = a;
-            }
-        }
-    }
-
-    fn rise(&mut self, mut entry: usize) {
-        while entry > 0 && self.is_farther(entry, (entry - 1) / 2) {
-            self.swap(entry, (entry - 1) / 2);
-            entry = (entry - 1) / 2;
-        }
-    }
-
-    /// Restores the heap of `end` entries after a change of the first.
-    fn sink(&mut self, end: usize) {
-        let mut entry = 0;
-        loop {
-            let left = 2 * entry + 1;
-            let right = left + 1;
-            let child = if right < end && self.is_farther(right, left) { right } else { left };
-            if child >= end || !self.is_farther(child, entry) {
-                return;
-            }
-            self.swap(entry, child);
-            entry = child;
-        }
+    if let Some(place) = heap.get_mut(at) {
+        *place = key;
     }
 }
