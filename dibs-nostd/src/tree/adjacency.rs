@@ -20,24 +20,29 @@ impl<I: Index> Tree<'_, I> {
     /// The triangle across an edge: 0 leads from the first corner to the second, 1 to the third, 2 back to the
     /// first. `None` at a border, outside the table, or where the tree has no adjacency.
     ///
-    /// Cost: one or two triangle rows read, at most four.
+    /// Cost: up to 65,535 triangles one table row read; beyond, triangle rows, too, at most four.
     #[must_use]
     pub const fn neighbour(&self, triangle: TriangleRow, edge: u32) -> Option<TriangleRow> {
-        match self.across(triangle.0, edge) {
-            Some((row, _)) => Some(TriangleRow(row)),
+        match self.row_across(triangle.0, edge) {
+            Some(row) => Some(TriangleRow(row)),
             None => None,
         }
     }
 
-    /// The triangle across an edge.
+    /// The row of the triangle across an edge.
     #[inline]
-    pub(crate) fn row_across(&self, triangle: u32, edge: u32) -> Option<u32> {
+    pub(crate) const fn row_across(&self, triangle: u32, edge: u32) -> Option<u32> {
         // A code that no two rows share is the row itself.
-        if self.header.triangles <= u32::from(u16::MAX) {
-            let code = format::neighbour_code::<I>(self.sections.adjacency, triangle, edge);
-            return code.filter(|&row| row < self.header.triangles);
+        if self.header.triangles <= u16::MAX as u32 {
+            return match format::neighbour_code::<I>(self.sections.adjacency, triangle, edge) {
+                Some(row) if row < self.header.triangles => Some(row),
+                _ => None,
+            };
         }
-        self.across(triangle, edge).map(|(row, _)| row)
+        match self.across(triangle, edge) {
+            Some((row, _)) => Some(row),
+            None => None,
+        }
     }
 
     /// The triangle across an edge, and the number of that edge in it.

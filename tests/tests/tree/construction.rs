@@ -1,10 +1,12 @@
 //! The builder: coverage against independently computed distances, determinism, cost, refusals.
 
+use std::collections::HashMap;
+
 use dibs_build::{BuildError, Builder, BuiltTree, Construction, IndexWidth, Mesh, Paths, generate};
 use dibs_nostd::format::{Link, MAX_STACK, PathKind};
 use dibs_nostd::{Index, Options, Query, Sphere, Tree, TriangleRow, measure_stretch};
 use dibs_tests::deform::{Deformation, unit};
-use dibs_tests::stretch;
+use dibs_tests::{stretch, surfaces};
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -215,6 +217,26 @@ fn the_bytes_do_not_depend_on_the_threads() {
     let one = with(1);
     for threads in [2, 7] {
         assert!(with(threads).blob() == one.blob(), "{threads} threads");
+    }
+}
+
+/// Up to 65,535 triangles a neighbour's 16-bit code is its row; beyond, up to four rows share one.
+#[test]
+fn neighbours_share_an_edge() {
+    let all = [surfaces::sheet(6, 1.0, |_, _| 0.0), heart(1_000), surfaces::ball(6)];
+    for mesh in all.iter().chain([&generate::brain(68_000).expect("a valid size")]) {
+        let built = Builder::new().index(IndexWidth::Bits16).build(mesh).expect("a valid mesh");
+        let tree: Tree<'_, u16> = built.tree().expect("16-bit indices");
+        let triangles = surfaces::triangles(&tree);
+        let edges = |[a, b, c]: [u32; 3]| [(a, b), (b, c), (c, a)];
+        let rows = (0..).map(TriangleRow).zip(&triangles);
+        let own = rows.flat_map(|(row, &corners)| edges(corners).map(|edge| (edge, row)));
+        let own: HashMap<_, _> = own.collect();
+        for (row, &corners) in (0..).map(TriangleRow).zip(&triangles) {
+            for (edge, (from, to)) in (0..).zip(edges(corners)) {
+                assert_eq!(tree.neighbour(row, edge), own.get(&(to, from)).copied(), "{row}");
+            }
+        }
     }
 }
 
