@@ -39,7 +39,7 @@ pub const MARGIN: f32 = 5.0;
 
 /// A search that keeps what it found from tick to tick, with room for so many opened nodes.
 #[cfg(not(feature = "wide"))]
-type Search = surface::Tracker<184>;
+type Search = surface::Tracker<256>;
 
 /// A search from the root at every tick, to show that the wide one has no panic path either.
 #[cfg(feature = "wide")]

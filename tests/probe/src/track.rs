@@ -49,7 +49,7 @@ pub const TREE_BYTES: usize = 1 << 20;
 pub const VERTICES: usize = 26_000;
 const STACK: usize = 128;
 /// Opened nodes that the tracker remembers.
-pub const OPENED: usize = 184;
+pub const OPENED: usize = 256;
 
 /// Memory for a tree and two frames.
 pub struct Memory {
@@ -108,7 +108,7 @@ pub fn run<const EVERY: bool>(
     let [before, after] = frames.each_mut().map(|rows| rows.get_mut(..count));
     let (mut before, mut after) = (before.ok_or(Fault)?, after.ok_or(Fault)?);
     for tracker in &mut *trackers {
-        *tracker = Some(Tracker::new(&tree).map_err(|_| Fault)?);
+        place(&tree, tracker)?;
     }
     let query = Query::new(&tree).map_err(|_| Fault)?;
     let mut session = Session { query, trackers, last: None };
@@ -127,6 +127,13 @@ pub fn run<const EVERY: bool>(
         stretch = Some(measured);
     }
     if next == command::END { Ok(()) } else { Err(Fault) }
+}
+
+/// Makes a tracker. A separate function, because it passes over the stack.
+#[inline(never)]
+fn place(tree: &Tree<'static, u16>, tracker: &mut Option<Follower>) -> Result<(), Fault> {
+    *tracker = Some(Tracker::new(tree).map_err(|_| Fault)?);
+    Ok(())
 }
 
 /// The state from frame to frame.

@@ -118,7 +118,8 @@ impl Tally {
             }
         }
         if let Some(time) = found.contact {
-            assert!(way.separation(f64::from(time)) <= margin + spare, "{found:?}");
+            let apart = way.separation(f64::from(time));
+            assert!(apart <= margin + spare, "{apart} {margin} {spare} {found:?} {:?} {:?}", way.ends, way.shares);
             assert!(time >= found.clear_until, "{found:?}");
             self.contacts += 1;
         } else if found.clear_until > 1.0 {

@@ -301,7 +301,7 @@ fn a_tick_on_the_path_of_table_3_takes_few_tests() {
     let built = Builder::new().stretch(1.5).build(&mesh).expect("builds");
     let tree = built.tree::<u16>().expect("valid");
     let beat = Beat::new(&motion);
-    let mut subject = Subject::<184>::new(&tree);
+    let mut subject = Subject::<256>::new(&tree);
     let mut odometer = Odometer::new(&tree);
     let (mut positions, mut before) = (Vec::new(), built.to_rows(&motion.frames[0]));
     for tick in 0..ticks(4_000) as u32 / 2 {

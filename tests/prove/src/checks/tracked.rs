@@ -49,7 +49,7 @@ pub const CHECK: Check = Check {
             criterion: TIMING,
             bound: Bound::Is(0.0),
             unit: "ticks but the first",
-            limits: "As above. 184 opened nodes are remembered.",
+            limits: "As above. 256 opened nodes are remembered.",
         },
         golden("m7.track.held.mean"),
         golden("m7.track.held.largest"),
