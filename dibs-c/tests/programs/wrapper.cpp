@@ -2,14 +2,21 @@
  * Run by tests/wrapper.rs. */
 #include <dibs.hpp>
 
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <type_traits>
 #include <vector>
 
 namespace {
+
+/* The library keeps the addresses of objects. */
+template <class T> constexpr bool stays = !std::is_copy_constructible_v<T> && !std::is_move_constructible_v<T> &&
+                                          !std::is_copy_assignable_v<T> && !std::is_move_assignable_v<T>;
+static_assert(stays<dibs::Tree> && stays<dibs::Frame> && stays<dibs::Surface<502>> && stays<dibs::Tracker<502>>);
 
 std::vector<std::uint8_t> read(const char *path) {
     std::ifstream file(path, std::ios::binary);
@@ -49,6 +56,10 @@ int main(int argc, char **argv) {
     dibs_proximity on_bus, at_rest;
 
     EXPECT(DIBS_CODE_NULL, query.init(tree));
+    MUST(tree.init(bytes));
+    /* After an `init` that fails there is no object. */
+    EXPECT(DIBS_CODE_NULL, tree.init({}));
+    EXPECT(DIBS_CODE_NOT_INITIALISED, query.init(tree));
     MUST(tree.init(bytes));
     MUST(query.init(tree));
     MUST(contacts.init());
