@@ -79,6 +79,18 @@ int main(int argc, char **argv) {
         MUST(reader.latest(1, 50, frame));
         EXPECT(DIBS_CODE_HELD, reader.latest(1, 50, other));
         MUST(query.closest(frame, tool, on_bus));
+
+        /* A tracker on the bus' frame itself, in storage without room for a copy. */
+        static dibs::Tracker<0> tracker;
+        dibs_proximity tracked;
+        dibs_fallback fallback = DIBS_FALLBACK_NONE;
+        MUST(tracker.init(tree));
+        EXPECT(DIBS_CODE_VERTEX_COUNT, tracker.set(frame));
+        MUST(dibs_tracker_closest_on(tracker, frame, &tool, nullptr, &tracked, &fallback));
+        EXPECT(true, fallback == DIBS_FALLBACK_START && tracked.separation == on_bus.separation);
+        MUST(dibs_tracker_closest_on(tracker, frame, &tool, nullptr, &tracked, &fallback));
+        EXPECT(true, fallback == DIBS_FALLBACK_NONE && tracked.separation == on_bus.separation);
+        EXPECT(true, tracked.node_tests < on_bus.node_tests);
     }
     dibs::Frame frame;
     MUST(frame.init());
