@@ -655,7 +655,8 @@ typedef struct dibs_surface dibs_surface;
 /**
  * A query that remembers its last answer's proof.
  *
- * It keeps a copy of the surface, so that a frame is held for its copying alone. One context at a time.
+ * It keeps a copy of the surface, so that a frame is held for its copying alone, or it searches a reader's frame itself. One
+ * context at a time.
  */
 typedef struct dibs_tracker dibs_tracker;
 
@@ -1715,12 +1716,16 @@ dibs_code dibs_surface_init(void *storage,
 /**
  * Makes a tracker on a tree, without a surface.
  *
- * @param storage  `DIBS_TRACKER_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`. Needs no initial value.
+ * @param storage  `DIBS_TRACKER_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`; `DIBS_TRACKER_SIZE(0)` are enough for
+ *                 `dibs_tracker_closest_on` alone. Needs no initial value.
  * @param size     Bytes of the storage.
  * @param tree     The tree.
  * @param tracker  Receives the tracker's address.
  */
-dibs_code dibs_tracker_init(void *storage, size_t size, dibs_tree *tree, dibs_tracker **tracker);
+dibs_code dibs_tracker_init(void *storage,
+                            size_t size,
+                            dibs_tree *tree,
+                            dibs_tracker **tracker);
 
 /**
  * Takes over a new surface: copies it, and measures how far it moved. Call it for each new frame, and release the frame
@@ -1730,8 +1735,8 @@ dibs_code dibs_tracker_init(void *storage, size_t size, dibs_tree *tree, dibs_tr
  *
  * @param tracker  The tracker.
  * @param frame    The surface.
- * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_VERTEX_COUNT`, or a misuse. After an error
- *         the surface is the one before.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_VERTEX_COUNT` (also where the storage has no
+ *         room for copies), or a misuse. After an error the surface is the one before.
  */
 dibs_code dibs_tracker_set_frame(dibs_tracker *tracker,
                                  dibs_frame *frame);
@@ -1753,6 +1758,28 @@ dibs_code dibs_tracker_closest(dibs_tracker *tracker,
                                const dibs_options *options,
                                dibs_proximity *proximity,
                                dibs_fallback *fallback);
+
+/**
+ * The closest pair of the tool and the frame that a reader holds: the answer of `dibs_tracker_closest`, without a copy of the
+ * surface. The receiver has measured the frame's motion. The frame is held for the whole call, and released after it. For a
+ * control tick that has no time for `dibs_tracker_set_frame`.
+ *
+ * Cost: the budget at most, and a number for each opened node.
+ *
+ * @param tracker    The tracker.
+ * @param frame      A reader's frame.
+ * @param tool       The tool.
+ * @param options    Options, or null.
+ * @param proximity  Receives the answer; its counts of tests are this tick's.
+ * @param fallback   Receives the reason for a whole query; or null.
+ * @return As `dibs_query_closest`; `DIBS_CODE_ARGUMENT` of a frame of the caller's vertices.
+ */
+dibs_code dibs_tracker_closest_on(dibs_tracker *tracker,
+                                  dibs_frame *frame,
+                                  const dibs_tool *tool,
+                                  const dibs_options *options,
+                                  dibs_proximity *proximity,
+                                  dibs_fallback *fallback);
 
 /**
  * Fills the list with all locally closest pairs whose separation is at most `margin`, deepest first: that of

@@ -162,6 +162,11 @@ impl Held {
         let guard = unsafe { mem::transmute::<Guard<'_>, Guard<'static>>(guard) };
         Self { guard, _hold: hold }
     }
+
+    /// The frame with its motion since others.
+    pub(crate) const fn moving(&self) -> &Guard<'static> {
+        &self.guard
+    }
 }
 
 impl VertexTable for Held {

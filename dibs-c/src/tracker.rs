@@ -28,7 +28,8 @@ pub const DIBS_OPENED: usize = 256;
 
 /// A query that remembers its last answer's proof.
 ///
-/// It keeps a copy of the surface, so that a frame is held for its copying alone. One context at a time.
+/// It keeps a copy of the surface, so that a frame is held for its copying alone, or it searches a reader's frame itself. One
+/// context at a time.
 pub struct dibs_tracker {
     tracker: Tracker<'static, u16, STACK, DIBS_OPENED>,
     odometer: Odometer,
@@ -102,7 +103,8 @@ impl VertexTable for Copied {
 
 /// Makes a tracker on a tree, without a surface.
 ///
-/// @param storage  `DIBS_TRACKER_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`. Needs no initial value.
+/// @param storage  `DIBS_TRACKER_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`; `DIBS_TRACKER_SIZE(0)` are enough for
+///                 `dibs_tracker_closest_on` alone. Needs no initial value.
 /// @param size     Bytes of the storage.
 /// @param tree     The tree.
 /// @param tracker  Receives the tracker's address.
@@ -116,7 +118,8 @@ pub extern "C" fn dibs_tracker_init(
     dibs_code::of(|| {
         storage.make(size, tracker, || {
             let tree = &tree.share()?.tree;
-            let each = (tree.vertex_count() as usize).checked_mul(3).ok_or(dibs_code::Argument)?;
+            let vertices = if size == DIBS_TRACKER_BASE { 0 } else { tree.vertex_count() as usize };
+            let each = vertices.checked_mul(3).ok_or(dibs_code::Argument)?;
             let both = each.checked_mul(2).ok_or(dibs_code::Argument)?;
             let words = storage.words(size, DIBS_TRACKER_BASE, both)?;
             let (first, second) = words.split_at_mut_checked(each).ok_or(dibs_code::Argument)?;
@@ -140,8 +143,8 @@ pub extern "C" fn dibs_tracker_init(
 ///
 /// @param tracker  The tracker.
 /// @param frame    The surface.
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_VERTEX_COUNT`, or a misuse. After an error
-///         the surface is the one before.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_VERTEX_COUNT` (also where the storage has no
+///         room for copies), or a misuse. After an error the surface is the one before.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tracker_set_frame(
     tracker: *mut dibs_tracker,
@@ -240,6 +243,50 @@ pub extern "C" fn dibs_tracker_closest(
         let found: Tracked = match &shape {
             Shape::Sphere(sphere) => tracker.closest(surface, sphere, &options)?,
             Shape::Capsule(capsule) => tracker.closest(surface, capsule, &options)?,
+        };
+        proximity.set(found.closest.into());
+        if let Some(fallback) = fallback {
+            fallback.set(found.fallback.into());
+        }
+        Ok(())
+    })
+}
+
+/// The closest pair of the tool and the frame that a reader holds: the answer of `dibs_tracker_closest`, without a copy of the
+/// surface. The receiver has measured the frame's motion. The frame is held for the whole call, and released after it. For a
+/// control tick that has no time for `dibs_tracker_set_frame`.
+///
+/// Cost: the budget at most, and a number for each opened node.
+///
+/// @param tracker    The tracker.
+/// @param frame      A reader's frame.
+/// @param tool       The tool.
+/// @param options    Options, or null.
+/// @param proximity  Receives the answer; its counts of tests are this tick's.
+/// @param fallback   Receives the reason for a whole query; or null.
+/// @return As `dibs_query_closest`; `DIBS_CODE_ARGUMENT` of a frame of the caller's vertices.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_tracker_closest_on(
+    tracker: *mut dibs_tracker,
+    frame: *mut dibs_frame,
+    tool: *const dibs_tool,
+    options: *const dibs_options,
+    proximity: *mut dibs_proximity,
+    fallback: *mut dibs_fallback,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (proximity, fallback) = (proximity.check()?, fallback.check_if_any()?);
+        let (shape, mut tracker) = (Shape::try_from(tool.get()?)?, tracker.open()?);
+        let (frame, options) = (frame.open()?, dibs_options::of(options)?);
+        let surface = match &frame.table {
+            Table::Empty => return Err(dibs_code::NoSurface),
+            // Their motion is not measured.
+            Table::Vertices(_) => return Err(dibs_code::Argument),
+            Table::Held(held) => held.moving(),
+        };
+        let found: Tracked = match &shape {
+            Shape::Sphere(sphere) => tracker.tracker.closest(surface, sphere, &options)?,
+            Shape::Capsule(capsule) => tracker.tracker.closest(surface, capsule, &options)?,
         };
         proximity.set(found.closest.into());
         if let Some(fallback) = fallback {

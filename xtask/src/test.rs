@@ -23,7 +23,7 @@ pub struct Options {
     #[arg(long, default_value_t = 5)]
     pub demo_seconds: u32,
     /// Also the slow tests: an empty crate brought to an answer on the board by the guide alone, the viewer's query in
-    /// WebAssembly, every row of docs/processors.md, and a few mutants of the lines that changed.
+    /// WebAssembly, and a few mutants of the lines that changed.
     #[arg(long)]
     pub whole: bool,
 }

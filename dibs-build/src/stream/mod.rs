@@ -21,6 +21,8 @@
 //! The bytes are specified in `dibs-nostd`'s `docs/wire.md`; [`transport`](crate::transport) carries them, and
 //! [`faults`](crate::faults) damages them, for tests.
 
+mod pace;
 mod sender;
 
+pub use pace::Pace;
 pub use sender::{Prepared, SendError, Sender, Sent, Settings, SurfaceOrder, Totals};

@@ -9,6 +9,7 @@ mod formats;
 mod groups;
 mod labels;
 mod manners;
+mod pace;
 mod placement;
 mod program;
 mod sender;

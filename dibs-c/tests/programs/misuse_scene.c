@@ -95,11 +95,15 @@ static void trackers(const float *positions, uint32_t vertices) {
     EXPECT(NO_SURFACE, dibs_tracker_closest(tracker, &tool, NULL, &found, NULL));
     EXPECT(NO_SURFACE, dibs_tracker_contacts(tracker, &tool, 60.0f, NULL, contacts, NULL, NULL));
     EXPECT(NO_SURFACE, dibs_tracker_set_frame(tracker, frame));
+    EXPECT(NO_SURFACE, dibs_tracker_closest_on(tracker, frame, &tool, NULL, &found, NULL));
     EXPECT(OK, dibs_frame_set_vertices(frame, positions, vertices - 1, 0.0f));
     EXPECT(VERTEX_COUNT, dibs_tracker_set_frame(tracker, frame));
     EXPECT(OK, dibs_frame_set_vertices(frame, positions, vertices, 0.5f));
     EXPECT(OK, dibs_tracker_set_frame(tracker, frame));
     EXPECT(OK, dibs_tracker_closest(tracker, &tool, NULL, &found, NULL));
+    EXPECT(ARGUMENT, dibs_tracker_closest_on(tracker, frame, &tool, NULL, &found, NULL));
+    EXPECT(NULL, dibs_tracker_closest_on(tracker, NULL, &tool, NULL, &found, NULL));
+    EXPECT(NULL, dibs_tracker_closest_on(NULL, frame, &tool, NULL, &found, NULL));
     /* The frame's error is part of the accuracy. */
     EXPECT_THAT(found.accuracy > 0.5f && found.accuracy < 0.6f);
 

@@ -2,14 +2,21 @@
  * Run by tests/wrapper.rs. */
 #include <dibs.hpp>
 
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <type_traits>
 #include <vector>
 
 namespace {
+
+/* The library keeps the addresses of objects. */
+template <class T> constexpr bool stays = !std::is_copy_constructible_v<T> && !std::is_move_constructible_v<T> &&
+                                          !std::is_copy_assignable_v<T> && !std::is_move_assignable_v<T>;
+static_assert(stays<dibs::Tree> && stays<dibs::Frame> && stays<dibs::Surface<502>> && stays<dibs::Tracker<502>>);
 
 std::vector<std::uint8_t> read(const char *path) {
     std::ifstream file(path, std::ios::binary);
@@ -50,6 +57,10 @@ int main(int argc, char **argv) {
 
     EXPECT(DIBS_CODE_NULL, query.init(tree));
     MUST(tree.init(bytes));
+    /* After an `init` that fails there is no object. */
+    EXPECT(DIBS_CODE_NULL, tree.init({}));
+    EXPECT(DIBS_CODE_NOT_INITIALISED, query.init(tree));
+    MUST(tree.init(bytes));
     MUST(query.init(tree));
     MUST(contacts.init());
     MUST(surface.init());
@@ -68,6 +79,18 @@ int main(int argc, char **argv) {
         MUST(reader.latest(1, 50, frame));
         EXPECT(DIBS_CODE_HELD, reader.latest(1, 50, other));
         MUST(query.closest(frame, tool, on_bus));
+
+        /* A tracker on the bus' frame itself, in storage without room for a copy. */
+        static dibs::Tracker<0> tracker;
+        dibs_proximity tracked;
+        dibs_fallback fallback = DIBS_FALLBACK_NONE;
+        MUST(tracker.init(tree));
+        EXPECT(DIBS_CODE_VERTEX_COUNT, tracker.set(frame));
+        MUST(dibs_tracker_closest_on(tracker, frame, &tool, nullptr, &tracked, &fallback));
+        EXPECT(true, fallback == DIBS_FALLBACK_START && tracked.separation == on_bus.separation);
+        MUST(dibs_tracker_closest_on(tracker, frame, &tool, nullptr, &tracked, &fallback));
+        EXPECT(true, fallback == DIBS_FALLBACK_NONE && tracked.separation == on_bus.separation);
+        EXPECT(true, tracked.node_tests < on_bus.node_tests);
     }
     dibs::Frame frame;
     MUST(frame.init());

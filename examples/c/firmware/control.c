@@ -34,12 +34,12 @@ static const dibs_limits limits = {
 static const dibs_wall wall = {
     .stiffness = 1.0f, .damping = 0.002f, .hold_damping = 0.002f, .max_force = 5.0f, .margin = 5.0f};
 
-static alignas(DIBS_ALIGNMENT) uint8_t query_memory[DIBS_QUERY_SIZE];
+static alignas(DIBS_ALIGNMENT) uint8_t tracker_memory[DIBS_TRACKER_SIZE(0)];
 static alignas(DIBS_ALIGNMENT) uint8_t reader_memory[DIBS_READER_SIZE];
 static alignas(DIBS_ALIGNMENT) uint8_t frame_memory[DIBS_FRAME_SIZE];
 static alignas(DIBS_ALIGNMENT) uint8_t failsafe_memory[DIBS_FAILSAFE_SIZE];
 
-static dibs_query *query;
+static dibs_tracker *tracker;
 static dibs_reader *reader;
 static dibs_frame *frame;
 static dibs_failsafe *failsafe;
@@ -49,7 +49,7 @@ static uint32_t tick;
 static dibs_tool before;
 
 void control_init(void) {
-    must(dibs_query_init(query_memory, sizeof query_memory, surface_tree(), &query));
+    must(dibs_tracker_init(tracker_memory, sizeof tracker_memory, surface_tree(), &tracker));
     must(dibs_reader_init(reader_memory, sizeof reader_memory, surface_buffers(), &reader));
     must(dibs_frame_init(frame_memory, sizeof frame_memory, &frame));
     must(dibs_failsafe_init(failsafe_memory, sizeof failsafe_memory, &limits, &failsafe));
@@ -81,7 +81,7 @@ static dibs_code ask(const dibs_tool *tool, dibs_observation *seen, dibs_proximi
     record->position_error = facts.position_error;
 
     const uint32_t start = clock_now();
-    seen->query = dibs_query_closest(query, frame, tool, &options, found);
+    seen->query = dibs_tracker_closest_on(tracker, frame, tool, &options, found, &record->fallback);
     record->query_counts = clock_now() - start;
     /* Until then no frame is published. */
     must(dibs_frame_release(frame));

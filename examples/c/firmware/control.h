@@ -4,7 +4,7 @@
 
 #include "telemetry.h"
 
-/* Makes query, reader and fail-safe machine. */
+/* Makes tracker, reader and fail-safe machine. */
 void control_init(void);
 
 /* Runs one tick. */

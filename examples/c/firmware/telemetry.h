@@ -41,7 +41,7 @@ typedef struct {
     uint32_t rejected;
     uint32_t read_epoch;
     uint32_t read_digest;
-    /* Of a tracker; a query has neither. */
+    /* Nodes that the tracker has opened, of which the C interface says nothing; and its `dibs_fallback`. */
     uint32_t front;
     uint32_t fallback;
 } tick_record;

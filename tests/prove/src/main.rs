@@ -35,7 +35,7 @@ enum Task {
         /// Seconds of the controller's time in the demo.
         #[arg(long)]
         demo_seconds: u32,
-        /// Also every processor, and a few mutants of the lines that changed.
+        /// Also a few mutants of the lines that changed.
         #[arg(long)]
         whole: bool,
         /// Where to list the steps.
@@ -58,7 +58,7 @@ fn main() -> ExitCode {
         #[cfg(feature = "peers")]
         Task::Bench(options) => dibs_prove::paper::bench(&options),
         Task::Mutants(options) => mutants::mutants(&options),
-        Task::Processors => processors::check(false).map(|outcome| {
+        Task::Processors => processors::check().map(|outcome| {
             if let Outcome::Skipped(reason) = outcome {
                 println!("skipped: {reason}");
             }
@@ -66,7 +66,7 @@ fn main() -> ExitCode {
         Task::Test { demo_seconds, whole, steps: file } => {
             let mut steps = Steps::default();
             harness::test(&Effort { demo_seconds, ..Effort::TEST }, &mut steps);
-            steps.run("processors", || processors::check(!whole));
+            steps.run("processors", processors::check);
             if whole {
                 steps.run("mutants of changed lines", mutants::sample);
             }

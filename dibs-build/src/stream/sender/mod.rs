@@ -274,8 +274,21 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     /// # Errors
     /// [`SendError::Line`] when the connection is gone.
     pub fn transmit(&mut self, frame: Prepared) -> Result<Sent, SendError> {
+        self.transmit_paced(frame, || ())
+    }
+
+    /// The same, with a call of `wait` before each packet: a [`Pace`](super::Pace) spreads them.
+    ///
+    /// # Errors
+    /// As [`transmit`](Self::transmit).
+    pub fn transmit_paced(
+        &mut self,
+        frame: Prepared,
+        mut wait: impl FnMut(),
+    ) -> Result<Sent, SendError> {
         let Prepared { sent, packets } = frame;
         for packet in &packets {
+            wait();
             self.heartbeat()?;
             self.put(packet)?;
         }

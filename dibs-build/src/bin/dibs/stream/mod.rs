@@ -36,7 +36,7 @@ pub struct Args {
     /// The motion, with a position for each of the mesh's vertices in every frame: .pc2, .npy or a series (heart_%03d.vtp)
     motion: PathBuf,
     /// Where to: `serial:PORT` or `serial:PORT@BAUD`, `tcp:HOST:PORT`, `udp:HOST:PORT` or
-    /// `udp:HOST:PORT@LOCAL_PORT`, `unix:PATH`
+    /// `udp:HOST:PORT@LOCAL_PORT`, `unix:PATH`. A frame's UDP packets are spread over half of the time to the next one
     #[arg(long)]
     to: Target,
     /// Frames a second; by default the motion's own rate

@@ -4,8 +4,8 @@ use super::interrupt::Interrupt;
 use super::report::{self, Display, Outcome};
 use super::{Args, Recording};
 use anyhow::{Result, anyhow, bail};
-use dibs_build::stream::{SendError, Sender};
-use dibs_build::transport::Line;
+use dibs_build::stream::{Pace, SendError, Sender};
+use dibs_build::transport::{Line, Target};
 use dibs_nostd::wire::Mac;
 use std::time::{Duration, Instant};
 
@@ -15,6 +15,9 @@ const SILENT: Duration = Duration::from_secs(2);
 /// Between two attempts to connect.
 const ATTEMPT: Duration = Duration::from_millis(200);
 
+/// Longest time over which a frame's packets are spread: a slow recording's frames need not arrive later than that.
+const SPREAD: Duration = Duration::from_millis(50);
+
 /// Time between two polls.
 const GLANCE: Duration = Duration::from_millis(2);
 
@@ -23,6 +26,10 @@ pub struct Player<'a, const MTU: usize, M> {
     recording: &'a Recording,
     sender: Sender<Line, MTU, M>,
     interrupt: Interrupt,
+    /// From one frame to the next.
+    interval: Duration,
+    /// Time over which a frame's packets are spread.
+    spread: Duration,
     display: Display,
     outcome: Outcome,
 }
@@ -34,8 +41,14 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         sender: Sender<Line, MTU, M>,
         interrupt: Interrupt,
     ) -> Self {
+        let interval = Duration::from_secs_f64(1.0 / recording.rate);
+        // Any other line holds the sender up by itself; a datagram that does not fit the receiver's buffer is lost.
+        let spread = match args.to {
+            Target::Udp { .. } => SPREAD.min(interval / 2),
+            _ => Duration::ZERO,
+        };
         let (display, outcome) = (Display::new(), Outcome::default());
-        Self { args, recording, sender, interrupt, display, outcome }
+        Self { args, recording, sender, interrupt, interval, spread, display, outcome }
     }
 
     /// Sends the frames, and prints the totals, after an interrupt too.
@@ -66,7 +79,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
 
     /// Sends each frame when it is due.
     fn play(&mut self) -> Result<()> {
-        let interval = Duration::from_secs_f64(1.0 / self.recording.rate);
+        let interval = self.interval;
         let mut due = Instant::now();
         let recorded = self.recording.frames.len() as u64;
         let end = if self.args.repeat { u64::MAX } else { recorded };
@@ -100,12 +113,15 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
     fn send(&mut self, frame: usize) -> Result<()> {
         let (sender, recording) = (&mut self.sender, self.recording);
         // A recorded frame counts as captured when it is due, even if the surface stands still.
-        let sent = match &recording.weights {
-            Some(weights) => sender
-                .prepare_weights_captured(&weights[frame], Duration::ZERO)
-                .and_then(|frame| sender.transmit(frame)),
-            None => sender.send_captured(&recording.frames[frame], Duration::ZERO),
+        let prepared = match &recording.weights {
+            Some(weights) => sender.prepare_weights_captured(&weights[frame], Duration::ZERO),
+            None => sender.prepare_captured(&recording.frames[frame], Duration::ZERO),
         };
+        let sent = prepared.and_then(|prepared| {
+            let packets = prepared.sent().packets;
+            let mut pace = Pace::new(Instant::now(), self.spread, packets);
+            sender.transmit_paced(prepared, || pace.wait())
+        });
         match sent {
             Ok(sent) => self.display.show(&self.sender, &sent),
             Err(SendError::Line(error)) => self.reconnect(&error)?,
