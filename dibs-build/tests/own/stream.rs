@@ -349,7 +349,8 @@ fn what_cannot_be_streamed_is_one_sentence() {
         (format!("{to} --key text.key"), "text.key: a key file holds 32 hexadecimal digits"),
         #[cfg(unix)]
         (format!("{to} --key open.key"), "open.key: other users can read"),
-        (format!("{to} --rate 0"), "--rate 0: a rate is above 0"),
+        (format!("{to} --rate 0"), "--rate 0: a rate is 0.001 to 100000 frames a second"),
+        (format!("{to} --rate 1e-30"), "a rate is 0.001 to 100000 frames a second"),
         (format!("{to} --partial=-1"), "--partial: a tolerance"),
         (format!("{to} --modes"), "--motion and --modes"),
         ("--to unix:absent/bus".to_owned(), "unix:absent/bus: cannot be opened"),

@@ -96,8 +96,8 @@ pub fn run(args: &Args) -> Result<()> {
         (None, recorded) if recorded > 0.0 => f64::from(recorded),
         _ => bail!("{name}: the file does not say how fast it was recorded; give --rate"),
     };
-    if !(rate > 0.0 && rate <= 1e5) {
-        bail!("--rate {rate}: a rate is above 0 and at most 100000 frames a second");
+    if !(1e-3..=1e5).contains(&rate) {
+        bail!("--rate {rate}: a rate is 0.001 to 100000 frames a second");
     }
     if args.partial.is_some_and(|tolerance| !(tolerance >= 0.0 && tolerance.is_finite())) {
         bail!("--partial: a tolerance is a length of at least 0");
