@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { readFile, stat, writeFile } from "node:fs/promises";
-import { join } from "node:path";
+import { join, resolve } from "node:path";
 import { pathToFileURL } from "node:url";
 import puppeteer from "puppeteer-core";
 import { answers, contacts, differences, otherContacts, poses, program } from "./poses.mjs";
@@ -12,6 +12,7 @@ const folder = process.argv[2];
 const dibs = (...args) => execFileSync(program(folder), args, { cwd: folder, maxBuffer: 1 << 26 }).toString();
 const pictures = join(folder, "..");
 const PICTURE = join(pictures, "viewer.jpg");
+const DEMO = join(folder, "../../demo");
 const SOFTWARE_GL = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 
 async function launch(flags) {
@@ -29,7 +30,7 @@ async function open(browser, name, { width = 640, height = 480, hasTouch = false
   page.on("pageerror", (error) => page.complaints.push(error.message));
   page.on("request", (request) => request.url().startsWith("http") && page.complaints.push(`asks for ${request.url()}`));
   await page.setViewport({ width, height, hasTouch });
-  await page.goto(pathToFileURL(join(folder, name)).href);
+  await page.goto(pathToFileURL(resolve(folder, name)).href);
   await page.waitForFunction("window.viewer?.numbers && document.getElementById('separation').innerText.length > 3");
   if (!runs) await page.evaluate(() => (viewer.frame = () => {}));
   return page;
@@ -134,7 +135,7 @@ const checks = {
   },
 
   async "sliders do what they say"(page) {
-    await page.evaluate(() => viewer.play(false));
+    await page.evaluate(() => (viewer.play(false), viewer.tick = 0));
     await page.evaluate(() => viewer.take([20, -60, 40, 90, -90, 90, 3]));
     await set(page, "search", "2");
     let last = Infinity;
@@ -264,6 +265,46 @@ async function replay(browser) {
   }
 }
 
+// The page of `cargo xtask demo`, if there is one: it plays the instrument of every tick. Returns a picture of the deepest.
+async function demo(browser) {
+  const lines = await readFile(join(DEMO, "tools.csv"), "utf8").catch(() => null);
+  if (!lines) return null;
+  const poses = lines.trim().split("\n").map((line) => line.replace("capsule:", "").split(",").map(Number));
+  const page = await open(browser, join(DEMO, "replay.html"), LARGE);
+  const found = await page.evaluate((count) => {
+    viewer.restart();
+    const ticks = [];
+    for (let tick = 0; tick < count; tick++) {
+      viewer.advance(1);
+      ticks.push({ pose: [...viewer.to], separation: viewer.session.answer()[0] });
+    }
+    return ticks;
+  }, poses.length);
+  for (const [tick, { pose }] of found.entries()) {
+    assert.deepEqual(pose.map(Math.fround), poses[tick].map(Math.fround), `tick ${tick} of the demo`);
+  }
+  const depths = found.map(({ separation }) => separation);
+  const deepest = depths.indexOf(Math.min(...depths));
+  assert(depths[deepest] < 0, `the demo's instrument crosses the wall: ${depths[deepest]}`);
+  await page.evaluate((ticks) => {
+    viewer.play(true);
+    viewer.restart();
+    const { picture } = viewer;
+    viewer.picture = null;
+    for (let tick = 0; tick < ticks; tick += 17) viewer.step(Math.min(17, ticks - tick));
+    viewer.picture = picture;
+    viewer.play(false);
+  }, deepest + 1);
+  await set(page, "opacity", "0.5");
+  await fresh(page);
+  const path = join(pictures, "replay.jpg");
+  await page.screenshot({ path, type: "jpeg", quality: 82 });
+  await shot(page, "replay");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+  return path;
+}
+
 async function touches(browser) {
   const page = await open(browser, "heart.html", { width: 420, height: 800, hasTouch: true });
   await page.evaluate(() => viewer.play(false));
@@ -383,12 +424,14 @@ try {
   console.log("passed: a finger");
   await replay(browser);
   console.log("passed: a replay has the separations of `dibs track`");
+  const run = await demo(browser);
+  console.log(run ? "passed: the demo's run has its instrument at every tick" : "skipped: no run of `cargo xtask demo`");
   await withoutWebGl();
   console.log("passed: without WebGL the page says so, and answers");
   await scenes(browser);
   const measured = { size, version: await browser.version(), ...(await measure(browser)) };
   console.log(measured);
-  if (process.argv.includes("--record")) await recordPage(measured, PICTURE);
+  if (process.argv.includes("--record")) await recordPage(measured, [PICTURE, ...(run ? [run] : [])]);
 } finally {
   await browser.close();
 }

@@ -1,13 +1,13 @@
-// Writes the measured figures and the picture into docs/.
+// Writes the measured figures and the pictures into docs/.
 import { copyFile, readFile, writeFile } from "node:fs/promises";
 import { cpus } from "node:os";
-import { join } from "node:path";
+import { basename, join } from "node:path";
 import { fileURLToPath } from "node:url";
 
 const docs = fileURLToPath(new URL("../../docs", import.meta.url));
 const [BEGIN, END] = ["<!-- measured: written by `cargo xtask viewer --test --record` -->\n", "<!-- end of measured -->"];
 
-export async function recordPage(measured, picture) {
+export async function recordPage(measured, pictures) {
   const path = join(docs, "viewer.md");
   const page = await readFile(path, "utf8");
   const [head, rest] = page.split(BEGIN);
@@ -27,5 +27,5 @@ export async function recordPage(measured, picture) {
     `At 60 frames a second a frame has 16.7 ms: a graphics card, which none was here to measure, has ${(16.7 - work - commands).toFixed(1)} ms of ` +
     "them for 10,272 triangles.\n\n";
   await writeFile(path, head + BEGIN + text + END + tail);
-  await copyFile(picture, join(docs, "viewer.jpg"));
+  for (const picture of pictures) await copyFile(picture, join(docs, basename(picture)));
 }
