@@ -7,7 +7,7 @@ use dibs_nostd::constraint::{ForbiddenRegion, GainError, SpringDamper};
 use dibs_nostd::failsafe::{FailSafe, LimitError, Observation};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
-    Budget, Capsule, Cost, FrameAge, Options, Proximity, QueryError, Tool, Unavailable,
+    Budget, Capsule, Cost, FrameAge, Options, Proximity, QueryError, Tool, Unavailable, VertexTable,
 };
 
 use crate::surface::{self, TREE};
@@ -48,7 +48,7 @@ type Search = surface::Query;
 /// The controller's state from tick to tick.
 pub struct Control {
     search: Search,
-    surface: surface::Reader,
+    surface: surface::continuous::Reader,
     wall: ForbiddenRegion,
     failsafe: FailSafe,
     bus: &'static BusStatus,
@@ -64,7 +64,7 @@ impl Control {
     /// [`SetupError`] when a constant above is out of range, or the query's stack too small.
     pub fn new(
         tree: &surface::Tree,
-        surface: surface::Reader,
+        surface: surface::continuous::Reader,
         bus: &'static BusStatus,
         trust: &Trust,
     ) -> Result<Self, SetupError> {
@@ -95,6 +95,7 @@ impl Control {
     pub fn tick(&mut self, clock: impl Fn() -> u32) -> Tick {
         let mut record = Tick { kind: Tick::KIND, tick: self.tick, ..Tick::zeroed() };
         record.triangle = u32::MAX;
+        record.shown_error = -1.0;
         record.bytes = self.bus.bytes();
         record.frames_published = self.bus.published();
         record.rejected = self.bus.rejected();
@@ -108,7 +109,7 @@ impl Control {
             None => (None, Err(Unavailable::NotFinite)),
         };
         let link = self.bus.link.read(self.tick);
-        let verdict = self.failsafe.step(&Observation {
+        let mut verdict = self.failsafe.step(&Observation {
             frame,
             link,
             query_error: match answer {
@@ -118,6 +119,10 @@ impl Control {
             is_tree_corrupt: self.bus.is_tree_corrupt()
                 || self.search.tree().check(TREE.bytes()).is_err(),
         });
+        // A surface that moves on is off by what it was off at the last frame, not by the tissue's way since then.
+        if record.shown_error >= 0.0 {
+            verdict.margin = record.shown_error;
+        }
         self.bus.set_state(verdict.state);
         let admitted = answer.and_then(|closest| verdict.admit(closest));
         let along = answer.map_or(0.5, |closest| closest.axis_parameter);
@@ -139,7 +144,7 @@ impl Control {
         record
     }
 
-    /// The closest pair on the frame published last, and that frame's age.
+    /// The closest pair on the surface as it has moved on from the frame published last, and that frame's age.
     fn ask(
         &mut self,
         tool: &Capsule,
@@ -159,18 +164,22 @@ impl Control {
         let label = frame.label();
         record.epoch = label.epoch;
         record.age = age.map_or(u32::MAX, |age| age.age);
-        record.position_error = label.position_error;
+        let surface = frame.extrapolated();
+        record.epoch_before = surface.before().epoch().unwrap_or(label.epoch);
+        record.share = surface.share();
+        record.shown_error = surface.shown_error().unwrap_or(-1.0);
+        record.position_error = surface.position_error();
 
         let options = Options::new().budget(BUDGET);
         let start = clock();
         #[cfg(not(feature = "wide"))]
-        let answer = self.search.closest(&frame, tool, &options).map(|tracked| {
+        let answer = self.search.closest(&surface, tool, &options).map(|tracked| {
             record.front = tracked.opened;
             record.fallback = fallback_code(tracked.fallback);
             tracked.closest
         });
         #[cfg(feature = "wide")]
-        let answer = self.search.closest_wide(&frame, tool, &options);
+        let answer = self.search.closest_wide(&surface, tool, &options);
         record.query_counts = clock().wrapping_sub(start);
         drop(frame);
 

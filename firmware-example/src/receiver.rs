@@ -40,7 +40,7 @@ const ROWS: u32 = 32;
 /// tick's priority.
 pub struct Receiver {
     deframer: Deframer<MTU>,
-    assembler: surface::Receiver<'static>,
+    assembler: surface::continuous::Receiver<'static>,
     fingerprint: Fingerprint,
     status: &'static BusStatus,
     /// Tick of the last status.
@@ -56,14 +56,14 @@ impl Receiver {
     /// [`StretchError`] when the tree lacks its metric.
     pub fn new(
         tree: &'static surface::Tree,
-        writer: surface::Writer,
+        writer: surface::continuous::Writer,
         status: &'static BusStatus,
     ) -> Result<Self, StretchError> {
         let reach = CENTRE.abs().max_element() + ROOM * REACH;
         let limits = SurfaceLimits::reach_mm(reach).speed(SPEED);
         Ok(Self {
             deframer: Deframer::new(),
-            assembler: surface::receiver(tree, writer, limits)?,
+            assembler: surface::continuous::receiver(tree, writer, limits)?,
             fingerprint: Fingerprint::new(),
             status,
             reported: 0,

@@ -33,14 +33,16 @@ pub struct Tick {
     pub cause: u32,
     /// 1 if there was an answer, else 0.
     pub answered: u32,
-    /// Most that the tissue may have moved since the frame was received, in mm. The constraint's answer has it added to
-    /// its accuracy.
+    /// Most that the tissue may be off, in mm: by its speed since the frame was received, or by [`shown_error`] if that is
+    /// known. The constraint's answer has it added to its accuracy.
+    ///
+    /// [`shown_error`]: Self::shown_error
     pub margin: f32,
     /// The frame that was searched, if there was an answer.
     pub epoch: u32,
     /// Its age in ticks.
     pub age: u32,
-    /// Largest distance of its vertices from the sender's, in mm: the bus's quantisation.
+    /// Largest distance of the surface's vertices from the sender's, in mm: the bus's quantisation.
     pub position_error: f32,
     /// The instrument's tip, exactly as in the query, in mm.
     pub tool_start: [f32; 3],
@@ -82,6 +84,12 @@ pub struct Tick {
     pub front: u32,
     /// Why the front did not serve: [`fallback_code`]; 0 if it did.
     pub fallback: u32,
+    /// The frame before the one that was searched, from which the surface moved on; the same where it was held.
+    pub epoch_before: u32,
+    /// The surface's place in time: `dibs_nostd::Between::share`.
+    pub share: f32,
+    /// The error of the last extrapolation, in mm: `dibs_nostd::Between::shown_error`; -1 if unknown.
+    pub shown_error: f32,
 }
 
 /// A fallback as a number.

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
-use controller::surface::{self, Surface};
+use controller::surface::{self, continuous::Surface};
 use controller::telemetry::{Tick, cause_code};
 use controller::{BusStatus, Control, MTU, Receiver, Trust};
 use dibs_build::{Builder, generate};
@@ -72,7 +72,7 @@ impl Sender {
 
     /// A frame as the bytes of the bus, as fresh as it says.
     fn sent(&mut self, epoch: u32, freshness: Freshness) -> Vec<u8> {
-        let exact = &self.frames[epoch as usize * 5 % self.frames.len()];
+        let exact = &self.frames[epoch as usize % self.frames.len()];
         let grid = QuantisedBox::covering(exact).expect("finite positions");
         let decode = |&p: &Vec3| grid.position(grid.quantise(p).expect("inside its own box"));
         self.decoded.insert(epoch, exact.iter().map(decode).collect());
@@ -90,15 +90,16 @@ impl Sender {
         all
     }
 
-    /// Compares an answer with exhaustive search on its frame.
+    /// Compares an answer with exhaustive search on its surface, between two frames or beyond them.
     fn check(&self, tick: &Tick) {
         let (start, end) = (Vec3::from(tick.tool_start), Vec3::from(tick.tool_end));
         let tool = Instrument::capsule(start, end, tick.tool_radius);
-        let truth = exhaustive(&self.decoded[&tick.epoch], &self.triangles, &tool).unwrap();
+        let frames = self.decoded[&tick.epoch_before].iter().zip(&self.decoded[&tick.epoch]);
+        let rows: Vec<Vec3> = frames.map(|(&a, &b)| a + (b - a) * tick.share).collect();
+        let truth = exhaustive(&rows, &self.triangles, &tool).unwrap();
         // Both sides have the vertices as they were decoded: no error of their positions.
         let accuracy = f64::from(tick.accuracy) - f64::from(tick.position_error);
-        let rows = &self.decoded[&tick.epoch];
-        let (low, high) = sides::signed_separation(rows, &self.triangles, &tool, &truth, accuracy);
+        let (low, high) = sides::signed_separation(&rows, &self.triangles, &tool, &truth, accuracy);
         assert!(f64::from(tick.separation) >= low - accuracy, "tick {}: {low}", tick.tick);
         assert!(f64::from(tick.lower) <= high + accuracy, "tick {}: {high}", tick.tick);
     }
@@ -109,7 +110,7 @@ fn force(tick: &Tick) -> f32 {
 }
 
 #[test]
-fn every_answer_is_that_of_one_whole_frame() {
+fn every_answer_is_that_of_whole_frames() {
     let (mut receiver, mut control, bus) = controller();
     let mut sender = Sender::new();
 
@@ -118,10 +119,12 @@ fn every_answer_is_that_of_one_whole_frame() {
     assert!(!first.is_answered());
 
     let (mut answers, mut checked, mut acting, mut free) = (0, 0, 0, 0);
-    let mut last_epoch = 0;
+    let (mut last_epoch, mut moving) = (0, 0);
     for epoch in 1..=30 {
-        // A tick every 61 bytes, so that most ticks fall inside a packet.
-        for chunk in sender.bytes(epoch, control.now()).chunks(61) {
+        // A tick every 122 bytes, so that most ticks fall inside a packet, and a pause as long as the frame.
+        let bytes = sender.bytes(epoch, control.now());
+        let chunks: Vec<&[u8]> = bytes.chunks(122).collect();
+        for chunk in chunks.iter().copied().chain(chunks.iter().map(|_| &[][..])) {
             for &byte in chunk {
                 receiver.byte(byte, control.now());
                 while receiver.work() {}
@@ -135,6 +138,9 @@ fn every_answer_is_that_of_one_whole_frame() {
                     checked += 1;
                 }
                 (last_epoch, answers) = (tick.epoch, answers + 1);
+                moving += u32::from(
+                    tick.share > 1.0 && tick.share < 2.0 && tick.margin == tick.shown_error,
+                );
                 if force(&tick) > 0.0 { acting += 1 } else { free += 1 }
             }
         }
@@ -142,6 +148,8 @@ fn every_answer_is_that_of_one_whole_frame() {
     }
     assert_eq!(bus.rejected(), 0);
     assert!(answers > 10_000 && checked > 2_000, "{answers} answers, {checked} checked");
+    // It moves on while nothing comes, and is at the end of its way when the next frame begins.
+    assert!(moving > answers * 4 / 10, "{moving} of {answers} on a moving surface");
     assert!(acting > 100 && free > 100, "the wall acted {acting} times and was still {free} times");
 }
 

@@ -76,6 +76,41 @@ pub mod {name} {{
         }}
     }}
 
+    /// The same for a surface that moves between frames: with a third buffer, 36 bytes of RAM a vertex.
+    pub mod continuous {{
+        /// Three buffers for the vertices: the frame published last, the one before, and the one that arrives.
+        pub type Surface = ::dibs_nostd::Frames<{{ super::VERTICES }}, 3>;
+
+        /// The bus's end of the buffers.
+        pub type Writer = ::dibs_nostd::FrameWriter<'static, {{ super::VERTICES }}, Surface>;
+
+        /// The control loop's end of the buffers.
+        pub type Reader = ::dibs_nostd::FrameReader<'static, {{ super::VERTICES }}, Surface>;
+
+        ::dibs_nostd::if_bus! {{
+            /// Publishes frames that are complete and within the stretch limit, and measures the surface beyond them.
+            pub type Receiver<'t> = ::dibs_nostd::Assembler<
+                'static,
+                ::dibs_nostd::StretchMonitor<'t, super::Index, 2>,
+                {{ super::VERTICES }},
+                ::dibs_nostd::wire::NoMac,
+                Surface,
+            >;
+
+            /// A receiver for surfaces of this tree that keep to these limits.
+            ///
+            /// # Errors
+            /// Where the tree was built without its metric.
+            pub fn receiver(
+                tree: &super::Tree,
+                writer: Writer,
+                limits: ::dibs_nostd::SurfaceLimits,
+            ) -> ::core::result::Result<Receiver<'_>, ::dibs_nostd::StretchError> {{
+                Receiver::continuous(writer, tree, limits)
+            }}
+        }}
+    }}
+
     /// A query with the stack that this tree needs.
     pub type Query = ::dibs_nostd::Query<'static, Index, STACK>;
 

@@ -93,6 +93,13 @@ pub trait Gate {
         None
     }
 
+    /// The stretch of the frame's extrapolation, once it is admitted: as long after it as the published frame was
+    /// before. `None` where the gate measures none, or it is beyond the limit.
+    #[doc(hidden)]
+    fn ahead(&self) -> Option<MeasuredStretch> {
+        None
+    }
+
     /// The error (mm) of making the surface from the frame's rows: added to the frame's position error.
     fn position_error(&self) -> f32 {
         0.0

@@ -5,6 +5,7 @@ mod kernel;
 mod limits;
 mod monitor;
 mod motion;
+mod pass;
 mod regions;
 mod rows;
 

@@ -2,23 +2,15 @@
 
 use core::ops::Range;
 
-use super::kernel::Worst;
 use super::motion::{farthest, largest_step, too_fast};
-use super::regions::{of_regions, region_rows};
-use super::rows::Room;
-use super::{Arriving, Changed, Gate, StretchError, SurfaceLimits, Verdict, check_tables, rows};
-use crate::surface::{REGIONS, TravelUnit, VertexTable};
-use crate::tree::{Index, Tree, TriangleRow};
+use super::pass::{ALL, Pass};
+use super::regions::region_rows;
+use super::{Arriving, Changed, Gate, StretchError, SurfaceLimits, Verdict, check_tables};
+use crate::surface::{Between, MeasuredStretch, REGIONS, TravelUnit, VertexTable};
+use crate::tree::{Index, Tree};
 
 /// Blocks of vertex rows, at most: they mark the rows that a partial frame moved.
 const BLOCKS: usize = 32;
-
-/// No row.
-const NONE: u32 = u32::MAX;
-
-/// All regions, one bit each.
-const ALL: u32 = u32::MAX;
-const _: () = assert!(REGIONS == u32::BITS as usize);
 
 /// Measures every frame before it is published, a few triangles at a time. This [`Gate`] refuses surfaces stretched,
 /// shrunk or moved beyond their limits, and gives the query the measured stretch.
@@ -32,8 +24,13 @@ const _: () = assert!(REGIONS == u32::BITS as usize);
 ///
 /// The rows that a frame brings are compared with the published ones; [`SurfaceLimits`] lists the refusals.
 ///
+/// With `SURFACES` = 2 ([`continuous`](StretchMonitor::continuous)) it measures the frame's extrapolation, too: the
+/// positions twice the frame's less the published frame's, as long after the frame as that was before. By convexity the
+/// two bound the stretch of all surfaces on the way.
+///
 /// Cost: [`advance`](Gate::advance) checks at most `work` rows and triangles, plus O([`REGIONS`]). RAM: half a kilobyte
-/// at most, whatever the surface. [`new`](Self::new) makes one pass over the triangles.
+/// at most, whatever the surface, and 300 bytes more with the extrapolation. [`new`](Self::new) makes one pass over the
+/// triangles.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -64,24 +61,20 @@ const _: () = assert!(REGIONS == u32::BITS as usize);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct StretchMonitor<'t, I> {
+pub struct StretchMonitor<'t, I, const SURFACES: usize = 1> {
     tree: &'t Tree<'t, I>,
     /// The regions with corners in each block of `1 << block_shift` vertex rows.
     touched: [u32; BLOCKS],
     block_shift: u8,
     changed: Changed,
-    /// Regions still to be measured.
-    left: u32,
-    /// Regions whose entry below is that of an abandoned frame or the one in work. The next partial frame measures
-    /// them, changed or not.
-    unpublished: u32,
-    /// The next triangle of the region that is being measured.
-    next: u32,
-    regions: [Worst; REGIONS],
+    /// The measurement of the frame, and that of its extrapolation.
+    passes: [Pass; SURFACES],
+    /// The extrapolation of the frame in work, once measured and within the limit.
+    ahead: Option<MeasuredStretch>,
+    /// The extrapolation is beyond the limit.
+    is_beyond: bool,
     speed: f32,
     shrinkage: f32,
-    /// [`Room`]'s sum of the region that is being measured.
-    room: f32,
     /// Blocks of rows still to be compared with the published ones, and the next row of the first of them.
     blocks_left: u32,
     next_row: u32,
@@ -93,6 +86,23 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
     /// # Errors
     /// [`StretchError::NoMetric`] where the tree was emitted without its metric.
     pub fn new(tree: &'t Tree<'t, I>) -> Result<Self, StretchError> {
+        Self::with_passes(tree)
+    }
+}
+
+impl<'t, I: Index> StretchMonitor<'t, I, 2> {
+    /// The same with the frames' extrapolations. An extrapolation beyond the tree's limit is no error: the surface is
+    /// held then.
+    ///
+    /// # Errors
+    /// [`StretchError::NoMetric`] where the tree was emitted without its metric.
+    pub fn continuous(tree: &'t Tree<'t, I>) -> Result<Self, StretchError> {
+        Self::with_passes(tree)
+    }
+}
+
+impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
+    fn with_passes(tree: &'t Tree<'t, I>) -> Result<Self, StretchError> {
         let limits = SurfaceLimits::reach_mm(f32::INFINITY);
         if tree.sections().metric.is_empty() {
             return Err(StretchError::NoMetric);
@@ -117,13 +127,11 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
             touched,
             block_shift: block_shift as u8,
             changed: Changed::Whole,
-            left: ALL,
-            unpublished: ALL,
-            next: NONE,
-            regions: [Worst::none(u32::MAX); REGIONS],
+            passes: [const { Pass::new() }; SURFACES],
+            ahead: None,
+            is_beyond: false,
             speed: limits.speed,
             shrinkage: limits.shrinkage,
-            room: 0.0,
             blocks_left: ALL,
             next_row: 0,
         })
@@ -148,7 +156,7 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
     #[must_use]
     pub const fn whole_work(&self) -> u32 {
         let rows = self.tree.vertex_count().saturating_add(self.tree.triangle_count());
-        rows.saturating_add(REGIONS as u32)
+        rows.saturating_add(REGIONS as u32).saturating_mul(SURFACES as u32)
     }
 
     /// Compares arrived rows with the published ones. Returns the work left, and whether all rows are done.
@@ -192,33 +200,40 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
         Ok((work, true))
     }
 
-    /// Checks that the measured region, which begins with this triangle, has not shrunk.
-    const fn check_room(&self, triangle: u32) -> Result<(), StretchError> {
-        if self.room >= 0.0 {
-            return Ok(());
+    /// Measures the extrapolation of arrived rows, with at most `work` triangles. Returns whether that is over.
+    fn look_ahead<V: VertexTable + ?Sized>(
+        &mut self,
+        before: Option<&V>,
+        surface: &V,
+        ready: u32,
+        work: u32,
+    ) -> bool {
+        let ([_, ahead, ..], Some(before)) = (self.passes.as_mut_slice(), before) else {
+            return true;
+        };
+        if self.is_beyond {
+            return true;
         }
-        Err(StretchError::Shrunk { triangle: TriangleRow(triangle), limit: self.shrinkage })
-    }
-
-    /// The rows of a region's triangles.
-    fn rows(&self, region: u32) -> Range<u32> {
-        let rows = region_rows(self.tree);
-        let triangles = self.tree.triangle_count();
-        let first = rows.saturating_mul(region);
-        let end = first.saturating_add(rows);
-        if end < triangles { first..end } else { first.min(triangles)..triangles }
+        let surface = Between::ahead(before, surface);
+        // Beyond the limit, or not finite: no extrapolation.
+        let measured = ahead.advance(self.tree, &surface, ready, 0.0, work);
+        self.is_beyond = measured.is_err();
+        let is_done = measured.is_ok_and(|(_, is_done)| is_done);
+        self.ahead = is_done.then(|| ahead.measured(self.tree, None));
+        is_done || self.is_beyond
     }
 }
 
-impl<I: Index> Gate for StretchMonitor<'_, I> {
+impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
     fn begin(&mut self, changed: Changed) {
         self.changed = changed;
-        self.next = NONE;
         self.next_row = 0;
-        (self.left, self.blocks_left) = match changed {
-            Changed::Whole => (ALL, ALL),
-            Changed::Partial => (self.unpublished, 0),
-        };
+        self.blocks_left = if changed == Changed::Whole { ALL } else { 0 };
+        (self.ahead, self.is_beyond) = (None, false);
+        for (number, pass) in self.passes.iter_mut().enumerate() {
+            // What a partial frame leaves as it was has moved before, so its extrapolation is another one.
+            pass.begin(changed == Changed::Whole || number > 0);
+        }
     }
 
     fn moved(&mut self, rows: Range<u32>) {
@@ -230,7 +245,9 @@ impl<I: Index> Gate for StretchMonitor<'_, I> {
         for (number, block) in
             self.touched.iter().enumerate().take(last.saturating_add(1)).skip(first)
         {
-            self.left |= block;
+            if let Some(pass) = self.passes.first_mut() {
+                pass.add(*block);
+            }
             self.blocks_left |= 1_u32.wrapping_shl(number as u32);
         }
     }
@@ -240,53 +257,30 @@ impl<I: Index> Gate for StretchMonitor<'_, I> {
         arriving: Arriving<'_, V>,
         work: u32,
     ) -> Result<Verdict, StretchError> {
-        let Arriving { surface, ready, .. } = arriving;
+        let Arriving { surface, ready, before } = arriving;
+        let before = before.map(|(before, _)| before);
         check_tables(self.tree, surface)?;
         let is_complete = ready >= self.tree.vertex_count();
         if self.changed == Changed::Partial && !is_complete {
             return Ok(Verdict::Pending);
         }
-        let (mut work, is_compared) = self.compare(arriving, work)?;
-        while self.left != 0 {
-            let region = self.left.trailing_zeros();
-            let rows = self.rows(region);
-            let next = if self.next == NONE { rows.start } else { self.next };
-            let slot = self.regions.get_mut(region as usize);
-            let slot = slot.ok_or(StretchError::Corrupt { row: rows.start })?;
-            if self.next == NONE {
-                if work == 0 {
-                    return Ok(Verdict::Pending);
-                }
-                let last = slot.triangle;
-                let mut worst = Worst::none(rows.start);
-                if rows.contains(&last) {
-                    if !rows::look(self.tree, surface, last, ready, &mut worst) {
-                        return Ok(Verdict::Pending);
-                    }
-                    work -= 1;
-                }
-                *slot = worst;
-                self.room = 0.0;
-                self.unpublished |= 1 << region;
-            }
-            let stop = if rows.end - next < work { rows.end } else { next + work };
-            let mut room = Room { least: self.shrinkage * self.shrinkage, sum: self.room };
-            let at = rows::scan(self.tree, surface, next..stop, ready, slot, &mut room)?;
-            self.room = room.sum;
-            work -= at - next;
-            if at < rows.end {
-                self.next = at;
-                return Ok(Verdict::Pending);
-            }
-            self.check_room(rows.start)?;
-            self.next = NONE;
-            self.left &= self.left - 1;
-        }
-        if !is_complete || !is_compared {
+        let (work, is_compared) = self.compare(arriving, work)?;
+        // Half of the work each, so that both keep up with the frame.
+        let ahead = if SURFACES > 1 { work / 2 } else { 0 };
+        let (tree, shrinkage) = (self.tree, self.shrinkage);
+        let Some(own) = self.passes.first_mut() else { return Ok(Verdict::Pending) };
+        let (left, is_measured) = own.advance(tree, surface, ready, shrinkage, work - ahead)?;
+        let is_ahead =
+            SURFACES == 1 || self.look_ahead(before, surface, ready, ahead.saturating_add(left));
+        if !is_complete || !is_compared || !is_measured || !is_ahead {
             return Ok(Verdict::Pending);
         }
-        let measured = of_regions(self.tree, &self.regions, surface.epoch());
-        Ok(Verdict::Admitted(Some(measured)))
+        let Some(own) = self.passes.first() else { return Ok(Verdict::Pending) };
+        Ok(Verdict::Admitted(Some(own.measured(tree, surface.epoch()))))
+    }
+
+    fn ahead(&self) -> Option<MeasuredStretch> {
+        self.ahead
     }
 
     fn travel_unit(&self) -> Option<TravelUnit> {
@@ -298,6 +292,8 @@ impl<I: Index> Gate for StretchMonitor<'_, I> {
     }
 
     fn published(&mut self) {
-        self.unpublished = 0;
+        for pass in &mut self.passes {
+            pass.published();
+        }
     }
 }

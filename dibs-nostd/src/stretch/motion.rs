@@ -15,9 +15,9 @@ pub(crate) const fn farthest(speed: f32, elapsed: u32) -> f32 {
 /// The largest squared distance of these rows from their previous positions, or `largest` if that is larger. NaN where
 /// a position is NaN.
 #[inline(never)]
-pub(crate) fn largest_step<V: VertexTable + ?Sized>(
+pub(crate) fn largest_step<V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
     now: &V,
-    before: &V,
+    before: &W,
     rows: Range<u32>,
     mut largest: f32,
 ) -> f32 {

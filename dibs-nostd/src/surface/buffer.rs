@@ -1,4 +1,4 @@
-//! One of the two buffers: positions and the label of their frame, in relaxed atomics.
+//! One of the buffers: positions and the label of their frame, in relaxed atomics.
 
 use core::fmt;
 
@@ -21,6 +21,19 @@ pub struct FrameLabel {
     pub position_error: f32,
     /// Measured stretch of the frame against the rest shape; `None` if not measured.
     pub stretch: Option<MeasuredStretch>,
+}
+
+/// The surface after a frame, as long after it as the frame before was before.
+#[derive(Clone, Copy, Debug)]
+pub struct Ahead {
+    /// The largest stretch of the positions `2 now - before`; NaN unless measured, and within the tree's limit.
+    pub sigma: f32,
+    /// Largest distance (mm) of a vertex of this frame from its extrapolation by the two frames before; NaN if unknown.
+    pub shown: f32,
+}
+
+impl Ahead {
+    pub(crate) const UNKNOWN: Self = Self { sigma: f32::NAN, shown: f32::NAN };
 }
 
 /// One position, as bits of `f32`.
@@ -84,6 +97,8 @@ pub struct Buffer<P: ?Sized> {
     stretch: [AtomicU32; MeasuredStretch::WORDS],
     /// The odometer's reading, all zero if there is none.
     travel: [AtomicU32; Travel::WORDS],
+    /// The numbers of [`Ahead`].
+    ahead: [AtomicU32; 2],
     positions: P,
 }
 
@@ -96,6 +111,7 @@ impl<const N: usize> Buffer<[Position; N]> {
             position_error: AtomicU32::new(0),
             stretch: [const { AtomicU32::new(0) }; MeasuredStretch::WORDS],
             travel: [const { AtomicU32::new(0) }; Travel::WORDS],
+            ahead: [const { AtomicU32::new(0) }; 2],
             positions: [const { Position([const { AtomicU32::new(0) }; 3]) }; N],
         }
     }
@@ -109,6 +125,7 @@ impl<const N: usize> Buffer<[Position; N]> {
             position_error: AtomicU32::new(0),
             stretch: from_fn(|_| AtomicU32::new(0)),
             travel: from_fn(|_| AtomicU32::new(0)),
+            ahead: from_fn(|_| AtomicU32::new(0)),
             positions: from_fn(|_| Position(from_fn(|_| AtomicU32::new(0)))),
         }
     }
@@ -125,7 +142,7 @@ impl<P: Rows + ?Sized> Buffer<P> {
         self.rows().get(vertex as usize).map(Position::get)
     }
 
-    pub(super) fn set_label(&self, label: FrameLabel, travel: Option<Travel>) {
+    pub(super) fn set_label(&self, label: FrameLabel, travel: Option<Travel>, ahead: Ahead) {
         self.epoch.store(label.epoch, Ordering::Relaxed);
         self.received.store(label.received, Ordering::Relaxed);
         self.position_error.store(label.position_error.to_bits(), Ordering::Relaxed);
@@ -140,6 +157,16 @@ impl<P: Rows + ?Sized> Buffer<P> {
         for (at, word) in self.travel.iter().zip(words) {
             at.store(word, Ordering::Relaxed);
         }
+        let [sigma, shown] = &self.ahead;
+        sigma.store(ahead.sigma.to_bits(), Ordering::Relaxed);
+        shown.store(ahead.shown.to_bits(), Ordering::Relaxed);
+    }
+
+    /// That of a labelled frame.
+    pub(super) fn ahead(&self) -> Ahead {
+        let [sigma, shown] =
+            self.ahead.each_ref().map(|word| f32::from_bits(word.load(Ordering::Relaxed)));
+        Ahead { sigma, shown }
     }
 
     pub(super) fn label(&self) -> FrameLabel {

@@ -1,23 +1,24 @@
 //! The double buffer between the bus and the control tick: complete frames only, never torn.
 //!
 //! One side writes vertices into the back buffer, the other reads the front buffer, and one atomic word states which
-//! buffer is in front. The whole module is safe code: positions are stored as the bits of `f32` in relaxed atomics,
-//! which compile to plain loads and stores.
+//! buffer is in front. Of three buffers the third keeps the frame before, so that the surface between the two is known.
+//! The whole module is safe code: positions are stored as the bits of `f32` in relaxed atomics, which compile to plain
+//! loads and stores.
 //!
 //! # Why no read is torn
 //!
-//! The state word holds three bits: the index of the front buffer, whether a read is in progress, and whether a frame
-//! was published.
+//! The state word holds the number of the front buffer, whether a read is in progress, and whether a frame was
+//! published.
 //!
-//! - A read begins with one `fetch_or` that sets READING and returns the index of the front buffer. It ends with one
+//! - A read begins with one `fetch_or` that sets READING and returns the number of the front buffer. It ends with one
 //!   `fetch_and` that clears READING.
-//! - A publication is one compare-exchange that flips the front buffer and expects READING to be
+//! - A publication is one compare-exchange that moves the front on by one buffer and expects READING to be
 //!   clear. So the front buffer never changes while a read is in progress, and the writer writes
-//!   to the back buffer only.
+//!   to the back buffer only, which is the one after it. Of three buffers, the one after that holds the frame before.
 //!
 //! Ordering: the compare-exchange releases the writer's stores, and the `fetch_or` acquires them, so a read sees the
 //! whole frame. The `fetch_and` releases the reader's loads, and the next compare-exchange acquires them, so the
-//! writer's next stores, which go to the former front buffer, come after every load of the last read. Both hold on any
+//! writer's next stores, which go to a buffer that was readable before, come after every load of the last read. Both hold on any
 //! number of cores.
 //!
 //! # Who waits
@@ -32,24 +33,24 @@ use core::ops::Range;
 
 use glam::Vec3;
 
-#[cfg(feature = "bus")]
-use super::age::elapsed;
 use super::atomic::{AtomicBool, AtomicU32, Ordering};
-use super::buffer::{Buffer, FrameLabel, Position, Rows};
+use super::buffer::{Ahead, Buffer, FrameLabel, Position, Rows};
 use super::error::{OutOfTableError, PublishError, SplitError};
-use super::motion::{MovingSurface, Travel};
-use super::{Ageing, FrameAge, Latest, MeasuredStretch, VertexTable};
+use super::motion::Travel;
+use super::reader::{FrameReader, FrameView};
 
-/// State word, bit 0: index of the front buffer.
-const FRONT: u32 = 1;
-/// State word, bit 1: a read is in progress.
-const READING: u32 = 2;
-/// State word, bit 2: the front buffer holds a frame.
-const PUBLISHED: u32 = 4;
+/// State word, bits 0 and 1: number of the front buffer.
+const FRONT: u32 = 3;
+/// State word, bit 2: a read is in progress.
+pub(super) const READING: u32 = 4;
+/// State word, bit 3: the front buffer holds a frame.
+const PUBLISHED: u32 = 8;
 
-/// A double buffer of `N` vertex positions, meant for a `static`.
+/// A double buffer of `N` vertex positions, meant for a `static`. With 3 `BUFFERS` it keeps the frame before the published
+/// one, too, so that a frame that is read has [`interpolated`](crate::FrameGuard::interpolated) and
+/// [`extrapolated`](crate::FrameGuard::extrapolated) surfaces.
 ///
-/// RAM: 24 bytes a vertex (two positions), plus some 150. All zero at start, so it lies in `.bss`.
+/// RAM: 12 bytes a vertex and buffer, plus some 80 a buffer. All zero at start, so it lies in `.bss`.
 ///
 /// ```
 /// use dibs_nostd::{FrameLabel, Frames, VertexTable, glam::Vec3};
@@ -73,41 +74,47 @@ const PUBLISHED: u32 = 4;
 /// assert!(latest.within(50).is_ok());
 /// ```
 #[derive(Debug)]
-pub struct Frames<const N: usize> {
-    buffers: [Buffer<[Position; N]>; 2],
+pub struct Frames<const N: usize, const BUFFERS: usize = 2> {
+    buffers: [Buffer<[Position; N]>; BUFFERS],
     state: AtomicU32,
     split: AtomicBool,
 }
 
-impl<const N: usize> Frames<N> {
-    /// An empty double buffer: nothing is published.
+impl<const N: usize, const BUFFERS: usize> Frames<N, BUFFERS> {
+    /// Empty buffers: nothing is published.
     #[cfg(not(loom))]
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            buffers: [const { Buffer::new() }; 2],
+            buffers: [const { Buffer::new() }; BUFFERS],
             state: AtomicU32::new(0),
             split: AtomicBool::new(false),
         }
     }
 
-    /// An empty double buffer, for a model checker.
+    /// Empty buffers, for a model checker.
     #[cfg(loom)]
     #[must_use]
     pub fn new() -> Self {
-        use core::array::from_fn;
         Self {
-            buffers: from_fn(|_| Buffer::new()),
+            buffers: core::array::from_fn(|_| Buffer::new()),
             state: AtomicU32::new(0),
             split: AtomicBool::new(false),
         }
     }
+}
 
+impl<const N: usize, const BUFFERS: usize> Frames<N, BUFFERS>
+where
+    Self: Buffers,
+{
     /// The two ends, once, so that there is one writer and one reader.
     ///
     /// # Errors
     /// [`SplitError`] at every later call.
-    pub fn split(&self) -> Result<(FrameWriter<'_, N>, FrameReader<'_, N>), SplitError> {
+    pub fn split(
+        &self,
+    ) -> Result<(FrameWriter<'_, N, Self>, FrameReader<'_, N, Self>), SplitError> {
         if self.split.swap(true, Ordering::AcqRel) {
             return Err(SplitError);
         }
@@ -115,18 +122,24 @@ impl<const N: usize> Frames<N> {
     }
 }
 
-/// Two buffers and their state: [`Frames`], or memory of a size that no type has.
+/// Buffers and their state: [`Frames`], or memory of a size that no type has.
 pub trait Buffers {
     /// Positions of a buffer.
     type Rows: Rows + ?Sized;
 
+    /// How many there are.
+    const COUNT: u32;
+
     fn state(&self) -> &AtomicU32;
 
-    fn buffers(&self) -> [&Buffer<Self::Rows>; 2];
+    /// The buffer with this number, below [`COUNT`](Self::COUNT).
+    fn buffer(&self, number: u32) -> &Buffer<Self::Rows>;
 }
 
 impl<const N: usize> Buffers for Frames<N> {
     type Rows = [Position; N];
+
+    const COUNT: u32 = 2;
 
     #[inline(always)]
     fn state(&self) -> &AtomicU32 {
@@ -134,10 +147,56 @@ impl<const N: usize> Buffers for Frames<N> {
     }
 
     #[inline(always)]
-    fn buffers(&self) -> [&Buffer<[Position; N]>; 2] {
+    fn buffer(&self, number: u32) -> &Buffer<[Position; N]> {
         let [first, second] = &self.buffers;
-        [first, second]
+        if number == 0 { first } else { second }
     }
+}
+
+impl<const N: usize> Buffers for Frames<N, 3> {
+    type Rows = [Position; N];
+
+    const COUNT: u32 = 3;
+
+    #[inline(always)]
+    fn state(&self) -> &AtomicU32 {
+        &self.state
+    }
+
+    #[inline(always)]
+    fn buffer(&self, number: u32) -> &Buffer<[Position; N]> {
+        let [first, second, third] = &self.buffers;
+        match number {
+            0 => first,
+            1 => second,
+            _ => third,
+        }
+    }
+}
+
+/// Numbers of the front buffer, of the one to be written next, and of the one that held the front before.
+#[derive(Clone, Copy, Debug)]
+struct Places {
+    front: u32,
+    back: u32,
+    before: u32,
+}
+
+impl Places {
+    #[inline(always)]
+    const fn of<F: Buffers>(state: u32) -> Self {
+        let front = state & FRONT;
+        let back = if front + 1 < F::COUNT { front + 1 } else { 0 };
+        let before = if back + 1 < F::COUNT { back + 1 } else { 0 };
+        Self { front, back, before }
+    }
+}
+
+/// The published buffer and the one before it; of two buffers, the published one twice. `None` before the first frame.
+#[inline(always)]
+pub(super) fn published<F: Buffers>(frames: &F, state: u32) -> Option<[&Buffer<F::Rows>; 2]> {
+    let Places { front, before, .. } = Places::of::<F>(state);
+    (state & PUBLISHED != 0).then_some([frames.buffer(front), frames.buffer(before)])
 }
 
 /// Buffers in somebody else's memory, of the same size, and their state. All of it must be zero at first.
@@ -152,12 +211,15 @@ pub struct BorrowedFrames<'m> {
 impl Buffers for BorrowedFrames<'_> {
     type Rows = [Position];
 
+    const COUNT: u32 = 2;
+
     fn state(&self) -> &AtomicU32 {
         self.state
     }
 
-    fn buffers(&self) -> [&Buffer<[Position]>; 2] {
-        self.buffers
+    fn buffer(&self, number: u32) -> &Buffer<[Position]> {
+        let [first, second] = self.buffers;
+        if number == 0 { first } else { second }
     }
 }
 
@@ -171,12 +233,11 @@ impl BorrowedFrames<'_> {
 
 /// The two ends of these buffers.
 fn ends<const N: usize, F: Buffers>(frames: &F) -> (FrameWriter<'_, N, F>, FrameReader<'_, N, F>) {
-    let [_, back] = frames.buffers();
-    let writer = FrameWriter { frames, back, state: 0, filled: 0 };
-    (writer, FrameReader { frames, ageing: (0, Ageing::default()) })
+    let back = frames.buffer(Places::of::<F>(0).back);
+    (FrameWriter { frames, back, state: 0, filled: 0 }, FrameReader::new(frames))
 }
 
-impl<const N: usize> Default for Frames<N> {
+impl<const N: usize, const BUFFERS: usize> Default for Frames<N, BUFFERS> {
     fn default() -> Self {
         Self::new()
     }
@@ -249,18 +310,26 @@ impl<const N: usize, F: Buffers> FrameWriter<'_, N, F> {
     /// The frame being written, complete or not: for a check before it is published.
     #[must_use]
     pub const fn back(&self) -> FrameView<'_, N, F> {
-        FrameView { buffer: self.back }
+        FrameView { buffer: self.back, is_published: false }
     }
 
     /// The published frame, `None` before the first.
     #[must_use]
     pub fn front(&self) -> Option<FrameView<'_, N, F>> {
-        (self.state & PUBLISHED != 0).then_some(FrameView { buffer: self.front_buffer() })
+        let [front, _] = published(self.frames, self.state)?;
+        Some(FrameView::published(front))
     }
 
+    /// The published frame and the one before it, in the order of time, if three buffers keep both.
+    #[cfg(feature = "bus")]
+    pub(crate) fn last_two(&self) -> Option<[FrameView<'_, N, F>; 2]> {
+        let [front, before] = published(self.frames, self.state)?;
+        (F::COUNT > 2).then_some([before, front].map(FrameView::published))
+    }
+
+    #[cfg(feature = "bus")]
     fn front_buffer(&self) -> &Buffer<F::Rows> {
-        let [first, second] = self.frames.buffers();
-        if self.state & FRONT == 0 { first } else { second }
+        self.frames.buffer(Places::of::<F>(self.state).front)
     }
 
     /// Publishes the frame, by one compare-exchange. The next frame begins with [`begin`](Self::begin).
@@ -272,163 +341,26 @@ impl<const N: usize, F: Buffers> FrameWriter<'_, N, F> {
         if self.missing() != 0 {
             return Err(PublishError::Incomplete { missing: self.missing() });
         }
-        self.set_label(label, None);
+        self.set_label(label, None, Ahead::UNKNOWN);
         self.publish_complete()
     }
 
     /// Labels the frame being written, with its odometer's reading if its motion since the published one is measured.
-    pub(crate) fn set_label(&mut self, label: FrameLabel, travel: Option<Travel>) {
-        self.back.set_label(label, travel);
+    pub(crate) fn set_label(&mut self, label: FrameLabel, travel: Option<Travel>, ahead: Ahead) {
+        self.back.set_label(label, travel, ahead);
     }
 
     /// Publishes a labelled frame that the caller has proven complete.
     pub(crate) fn publish_complete(&mut self) -> Result<(), PublishError> {
-        let next = (self.state ^ FRONT) | PUBLISHED;
+        let next = Places::of::<F>(self.state).back | PUBLISHED;
         self.frames
             .state()
             .compare_exchange(self.state, next, Ordering::AcqRel, Ordering::Relaxed)
             .map_err(|_| PublishError::Busy)?;
-        let [first, second] = self.frames.buffers();
-        self.back = if next & FRONT == 0 { second } else { first };
+        self.back = self.frames.buffer(Places::of::<F>(next).back);
         self.state = next;
         // The back buffer now holds an old frame: it must be begun before it is published.
         self.filled = 0;
         Ok(())
-    }
-}
-
-/// The end that reads: owned by the control tick.
-#[derive(Debug)]
-pub struct FrameReader<'f, const N: usize, F: Buffers = Frames<N>> {
-    frames: &'f F,
-    /// Epoch and age of the frame read last.
-    ageing: (u32, Ageing),
-}
-
-impl<const N: usize, F: Buffers> FrameReader<'_, N, F> {
-    /// The published frame and its age at `now`, on the receiver's clock. [`Latest::within`] a limit gives the frame,
-    /// held as by [`read`](Self::read).
-    #[inline]
-    pub fn latest(&mut self, now: u32) -> Latest<FrameGuard<'_, N, F>> {
-        let (epoch_before, before) = self.ageing;
-        let Some(guard) = read(self.frames) else { return Latest::new(None) };
-        let FrameLabel { epoch, received, .. } = guard.label();
-        let before = if epoch == epoch_before { before } else { Ageing::default() };
-        let ageing = before.at(now, received);
-        self.ageing = (epoch, ageing);
-        Latest::new(Some((guard, FrameAge { epoch, received, age: ageing.oldest })))
-    }
-
-    /// The published frame, held for as long as the guard lives; `None` before the first.
-    ///
-    /// Keep the guard for one query, not longer: no frame is published meanwhile. A leaked guard keeps the surface at
-    /// its present frame, whose age then grows. This does not check the age: use [`latest`](Self::latest).
-    #[inline]
-    pub fn read(&mut self) -> Option<FrameGuard<'_, N, F>> {
-        read(self.frames)
-    }
-}
-
-#[inline]
-fn read<const N: usize, F: Buffers>(frames: &F) -> Option<FrameGuard<'_, N, F>> {
-    let state = frames.state().fetch_or(READING, Ordering::Acquire);
-    let [first, second] = frames.buffers();
-    let buffer = if state & FRONT == 0 { first } else { second };
-    // Created before the check, so that it clears READING on both paths.
-    let guard = FrameGuard { state: frames.state(), view: FrameView { buffer } };
-    (state & PUBLISHED != 0).then_some(guard)
-}
-
-/// The published frame, held still: a [`VertexTable`] that carries its measured stretch and its position error.
-#[derive(Debug)]
-pub struct FrameGuard<'f, const N: usize, F: Buffers = Frames<N>> {
-    state: &'f AtomicU32,
-    view: FrameView<'f, N, F>,
-}
-
-impl<const N: usize, F: Buffers> FrameGuard<'_, N, F> {
-    /// The facts about this frame.
-    #[must_use]
-    pub fn label(&self) -> FrameLabel {
-        self.view.buffer.label()
-    }
-}
-
-impl<const N: usize, F: Buffers> Drop for FrameGuard<'_, N, F> {
-    fn drop(&mut self) {
-        self.state.fetch_and(!READING, Ordering::Release);
-    }
-}
-
-impl<const N: usize, F: Buffers> VertexTable for FrameGuard<'_, N, F> {
-    fn len(&self) -> usize {
-        self.view.len()
-    }
-
-    #[inline(always)]
-    fn position(&self, vertex: u32) -> Option<Vec3> {
-        self.view.buffer.position(vertex)
-    }
-
-    fn epoch(&self) -> Option<u32> {
-        Some(self.view.buffer.epoch.load(Ordering::Relaxed))
-    }
-
-    fn stretch(&self) -> Option<MeasuredStretch> {
-        self.view.buffer.stretch()
-    }
-
-    fn position_error(&self) -> f32 {
-        self.view.buffer.position_error()
-    }
-}
-
-/// Its motion since other frames is known if an [`Assembler`](crate::Assembler) with a tree's gate published them all.
-impl<const N: usize, F: Buffers> MovingSurface for FrameGuard<'_, N, F> {
-    fn travel(&self) -> Option<Travel> {
-        self.view.buffer.travel()
-    }
-}
-
-/// The writer's view of one buffer: a [`VertexTable`].
-#[derive(Debug)]
-pub struct FrameView<'f, const N: usize, F: Buffers = Frames<N>> {
-    buffer: &'f Buffer<F::Rows>,
-}
-
-impl<const N: usize, F: Buffers> Clone for FrameView<'_, N, F> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<const N: usize, F: Buffers> Copy for FrameView<'_, N, F> {}
-
-#[cfg(feature = "bus")]
-impl<const N: usize, F: Buffers> FrameView<'_, N, F> {
-    /// The facts about the frame; arbitrary for a frame not yet labelled.
-    pub(crate) fn label(&self) -> FrameLabel {
-        self.buffer.label()
-    }
-
-    /// Its odometer's reading.
-    pub(crate) fn travel(&self) -> Option<Travel> {
-        self.buffer.travel()
-    }
-
-    /// Time from this frame to one with the stamp `received`.
-    pub(crate) fn time_to(&self, received: u32) -> u32 {
-        elapsed(received, self.buffer.received.load(Ordering::Relaxed))
-    }
-}
-
-impl<const N: usize, F: Buffers> VertexTable for FrameView<'_, N, F> {
-    fn len(&self) -> usize {
-        self.buffer.rows().len()
-    }
-
-    #[inline(always)]
-    fn position(&self, vertex: u32) -> Option<Vec3> {
-        self.buffer.position(vertex)
     }
 }

@@ -46,9 +46,15 @@ impl MeasuredStretch {
     /// the largest singular value (or edge) is convex. `None` if they were measured with different trees.
     #[must_use]
     pub fn or_larger(self, other: Self) -> Option<Self> {
+        let larger = if other.sigma > self.sigma { other.sigma } else { self.sigma };
+        self.of_both(other, larger)
+    }
+
+    /// A bound for a surface made of two that were measured; `None` if with different trees.
+    pub(super) fn of_both(self, other: Self, sigma: f32) -> Option<Self> {
         let larger = if other.sigma > self.sigma { other } else { self };
         let regions = [u8::MAX; REGIONS];
-        (self.tree == other.tree).then_some(Self { epoch: None, regions, ..larger })
+        (self.tree == other.tree).then_some(Self { sigma, epoch: None, regions, ..larger })
     }
 
     /// The largest stretch, rounded up: at least 1 where anything kept its length, and never below a

@@ -9,17 +9,21 @@ mod latest;
 mod measured;
 pub(crate) mod motion;
 mod moving;
+mod reader;
 mod vertices;
 
 pub(crate) use age::Ageing;
+#[cfg(feature = "bus")]
+pub(crate) use buffer::Ahead;
 pub use buffer::{Buffer, FrameLabel, Position};
 pub use error::{OutOfTableError, PublishError, SplitError};
-pub use frames::{
-    BorrowedFrames, Buffers, FrameGuard, FrameReader, FrameView, FrameWriter, Frames,
-};
+pub use frames::{BorrowedFrames, Buffers, FrameWriter, Frames};
 pub use latest::{FrameAge, Latest};
 pub(crate) use measured::share;
 pub use measured::{MeasuredStretch, REGIONS};
 pub use motion::{Moved, MovingSurface, Odometer, Travel, TravelUnit};
 pub use moving::{Between, Step};
+#[cfg(feature = "bus")]
+pub(crate) use reader::LastStep;
+pub use reader::{FrameGuard, FrameReader, FrameView};
 pub use vertices::{QuantisedVertices, VertexTable};

@@ -70,6 +70,12 @@ impl Travel {
         Some(along.saturating_add(aside))
     }
 
+    /// Units from an earlier reading of a frame to this one's; `None` if the motion was not measured all the way.
+    pub(super) fn after(&self, before: &Self) -> Option<u64> {
+        let is_one_run = self.tree == before.tree && self.chain == before.chain;
+        if is_one_run { self.reading.checked_sub(before.reading) } else { None }
+    }
+
     /// The reading at the start of an unbroken run of measurements.
     pub(crate) fn start(tree: u32) -> Self {
         Self { tree, chain: next_chain(), reading: 0, aside: 0 }

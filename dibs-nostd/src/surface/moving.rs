@@ -6,6 +6,7 @@
 
 use glam::Vec3;
 
+use super::buffer::Ahead;
 use super::motion::{Moved, MovingSurface, Travel};
 use crate::{MeasuredStretch, VertexTable};
 
@@ -44,40 +45,36 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
 
     /// The surface between the two: `share` 0 is the earlier frame and 1 the later. It is exact, but late by a frame.
     ///
-    /// Its stretch is at most the larger of the two frames' (gradients are linear in positions, and the largest
-    /// singular value is convex): see [`MeasuredStretch::or_larger`](crate::MeasuredStretch::or_larger). `share` is
-    /// clamped to 0..=1.
+    /// `share` is clamped to 0..=1. If both frames carry their stretch, so does the surface: see
+    /// [`Between::stretch`](VertexTable::stretch).
     #[must_use]
     pub fn at(&self, share: f32) -> Between<'v, W, V> {
-        // Written so that a NaN becomes 0.
-        let share = if share > 0.0 { share } else { 0.0 };
-        let share = if share < 1.0 { share } else { 1.0 };
-        // Off by less than a few units, within a tracker's slack.
-        let along = (share * self.units as f32) as u64;
-        self.moved_by(share, self.from.beyond(along, 0))
+        let between = Between::inside(self.before, self.after, share, self.from, self.units);
+        self.unless_unmeasured(between)
     }
 
     /// The surface after the later frame, if every vertex keeps its velocity between the two: `share` 0 is the later
     /// frame, 1 as long after it as the earlier frame was before. It is on time, and wrong by the change of the motion.
     ///
-    /// Its stretch is at most the later frame's plus `share` times that of the difference of the two. `share` is
-    /// clamped to 0..=`FARTHEST_SHARE`.
+    /// `share` is clamped to 0..=1. Beyond the frames no frame's measurement bounds the stretch: measure it
+    /// ([`measure_stretch`](crate::measure_stretch)), unless both frames carry theirs. Frames behind a bus do:
+    /// [`FrameGuard::extrapolated`](crate::FrameGuard::extrapolated).
     #[must_use]
     pub fn beyond(&self, share: f32) -> Between<'v, W, V> {
-        let share = if share > 0.0 { share } else { 0.0 };
-        let share = if share < FARTHEST_SHARE { share } else { FARTHEST_SHARE };
-        let aside = (share * self.units as f32) as i64;
-        self.moved_by(1.0 + share, self.travel.beyond(0, aside))
+        let between = Between::outside(self.before, self.after, share, self.travel, self.units);
+        self.unless_unmeasured(between)
     }
 
-    fn moved_by(&self, share: f32, travel: Travel) -> Between<'v, W, V> {
-        let travel = self.is_measured.then_some(travel);
-        Between { before: self.before, after: self.after, share, travel }
+    fn unless_unmeasured(&self, between: Between<'v, W, V>) -> Between<'v, W, V> {
+        Between { travel: if self.is_measured { between.travel } else { None }, ..between }
     }
 }
 
-/// Longest extrapolation, in units of the time between the frames: a longer one is worse than the last frame.
-pub const FARTHEST_SHARE: f32 = 1.0;
+/// A number within 0..=1: 0 for NaN. A longer extrapolation is worse than the last frame.
+fn clamped(share: f32) -> f32 {
+    let share = if share > 0.0 { share } else { 0.0 };
+    if share < 1.0 { share } else { 1.0 }
+}
 
 /// A surface on its way from one frame to another, or beyond: `before + share * (after - before)`.
 ///
@@ -86,8 +83,79 @@ pub const FARTHEST_SHARE: f32 = 1.0;
 pub struct Between<'v, W: ?Sized, V: ?Sized> {
     before: &'v W,
     after: &'v V,
+    /// 0 is the earlier frame, 1 the later, 2 as far beyond.
     share: f32,
     travel: Option<Travel>,
+    ahead: Ahead,
+}
+
+impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
+    /// The surface between two frames, which are `units` of the odometer apart.
+    pub(super) fn inside(
+        before: &'v W,
+        after: &'v V,
+        share: f32,
+        from: Travel,
+        units: u64,
+    ) -> Self {
+        let share = clamped(share);
+        // Off by less than a few units, within a tracker's slack.
+        let along = (share * units as f32) as u64;
+        let travel = Some(from.beyond(along, 0));
+        Self { before, after, share, travel, ahead: Ahead::UNKNOWN }
+    }
+
+    /// The surface after the later frame.
+    pub(super) fn outside(
+        before: &'v W,
+        after: &'v V,
+        share: f32,
+        last: Travel,
+        units: u64,
+    ) -> Self {
+        let share = clamped(share);
+        let travel = Some(last.beyond(0, (share * units as f32) as i64));
+        Self { before, after, share: 1.0 + share, travel, ahead: Ahead::UNKNOWN }
+    }
+
+    /// The same with what was measured of the later frame.
+    pub(super) const fn measured(mut self, ahead: Ahead) -> Self {
+        self.ahead = ahead;
+        self
+    }
+
+    /// The surface's place in time: 0 is the earlier frame, 1 the later, and 2 as long after it.
+    #[must_use]
+    pub const fn share(&self) -> f32 {
+        self.share
+    }
+
+    /// The earlier frame; the later one for a surface that is held.
+    #[must_use]
+    pub const fn before(&self) -> &'v W {
+        self.before
+    }
+
+    /// The largest distance (mm) of a vertex of the later frame from its extrapolation by the two frames before it: an
+    /// estimate of this surface's own error until the next frame, not a bound. `None` for a surface between its frames,
+    /// where it was not measured, and once the extrapolation has come to its end.
+    #[must_use]
+    pub fn shown_error(&self) -> Option<f32> {
+        let is_known = self.ahead.shown >= 0.0 && self.share < 2.0;
+        is_known.then_some(self.ahead.shown)
+    }
+}
+
+impl<'v, V: VertexTable + ?Sized> Between<'v, V, V> {
+    /// A frame, held.
+    pub(super) const fn held(frame: &'v V, travel: Option<Travel>) -> Self {
+        Self { before: frame, after: frame, share: 1.0, travel, ahead: Ahead::UNKNOWN }
+    }
+
+    /// The surface as long after `after` as `before` was before, whose motion is not measured.
+    pub(crate) const fn ahead(before: &'v V, after: &'v V) -> Self {
+        Self { before, after, share: 2.0, travel: None, ahead: Ahead::UNKNOWN }
+    }
 }
 
 impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> VertexTable for Between<'_, W, V> {
@@ -102,10 +170,23 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> VertexTable for Between<'
         Some(before + (after - before) * self.share)
     }
 
-    /// Between the two frames a bound on both holds; beyond them there is no measurement.
+    /// A bound by those of the frames: gradients are linear in the positions, and the largest singular value (or edge)
+    /// is convex. Between the frames that is the mean of theirs by `share`. Beyond, it is the mean of the later frame's
+    /// and that of the positions `2 after - before` if they were measured, and else their sum by the triangle
+    /// inequality. `None` where a frame was not measured.
     fn stretch(&self) -> Option<MeasuredStretch> {
         let (before, after) = (self.before.stretch()?, self.after.stretch()?);
-        if self.share <= 1.0 { before.or_larger(after) } else { None }
+        let (share, beyond) = (self.share, self.share - 1.0);
+        let (old, new) = (before.sigma(), after.sigma());
+        let sigma = if share <= 1.0 {
+            (1.0 - share) * old + share * new
+        } else if self.ahead.sigma >= 0.0 {
+            (1.0 - beyond) * new + beyond * self.ahead.sigma
+        } else {
+            share * new + beyond * old
+        };
+        // The sum is rounded by three halves of a unit in its last place at most.
+        before.of_both(after, sigma * (1.0 + 2.0 * f32::EPSILON))
     }
 
     fn position_error(&self) -> f32 {

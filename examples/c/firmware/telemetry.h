@@ -44,6 +44,10 @@ typedef struct {
     /* Nodes that the tracker has opened, of which the C interface says nothing; and its `dibs_fallback`. */
     uint32_t front;
     uint32_t fallback;
+    /* The C interface holds the surface from frame to frame. */
+    uint32_t epoch_before;
+    float share;
+    float shown_error;
 } tick_record;
 
 #define TICK_KIND 1u

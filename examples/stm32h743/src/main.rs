@@ -26,7 +26,7 @@ use cortex_m::Peripherals;
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::entry;
 
-static FRAMES: surface::Surface = surface::Surface::new();
+static FRAMES: surface::continuous::Surface = surface::continuous::Surface::new();
 static BUS: BusStatus = BusStatus::new();
 
 #[entry]

@@ -18,7 +18,7 @@ use dibs_nostd::wire::{Counters, Event};
 /// Slices of background work between two looks at the bus.
 const SLICES: u32 = 1_000;
 
-static FRAMES: surface::Surface = surface::Surface::new();
+static FRAMES: surface::continuous::Surface = surface::continuous::Surface::new();
 static BUS: BusStatus = BusStatus::new();
 static TICKS: AtomicU32 = AtomicU32::new(0);
 static COUNTERS: Mutex<Counters> = Mutex::new(Counters::new());

@@ -12,7 +12,9 @@ use crate::bus::wire::{
     Content, Counters, Event, FrameId, Mac, NoMac, Packet, Status, StreamError,
 };
 use crate::stretch::{Arriving, Gate, StretchError, StretchMonitor, SurfaceLimits, Verdict};
-use crate::surface::{Buffers, FrameLabel, FrameView, FrameWriter, Frames, PublishError};
+use crate::surface::{
+    Ahead, Buffers, FrameLabel, FrameView, FrameWriter, Frames, LastStep, PublishError,
+};
 use crate::tree::{Index, Tree};
 
 use collector::Collector;
@@ -151,6 +153,24 @@ impl<'f, 't, I: Index, const N: usize, F: Buffers>
         limits: SurfaceLimits,
     ) -> Result<Self, StretchError> {
         let monitor = StretchMonitor::new(tree)?.limits(limits);
+        Ok(Self::new(writer, monitor, tree.mesh_id(), limits.reach))
+    }
+}
+
+impl<'f, 't, I: Index, const N: usize>
+    Assembler<'f, StretchMonitor<'t, I, 2>, N, NoMac, Frames<N, 3>>
+{
+    /// The same, for three buffers: the frames that it publishes move between their times and beyond
+    /// ([`FrameGuard::extrapolated`](crate::FrameGuard::extrapolated)). It measures twice as much.
+    ///
+    /// # Errors
+    /// [`StretchError::NoMetric`] where the tree was emitted without its metric section.
+    pub fn continuous(
+        writer: FrameWriter<'f, N, Frames<N, 3>>,
+        tree: &'t Tree<'t, I>,
+        limits: SurfaceLimits,
+    ) -> Result<Self, StretchError> {
+        let monitor = StretchMonitor::continuous(tree)?.limits(limits);
         Ok(Self::new(writer, monitor, tree.mesh_id(), limits.reach))
     }
 }
@@ -329,7 +349,12 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
         let unit = self.gate.travel_unit();
         let mut work = work;
         if let (Some(front), Some(_)) = (&front, &unit) {
-            work = self.step.compare(&back, front, ready, work);
+            let two = self.writer.last_two();
+            let age = front.time_to(frame.captured());
+            let expected = two.as_ref().and_then(|[before, last]| {
+                Some(LastStep::between(before, last)?.outside([before, last], age))
+            });
+            work = self.step.compare(&back, front, expected.as_ref(), ready, work);
             if frame.is_complete && self.step.compared() < ready {
                 return Ok(Advance::Pending);
             }
@@ -355,7 +380,11 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
                 };
                 let before = front.and_then(|front| front.travel());
                 let travel = unit.map(|unit| self.step.travel(&unit, before));
-                self.writer.set_label(label, travel);
+                let ahead = Ahead {
+                    sigma: self.gate.ahead().map_or(f32::NAN, |ahead| ahead.sigma()),
+                    shown: self.step.shown_error(),
+                };
+                self.writer.set_label(label, travel, ahead);
                 self.is_admitted = true;
                 Ok(self.publish())
             }

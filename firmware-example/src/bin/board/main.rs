@@ -31,7 +31,7 @@ use semihosting::Arguments;
 /// Records that wait for the line.
 const QUEUE: usize = 64;
 
-static FRAMES: surface::Surface = surface::Surface::new();
+static FRAMES: surface::continuous::Surface = surface::continuous::Surface::new();
 static BUS: BusStatus = BusStatus::new();
 
 #[entry]

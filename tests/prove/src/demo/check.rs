@@ -1,4 +1,4 @@
-//! Checks an answer by exhaustive search in f64 on the vertices of the same frame.
+//! Checks an answer by exhaustive search in f64 on the vertices of the same surface.
 
 use anyhow::{Context, Result};
 use controller::fingerprint;
@@ -10,6 +10,7 @@ use glam::Vec3;
 
 use super::scene::Scene;
 use super::sender::Link;
+use super::surface::positions;
 
 /// The result of checking one answer.
 #[derive(Clone, Copy, Debug)]
@@ -36,9 +37,7 @@ pub fn accuracy_of(tick: &Tick) -> f64 {
 /// Checks one answer: its separation, its interval, and its point. The error is the largest of the
 /// three.
 pub fn check(scene: &Scene, link: &Link, tick: &Tick) -> Result<Checked> {
-    let positions = link
-        .frame(tick.epoch)
-        .with_context(|| format!("tick {} used frame {}, never sent", tick.tick, tick.epoch))?;
+    let positions = positions(link, tick)?;
     let tool = Instrument::capsule(
         Vec3::from(tick.tool_start),
         Vec3::from(tick.tool_end),

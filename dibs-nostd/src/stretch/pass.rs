@@ -1,0 +1,125 @@
+//! The measurement of one surface, region by region, in slices of bounded work.
+
+use core::ops::Range;
+
+use super::kernel::Worst;
+use super::regions::{of_regions, region_rows};
+use super::rows::Room;
+use super::{StretchError, rows};
+use crate::surface::{MeasuredStretch, REGIONS, VertexTable};
+use crate::tree::{Index, Tree, TriangleRow};
+
+/// No row.
+const NONE: u32 = u32::MAX;
+
+/// All regions, one bit each.
+pub(super) const ALL: u32 = u32::MAX;
+const _: () = assert!(REGIONS == u32::BITS as usize);
+
+/// The worst triangle of each region, and how far the measurement has come.
+#[derive(Clone, Debug)]
+pub(super) struct Pass {
+    /// Regions still to be measured.
+    left: u32,
+    /// Regions whose entry below is that of an abandoned frame or the one in work. The next partial frame measures
+    /// them, changed or not.
+    unpublished: u32,
+    /// The next triangle of the region that is being measured.
+    next: u32,
+    /// [`Room`]'s sum of that region.
+    room: f32,
+    regions: [Worst; REGIONS],
+}
+
+impl Pass {
+    pub const fn new() -> Self {
+        Self {
+            left: ALL,
+            unpublished: ALL,
+            next: NONE,
+            room: 0.0,
+            regions: [Worst::none(u32::MAX); REGIONS],
+        }
+    }
+
+    /// Begins with all regions, or with those whose entry is of no published frame.
+    pub const fn begin(&mut self, is_whole: bool) {
+        self.next = NONE;
+        self.left = if is_whole { ALL } else { self.unpublished };
+    }
+
+    /// Adds regions.
+    pub const fn add(&mut self, regions: u32) {
+        self.left |= regions;
+    }
+
+    /// The entries are those of the published frame.
+    pub const fn published(&mut self) {
+        self.unpublished = 0;
+    }
+
+    /// Measures at most `work` triangles whose corners are below row `ready`. Returns the work left, and whether all
+    /// regions are done. A region must not shrink below `shrinkage` of its size.
+    pub fn advance<I: Index, V: VertexTable + ?Sized>(
+        &mut self,
+        tree: &Tree<'_, I>,
+        surface: &V,
+        ready: u32,
+        shrinkage: f32,
+        mut work: u32,
+    ) -> Result<(u32, bool), StretchError> {
+        while self.left != 0 {
+            let region = self.left.trailing_zeros();
+            let rows = rows_of(tree, region);
+            let next = if self.next == NONE { rows.start } else { self.next };
+            let slot = self.regions.get_mut(region as usize);
+            let slot = slot.ok_or(StretchError::Corrupt { row: rows.start })?;
+            if self.next == NONE {
+                if work == 0 {
+                    return Ok((work, false));
+                }
+                let last = slot.triangle;
+                let mut worst = Worst::none(rows.start);
+                if rows.contains(&last) {
+                    if !rows::look(tree, surface, last, ready, &mut worst) {
+                        return Ok((work, false));
+                    }
+                    work -= 1;
+                }
+                *slot = worst;
+                self.room = 0.0;
+                self.unpublished |= 1 << region;
+            }
+            let stop = if rows.end - next < work { rows.end } else { next + work };
+            let mut room = Room { least: shrinkage * shrinkage, sum: self.room };
+            let at = rows::scan(tree, surface, next..stop, ready, slot, &mut room)?;
+            self.room = room.sum;
+            work -= at - next;
+            if at < rows.end {
+                self.next = at;
+                return Ok((work, false));
+            }
+            if !(self.room >= 0.0) {
+                let triangle = TriangleRow(rows.start);
+                return Err(StretchError::Shrunk { triangle, limit: shrinkage });
+            }
+            self.next = NONE;
+            self.left &= self.left - 1;
+        }
+        Ok((work, true))
+    }
+
+    /// The measurement, once all regions are done.
+    pub fn measured<I: Index>(&self, tree: &Tree<'_, I>, epoch: Option<u32>) -> MeasuredStretch {
+        of_regions(tree, &self.regions, epoch)
+    }
+}
+
+/// The rows of a region's triangles.
+fn rows_of<I: Index>(tree: &Tree<'_, I>, region: u32) -> Range<u32> {
+    let rows = region_rows(tree);
+    let triangles = tree.triangle_count();
+    let first = rows.saturating_mul(region);
+    let end = first.saturating_add(rows);
+    if end < triangles { first..end } else { first.min(triangles)..triangles }
+}

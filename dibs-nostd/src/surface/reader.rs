@@ -1,0 +1,261 @@
+//! The control tick's end of the buffers: the published frame, held still, and the surface between it and the one
+//! before.
+
+use glam::Vec3;
+
+use super::age::elapsed;
+use super::atomic::{AtomicU32, Ordering};
+use super::buffer::{Buffer, FrameLabel};
+use super::frames::{Buffers, Frames, READING, published};
+use super::motion::{MovingSurface, Travel};
+use super::moving::Between;
+use super::{Ageing, FrameAge, Latest, MeasuredStretch, VertexTable};
+
+/// The end that reads: owned by the control tick.
+#[derive(Debug)]
+pub struct FrameReader<'f, const N: usize, F: Buffers = Frames<N>> {
+    frames: &'f F,
+    /// Epoch and age of the frame read last.
+    ageing: (u32, Ageing),
+}
+
+impl<'f, const N: usize, F: Buffers> FrameReader<'f, N, F> {
+    pub(super) fn new(frames: &'f F) -> Self {
+        Self { frames, ageing: (0, Ageing::default()) }
+    }
+
+    /// The published frame and its age at `now`, on the receiver's clock. [`Latest::within`] a limit gives the frame,
+    /// held as by [`read`](Self::read).
+    #[inline]
+    pub fn latest(&mut self, now: u32) -> Latest<FrameGuard<'_, N, F>> {
+        let (epoch_before, before) = self.ageing;
+        let Some(mut guard) = read(self.frames) else { return Latest::new(None) };
+        let FrameLabel { epoch, received, .. } = guard.label();
+        let before = if epoch == epoch_before { before } else { Ageing::default() };
+        let ageing = before.at(now, received);
+        self.ageing = (epoch, ageing);
+        guard.age = ageing.oldest;
+        Latest::new(Some((guard, FrameAge { epoch, received, age: ageing.oldest })))
+    }
+
+    /// The published frame, held for as long as the guard lives; `None` before the first.
+    ///
+    /// Keep the guard for one query, not longer: no frame is published meanwhile. A leaked guard keeps the surface at
+    /// its present frame, whose age then grows. This does not check the age: use [`latest`](Self::latest).
+    #[inline]
+    pub fn read(&mut self) -> Option<FrameGuard<'_, N, F>> {
+        read(self.frames)
+    }
+}
+
+#[inline]
+fn read<const N: usize, F: Buffers>(frames: &F) -> Option<FrameGuard<'_, N, F>> {
+    let state = frames.state().fetch_or(READING, Ordering::Acquire);
+    let Some([buffer, before]) = published(frames, state) else {
+        frames.state().fetch_and(!READING, Ordering::Release);
+        return None;
+    };
+    let [view, before] = [buffer, before].map(FrameView::published);
+    Some(FrameGuard { state: frames.state(), view, before, age: 0 })
+}
+
+/// The published frame, held still: a [`VertexTable`] that carries its measured stretch and its position error.
+#[derive(Debug)]
+pub struct FrameGuard<'f, const N: usize, F: Buffers = Frames<N>> {
+    state: &'f AtomicU32,
+    view: FrameView<'f, N, F>,
+    /// The frame before, if there are three buffers.
+    before: FrameView<'f, N, F>,
+    /// Age of the frame when it was read.
+    age: u32,
+}
+
+impl<const N: usize, F: Buffers> FrameGuard<'_, N, F> {
+    /// The facts about this frame.
+    #[must_use]
+    pub fn label(&self) -> FrameLabel {
+        self.view.label()
+    }
+}
+
+/// With three buffers the surface moves between frames.
+///
+/// Both surfaces below hold the published frame until a second one has come whose motion was measured, from
+/// [`Assembler::continuous`](crate::Assembler::continuous). Their time is that of [`FrameReader::latest`]; a frame from
+/// [`FrameReader::read`] is as it was received.
+impl<'f, const N: usize> FrameGuard<'f, N, Frames<N, 3>> {
+    /// The surface as long ago as the time between the last two frames: certain, and late by that time.
+    #[must_use]
+    pub fn interpolated(&self) -> Between<'_, ContinuousView<'f, N>, ContinuousView<'f, N>> {
+        match self.last_step() {
+            Some(step) => step.inside([&self.before, &self.view], self.age),
+            None => Between::held(&self.view, self.view.travel()),
+        }
+    }
+
+    /// The surface now, if every vertex has kept its velocity since the last frame: on time, and wrong by the change of
+    /// the motion. [`Between::shown_error`] is the error that the last frame showed.
+    ///
+    /// It goes on for as long as the time between the last two frames, and is held then. It is held at once where the
+    /// surface, moved on for so long, would be stretched beyond the tree's limit.
+    #[must_use]
+    pub fn extrapolated(&self) -> Between<'_, ContinuousView<'f, N>, ContinuousView<'f, N>> {
+        let ahead = self.view.buffer.ahead();
+        match self.last_step() {
+            Some(step) if ahead.sigma >= 0.0 => {
+                step.outside([&self.before, &self.view], self.age).measured(ahead)
+            }
+            _ => Between::held(&self.view, self.view.travel()),
+        }
+    }
+
+    fn last_step(&self) -> Option<LastStep> {
+        LastStep::between(&self.before, &self.view)
+    }
+}
+
+/// A frame of three buffers.
+type ContinuousView<'f, const N: usize> = FrameView<'f, N, Frames<N, 3>>;
+
+impl<const N: usize, F: Buffers> Drop for FrameGuard<'_, N, F> {
+    fn drop(&mut self) {
+        self.state.fetch_and(!READING, Ordering::Release);
+    }
+}
+
+impl<const N: usize, F: Buffers> VertexTable for FrameGuard<'_, N, F> {
+    fn len(&self) -> usize {
+        self.view.len()
+    }
+
+    #[inline(always)]
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.view.buffer.position(vertex)
+    }
+
+    fn epoch(&self) -> Option<u32> {
+        self.view.epoch()
+    }
+
+    fn stretch(&self) -> Option<MeasuredStretch> {
+        self.view.stretch()
+    }
+
+    fn position_error(&self) -> f32 {
+        self.view.position_error()
+    }
+}
+
+/// Its motion since other frames is known if an [`Assembler`](crate::Assembler) with a tree's gate published them all.
+impl<const N: usize, F: Buffers> MovingSurface for FrameGuard<'_, N, F> {
+    fn travel(&self) -> Option<Travel> {
+        self.view.travel()
+    }
+}
+
+/// The step from a published frame to the next.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LastStep {
+    /// Readings of the odometer.
+    from: Travel,
+    travel: Travel,
+    units: u64,
+    /// Time between the two, on the receiver's clock, above 0.
+    interval: u32,
+}
+
+impl LastStep {
+    /// `None` where the motion between the two was not measured, or they are of one time.
+    pub fn between<const N: usize, F: Buffers>(
+        before: &FrameView<'_, N, F>,
+        after: &FrameView<'_, N, F>,
+    ) -> Option<Self> {
+        let (from, travel) = (before.travel()?, after.travel()?);
+        let units = travel.after(&from)?;
+        let interval = before.time_to(after.label().received);
+        (interval > 0).then_some(Self { from, travel, units, interval })
+    }
+
+    /// The surface between the two, `age` after the later, less the time between them.
+    fn inside<'v, V: VertexTable>(
+        &self,
+        [before, after]: [&'v V; 2],
+        age: u32,
+    ) -> Between<'v, V, V> {
+        Between::inside(before, after, self.share(age), self.from, self.units)
+    }
+
+    /// The surface `age` after the later frame, if every vertex keeps its velocity.
+    pub fn outside<'v, V: VertexTable>(
+        &self,
+        [before, after]: [&'v V; 2],
+        age: u32,
+    ) -> Between<'v, V, V> {
+        Between::outside(before, after, self.share(age), self.travel, self.units)
+    }
+
+    fn share(&self, age: u32) -> f32 {
+        age as f32 / self.interval as f32
+    }
+}
+
+/// A view of one buffer: a [`VertexTable`] with the facts about its frame, once that is published.
+#[derive(Debug)]
+pub struct FrameView<'f, const N: usize, F: Buffers = Frames<N>> {
+    pub(super) buffer: &'f Buffer<F::Rows>,
+    /// Whether the buffer's label is that of its positions.
+    pub(super) is_published: bool,
+}
+
+impl<const N: usize, F: Buffers> Clone for FrameView<'_, N, F> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<const N: usize, F: Buffers> Copy for FrameView<'_, N, F> {}
+
+impl<'f, const N: usize, F: Buffers> FrameView<'f, N, F> {
+    /// The view of a labelled buffer.
+    pub(super) const fn published(buffer: &'f Buffer<F::Rows>) -> Self {
+        Self { buffer, is_published: true }
+    }
+
+    /// The facts about the frame; arbitrary for a frame not yet labelled.
+    pub(crate) fn label(&self) -> FrameLabel {
+        self.buffer.label()
+    }
+
+    /// Its odometer's reading.
+    pub(crate) fn travel(&self) -> Option<Travel> {
+        self.buffer.travel()
+    }
+
+    /// Time from this frame to one with the stamp `received`.
+    pub(crate) fn time_to(&self, received: u32) -> u32 {
+        elapsed(received, self.buffer.received.load(Ordering::Relaxed))
+    }
+}
+
+impl<const N: usize, F: Buffers> VertexTable for FrameView<'_, N, F> {
+    fn len(&self) -> usize {
+        self.buffer.rows().len()
+    }
+
+    #[inline(always)]
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.buffer.position(vertex)
+    }
+
+    fn epoch(&self) -> Option<u32> {
+        self.is_published.then(|| self.buffer.epoch.load(Ordering::Relaxed))
+    }
+
+    fn stretch(&self) -> Option<MeasuredStretch> {
+        if self.is_published { self.buffer.stretch() } else { None }
+    }
+
+    fn position_error(&self) -> f32 {
+        if self.is_published { self.buffer.position_error() } else { 0.0 }
+    }
+}

@@ -1,0 +1,18 @@
+//! The surface that a tick was asked on, on its way from one frame to the next.
+
+use anyhow::{Context, Result};
+use controller::telemetry::Tick;
+use glam::Vec3;
+
+use super::sender::Link;
+
+/// The vertices' positions at a tick, with the sums of `dibs_nostd::Between`.
+pub fn positions(link: &Link, tick: &Tick) -> Result<Vec<Vec3>> {
+    let frame = |epoch| {
+        link.frame(epoch)
+            .with_context(|| format!("tick {} used frame {epoch}, never sent", tick.tick))
+    };
+    let (before, after) = (frame(tick.epoch_before)?, frame(tick.epoch)?);
+    let moved = |(&before, &after): (&Vec3, &Vec3)| before + (after - before) * tick.share;
+    Ok(before.iter().zip(after.iter()).map(moved).collect())
+}
