@@ -119,9 +119,11 @@ impl Control {
             is_tree_corrupt: self.bus.is_tree_corrupt()
                 || self.search.tree().check(TREE.bytes()).is_err(),
         });
-        // A surface that moves on is off by what it was off at the last frame, not by the tissue's way since then.
+        // A surface that moves on is off by the change of the tissue's motion, not by its way since the last frame: as the
+        // last frames showed, and growing as if the velocity changed steadily.
         if record.shown_error >= 0.0 {
-            verdict.margin = record.shown_error;
+            let beyond = record.share - 1.0;
+            verdict.margin = record.shown_error * beyond * (beyond + 1.0) / 2.0;
         }
         self.bus.set_state(verdict.state);
         let admitted = answer.and_then(|closest| verdict.admit(closest));

@@ -33,10 +33,8 @@ pub struct Tick {
     pub cause: u32,
     /// 1 if there was an answer, else 0.
     pub answered: u32,
-    /// Most that the tissue may be off, in mm: by its speed since the frame was received, or by [`shown_error`] if that is
-    /// known. The constraint's answer has it added to its accuracy.
-    ///
-    /// [`shown_error`]: Self::shown_error
+    /// How far the tissue may be off, in mm: by its speed since the frame was received, or by the error that extrapolations
+    /// showed if that is known. The constraint's answer has it added to its accuracy.
     pub margin: f32,
     /// The frame that was searched, if there was an answer.
     pub epoch: u32,
@@ -88,7 +86,7 @@ pub struct Tick {
     pub epoch_before: u32,
     /// The surface's place in time: `dibs_nostd::Between::share`.
     pub share: f32,
-    /// The error of the last extrapolation, in mm: `dibs_nostd::Between::shown_error`; -1 if unknown.
+    /// The error of the last extrapolations, in mm: `dibs_nostd::Between::shown_error`; -1 if unknown.
     pub shown_error: f32,
 }
 

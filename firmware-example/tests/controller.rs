@@ -139,7 +139,7 @@ fn every_answer_is_that_of_whole_frames() {
                 }
                 (last_epoch, answers) = (tick.epoch, answers + 1);
                 moving += u32::from(
-                    tick.share > 1.0 && tick.share < 2.0 && tick.margin == tick.shown_error,
+                    tick.share > 1.0 && tick.share < 3.0 && tick.margin < tick.shown_error * 3.0,
                 );
                 if force(&tick) > 0.0 { acting += 1 } else { free += 1 }
             }
@@ -148,8 +148,7 @@ fn every_answer_is_that_of_whole_frames() {
     }
     assert_eq!(bus.rejected(), 0);
     assert!(answers > 10_000 && checked > 2_000, "{answers} answers, {checked} checked");
-    // It moves on while nothing comes, and is at the end of its way when the next frame begins.
-    assert!(moving > answers * 4 / 10, "{moving} of {answers} on a moving surface");
+    assert!(moving > answers * 9 / 10, "{moving} of {answers} on a moving surface");
     assert!(acting > 100 && free > 100, "the wall acted {acting} times and was still {free} times");
 }
 

@@ -93,8 +93,7 @@ pub trait Gate {
         None
     }
 
-    /// The stretch of the frame's extrapolation, once it is admitted: as long after it as the published frame was
-    /// before. `None` where the gate measures none, or it is beyond the limit.
+    /// The stretch at the end of the frame's extrapolation, once it is admitted. `None` where the gate measures none, or it is beyond the limit.
     #[doc(hidden)]
     fn ahead(&self) -> Option<MeasuredStretch> {
         None

@@ -24,9 +24,9 @@ const BLOCKS: usize = 32;
 ///
 /// The rows that a frame brings are compared with the published ones; [`SurfaceLimits`] lists the refusals.
 ///
-/// With `SURFACES` = 2 ([`continuous`](StretchMonitor::continuous)) it measures the frame's extrapolation, too: the
-/// positions twice the frame's less the published frame's, as long after the frame as that was before. By convexity the
-/// two bound the stretch of all surfaces on the way.
+/// With `SURFACES` = 2 ([`continuous`](StretchMonitor::continuous)) it measures the end of the frame's extrapolation, too:
+/// `now + 2 (now - before)`, with the published frame before. By convexity the two bound the stretch of all surfaces on
+/// the way.
 ///
 /// Cost: [`advance`](Gate::advance) checks at most `work` rows and triangles, plus O([`REGIONS`]). RAM: half a kilobyte
 /// at most, whatever the surface, and 300 bytes more with the extrapolation. [`new`](Self::new) makes one pass over the

@@ -23,10 +23,10 @@ pub struct FrameLabel {
     pub stretch: Option<MeasuredStretch>,
 }
 
-/// The surface after a frame, as long after it as the frame before was before.
+/// The surface after a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Ahead {
-    /// The largest stretch of the positions `2 now - before`; NaN unless measured, and within the tree's limit.
+    /// The largest stretch at the end of its extrapolation; NaN unless measured, and within the tree's limit.
     pub sigma: f32,
     /// Largest distance (mm) of a vertex of this frame from its extrapolation by the two frames before; NaN if unknown.
     pub shown: f32,

@@ -56,7 +56,7 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
     /// The surface after the later frame, if every vertex keeps its velocity between the two: `share` 0 is the later
     /// frame, 1 as long after it as the earlier frame was before. It is on time, and wrong by the change of the motion.
     ///
-    /// `share` is clamped to 0..=1. Beyond the frames no frame's measurement bounds the stretch: measure it
+    /// `share` is clamped to 0..=2. Beyond the frames no frame's measurement bounds the stretch: measure it
     /// ([`measure_stretch`](crate::measure_stretch)), unless both frames carry theirs. Frames behind a bus do:
     /// [`FrameGuard::extrapolated`](crate::FrameGuard::extrapolated).
     #[must_use]
@@ -65,15 +65,22 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
         self.unless_unmeasured(between)
     }
 
-    fn unless_unmeasured(&self, between: Between<'v, W, V>) -> Between<'v, W, V> {
-        Between { travel: if self.is_measured { between.travel } else { None }, ..between }
+    fn unless_unmeasured(&self, mut between: Between<'v, W, V>) -> Between<'v, W, V> {
+        if !self.is_measured {
+            between.travel = None;
+        }
+        between
     }
 }
 
-/// A number within 0..=1: 0 for NaN. A longer extrapolation is worse than the last frame.
-fn clamped(share: f32) -> f32 {
+/// Longest extrapolation, in units of the time between the frames. At a steady rate a frame whose way takes as long as
+/// that time is twice as old when the next one comes.
+const FARTHEST: f32 = 2.0;
+
+/// A number within 0 and `most`: 0 for NaN.
+fn clamped(share: f32, most: f32) -> f32 {
     let share = if share > 0.0 { share } else { 0.0 };
-    if share < 1.0 { share } else { 1.0 }
+    if share < most { share } else { most }
 }
 
 /// A surface on its way from one frame to another, or beyond: `before + share * (after - before)`.
@@ -83,7 +90,7 @@ fn clamped(share: f32) -> f32 {
 pub struct Between<'v, W: ?Sized, V: ?Sized> {
     before: &'v W,
     after: &'v V,
-    /// 0 is the earlier frame, 1 the later, 2 as far beyond.
+    /// 0 is the earlier frame, 1 the later, 2 as far beyond, and 3 the farthest.
     share: f32,
     travel: Option<Travel>,
     ahead: Ahead,
@@ -98,7 +105,7 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
         from: Travel,
         units: u64,
     ) -> Self {
-        let share = clamped(share);
+        let share = clamped(share, 1.0);
         // Off by less than a few units, within a tracker's slack.
         let along = (share * units as f32) as u64;
         let travel = Some(from.beyond(along, 0));
@@ -113,7 +120,7 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
         last: Travel,
         units: u64,
     ) -> Self {
-        let share = clamped(share);
+        let share = clamped(share, FARTHEST);
         let travel = Some(last.beyond(0, (share * units as f32) as i64));
         Self { before, after, share: 1.0 + share, travel, ahead: Ahead::UNKNOWN }
     }
@@ -124,7 +131,7 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
         self
     }
 
-    /// The surface's place in time: 0 is the earlier frame, 1 the later, and 2 as long after it.
+    /// The surface's place in time: 0 is the earlier frame, 1 the later, 2 as long after it, and 3 the end.
     #[must_use]
     pub const fn share(&self) -> f32 {
         self.share
@@ -136,12 +143,13 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
         self.before
     }
 
-    /// The largest distance (mm) of a vertex of the later frame from its extrapolation by the two frames before it: an
-    /// estimate of this surface's own error until the next frame, not a bound. `None` for a surface between its frames,
-    /// where it was not measured, and once the extrapolation has come to its end.
+    /// The largest distance (mm) of a vertex of a frame from its extrapolation by the two frames before, the larger of the
+    /// last two frames': an estimate of this surface's own error by the time of the next frame, not a bound. A surface
+    /// whose velocity changes steadily is three times as far off at the end. `None` for a surface between its frames, where it was not measured,
+    /// and once the extrapolation has come to its end.
     #[must_use]
     pub fn shown_error(&self) -> Option<f32> {
-        let is_known = self.ahead.shown >= 0.0 && self.share < 2.0;
+        let is_known = self.ahead.shown >= 0.0 && self.share < 1.0 + FARTHEST;
         is_known.then_some(self.ahead.shown)
     }
 }
@@ -152,9 +160,9 @@ impl<'v, V: VertexTable + ?Sized> Between<'v, V, V> {
         Self { before: frame, after: frame, share: 1.0, travel, ahead: Ahead::UNKNOWN }
     }
 
-    /// The surface as long after `after` as `before` was before, whose motion is not measured.
+    /// The end of the extrapolation, whose motion is not measured.
     pub(crate) const fn ahead(before: &'v V, after: &'v V) -> Self {
-        Self { before, after, share: 2.0, travel: None, ahead: Ahead::UNKNOWN }
+        Self { before, after, share: 1.0 + FARTHEST, travel: None, ahead: Ahead::UNKNOWN }
     }
 }
 
@@ -172,8 +180,7 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> VertexTable for Between<'
 
     /// A bound by those of the frames: gradients are linear in the positions, and the largest singular value (or edge)
     /// is convex. Between the frames that is the mean of theirs by `share`. Beyond, it is the mean of the later frame's
-    /// and that of the positions `2 after - before` if they were measured, and else their sum by the triangle
-    /// inequality. `None` where a frame was not measured.
+    /// and that of the end of the extrapolation if that was measured, and else their sum by the triangle inequality. `None` where a frame was not measured.
     fn stretch(&self) -> Option<MeasuredStretch> {
         let (before, after) = (self.before.stretch()?, self.after.stretch()?);
         let (share, beyond) = (self.share, self.share - 1.0);
@@ -181,7 +188,8 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> VertexTable for Between<'
         let sigma = if share <= 1.0 {
             (1.0 - share) * old + share * new
         } else if self.ahead.sigma >= 0.0 {
-            (1.0 - beyond) * new + beyond * self.ahead.sigma
+            let part = beyond / FARTHEST;
+            (1.0 - part) * new + part * self.ahead.sigma
         } else {
             share * new + beyond * old
         };

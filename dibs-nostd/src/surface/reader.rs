@@ -94,19 +94,31 @@ impl<'f, const N: usize> FrameGuard<'f, N, Frames<N, 3>> {
     }
 
     /// The surface now, if every vertex has kept its velocity since the last frame: on time, and wrong by the change of
-    /// the motion. [`Between::shown_error`] is the error that the last frame showed.
+    /// the motion. [`Between::shown_error`] is the error that the last frames showed.
     ///
-    /// It goes on for as long as the time between the last two frames, and is held then. It is held at once where the
-    /// surface, moved on for so long, would be stretched beyond the tree's limit.
+    /// It goes on for twice the time between the last two frames, and is held then: long enough for frames at a steady
+    /// rate whose way to here takes as long as the time between them. It is held at once where the surface, moved on for
+    /// so long, would be stretched beyond the tree's limit.
     #[must_use]
     pub fn extrapolated(&self) -> Between<'_, ContinuousView<'f, N>, ContinuousView<'f, N>> {
-        let ahead = self.view.buffer.ahead();
+        let (mut ahead, before) = (self.view.buffer.ahead(), self.before.buffer.ahead());
+        // The change of the motion may have been none by chance. False for NaN.
+        if before.shown > ahead.shown {
+            ahead.shown = before.shown;
+        }
         match self.last_step() {
             Some(step) if ahead.sigma >= 0.0 => {
                 step.outside([&self.before, &self.view], self.age).measured(ahead)
             }
             _ => Between::held(&self.view, self.view.travel()),
         }
+    }
+
+    /// The frame that was published before this one; as it was at the start, if there is none.
+    #[cfg(loom)]
+    #[must_use]
+    pub fn before(&self) -> &ContinuousView<'f, N> {
+        &self.before
     }
 
     fn last_step(&self) -> Option<LastStep> {

@@ -82,6 +82,50 @@ fn no_order_of_steps_tears_a_frame() {
     assert!(orders > 100, "{orders}");
 }
 
+/// The same with three buffers: the frame before the published one is whole, too, while it is read.
+#[test]
+fn no_order_of_steps_tears_the_frame_before() {
+    let orders = std::sync::Arc::new(std::sync::atomic::AtomicU32::new(0));
+    let counter = orders.clone();
+    loom::model(move || {
+        counter.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        let frames: &'static Frames<VERTICES, 3> = Box::leak(Box::new(Frames::new()));
+        let beside: &'static [UnsafeCell<()>; 3] =
+            Box::leak(Box::new([(); 3].map(|()| UnsafeCell::new(()))));
+        let (mut writer, mut reader) = frames.split().expect("split once");
+        let sender = thread::spawn(move || {
+            let mut buffer = 1;
+            for epoch in 1..=3 {
+                writer.begin();
+                beside[buffer].with_mut(|_| ());
+                writer.push(position(epoch)).expect("inside the table");
+                match writer.publish(label(epoch, buffer)) {
+                    Ok(()) => buffer = (buffer + 1) % 3,
+                    Err(PublishError::Busy) => {}
+                    Err(other) => panic!("{other}"),
+                }
+            }
+        });
+        for _ in 0..3 {
+            if let Some(frame) = reader.read() {
+                let FrameLabel { epoch, position_error, .. } = frame.label();
+                let buffer = position_error as usize;
+                beside[buffer].with(|_| ());
+                assert_eq!(frame.position(0), Some(position(epoch)), "the published frame");
+                let before = frame.before();
+                beside[(buffer + 2) % 3].with(|_| ());
+                // Before the second frame there is none.
+                let (epoch, row) = (before.epoch().expect("a label"), before.position(0));
+                assert!(epoch == 0 || row == Some(position(epoch)), "the frame before: {row:?}");
+            }
+        }
+        sender.join().expect("no panic");
+    });
+    let orders = orders.load(std::sync::atomic::Ordering::Relaxed);
+    println!("interleavings: {orders}");
+    assert!(orders > 100, "{orders}");
+}
+
 /// The check can fail: on a buffer without the protocol it finds a torn read.
 #[test]
 #[should_panic(expected = "torn")]

@@ -5,6 +5,7 @@ mod authenticity;
 mod black_channel;
 mod causes;
 mod complete;
+mod continuous;
 mod exhaustive;
 mod order;
 mod partial;

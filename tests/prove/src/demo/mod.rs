@@ -14,6 +14,7 @@ mod report;
 pub mod scene;
 mod sender;
 pub mod session;
+mod steps;
 mod surface;
 mod timeline;
 mod transition;

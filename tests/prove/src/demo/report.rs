@@ -19,6 +19,7 @@ use super::machine::Machine;
 use super::push::Pushed;
 use super::scene::Scene;
 use super::session::Outcome;
+use super::steps::Steps;
 use super::transition::Transition;
 use crate::harness::run::Run;
 
@@ -52,6 +53,8 @@ pub struct Report {
     separation_min_mm: f32,
     separation_max_mm: f32,
     force_max_n: f32,
+    #[serde(flatten)]
+    steps: Steps,
     /// Ticks whose force was compared with that of the wall, and those of them that were within its margin.
     forces_compared: usize,
     forces_pushing: usize,
@@ -155,6 +158,7 @@ impl Report {
             separation_min_mm: least(|tick| tick.separation),
             separation_max_mm: largest(|tick| tick.separation),
             force_max_n: largest(force),
+            steps: outcome.steps,
             forces_compared: pushed.checked,
             forces_pushing: pushed.pushing,
             forces_wrong: pushed.wrong,
@@ -338,6 +342,7 @@ impl Report {
             format!("{:.2} to {:.2} mm", self.separation_min_mm, self.separation_max_mm),
         );
         row("largest force", format!("{:.2} N", self.force_max_n));
+        row("force steps", self.steps.row());
         row(
             "forces compared",
             format!(

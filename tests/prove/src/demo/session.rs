@@ -25,6 +25,7 @@ use super::faults::{Faults, Plan};
 use super::machine::Machine;
 use super::scene::Scene;
 use super::sender::{Link, send};
+use super::steps::Steps;
 
 /// Real time that a connected controller may stay silent.
 const SILENCE: Duration = Duration::from_secs(30);
@@ -55,6 +56,8 @@ pub struct Outcome {
     pub checked: Vec<Checked>,
     /// The comparison of every published frame.
     pub compared: Vec<Compared>,
+    /// The force's steps at new frames.
+    pub steps: Steps,
     /// The faults on the bus, if any.
     pub faults: Option<Faults>,
     /// Frames of a flood that were sent.
@@ -138,6 +141,7 @@ pub fn run(
     for tick in &ticks {
         compare(&link, tick, &mut compared);
     }
+    let steps = Steps::of(scene, &link, &ticks)?;
     let status = child.0.wait()?;
     Ok(Outcome {
         bus: machine.bus(),
@@ -146,6 +150,7 @@ pub fn run(
         summary,
         checked: checked?,
         compared,
+        steps,
         faults: faults.map(|plan| Faults::new(plan, injected)),
         flood: flooded?,
         flipped_at,
