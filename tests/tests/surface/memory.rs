@@ -1,6 +1,7 @@
-//! A surface's share of a controller's memory: two buffers of positions, and at most 1,100 bytes for both of their
-//! ends, the assembler, and the stretch of every region.
+//! A surface's share of a controller's memory: two or three buffers of positions, and some bytes for both of their ends,
+//! the assembler, and the stretch of every region.
 
+use dibs_nostd::wire::NoMac;
 use dibs_nostd::{Assembler, FrameReader, Frames, StretchMonitor};
 
 /// Bytes besides the positions, of a surface of `N` vertices.
@@ -17,4 +18,17 @@ fn a_surface_takes_1100_bytes_besides_its_positions() {
     let all = [besides::<162>(), besides::<5_138>(), besides::<65_536>()];
     println!("{all:?} bytes besides 24 a vertex");
     assert!(all.iter().all(|&bytes| bytes == all[0] && bytes <= 1_100), "{all:?}");
+}
+
+/// A surface that moves between frames has a third buffer, and the stretch of its extrapolation.
+#[test]
+fn a_continuous_surface_takes_36_bytes_a_vertex_and_1600() {
+    type Continuous = Frames<5_138, 3>;
+    type Monitor = StretchMonitor<'static, u16, 2>;
+    let all = size_of::<Continuous>()
+        + size_of::<FrameReader<'static, 5_138, Continuous>>()
+        + size_of::<Assembler<'static, Monitor, 5_138, NoMac, Continuous>>();
+    let besides = all - 3 * 12 * 5_138;
+    println!("{besides} bytes besides 36 a vertex");
+    assert!(besides <= 1_600, "{besides}");
 }
