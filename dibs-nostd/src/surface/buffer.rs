@@ -190,6 +190,6 @@ impl<P: Rows + ?Sized> Buffer<P> {
         let words = self.stretch.each_ref().map(|word| word.load(Ordering::Relaxed));
         let epoch = self.epoch.load(Ordering::Relaxed);
         let is_measured = words.first().is_some_and(|&sigma| !f32::from_bits(sigma).is_nan());
-        is_measured.then(|| MeasuredStretch::from_words(&words, epoch))
+        is_measured.then(|| MeasuredStretch::from_words(words, epoch))
     }
 }

@@ -50,7 +50,7 @@ const PUBLISHED: u32 = 8;
 /// one, too, so that a frame that is read has [`interpolated`](crate::FrameGuard::interpolated) and
 /// [`extrapolated`](crate::FrameGuard::extrapolated) surfaces.
 ///
-/// RAM: 12 bytes a vertex and buffer, plus some 80 a buffer. All zero at start, so it lies in `.bss`.
+/// RAM: 12 bytes a vertex and buffer, plus some 50 a buffer. All zero at start, so it lies in `.bss`.
 ///
 /// ```
 /// use dibs_nostd::{FrameLabel, Frames, VertexTable, glam::Vec3};

@@ -64,7 +64,8 @@ impl MeasuredStretch {
         self.sigma
     }
 
-    /// The largest stretch of each region, rounded up to a 256th of [`sigma`](Self::sigma).
+    /// The largest stretch of each region, rounded up to a 256th of [`sigma`](Self::sigma). A frame's label keeps the
+    /// whole's alone.
     #[must_use]
     pub fn regions(&self) -> [f32; REGIONS] {
         self.regions.map(|code| share(self.sigma, code))
@@ -88,32 +89,21 @@ impl MeasuredStretch {
         self.epoch
     }
 
-    /// The measurement as words, without its epoch, for the frame's label.
-    pub(crate) fn to_words(self) -> [u32; MeasuredStretch::WORDS] {
-        let mut words = [0; Self::WORDS];
-        let [sigma, tree, triangle, regions @ ..] = &mut words;
-        (*sigma, *tree, *triangle) = (self.sigma.to_bits(), self.tree, self.triangle);
-        let (codes, _) = self.regions.as_chunks::<4>();
-        for (word, codes) in regions.iter_mut().zip(codes) {
-            *word = u32::from_le_bytes(*codes);
-        }
-        words
+    /// The measurement as words, without its epoch and its regions, for the frame's label.
+    pub(crate) const fn to_words(self) -> [u32; MeasuredStretch::WORDS] {
+        [self.sigma.to_bits(), self.tree, self.triangle]
     }
 
     /// The inverse of [`to_words`](Self::to_words).
-    pub(crate) fn from_words(words: &[u32; Self::WORDS], epoch: u32) -> Self {
-        let [sigma, tree, triangle, packed @ ..] = words;
-        let mut regions = [0; REGIONS];
-        let (codes, _) = regions.as_chunks_mut::<4>();
-        for (codes, word) in codes.iter_mut().zip(packed) {
-            *codes = word.to_le_bytes();
-        }
-        let sigma = f32::from_bits(*sigma);
-        Self { sigma, tree: *tree, triangle: *triangle, epoch: Some(epoch), regions }
+    pub(crate) const fn from_words(
+        [sigma, tree, triangle]: [u32; MeasuredStretch::WORDS],
+        epoch: u32,
+    ) -> Self {
+        Self::new(f32::from_bits(sigma), tree, triangle, Some(epoch), [u8::MAX; REGIONS])
     }
 
     /// Words that a measurement takes.
-    pub(crate) const WORDS: usize = 3 + REGIONS / 4;
+    pub(crate) const WORDS: usize = 3;
 }
 
 /// Stretch that a region's code stands for.
