@@ -13,6 +13,8 @@ const dibs = (...args) => execFileSync(program(folder), args, { cwd: folder, max
 const pictures = join(folder, "..");
 const PICTURE = join(pictures, "viewer.jpg");
 const DEMO = join(folder, "../../demo");
+// A demo of 15 s has room in a page that is sent by mail.
+const MOST_BYTES = 3_000_000;
 const SOFTWARE_GL = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 
 async function launch(flags) {
@@ -270,6 +272,9 @@ async function demo(browser) {
   const lines = await readFile(join(DEMO, "tools.csv"), "utf8").catch(() => null);
   if (!lines) return null;
   const poses = lines.trim().split("\n").map((line) => line.replace("capsule:", "").split(",").map(Number));
+  const { size } = await stat(join(DEMO, "replay.html"));
+  assert(size <= MOST_BYTES, `the demo's page has ${size} bytes, more than ${MOST_BYTES}`);
+  console.log(`the demo's page, ${poses.length} ticks: ${size} bytes`);
   const page = await open(browser, join(DEMO, "replay.html"), LARGE);
   const found = await page.evaluate((count) => {
     viewer.restart();

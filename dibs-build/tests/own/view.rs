@@ -1,6 +1,11 @@
 //! The page that `dibs view` writes. Its contents are tested where they are read: `viewer/test/`.
 
 use std::fs;
+use std::io::Read;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use flate2::read::ZlibDecoder;
 
 use crate::program::{fails, succeeds};
 
@@ -11,13 +16,20 @@ fn a_page_is_written_whole_or_not_at_all() {
     succeeds(folder, "generate heart --triangles 320 -o heart.ply --motion heart.pc2");
     succeeds(folder, "build heart.ply -o <i>.dibs --stretch 2");
     fs::write(folder.join("page.html"), "<p>before</p><!--data--><p>after</p>").unwrap();
-    fs::write(folder.join("tools.csv"), "sphere:0,0,90,2\ncapsule:0,0,90,0,0,120,2.5\n").unwrap();
+    fs::write(folder.join("tools.csv"), "sphere:-0,0.1,90,2\ncapsule:0,0,90,0,0,120,2.5\n")
+        .unwrap();
 
     let view = "view <i>.dibs heart.pc2 --page page.html -o out.html";
     assert!(succeeds(folder, &format!("{view} --path tools.csv")).starts_with("written  out.html"));
     let page = fs::read_to_string(folder.join("out.html")).unwrap();
     assert!(page.starts_with("<p>before</p><script") && page.ends_with("</script>\n<p>after</p>"));
-    assert!(page.contains(r#""path":[[0.0,0.0,90.0,2.0],[0.0,0.0,90.0,0.0,0.0,120.0,2.5]]"#));
+    let sphere = [4.0, -0.0, 0.1, 90.0, 2.0];
+    let capsule = [7.0, 0.0, 0.0, 90.0, 0.0, 0.0, 120.0, 2.5];
+    let packed = [&sphere[..], &capsule].concat();
+    assert_eq!(
+        element(&page, "path"),
+        packed.into_iter().flat_map(f32::to_le_bytes).collect::<Vec<u8>>()
+    );
     assert!(page.contains(r#""frames":25"#) && page.contains(r#""rate":30.0"#));
     assert!(page.contains("\\u003ci>.dibs") && !page.contains("<i>"), "a name ends no element");
 
@@ -35,4 +47,13 @@ fn a_page_is_written_whole_or_not_at_all() {
     let error = fails(folder, "view tight.dibs heart.pc2 --page page.html -o out.html");
     assert!(error.contains("frame ") && error.contains("--stretch"), "{error}");
     assert!(!folder.join("out.html").exists());
+}
+
+/// The bytes in a page's element.
+fn element(page: &str, id: &str) -> Vec<u8> {
+    let (_, rest) = page.split_once(&format!("id=\"{id}\">")).unwrap();
+    let (text, _) = rest.split_once('<').unwrap();
+    let mut bytes = Vec::new();
+    ZlibDecoder::new(STANDARD.decode(text).unwrap().as_slice()).read_to_end(&mut bytes).unwrap();
+    bytes
 }

@@ -106,13 +106,14 @@ fn data<I: Index>(args: &Args, tree: &Tree<'_, I>, bytes: &[u8]) -> Result<Strin
         "tree": args.tree.display().to_string(),
         "rate": rate,
         "frames": frames.len().max(1),
-        "path": path,
     });
     let mut data = String::new();
     // A `<` in a name must not end the element.
     let facts = facts.to_string().replace('<', "\\u003c");
     data += &format!("<script type=\"application/json\" id=\"facts\">{facts}</script>\n");
-    for (id, bytes) in [("tree", bytes), ("motion", &pack::words(&frames))] {
+    let elements =
+        [("tree", bytes), ("motion", &pack::words(&frames)), ("path", &pack::path(&path))];
+    for (id, bytes) in elements {
         let text = pack::text(bytes)?;
         data += &format!("<script type=\"text/plain\" id=\"{id}\">{text}</script>\n");
     }
