@@ -84,7 +84,7 @@ fn depths_are_those_of_dense_sampling() {
             let stated = -upper - f64::from(radius);
             let off = (depth.max(0.0) - stated).abs();
             assert!(stated == 0.0 || off <= accuracy, "{}: off {off} {found:?}", surface.name);
-            let tolerance = capsule.axis_length() / 512.0;
+            let tolerance = (capsule.axis_length() / 512.0).max(32.0 * found.accuracy);
             if found.separation - found.lower > tolerance {
                 wide += 1;
                 println!("{}: {tool:?} {found:?}", surface.name);

@@ -2,6 +2,7 @@
 
 mod bus;
 mod check;
+mod contacts;
 pub mod debugger;
 mod faults;
 mod flood;

@@ -10,6 +10,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use xtask::qemu;
 
+use super::contacts::Touch;
 use super::report::force;
 use super::session::Outcome;
 
@@ -21,8 +22,10 @@ const BINS: usize = 80;
 
 const BLUE_INK: RGBColor = RGBColor(31, 90, 160);
 const RED_INK: RGBColor = RGBColor(190, 50, 40);
+const GREEN_INK: RGBColor = RGBColor(0, 120, 90);
+const ORANGE_INK: RGBColor = RGBColor(230, 140, 0);
 
-/// Draws `separation.svg` (with the force below it) and, where instructions were counted,
+/// Draws `separation.svg` (with contacts and forces below it) and, where instructions were counted,
 /// `instructions.svg`.
 pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
     let answered: Vec<&Tick> = outcome.ticks.iter().filter(|tick| tick.is_answered()).collect();
@@ -30,16 +33,28 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
         return Ok(());
     }
     let picture = folder.join("separation.svg");
-    let root = SVGBackend::new(&picture, (900, 560)).into_drawing_area();
+    let root = SVGBackend::new(&picture, (900, 760)).into_drawing_area();
     root.fill(&WHITE).map_err(failed)?;
-    let (upper, lower) = root.split_vertically(280);
-    curve(
-        &upper,
-        "separation (mm)",
-        BLUE_INK,
-        &extremes(&answered, |tick| tick.separation.into()),
-    )?;
-    curve(&lower, "force (N)", RED_INK, &extremes(&answered, |tick| force(tick).into()))?;
+    let (upper, rest) = root.split_vertically(280);
+    let (middle, lower) = rest.split_vertically(200);
+    let separation = extremes(&answered, |tick| at(tick.tick, tick.separation.into()));
+    curves(&upper, "separation (mm)", &Curve::alone(separation, BLUE_INK))?;
+    let touches: Vec<&Touch> = outcome.touches.all.iter().collect();
+    let contacts = extremes(&touches, |touch| at(touch.tick, touch.contacts as f64));
+    curves(&middle, "contacts", &Curve::alone(contacts, GREEN_INK))?;
+    let forces = [
+        Curve {
+            name: "of all contacts, by the proxy",
+            ink: ORANGE_INK,
+            points: extremes(&touches, |touch| at(touch.tick, touch.force.into())),
+        },
+        Curve {
+            name: "the controller's, of the closest pair",
+            ink: BLUE_INK,
+            points: extremes(&answered, |tick| at(tick.tick, force(tick).into())),
+        },
+    ];
+    curves(&lower, "force (N)", &forces)?;
     root.present().map_err(failed)?;
 
     let instructions = |tick: &Tick| f64::from(tick.query_counts * qemu::INSTRUCTIONS_A_COUNT);
@@ -48,7 +63,8 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
         let root = SVGBackend::new(&picture, (900, 560)).into_drawing_area();
         root.fill(&WHITE).map_err(failed)?;
         let (upper, lower) = root.split_vertically(280);
-        curve(&upper, "instructions a query", BLUE_INK, &extremes(&answered, instructions))?;
+        let curve = extremes(&answered, |tick| at(tick.tick, instructions(tick)));
+        curves(&upper, "instructions a query", &Curve::alone(curve, BLUE_INK))?;
         let values: Vec<f64> = answered.iter().map(|tick| instructions(tick)).collect();
         histogram(&lower, "instructions a query", &values)?;
         root.present().map_err(failed)?;
@@ -56,33 +72,54 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A value over time, thinned out so that every stretch of time keeps its least and largest.
-fn extremes(ticks: &[&Tick], value: impl Fn(&Tick) -> f64) -> Vec<(f64, f64)> {
-    let point = |tick: &&Tick| (f64::from(tick.tick) / f64::from(TICK_RATE), value(tick));
-    let of_chunk = |chunk: &[&Tick]| {
+/// A value at a tick's time, in s.
+fn at(tick: u32, value: f64) -> (f64, f64) {
+    (f64::from(tick) / f64::from(TICK_RATE), value)
+}
+
+/// Values over time, thinned out so that every stretch of time keeps its least and largest.
+fn extremes<T>(ticks: &[&T], point: impl Fn(&T) -> (f64, f64)) -> Vec<(f64, f64)> {
+    let of_chunk = |chunk: &[&T]| {
         let by_value = |a: &(f64, f64), b: &(f64, f64)| a.1.total_cmp(&b.1);
-        let least = chunk.iter().map(point).min_by(by_value);
-        let most = chunk.iter().map(point).max_by(by_value);
+        let points = || chunk.iter().map(|tick| point(tick));
+        let (least, most) = (points().min_by(by_value), points().max_by(by_value));
         let mut both: Vec<_> = least.into_iter().chain(most).collect();
         both.sort_by(|a, b| a.0.total_cmp(&b.0));
         both
     };
-    ticks.chunks((2 * ticks.len()).div_ceil(POINTS)).flat_map(of_chunk).collect()
+    ticks.chunks((2 * ticks.len()).div_ceil(POINTS).max(1)).flat_map(of_chunk).collect()
 }
 
-fn curve(
+/// A value over time, in s.
+struct Curve {
+    /// Its name, if there are several.
+    name: &'static str,
+    ink: RGBColor,
+    points: Vec<(f64, f64)>,
+}
+
+impl Curve {
+    fn alone(points: Vec<(f64, f64)>, ink: RGBColor) -> [Self; 1] {
+        [Self { name: "", ink, points }]
+    }
+}
+
+/// Curves over the same time.
+fn curves(
     area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
     name: &str,
-    ink: RGBColor,
-    points: &[(f64, f64)],
+    curves: &[Curve],
 ) -> Result<()> {
-    let time = range(points.iter().map(|point| point.0));
-    let top = range(points.iter().map(|point| point.1)).end;
+    let points = || curves.iter().flat_map(|curve| &curve.points);
+    let time = range(points().map(|point| point.0));
+    let Range { start: low, end: top } = range(points().map(|point| point.1).chain([0.0]));
+    let room = if top > low { (top - low) * 0.05 } else { 1.0 };
+    let low = if low < 0.0 { low - room } else { 0.0 };
     let mut chart = ChartBuilder::on(area)
         .margin(12)
         .x_label_area_size(36)
         .y_label_area_size(70)
-        .build_cartesian_2d(time, 0.0..if top > 0.0 { top * 1.05 } else { 1.0 })
+        .build_cartesian_2d(time.clone(), low..top + room)
         .map_err(failed)?;
     chart
         .configure_mesh()
@@ -91,7 +128,24 @@ fn curve(
         .light_line_style(TRANSPARENT)
         .draw()
         .map_err(failed)?;
-    chart.draw_series(LineSeries::new(points.iter().copied(), ink)).map_err(failed)?;
+    if low < 0.0 {
+        let zero = [(time.start, 0.0), (time.end, 0.0)];
+        chart.draw_series(LineSeries::new(zero, RED_INK)).map_err(failed)?;
+    }
+    for &Curve { name, ink, ref points } in curves {
+        let series = LineSeries::new(points.iter().copied(), ink);
+        let drawn = chart.draw_series(series).map_err(failed)?;
+        if curves.len() > 1 {
+            drawn
+                .label(name)
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], ink.stroke_width(2)));
+        }
+    }
+    if curves.len() > 1 {
+        let legend = &mut chart.configure_series_labels();
+        let legend = legend.position(SeriesLabelPosition::LowerRight).background_style(WHITE);
+        legend.border_style(BLACK.mix(0.3)).draw().map_err(failed)?;
+    }
     Ok(())
 }
 

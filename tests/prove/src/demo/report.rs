@@ -13,6 +13,7 @@ use serde::Serialize;
 use xtask::qemu;
 
 use super::check;
+use super::contacts::Touches;
 use super::faults::{Faults, Silence};
 use super::freshness::Freshness;
 use super::machine::Machine;
@@ -55,6 +56,8 @@ pub struct Report {
     force_max_n: f32,
     #[serde(flatten)]
     steps: Steps,
+    #[serde(flatten)]
+    touches: Touches,
     /// Ticks whose force was compared with that of the wall, and those of them that were within its margin.
     forces_compared: usize,
     forces_pushing: usize,
@@ -159,6 +162,7 @@ impl Report {
             separation_max_mm: largest(|tick| tick.separation),
             force_max_n: largest(force),
             steps: outcome.steps,
+            touches: outcome.touches.clone(),
             forces_compared: pushed.checked,
             forces_pushing: pushed.pushing,
             forces_wrong: pushed.wrong,
@@ -226,6 +230,14 @@ impl Report {
         promise(
             wrong == 0,
             format!("{wrong} ticks have another force than the wall's, the first is {first}"),
+        );
+        let Touches { ticks_too_weak, ticks_proxy_too_weak, ticks_proxy_inward, .. } = self.touches;
+        promise(
+            ticks_too_weak + ticks_proxy_too_weak + ticks_proxy_inward == 0,
+            format!(
+                "inside, the force is too weak at {ticks_too_weak} ticks and the proxy's at {ticks_proxy_too_weak}, which \
+                 points inwards at {ticks_proxy_inward}"
+            ),
         );
         let wrong = self.frames_published_wrong;
         promise(wrong == 0, format!("{wrong} published frames differ from what was sent"));
@@ -343,6 +355,9 @@ impl Report {
         );
         row("largest force", format!("{:.2} N", self.force_max_n));
         row("force steps", self.steps.row());
+        for (name, value) in self.touches.rows() {
+            row(name, value);
+        }
         row(
             "forces compared",
             format!(

@@ -20,6 +20,7 @@ use xtask::{qemu, workspace};
 
 use super::bus::{Bus, Opened};
 use super::check::{Checked, Compared, check, compare};
+use super::contacts::Touches;
 use super::debugger::{Bits, flip};
 use super::faults::{Faults, Plan};
 use super::machine::Machine;
@@ -58,6 +59,8 @@ pub struct Outcome {
     pub compared: Vec<Compared>,
     /// The force's steps at new frames.
     pub steps: Steps,
+    /// All contacts of every tick.
+    pub touches: Touches,
     /// The faults on the bus, if any.
     pub faults: Option<Faults>,
     /// Frames of a flood that were sent.
@@ -142,6 +145,7 @@ pub fn run(
         compare(&link, tick, &mut compared);
     }
     let steps = Steps::of(scene, &link, &ticks)?;
+    let touches = Touches::of(scene, &link, &ticks)?;
     let status = child.0.wait()?;
     Ok(Outcome {
         bus: machine.bus(),
@@ -151,6 +155,7 @@ pub fn run(
         checked: checked?,
         compared,
         steps,
+        touches,
         faults: faults.map(|plan| Faults::new(plan, injected)),
         flood: flooded?,
         flipped_at,

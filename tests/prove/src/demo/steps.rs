@@ -110,7 +110,8 @@ impl Steps {
     }
 }
 
-fn tool(tick: &Tick) -> Result<Capsule> {
+/// A tick's instrument.
+pub fn tool(tick: &Tick) -> Result<Capsule> {
     let (start, end) = (Vec3::from(tick.tool_start), Vec3::from(tick.tool_end));
     Ok(Capsule::new(start, end, tick.tool_radius)?)
 }

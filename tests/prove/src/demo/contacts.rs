@@ -1,0 +1,151 @@
+//! All contacts of every tick, and the force of a proxy that they hold outside: computed here after the run, because a
+//! tick of the board has no time for them.
+
+use anyhow::Result;
+use controller::telemetry::Tick;
+use controller::{DAMPING, MARGIN, MAX_FORCE, STIFFNESS, TICK_RATE};
+use dibs_nostd::constraint::{Proxy, SpringDamper};
+use dibs_nostd::failsafe::State;
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{Contacts, Index, Options, Query, Tree, Unavailable};
+use glam::Vec3;
+use serde::Serialize;
+
+use super::report::force;
+use super::scene::Scene;
+use super::sender::Link;
+use super::steps::tool;
+use super::surface::positions;
+
+/// Most contacts that are kept.
+const MOST: usize = 16;
+
+/// The contacts of a tick and the proxy's force.
+#[derive(Clone, Copy)]
+pub struct Touch {
+    pub tick: u32,
+    pub contacts: usize,
+    /// Size of the proxy's force, in N.
+    pub force: f32,
+}
+
+/// The contacts of a run.
+#[derive(Clone, Default, Serialize)]
+pub struct Touches {
+    #[serde(skip)]
+    pub all: Vec<Touch>,
+    contacts_mean: f64,
+    contacts_max: usize,
+    /// Ticks whose buffer of contacts was full.
+    contacts_cut: usize,
+    proxy_force_max_n: f32,
+    /// Largest change in the size of a force from one tick to the next, of the same frame: the controller's, and the
+    /// proxy's.
+    force_step_max_n: f32,
+    proxy_force_step_max_n: f32,
+    /// Ticks with the instrument in the surface, and those of them at which a force was below that of the wall's spring at
+    /// first contact, but for the damper's part: the controller's, and the proxy's.
+    pub ticks_inside: usize,
+    pub ticks_too_weak: usize,
+    pub ticks_proxy_too_weak: usize,
+    /// Ticks at which the proxy's force pointed into the surface at the deepest contact.
+    pub ticks_proxy_inward: usize,
+}
+
+impl Touches {
+    /// Of a run.
+    pub fn of(scene: &Scene, link: &Link, ticks: &[Tick]) -> Result<Self> {
+        match scene.tree.index_bits() {
+            16 => Self::on(&scene.tree.tree::<u16>()?, link, ticks),
+            _ => Self::on(&scene.tree.tree::<u32>()?, link, ticks),
+        }
+    }
+
+    fn on<I: Index>(tree: &Tree<'_, I>, link: &Link, ticks: &[Tick]) -> Result<Self> {
+        let spring = SpringDamper::stiffness(STIFFNESS).damping(DAMPING).max_force(MAX_FORCE);
+        let proxy = Proxy::new(spring, MARGIN)?;
+        let mut query = Query::<I, MAX_STACK>::new(tree)?;
+        let mut list = Contacts::<MOST>::new();
+        let mut touches = Self::default();
+        for pair in ticks.windows(2) {
+            let [before, tick] = pair else { continue };
+            let is_acting = |tick: &Tick| tick.is_answered() && tick.state != State::Safe as u32;
+            if !is_acting(before) || !is_acting(tick) {
+                continue;
+            }
+            let rows = positions(link, tick)?;
+            let (was, now) = (tool(before)?, tool(tick)?);
+            let off = tick.margin + tick.position_error;
+            let margin = MARGIN + off + tick.accuracy;
+            query.contacts(rows.as_slice(), &now, margin, &Options::new(), &mut list)?;
+            let velocity = (now.start() - was.start()) * TICK_RATE as f32;
+            let axis = (now.end() - now.start(), was.end() - was.start());
+            let angular = axis.1.cross(axis.0) / axis.0.length_squared() * TICK_RATE as f32;
+            let wrench = proxy.wrench(
+                Ok::<_, Unavailable>(list.iter()),
+                list.accuracy() + off,
+                now.start(),
+                velocity,
+                angular,
+            );
+            touches.add(before, tick, wrench.force, &list);
+        }
+        let count = touches.all.len().max(1) as f64;
+        touches.contacts_mean /= count;
+        Ok(touches)
+    }
+
+    /// Adds a tick with the proxy's force.
+    fn add<const N: usize>(
+        &mut self,
+        before: &Tick,
+        tick: &Tick,
+        pushed: Vec3,
+        list: &Contacts<N>,
+    ) {
+        let touch = Touch { tick: tick.tick, contacts: list.len(), force: pushed.length() };
+        self.contacts_mean += list.len() as f64;
+        self.contacts_max = self.contacts_max.max(list.len());
+        self.contacts_cut += usize::from(list.is_full());
+        self.proxy_force_max_n = self.proxy_force_max_n.max(touch.force);
+        if let Some(last) = self.all.last()
+            && last.tick + 1 == tick.tick
+            && before.epoch == tick.epoch
+        {
+            let step = (touch.force - last.force).abs();
+            self.proxy_force_step_max_n = self.proxy_force_step_max_n.max(step);
+            let step = (force(tick) - force(before)).abs();
+            self.force_step_max_n = self.force_step_max_n.max(step);
+        }
+        let deepest = list.iter().next();
+        let is_inward = deepest.is_some_and(|deepest| deepest.normal.dot(pushed) < 0.0);
+        self.ticks_proxy_inward += usize::from(is_inward);
+        if tick.separation < 0.0 {
+            let ends = [(tick.tool_start, before.tool_start), (tick.tool_end, before.tool_end)];
+            let moved = ends.map(|(now, was)| Vec3::from(now).distance(Vec3::from(was)));
+            let speed = moved[0].max(moved[1]) * TICK_RATE as f32;
+            let first = (STIFFNESS * MARGIN).min(MAX_FORCE) - DAMPING * speed - 1e-3;
+            self.ticks_inside += 1;
+            self.ticks_too_weak += usize::from(force(tick) < first);
+            self.ticks_proxy_too_weak += usize::from(touch.force < first);
+        }
+        self.all.push(touch);
+    }
+
+    /// Lines for the user.
+    pub fn rows(&self) -> [(&'static str, String); 2] {
+        let contacts = format!(
+            "{:.1} within the margin in the mean, {} at most; a proxy that they hold: {:.2} N at most",
+            self.contacts_mean, self.contacts_max, self.proxy_force_max_n
+        );
+        let inside = format!(
+            "{} ticks; too weak at {}, the proxy at {}; steps of one frame {:.2} N at most, the proxy's {:.2}",
+            self.ticks_inside,
+            self.ticks_too_weak,
+            self.ticks_proxy_too_weak,
+            self.force_step_max_n,
+            self.proxy_force_step_max_n
+        );
+        [("contacts", contacts), ("inside", inside)]
+    }
+}
