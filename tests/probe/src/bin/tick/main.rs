@@ -13,7 +13,7 @@ mod exit;
 #[path = "../board/files.rs"]
 mod files;
 
-use controller::surface::{self, Surface};
+use controller::surface::{self, continuous::Surface};
 use controller::{BusStatus, Control, Receiver, Trust};
 use cortex_m_rt::entry;
 use exit::exit;
