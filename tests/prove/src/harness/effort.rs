@@ -75,7 +75,7 @@ impl Effort {
         board_faults: 1,
         demo_seconds: 5,
         fault_seconds: 4,
-        flood_seconds: 1,
+        flood_seconds: 4,
         fuzz_seconds: 8,
         is_record: false,
         share: 0,
