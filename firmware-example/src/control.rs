@@ -16,8 +16,9 @@ use crate::telemetry::fallback_code;
 use crate::telemetry::{Tick, cause_code};
 use crate::{BusStatus, TICK_RATE, Trust, instrument};
 
-/// The budget of a query: more than the heart needs, and within a tick on every admitted surface.
-pub const BUDGET: Budget = Budget { node_tests: 1_800, triangle_tests: 150 };
+/// The budget of a query: more than the heart needs, and within a tick on every admitted surface. It is less than
+/// [`Cost`] would allow, because a position of a moving surface is a sum of two.
+pub const BUDGET: Budget = Budget { node_tests: 1_500, triangle_tests: 120 };
 
 /// The deadline of a tick in instructions: 1 ms at 480 MHz, with one cycle for each.
 pub const TICK_INSTRUCTIONS: u64 = 480_000;
