@@ -21,7 +21,7 @@ use super::{Modes, WeightsError};
 use crate::surface::MeasuredStretch;
 
 /// Allowance for the f32 rounding of a bound.
-const ROUNDING: f32 = 1.0 + 1.0 / 65_536.0;
+pub(super) const ROUNDING: f32 = 1.0 + 1.0 / 65_536.0;
 
 impl Modes<'_> {
     /// An upper bound of the stretch of the surface at these weights: never below the true one, and at the recorded
@@ -66,7 +66,7 @@ impl Modes<'_> {
             }
         }
         let sigma = sigma * ROUNDING + self.header.slack;
-        MeasuredStretch::everywhere(sigma, self.tree, triangle)
+        MeasuredStretch::everywhere(sigma, self.travel.tree, triangle)
     }
 
     fn anchor(&self, row: usize) -> Option<Anchor<'_>> {

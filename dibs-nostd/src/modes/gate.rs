@@ -1,5 +1,6 @@
 //! The check of a modal frame before it is published.
 
+use super::reach::Reach;
 use super::{ModalSurface, Modes, WeightsError};
 use crate::stretch::{Arriving, Changed, Gate, StretchError, Verdict, farthest};
 use crate::surface::VertexTable;
@@ -17,6 +18,7 @@ use crate::surface::VertexTable;
 #[derive(Clone, Debug)]
 pub struct ModalGate<'a, G, const K: usize> {
     modes: Modes<'a>,
+    reach: Reach<K>,
     exact: G,
     /// The surface that `exact` measures, where a bound exceeded its limit.
     surface: Option<ModalSurface<'a, K>>,
@@ -27,6 +29,8 @@ impl<'a, G, const K: usize> ModalGate<'a, G, K> {
     /// A gate for surfaces of exactly `K` modes. `exact`, the tree or a monitor of it, measures the surfaces that the
     /// bounds cannot admit. Only a monitor limits the speed.
     ///
+    /// Cost: one pass over the displacements of all vertices.
+    ///
     /// # Errors
     /// [`WeightsError::Count`] for another number of modes.
     pub fn new(modes: &Modes<'a>, exact: G) -> Result<Self, WeightsError> {
@@ -34,7 +38,8 @@ impl<'a, G, const K: usize> ModalGate<'a, G, K> {
         if expected != found {
             return Err(WeightsError::Count { expected, found });
         }
-        Ok(Self { modes: *modes, exact, surface: None, measured: 0 })
+        let reach = Reach::of(modes);
+        Ok(Self { modes: *modes, reach, exact, surface: None, measured: 0 })
     }
 
     /// Frames measured by the inner gate since the start; saturates.
@@ -94,7 +99,7 @@ impl<G: Gate, const K: usize> Gate for ModalGate<'_, G, K> {
                 let surface = ModalSurface::new(&self.modes, weights.into_iter());
                 let speed = self.exact.speed_limit();
                 let is_slow = before.as_ref().is_none_or(|(before, elapsed)| {
-                    surface.farthest_from(before) <= farthest(speed, *elapsed)
+                    self.reach.between(before, &surface) <= farthest(speed, *elapsed)
                 });
                 let bound = self.modes.bound(&weights);
                 if is_slow && bound.sigma() <= self.modes.stretch_limit() {

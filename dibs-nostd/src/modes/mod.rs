@@ -14,25 +14,29 @@
 
 mod bound;
 mod error;
+mod frame;
 mod gate;
 mod layout;
 mod memo;
+mod reach;
 mod reader;
 mod surface;
 
 use layout::Header;
 
 pub use error::{ModesError, WeightsError};
+pub use frame::ModalFrame;
 pub use gate::ModalGate;
 /// The layout of the modes' bytes, for their builder.
 #[doc(hidden)]
 pub use layout::{ANCHOR_TAIL_BYTES, HEADER_BYTES, MAX_ANCHORS, MODE_BYTES, VERTEX_MODE_BYTES};
 pub use memo::Memo;
-pub use reader::{ModalFrame, ModalReader};
+pub use reader::ModalReader;
 pub use surface::ModalSurface;
 
 use glam::Vec3;
 
+use crate::surface::TravelUnit;
 use crate::tree::{Index, Tree, format};
 
 /// Most modes of a surface.
@@ -85,8 +89,8 @@ pub struct Modes<'a> {
     rest: &'a [u8],
     vertices: u32,
     mesh_id: u32,
-    /// The tree's checksum.
-    tree: u32,
+    /// The unit of the surface's motion, with the tree's checksum.
+    travel: TravelUnit,
     /// The tree's stretch limit.
     limit: f32,
 }
@@ -116,7 +120,7 @@ impl<'a> Modes<'a> {
                 rest: sections.rest,
                 vertices,
                 mesh_id: tree.mesh_id(),
-                tree: tree.checksum(),
+                travel: TravelUnit::of(tree),
                 limit: tree.stretch(),
             }),
             Err(error) => Err(error),

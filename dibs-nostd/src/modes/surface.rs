@@ -6,9 +6,6 @@ use super::{FRACTION_BITS, Modes};
 use crate::surface::VertexTable;
 use crate::tree::format;
 
-/// The square root of 3, rounded up by more than the rounding of a few operations.
-const DIAGONAL: f32 = 1.7321;
-
 /// The surface at some weights: [`Modes::surface`] makes one.
 ///
 /// It stores a copy of its weights and a view of flash. `K` is the room for weights, at least [`Modes::count`].
@@ -20,9 +17,9 @@ const DIAGONAL: f32 = 1.7321;
 /// RAM: `4 K` bytes and a copy of [`Modes`].
 #[derive(Clone, Copy, Debug)]
 pub struct ModalSurface<'a, const K: usize> {
-    modes: Modes<'a>,
+    pub(super) modes: Modes<'a>,
     /// Weight times gain of each mode.
-    gains: [i32; K],
+    pub(super) gains: [i32; K],
 }
 
 impl<'a, const K: usize> ModalSurface<'a, K> {
@@ -33,17 +30,6 @@ impl<'a, const K: usize> ModalSurface<'a, K> {
             *gain = (weight * mode.gain) as i32;
         }
         Self { modes: *modes, gains }
-    }
-
-    /// Upper bound (mm) on a vertex's distance from its position on `before`, a surface of the same modes, but for the
-    /// rounding of the two positions.
-    ///
-    /// On each axis a mode moves a vertex by at most 2^15 of its steps, rounded down: `gain * 2^15 / 2^16` units, plus
-    /// one.
-    pub(super) fn farthest_from(&self, before: &Self) -> f32 {
-        let halves = |(now, before): (&i32, &i32)| u64::from(now.abs_diff(*before)) + 2;
-        let sum: u64 = self.gains.iter().zip(&before.gains).map(halves).sum();
-        sum as f32 * (0.5 * DIAGONAL) * self.modes.header.unit
     }
 
     /// The modes that move this surface.

@@ -51,7 +51,7 @@ impl MeasuredStretch {
     }
 
     /// A bound for a surface made of two that were measured; `None` if with different trees.
-    pub(super) fn of_both(self, other: Self, sigma: f32) -> Option<Self> {
+    pub(crate) fn of_both(self, other: Self, sigma: f32) -> Option<Self> {
         let larger = if other.sigma > self.sigma { other } else { self };
         let regions = [u8::MAX; REGIONS];
         (self.tree == other.tree).then_some(Self { sigma, epoch: None, regions, ..larger })

@@ -12,7 +12,7 @@ mod moving;
 mod reader;
 mod vertices;
 
-pub(crate) use age::Ageing;
+pub(crate) use age::{Ageing, elapsed};
 #[cfg(feature = "bus")]
 pub(crate) use buffer::Ahead;
 pub use buffer::{Buffer, FrameLabel, Position};
@@ -23,6 +23,8 @@ pub(crate) use measured::share;
 pub use measured::{MeasuredStretch, REGIONS};
 pub use motion::{Moved, MovingSurface, Odometer, Travel, TravelUnit};
 pub use moving::{Between, Step};
+#[cfg(feature = "modes")]
+pub(crate) use moving::{FARTHEST, clamped};
 #[cfg(feature = "bus")]
 pub(crate) use reader::LastStep;
 pub use reader::{FrameGuard, FrameReader, FrameView};

@@ -25,6 +25,8 @@ mod sealed {
     impl<V: super::VertexTable + ?Sized> Sealed for super::Moved<'_, V> {}
     impl<S: super::MovingSurface + ?Sized> Sealed for &S {}
     impl<const N: usize, F: crate::surface::Buffers> Sealed for crate::FrameGuard<'_, N, F> {}
+    #[cfg(feature = "modes")]
+    impl<const K: usize> Sealed for crate::modes::ModalFrame<'_, K> {}
     impl<W, V> Sealed for crate::surface::moving::Between<'_, W, V>
     where
         W: super::VertexTable + ?Sized,
@@ -153,10 +155,14 @@ impl Unit {
         self.down(length).wrapping_add(1)
     }
 
+    /// A length in units, rounded up, however long it is.
+    fn units_of(self, length: f32) -> u64 {
+        ((length * self.inverse) as u64).saturating_add(1)
+    }
+
     /// The units of a step whose square was rounded to nearest, rounded up; `None` if it is not finite.
     fn units_of_step(self, squared: f32) -> Option<u64> {
-        let units = ((length_of_step(squared) * self.inverse) as u64).saturating_add(1);
-        (squared < f32::INFINITY).then_some(units)
+        (squared < f32::INFINITY).then(|| self.units_of(length_of_step(squared)))
     }
 
     /// The length of so many units, to the nearest f32.
@@ -177,6 +183,12 @@ pub struct TravelUnit {
 impl TravelUnit {
     pub(crate) const fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
         Self { tree: tree.checksum(), unit: Unit::of(tree) }
+    }
+
+    /// A length in units, rounded up.
+    #[cfg(feature = "modes")]
+    pub(crate) fn units_of(&self, length: f32) -> u64 {
+        self.unit.units_of(length)
     }
 }
 

@@ -75,10 +75,10 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
 
 /// Longest extrapolation, in units of the time between the frames. At a steady rate a frame whose way takes as long as
 /// that time is twice as old when the next one comes.
-const FARTHEST: f32 = 2.0;
+pub(crate) const FARTHEST: f32 = 2.0;
 
 /// A number within 0 and `most`: 0 for NaN.
-fn clamped(share: f32, most: f32) -> f32 {
+pub(crate) fn clamped(share: f32, most: f32) -> f32 {
     let share = if share > 0.0 { share } else { 0.0 };
     if share < most { share } else { most }
 }

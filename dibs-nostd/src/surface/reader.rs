@@ -76,6 +76,12 @@ impl<const N: usize, F: Buffers> FrameGuard<'_, N, F> {
     pub fn label(&self) -> FrameLabel {
         self.view.label()
     }
+
+    /// Its age when it was read.
+    #[cfg(feature = "modes")]
+    pub(crate) const fn age(&self) -> u32 {
+        self.age
+    }
 }
 
 /// With three buffers the surface moves between frames.

@@ -9,6 +9,7 @@ pub mod bus;
 pub mod receive;
 pub mod tick;
 pub mod track;
+pub mod weights;
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::modes::{MAX_MODES, Memo, ModalSurface, Modes};

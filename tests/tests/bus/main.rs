@@ -13,3 +13,4 @@ mod properties;
 mod specification;
 mod travel;
 mod weights;
+mod weights_between;

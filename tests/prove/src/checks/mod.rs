@@ -31,6 +31,7 @@ mod stack;
 mod ticks;
 mod torn;
 mod tracked;
+mod tracked_modes;
 
 use crate::harness::Check;
 
@@ -62,6 +63,7 @@ pub const CHECKS: &[Check] = &[
     torn::CHECK,
     receive::CHECK,
     modes::CHECK,
+    tracked_modes::CHECK,
     sanitizers::ADDRESS,
     sanitizers::THREAD,
     miri::CHECK,

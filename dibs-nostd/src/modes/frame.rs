@@ -1,0 +1,218 @@
+//! A modal surface that came over the bus: as it was sent, between it and the frame before, and after it.
+//!
+//! Weights are blended, not positions: a vertex costs as much as on the frame itself. The stretch between two shapes is
+//! bounded by convexity, as in the [bound](super::bound) of a frame.
+
+use glam::Vec3;
+
+use super::bound::ROUNDING;
+use super::reach::Reach;
+use super::{ModalSurface, Modes};
+use crate::surface::{
+    FARTHEST, FrameLabel, MeasuredStretch, MovingSurface, Travel, VertexTable, clamped,
+};
+
+/// The weights of a surface, and a bound on its stretch.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Weights<const K: usize> {
+    pub values: [f32; K],
+    pub stretch: Option<MeasuredStretch>,
+}
+
+impl<const K: usize> Weights<K> {
+    fn surface<'a>(&self, modes: &Modes<'a>) -> ModalSurface<'a, K> {
+        ModalSurface::new(modes, self.values.iter().copied())
+    }
+
+    /// The surface on the straight way to another: `share` 0 is this one, 1 the other.
+    fn towards(&self, other: &Self, share: f32, modes: &Modes<'_>) -> Self {
+        let mut values = self.values;
+        for (value, other) in values.iter_mut().zip(&other.values) {
+            *value += (other - *value) * share;
+        }
+        let stretch = match (self.stretch, other.stretch) {
+            (Some(old), Some(new)) => {
+                let sigma = (1.0 - share) * old.sigma() + share * new.sigma();
+                old.of_both(new, sigma * ROUNDING + modes.header.slack)
+            }
+            _ => None,
+        };
+        Self { values, stretch }
+    }
+}
+
+/// The way from the frame before to this one, and on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Step<const K: usize> {
+    before: Weights<K>,
+    /// The end of the extrapolation, its weights within their ranges.
+    end: Weights<K>,
+    /// Time from the frame before to this one, on the receiver's clock.
+    interval: u32,
+    /// The odometer's reading at the frame before.
+    from: Travel,
+    /// Units of the odometer from the frame before to this one, and from this one to the end.
+    pub units: u64,
+    units_ahead: u64,
+    /// Distances of the frame before and of this one from their extrapolations; NaN if unknown.
+    shown: [f32; 2],
+}
+
+impl<const K: usize> Step<K> {
+    /// The step from a frame with the reading `from` to the next.
+    ///
+    /// Cost: O(modes times anchors).
+    pub fn new(
+        modes: &Modes<'_>,
+        reach: &Reach<K>,
+        [before, now]: [&Weights<K>; 2],
+        (from, interval): (Travel, u32),
+        last: Option<&Self>,
+    ) -> Self {
+        let mut end = *now;
+        for ((end, before), mode) in end.values.iter_mut().zip(&before.values).zip(modes.modes()) {
+            let ahead = *end + (*end - before) * FARTHEST;
+            let ahead = if ahead > mode.low { ahead } else { mode.low };
+            *end = if ahead < mode.high { ahead } else { mode.high };
+        }
+        end.stretch = Some(modes.bound(&end.values));
+        let surface = now.surface(modes);
+        let units = |other: &Weights<K>| {
+            modes.travel.units_of(reach.between(&other.surface(modes), &surface))
+        };
+        let shown = match last {
+            Some(last) => {
+                let expected = before.towards(&last.end, last.ahead(interval), modes);
+                [last.shown[1], reach.between(&expected.surface(modes), &surface)]
+            }
+            None => [f32::NAN; 2],
+        };
+        let (units, units_ahead) = (units(before), units(&end));
+        Self { before: *before, end, interval, from, units, units_ahead, shown }
+    }
+
+    /// Part of the way to the end after so long.
+    fn ahead(&self, age: u32) -> f32 {
+        clamped(age as f32 / self.interval as f32, FARTHEST) / FARTHEST
+    }
+}
+
+/// A published modal surface: a [`VertexTable`] that carries a bound on its stretch and its position error, and a
+/// [`MovingSurface`].
+///
+/// RAM: `16 K` bytes and some 400.
+#[derive(Clone, Copy, Debug)]
+pub struct ModalFrame<'a, const K: usize> {
+    surface: ModalSurface<'a, K>,
+    label: FrameLabel,
+    weights: Weights<K>,
+    travel: Option<Travel>,
+    step: Option<Step<K>>,
+    /// Age of the frame when it was read.
+    age: u32,
+    is_frame: bool,
+    shown: f32,
+}
+
+impl<'a, const K: usize> ModalFrame<'a, K> {
+    /// A frame as it was received.
+    pub(super) fn new(
+        modes: &Modes<'a>,
+        label: FrameLabel,
+        weights: &Weights<K>,
+        travel: Option<Travel>,
+        step: Option<Step<K>>,
+        age: u32,
+    ) -> Self {
+        let surface = weights.surface(modes);
+        let (is_frame, shown) = (true, f32::NAN);
+        Self { surface, label, weights: *weights, travel, step, age, is_frame, shown }
+    }
+
+    /// The facts about this frame; of a surface between frames, those of the later. Its position error is that of the
+    /// modes for the motion that they were fitted to.
+    #[must_use]
+    pub const fn label(&self) -> FrameLabel {
+        self.label
+    }
+
+    /// The surface as long ago as the time between the last two frames that were read: certain, and late by that time.
+    ///
+    /// This and [`extrapolated`](Self::extrapolated) are the frame itself until a second one has been read, of another
+    /// time. A frame from [`ModalReader::read`](super::ModalReader::read) has no age. O(modes).
+    #[must_use]
+    pub fn interpolated(&self) -> Self {
+        let Some(step) = &self.step else { return *self };
+        let share = clamped(self.age as f32 / step.interval as f32, 1.0);
+        let weights = step.before.towards(&self.weights, share, self.surface.modes());
+        let travel = step.from.beyond((share * step.units as f32) as u64, 0);
+        self.moved(weights, travel, f32::NAN)
+    }
+
+    /// The surface now, if every weight has kept its velocity since the last frame: on time, and wrong by the change of
+    /// the motion. O(modes).
+    ///
+    /// It goes on for twice the time between the last two frames, and is held then. No weight leaves its range. It is
+    /// held at once where the surface, moved on for so long, might be stretched beyond the tree's limit.
+    #[must_use]
+    pub fn extrapolated(&self) -> Self {
+        let (Some(step), Some(travel)) = (&self.step, self.travel) else { return *self };
+        let modes = self.surface.modes();
+        if !step.end.stretch.is_some_and(|end| end.sigma() <= modes.stretch_limit()) {
+            return *self;
+        }
+        let share = step.ahead(self.age);
+        let weights = self.weights.towards(&step.end, share, modes);
+        let travel = travel.beyond(0, (share * step.units_ahead as f32) as i64);
+        // The change of the motion may have been none by chance. False for NaN.
+        let [before, now] = step.shown;
+        let shown = if before > now { before } else { now };
+        let shown = if share < 1.0 { shown } else { f32::NAN };
+        self.moved(weights, travel, shown)
+    }
+
+    /// A bound (mm) on the distance of the last frame's vertices from its extrapolation by the two frames before, the
+    /// larger of the last two frames': an estimate of this surface's own error by the time of the next frame, not a
+    /// bound. `None` for a surface between its frames, where it is not known, and once the extrapolation has come to its
+    /// end.
+    #[must_use]
+    pub fn shown_error(&self) -> Option<f32> {
+        (self.shown >= 0.0).then_some(self.shown)
+    }
+
+    fn moved(&self, weights: Weights<K>, travel: Travel, shown: f32) -> Self {
+        let surface = weights.surface(self.surface.modes());
+        let (travel, step) = (Some(travel), None);
+        Self { surface, weights, travel, step, shown, is_frame: false, ..*self }
+    }
+}
+
+impl<const K: usize> VertexTable for ModalFrame<'_, K> {
+    fn len(&self) -> usize {
+        self.surface.len()
+    }
+
+    #[inline(always)]
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.surface.position(vertex)
+    }
+
+    fn epoch(&self) -> Option<u32> {
+        self.is_frame.then_some(self.label.epoch)
+    }
+
+    fn stretch(&self) -> Option<MeasuredStretch> {
+        self.weights.stretch
+    }
+
+    fn position_error(&self) -> f32 {
+        self.label.position_error
+    }
+}
+
+/// Its motion since other frames of one reader is known, between frames too.
+impl<const K: usize> MovingSurface for ModalFrame<'_, K> {
+    fn travel(&self) -> Option<Travel> {
+        self.travel
+    }
+}
