@@ -26,8 +26,10 @@ pub fn of(experiment: &str, plan: &Plan, options: &Options, records: &mut Record
     if let Some(queries) = options.queries {
         command += &format!(" --queries {queries}");
     }
-    if options.only == Some(Only::Imaging) {
-        command += " --only imaging";
+    match options.only {
+        Some(Only::Imaging) => command += " --only imaging",
+        Some(Only::Contacts) => command += " --only contacts",
+        None => (),
     }
     let meshes = match real() {
         Some(_) => "real anatomy (human brains and a human heart, beside the repository)",

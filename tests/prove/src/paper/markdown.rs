@@ -3,9 +3,9 @@
 use std::fmt::Write;
 
 use super::brain::TOOLS;
-use super::imaging;
 use super::names::*;
 use super::record::{Cell, Record, Records};
+use super::{contacts, imaging};
 
 /// The page.
 pub fn benchmarks(records: &Records) -> String {
@@ -22,6 +22,7 @@ pub fn benchmarks(records: &Records) -> String {
     hearts(&mut page, records);
     cortex_m7(&mut page, records);
     control_loop(&mut page, records);
+    contacts::table(&mut page, records);
     ratios(&mut page, records);
     crossovers(&mut page, records);
     page.push_str(FIGURE_6);

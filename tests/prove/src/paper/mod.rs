@@ -3,6 +3,7 @@
 mod ablation;
 mod brain;
 mod claims;
+pub mod contacts;
 mod facts;
 mod figures;
 mod heart;
@@ -36,11 +37,15 @@ pub fn bench(options: &Options) -> Result<()> {
     let folder = options.out.clone().unwrap_or(default);
     let records = if options.render {
         Records::read(&folder.join("benchmarks.json"))?
-    } else if options.only == Some(Only::Imaging) {
+    } else if let Some(only) = options.only {
         let path = folder.join("benchmarks.json");
         let mut records = if path.is_file() { Records::read(&path)? } else { Records::default() };
         let start = Instant::now();
-        imaging::run(&Plan::of(options), options, &mut records)?;
+        let plan = Plan::of(options);
+        match only {
+            Only::Imaging => imaging::run(&plan, options, &mut records)?,
+            Only::Contacts => contacts::run(&plan, options, &mut records)?,
+        }
         println!("measured in {:.0} s", start.elapsed().as_secs_f64());
         records
     } else if options.paper_search {
@@ -80,6 +85,7 @@ pub fn run(plan: &Plan, options: &Options) -> Result<Records> {
     ablation::run(plan, &mut records)?;
     search::run(plan, &mut records)?;
     imaging::run(plan, options, &mut records)?;
+    contacts::run(plan, options, &mut records)?;
     Ok(records)
 }
 

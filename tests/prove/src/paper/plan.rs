@@ -36,6 +36,8 @@ pub struct Options {
 pub enum Only {
     /// The control loop at imaging rates: ten minutes on a quiet machine.
     Imaging,
+    /// Contacts within a margin: five minutes.
+    Contacts,
 }
 
 /// The size of a run.
@@ -56,6 +58,8 @@ pub struct Plan {
     /// Brains in the control loop at imaging rates, and its ticks.
     pub imaging_brains: Vec<u32>,
     pub imaging_ticks: u32,
+    /// Ticks at which contacts are asked for, on the same brains.
+    pub contact_ticks: u32,
 }
 
 impl Plan {
@@ -72,6 +76,7 @@ impl Plan {
             ablation_queries: 1_000,
             imaging_brains: vec![5_000, 50_000, 500_000],
             imaging_ticks: 7_000,
+            contact_ticks: 10_000,
         }
     }
 
@@ -94,6 +99,7 @@ impl Plan {
             ablation_brains: vec![5_000],
             ablation_queries: 200,
             imaging_ticks: 1_000,
+            contact_ticks: 1_000,
             ..Self::full()
         }
     }
@@ -111,6 +117,7 @@ impl Plan {
             ablation_queries: 5,
             imaging_brains: vec![500],
             imaging_ticks: 200,
+            contact_ticks: 2_000,
         }
     }
 

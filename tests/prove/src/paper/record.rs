@@ -11,7 +11,8 @@ use super::statistics::Summary;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// `run` (facts about the run), `brain` (tables 1 and 2), `heart` (table 3), `compare`, `crossover`,
-    /// `ablation`, `histogram`, `imaging`, `imaging-heart` and `imaging-run` (their facts).
+    /// `ablation`, `histogram`, `imaging`, `imaging-heart` and `imaging-run` (their facts), `contacts` and
+    /// `contacts-run`.
     pub experiment: String,
     pub mesh: String,
     pub triangles: u64,

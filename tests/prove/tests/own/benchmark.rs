@@ -9,7 +9,7 @@ use dibs_prove::paper::imaging::ours::Surface;
 use dibs_prove::paper::imaging::race::{Contender, Period, Race};
 use dibs_prove::paper::plan::{Options, Plan};
 use dibs_prove::paper::record::{Record, Records};
-use dibs_prove::paper::{documents, imaging, run, write};
+use dibs_prove::paper::{contacts, documents, imaging, run, write};
 use dibs_tests::method::{Found, Probe};
 use xtask::workspace;
 
@@ -21,6 +21,8 @@ fn every_experiment_runs_and_all_methods_agree() {
         let count = records.0.iter().filter(|r| r.experiment == experiment).count();
         assert!(count > 10, "{experiment}: {count} records");
     }
+    let contacts = records.0.iter().filter(|r| r.experiment == "contacts");
+    assert!(contacts.filter(|r| r.metric == "contacts" && r.mean > 0.1).count() == 2);
     let back: serde_json::Value =
         serde_json::from_str(&records.json().expect("numbers are finite")).expect("valid JSON");
     assert_eq!(back.as_array().map(Vec::len), Some(records.0.len()));
@@ -47,16 +49,20 @@ fn check(folder: &Path) {
 
 /// A part that is recorded by itself replaces its own records, and leaves the others as they are.
 #[test]
-fn the_control_loop_is_recorded_apart_from_the_rest() {
+fn a_part_is_recorded_apart_from_the_rest() {
     let mut records = Records(vec![
         Record::fact("run", "kind", "another run"),
         Record::fact("imaging", "an older run", "to be replaced"),
+        Record::fact("contacts", "an older run", "to be replaced"),
         Record::fact("brain", "total", "another run"),
     ]);
-    let others = [records.0[0].clone(), records.0[2].clone()];
+    let others = [records.0[0].clone(), records.0[3].clone()];
     imaging::run(&Plan::smoke(), &Options::default(), &mut records).expect("methods agree");
+    contacts::run(&Plan::smoke(), &Options::default(), &mut records).expect("all are found");
     assert_eq!(records.0[..2], others);
-    assert!(records.0[2..].iter().all(|r| r.experiment.starts_with("imaging")));
+    let of = |name: &str| records.0[2..].iter().filter(|r| r.experiment.starts_with(name)).count();
+    assert!(of("imaging") > 10 && of("contacts") > 10);
+    assert_eq!(of("imaging") + of("contacts") + 2, records.0.len());
     assert!(records.0.iter().all(|r| r.metric != "an older run"));
 }
 
