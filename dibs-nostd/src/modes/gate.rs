@@ -29,7 +29,7 @@ impl<'a, G, const K: usize> ModalGate<'a, G, K> {
     /// A gate for surfaces of exactly `K` modes. `exact`, the tree or a monitor of it, measures the surfaces that the
     /// bounds cannot admit. Only a monitor limits the speed.
     ///
-    /// Cost: one pass over the displacements of all vertices.
+    /// Cost: two passes over the displacements of all vertices.
     ///
     /// # Errors
     /// [`WeightsError::Count`] for another number of modes.

@@ -21,6 +21,8 @@ mod memo;
 mod reach;
 mod reader;
 mod surface;
+#[cfg(test)]
+mod tests;
 
 use layout::Header;
 

@@ -89,30 +89,11 @@ fn fourth_power_of_norm(columns: impl Iterator<Item = Vec3>) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use dibs_build::modes::ModalFit;
-    use dibs_build::{Builder, BuiltTree, generate};
     use fastrand::Rng;
 
     use super::*;
+    use crate::modes::tests::{MODES, surface};
     use crate::{Tree, VertexTable};
-
-    const MODES: usize = 8;
-
-    /// A beating heart that three waves run over.
-    fn surface() -> BuiltTree {
-        let generate::MovingMesh { mesh, mut motion } = generate::heart(320).unwrap();
-        for (time, frame) in (0_u8..).zip(&mut motion.frames) {
-            for (position, rest) in frame.iter_mut().zip(&mesh.positions) {
-                for wave in 1..=3_u8 {
-                    let (axis, wave) = (Vec3::AXES[usize::from(wave % 3)], f32::from(wave));
-                    let phase = rest.dot(axis) * 0.05 * wave + 0.2 * wave * f32::from(time);
-                    *position += axis * phase.sin() * 3.0;
-                }
-            }
-        }
-        let fit = ModalFit::new(&mesh, &motion).unwrap();
-        Builder::new().stretch(3.0).build(&mesh).unwrap().with_modes(&fit, MODES).unwrap()
-    }
 
     /// No vertex moves farther than the bound, whatever the weights, and also where they are chosen so that one vertex
     /// moves as far as it can.

@@ -34,7 +34,7 @@ struct Last<const K: usize> {
 impl<'f, 'a, const K: usize> ModalReader<'f, 'a, K> {
     /// A reader of surfaces of exactly `K` modes.
     ///
-    /// Cost: one pass over the displacements of all vertices.
+    /// Cost: two passes over the displacements of all vertices.
     ///
     /// # Errors
     /// [`WeightsError::Count`] for another number of modes.

@@ -203,6 +203,15 @@ fn label(epoch: u32, received: u32) -> FrameLabel {
     FrameLabel { epoch, received, position_error: 0.0, stretch: None }
 }
 
+/// Publishes weights by hand.
+fn publish(writer: &mut FrameWriter<'static, MODES>, weights: &[f32], label: FrameLabel) {
+    writer.begin();
+    for weight in weights {
+        writer.push(Vec3::new(*weight, 0.0, 0.0)).expect("in the table");
+    }
+    writer.publish(label).expect("complete");
+}
+
 /// Weights that no receiver publishes, out of their ranges: their motion is unknown, and so is that to the next frame.
 #[test]
 fn weights_out_of_range_have_no_motion() {
@@ -225,11 +234,7 @@ fn weights_out_of_range_have_no_motion() {
             (&good, None),
         ];
         for (epoch, (weights, expected)) in (0..).zip(frames) {
-            writer.begin();
-            for weight in weights {
-                writer.push(Vec3::new(*weight, 0.0, 0.0)).expect("in the table");
-            }
-            writer.publish(label(epoch, 20 * epoch)).expect("complete");
+            publish(&mut writer, weights, label(epoch, 20 * epoch));
             let frame = reader.latest(20 * epoch + 10).of_any_age().expect("published");
             for surface in [frame, frame.interpolated(), frame.extrapolated()] {
                 assert_eq!(surface.travel().is_some(), !std::ptr::eq(weights, &raw const bad));
@@ -237,6 +242,30 @@ fn weights_out_of_range_have_no_motion() {
             let found = tracker.closest(&frame, &tool, &Options::cold().unsigned()).expect("sound");
             assert_eq!(found.fallback, expected, "{epoch}: {hostile}");
         }
+    }
+}
+
+/// Frames that a writer labels alike are not one frame: the second has its own place, and its motion is measured.
+#[test]
+fn frames_of_one_label_are_told_apart() {
+    let mut rng = Rng::with_seed(35);
+    let tree = surface();
+    let modes = Modes::of(tree).expect("valid");
+    let (mut writer, mut reader) = buffers(&modes);
+    let mut tracker = Tracker::<u16, MAX_STACK, 96>::new(tree).expect("deep");
+    let mut whole = Query::<u16, MAX_STACK>::new(tree).expect("deep");
+    let options = Options::cold().unsigned();
+    for _ in 0..50 {
+        let weights = anywhere(&modes, &mut rng);
+        publish(&mut writer, &weights, label(7, 20));
+        let frame = reader.latest(30).of_any_age().expect("published");
+        let exact =
+            exact(&modes, &weights.iter().map(|weight| f64::from(*weight)).collect::<Vec<_>>());
+        assert!(off(&frame, &exact) < 1e-2);
+        let tool = Sphere::new(exact[0].as_vec3() * 1.1, 2.0).expect("valid");
+        let found = tracker.closest(&frame, &tool, &options).expect("sound").closest;
+        let truth = whole.closest(&frame, &tool, &options).expect("sound");
+        assert!((found.separation - truth.separation).abs() <= 2.0 * truth.accuracy);
     }
 }
 
@@ -261,6 +290,34 @@ fn without_a_time_between_frames_nothing_moves() {
         let frame = reader.read().expect("published");
         assert!(same(&frame, frame.extrapolated()) || epoch == 4, "{epoch}");
     }
+}
+
+/// No extrapolated weight leaves its range.
+#[test]
+fn an_extrapolation_ends_at_the_ends_of_the_ranges() {
+    let tree = surface();
+    let modes = Modes::of(tree).expect("valid");
+    let mut ended = 0;
+    for (mode, end) in (0..MODES).flat_map(|mode| [(mode, 0), (mode, 1)]) {
+        let (writer, mut reader) = buffers(&modes);
+        let mut bus = Assembler::new(writer, WithinRange(&modes), tree.mesh_id(), 1e4);
+        let at = |share: f32| {
+            let mut weights = [0.0; MODES];
+            weights[mode] = modes.range(mode).expect("there")[end] * share;
+            weights
+        };
+        assert!(send(&mut bus, tree.mesh_id(), 1, &at(0.2), 20));
+        assert!(reader.read().is_some());
+        assert!(send(&mut bus, tree.mesh_id(), 2, &at(0.7), 40));
+        let frame = reader.latest(80).of_any_age().expect("published");
+        let moved = frame.extrapolated();
+        if moved.epoch().is_none() {
+            let last = at(1.0).map(f64::from);
+            assert!(off(&moved, &exact(&modes, &last)) < 1e-4, "{mode}");
+            ended += 1;
+        }
+    }
+    assert!(ended > 2, "{ended}");
 }
 
 /// A gate that bounds no stretch.

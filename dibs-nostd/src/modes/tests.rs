@@ -1,0 +1,92 @@
+//! The motion of a modal surface as its odometer states it, which only the crate can read.
+
+use dibs_build::modes::ModalFit;
+use dibs_build::{Builder, BuiltTree, generate};
+use fastrand::Rng;
+use glam::Vec3;
+
+use super::{ModalFrame, ModalReader, Modes};
+use crate::surface::motion::Unit;
+use crate::{FrameLabel, FrameWriter, Frames, MovingSurface, Tree, VertexTable};
+
+pub(super) const MODES: usize = 8;
+
+/// A beating heart that three waves run over.
+pub(super) fn surface() -> BuiltTree {
+    let generate::MovingMesh { mesh, mut motion } = generate::heart(320).unwrap();
+    for (time, frame) in (0_u8..).zip(&mut motion.frames) {
+        for (position, rest) in frame.iter_mut().zip(&mesh.positions) {
+            for wave in 1..=3_u8 {
+                let (axis, wave) = (Vec3::AXES[usize::from(wave % 3)], f32::from(wave));
+                let phase = rest.dot(axis) * 0.05 * wave + 0.2 * wave * f32::from(time);
+                *position += axis * phase.sin() * 3.0;
+            }
+        }
+    }
+    let fit = ModalFit::new(&mesh, &motion).unwrap();
+    Builder::new().stretch(3.0).build(&mesh).unwrap().with_modes(&fit, MODES).unwrap()
+}
+
+/// The farthest that a vertex moved from one surface to another.
+fn moved(before: &impl VertexTable, after: &impl VertexTable) -> f32 {
+    let rows = 0..before.len() as u32;
+    rows.map(|row| before.position(row).unwrap().distance(after.position(row).unwrap()))
+        .fold(0.0, f32::max)
+}
+
+fn publish(writer: &mut FrameWriter<'_, MODES>, weights: &[f32], epoch: u32, received: u32) {
+    writer.begin();
+    for weight in weights {
+        writer.push(Vec3::new(*weight, 0.0, 0.0)).unwrap();
+    }
+    let label = FrameLabel { epoch, received, position_error: 0.0, stretch: None };
+    writer.publish(label).unwrap();
+}
+
+/// Between any two surfaces that a reader gave, frames, between frames and beyond them, no vertex moved farther than the
+/// odometer says, and it does not say much more. Some frames have the number and the time of the one before.
+#[test]
+fn no_vertex_moves_farther_than_the_odometer_says() {
+    let built = surface();
+    let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
+    let modes = Modes::of(&tree).unwrap();
+    let frames = Frames::<MODES>::new();
+    let (mut writer, reader) = frames.split().unwrap();
+    let mut reader = ModalReader::new(reader, &modes).unwrap();
+    let unit = Unit::of(&tree);
+    let mut rng = Rng::with_seed(5);
+    let mut before: [Option<ModalFrame<'_, MODES>>; 3] = [None; 3];
+    let (mut sums, mut now) = ([[0.0; 2]; 3], 9_u32.wrapping_neg());
+    let mut weights = [0.0; MODES];
+    let (mut epoch, mut received) = (0, now);
+    for _ in 0..400 {
+        let ranges = (0..MODES).map(|mode| modes.range(mode).unwrap());
+        for (weight, [low, high]) in weights.iter_mut().zip(ranges) {
+            *weight += 0.1 * (low + (high - low) * rng.f32() - *weight);
+        }
+        if rng.u32(..6) > 0 {
+            (epoch, received) = (epoch + 1, now);
+        }
+        publish(&mut writer, &weights, epoch, received);
+        for _ in 0..rng.u32(1..8) {
+            now = now.wrapping_add(rng.u32(0..6));
+            let frame = reader.latest(now).of_any_age().unwrap();
+            let surfaces = [frame, frame.interpolated(), frame.extrapolated()];
+            for ((surface, before), sums) in surfaces.iter().zip(&mut before).zip(&mut sums) {
+                if let Some(before) = before {
+                    let units = surface.travel().unwrap().since(&before.travel().unwrap());
+                    let (stated, found) =
+                        (unit.length(units.unwrap() as i32), moved(before, surface));
+                    assert!(found <= stated + 1e-4, "{epoch}: {found} {stated}");
+                    *sums = [sums[0] + found, sums[1] + stated];
+                }
+                if before.is_none() || rng.bool() {
+                    *before = Some(*surface);
+                }
+            }
+        }
+    }
+    for [found, stated] in sums {
+        assert!(found > 100.0 && stated < 3.0 * found, "{sums:?}");
+    }
+}
