@@ -36,7 +36,7 @@ pub struct Options {
 pub enum Only {
     /// The control loop at imaging rates: ten minutes on a quiet machine.
     Imaging,
-    /// Contacts within a margin: five minutes.
+    /// Contacts within a margin: two minutes.
     Contacts,
 }
 
