@@ -32,6 +32,8 @@ pub mod tick {
     pub const CONTACTS: u32 = 1 << 2;
     /// A chain of [`LINKS`](super::LINKS) capsules, each with its tracker.
     pub const CHAIN: u32 = 1 << 3;
+    /// With the side alone: where the axis crosses, any depth will do.
+    pub const SIDE: u32 = 1 << 4;
 }
 
 /// Capsules of a chain.
@@ -44,7 +46,7 @@ pub const JOINTS: usize = LINKS + 1;
 /// the difference from the query's separation in units of both accuracies, and of the tolerance of a depth.
 pub const ANSWER_WORDS: usize = 8;
 /// Largest tree, in bytes.
-pub const TREE_BYTES: usize = 1 << 20;
+pub const TREE_BYTES: usize = 5 << 19;
 /// Most vertices.
 pub const VERTICES: usize = 26_000;
 const STACK: usize = 128;
@@ -195,7 +197,11 @@ impl Session<'_, '_> {
         let link = |from, to| Capsule::new(from, to, radius).map_err(|_| Fault);
         let first = link(a, b)?;
         let options = Options::cold().stretch(stretch);
-        let options = if !EVERY || kind & tick::SIGNED == 0 { options.unsigned() } else { options };
+        let options = match (EVERY, kind & (tick::SIGNED | tick::SIDE)) {
+            (true, tick::SIGNED) => options,
+            (true, tick::SIDE) => options.depth_tolerance(f32::INFINITY),
+            _ => options.unsigned(),
+        };
         let mut contacts = Contacts::<8>::new();
         let (took, found) = if EVERY && kind & tick::CHAIN != 0 {
             let chain = [
@@ -216,7 +222,8 @@ impl Session<'_, '_> {
                 let whole = self.query.closest(surface, capsule, &options).map_err(|_| Fault)?;
                 closest = if whole.separation < closest { whole.separation } else { closest };
             }
-            return Ok(answer(took, 0, &found, closest, found.closest.accuracy, &chain[0]));
+            let accuracy = found.closest.accuracy;
+            return Ok(answer(took, 0, &found, closest, accuracy, &chain[0], kind));
         } else {
             let [Some(tracker), ..] = &mut *self.trackers else { return Err(Fault) };
             let before = machine.clock();
@@ -240,7 +247,11 @@ impl Session<'_, '_> {
         let whole_took = machine.clock().wrapping_sub(before);
         let whole = whole.map_err(|_| Fault)?;
         self.last = whole.triangle;
-        Ok(answer(took, whole_took, &found, whole.separation, whole.accuracy, &first))
+        let is_near = whole.axis_distance <= 2.0 * whole.accuracy;
+        if EVERY && found.closest.side != whole.side && !is_near {
+            return Err(Fault);
+        }
+        Ok(answer(took, whole_took, &found, whole.separation, whole.accuracy, &first, kind))
     }
 
     fn closest_of(
@@ -277,11 +288,16 @@ fn answer(
     whole: f32,
     accuracy: f32,
     tool: &Capsule,
+    kind: u32,
 ) -> [u32; ANSWER_WORDS] {
     let closest = &found.closest;
     // Of an axis that crosses or touches each search finds a depth within the tolerance.
     let is_deep = closest.separation <= -tool.radius() || whole <= -tool.radius();
-    let tolerance = if is_deep { Tool::axis_length(tool) / 512.0 } else { 0.0 };
+    let tolerance = match (is_deep, kind & tick::SIDE) {
+        (false, _) => 0.0,
+        (true, 0) => Tool::axis_length(tool) / 512.0,
+        (true, _) => f32::INFINITY,
+    };
     let apart = closest.separation - whole;
     let apart = if apart < 0.0 { -apart } else { apart };
     let apart = apart / (closest.accuracy + accuracy + 2.0 * tolerance);

@@ -77,6 +77,21 @@ fn depths_are_those_of_dense_sampling() {
             }
             assert!(holds, "{}: {tool:?} {found:?} {low} {high}", surface.name);
             crossing += 1;
+            // The side alone costs the closest pair, and leaves the depth between two ends.
+            let [side, plain] =
+                [Options::cold().depth_tolerance(f32::INFINITY), Options::cold().unsigned()].map(
+                    |options| {
+                        query.closest(rows.as_slice(), &capsule, &options).expect("an answer")
+                    },
+                );
+            let touches = Side::Undefined(NoSide::BelowAccuracy);
+            assert!(side.side == Side::Crossing || side.side == touches, "{side:?}");
+            assert_eq!(
+                (side.node_tests, side.triangle_tests),
+                (plain.node_tests, plain.triangle_tests)
+            );
+            let (lower, upper) = (f64::from(side.lower), f64::from(side.separation));
+            assert!(lower <= low + accuracy && upper >= low - accuracy, "{side:?} {low} {high}");
             searches += u64::from(found.node_tests);
             // The stated depth is the depth of the stated point.
             let deepest = capsule.axis_point(found.axis_parameter);

@@ -75,7 +75,11 @@ fn the_depth_is_that_of_a_whole_query() {
             _ => Budget::UNLIMITED,
         };
         let options = Options::new().budget(budget);
-        let options = if shaft.rng.u32(..60) == 0 { options.unsigned() } else { options };
+        let options = match shaft.rng.u32(..60) {
+            0 => options.unsigned(),
+            1 => options.depth_tolerance(f32::INFINITY),
+            _ => options,
+        };
         let tracked = tracker.closest(&surface, &capsule, &options).expect("an answer").closest;
         let whole = query.closest(&surface, &capsule, &Options::new()).expect("an answer");
         if matches!(tracked.side, Side::Undefined(_)) && whole.side != tracked.side {

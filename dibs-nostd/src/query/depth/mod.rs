@@ -103,6 +103,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         let least = LEAST_TOLERANCE * self.meeting.accuracy;
         let default = larger(self.tool.axis_length() * TOLERANCE, least);
         let tolerance = self.options.depth_tolerance.unwrap_or(default);
+        let reach = self.reach();
+        if reach <= tolerance {
+            if let Some(known) = known {
+                known.forget();
+            }
+            return self.finish(reach);
+        }
         let (mut parts, deepest) = match known.as_deref_mut().and_then(Known::now) {
             Some((points, deepest)) => (self.resume(points)?, Some(deepest)),
             None => (self.begin(tolerance)?, None),
@@ -112,6 +119,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             known.keep(&mut parts, self.deepest, self.deepest_at);
         }
         self.finish(bound)
+    }
+
+    /// The most that any point of the axis can be deep, by its distance from the point that meets the surface.
+    fn reach(&self) -> f32 {
+        let (length, meeting) = (self.tool.axis_length(), &self.meeting);
+        let along = meeting.axis_parameter * length;
+        larger(along, length - along) + meeting.axis_distance + meeting.accuracy
     }
 
     /// The parts before and after the point where the axis meets the surface.

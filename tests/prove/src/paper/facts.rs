@@ -29,6 +29,7 @@ pub fn of(experiment: &str, plan: &Plan, options: &Options, records: &mut Record
     match options.only {
         Some(Only::Imaging) => command += " --only imaging",
         Some(Only::Contacts) => command += " --only contacts",
+        Some(Only::Tracker) => command += " --only tracker",
         None => (),
     }
     let meshes = match real() {

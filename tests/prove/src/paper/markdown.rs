@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::brain::TOOLS;
 use super::names::*;
 use super::record::{Cell, Record, Records};
-use super::{contacts, imaging};
+use super::{contacts, imaging, tracker};
 
 /// The page.
 pub fn benchmarks(records: &Records) -> String {
@@ -23,6 +23,7 @@ pub fn benchmarks(records: &Records) -> String {
     cortex_m7(&mut page, records);
     control_loop(&mut page, records);
     contacts::table(&mut page, records);
+    tracker::table(&mut page, records);
     ratios(&mut page, records);
     crossovers(&mut page, records);
     page.push_str(FIGURE_6);

@@ -17,6 +17,7 @@ pub mod record;
 mod search;
 pub mod statistics;
 mod subjects;
+mod tracker;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -45,6 +46,7 @@ pub fn bench(options: &Options) -> Result<()> {
         match only {
             Only::Imaging => imaging::run(&plan, options, &mut records)?,
             Only::Contacts => contacts::run(&plan, options, &mut records)?,
+            Only::Tracker => tracker::run(&plan, options, &mut records)?,
         }
         println!("measured in {:.0} s", start.elapsed().as_secs_f64());
         records
@@ -60,6 +62,7 @@ pub fn bench(options: &Options) -> Result<()> {
                 Ok(report) => facts::cortex_m7(&report, &mut records)?,
                 Err(error) => eprintln!("the Cortex-M7's part is left out: {error:#}"),
             }
+            tracker::run(&Plan::of(options), options, &mut records)?;
         }
         println!("measured in {:.0} s", start.elapsed().as_secs_f64());
         records

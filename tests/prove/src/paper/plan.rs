@@ -38,6 +38,8 @@ pub enum Only {
     Imaging,
     /// Contacts within a margin: two minutes.
     Contacts,
+    /// A tracker on the emulated Cortex-M7, on real surfaces where they are at hand.
+    Tracker,
 }
 
 /// The size of a run.
@@ -60,6 +62,9 @@ pub struct Plan {
     pub imaging_ticks: u32,
     /// Ticks at which contacts are asked for, on the same brains.
     pub contact_ticks: u32,
+    /// Ticks of a tracker on the emulated board, and triangles of its brain.
+    pub board_ticks: u32,
+    pub board_brain: u32,
 }
 
 impl Plan {
@@ -77,6 +82,8 @@ impl Plan {
             imaging_brains: vec![5_000, 50_000, 500_000],
             imaging_ticks: 7_000,
             contact_ticks: 10_000,
+            board_ticks: 77_000,
+            board_brain: 50_000,
         }
     }
 
@@ -100,6 +107,7 @@ impl Plan {
             ablation_queries: 200,
             imaging_ticks: 1_000,
             contact_ticks: 1_000,
+            board_ticks: 7_000,
             ..Self::full()
         }
     }
@@ -118,6 +126,8 @@ impl Plan {
             imaging_brains: vec![500],
             imaging_ticks: 200,
             contact_ticks: 2_000,
+            board_ticks: 200,
+            board_brain: 1_000,
         }
     }
 

@@ -1,6 +1,7 @@
 //! The probe: a program that answers a script, on the emulated board and on this computer.
 
 pub mod script;
+pub mod ticks;
 
 use std::collections::BTreeMap;
 use std::fs;

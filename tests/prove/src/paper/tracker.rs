@@ -1,0 +1,157 @@
+//! A tracker's ticks on the emulated Cortex-M7, on generated and real surfaces: table 6.
+
+use std::fmt::Write;
+
+use anyhow::{Context, Result, ensure};
+use dibs_build::{Builder, BuiltTree, IndexWidth, Motion, MotionStretch, Paths};
+use dibs_tests::streams::{Pulse, TICK_RATE};
+use probe::track::{OPENED, tick};
+
+use super::brain::STRETCH;
+use super::facts;
+use super::names::DIBS;
+use super::plan::{self, Plan, Progress};
+use super::record::{Cell, Record, Records};
+use super::statistics::Summary;
+use super::subjects::{self, Heart};
+use crate::probe::ticks::{Tick, read, script};
+use crate::probe::{COUNTING, board, build_for_board, run_on_board};
+
+pub const EXPERIMENT: &str = "tracker";
+/// The facts about its run.
+pub const RUN: &str = "tracker-run";
+
+/// Frames a second of the pulsing brain, and the seed of its motion.
+const RATE: f32 = 30.0;
+const SEED: u64 = 3_000;
+/// Margin of learned limits.
+const MARGIN: f32 = 0.1;
+
+/// The questions: a name, and the bits for the probe.
+const QUESTIONS: [(&str, u32); 4] = [
+    ("closest pair", tick::INTERPOLATED),
+    ("and side", tick::INTERPOLATED | tick::SIDE),
+    ("and side, held", tick::SIDE),
+    ("and depth", tick::INTERPOLATED | tick::SIGNED),
+];
+
+/// Runs this experiment anew, whatever the records have of it.
+pub fn run(plan: &Plan, options: &plan::Options, records: &mut Records) -> Result<()> {
+    records.0.retain(|r| ![EXPERIMENT, RUN].contains(&r.experiment.as_str()));
+    facts::of(RUN, plan, options, records);
+    let program = build_for_board(&board()?, "chain")?;
+    let follow = |name: &str, built: &BuiltTree, motion: &Motion, records: &mut Records| {
+        let progress = Progress::start(&format!("a tracker on the board, {name}"), 0);
+        for (question, bits) in QUESTIONS {
+            let cell = Cell::new(EXPERIMENT, name, built.summary().triangles as usize, question);
+            let words =
+                run_on_board(&program, &script(built, motion, bits, plan.board_ticks)?, COUNTING)?;
+            let ticks = read(&words, plan.board_ticks)?;
+            let far = ticks.iter().position(|tick| !(tick.apart <= 1.0));
+            ensure!(
+                far.is_none(),
+                "{name}, {question}: tick {far:?} is not a whole query's answer"
+            );
+            note(&cell, &ticks, records);
+        }
+        progress.finish();
+        anyhow::Ok(())
+    };
+    for heart in subjects::hearts(plan.heart_triangles)? {
+        follow(&heart.name, &of_heart(&heart)?, &heart.motion, records)?;
+    }
+    let subject = subjects::brain(plan.board_brain)?;
+    let built = builder().stretch(STRETCH).build(&subject.mesh)?;
+    let pulse = Pulse::new(&subject.mesh.positions, SEED);
+    let count = (plan.board_ticks as f32 / TICK_RATE * RATE) as u32 + 2;
+    let frames = (0..count).map(|number| {
+        let mut positions = Vec::new();
+        pulse.deform(number as f32 / RATE, &mut positions);
+        positions
+    });
+    let motion = Motion { frames: frames.collect(), rate: RATE, ..Motion::default() };
+    follow(&subject.name, &built, &motion, records)
+}
+
+fn builder() -> Builder<'static> {
+    Builder::new().index(IndexWidth::Bits16)
+}
+
+/// Limits as table 3's, or learned from the motion.
+fn of_heart(heart: &Heart) -> Result<BuiltTree> {
+    let builder = match heart.stretch {
+        Some(limit) => builder().stretch(limit),
+        None => {
+            let needed = MotionStretch::new(&heart.mesh, &heart.motion, Paths::default(), &|_| ())
+                .context("measuring the motion")?;
+            builder().limits(needed.limits(MARGIN))
+        }
+    };
+    Ok(builder.build(&heart.mesh)?)
+}
+
+fn note(cell: &Cell, ticks: &[Tick], records: &mut Records) {
+    let mut put = |metric: &str, unit: &str, of: &dyn Fn(&Tick) -> f64| {
+        let values: Vec<f64> = ticks.iter().map(of).collect();
+        records.push(Record::summary(cell, DIBS, metric, &Summary::of(&values), unit));
+    };
+    put("tracked", "instructions", &|tick| f64::from(tick.instructions));
+    put("whole", "instructions", &|tick| f64::from(tick.whole));
+    put("node_tests", "tests", &|tick| f64::from(tick.tests[0]));
+    put("triangle_tests", "tests", &|tick| f64::from(tick.tests[1]));
+    put("fallbacks", "share of ticks", &|tick| f64::from(u8::from(tick.is_fallback)));
+}
+
+/// Table 6.
+pub fn table(page: &mut String, records: &Records) {
+    let meshes = records.meshes(EXPERIMENT);
+    if meshes.is_empty() {
+        return;
+    }
+    let fact = |metric| records.note_of(RUN, metric);
+    let _ = writeln!(
+        page,
+        "\n## Table 6: a tracker's tick on the emulated Cortex-M7\n\n\
+         Instructions of `Tracker::closest`, not cycles: a capsule on table 3's path, ticks of 1 ms in a row, the first \
+         aside, the surface interpolated and thus another at every tick, or held until the next frame. *And side* takes \
+         any depth where the axis crosses (`Options::depth_tolerance` without end), *and depth* a depth to the default \
+         tolerance. The tracker remembers {OPENED} opened nodes; a tick that falls back is a whole query. The answer of \
+         every tick is that of a whole query on the board, warm, in the column *whole*; otherwise nothing is recorded. \
+         The human heart has the limits that its motion needs and a tenth more, the generated one 1.5, the brain 2: it \
+         pulses in long waves, 30 frames a second.\n\n\
+         Recorded by `{}` on {}, commit {}, {}.\n\n\
+         | surface | triangles | answer | ticks | mean | p99 | largest | whole | node tests | triangle tests | fall-backs \
+         |\n|---|---|---|---|---|---|---|---|---|---|---|",
+        fact("command"),
+        fact("machine"),
+        fact("commit"),
+        fact("date")
+    );
+    for (mesh, triangles) in meshes {
+        for (question, _) in QUESTIONS {
+            let cell = Cell::new(EXPERIMENT, &mesh, triangles as usize, question);
+            let get = |metric| records.find(&cell, DIBS, metric);
+            let (Some(took), Some(whole), Some(nodes), Some(tests), Some(fallbacks)) = (
+                get("tracked"),
+                get("whole"),
+                get("node_tests"),
+                get("triangle_tests"),
+                get("fallbacks"),
+            ) else {
+                continue;
+            };
+            let _ = writeln!(
+                page,
+                "| {mesh} | {triangles} | {question} | {} | {:.0} | {:.0} | {:.0} | {:.0} | {:.1} | {:.1} | {:.0} |",
+                took.n,
+                took.mean,
+                took.p99,
+                took.max,
+                whole.mean,
+                nodes.mean,
+                tests.mean,
+                fallbacks.mean * fallbacks.n as f64
+            );
+        }
+    }
+}
