@@ -110,6 +110,72 @@ impl Feature {
         feature
     }
 
+    /// Whether a point is above all triangles that meet in a feature, or below all, by the sine `least` against its
+    /// direction `towards` from the closest point. Then it is so for any pseudonormal of the feature, which costs twice
+    /// as much. `None` where that is not clear.
+    pub fn clear_side<I: Index, V: VertexTable + ?Sized>(
+        self,
+        tree: &Tree<'_, I>,
+        vertices: &V,
+        triangle: u32,
+        corners: &[Vec3; 3],
+        towards: Vec3,
+        least: f32,
+    ) -> Option<bool> {
+        let square = least * least * towards.length_squared();
+        let is_above = |[centre, from, to]: [Vec3; 3]| {
+            let (one, other) = (from - centre, to - centre);
+            let across = one.cross(other);
+            let squared = across.length_squared();
+            let is_flat = !(squared > FLAT * one.length_squared() * other.length_squared());
+            let height = towards.dot(across);
+            let is_clear = squared > TINY && !is_flat && height * height > square * squared;
+            is_clear.then_some(height > 0.0)
+        };
+        let first = self.corner();
+        let [centre, mut from, to] = turned(*corners, first);
+        let side = is_above([centre, from, to])?;
+        let (mut row, mut corner) = (triangle, first);
+        for _ in 0..self.most() {
+            // The next triangle has this one's edge from `centre` to `from`.
+            let (next, back) = tree.across(row, corner)?;
+            if next == triangle {
+                return Some(side);
+            }
+            (row, corner) = (next, after(back));
+            let [a, b, c] = tree.triangle(row)?;
+            let vertex = match corner {
+                0 => b,
+                1 => c,
+                _ => a,
+            };
+            let to = from;
+            from = vertices.position(vertex)?;
+            if is_above([centre, from, to])? != side {
+                return None;
+            }
+        }
+        if matches!(self, Self::Vertex(_)) { None } else { Some(side) }
+    }
+
+    /// The corner around which the feature's triangles lie, and which its edge leaves.
+    const fn corner(self) -> u32 {
+        match self {
+            Self::Face => 0,
+            Self::Edge(edge) => edge,
+            Self::Vertex(corner) => corner,
+        }
+    }
+
+    /// The most triangles that meet in it besides the first.
+    const fn most(self) -> u32 {
+        match self {
+            Self::Face => 0,
+            Self::Edge(_) => 1,
+            Self::Vertex(_) => MAX_RING,
+        }
+    }
+
     /// The pseudonormal of a feature of a triangle, for a point to whose distance the feature's comes near.
     ///
     /// Cost: one normal of a face, two of an edge, at most [`MAX_RING`] of a vertex.
@@ -139,7 +205,7 @@ impl Feature {
                     if next == triangle {
                         return Ok(sum);
                     }
-                    (row, corner) = (next, if back == 2 { 0 } else { back + 1 });
+                    (row, corner) = (next, after(back));
                 }
                 Err(NoNormal::Unclear)
             }
@@ -156,6 +222,11 @@ pub(super) fn corners<I: Index, V: VertexTable + ?Sized>(
     let [a, b, c] = tree.triangle(row).ok_or(NoNormal::Corrupt(row))?;
     let position = |vertex| vertices.position(vertex).ok_or(NoNormal::Corrupt(vertex));
     Ok([position(a)?, position(b)?, position(c)?])
+}
+
+/// The corner after one.
+const fn after(corner: u32) -> u32 {
+    if corner == 2 { 0 } else { corner + 1 }
 }
 
 /// The corners in their order, from one of them on.

@@ -91,6 +91,9 @@ pub(super) struct PointSide {
 /// pseudonormal's sign counts only if no triangle that the point leans over has the other one.
 ///
 /// Any other product leaves the side undefined.
+///
+/// A point that is clearly above all triangles of its feature is above their pseudonormal, whatever their weights: then
+/// none is needed.
 pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     vertices: &V,
@@ -103,10 +106,26 @@ pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
     };
     let point = pair.point_on_surface;
     let error = pair.accuracy + COORDINATES * point.abs().max_element();
-    let found = corners(tree, vertices, triangle).and_then(|corners| {
-        let off = Off { point: on_axis, error };
-        Feature::of(&corners, point, error).pseudonormal(tree, vertices, triangle, off)
-    });
+    let (distance, towards) = (pair.axis_distance, on_axis - point);
+    let corners = corners(tree, vertices, triangle);
+    let feature = corners.map(|corners| Feature::of(&corners, point, error));
+    if let (Ok(corners), Ok(feature)) = (&corners, &feature)
+        && distance > NEAR * error
+    {
+        let least = sqrt(4.0 * error / distance) + NORMAL;
+        if let Some(is_above) =
+            feature.clear_side(tree, vertices, triangle, corners, towards, least)
+        {
+            let outward = towards / sqrt(towards.length_squared());
+            return Ok(if is_above {
+                PointSide { side: Side::Outside, outward }
+            } else {
+                PointSide { side: Side::Inside, outward: -outward }
+            });
+        }
+    }
+    let off = Off { point: on_axis, error };
+    let found = feature.and_then(|feature| feature.pseudonormal(tree, vertices, triangle, off));
     let normal = match found {
         Ok(normal) => normal,
         Err(NoNormal::Open) => return undefined(NoSide::OpenBoundary, Vec3::ZERO),
@@ -117,11 +136,9 @@ pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
     let unit = normal.vector / length;
     let is_known = length > NORMAL * normal.weight;
     let unit = if is_known { unit } else { Vec3::ZERO };
-    let distance = pair.axis_distance;
     if !(distance > 2.0 * error) {
         return undefined(NoSide::BelowAccuracy, unit);
     }
-    let towards = on_axis - point;
     let height = towards.dot(normal.vector);
     let doubt = sqrt(2.0 * error * distance) * length + NORMAL * distance * normal.weight;
     let side = if height > doubt && !normal.is_below {
