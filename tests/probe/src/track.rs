@@ -92,12 +92,12 @@ impl Default for Trackers {
     }
 }
 
-/// Follows a script to its end: with `EVERY`, one of any ticks. Without it, ticks with no bit but
-/// [`INTERPOLATED`](tick::INTERPOLATED), so that the tracker is in the program once, as in a controller.
+/// Follows a script to its end. Of a tick's bits those in `KINDS` count, so that a program may hold the tracker once, as
+/// a controller does.
 ///
 /// # Errors
 /// [`Fault`] where the script makes no sense, or a query fails.
-pub fn run<const EVERY: bool>(
+pub fn run<const KINDS: u32>(
     memory: &'static mut Memory,
     Trackers(trackers): &mut Trackers,
     machine: &mut impl Machine,
@@ -125,7 +125,7 @@ pub fn run<const EVERY: bool>(
         let measured = measure_stretch(&tree, &*after).map_err(|_| Fault)?;
         let both = stretch.unwrap_or(measured).or_larger(measured).ok_or(Fault)?;
         let step = odometer.step(&*before, &*after);
-        next = session.ticks::<EVERY>(&step, both, measured, machine)?;
+        next = session.ticks::<KINDS>(&step, both, measured, machine)?;
         stretch = Some(measured);
     }
     if next == command::END { Ok(()) } else { Err(Fault) }
@@ -154,7 +154,7 @@ struct Found {
 
 impl Session<'_, '_> {
     /// Runs the ticks of a frame. Returns the first other command.
-    fn ticks<const EVERY: bool>(
+    fn ticks<const KINDS: u32>(
         &mut self,
         step: &Step<'_, [Vec3], [Vec3]>,
         both: MeasuredStretch,
@@ -167,7 +167,7 @@ impl Session<'_, '_> {
                 other => return Ok(other),
             }
             let kind = word(machine)?;
-            let kind = if EVERY { kind } else { kind & tick::INTERPOLATED };
+            let kind = kind & KINDS;
             let share = f32::from_bits(word(machine)?);
             let links = if kind & tick::CHAIN == 0 { 1 } else { LINKS };
             let mut joints = [Vec3::ZERO; JOINTS];
@@ -176,15 +176,15 @@ impl Session<'_, '_> {
             }
             let radius = f32::from_bits(word(machine)?);
             let answer = if kind & tick::INTERPOLATED == 0 {
-                self.ask::<EVERY>(&step.after(), joints, radius, kind, measured, machine)
+                self.ask::<KINDS>(&step.after(), joints, radius, kind, measured, machine)
             } else {
-                self.ask::<EVERY>(&step.at(share), joints, radius, kind, both, machine)
+                self.ask::<KINDS>(&step.at(share), joints, radius, kind, both, machine)
             }?;
             put(machine, &answer)?;
         }
     }
 
-    fn ask<const EVERY: bool>(
+    fn ask<const KINDS: u32>(
         &mut self,
         surface: &impl MovingSurface,
         joints: [Vec3; JOINTS],
@@ -197,13 +197,14 @@ impl Session<'_, '_> {
         let link = |from, to| Capsule::new(from, to, radius).map_err(|_| Fault);
         let first = link(a, b)?;
         let options = Options::cold().stretch(stretch);
-        let options = match (EVERY, kind & (tick::SIGNED | tick::SIDE)) {
-            (true, tick::SIGNED) => options,
-            (true, tick::SIDE) => options.depth_tolerance(f32::INFINITY),
+        let kind = kind & KINDS;
+        let options = match kind & (tick::SIGNED | tick::SIDE) {
+            tick::SIGNED => options,
+            tick::SIDE => options.depth_tolerance(f32::INFINITY),
             _ => options.unsigned(),
         };
         let mut contacts = Contacts::<8>::new();
-        let (took, found) = if EVERY && kind & tick::CHAIN != 0 {
+        let (took, found) = if kind & tick::CHAIN != 0 {
             let chain = [
                 first,
                 link(b, c)?,
@@ -227,7 +228,7 @@ impl Session<'_, '_> {
         } else {
             let [Some(tracker), ..] = &mut *self.trackers else { return Err(Fault) };
             let before = machine.clock();
-            let tracked = if !EVERY || kind & tick::CONTACTS == 0 {
+            let tracked = if kind & tick::CONTACTS == 0 {
                 tracker.closest(surface, &first, &options)
             } else {
                 tracker.contacts(surface, &first, MARGIN, &options, &mut contacts)
@@ -239,7 +240,7 @@ impl Session<'_, '_> {
         };
         let options = options.warm_start(self.last);
         let before = machine.clock();
-        let whole = if !EVERY || kind & tick::CONTACTS == 0 {
+        let whole = if kind & tick::CONTACTS == 0 {
             self.query.closest(surface, &first, &options)
         } else {
             self.query.contacts(surface, &first, MARGIN, &options, &mut contacts)
@@ -248,7 +249,7 @@ impl Session<'_, '_> {
         let whole = whole.map_err(|_| Fault)?;
         self.last = whole.triangle;
         let is_near = whole.axis_distance <= 2.0 * whole.accuracy;
-        if EVERY && found.closest.side != whole.side && !is_near {
+        if kind & (tick::SIGNED | tick::SIDE) != 0 && found.closest.side != whole.side && !is_near {
             return Err(Fault);
         }
         Ok(answer(took, whole_took, &found, whole.separation, whole.accuracy, &first, kind))

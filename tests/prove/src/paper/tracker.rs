@@ -27,22 +27,22 @@ const SEED: u64 = 3_000;
 /// Margin of learned limits.
 const MARGIN: f32 = 0.1;
 
-/// The questions: a name, and the bits for the probe.
-const QUESTIONS: [(&str, u32); 4] = [
-    ("closest pair", tick::INTERPOLATED),
-    ("and side", tick::INTERPOLATED | tick::SIDE),
-    ("and side, held", tick::SIDE),
-    ("and depth", tick::INTERPOLATED | tick::SIGNED),
+/// The questions: a name, the bits for the probe, and its program.
+const QUESTIONS: [(&str, u32, &str); 4] = [
+    ("closest pair", tick::INTERPOLATED, "track"),
+    ("and side", tick::INTERPOLATED | tick::SIDE, "side"),
+    ("and side, held", tick::SIDE, "side"),
+    ("and depth", tick::INTERPOLATED | tick::SIGNED, "chain"),
 ];
 
 /// Runs this experiment anew, whatever the records have of it.
 pub fn run(plan: &Plan, options: &plan::Options, records: &mut Records) -> Result<()> {
     records.0.retain(|r| ![EXPERIMENT, RUN].contains(&r.experiment.as_str()));
     facts::of(RUN, plan, options, records);
-    let program = build_for_board(&board()?, "chain")?;
     let follow = |name: &str, built: &BuiltTree, motion: &Motion, records: &mut Records| {
         let progress = Progress::start(&format!("a tracker on the board, {name}"), 0);
-        for (question, bits) in QUESTIONS {
+        for (question, bits, program) in QUESTIONS {
+            let program = build_for_board(&board()?, program)?;
             let cell = Cell::new(EXPERIMENT, name, built.summary().triangles as usize, question);
             let words =
                 run_on_board(&program, &script(built, motion, bits, plan.board_ticks)?, COUNTING)?;
@@ -128,7 +128,7 @@ pub fn table(page: &mut String, records: &Records) {
         fact("date")
     );
     for (mesh, triangles) in meshes {
-        for (question, _) in QUESTIONS {
+        for (question, ..) in QUESTIONS {
             let cell = Cell::new(EXPERIMENT, &mesh, triangles as usize, question);
             let get = |metric| records.find(&cell, DIBS, metric);
             let (Some(took), Some(whole), Some(nodes), Some(tests), Some(fallbacks)) = (

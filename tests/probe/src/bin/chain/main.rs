@@ -19,5 +19,5 @@ use probe::track::{Memory, Trackers, run};
 fn main() -> ! {
     static mut MEMORY: Memory = Memory::new();
     static mut TRACKERS: Trackers = Trackers::new();
-    machine::answer(|board| run::<true>(MEMORY, TRACKERS, board))
+    machine::answer(|board| run::<{ u32::MAX }>(MEMORY, TRACKERS, board))
 }

@@ -13,11 +13,11 @@ mod files;
 mod machine;
 
 use cortex_m_rt::entry;
-use probe::track::{Memory, Trackers, run};
+use probe::track::{Memory, Trackers, run, tick};
 
 #[entry]
 fn main() -> ! {
     static mut MEMORY: Memory = Memory::new();
     static mut TRACKERS: Trackers = Trackers::new();
-    machine::answer(|board| run::<false>(MEMORY, TRACKERS, board))
+    machine::answer(|board| run::<{ tick::INTERPOLATED }>(MEMORY, TRACKERS, board))
 }
