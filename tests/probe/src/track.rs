@@ -5,7 +5,7 @@
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
     Capsule, Contacts, Fallback, MeasuredStretch, MovingSurface, Odometer, Options, Proximity,
-    Query, Step, Tool, Tracker, Tree, TriangleRow, measure_stretch,
+    Query, Side, Step, Tool, Tracker, Tree, TriangleRow, measure_stretch,
 };
 
 use crate::{Fault, MARGIN, Machine, point, put, word};
@@ -248,8 +248,7 @@ impl Session<'_, '_> {
         let whole_took = machine.clock().wrapping_sub(before);
         let whole = whole.map_err(|_| Fault)?;
         self.last = whole.triangle;
-        let is_near = whole.axis_distance <= 2.0 * whole.accuracy;
-        if kind & (tick::SIGNED | tick::SIDE) != 0 && found.closest.side != whole.side && !is_near {
+        if kind & (tick::SIGNED | tick::SIDE) != 0 && is_other_side(&found.closest, &whole) {
             return Err(Fault);
         }
         Ok(answer(took, whole_took, &found, whole.separation, whole.accuracy, &first, kind))
@@ -280,6 +279,15 @@ impl Session<'_, '_> {
         let found = Tracker::closest_of(&mut pairs, options).map_err(|_| Fault)?.ok_or(Fault)?;
         Ok(Found { closest: found.closest, fallback: found.fallback, searched: found.searched })
     }
+}
+
+/// Whether two answers have sides that cannot both be right.
+fn is_other_side(tracked: &Proximity, whole: &Proximity) -> bool {
+    let is_defined = |side| !matches!(side, Side::Undefined(_));
+    tracked.side != whole.side
+        && is_defined(tracked.side)
+        && is_defined(whole.side)
+        && whole.axis_distance > 2.0 * whole.accuracy
 }
 
 fn answer(
