@@ -5,7 +5,7 @@
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
     Capsule, Contacts, Fallback, MeasuredStretch, MovingSurface, Odometer, Options, Proximity,
-    Query, Side, Step, Tool, Tracker, Tree, TriangleRow, measure_stretch,
+    Query, Side, Step, Tracker, Tree, TriangleRow, measure_stretch,
 };
 
 use crate::{Fault, MARGIN, Machine, point, put, word};
@@ -43,7 +43,7 @@ pub const JOINTS: usize = LINKS + 1;
 
 /// Words of an answer: the clock's counts for the tracker and for a whole query (warm, with measured stretch), the
 /// tracker's node and triangle tests, its [`Fallback`] (0 for none), the pairs that it searched, its separation, and
-/// the difference from the query's separation in units of both accuracies, and of the tolerance of a depth.
+/// the distance of its certified interval from the query's in units of both accuracies.
 pub const ANSWER_WORDS: usize = 8;
 /// Largest tree, in bytes.
 pub const TREE_BYTES: usize = 5 << 19;
@@ -152,6 +152,13 @@ struct Found {
     searched: u32,
 }
 
+/// A whole query's separation: not above `upper`, not below `lower`.
+struct Interval {
+    lower: f32,
+    upper: f32,
+    accuracy: f32,
+}
+
 impl Session<'_, '_> {
     /// Runs the ticks of a frame. Returns the first other command.
     fn ticks<const KINDS: u32>(
@@ -224,7 +231,8 @@ impl Session<'_, '_> {
                 closest = if whole.separation < closest { whole.separation } else { closest };
             }
             let accuracy = found.closest.accuracy;
-            return Ok(answer(took, 0, &found, closest, accuracy, &chain[0], kind));
+            let whole = Interval { lower: closest, upper: closest, accuracy };
+            return Ok(answer(took, 0, &found, &whole));
         } else {
             let [Some(tracker), ..] = &mut *self.trackers else { return Err(Fault) };
             let before = machine.clock();
@@ -251,7 +259,8 @@ impl Session<'_, '_> {
         if kind & (tick::SIGNED | tick::SIDE) != 0 && is_other_side(&found.closest, &whole) {
             return Err(Fault);
         }
-        Ok(answer(took, whole_took, &found, whole.separation, whole.accuracy, &first, kind))
+        let Proximity { lower, separation: upper, accuracy, .. } = whole;
+        Ok(answer(took, whole_took, &found, &Interval { lower, upper, accuracy }))
     }
 
     fn closest_of(
@@ -290,26 +299,13 @@ fn is_other_side(tracked: &Proximity, whole: &Proximity) -> bool {
         && whole.axis_distance > 2.0 * whole.accuracy
 }
 
-fn answer(
-    took: u32,
-    whole_took: u32,
-    found: &Found,
-    whole: f32,
-    accuracy: f32,
-    tool: &Capsule,
-    kind: u32,
-) -> [u32; ANSWER_WORDS] {
+fn answer(took: u32, whole_took: u32, found: &Found, whole: &Interval) -> [u32; ANSWER_WORDS] {
     let closest = &found.closest;
-    // Of an axis that crosses or touches each search finds a depth within the tolerance.
-    let is_deep = closest.separation <= -tool.radius() || whole <= -tool.radius();
-    let tolerance = match (is_deep, kind & tick::SIDE) {
-        (false, _) => 0.0,
-        (true, 0) => Tool::axis_length(tool) / 512.0,
-        (true, _) => f32::INFINITY,
-    };
-    let apart = closest.separation - whole;
-    let apart = if apart < 0.0 { -apart } else { apart };
-    let apart = apart / (closest.accuracy + accuracy + 2.0 * tolerance);
+    // Where the axis does not cross, an interval is one separation.
+    let (above, below) = (closest.lower - whole.upper, whole.lower - closest.separation);
+    let apart = if above > below { above } else { below };
+    let apart = if apart > 0.0 { apart } else { 0.0 };
+    let apart = apart / (closest.accuracy + whole.accuracy);
     let fallback = match found.fallback {
         None => 0,
         Some(Fallback::Start) => 1,

@@ -34,7 +34,7 @@ pub const CHECK: Check = Check {
         note("m7.track.ticks"),
         Promise {
             id: "m7.track.apart",
-            says: "How far a tracker's separation is from a whole query's",
+            says: "How far a tracker's certified interval is from a whole query's",
             criterion: TIMING,
             bound: Bound::AtMost(1.0),
             unit: "of the accuracy that both state, at most",

@@ -63,7 +63,7 @@ pub struct Tick {
     /// Pairs that were searched.
     pub searched: u32,
     pub is_fallback: bool,
-    /// How far the separation is from a whole query's, in units of both accuracies.
+    /// How far the certified interval is from a whole query's, in units of both accuracies.
     pub apart: f32,
 }
 
