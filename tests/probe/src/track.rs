@@ -152,13 +152,6 @@ struct Found {
     searched: u32,
 }
 
-/// A whole query's separation: not above `upper`, not below `lower`.
-struct Interval {
-    lower: f32,
-    upper: f32,
-    accuracy: f32,
-}
-
 impl Session<'_, '_> {
     /// Runs the ticks of a frame. Returns the first other command.
     fn ticks<const KINDS: u32>(
@@ -225,14 +218,13 @@ impl Session<'_, '_> {
             let before = machine.clock();
             let found = self.closest_of(surface, &chain, &options)?;
             let took = machine.clock().wrapping_sub(before);
-            let mut closest = f32::INFINITY;
+            let mut closest = found.closest;
+            closest.separation = f32::INFINITY;
             for capsule in &chain {
                 let whole = self.query.closest(surface, capsule, &options).map_err(|_| Fault)?;
-                closest = if whole.separation < closest { whole.separation } else { closest };
+                closest = if whole.separation < closest.separation { whole } else { closest };
             }
-            let accuracy = found.closest.accuracy;
-            let whole = Interval { lower: closest, upper: closest, accuracy };
-            return Ok(answer(took, 0, &found, &whole));
+            return Ok(answer(took, 0, &found, &closest));
         } else {
             let [Some(tracker), ..] = &mut *self.trackers else { return Err(Fault) };
             let before = machine.clock();
@@ -259,8 +251,7 @@ impl Session<'_, '_> {
         if kind & (tick::SIGNED | tick::SIDE) != 0 && is_other_side(&found.closest, &whole) {
             return Err(Fault);
         }
-        let Proximity { lower, separation: upper, accuracy, .. } = whole;
-        Ok(answer(took, whole_took, &found, &Interval { lower, upper, accuracy }))
+        Ok(answer(took, whole_took, &found, &whole))
     }
 
     fn closest_of(
@@ -299,11 +290,16 @@ fn is_other_side(tracked: &Proximity, whole: &Proximity) -> bool {
         && whole.axis_distance > 2.0 * whole.accuracy
 }
 
-fn answer(took: u32, whole_took: u32, found: &Found, whole: &Interval) -> [u32; ANSWER_WORDS] {
+fn answer(took: u32, whole_took: u32, found: &Found, whole: &Proximity) -> [u32; ANSWER_WORDS] {
     let closest = &found.closest;
-    // Where the axis does not cross, an interval is one separation.
-    let (above, below) = (closest.lower - whole.upper, whole.lower - closest.separation);
-    let apart = if above > below { above } else { below };
+    // Where the axis does not cross, an interval is one separation. Next to the surface one side may be undefined.
+    let ends = if closest.side == whole.side {
+        [closest.lower - whole.separation, whole.lower - closest.separation]
+    } else {
+        let apart = closest.axis_distance - whole.axis_distance;
+        [apart, -apart]
+    };
+    let apart = if ends[0] > ends[1] { ends[0] } else { ends[1] };
     let apart = if apart > 0.0 { apart } else { 0.0 };
     let apart = apart / (closest.accuracy + whole.accuracy);
     let fallback = match found.fallback {
