@@ -218,13 +218,14 @@ impl Session<'_, '_> {
             let before = machine.clock();
             let found = self.closest_of(surface, &chain, &options)?;
             let took = machine.clock().wrapping_sub(before);
-            let mut closest = found.closest;
-            closest.separation = f32::INFINITY;
+            let mut closest = f32::INFINITY;
             for capsule in &chain {
                 let whole = self.query.closest(surface, capsule, &options).map_err(|_| Fault)?;
-                closest = if whole.separation < closest.separation { whole } else { closest };
+                closest = if whole.separation < closest { whole.separation } else { closest };
             }
-            return Ok(answer(took, 0, &found, &closest));
+            let Proximity { separation, accuracy, .. } = found.closest;
+            let apart = [separation - closest, closest - separation];
+            return Ok(answer(took, 0, &found, apart, 2.0 * accuracy));
         } else {
             let [Some(tracker), ..] = &mut *self.trackers else { return Err(Fault) };
             let before = machine.clock();
@@ -248,10 +249,18 @@ impl Session<'_, '_> {
         let whole_took = machine.clock().wrapping_sub(before);
         let whole = whole.map_err(|_| Fault)?;
         self.last = whole.triangle;
-        if kind & (tick::SIGNED | tick::SIDE) != 0 && is_other_side(&found.closest, &whole) {
-            return Err(Fault);
+        let tracked = &found.closest;
+        let mut apart = [tracked.lower - whole.separation, whole.lower - tracked.separation];
+        if kind & (tick::SIGNED | tick::SIDE) != 0 && tracked.side != whole.side {
+            if is_other_side(tracked, &whole) {
+                return Err(Fault);
+            }
+            // Next to the surface one side may be undefined.
+            let distance = tracked.axis_distance - whole.axis_distance;
+            apart = [distance, -distance];
         }
-        Ok(answer(took, whole_took, &found, &whole))
+        let accuracy = tracked.accuracy + whole.accuracy;
+        Ok(answer(took, whole_took, &found, apart, accuracy))
     }
 
     fn closest_of(
@@ -281,27 +290,23 @@ impl Session<'_, '_> {
     }
 }
 
-/// Whether two answers have sides that cannot both be right.
+/// Whether two answers' sides, which differ, cannot both be right.
 fn is_other_side(tracked: &Proximity, whole: &Proximity) -> bool {
     let is_defined = |side| !matches!(side, Side::Undefined(_));
-    tracked.side != whole.side
-        && is_defined(tracked.side)
-        && is_defined(whole.side)
-        && whole.axis_distance > 2.0 * whole.accuracy
+    is_defined(tracked.side) && is_defined(whole.side) && whole.axis_distance > 2.0 * whole.accuracy
 }
 
-fn answer(took: u32, whole_took: u32, found: &Found, whole: &Proximity) -> [u32; ANSWER_WORDS] {
+/// An answer whose interval lies so far above and below a whole query's.
+fn answer(
+    took: u32,
+    whole_took: u32,
+    found: &Found,
+    [above, below]: [f32; 2],
+    accuracy: f32,
+) -> [u32; ANSWER_WORDS] {
     let closest = &found.closest;
-    // Where the axis does not cross, an interval is one separation. Next to the surface one side may be undefined.
-    let ends = if closest.side == whole.side {
-        [closest.lower - whole.separation, whole.lower - closest.separation]
-    } else {
-        let apart = closest.axis_distance - whole.axis_distance;
-        [apart, -apart]
-    };
-    let apart = if ends[0] > ends[1] { ends[0] } else { ends[1] };
-    let apart = if apart > 0.0 { apart } else { 0.0 };
-    let apart = apart / (closest.accuracy + whole.accuracy);
+    let apart = if above > below { above } else { below };
+    let apart = if apart > 0.0 { apart / accuracy } else { 0.0 };
     let fallback = match found.fallback {
         None => 0,
         Some(Fallback::Start) => 1,
