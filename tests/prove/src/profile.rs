@@ -147,5 +147,25 @@ fn document(parts: &BTreeMap<&str, u64>, queries: f64) -> Result<String> {
             figure("triangle-tests")?
         )?;
     }
+    writeln!(
+        text,
+        "\n## From tick to tick\n\nFrom the same record: a tracker on that path, {} ticks in a row, another surface at \
+         every tick, the first aside. Other surfaces are in table 6 of [benchmarks.md](benchmarks.md).\n\n\
+         | a tick's answer | mean | 99 % below | largest |\n|---|---:|---:|---:|",
+        record::figure("m7.track.ticks")?
+    )?;
+    for (name, what) in [
+        ("", "closest pair"),
+        (".side", "closest pair and side"),
+        (".signed", "and the depth of a crossing axis"),
+        (".contacts", "and all contacts within 5 mm"),
+        (".chain", "closest pair of eight capsules"),
+        (".modes.8", "closest pair, the surface moved by 8 modes"),
+        (".modes.24", "closest pair, 24 modes"),
+    ] {
+        let figure = |kind: &str| record::figure(&format!("m7.track{name}.{kind}"));
+        let (mean, most, largest) = (figure("mean")?, figure("99")?, figure("largest")?);
+        writeln!(text, "| {what} | {mean} | {most} | {largest} |")?;
+    }
     Ok(text)
 }

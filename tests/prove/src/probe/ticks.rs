@@ -67,6 +67,13 @@ pub struct Tick {
     pub apart: f32,
 }
 
+impl Tick {
+    /// Whether the answer is a whole query's.
+    pub fn is_whole(&self) -> bool {
+        self.apart <= 1.0
+    }
+}
+
 /// The answers to a script of so many ticks, without that to the first.
 pub fn read(words: &[u32], ticks: u32) -> Result<Vec<Tick>> {
     // The board's clock counts 1.6 to each instruction.
