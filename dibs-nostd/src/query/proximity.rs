@@ -20,7 +20,8 @@ pub struct Proximity {
     /// Separation of the best pair found: the upper end of the certified interval. With `d`, the distance from the
     /// tool's axis to the surface, and `r`, the tool's radius: `d - r` outside, negative where they overlap; `-d - r`
     /// inside; and where the axis crosses the surface, `-D - r`, with the largest distance `D` of any of its points
-    /// inside.
+    /// inside. Where the surface cuts itself, the inside is that of the closest sheet, and `D` no certain one: it jumps
+    /// along the axis.
     pub separation: f32,
     /// Lower end of the certified interval. Equals `separation` unless the budget ran out, or the axis crosses the
     /// surface: then it is lower by at most [`Options::depth_tolerance`](crate::Options::depth_tolerance), or by more

@@ -12,8 +12,10 @@
 
 /* Control ticks a second. */
 #define TICK_RATE 1000u
-/* More than the heart needs, and within a tick on every admitted surface. */
-static const dibs_options options = {.budget = {.node_tests = 1800, .triangle_tests = 150}};
+/* More than the closest pair on the heart needs, and within a tick on every admitted surface. The spring tells depths
+   of a quarter of a millimetre apart. */
+static const dibs_options options = {.budget = {.node_tests = 1800, .triangle_tests = 150},
+                                     .depth_tolerance = 0.25f};
 
 /* Limits in ticks, the first degraded and the second safe. The emulated line takes one to three seconds for a frame; those
    of a real bus, which brings tens of frames a second, are some tens of milliseconds. */
