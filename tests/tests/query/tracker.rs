@@ -318,3 +318,42 @@ fn a_tick_on_the_path_of_table_3_takes_few_tests() {
     assert_eq!(tally.fallbacks[4], tally.ticks - 1, "{tally:?}");
     assert!(tally.nodes[0] * 12 < tally.nodes[1], "{tally:?}");
 }
+
+/// A front that was full starts anew: it is full again only where one that just started is.
+#[test]
+fn a_full_front_does_not_stay_full() {
+    type Small<'t> = Tracker<'t, u16, MAX_STACK, 100>;
+    let generate::MovingMesh { mesh, motion } = generate::heart(10_272).expect("a valid size");
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("builds");
+    let tree = built.tree::<u16>().expect("valid");
+    let beat = Beat::new(&motion);
+    let mut tracker = Small::new(&tree).expect("deep enough");
+    let mut odometer = Odometer::new(&tree);
+    let (mut positions, mut before) = (Vec::new(), built.to_rows(&motion.frames[0]));
+    let (mut last, mut full, mut full_again, mut stuck) = (None, 0, 0, 0);
+    for tick in 0..ticks(14_000) as u32 / 2 {
+        beat.deform(tick, &mut positions);
+        let rows = built.to_rows(&positions);
+        let Probe::Capsule(tool) = beat.tool(tick) else { unreachable!("the beat's is a capsule") };
+        let measured = measure_stretch(&tree, rows.as_slice()).expect("within the limit");
+        let surface = odometer.step(before.as_slice(), rows.as_slice()).after();
+        let options = Options::new().unsigned().stretch(measured);
+        let found = tracker.closest(&surface, &tool, &options).expect("an answer");
+        let (was, first) = last.unwrap_or((None, None));
+        if found.fallback == Some(Fallback::Full) {
+            full += 1;
+            if was == Some(Fallback::Full) {
+                full_again += 1;
+                let mut fresh = Small::new(&tree).expect("deep enough");
+                let fresh = fresh.closest(&surface, &tool, &options.warm_start(first));
+                stuck += usize::from(fresh.expect("an answer").fallback != Some(Fallback::Full));
+            }
+        } else if was == Some(Fallback::Full) {
+            assert_eq!(found.fallback, Some(Fallback::Start), "tick {tick}");
+        }
+        last = Some((found.fallback, found.closest.triangle));
+        before = rows;
+    }
+    println!("{full} full, {full_again} again, {stuck} stuck");
+    assert!(full_again > 0 && stuck == 0);
+}

@@ -147,8 +147,8 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                     return Ok(Outcome::Answer { closest, is_complete: false, restarted });
                 }
                 Visit::Full => {
-                    self.put_back_waiting().ok_or(corrupt)?;
-                    self.close_some(8)?;
+                    // What is due beyond this node would stay due, and the front full.
+                    self.front.clear();
                     let (all, left) = (self.search.budget, self.search.left);
                     let tests = Budget {
                         node_tests: all.node_tests.saturating_sub(left.node_tests),

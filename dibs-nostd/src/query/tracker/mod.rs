@@ -115,13 +115,13 @@ pub struct Tracked {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Fallback {
-    /// Nothing is remembered: the first tick, or the one after an error.
+    /// Nothing is remembered: the first tick, or the one after an error or a full front.
     Start,
     /// The surface's motion since the last tick was not measured all the way.
     Surface,
     /// Tool or surface moved so far that more than half of the front ran out.
     Jump,
-    /// More nodes had to be opened than there are places.
+    /// More nodes had to be opened than there are places. The next tick starts anew.
     Full,
 }
 
@@ -184,7 +184,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         let moved = self.moved(tool, travel);
         self.last = None;
         let (moved, mut fallback) = match moved {
-            Ok(moved) => (moved, None),
+            Ok(moved) => (moved, self.front.borrow().is_empty().then_some(Fallback::Start)),
             Err(fallback) => {
                 self.front.borrow().clear();
                 self.behind = 0;
@@ -209,7 +209,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
             }
             Outcome::Full { tests } => {
                 fallback = Some(Fallback::Full);
-                (self.whole(surface, tool, options, best, tests)?, false)
+                (self.whole(surface, tool, options, best, tests)?, true)
             }
         };
         let known = Some(&mut self.known);
