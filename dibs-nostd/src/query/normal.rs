@@ -326,6 +326,55 @@ mod tests {
         }
     }
 
+    /// On a crumpled surface, some of whose triangles have no area, a side that is clear is that of the pseudonormal.
+    #[test]
+    fn a_clear_side_is_that_of_the_pseudonormal() {
+        const WEIGHTS: f32 = 1e-5;
+        let mesh = dibs_build::generate::heart(320).unwrap().mesh;
+        let built = dibs_build::Builder::new().build(&mesh).unwrap();
+        let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
+        let mut rng = fastrand::Rng::with_seed(1);
+        let unit = |rng: &mut fastrand::Rng| {
+            let mut axis = || rng.f32() - 0.5;
+            Vec3::new(axis(), axis(), axis()).normalize_or(Vec3::X)
+        };
+        let mut clear = [0; 2];
+        for round in 0..40 {
+            let mut rows = built.to_rows(&mesh.positions);
+            for row in &mut rows {
+                *row += unit(&mut rng) * (rng.f32() * 0.3 * round as f32);
+            }
+            for _ in 0..round {
+                let [a, b, _] = tree.triangle(rng.u32(..320)).unwrap();
+                rows[b as usize] = rows[a as usize];
+            }
+            let rows = rows.as_slice();
+            for _ in 0..2_000 {
+                let triangle = rng.u32(..320);
+                let at @ [a, b, c] = corners(&tree, rows, triangle).unwrap();
+                let (feature, from) = match rng.u32(..3) {
+                    0 => (Feature::Face, (a + b + c) / 3.0),
+                    1 => (Feature::Edge(1), b.midpoint(c)),
+                    _ => (Feature::Vertex(2), c),
+                };
+                let towards = unit(&mut rng) * 10.0_f32.powf(rng.f32() * 5.0 - 4.0);
+                let (point, error, distance) = (from + towards, 1e-5, towards.length());
+                let least = (4.0 * error / distance).sqrt() + WEIGHTS;
+                let found = feature.clear_side(&tree, rows, triangle, &at, towards, least);
+                let Some(is_above) = found else { continue };
+                clear[usize::from(is_above)] += 1;
+                let normal =
+                    feature.pseudonormal(&tree, rows, triangle, Off { point, error }).unwrap();
+                let height = towards.dot(normal.vector) * if is_above { 1.0 } else { -1.0 };
+                let doubt = (2.0 * error * distance).sqrt() * normal.vector.length()
+                    + WEIGHTS * distance * normal.weight;
+                assert!(height > doubt, "{feature:?} {height} {doubt}");
+                assert!(!(if is_above { normal.is_below } else { normal.is_above }));
+            }
+        }
+        assert!(clear[0] > 1_000 && clear[1] > 1_000, "{clear:?}");
+    }
+
     #[test]
     fn a_sliver_has_the_normal_that_f64_says() {
         for height in [1e-3, 1e-5, 1e-6] {
