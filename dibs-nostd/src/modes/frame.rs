@@ -8,6 +8,7 @@ use glam::Vec3;
 use super::bound::ROUNDING;
 use super::reach::Reach;
 use super::{ModalSurface, Modes};
+use crate::surface::motion::sealed::Sealed;
 use crate::surface::{
     FARTHEST, FrameLabel, MeasuredStretch, MovingSurface, Travel, VertexTable, clamped,
 };
@@ -209,6 +210,8 @@ impl<const K: usize> VertexTable for ModalFrame<'_, K> {
         self.label.position_error
     }
 }
+
+impl<const K: usize> Sealed for ModalFrame<'_, K> {}
 
 /// Its motion since other frames of one reader is known, between frames too.
 impl<const K: usize> MovingSurface for ModalFrame<'_, K> {

@@ -20,13 +20,11 @@ pub trait MovingSurface: VertexTable + sealed::Sealed {
     fn travel(&self) -> Option<Travel>;
 }
 
-mod sealed {
+pub(crate) mod sealed {
     pub trait Sealed {}
     impl<V: super::VertexTable + ?Sized> Sealed for super::Moved<'_, V> {}
     impl<S: super::MovingSurface + ?Sized> Sealed for &S {}
     impl<const N: usize, F: crate::surface::Buffers> Sealed for crate::FrameGuard<'_, N, F> {}
-    #[cfg(feature = "modes")]
-    impl<const K: usize> Sealed for crate::modes::ModalFrame<'_, K> {}
     impl<W, V> Sealed for crate::surface::moving::Between<'_, W, V>
     where
         W: super::VertexTable + ?Sized,
