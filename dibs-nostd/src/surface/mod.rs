@@ -12,7 +12,9 @@ mod moving;
 mod reader;
 mod vertices;
 
-pub(crate) use age::{Ageing, elapsed};
+pub(crate) use age::Ageing;
+#[cfg(feature = "modes")]
+pub(crate) use age::elapsed;
 #[cfg(feature = "bus")]
 pub(crate) use buffer::Ahead;
 pub use buffer::{Buffer, FrameLabel, Position};
