@@ -133,29 +133,30 @@ impl Feature {
             is_clear.then_some(height > 0.0)
         };
         let first = self.corner();
-        let [centre, mut from, to] = turned(*corners, first);
-        let side = is_above([centre, from, to])?;
-        let (mut row, mut corner) = (triangle, first);
-        for _ in 0..self.most() {
+        let [centre, mut from, mut to] = turned(*corners, first);
+        let (mut row, mut corner, mut side) = (triangle, first, None);
+        for rest in (0..=self.most()).rev() {
+            let this = is_above([centre, from, to])?;
+            if *side.get_or_insert(this) != this {
+                return None;
+            }
+            if rest == 0 {
+                break;
+            }
             // The next triangle has this one's edge from `centre` to `from`.
             let (next, back) = tree.across(row, corner)?;
             if next == triangle {
-                return Some(side);
+                return side;
             }
-            (row, corner) = (next, after(back));
+            (row, corner, to) = (next, after(back), from);
             let [a, b, c] = tree.triangle(row)?;
-            let vertex = match corner {
+            from = vertices.position(match corner {
                 0 => b,
                 1 => c,
                 _ => a,
-            };
-            let to = from;
-            from = vertices.position(vertex)?;
-            if is_above([centre, from, to])? != side {
-                return None;
-            }
+            })?;
         }
-        if matches!(self, Self::Vertex(_)) { None } else { Some(side) }
+        if matches!(self, Self::Vertex(_)) { None } else { side }
     }
 
     /// The corner around which the feature's triangles lie, and which its edge leaves.

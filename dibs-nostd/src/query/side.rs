@@ -94,6 +94,7 @@ pub(super) struct PointSide {
 ///
 /// A point that is clearly above all triangles of its feature is above their pseudonormal, whatever their weights: then
 /// none is needed.
+#[inline(never)] // So that a tick's code fits the tightly coupled memory of small controllers.
 pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     vertices: &V,
