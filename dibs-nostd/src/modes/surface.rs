@@ -49,11 +49,13 @@ impl<const K: usize> VertexTable for ModalSurface<'_, K> {
     fn position(&self, vertex: u32) -> Option<Vec3> {
         let rest = format::rest_position(self.modes.rest, vertex)?;
         let (mut x, mut y, mut z) = (0_i32, 0_i32, 0_i32);
-        for (&gain, &[x0, x1, y0, y1, z0, z1]) in self.gains.iter().zip(self.modes.row(vertex)?) {
+        for (&gain, mode) in self.gains.iter().zip(self.modes.row(vertex)?) {
+            // One load for two axes.
+            let xy = i32::from_le_bytes(*mode.first_chunk()?);
             // The layout's check bounds the sums, so they do not wrap.
-            x = x.wrapping_add(scaled(gain, [x0, x1]));
-            y = y.wrapping_add(scaled(gain, [y0, y1]));
-            z = z.wrapping_add(scaled(gain, [z0, z1]));
+            x = x.wrapping_add(scaled(gain, xy as i16));
+            y = y.wrapping_add(scaled(gain, (xy >> 16) as i16));
+            z = z.wrapping_add(scaled(gain, i16::from_le_bytes(*mode.last_chunk()?)));
         }
         Some(rest + Vec3::new(x as f32, y as f32, z as f32) * self.modes.header.unit)
     }
@@ -66,6 +68,6 @@ impl<const K: usize> VertexTable for ModalSurface<'_, K> {
 
 /// One mode's share of one axis, in units. With the addition it is `smlawb` or `smlawt` on ARM.
 #[inline(always)]
-const fn scaled(gain: i32, displacement: [u8; 2]) -> i32 {
-    ((gain as i64 * i16::from_le_bytes(displacement) as i64) >> FRACTION_BITS) as i32
+const fn scaled(gain: i32, displacement: i16) -> i32 {
+    ((gain as i64 * displacement as i64) >> FRACTION_BITS) as i32
 }
