@@ -17,20 +17,24 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The tree in flash: of the generated heart, or of the mesh file in `DIBS_MESH`; for a stretch of 1.5, or that in
-/// `DIBS_STRETCH`.
+/// The tree in flash: of the generated heart, or of the mesh file in `DIBS_MESH`; for a stretch of 1.5, that in
+/// `DIBS_STRETCH`, or the limits of the file in `DIBS_LIMITS`.
 fn surface() -> Result<()> {
-    println!("cargo::rerun-if-env-changed=DIBS_MESH");
-    println!("cargo::rerun-if-env-changed=DIBS_STRETCH");
+    for variable in ["DIBS_MESH", "DIBS_STRETCH", "DIBS_LIMITS"] {
+        println!("cargo::rerun-if-env-changed={variable}");
+    }
     let tree = match env::var_os("DIBS_MESH") {
         Some(path) => dibs_build::tree(&path),
         None => dibs_build::tree(generate::heart(10_272)?.mesh),
     };
-    let stretch = match env::var("DIBS_STRETCH") {
-        Ok(text) => text.parse().with_context(|| format!("DIBS_STRETCH=`{text}`"))?,
-        Err(_) => 1.5,
+    let tree = match (env::var_os("DIBS_LIMITS"), env::var("DIBS_STRETCH")) {
+        (Some(file), _) => tree.limits(file),
+        (None, Ok(text)) => {
+            tree.stretch(text.parse().with_context(|| format!("DIBS_STRETCH=`{text}`"))?)
+        }
+        (None, Err(_)) => tree.stretch(1.5),
     };
-    tree.stretch(stretch).emit("surface");
+    tree.emit("surface");
     Ok(())
 }
 

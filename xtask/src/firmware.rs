@@ -12,8 +12,16 @@ use crate::toolchain::Cross;
 pub struct Surface {
     /// A mesh file, or the generated heart.
     pub mesh: Option<PathBuf>,
-    /// The limit on stretch.
-    pub stretch: f32,
+    /// The limits on stretch.
+    pub limits: Limits,
+}
+
+/// How far a surface may be stretched.
+pub enum Limits {
+    /// Everywhere alike.
+    Stretch(f32),
+    /// A file with a limit for each triangle.
+    File(PathBuf),
 }
 
 /// The generated heart's limit on stretch, as in the paper; its motion stays within it.
@@ -21,7 +29,7 @@ pub const HEART_STRETCH: f32 = 1.5;
 
 impl Default for Surface {
     fn default() -> Self {
-        Self { mesh: None, stretch: HEART_STRETCH }
+        Self { mesh: None, limits: Limits::Stretch(HEART_STRETCH) }
     }
 }
 
@@ -48,15 +56,20 @@ impl Surface {
             Some(mesh) => cargo.env("DIBS_MESH", mesh),
             None => cargo.env_remove("DIBS_MESH"),
         };
-        if self.stretch == HEART_STRETCH {
-            cargo.env_remove("DIBS_STRETCH");
-        } else {
-            cargo.env("DIBS_STRETCH", self.stretch.to_string());
+        cargo.env_remove("DIBS_STRETCH").env_remove("DIBS_LIMITS");
+        match &self.limits {
+            Limits::Stretch(HEART_STRETCH) => {}
+            Limits::Stretch(stretch) => {
+                cargo.env("DIBS_STRETCH", stretch.to_string());
+            }
+            Limits::File(file) => {
+                cargo.env("DIBS_LIMITS", file);
+            }
         }
     }
 
     /// Whether this is the build script's default.
     pub fn is_default(&self) -> bool {
-        self.mesh.is_none() && self.stretch == HEART_STRETCH
+        self.mesh.is_none() && matches!(self.limits, Limits::Stretch(HEART_STRETCH))
     }
 }

@@ -18,7 +18,7 @@ use fastrand::Rng;
 use glam::{Quat, Vec3};
 use probe::tick::{ANSWER_WORDS, BYTES, END, SKIP, TICK};
 use rayon::prelude::*;
-use xtask::firmware::Surface;
+use xtask::firmware::{HEART_STRETCH, Surface};
 use xtask::process::run;
 use xtask::steps::Outcome;
 
@@ -73,7 +73,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let program = cross.program("firmware", "tick");
 
     let mesh = generate::heart(10_272)?.mesh;
-    let built = Builder::new().stretch(Surface::default().stretch).build(&mesh)?;
+    let built = Builder::new().stretch(HEART_STRETCH).build(&mesh)?;
     let mesh_id = built.summary().mesh_id;
     let kinds = (0..effort.tick_frames).into_par_iter();
     let frames = kinds

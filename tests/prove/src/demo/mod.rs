@@ -42,8 +42,8 @@ pub struct Options {
     /// Its motion: a PC2 file with a position for each of the mesh's vertices in every frame.
     #[arg(long, requires = "mesh")]
     pub motion: Option<PathBuf>,
-    /// Limit on stretch that the tree is built for; by default 1.5 for the generated heart, and
-    /// what the motion needs (with 2 % to spare) for a mesh of your own.
+    /// Limit on stretch that the tree is built for; by default 1.5 for the generated heart, and what each triangle needs
+    /// in the motion (with a tenth to spare) for a mesh of your own.
     #[arg(long)]
     pub stretch: Option<f32>,
     /// Seconds of the controller's time to run.

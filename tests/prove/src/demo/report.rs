@@ -192,7 +192,7 @@ impl Report {
             records_lost: summary.records_dropped.max(expected),
             real_seconds: outcome.took.as_secs_f64(),
             surface: scene.describe(),
-            stretch_limit: scene.surface.stretch,
+            stretch_limit: scene.tree.summary().stretch,
             controller: machine.describe(),
             run: Run::now(format!("{} s", outcome.ticks_asked / TICK_RATE)),
             command: command_line(),

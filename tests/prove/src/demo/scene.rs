@@ -1,18 +1,16 @@
 //! The surface, its motion and its tree, as in the firmware.
 
 use anyhow::{Context, Result, ensure};
-use dibs_build::{Builder, BuiltTree, Mesh, Motion, Unit, generate};
-use dibs_nostd::{Index, measure_stretch};
-use xtask::firmware::{HEART_STRETCH, Surface};
+use dibs_build::{Builder, BuiltTree, Motion, MotionStretch, Paths, Unit, generate, write_limits};
+use xtask::firmware::{HEART_STRETCH, Limits, Surface};
+use xtask::workspace;
 
 use super::Options;
 
 /// Triangles of the generated heart: those of the paper's.
 const HEART_TRIANGLES: u32 = 10_272;
-/// Margin above the largest stretch of a recorded motion.
-const MARGIN: f32 = 1.02;
-/// A limit beyond any motion, for the tree that measures a motion's stretch.
-const ANY_STRETCH: f32 = 1_000.0;
+/// Margin of the limits that are learned from a motion.
+const MARGIN: f32 = 0.1;
 
 /// The moving surface, and the firmware's tree of it.
 pub struct Scene {
@@ -46,12 +44,23 @@ impl Scene {
         };
         motion.check_fits(&mesh)?;
         ensure!(!motion.frames.is_empty(), "the motion has no frame");
-        let stretch = match (options.stretch, &options.mesh) {
-            (Some(stretch), _) => stretch,
-            (None, None) => HEART_STRETCH,
-            (None, Some(_)) => needed_stretch(&mesh, &motion)?,
+        let limit = match (options.stretch, &options.mesh) {
+            (Some(stretch), _) => Some(stretch),
+            (None, None) => Some(HEART_STRETCH),
+            (None, Some(_)) => None,
         };
-        let tree = Builder::new().stretch(stretch).build(&mesh)?;
+        let (limits, tree) = match limit {
+            Some(stretch) => (Limits::Stretch(stretch), Builder::new().stretch(stretch)),
+            None => {
+                let needed = MotionStretch::new(&mesh, &motion, Paths::default(), &|_| ())
+                    .context("measuring the motion")?;
+                let each = needed.limits(MARGIN);
+                let file = workspace::target().join("demo-limits.txt");
+                write_limits(&file, &mesh, &each, "Learned by `cargo xtask demo`")?;
+                (Limits::File(file), Builder::new().limits(each))
+            }
+        };
+        let tree = tree.build(&mesh)?;
         let mut row = vec![0; mesh.positions.len()];
         for (place, &vertex) in (0..).zip(tree.vertex_order()) {
             row[vertex as usize] = place;
@@ -60,7 +69,7 @@ impl Scene {
         let given = options.mesh.as_ref().map(|path| path.display().to_string());
         Ok(Self {
             name: given.unwrap_or_else(|| "generated heart".to_owned()),
-            surface: Surface { mesh: path, stretch },
+            surface: Surface { mesh: path, limits },
             rate: if motion.rate > 0.0 { motion.rate } else { 25.0 },
             triangles: mesh.triangles.iter().map(|t| t.map(|v| row[v as usize])).collect(),
             tree,
@@ -71,34 +80,16 @@ impl Scene {
     /// One line for the user.
     pub fn describe(&self) -> String {
         let summary = self.tree.summary();
+        let limits = match self.surface.limits {
+            Limits::Stretch(stretch) => format!("stretch limit {stretch}"),
+            Limits::File(_) => format!("limits learned, {} at most", summary.stretch),
+        };
         format!(
-            "{}: {} triangles, {} vertices, {} frames of motion, stretch limit {}",
+            "{}: {} triangles, {} vertices, {} frames of motion, {limits}",
             self.name,
             summary.triangles,
             summary.vertices,
             self.motion.frames.len(),
-            summary.stretch
         )
     }
-}
-
-/// The stretch limit that a motion needs.
-fn needed_stretch(mesh: &Mesh, motion: &Motion) -> Result<f32> {
-    let tree = Builder::new().stretch(ANY_STRETCH).build(mesh)?;
-    let largest = match tree.index_bits() {
-        16 => largest_stretch::<u16>(&tree, motion),
-        _ => largest_stretch::<u32>(&tree, motion),
-    }?;
-    Ok((largest * MARGIN * 100.0).ceil() / 100.0)
-}
-
-fn largest_stretch<I: Index>(built: &BuiltTree, motion: &Motion) -> Result<f32> {
-    let tree = built.tree::<I>()?;
-    let mut largest = 1.0_f32;
-    for (number, frame) in motion.frames.iter().enumerate() {
-        let measured = measure_stretch(&tree, &built.to_rows(frame)[..])
-            .with_context(|| format!("frame {number} of the motion"))?;
-        largest = largest.max(measured.sigma());
-    }
-    Ok(largest)
 }
