@@ -37,8 +37,20 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
     root.fill(&WHITE).map_err(failed)?;
     let (upper, rest) = root.split_vertically(280);
     let (middle, lower) = rest.split_vertically(200);
-    let separation = extremes(&answered, |tick| at(tick.tick, tick.separation.into()));
-    curves(&upper, "separation (mm)", &Curve::alone(separation, BLUE_INK))?;
+    // They differ where the budget ended before a depth was known.
+    let interval = [
+        Curve {
+            name: "certainly at most",
+            ink: ORANGE_INK,
+            points: extremes(&answered, |tick| at(tick.tick, tick.separation.into())),
+        },
+        Curve {
+            name: "at least, which the force is for",
+            ink: BLUE_INK,
+            points: extremes(&answered, |tick| at(tick.tick, tick.lower.into())),
+        },
+    ];
+    curves(&upper, "separation (mm)", &interval)?;
     let touches: Vec<&Touch> = outcome.touches.all.iter().collect();
     let contacts = extremes(&touches, |touch| at(touch.tick, touch.contacts as f64));
     curves(&middle, "contacts", &Curve::alone(contacts, GREEN_INK))?;
@@ -143,7 +155,12 @@ fn curves(
     }
     if curves.len() > 1 {
         let legend = &mut chart.configure_series_labels();
-        let legend = legend.position(SeriesLabelPosition::LowerRight).background_style(WHITE);
+        let place = if low < 0.0 {
+            SeriesLabelPosition::UpperRight
+        } else {
+            SeriesLabelPosition::LowerRight
+        };
+        let legend = legend.position(place).background_style(WHITE);
         legend.border_style(BLACK.mix(0.3)).draw().map_err(failed)?;
     }
     Ok(())
