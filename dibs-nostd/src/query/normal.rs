@@ -327,7 +327,7 @@ mod tests {
         }
     }
 
-    /// On a crumpled surface, some of whose triangles have no area, a side that is clear is that of the pseudonormal.
+    /// A clear side is the pseudonormal's side. The surface is crumpled, and some triangles have no area.
     #[test]
     fn a_clear_side_is_that_of_the_pseudonormal() {
         const WEIGHTS: f32 = 1e-5;

@@ -42,8 +42,8 @@ pub struct Options {
     /// Its motion: a PC2 file with a position for each of the mesh's vertices in every frame.
     #[arg(long, requires = "mesh")]
     pub motion: Option<PathBuf>,
-    /// Limit on stretch that the tree is built for; by default 1.5 for the generated heart, and what each triangle needs
-    /// in the motion (with a tenth to spare) for a mesh of your own.
+    /// Limit on stretch of every triangle. By default the generated heart has 1.5, and a mesh of your own has limits
+    /// learned from its motion, with a tenth to spare.
     #[arg(long)]
     pub stretch: Option<f32>,
     /// Seconds of the controller's time to run.

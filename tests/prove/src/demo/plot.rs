@@ -39,32 +39,25 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
     let (middle, lower) = rest.split_vertically(200);
     // They differ where the budget ended before a depth was known.
     let interval = [
-        Curve {
-            name: "certainly at most",
-            ink: ORANGE_INK,
-            points: extremes(&answered, |tick| at(tick.tick, tick.separation.into())),
-        },
-        Curve {
-            name: "at least, which the force is for",
-            ink: BLUE_INK,
-            points: extremes(&answered, |tick| at(tick.tick, tick.lower.into())),
-        },
+        Curve::new("certainly at most", ORANGE_INK, &answered, |tick| {
+            at(tick.tick, tick.separation.into())
+        }),
+        Curve::new("at least, which the force is for", BLUE_INK, &answered, |tick| {
+            at(tick.tick, tick.lower.into())
+        }),
     ];
     curves(&upper, "separation (mm)", &interval)?;
     let touches: Vec<&Touch> = outcome.touches.all.iter().collect();
-    let contacts = extremes(&touches, |touch| at(touch.tick, touch.contacts as f64));
-    curves(&middle, "contacts", &Curve::alone(contacts, GREEN_INK))?;
+    let contacts =
+        Curve::new("", GREEN_INK, &touches, |touch| at(touch.tick, touch.contacts as f64));
+    curves(&middle, "contacts", &[contacts])?;
     let forces = [
-        Curve {
-            name: "of all contacts, by the proxy",
-            ink: ORANGE_INK,
-            points: extremes(&touches, |touch| at(touch.tick, touch.force.into())),
-        },
-        Curve {
-            name: "the controller's, of the closest pair",
-            ink: BLUE_INK,
-            points: extremes(&answered, |tick| at(tick.tick, force(tick).into())),
-        },
+        Curve::new("of all contacts, by the proxy", ORANGE_INK, &touches, |touch| {
+            at(touch.tick, touch.force.into())
+        }),
+        Curve::new("the controller's, of the closest pair", BLUE_INK, &answered, |tick| {
+            at(tick.tick, force(tick).into())
+        }),
     ];
     curves(&lower, "force (N)", &forces)?;
     root.present().map_err(failed)?;
@@ -75,8 +68,8 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
         let root = SVGBackend::new(&picture, (900, 560)).into_drawing_area();
         root.fill(&WHITE).map_err(failed)?;
         let (upper, lower) = root.split_vertically(280);
-        let curve = extremes(&answered, |tick| at(tick.tick, instructions(tick)));
-        curves(&upper, "instructions a query", &Curve::alone(curve, BLUE_INK))?;
+        let curve = Curve::new("", BLUE_INK, &answered, |tick| at(tick.tick, instructions(tick)));
+        curves(&upper, "instructions a query", &[curve])?;
         let values: Vec<f64> = answered.iter().map(|tick| instructions(tick)).collect();
         histogram(&lower, "instructions a query", &values)?;
         root.present().map_err(failed)?;
@@ -111,8 +104,13 @@ struct Curve {
 }
 
 impl Curve {
-    fn alone(points: Vec<(f64, f64)>, ink: RGBColor) -> [Self; 1] {
-        [Self { name: "", ink, points }]
+    fn new<T>(
+        name: &'static str,
+        ink: RGBColor,
+        ticks: &[&T],
+        point: impl Fn(&T) -> (f64, f64),
+    ) -> Self {
+        Self { name, ink, points: extremes(ticks, point) }
     }
 }
 
@@ -155,6 +153,7 @@ fn curves(
     }
     if curves.len() > 1 {
         let legend = &mut chart.configure_series_labels();
+        // Away from most of the curve: a tool in the surface is below zero, and a force is mostly at its largest.
         let place = if low < 0.0 {
             SeriesLabelPosition::UpperRight
         } else {

@@ -44,14 +44,8 @@ impl Scene {
         };
         motion.check_fits(&mesh)?;
         ensure!(!motion.frames.is_empty(), "the motion has no frame");
-        let limit = match (options.stretch, &options.mesh) {
-            (Some(stretch), _) => Some(stretch),
-            (None, None) => Some(HEART_STRETCH),
-            (None, Some(_)) => None,
-        };
-        let (limits, tree) = match limit {
-            Some(stretch) => (Limits::Stretch(stretch), Builder::new().stretch(stretch)),
-            None => {
+        let (limits, builder) = match (options.stretch, &options.mesh) {
+            (None, Some(_)) => {
                 let needed = MotionStretch::new(&mesh, &motion, Paths::default(), &|_| ())
                     .context("measuring the motion")?;
                 let each = needed.limits(MARGIN);
@@ -59,8 +53,12 @@ impl Scene {
                 write_limits(&file, &mesh, &each, "Learned by `cargo xtask demo`")?;
                 (Limits::File(file), Builder::new().limits(each))
             }
+            (stretch, _) => {
+                let stretch = stretch.unwrap_or(HEART_STRETCH);
+                (Limits::Stretch(stretch), Builder::new().stretch(stretch))
+            }
         };
-        let tree = tree.build(&mesh)?;
+        let tree = builder.build(&mesh)?;
         let mut row = vec![0; mesh.positions.len()];
         for (place, &vertex) in (0..).zip(tree.vertex_order()) {
             row[vertex as usize] = place;
