@@ -155,6 +155,27 @@ fn no_contact_is_missing_and_none_is_doubled() {
     assert!(checked > poses * 3 && several > checked / 20);
 }
 
+/// Most of several thousand triangles within the margin lead down to a contact, and are not kept.
+#[test]
+fn a_fine_surface_needs_little_room() {
+    let waves = |x: f32, y: f32| 2.5 * (0.4 * x).sin() * (0.3 * y).cos();
+    let (from, to) = (Vec3::new(-25.0, 1.0, 4.0), Vec3::new(25.0, 3.0, 4.5));
+    let tool = Capsule::new(from, to, 1.0).expect("valid");
+    let found = |cells| {
+        let (built, rows) = build(&sheet(cells, 60.0, waves));
+        let tree = built.tree::<u16>().expect("valid");
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        let mut contacts = Contacts::<32, 2048>::new();
+        let answer =
+            query.contacts(rows.as_slice(), &tool, MARGIN, &Options::cold(), &mut contacts);
+        answer.expect("an answer");
+        assert!(contacts.bound() >= MARGIN, "{cells}: only within {}", contacts.bound());
+        contacts.len()
+    };
+    let (coarse, fine) = (found(40), found(126));
+    assert!(coarse > 3 && fine == coarse, "{coarse} and {fine}");
+}
+
 #[test]
 fn a_flat_wall_along_a_capsule_is_one_contact() {
     let (built, rows) = build(&sheet(30, 60.0, |_, _| 0.0));

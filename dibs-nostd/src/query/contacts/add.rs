@@ -82,42 +82,71 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             return Ok(Budget { node_tests: 0, triangle_tests: 0 });
         }
         basins.clear();
-        let limit = tool.radius() + margin;
+        let ridge = (margin * RIDGE) + 2.0 * accuracy;
+        let limit = tool.radius() + margin + ridge;
         let mut complete = limit;
         let search = Search::start(tree, stack, vertices, tool, options, None)?;
-        let (beyond, made) = search.each_within(limit, |row, square| {
+        let (beyond, mut made) = search.each_low(limit, ridge, |row, square| {
             if let Some(farthest) = basins.push(Near { square, row }) {
                 complete = sqrt(farthest);
             }
             complete
         })?;
-        let least = if beyond < complete { beyond } else { complete };
-        found.is_cut_short |= !has_side || beyond < limit;
-        // Without a side the tool may be inside, deeper than every pair seen.
-        found.lower_bound(if has_side { least - tool.radius() } else { f32::NEG_INFINITY });
         let is_crossing = closest.side == Side::Crossing;
         if is_crossing && let Some(contact) = pair.contact(closest) {
             found.insert(contact);
         }
-        let ridge = (margin * RIDGE) + 2.0 * accuracy;
-        let mut failed = None;
-        basins.each_valley(tree, ridge, |near| {
+        let mut is_cut_short = !has_side || beyond < limit;
+        let height = |row| {
+            if made.triangle_tests >= options.budget.triangle_tests {
+                is_cut_short = true;
+                return Ok(None);
+            }
+            made.triangle_tests += 1;
+            pair.square(row, limit + ridge).map(Some)
+        };
+        let missing = basins.each_valley(tree, ridge, height, |near| {
             let is_on = sqrt(near.square) <= accuracy;
             // The crossing pair, inserted above, stands for these triangles.
             if is_crossing && is_on {
-                return;
+                return Ok(());
             }
-            match pair_at(tree, vertices, tool, near, accuracy) {
-                Ok(other) if other.side == Side::Inside || other.separation > margin => (),
-                Ok(other) => {
-                    if let Some(contact) = pair.contact(&other) {
-                        found.insert(contact);
-                    }
-                }
-                Err(error) => failed = Some(error),
+            let other = pair_at(tree, vertices, tool, near, accuracy)?;
+            if other.side != Side::Inside
+                && other.separation <= margin
+                && let Some(contact) = pair.contact(&other)
+            {
+                found.insert(contact);
             }
-        });
-        failed.map_or(Ok(made), Err)
+            Ok(())
+        })?;
+        let mut least = if beyond < complete { beyond } else { complete };
+        if let Some(from) = missing.map(sqrt).filter(|&from| from < least) {
+            least = from;
+        }
+        found.is_cut_short |= is_cut_short;
+        // Without a side the tool may be inside, deeper than every pair seen.
+        if !has_side {
+            found.lower_bound(f32::NEG_INFINITY);
+        } else if least < limit {
+            // A valley's lowest triangle is less than a ridge below the low one that was visited.
+            found.lower_bound(least - ridge - tool.radius());
+        }
+        Ok(made)
+    }
+}
+
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
+    /// The square of a triangle's distance from the axis; infinite if beyond the limit.
+    fn square(&self, row: u32, limit: f32) -> Result<f32, QueryError> {
+        let (rows, corners) = corners(self.tree, self.vertices, row)?;
+        match self.tool.closest_on_triangle(&corners, limit * limit) {
+            Some(found) => Ok(found.distance_squared),
+            None => match rows.into_iter().zip(corners).find(|(_, corner)| !corner.is_finite()) {
+                Some((vertex, _)) => Err(QueryError::Position { vertex }),
+                None => Ok(f32::INFINITY),
+            },
+        }
     }
 }
 
@@ -151,12 +180,9 @@ fn pair_at<I: Index, V: VertexTable + ?Sized, T: Tool>(
     accuracy: f32,
 ) -> Result<Proximity, QueryError> {
     let row = near.row;
-    let corners = tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
-    let [a, b, c] = corners;
-    let position = |vertex| vertices.position(vertex).ok_or(QueryError::Corrupt { row: vertex });
-    let positions = [position(a)?, position(b)?, position(c)?];
+    let (corners, positions) = corners(tree, vertices, row)?;
     let found = tool.closest_on_triangle(&positions, f32::INFINITY);
-    let found = found.ok_or(QueryError::Position { vertex: a })?;
+    let found = found.ok_or(QueryError::Position { vertex: corners[0] })?;
     let axis_distance = sqrt(found.distance_squared);
     let towards = found.on_axis - found.on_surface;
     let length = sqrt(towards.length_squared());
@@ -185,4 +211,16 @@ fn pair_at<I: Index, V: VertexTable + ?Sized, T: Tool>(
     }
     pair.point_on_tool = found.on_axis - pair.direction * tool.radius();
     Ok(pair)
+}
+
+/// A triangle's corners: their rows, and their positions.
+fn corners<I: Index, V: VertexTable + ?Sized>(
+    tree: &Tree<'_, I>,
+    vertices: &V,
+    row: u32,
+) -> Result<([u32; 3], [Vec3; 3]), QueryError> {
+    let corners = tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
+    let position = |vertex| vertices.position(vertex).ok_or(QueryError::Corrupt { row: vertex });
+    let [a, b, c] = corners;
+    Ok((corners, [position(a)?, position(b)?, position(c)?]))
 }

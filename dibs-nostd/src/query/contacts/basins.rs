@@ -1,10 +1,11 @@
 //! Selects the triangles near a tool that are closer than their surroundings.
 //!
-//! The distance from the tool is a height over the surface, and each valley of it is a contact. A watershed fills the
-//! valleys from the lowest triangle on and merges two that only a low ridge parts: a flat wall along a capsule is one
-//! valley, however many triangles are equally far.
+//! The distance from the tool is a height over the surface, and each valley of it is a contact. A flood from each low
+//! triangle, the lowest first, rises by the height of a ridge. If it runs into the flood of a lower one, both are one
+//! valley: a flat wall along a capsule is one, however many triangles are equally far.
 
 use crate::math::sqrt::sqrt;
+use crate::unavailable::QueryError;
 use crate::{Index, Tree};
 
 /// A triangle, and the square of its distance.
@@ -39,19 +40,30 @@ impl Key {
 /// No entry.
 const NONE: u16 = u16::MAX;
 
-/// The nearest triangles, at most `N`; then their valleys.
+/// The nearest low triangles, at most half of `N`; then those that floods have met.
 #[derive(Clone, Debug)]
 pub(super) struct Basins<const N: usize> {
     near: [Key; N],
-    /// Whether they are a heap, the farthest first.
+    /// Whether the low triangles are a heap, the farthest first.
     is_heap: bool,
-    /// For each entry one that is not higher: a chain that ends at the lowest of its valley.
-    lower: [u16; N],
-    /// Hash table of the flooded entries: the first for each remainder of rows by `N`, and the next with the same one.
+    /// Hash table of the entries: the first for each remainder of rows by `N`, and the next with the same one.
     heads: [u16; N],
     next: [u16; N],
-    is_contact: [bool; N],
+    /// The low triangle whose flood has reached each entry.
+    reached_by: [u16; N],
+    /// Entries that the flood has reached, in order.
+    reached: [u16; N],
     count: usize,
+}
+
+/// The end of a flood.
+enum Flood {
+    /// It has reached all that is below its level; the lowest.
+    Ended(Near),
+    /// It has met the flood of a lower triangle.
+    Joined,
+    /// No room for another triangle, or no budget.
+    CutShort,
 }
 
 impl<const N: usize> Basins<N> {
@@ -59,10 +71,10 @@ impl<const N: usize> Basins<N> {
         Self {
             near: [Key(0); N],
             is_heap: false,
-            lower: [NONE; N],
             heads: [NONE; N],
             next: [NONE; N],
-            is_contact: [false; N],
+            reached_by: [NONE; N],
+            reached: [NONE; N],
             count: 0,
         }
     }
@@ -71,88 +83,135 @@ impl<const N: usize> Basins<N> {
         (self.count, self.is_heap) = (0, false);
     }
 
-    /// Keeps a triangle, and drops the farthest if there is no room. Returns the largest square kept, once full.
+    /// Keeps a low triangle, and drops the farthest if there is no room. Returns the largest square kept, once full.
     pub fn push(&mut self, near: Near) -> Option<f32> {
         let key = Key::of(near);
-        if let Some(place) = self.near.get_mut(self.count) {
+        let low = self.near.get_mut(..N.div_ceil(2))?;
+        if let Some(place) = low.get_mut(self.count) {
             *place = key;
             self.count += 1;
             return None;
         }
         if !self.is_heap {
             self.is_heap = true;
-            heap(&mut self.near);
+            heap(low);
         }
-        if key < *self.near.first()? {
-            sink(&mut self.near, 0, key);
+        if key < *low.first()? {
+            sink(low, 0, key);
         }
-        self.near.first().map(|farthest| farthest.square())
+        low.first().map(|farthest| farthest.square())
     }
 
     /// Finds the valleys: ridges of at most `ridge` above the higher valley do not count. Calls back with the lowest
-    /// triangle of each, nearest first.
+    /// triangle of each, nearest first. `height` is the square of a triangle's distance, or `None` without budget.
+    ///
+    /// Returns the square of the distance from which on valleys may be missing, if any.
     pub fn each_valley<I: Index>(
         &mut self,
         tree: &Tree<'_, I>,
         ridge: f32,
-        mut visit: impl FnMut(Near),
-    ) {
+        mut height: impl FnMut(u32) -> Result<Option<f32>, QueryError>,
+        mut visit: impl FnMut(Near) -> Result<(), QueryError>,
+    ) -> Result<Option<f32>, QueryError> {
         sort(self.near.get_mut(..self.count).unwrap_or_default(), self.is_heap);
         self.is_heap = false;
         self.heads.fill(NONE);
-        for entry in 0..self.count {
-            self.flood(tree, entry, ridge);
+        let low = self.count;
+        for entry in 0..low {
+            self.enter(entry);
         }
-        for entry in 0..self.count {
-            let is_lowest = self.lower.get(entry).is_some_and(|&lower| usize::from(lower) == entry);
-            let was_cut_off = self.is_contact.get(entry).is_some_and(|&is| is);
-            if let Some(key) = self.near.get(entry).filter(|_| is_lowest || was_cut_off) {
-                visit(key.near());
+        for entry in 0..low {
+            match self.flood(tree, entry as u16, ridge, &mut height)? {
+                Flood::Ended(lowest) => visit(lowest)?,
+                Flood::Joined => (),
+                Flood::CutShort => return Ok(self.near.get(entry).map(|key| key.square())),
             }
         }
+        Ok(None)
     }
 
-    /// Joins an entry with the valleys next to it, all of them lower.
-    fn flood<I: Index>(&mut self, tree: &Tree<'_, I>, entry: usize, ridge: f32) {
-        let Some(&key) = self.near.get(entry) else { return };
-        let row = key.row();
-        let mut valleys = [NONE; 3];
-        let mut lowest = entry as u16;
-        for (valley, edge) in valleys.iter_mut().zip(0..) {
-            if let Some(known) = tree.row_across(row, edge).and_then(|across| self.find(across)) {
-                *valley = self.bottom(known);
-                if *valley < lowest {
-                    lowest = *valley;
+    /// Floods the surroundings of a low triangle up to the height of a ridge above it.
+    fn flood<I: Index>(
+        &mut self,
+        tree: &Tree<'_, I>,
+        low: u16,
+        ridge: f32,
+        height: &mut impl FnMut(u32) -> Result<Option<f32>, QueryError>,
+    ) -> Result<Flood, QueryError> {
+        let Some(&(mut lowest)) = self.near.get(usize::from(low)) else {
+            return Ok(Flood::Joined);
+        };
+        let level = sqrt(lowest.square()) + ridge;
+        let mut count = 0;
+        if !self.reach(low, low, &mut count) {
+            return Ok(Flood::Joined);
+        }
+        for at in 0..N {
+            let Some(&entry) = self.reached.get(at).filter(|_| at < count) else { break };
+            let Some(row) = self.near.get(usize::from(entry)).map(|key| key.row()) else { break };
+            for across in (0..3).filter_map(|edge| tree.row_across(row, edge)) {
+                let Some(next) = self.entry(across, height)? else { return Ok(Flood::CutShort) };
+                let at = usize::from(next);
+                let (Some(&key), Some(&by)) = (self.near.get(at), self.reached_by.get(at)) else {
+                    return Ok(Flood::CutShort);
+                };
+                if by == low || key.square() > level * level {
+                    continue;
+                }
+                if !self.reach(next, low, &mut count) {
+                    return Ok(Flood::Joined);
+                }
+                // By rounding only: lower valleys were flooded before.
+                if key < lowest {
+                    lowest = key;
                 }
             }
         }
-        for valley in valleys.into_iter().filter(|&valley| valley != NONE && valley != lowest) {
-            let bottom = self.near.get(usize::from(valley)).map_or(0.0, |key| key.square());
-            if sqrt(key.square()) - sqrt(bottom) > ridge
-                && let Some(is_contact) = self.is_contact.get_mut(usize::from(valley))
-            {
-                *is_contact = true;
-            }
-            self.set_lower(valley, lowest);
+        Ok(Flood::Ended(lowest.near()))
+    }
+
+    /// Adds an entry to the flood of `low`, of `count` entries. Returns whether it is the first to reach it.
+    fn reach(&mut self, entry: u16, low: u16, count: &mut usize) -> bool {
+        let by = self.reached_by.get_mut(usize::from(entry));
+        let (Some(by), Some(place)) = (by, self.reached.get_mut(*count)) else { return false };
+        if *by != NONE {
+            return false;
         }
-        self.set_lower(entry as u16, lowest);
-        if let Some(is_contact) = self.is_contact.get_mut(entry) {
-            *is_contact = false;
+        (*by, *place) = (low, entry);
+        *count += 1;
+        true
+    }
+
+    /// The entry of a triangle, made if there is none. `None` without room or budget.
+    fn entry(
+        &mut self,
+        row: u32,
+        height: &mut impl FnMut(u32) -> Result<Option<f32>, QueryError>,
+    ) -> Result<Option<u16>, QueryError> {
+        let known = self.find(row);
+        if known.is_some() {
+            return Ok(known);
         }
+        let Some(place) = self.near.get_mut(self.count) else { return Ok(None) };
+        let Some(square) = height(row)? else { return Ok(None) };
+        *place = Key::of(Near { square, row });
+        self.enter(self.count);
+        self.count += 1;
+        Ok(Some((self.count - 1) as u16))
+    }
+
+    /// Enters an entry into the hash table.
+    fn enter(&mut self, entry: usize) {
+        let Some(row) = self.near.get(entry).map(|key| key.row()) else { return };
         let bucket = (row as usize).checked_rem(N).unwrap_or_default();
-        if let (Some(head), Some(next)) = (self.heads.get_mut(bucket), self.next.get_mut(entry)) {
-            *next = *head;
+        if let (Some(head), Some(next), Some(by)) =
+            (self.heads.get_mut(bucket), self.next.get_mut(entry), self.reached_by.get_mut(entry))
+        {
+            (*next, *by) = (*head, NONE);
             *head = entry as u16;
         }
     }
 
-    fn set_lower(&mut self, entry: u16, lower: u16) {
-        if let Some(place) = self.lower.get_mut(usize::from(entry)) {
-            *place = lower;
-        }
-    }
-
-    /// The entry of a triangle, if it was flooded.
     fn find(&self, row: u32) -> Option<u16> {
         let bucket = (row as usize).checked_rem(N)?;
         let mut entry = *self.heads.get(bucket)?;
@@ -164,20 +223,6 @@ impl<const N: usize> Basins<N> {
             entry = *self.next.get(usize::from(entry))?;
         }
         None
-    }
-
-    /// The lowest entry of an entry's valley. Halves the chain to it on the way.
-    fn bottom(&mut self, mut entry: u16) -> u16 {
-        for _ in 0..N {
-            let Some(&lower) = self.lower.get(usize::from(entry)) else { return entry };
-            let lowest = self.lower.get(usize::from(lower)).copied().unwrap_or(lower);
-            if lower == entry {
-                return entry;
-            }
-            self.set_lower(entry, lowest);
-            entry = lowest;
-        }
-        entry
     }
 }
 

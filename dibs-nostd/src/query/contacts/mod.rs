@@ -62,8 +62,8 @@ impl Contact {
     };
 }
 
-/// Up to `N` contacts, deepest first, and a bound on the others. A query compares up to `NEAR` triangles: 15 bytes
-/// each.
+/// Up to `N` contacts, deepest first, and a bound on the others. A query compares up to `NEAR` triangles, 16 bytes
+/// each: those near a contact, and some with no lower vertex next to theirs.
 ///
 /// Make it once, in a `static` or at start-up, and use it at every tick.
 ///
@@ -188,8 +188,8 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// contacts. Where the side is undefined the tool is taken to be outside. If that is because the budget ended,
     /// contacts may be missing at any distance: see [`Contacts::within`].
     ///
-    /// Cost: that of [`closest`](Self::closest), a range search, and some hundred instructions for each triangle within
-    /// the margin.
+    /// Cost: that of [`closest`](Self::closest), a range search that compares the corners of each triangle within the
+    /// margin, and exact tests of about an eighth of these and of those around a contact.
     ///
     /// # Errors
     /// [`QueryError`]: those of [`closest`](Self::closest); [`QueryError::NoAdjacency`] for a tree without;

@@ -1,4 +1,4 @@
-//! All triangles within a distance, instead of the closest.
+//! All low triangles within a distance, instead of the closest.
 
 use super::{Search, Waiting};
 use crate::Budget;
@@ -9,11 +9,13 @@ use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// Visits every triangle within `limit` of the axis, with the square of its distance. A visit returns the next
-    /// limit. Unvisited triangles are at least as far as the distance returned; the budget is the tests made.
-    pub fn each_within(
+    /// Visits every triangle within `limit` of the axis that may be the lowest of its surroundings, but for ridges of
+    /// `ridge`, with the square of its distance. A visit returns the next limit. Unvisited ones are at least as far as
+    /// the distance returned; the budget is the tests made.
+    pub fn each_low(
         mut self,
         limit: f32,
+        ridge: f32,
         mut visit: impl FnMut(u32, f32) -> f32,
     ) -> Result<(f32, Budget), QueryError> {
         self.set_limit(limit);
@@ -33,7 +35,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             };
             self.left.node_tests = left;
             let is_done = if is_leaf {
-                self.visit_leaf(first, count, &mut visit)?
+                self.visit_low(first, count, ridge, &mut visit)?
             } else {
                 self.wait_for_children(lower, first, count)?;
                 true
@@ -50,7 +52,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         self.budget.less(self.left.node_tests, self.left.triangle_tests)
     }
 
-    fn set_limit(&mut self, limit: f32) {
+    pub(super) fn set_limit(&mut self, limit: f32) {
         self.cutoff = limit + self.slack;
         self.cutoff_squared = self.cutoff * self.cutoff;
     }
@@ -81,31 +83,5 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;
         }
         Ok(())
-    }
-
-    /// Visits a leaf's triangles. Returns whether the budget was enough.
-    fn visit_leaf(
-        &mut self,
-        first: u32,
-        count: u32,
-        visit: &mut impl FnMut(u32, f32) -> f32,
-    ) -> Result<bool, QueryError> {
-        for triangle in first..first.saturating_add(count) {
-            let [a, b, c] = self.corners(triangle)?;
-            let plane = self.plane_towards((a + b + c) * super::THIRD);
-            if plane.has_beyond(a) && plane.has_beyond(b) && plane.has_beyond(c) {
-                continue;
-            }
-            if plane.limit.is_nan() {
-                return Err(QueryError::Position { vertex: self.not_finite(triangle) });
-            }
-            let Some(left) = self.left.triangle_tests.checked_sub(1) else { return Ok(false) };
-            self.left.triangle_tests = left;
-            if let Some(pair) = self.tool.closest_on_triangle(&[a, b, c], self.cutoff_squared) {
-                let limit = visit(triangle, pair.distance_squared);
-                self.set_limit(limit);
-            }
-        }
-        Ok(true)
     }
 }

@@ -36,8 +36,8 @@ const PASSES: usize = 3;
 /// Radius and length of the tool, in mm.
 const TOOL: [f32; 2] = [2.5, 60.0];
 
-/// Contacts that are kept, and triangles within the margin.
-type List = Contacts<16, 16_384>;
+/// Contacts that are kept, and triangles that are compared.
+type List = Contacts<16, 1_024>;
 
 /// Where the tool goes.
 const PATHS: [&str; 2] = ["over the surface", "through the middle"];

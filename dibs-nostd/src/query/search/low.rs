@@ -1,0 +1,246 @@
+//! A leaf's triangles that may be the lowest of their surroundings.
+//!
+//! The square of the distance from the axis is convex in space, and twice the vector from the axis is its gradient. So
+//! over a triangle it is at least the value at the lowest corner plus the least rise towards the other two. Where that
+//! is no more than `ridge / 2` below the corner's distance, and a vertex next to that corner is lower, the triangle is
+//! not the lowest: the triangles around the corner lead down, over no ridge of that height. Where the triangle may dip
+//! across one edge, and the vertex beyond it is lower than the dip, neither is it. All others may be.
+//!
+//! Each step down leads to a triangle with a lower lowest corner, so it ends at a triangle that is kept, `ridge / 2`
+//! above the first one at most.
+
+use glam::Vec3;
+
+use super::Search;
+use crate::tool::Tool;
+use crate::tree::format::MAX_LEAF_TRIANGLES;
+use crate::unavailable::QueryError;
+use crate::{Index, VertexTable};
+
+/// Most triangles of a leaf.
+const MOST: usize = MAX_LEAF_TRIANGLES as usize;
+/// Most triangles that are turned through around a vertex.
+const MAX_RING: u32 = 256;
+
+/// A vertex, and the square of its distance. Vertices that are equally far are in the order of their rows.
+#[derive(Clone, Copy, PartialEq, PartialOrd)]
+struct Corner {
+    square: f32,
+    vertex: u32,
+}
+
+/// A triangle, seen from the axis.
+#[derive(Clone, Copy)]
+struct Seen {
+    /// Its lowest corner, and that corner's index.
+    corner: Corner,
+    index: u32,
+    /// Lower bound on the square of its distance.
+    low: f32,
+    /// Where it may be lower than its lowest corner.
+    dip: Dip,
+}
+
+/// Where a triangle may be lower than its lowest corner, by more than counts.
+#[derive(Clone, Copy)]
+enum Dip {
+    Nowhere,
+    /// Along one edge, towards another corner.
+    Edge(u32),
+    Anywhere,
+}
+
+/// Vertices that have a lower one next to them.
+struct Higher {
+    vertices: [u32; 3 * MOST],
+    count: usize,
+}
+
+impl Higher {
+    fn insert(&mut self, vertex: u32) {
+        if let Some(place) = self.vertices.get_mut(self.count) {
+            *place = vertex;
+            self.count += 1;
+        }
+    }
+
+    fn contains(&self, vertex: u32) -> bool {
+        self.vertices.iter().take(self.count).any(|&other| other == vertex)
+    }
+}
+
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
+    /// Visits a leaf's triangles within the cutoff that may be the lowest of their surroundings, but for ridges of
+    /// `ridge`. A visit returns the next limit. Returns whether the budget was enough.
+    pub(super) fn visit_low(
+        &mut self,
+        first: u32,
+        count: u32,
+        ridge: f32,
+        visit: &mut impl FnMut(u32, f32) -> f32,
+    ) -> Result<bool, QueryError> {
+        let corrupt = QueryError::Corrupt { row: first };
+        let none = Seen {
+            corner: Corner { square: f32::INFINITY, vertex: 0 },
+            index: 0,
+            low: f32::INFINITY,
+            dip: Dip::Nowhere,
+        };
+        let mut leaf = [none; MOST];
+        let mut higher = Higher { vertices: [0; 3 * MOST], count: 0 };
+        let tree = self.tree;
+        let triangles = tree.triangles(first, count).ok_or(corrupt)?;
+        for ((seen, rows), triangle) in leaf.iter_mut().zip(triangles).zip(first..) {
+            *seen = self.see(triangle, rows, ridge, &mut higher)?;
+        }
+        for (seen, triangle) in leaf.iter().take(count as usize).zip(first..) {
+            if seen.low > self.cutoff_squared {
+                continue;
+            }
+            let is_low = match seen.dip {
+                Dip::Nowhere if higher.contains(seen.corner.vertex) => Some(false),
+                Dip::Nowhere => self.is_low(triangle, seen, &mut higher)?,
+                Dip::Edge(edge) => self.dips(triangle, edge, seen.low)?,
+                Dip::Anywhere => Some(true),
+            };
+            match is_low {
+                None => return Ok(false),
+                Some(false) => continue,
+                Some(true) => (),
+            }
+            let Some(left) = self.left.triangle_tests.checked_sub(1) else { return Ok(false) };
+            self.left.triangle_tests = left;
+            let corners = self.corners(triangle)?;
+            if let Some(pair) = self.tool.closest_on_triangle(&corners, self.cutoff_squared) {
+                let limit = visit(triangle, pair.distance_squared);
+                self.set_limit(limit);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Compares a triangle's corners.
+    #[inline(always)]
+    fn see(
+        &self,
+        triangle: u32,
+        rows: [u32; 3],
+        ridge: f32,
+        higher: &mut Higher,
+    ) -> Result<Seen, QueryError> {
+        let [a, b, c] = rows;
+        let positions = [self.position(a)?, self.position(b)?, self.position(c)?];
+        let towards = positions.map(|position| self.tool.axis_to(position));
+        let squares = towards.map(|to| to.dot(to));
+        let [p, q, r] = squares;
+        // Written so that NaN is refused.
+        let is_finite = p + q + r <= f32::MAX;
+        if !is_finite {
+            return Err(QueryError::Position { vertex: self.not_finite(triangle) });
+        }
+        let (a, b, c) = (
+            Corner { square: p, vertex: a },
+            Corner { square: q, vertex: b },
+            Corner { square: r, vertex: c },
+        );
+        let [at_a, at_b, at_c] = positions;
+        let [to_a, to_b, to_c] = towards;
+        let (index, corner, next, last, gradient, origin, along, across) = if a < b && a < c {
+            (0, a, b, c, to_a, at_a, at_b, at_c)
+        } else if b < c {
+            (1, b, c, a, to_b, at_b, at_c, at_a)
+        } else {
+            (2, c, a, b, to_c, at_c, at_a, at_b)
+        };
+        higher.insert(next.vertex);
+        higher.insert(last.vertex);
+        let (along, across) = (gradient.dot(along - origin), gradient.dot(across - origin));
+        let least = if along < across { along } else { across };
+        // The rounding of a rise is less than the tilt's slack, and so is that of the square.
+        let fall = if least < 0.0 { -2.0 * least } else { 0.0 } + 3.0 * self.tilt_slack;
+        let low = corner.square - fall;
+        let quarter = 0.25 * ridge * ridge;
+        let is_shallow = (fall + quarter) * (fall + quarter) <= ridge * ridge * corner.square;
+        let dip = if least >= self.tilt_slack || is_shallow {
+            Dip::Nowhere
+        } else if across >= self.tilt_slack {
+            Dip::Edge(index)
+        } else if along >= self.tilt_slack {
+            Dip::Edge(before(index))
+        } else {
+            Dip::Anywhere
+        };
+        let low = if least >= self.tilt_slack { corner.square - self.tilt_slack } else { low };
+        Ok(Seen { corner, index, low, dip })
+    }
+
+    /// Whether no vertex next to a triangle's lowest corner is lower, and no triangle around it comes before. `None`
+    /// without budget.
+    fn is_low(
+        &mut self,
+        triangle: u32,
+        seen: &Seen,
+        higher: &mut Higher,
+    ) -> Result<Option<bool>, QueryError> {
+        let tree = self.tree;
+        let (mut row, mut corner, mut is_back) = (triangle, seen.index, false);
+        let mut is_first = true;
+        for _ in 0..MAX_RING {
+            let edge = if is_back { before(corner) } else { corner };
+            let Some((next, other)) = tree.across(row, edge) else {
+                // At a border: from the first triangle the other way.
+                if is_back {
+                    break;
+                }
+                (row, corner, is_back) = (triangle, seen.index, true);
+                continue;
+            };
+            if next == triangle {
+                break;
+            }
+            let Some(left) = self.left.node_tests.checked_sub(1) else { return Ok(None) };
+            self.left.node_tests = left;
+            is_first &= triangle < next;
+            (row, corner) = (next, if is_back { other } else { after(other) });
+            let new = if is_back { before(corner) } else { after(corner) };
+            if self.corner(row, new)? < seen.corner {
+                higher.insert(seen.corner.vertex);
+                return Ok(Some(false));
+            }
+        }
+        Ok(Some(is_first))
+    }
+
+    /// Whether the vertex beyond an edge is not lower than the triangle. `None` without budget.
+    fn dips(&mut self, triangle: u32, edge: u32, low: f32) -> Result<Option<bool>, QueryError> {
+        let Some((row, other)) = self.tree.across(triangle, edge) else { return Ok(Some(true)) };
+        let Some(left) = self.left.node_tests.checked_sub(1) else { return Ok(None) };
+        self.left.node_tests = left;
+        let beyond = self.corner(row, before(other))?;
+        Ok(Some(!(beyond.square < low)))
+    }
+
+    /// A triangle's corner.
+    fn corner(&self, triangle: u32, index: u32) -> Result<Corner, QueryError> {
+        let corrupt = QueryError::Corrupt { row: triangle };
+        let rows = self.tree.triangle(triangle).ok_or(corrupt)?;
+        let &vertex = rows.get(index as usize).ok_or(corrupt)?;
+        let towards: Vec3 = self.tool.axis_to(self.position(vertex)?);
+        let square = towards.dot(towards);
+        if square <= f32::MAX {
+            Ok(Corner { square, vertex })
+        } else {
+            Err(QueryError::Position { vertex })
+        }
+    }
+}
+
+/// The corner after one, or the edge.
+const fn after(corner: u32) -> u32 {
+    if corner == 2 { 0 } else { corner + 1 }
+}
+
+/// The corner before one, or the edge.
+const fn before(corner: u32) -> u32 {
+    if corner == 0 { 2 } else { corner - 1 }
+}
