@@ -37,7 +37,7 @@ const PASSES: usize = 3;
 const TOOL: [f32; 2] = [2.5, 60.0];
 
 /// Contacts that are kept, and triangles that are compared.
-type List = Contacts<16, 1_024>;
+type List = Contacts<16, 4_096>;
 
 /// Where the tool goes.
 const PATHS: [&str; 2] = ["over the surface", "through the middle"];
