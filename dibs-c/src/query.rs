@@ -13,7 +13,7 @@ use crate::tool::{Shape, dibs_tool, dibs_vec3};
 use crate::tree::dibs_tree;
 
 /// Bytes of a query's storage.
-pub const DIBS_QUERY_SIZE: usize = 4_480;
+pub const DIBS_QUERY_SIZE: usize = 4_672;
 
 /// Entries of the stack: as many as the format allows, so that any tree can be searched.
 pub(crate) const STACK: usize = 512;

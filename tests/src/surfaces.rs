@@ -72,6 +72,23 @@ pub fn ball(splits: u32) -> Mesh {
     }
 }
 
+/// A box with outward triangles.
+///
+/// # Panics
+/// Never.
+#[must_use]
+pub fn cuboid(low: Vec3, high: Vec3) -> ([Vec3; 8], [[u32; 3]; 12]) {
+    let corner = |n: u32| {
+        let pick = |bit: u32, low: f32, high: f32| if n >> bit & 1 == 0 { low } else { high };
+        Vec3::new(pick(0, low.x, high.x), pick(1, low.y, high.y), pick(2, low.z, high.z))
+    };
+    let faces =
+        [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles = faces.as_flattened().as_chunks::<4>().0.iter();
+    let triangles = triangles.flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect::<Vec<_>>();
+    (core::array::from_fn(|n| corner(n as u32)), triangles.try_into().expect("twelve"))
+}
+
 /// A band of triangles a hundred times longer than wide.
 #[must_use]
 pub fn slivers(rows: u32) -> Mesh {

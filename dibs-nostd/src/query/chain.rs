@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::contacts::Pair;
 use super::search::{Search, WITHIN};
-use super::{Contacts, NoSide, Options, Proximity, Query, Side, signed};
+use super::{Contacts, NoSide, Options, Proximity, Query, Side};
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, TriangleRow, VertexTable};
 
@@ -58,15 +58,14 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         let first =
             first.filter(|(_, corner)| !(tool.axis_distance_squared(*corner) > limit * limit));
         let first = first.map(|(first, _)| first);
+        let touched = Some(&mut self.touched);
         let mut search =
-            Search::start(&self.tree, &mut self.stack, vertices, tool, options, first)?;
+            Search::start(&self.tree, &mut self.stack, vertices, tool, options, first, touched)?;
         let limit = search.limit_to(separation);
         let found = search.run::<WITHIN>(limit)?;
-        self.triangle = found.triangle.or(self.triangle);
         // A search that its budget ended has a lower bound below the limit.
         let is_farther = !(found.separation <= separation) && found.lower >= limit - tool.radius();
-        let found = signed(&self.tree, &mut self.stack, vertices, tool, options, found, None)?;
-        Ok((found, is_farther))
+        Ok((self.sided(vertices, tool, options, found)?, is_farther))
     }
 
     /// The closest pair between the surface and a chain of tools; `None` for an empty slice.

@@ -29,7 +29,7 @@ use glam::Vec3;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
 use depth::{Depth, Known};
-use search::{Search, WHOLE, Waiting, WideSearch};
+use search::{Search, Touched, WHOLE, Waiting, WideSearch};
 
 /// A query on one tree, with the fixed stack that its traversal needs: 8 bytes an entry.
 ///
@@ -41,6 +41,7 @@ pub struct Query<'t, I, const STACK: usize> {
     stack: [Waiting; STACK],
     /// The last answer's triangle.
     triangle: Option<TriangleRow>,
+    touched: Touched,
 }
 
 impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
@@ -53,7 +54,7 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
             return Err(QueryError::Stack { needed: tree.stack(), available: STACK as u32 });
         }
         let stack = [Waiting { lower: 0.0, link: 0 }; STACK];
-        Ok(Self { tree: *tree, stack, triangle: None })
+        Ok(Self { tree: *tree, stack, triangle: None, touched: Touched::new() })
     }
 
     /// The tree that is searched.
@@ -85,10 +86,11 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         options: &Options,
     ) -> Result<Proximity, QueryError> {
         let first = options.first(self.triangle);
-        let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options, first)?;
+        let touched = Some(&mut self.touched);
+        let search =
+            Search::start(&self.tree, &mut self.stack, vertices, tool, options, first, touched)?;
         let found = search.run::<WHOLE>(f32::INFINITY)?;
-        self.triangle = found.triangle.or(self.triangle);
-        signed(&self.tree, &mut self.stack, vertices, tool, options, found, None)
+        self.sided(vertices, tool, options, found)
     }
 
     /// As [`closest`](Self::closest), in batches of up to seven subtrees: for processors that overlap instructions
@@ -107,15 +109,32 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         options: &Options,
     ) -> Result<Proximity, QueryError> {
         let first = options.first(self.triangle);
-        let search = Search::start(&self.tree, &mut self.stack, vertices, tool, options, first)?;
+        let touched = Some(&mut self.touched);
+        let search =
+            Search::start(&self.tree, &mut self.stack, vertices, tool, options, first, touched)?;
         let found = WideSearch::new(search).run()?;
+        self.sided(vertices, tool, options, found)
+    }
+}
+
+impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
+    /// The answer with the side, for a search's closest pair.
+    #[inline(always)]
+    fn sided<V: VertexTable + ?Sized, T: Tool>(
+        &mut self,
+        vertices: &V,
+        tool: &T,
+        options: &Options,
+        found: Proximity,
+    ) -> Result<Proximity, QueryError> {
         self.triangle = found.triangle.or(self.triangle);
-        signed(&self.tree, &mut self.stack, vertices, tool, options, found, None)
+        signed(&self.tree, &mut self.stack, vertices, tool, options, found, (&self.touched, None))
     }
 }
 
 /// Adds the side, and the signed separation that follows from it. Both take the table's positions as exact; their
-/// position error is added to the accuracy last. `known` is a tracker's memory of the last tick's depth.
+/// position error is added to the accuracy last. `touched` are the triangles that the
+/// axis may meet, `known` a tracker's memory of the last tick's depth.
 #[inline(never)]
 fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     tree: &Tree<'_, I>,
@@ -124,16 +143,16 @@ fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     tool: &T,
     options: &Options,
     mut found: Proximity,
-    known: Option<&mut Known>,
+    (touched, known): (&Touched, Option<&mut Known>),
 ) -> Result<Proximity, QueryError> {
     let error = vertices.position_error();
     // No triangle is closer than one that is touched, so its side is certain without the rest of the budget.
-    let touches = found.triangle.is_some() && found.axis_distance <= found.accuracy;
+    let is_touching = found.triangle.is_some() && found.axis_distance <= found.accuracy;
     let reason = if !options.is_signed {
         Some(NoSide::NotAsked)
     } else if !tree.has_adjacency() {
         Some(NoSide::NoAdjacency)
-    } else if found.is_cut_short() && !touches {
+    } else if found.is_cut_short() && !is_touching {
         Some(NoSide::CutShort)
     } else {
         None
@@ -143,8 +162,9 @@ fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
         found.accuracy += error;
         return Ok(found);
     }
-    if touches && tool.axis_length() > 0.0 {
-        let mut found = Depth::new(tree, stack, vertices, tool, options, &found).run(known)?;
+    if is_touching && tool.axis_length() > 0.0 {
+        let depth = Depth::new(tree, stack, vertices, tool, options, &found);
+        let mut found = depth.run(touched, known)?;
         found.accuracy += error;
         return Ok(found);
     }

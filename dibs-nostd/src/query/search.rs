@@ -6,15 +6,17 @@ mod near;
 mod roots;
 mod slack;
 mod tick;
+mod touched;
 mod wide;
 
 use glam::Vec3;
 
 pub(super) use tick::{Outcome, Tick};
+pub(super) use touched::Touched;
 pub(super) use wide::WideSearch;
 
 use roots::Roots;
-use slack::{COORDINATES, FLOOR, SLACK, TILT};
+use slack::{ACCURACY, COORDINATES, FLOOR, SLACK, TILT};
 
 use super::plane::Plane;
 use super::{Budget, Options};
@@ -85,10 +87,15 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     best_triangle: u32,
     /// The rest of the budget.
     left: Budget,
+    /// A triangle no farther from the axis may meet it. Negative if nobody asks.
+    touching_squared: f32,
+    /// The triangles that the axis may meet, once the search has ended.
+    touched: Option<&'s mut Touched>,
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T> {
-    /// A search that tests the triangle `first` before anything else.
+    /// A search that tests the triangle `first` before anything else. If the side is asked for, `touched` will have
+    /// the triangles that the axis may meet, once the search has ended.
     #[inline(always)]
     pub fn start(
         tree: &'s Tree<'t, I>,
@@ -97,6 +104,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         tool: &'s T,
         options: &Options,
         first: Option<TriangleRow>,
+        mut touched: Option<&'s mut Touched>,
     ) -> Result<Self, QueryError> {
         let header = tree.header();
         if vertices.len() != header.vertices as usize {
@@ -152,6 +160,11 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             },
             triangle_tests: options.budget.triangle_tests,
         };
+        let is_asked = options.is_signed && tree.is_closed() && tool.axis_length() > 0.0;
+        if let Some(touched) = &mut touched {
+            touched.reset(is_asked);
+        }
+        let accuracy = ACCURACY * scale + FLOOR;
         let mut search = Self {
             tree,
             vertices,
@@ -171,6 +184,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             best: None,
             best_squared: f32::INFINITY,
             best_triangle: u32::MAX,
+            touching_squared: if is_asked { accuracy * accuracy } else { -1.0 },
+            touched,
         };
         search.lower_cutoff_to_pin(all.nearest.row, all.nearest.distance);
         if let Some(TriangleRow(triangle)) = first
@@ -206,6 +221,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
                 Link::Leaf { first, count } => self.leaf(first, count)?,
             };
             if matches!(step, Step::OutOfBudget) {
+                self.leave_unfinished();
                 let least = self.least_waiting(lower);
                 let is_beyond = KIND == WITHIN && self.is_beyond(limit) && limit < least;
                 return self.finish(if is_beyond { limit } else { least });
@@ -390,13 +406,30 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     /// The exact test; the caller has counted it.
     #[inline(always)]
     fn test_triangle(&mut self, triangle: u32, corners: &[Vec3; 3]) {
-        if let Some(pair) = self.tool.closest_on_triangle(corners, self.cutoff_squared)
-            && pair.distance_squared < self.best_squared
-        {
-            self.best_squared = pair.distance_squared;
-            self.best_triangle = triangle;
-            self.best = Some(pair);
-            self.lower_cutoff(sqrt(pair.distance_squared));
+        if let Some(pair) = self.tool.closest_on_triangle(corners, self.cutoff_squared) {
+            if pair.distance_squared < self.best_squared {
+                self.best_squared = pair.distance_squared;
+                self.best_triangle = triangle;
+                self.best = Some(pair);
+                self.lower_cutoff(sqrt(pair.distance_squared));
+            }
+            if pair.distance_squared <= self.touching_squared {
+                self.add_touched(triangle);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn add_touched(&mut self, triangle: u32) {
+        if let Some(touched) = &mut self.touched {
+            touched.push(triangle);
+        }
+    }
+
+    /// The axis may meet the surface where it was not searched.
+    fn leave_unfinished(&mut self) {
+        if let Some(touched) = &mut self.touched {
+            touched.reset(false);
         }
     }
 

@@ -17,6 +17,11 @@ impl<I: Index> Tree<'_, I> {
         !self.sections.adjacency.is_empty()
     }
 
+    /// Whether every edge has a triangle on each side.
+    pub(crate) const fn is_closed(&self) -> bool {
+        self.closed == self.header.checksum
+    }
+
     /// The triangle across an edge: 0 leads from the first corner to the second, 1 to the third, 2 back to the
     /// first. `None` at a border, outside the table, or where the tree has no adjacency.
     ///
@@ -94,16 +99,16 @@ const fn edge_between([a, b, c]: [u32; 3], from: u32, to: u32) -> Option<u32> {
 }
 
 /// Checks that every neighbour exists and has this triangle as its neighbour. A turn around a vertex then closes, or
-/// ends at a border.
-pub(super) const fn check<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatError> {
+/// ends at a border. Returns whether every edge has a neighbour.
+pub(super) const fn check<I: Index>(tree: &Tree<'_, I>) -> Result<bool, FormatError> {
     let triangles = tree.header.triangles;
     if !tree.has_adjacency() {
-        return Ok(());
+        return Ok(false);
     }
     if I::BYTES == 2 && triangles > MAX_NARROW_TRIANGLES {
         return Err(FormatError::Section { kind: format::section::ADJACENCY });
     }
-    let mut triangle = 0;
+    let (mut triangle, mut is_closed) = (0, true);
     while triangle < triangles {
         let mut edge = 0;
         while edge < 3 {
@@ -113,6 +118,7 @@ pub(super) const fn check<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatErro
                     None => false,
                 },
                 None => {
+                    is_closed = false;
                     match format::neighbour_code::<I>(tree.sections.adjacency, triangle, edge) {
                         Some(code) => code == format::no_neighbour::<I>(),
                         None => false,
@@ -126,5 +132,5 @@ pub(super) const fn check<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatErro
         }
         triangle += 1;
     }
-    Ok(())
+    Ok(is_closed)
 }

@@ -45,6 +45,9 @@ use sections::Sections;
 pub struct Tree<'a, I> {
     sections: Sections<'a>,
     header: Header,
+    /// The checksum if no edge of the surface is a border, else its complement. After a fault in memory it is neither, and
+    /// the tree counts as open: a depth then takes longer, and is right.
+    closed: u32,
     width: PhantomData<I>,
 }
 
@@ -64,8 +67,10 @@ impl<'a, I: Index> Tree<'a, I> {
         let header = tri!(header::read::<I>(bytes));
         let sections = tri!(sections::find::<I>(bytes, &header));
         tri!(validate::well_formed::<I>(&header, &sections));
-        let tree = Self { sections, header, width: PhantomData };
-        tri!(adjacency::check(&tree));
+        let mut tree = Self { sections, header, closed: !header.checksum, width: PhantomData };
+        if tri!(adjacency::check(&tree)) {
+            tree.closed = header.checksum;
+        }
         Ok(tree)
     }
 
@@ -90,7 +95,8 @@ impl<'a, I: Index> Tree<'a, I> {
     pub const fn moved_to<'b>(&self, copy: &'b [u8]) -> Result<Tree<'b, I>, FormatError> {
         match sections::find::<I>(copy, &self.header) {
             Ok(sections) if self.sections.matches(&sections) => {
-                Ok(Tree { sections, header: self.header, width: PhantomData })
+                let Self { header, closed, .. } = *self;
+                Ok(Tree { sections, header, closed, width: PhantomData })
             }
             Ok(_) => Err(FormatError::Section { kind: section::NODES }),
             Err(error) => Err(error),

@@ -12,7 +12,7 @@ use dibs_tests::deform::unit;
 use dibs_tests::oracle::{Instrument, exhaustive};
 use dibs_tests::side_poses::{POSES_OF_A_FRAME, Tally, bent, closed, judge, point};
 use dibs_tests::sides;
-use dibs_tests::surfaces::{self, ball, slivers};
+use dibs_tests::surfaces::{self, ball, cuboid, slivers};
 use dibs_tests::tree_bytes::{reseal, section};
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
@@ -332,4 +332,101 @@ fn no_side_is_wrong_next_to_a_saddle() {
     println!("{stated} sides stated, {undefined} undefined, {wrong} wrong");
     assert_eq!(wrong, 0);
     assert!(cfg!(debug_assertions) || stated > 2_000, "{stated}");
+}
+
+/// An open surface may be passed around: an axis that meets it nowhere between two points has them on both sides.
+#[test]
+fn a_depth_behind_an_open_sheet_is_found() {
+    // Two sheets with a gap between them, and a wall that the axis meets.
+    let sheet = |x: [f32; 2]| {
+        let [left, right] = x;
+        [[left, 0.0, 0.0], [right, 0.0, 0.0], [right, 10.0, 0.0], [left, 10.0, 0.0]]
+    };
+    let wall = [[9.0, 0.0, -5.0], [9.0, 0.0, 5.0], [9.0, 10.0, 5.0], [9.0, 10.0, -5.0]];
+    let corners = [sheet([-10.0, -2.0]), sheet([2.0, 8.0]), wall];
+    let positions = corners.concat().into_iter().map(Vec3::from).collect();
+    let triangles =
+        (0..3).flat_map(|part| [[0, 1, 2], [0, 2, 3]].map(|row| row.map(|c| 4 * part + c)));
+    let mesh = Mesh { positions, triangles: triangles.collect(), ..Mesh::default() };
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+
+    let (start, end) = (Vec3::new(-10.0, 5.0, 2.5), Vec3::new(9.5, 5.0, -2.375));
+    let mut deepest = 0.0_f32;
+    for share in 0..=2_000 {
+        let point = Sphere::new(start.lerp(end, share as f32 / 2_000.0), 0.0).expect("finite");
+        let found = query.closest(rows.as_slice(), &point, &Options::cold()).expect("an answer");
+        if found.side == Side::Inside {
+            deepest = deepest.max(found.axis_distance);
+        }
+    }
+    assert!(deepest > 1.0, "{deepest}: no point is behind the sheet");
+    let axis = Capsule::new(start, end, 0.5).expect("finite");
+    let found = query.closest(rows.as_slice(), &axis, &Options::cold()).expect("an answer");
+    assert_eq!(found.side, Side::Crossing);
+    assert!(found.lower <= -0.5 - deepest + found.accuracy, "{deepest} deep: {found:?}");
+}
+
+/// Two bodies next to each other: the axis leaves one and enters the other within less than the accuracy tells apart.
+#[test]
+fn a_depth_behind_a_narrow_gap_is_found() {
+    for gap in [0.0002, 0.001, 0.01] {
+        let near = cuboid(Vec3::new(-20.0, -20.0, -20.0), Vec3::new(0.0, 20.0, 20.0));
+        let far = cuboid(Vec3::new(gap, -20.0, -20.0), Vec3::new(40.0, 20.0, 20.0));
+        let positions = [near.0, far.0].concat();
+        let triangles = near.1.into_iter().chain(far.1.map(|row| row.map(|corner| corner + 8)));
+        let mesh = Mesh { positions, triangles: triangles.collect(), ..Mesh::default() };
+        let built = Builder::new().build(&mesh).expect("a valid mesh");
+        let tree = built.tree::<u16>().expect("16-bit indices");
+        let rows = built.to_rows(&mesh.positions);
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        // In the middle of one body, and 2 mm or 18 mm behind the face of the other one.
+        for [start, end] in [[-2.0, 18.0], [18.0, -2.0], [-10.0, 2.0], [2.0, -10.0]] {
+            for lean in 0..20 {
+                let y = 0.1 * lean as f32 - 1.0;
+                let (start, end) = (Vec3::new(start, y, 1.0), Vec3::new(end, 0.7 * y, 2.0));
+                let axis = Capsule::new(start, end, 0.5).expect("finite");
+                let found =
+                    query.closest(rows.as_slice(), &axis, &Options::cold()).expect("an answer");
+                let deepest = if start.x.max(end.x) > 10.0 { 18.0 - gap } else { 10.0 };
+                let (most, least) = (-found.lower - 0.5, -found.separation - 0.5);
+                let accuracy = 2.0 * found.accuracy;
+                let is_right = most >= deepest - accuracy && least <= deepest + accuracy;
+                assert!(is_right, "gap {gap}, {start} to {end}: {least} to {most} deep");
+            }
+        }
+    }
+}
+
+/// An axis through more bodies than a search tells apart, of which one is thick.
+#[test]
+fn a_depth_behind_many_bodies_is_found() {
+    for (count, thick) in [2, 5, 12, 40].into_iter().flat_map(|n| (0..n).map(move |at| (n, at))) {
+        let (mut positions, mut triangles, mut at) = (Vec::new(), Vec::new(), 0.0);
+        for body in 0..count {
+            let thickness = if body == thick { 30.0 } else { 1.0 };
+            let low = Vec3::new(at, -20.0, -20.0);
+            let (corners, faces) = cuboid(low, Vec3::new(at + thickness, 20.0, 20.0));
+            let first = positions.len() as u32;
+            positions.extend(corners);
+            triangles.extend(faces.map(|row| row.map(|corner| first + corner)));
+            at += thickness + 1.0;
+        }
+        let mesh = Mesh { positions, triangles, ..Mesh::default() };
+        let built = Builder::new().build(&mesh).expect("a valid mesh");
+        let tree = built.tree::<u16>().expect("16-bit indices");
+        let rows = built.to_rows(&mesh.positions);
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        let (start, end) = (Vec3::new(-1.0, 0.5, 1.0), Vec3::new(at, 1.5, 2.0));
+        for [start, end] in [[start, end], [end, start]] {
+            let axis = Capsule::new(start, end, 0.5).expect("finite");
+            let found = query.closest(rows.as_slice(), &axis, &Options::cold()).expect("an answer");
+            assert_eq!(found.side, Side::Crossing);
+            // Half of the thickness.
+            let (most, least) = (-found.lower - 0.5, -found.separation - 0.5);
+            assert!(most >= 14.99 && least <= 15.01, "{thick} of {count}: {least} to {most} deep");
+        }
+    }
 }

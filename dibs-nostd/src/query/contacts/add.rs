@@ -85,7 +85,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         let ridge = (margin * RIDGE) + 2.0 * accuracy;
         let limit = tool.radius() + margin + ridge;
         let mut complete = limit;
-        let search = Search::start(tree, stack, vertices, tool, options, None)?;
+        let search = Search::start(tree, stack, vertices, tool, options, None, None)?;
         let (beyond, mut made) = search.each_low(limit, ridge, |row, square| {
             if let Some(farthest) = basins.push(Near { square, row }) {
                 complete = sqrt(farthest);

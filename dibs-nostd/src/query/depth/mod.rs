@@ -4,17 +4,18 @@
 //! the distance to any one triangle of the surface. That distance is convex along the axis, so the triangles closest to
 //! two points bound the depth between them. The search divides the part of the axis with the highest bound (Piyavskii
 //! and Shubert, with this second bound added) until no part can be deeper than the deepest point found by more than the
-//! tolerance.
+//! tolerance. The axis stays on one side between two places where it meets the surface, and parts outside are not searched.
 //!
 //! A tracker keeps the bounds. Tool and surface change a depth by at most their motion, so the next tick looks only at
 //! the parts whose bounds have come above the deepest point by more than the tolerance.
 
 mod known;
 mod part;
+mod touches;
 
 use glam::Vec3;
 
-use super::search::{Search, UNTIL, Waiting};
+use super::search::{Search, Touched, UNTIL, Waiting};
 use super::side::{self, NoSide, Side};
 use super::{Budget, Options, Proximity};
 use crate::math::sqrt::sqrt;
@@ -23,7 +24,8 @@ use crate::unavailable::QueryError;
 use crate::{Index, Tree, TriangleRow, VertexTable};
 pub(super) use known::Known;
 use known::Point;
-use part::{Part, Parts, Sample, larger};
+use part::{Fit, Part, Parts, Sample, larger};
+use touches::Touches;
 
 /// A limit that no search reaches before its end.
 const EXACT: f32 = f32::NEG_INFINITY;
@@ -57,6 +59,8 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
     options: Options,
     /// The pair in which the axis meets the surface.
     meeting: Proximity,
+    /// The places where the axis meets the surface.
+    touches: Touches,
     /// The deepest point so far.
     answer: Proximity,
     deepest: f32,
@@ -90,6 +94,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             tool,
             options,
             meeting,
+            touches: Touches::ANYWHERE,
             answer,
             deepest,
             deepest_at,
@@ -99,7 +104,11 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
 
     /// The answer with side, signed separation, and the deepest point's pair. `known` is the last tick's search, and
     /// then this one.
-    pub fn run(mut self, mut known: Option<&mut Known>) -> Result<Proximity, QueryError> {
+    pub fn run(
+        mut self,
+        touched: &Touched,
+        mut known: Option<&mut Known>,
+    ) -> Result<Proximity, QueryError> {
         let least = LEAST_TOLERANCE * self.meeting.accuracy;
         let default = larger(self.tool.axis_length() * TOLERANCE, least);
         let tolerance = self.options.depth_tolerance.unwrap_or(default);
@@ -110,9 +119,10 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             }
             return self.finish(reach);
         }
+        self.find_touches(touched)?;
         let (mut parts, deepest) = match known.as_deref_mut().and_then(Known::now) {
             Some((points, deepest)) => (self.resume(points)?, Some(deepest)),
-            None => (self.begin(tolerance)?, None),
+            None => (self.begin(reach, tolerance)?, None),
         };
         let bound = self.divide(&mut parts, tolerance, deepest)?;
         if let Some(known) = known {
@@ -128,32 +138,74 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         larger(along, length - along) + meeting.axis_distance + meeting.accuracy
     }
 
-    /// The parts before and after the point where the axis meets the surface.
-    fn begin(&mut self, tolerance: f32) -> Result<Parts, QueryError> {
+    /// Finds the places where the axis meets the triangles that a search found to touch it.
+    fn find_touches(&mut self, touched: &Touched) -> Result<(), QueryError> {
+        let Some(rows) = touched.rows() else { return Ok(()) };
+        // A tracker's accuracy is larger than a search's, for which the closest triangle may be no touched one.
+        let closest = self.meeting.triangle.filter(|_| rows.is_empty());
+        self.touches = Touches::NONE;
+        for row in rows.iter().copied().chain(closest.map(|TriangleRow(row)| row)) {
+            if self.is_spent() {
+                self.touches = Touches::ANYWHERE;
+                break;
+            }
+            let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
+            let corners = self.corners(corners)?;
+            if let Some(pair) = self.tool.closest_on_triangle(&corners, f32::INFINITY) {
+                let accuracy = self.meeting.accuracy;
+                let touches = &mut self.touches;
+                let distances = touches.add(self.tool, TriangleRow(row), &corners, &pair, accuracy);
+                self.spend((1 + distances) * DISTANCE_COST);
+            }
+        }
+        Ok(())
+    }
+
+    /// The parts between the axis' ends and the places where it meets the surface.
+    fn begin(&mut self, reach: f32, tolerance: f32) -> Result<Parts, QueryError> {
         let meeting = self.meeting;
         let depth = meeting.axis_distance + meeting.accuracy;
-        let crossing =
-            self.sample(meeting.axis_parameter, depth, meeting.triangle, meeting.corners)?;
-        let start = self.look(0.0, &crossing, EXACT)?;
-        let end = self.look(1.0, &crossing, EXACT)?;
-        let enough = self.deepest + tolerance;
+        let Proximity { axis_parameter, triangle, corners, .. } = meeting;
+        let crossing = self.sample(axis_parameter, depth, triangle, corners)?;
+        let start = self.end(0.0, &crossing, tolerance)?;
+        let end = self.end(1.0, &crossing, tolerance)?;
         let mut parts = Parts::new();
-        parts.push(self.part(start, &crossing, 1, enough));
-        parts.push(self.part(crossing, &end, 2, enough));
+        parts.push(Part::remembered(start, 1, reach));
+        for place in self.touches.places() {
+            let row = place.triangle.0;
+            let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
+            let touch = self.sample(place.parameter, depth, Some(place.triangle), corners)?;
+            parts.push(Part::remembered(touch, parts.count() + 1, reach));
+        }
+        if parts.count() < 2 {
+            parts.push(Part::remembered(crossing, 2, reach));
+        }
         parts.push(Part::remembered(end, 0, 0.0));
         parts.end();
         Ok(parts)
     }
 
+    /// The sample of an end of the axis; not searched if it is outside for certain.
+    fn end(&mut self, parameter: f32, near: &Sample, tolerance: f32) -> Result<Sample, QueryError> {
+        let along = parameter * self.tool.axis_length();
+        let (ahead, behind) = (self.touches.ahead(along), self.touches.behind(along));
+        let way = if parameter > 0.0 { behind } else { ahead };
+        if way.is_outside && way.from == along {
+            return Ok(self.at(parameter, 0.0, near));
+        }
+        self.look(parameter, near, self.deepest + tolerance)
+    }
+
     /// The parts of the last tick.
-    fn resume(&self, points: &[Point]) -> Result<Parts, QueryError> {
+    fn resume(&mut self, points: &[Point]) -> Result<Parts, QueryError> {
         let mut parts = Parts::new();
         for point in points {
             let Point { parameter, depth, bound, triangle } = *point;
-            let row = triangle.0;
-            let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
-            let from = self.sample(parameter, depth, Some(triangle), corners)?;
-            let from = Sample { is_new: false, ..from };
+            let triangle = Some(triangle);
+            let from = self.at(parameter, depth, &Sample { triangle, ..Sample::NONE });
+            if depth < 0.0 {
+                self.touches.add_outside(from.along);
+            }
             parts.push(Part::remembered(from, parts.count() + 1, bound));
         }
         parts.end();
@@ -183,14 +235,20 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             if is_enough {
                 return Ok(part.bound);
             }
-            let Some(split) = part.split else {
+            let ends = [row, part.next];
+            let is_closest = ends.iter().all(|&row| parts.sample(row).fit == Fit::Closest);
+            let Some(split) = part.split.filter(|_| is_closest) else {
                 if self.is_spent() {
                     return Ok(part.bound);
                 }
-                self.walk(parts, row)?;
-                self.walk(parts, part.next)?;
-                let distances = parts.renew(row, enough);
-                self.spend(distances * DISTANCE_COST);
+                for row in ends {
+                    if part.split.is_none() {
+                        self.place(parts, row)?;
+                    } else {
+                        self.walk(parts, row)?;
+                    }
+                }
+                self.renew(parts, row, enough);
                 continue;
             };
             let Some(place) = self.room(parts, enough) else { return Ok(part.bound) };
@@ -214,9 +272,15 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
 
     /// The part between two samples.
     fn part(&mut self, from: Sample, to: &Sample, next: usize, enough: f32) -> Part {
-        let part = Part::new(from, to, next, enough);
+        let part = Part::new(from, to, next, enough, &self.touches);
         self.spend(part.distances * DISTANCE_COST);
         part
+    }
+
+    /// Bounds a remembered part anew.
+    fn renew(&mut self, parts: &mut Parts, row: usize, enough: f32) {
+        let distances = parts.renew(row, enough, &self.touches);
+        self.spend(distances * DISTANCE_COST);
     }
 
     /// Counts work that is no test as so many node tests.
@@ -250,18 +314,29 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         parts.free()
     }
 
+    /// Reads the corners of a remembered sample's triangle.
+    fn place(&self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
+        let mut sample = parts.sample(row);
+        if let (Fit::Remembered, Some(TriangleRow(row))) = (sample.fit, sample.triangle) {
+            let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
+            (sample.corners, sample.fit) = (self.corners(corners)?, Fit::Near);
+        }
+        parts.set_sample(row, sample);
+        Ok(())
+    }
+
     /// Moves a remembered sample's triangle to neighbours that are closer now.
     fn walk(&mut self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
         let mut sample = parts.sample(row);
-        if sample.is_new {
+        if sample.fit == Fit::Closest {
             return Ok(());
         }
-        sample.is_new = true;
+        sample.fit = Fit::Closest;
         let (mut least, mut distances) = (sample.square(sample.on_axis), 1);
         for _ in 0..STEPS {
             let Some(TriangleRow(from)) = sample.triangle else { break };
             let mut closest = sample;
-            for (row, _) in (0..3).filter_map(|edge| self.tree.across(from, edge)) {
+            for row in (0..3).filter_map(|edge| self.tree.row_across(from, edge)) {
                 let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
                 let (triangle, corners) = (Some(TriangleRow(row)), self.corners(corners)?);
                 let other = Sample { triangle, corners, ..sample };
@@ -295,12 +370,12 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         // The root's test is one of them.
         let Some(node_tests) = node_tests.checked_sub(1) else {
             let along = parameter * self.tool.axis_length();
-            let depth = near.depth + (along - near.along).abs();
-            return Ok(Sample { parameter, along, on_axis, depth, ..*near });
+            return Ok(self.at(parameter, near.depth + (along - near.along).abs(), near));
         };
         let options = self.options.budget(Budget { node_tests, triangle_tests });
         let (point, first) = (AxisPoint(on_axis), near.triangle);
-        let search = Search::start(self.tree, self.stack, self.vertices, &point, &options, first)?;
+        let search =
+            Search::start(self.tree, self.stack, self.vertices, &point, &options, first, None)?;
         let found = search.run::<UNTIL>(enough)?;
         self.options.budget = Budget {
             node_tests: node_tests.saturating_sub(found.node_tests.saturating_sub(1)),
@@ -316,7 +391,10 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             Some(side::of_point(self.tree, self.vertices, &found, on_axis)?)
         };
         let depth = match at {
-            Some(at) if at.side == Side::Outside => -distance,
+            Some(at) if at.side == Side::Outside => {
+                self.touches.add_outside(parameter * self.tool.axis_length());
+                -distance
+            }
             Some(at) if at.side == Side::Inside && distance > self.deepest => {
                 (self.deepest, self.deepest_at) = (distance, parameter);
                 *answer = Proximity {
@@ -341,6 +419,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         self.sample(parameter, depth, triangle, found.corners)
     }
 
+    /// The sample of the axis' point at a parameter, which is no deeper than `depth`, with the triangle of another one.
+    fn at(&self, parameter: f32, depth: f32, near: &Sample) -> Sample {
+        let (along, on_axis) =
+            (parameter * self.tool.axis_length(), self.tool.axis_point(parameter));
+        Sample { parameter, along, on_axis, depth, ..*near }
+    }
+
     /// The sample of the axis' point at a parameter, with the corners closest to it.
     fn sample(
         &self,
@@ -352,7 +437,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         let on_axis = self.tool.axis_point(parameter);
         let along = parameter * self.tool.axis_length();
         let corners = self.corners(corners)?;
-        Ok(Sample { parameter, along, on_axis, depth, triangle, corners, is_new: true })
+        Ok(Sample { parameter, along, on_axis, depth, triangle, corners, fit: Fit::Closest })
     }
 
     fn corners(&self, [a, b, c]: [u32; 3]) -> Result<[Vec3; 3], QueryError> {

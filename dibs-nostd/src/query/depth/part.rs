@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::touches::{Free, Touches};
 use crate::TriangleRow;
 use crate::math::sqrt::sqrt;
 use crate::tool::{AxisPoint, Tool};
@@ -27,25 +28,48 @@ pub(super) struct Sample {
     pub depth: f32,
     pub triangle: Option<TriangleRow>,
     pub corners: [Vec3; 3],
-    /// Its triangle was looked for at this tick.
-    pub is_new: bool,
+    pub fit: Fit,
+}
+
+/// A sample's triangle.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Fit {
+    /// An earlier tick's; its corners were not read.
+    Remembered,
+    /// An earlier tick's.
+    Near,
+    /// The closest one found at this tick.
+    Closest,
 }
 
 impl Sample {
-    const NONE: Self = Self {
+    pub const NONE: Self = Self {
         parameter: 0.0,
         along: 0.0,
         on_axis: Vec3::ZERO,
         depth: 0.0,
         triangle: None,
         corners: [Vec3::ZERO; 3],
-        is_new: false,
+        fit: Fit::Remembered,
     };
 
     /// Square of the distance from a point to the triangle.
     pub fn square(&self, point: Vec3) -> f32 {
         let pair = AxisPoint(point).closest_on_triangle(&self.corners, f32::INFINITY);
         pair.map_or(f32::INFINITY, |pair| pair.distance_squared)
+    }
+
+    /// A bound on the depth from here to the end of a way that is outside, if it is no higher than `enough`.
+    fn passes(&self, way: &Free, point: impl Fn(f32) -> Vec3, enough: f32) -> Option<f32> {
+        if !way.is_outside {
+            return None;
+        }
+        if way.from == self.along {
+            return Some(0.0);
+        }
+        // The distance to a triangle is convex.
+        let square = larger(self.square(self.on_axis), self.square(point(way.from)));
+        (square <= enough * enough).then(|| sqrt(square))
     }
 }
 
@@ -77,35 +101,47 @@ impl Part {
     }
 
     /// The part up to `to`. A bound that is no higher than `enough` is not lowered further.
-    pub fn new(mut from: Sample, to: &Sample, next: usize, enough: f32) -> Self {
+    pub fn new(mut from: Sample, to: &Sample, next: usize, enough: f32, touches: &Touches) -> Self {
         let (length, mut to) = (to.along - from.along, *to);
         // A depth changes by at most the length moved.
         from.depth = smaller(from.depth, to.depth + length);
         to.depth = smaller(to.depth, from.depth + length);
         let part =
             |bound, split, distances| Self { from, next, bound, split: Some(split), distances };
+        let span = to.on_axis - from.on_axis;
+        let point = |along: f32| from.on_axis + span * ((along - from.along) / length);
         // Points nearer to an outside sample than its distance are outside too.
-        let first = from.along + above_zero(-from.depth);
-        let last = to.along - above_zero(-to.depth);
+        let (mut first, mut last) =
+            (from.along + above_zero(-from.depth), to.along - above_zero(-to.depth));
+        let (mut beside, mut distances) = (0.0, 0);
+        let (ahead, behind) = (touches.ahead(from.along), touches.behind(to.along));
+        if ahead.from < to.along
+            && let Some(most) = from.passes(&ahead, point, enough)
+        {
+            (first, beside, distances) = (larger(first, ahead.to), most, 2);
+        }
+        if behind.from > from.along
+            && let Some(most) = to.passes(&behind, point, enough)
+        {
+            last = smaller(last, behind.to);
+            (beside, distances) = (larger(beside, most), distances + 2);
+        }
         if !(first < last) {
             let middle = (from.along + to.along) * 0.5;
-            return part(above_zero(larger(from.depth, to.depth)), middle, 0);
+            return part(beside, middle, distances);
         }
         let slope = (from.depth + to.depth + length) * 0.5;
         let middle = (first + last) * 0.5;
         if slope <= enough {
-            return part(slope, middle, 0);
+            return part(larger(beside, slope), middle, distances);
         }
-        let span = to.on_axis - from.on_axis;
-        let squares = |along: f32| {
-            let point = from.on_axis + span * ((along - from.along) / length);
-            [from.square(point), to.square(point)]
-        };
+        let squares = |along: f32| [from.square(point(along)), to.square(point(along))];
         let (at_first, at_last) = (squares(first), squares(last));
         // The first triangle's lead over the second: linear along the axis where both are points.
         let lead = |[one, other]: [f32; 2]| other - one;
         let (mut low, mut high) = ((first, lead(at_first)), (last, lead(at_last)));
-        let (mut least, mut peak, mut distances) = (f32::INFINITY, middle, 4);
+        let (mut least, mut peak) = (f32::INFINITY, middle);
+        distances += 4;
         for _ in 0..ROUNDS {
             let equal = low.0 + (high.0 - low.0) * (low.1 / (low.1 - high.1));
             let is_between = equal > low.0 && equal < high.0;
@@ -135,7 +171,7 @@ impl Part {
         } else {
             peak
         };
-        part(smaller(convex, slope), split, distances)
+        part(larger(beside, smaller(convex, slope)), split, distances)
     }
 }
 
@@ -246,9 +282,9 @@ impl Parts {
     }
 
     /// Bounds a remembered part anew. Returns the distances to triangles that it took.
-    pub fn renew(&mut self, row: usize, enough: f32) -> u32 {
+    pub fn renew(&mut self, row: usize, enough: f32, touches: &Touches) -> u32 {
         let Part { from, next, bound, .. } = self.part(row);
-        let new = Part::new(from, &self.sample(next), next, enough);
+        let new = Part::new(from, &self.sample(next), next, enough, touches);
         self.set(row, new.below(bound));
         new.distances
     }
@@ -270,7 +306,7 @@ fn convex([one, other]: [f32; 2], [one_next, other_next]: [f32; 2]) -> f32 {
     smaller(most, other_most)
 }
 
-fn smaller(a: f32, b: f32) -> f32 {
+pub(super) fn smaller(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 

@@ -142,6 +142,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 Visit::Done => from = at + 1,
                 Visit::OutOfBudget => {
                     self.put_back_waiting().ok_or(corrupt)?;
+                    self.search.leave_unfinished();
                     let least = self.unit.length(self.front.least(self.now));
                     let closest = self.finish(if least > 0.0 { least } else { 0.0 })?;
                     return Ok(Outcome::Answer { closest, is_complete: false, restarted });
@@ -377,6 +378,9 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             return Err(QueryError::Position { vertex: search.not_finite(triangle) });
         };
         let distance = sqrt(pair.distance_squared);
+        if pair.distance_squared <= search.touching_squared {
+            search.add_touched(triangle);
+        }
         if !(pair.distance_squared < search.best_squared) {
             return Ok(Some(distance));
         }

@@ -80,6 +80,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
                 }
             };
             if matches!(step?, Step::OutOfBudget) {
+                self.search.leave_unfinished();
                 return self.search.finish(self.search.least_waiting(lower));
             }
         }

@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use super::contacts::Pair;
 use super::depth::Known;
-use super::search::{Outcome, Search, Tick, WHOLE, Waiting};
+use super::search::{Outcome, Search, Tick, Touched, WHOLE, Waiting};
 use super::{Budget, Contacts, NoSide, Options, Proximity, Side, signed};
 use crate::math::sqrt::sqrt;
 use crate::surface::motion::Unit;
@@ -42,7 +42,7 @@ const FARTHEST: u32 = 1 << 29;
 /// Where the axis crosses the surface, it remembers which parts of the axis cannot be deepest, and searches those points
 /// that may have become so.
 ///
-/// RAM: 8 bytes for each entry of the stack, 44 for each opened node, and 600.
+/// RAM: 8 bytes for each entry of the stack, 44 for each opened node, and 740.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -77,6 +77,7 @@ pub struct Tracker<'t, I, const STACK: usize, const OPENED: usize> {
     /// Units since every bound due was tested.
     behind: u32,
     known: Known,
+    touched: Touched,
     triangle: Option<TriangleRow>,
 }
 
@@ -144,6 +145,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
             now: 0,
             behind: 0,
             known: Known::new(Unit::of(tree)),
+            touched: Touched::new(),
             triangle: None,
         })
     }
@@ -195,7 +197,9 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         self.now = self.now.wrapping_add(moved);
         self.known.add_motion(moved);
         let first = self.triangle.or(options.first(None));
-        let search = Search::start(&self.tree, &mut self.stack, surface, tool, options, first)?;
+        let touched = Some(&mut self.touched);
+        let search =
+            Search::start(&self.tree, &mut self.stack, surface, tool, options, first, touched)?;
         let tick = Tick::new(search, self.front.borrow(), self.unit, self.now, options.budget);
         let (outcome, best) = tick.run(moved)?;
         let best = best.map(TriangleRow);
@@ -212,8 +216,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
                 (self.whole(surface, tool, options, best, tests)?, true)
             }
         };
-        let known = Some(&mut self.known);
-        let closest = signed(&self.tree, &mut self.stack, surface, tool, options, closest, known)?;
+        let memory = (&self.touched, Some(&mut self.known));
+        let closest = signed(&self.tree, &mut self.stack, surface, tool, options, closest, memory)?;
         self.behind = if is_complete { 0 } else { self.behind.saturating_add(moved) };
         self.last = travel.map(|travel| Last::new(tool, travel, &closest));
         let opened = self.front.borrow().used() as u32;
@@ -268,7 +272,9 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         tests: Budget,
     ) -> Result<Proximity, QueryError> {
         let options = options.budget(options.budget.less(tests.node_tests, tests.triangle_tests));
-        let search = Search::start(&self.tree, &mut self.stack, surface, tool, &options, first)?;
+        let touched = Some(&mut self.touched);
+        let search =
+            Search::start(&self.tree, &mut self.stack, surface, tool, &options, first, touched)?;
         let mut closest = search.run::<WHOLE>(f32::INFINITY)?;
         closest.node_tests = closest.node_tests.saturating_add(tests.node_tests);
         closest.triangle_tests = closest.triangle_tests.saturating_add(tests.triangle_tests);

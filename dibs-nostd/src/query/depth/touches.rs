@@ -1,0 +1,225 @@
+//! Where an axis meets the surface. Between two such places it stays on one side of a closed surface.
+
+use glam::Vec3;
+
+use super::part::{larger, smaller};
+use crate::TriangleRow;
+use crate::math::sqrt::sqrt;
+use crate::tool::{AxisPair, AxisPoint, Tool};
+
+/// Most places told apart.
+const PLACES: usize = 8;
+
+/// Square of the sine of an axis' angle to a triangle's plane: 1/16. With less, the triangle is touched over a length
+/// that is found by halving.
+const INCLINED: f32 = 1.0 / 256.0;
+
+/// Times that a length is halved.
+const HALVINGS: u32 = 8;
+
+/// Square of the sine of a triangle's angle below which its normal is not trusted: 2^-8, as in its distances.
+const SLIVER: f32 = 1.0 / 65_536.0;
+
+/// The places where an axis may meet the surface. No two overlap.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Touches {
+    places: [Place; PLACES],
+    count: usize,
+}
+
+/// A place where the axis may meet the surface, in lengths from its start.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    first: f32,
+    last: f32,
+    /// Whether the axis is outside before the place, and after it; `None` if not known.
+    before: Option<bool>,
+    after: Option<bool>,
+    /// Parameter of a point of the axis in it.
+    pub parameter: f32,
+    /// A triangle that this point touches.
+    pub triangle: TriangleRow,
+}
+
+impl Place {
+    const fn unknown(last: f32) -> Self {
+        let (before, after, triangle) = (None, None, TriangleRow(0));
+        Self { first: 0.0, last, before, after, parameter: 0.0, triangle }
+    }
+
+    /// The place from the first end of both to the last.
+    fn joined(&self, other: &Self) -> Self {
+        let before = if self.before == other.before { self.before } else { None };
+        let after = if self.after == other.after { self.after } else { None };
+        let (first, last) = (smaller(self.first, other.first), larger(self.last, other.last));
+        Self { first, last, before, after, ..*self }
+    }
+}
+
+impl Touches {
+    /// No place.
+    pub const NONE: Self = Self { places: [Place::unknown(0.0); PLACES], count: 0 };
+    /// The whole axis.
+    pub const ANYWHERE: Self = Self { places: [Place::unknown(f32::INFINITY); PLACES], count: 1 };
+
+    /// Adds a triangle whose distance from the axis is within the accuracy. Returns the distances to it that this took.
+    ///
+    /// An axis that is clearly inclined to a triangle and pierces it passes the surface on the way that the triangle
+    /// faces. If it pierces a neighbour instead, because of rounding, that one is within the accuracy, too, and both
+    /// have one place.
+    pub fn add(
+        &mut self,
+        tool: &impl Tool,
+        triangle: TriangleRow,
+        corners: &[Vec3; 3],
+        pair: &AxisPair,
+        accuracy: f32,
+    ) -> u32 {
+        let length = tool.axis_length();
+        let (start, along) = (tool.axis_start(), tool.axis_span() / length);
+        let &[a, b, c] = corners;
+        let (ab, ac) = (b - a, c - a);
+        let normal = ab.cross(ac);
+        let (square, slope) = (normal.length_squared(), normal.dot(along));
+        let is_clear = square > SLIVER * ab.length_squared() * ac.length_squared();
+        let parameter = pair.axis_parameter;
+        let middle = parameter * length;
+        if is_clear && slope * slope > INCLINED * square {
+            // The axis meets the plane within two accuracies, divided by the sine. The rest is for rounding.
+            let within = 8.0 * accuracy * sqrt(square / (slope * slope));
+            let is_outward = (pair.distance_squared <= 0.0).then_some(slope > 0.0);
+            let (first, last) = (middle - within, middle + within);
+            let (before, after) = (is_outward.map(|is_outward| !is_outward), is_outward);
+            self.insert(Place { first, last, before, after, parameter, triangle });
+            return 0;
+        }
+        let is_touched = |at: f32| {
+            let point = AxisPoint(tool.axis_point(at / length));
+            let pair = point.closest_on_triangle(corners, f32::INFINITY);
+            pair.is_none_or(|pair| pair.distance_squared <= 4.0 * accuracy * accuracy)
+        };
+        // A point's distance to a triangle is convex along the axis.
+        let end = |beyond: f32| {
+            let (mut inside, mut outside) = (middle, beyond);
+            for _ in 0..HALVINGS {
+                let half = (inside + outside) * 0.5;
+                *if is_touched(half) { &mut inside } else { &mut outside } = half;
+            }
+            outside
+        };
+        let [a, b, c] = [a, b, c].map(|corner| along.dot(corner - start));
+        let first = smaller(a, smaller(b, smaller(c, middle))) - 2.0 * accuracy;
+        let last = larger(a, larger(b, larger(c, middle))) + 2.0 * accuracy;
+        let (first, last) = (end(first), end(last));
+        self.insert(Place { first, last, parameter, triangle, ..Place::unknown(0.0) });
+        2 * HALVINGS
+    }
+
+    /// Adds a place, joined with those that it overlaps.
+    fn insert(&mut self, mut place: Place) {
+        let mut all = Self::NONE;
+        let mut is_added = false;
+        for other in self.places.iter().take(self.count) {
+            if other.last < place.first {
+                all.push(*other);
+            } else if other.first > place.last {
+                if !is_added {
+                    all.push(place);
+                    is_added = true;
+                }
+                all.push(*other);
+            } else {
+                place = place.joined(other);
+            }
+        }
+        if !is_added {
+            all.push(place);
+        }
+        *self = all;
+    }
+
+    /// Adds a place behind the others; if there is no room, to the last one.
+    fn push(&mut self, place: Place) {
+        if let Some(free) = self.places.get_mut(self.count) {
+            *free = place;
+            self.count += 1;
+        } else {
+            let [.., last] = &mut self.places;
+            *last = Place { before: None, after: None, ..last.joined(&place) };
+        }
+    }
+
+    /// The places, unless they are unknown.
+    pub fn places(&self) -> impl Iterator<Item = &Place> {
+        self.places.iter().take(self.count).filter(|place| place.last < f32::INFINITY)
+    }
+
+    /// The axis is outside at this length.
+    pub fn add_outside(&mut self, along: f32) {
+        let mut previous: Option<&mut Place> = None;
+        for place in self.places.iter_mut().take(self.count) {
+            if place.first > along {
+                place.before.get_or_insert(true);
+                break;
+            }
+            previous = (place.last < along).then_some(place);
+            if previous.is_none() {
+                return;
+            }
+        }
+        if let Some(previous) = previous {
+            previous.after.get_or_insert(true);
+        }
+    }
+
+    /// The way forward from a length along the axis.
+    #[inline(never)] // Small code, see `side::of_point`.
+    pub fn ahead(&self, along: f32) -> Free {
+        let mut free = Free { from: along, to: f32::INFINITY, is_outside: false };
+        let mut previous = None;
+        for place in self.places.iter().take(self.count) {
+            if place.first > free.from {
+                return Free { to: place.first, ..free.between(previous, place.before) };
+            }
+            if place.last >= free.from {
+                free.from = place.last;
+            }
+            previous = place.after;
+        }
+        free.between(previous, None)
+    }
+
+    /// The way back.
+    #[inline(never)]
+    pub fn behind(&self, along: f32) -> Free {
+        let mut free = Free { from: along, to: f32::NEG_INFINITY, is_outside: false };
+        let mut next = None;
+        for place in self.places.iter().take(self.count).rev() {
+            if place.last < free.from {
+                return Free { to: place.last, ..free.between(place.after, next) };
+            }
+            if place.first <= free.from {
+                free.from = place.first;
+            }
+            next = place.before;
+        }
+        free.between(None, next)
+    }
+}
+
+/// A length of the axis that does not meet the surface.
+pub(super) struct Free {
+    /// Its end that is closer to the point it was asked for.
+    pub from: f32,
+    pub to: f32,
+    /// It is certain to be outside.
+    pub is_outside: bool,
+}
+
+impl Free {
+    /// Outside if one end is known to be, and neither is known to be inside.
+    fn between(self, one: Option<bool>, other: Option<bool>) -> Self {
+        let is_outside = one.or(other) == Some(true) && other.or(one) == Some(true);
+        Self { is_outside, ..self }
+    }
+}
