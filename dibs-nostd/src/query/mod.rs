@@ -72,7 +72,8 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     /// triangle, unless `options` say otherwise. Pins are vertices of the surface, so their distances are upper bounds
     /// from the first node on.
     ///
-    /// Where a capsule's axis crosses the surface, up to 27 more searches find the depth.
+    /// Where a capsule's axis crosses the surface, up to 27 more searches find the depth, with no more node tests than the
+    /// tree has nodes. Where they do not suffice, the interval is wider than the tolerance.
     ///
     /// Cost: the budget at most; typical counts are in the repository's `docs/benchmarks.md`.
     ///

@@ -5,6 +5,9 @@
 //! two points bound the depth between them. The search divides the part of the axis with the highest bound (Piyavskii
 //! and Shubert, with this second bound added) until no part can be deeper than the deepest point found by more than the
 //! tolerance. The axis stays on one side between two places where it meets the surface, and parts outside are not searched.
+//! A point is searched only if no triangle a few steps from those of its neighbours shows that it is no deeper.
+//!
+//! The work is bounded: it takes no more node tests than the tree has nodes, and then ends with the interval so far.
 //!
 //! A tracker keeps the bounds. Tool and surface change a depth by at most their motion, so the next tick looks only at
 //! the parts whose bounds have come above the deepest point by more than the tolerance.
@@ -24,7 +27,7 @@ use crate::unavailable::QueryError;
 use crate::{Index, Tree, TriangleRow, VertexTable};
 pub(super) use known::Known;
 use known::Point;
-use part::{Fit, Part, Parts, Sample, larger};
+use part::{Fit, Part, Parts, Sample, larger, smaller};
 use touches::Touches;
 
 /// A limit that no search reaches before its end.
@@ -83,7 +86,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         let mut options = *options;
         options.stretch = options.stretch.or_else(|| vertices.stretch());
         let Budget { node_tests, triangle_tests } = &mut options.budget;
-        *node_tests = node_tests.saturating_sub(meeting.node_tests);
+        let most = tree.header().nodes;
+        *node_tests = node_tests.saturating_sub(meeting.node_tests).min(most);
         *triangle_tests = triangle_tests.saturating_sub(meeting.triangle_tests);
         let (meeting, answer) = (*meeting, *meeting);
         let (deepest, deepest_at) = (0.0, f32::NAN);
@@ -193,7 +197,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         if way.is_outside && way.from == along {
             return Ok(self.at(parameter, 0.0, near));
         }
-        self.look(parameter, near, self.deepest + tolerance)
+        let most = near.depth + (along - near.along).abs();
+        self.look(self.at(parameter, most, near), self.deepest + tolerance)
     }
 
     /// The parts of the last tick.
@@ -259,9 +264,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
                 self.look_again(parts, row)?;
                 continue;
             }
-            let near = if split - from.along < to.along - split { &from } else { &to };
+            let is_nearer = split - from.along < to.along - split;
+            let ends = if is_nearer { [&from, &to] } else { [&to, &from] };
             let until = if is_first { EXACT } else { enough };
-            let middle = self.look(split / self.tool.axis_length(), near, until)?;
+            let mut middle = self.between(split, ends, until)?;
+            if middle.depth > until {
+                middle = self.look(middle, until)?;
+            }
             let enough = self.deepest + tolerance;
             let before = self.part(from, &middle, place, enough);
             let after = self.part(middle, &to, part.next, enough);
@@ -298,7 +307,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     /// Searches a sample's point to the end.
     fn look_again(&mut self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
         let sample = parts.sample(row);
-        let sample = self.look(sample.parameter, &sample, EXACT)?;
+        let sample = self.look(sample, EXACT)?;
         parts.set_sample(row, sample);
         Ok(())
     }
@@ -328,52 +337,79 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     /// Moves a remembered sample's triangle to neighbours that are closer now.
     fn walk(&mut self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
         let mut sample = parts.sample(row);
-        if sample.fit == Fit::Closest {
-            return Ok(());
+        if sample.fit != Fit::Closest {
+            self.descend(&mut sample, 0.0)?;
+            parts.set_sample(row, sample);
         }
-        sample.fit = Fit::Closest;
+        Ok(())
+    }
+
+    /// Moves a sample's triangle to closer neighbours, until none is closer or the distance is within `enough`.
+    fn descend(&mut self, sample: &mut Sample, enough: f32) -> Result<(), QueryError> {
         let (mut least, mut distances) = (sample.square(sample.on_axis), 1);
+        let mut before = None;
         for _ in 0..STEPS {
-            let Some(TriangleRow(from)) = sample.triangle else { break };
-            let mut closest = sample;
-            for row in (0..3).filter_map(|edge| self.tree.row_across(from, edge)) {
+            let Some(TriangleRow(from)) = sample.triangle.filter(|_| least > enough * enough)
+            else {
+                break;
+            };
+            let neighbours = (0..3).filter_map(|edge| self.tree.row_across(from, edge));
+            for row in neighbours.filter(|&row| before != Some(row)) {
                 let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
-                let (triangle, corners) = (Some(TriangleRow(row)), self.corners(corners)?);
-                let other = Sample { triangle, corners, ..sample };
-                let square = other.square(sample.on_axis);
+                let corners = self.corners(corners)?;
+                let square = part::square(sample.on_axis, &corners);
                 distances += 1;
                 if square < least {
-                    (least, closest) = (square, other);
+                    least = square;
+                    (sample.triangle, sample.corners) = (Some(TriangleRow(row)), corners);
                 }
             }
-            if closest.triangle == sample.triangle {
+            if sample.triangle == Some(TriangleRow(from)) {
                 break;
             }
-            sample = closest;
+            before = Some(from);
         }
-        let distance = sqrt(least);
-        if distance < sample.depth {
-            sample.depth = distance;
-        }
-        parts.set_sample(row, sample);
+        sample.fit = Fit::Closest;
+        sample.depth = smaller(sample.depth, sqrt(least));
         self.spend(distances * DISTANCE_COST);
         Ok(())
     }
 
-    /// Samples one point of the axis, near another sample. Out of budget, derives its bound from that sample. A point
-    /// that is no deeper than `enough` is not searched to the end.
-    fn look(&mut self, parameter: f32, near: &Sample, enough: f32) -> Result<Sample, QueryError> {
+    /// A point of the axis between two samples, with a triangle found by steps from theirs. Its depth is no more than
+    /// that triangle's distance. It is good enough if it is no deeper than `enough`.
+    fn between(
+        &mut self,
+        along: f32,
+        [near, far]: [&Sample; 2],
+        enough: f32,
+    ) -> Result<Sample, QueryError> {
+        let parameter = along / self.tool.axis_length();
+        let at = |this: &Self, end: &Sample| {
+            this.at(parameter, end.depth + (along - end.along).abs(), end)
+        };
+        let mut closest = at(self, near);
+        self.descend(&mut closest, enough)?;
+        if closest.depth > enough {
+            let mut other = at(self, far);
+            self.descend(&mut other, enough)?;
+            if other.depth < closest.depth {
+                closest = other;
+            }
+        }
+        Ok(closest)
+    }
+
+    /// Searches a point of the axis. Out of budget, returns the sample as it is. A point that is no deeper than `enough`
+    /// is not searched to the end.
+    fn look(&mut self, sample: Sample, enough: f32) -> Result<Sample, QueryError> {
         self.looks += 1;
         self.spend(LOOK_COST);
-        let on_axis = self.tool.axis_point(parameter);
+        let Sample { parameter, on_axis, .. } = sample;
         let Budget { node_tests, triangle_tests } = self.options.budget;
         // The root's test is one of them.
-        let Some(node_tests) = node_tests.checked_sub(1) else {
-            let along = parameter * self.tool.axis_length();
-            return Ok(self.at(parameter, near.depth + (along - near.along).abs(), near));
-        };
+        let Some(node_tests) = node_tests.checked_sub(1) else { return Ok(sample) };
         let options = self.options.budget(Budget { node_tests, triangle_tests });
-        let (point, first) = (AxisPoint(on_axis), near.triangle);
+        let (point, first) = (AxisPoint(on_axis), sample.triangle);
         let search =
             Search::start(self.tree, self.stack, self.vertices, &point, &options, first, None)?;
         let found = search.run::<UNTIL>(enough)?;
@@ -415,7 +451,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             answer.accuracy = found.accuracy;
         }
         // Without a triangle of its own, its corners are a pin.
-        let triangle = found.triangle.or(near.triangle);
+        let triangle = found.triangle.or(sample.triangle);
         self.sample(parameter, depth, triangle, found.corners)
     }
 

@@ -14,7 +14,7 @@ pub(super) const POINTS: usize = 28;
 const NEAREST_SPLIT: f32 = 0.125;
 
 /// Most steps towards the point at which two triangles are equally far.
-const ROUNDS: u32 = 3;
+const ROUNDS: u32 = 2;
 
 /// A point of the axis and the triangle found closest to it; where the budget ended, one pin as all three corners.
 #[derive(Clone, Copy)]
@@ -55,8 +55,7 @@ impl Sample {
 
     /// Square of the distance from a point to the triangle.
     pub fn square(&self, point: Vec3) -> f32 {
-        let pair = AxisPoint(point).closest_on_triangle(&self.corners, f32::INFINITY);
-        pair.map_or(f32::INFINITY, |pair| pair.distance_squared)
+        square(point, &self.corners)
     }
 
     /// A bound on the depth from here to the end of a way that is outside, if it is no higher than `enough`.
@@ -255,14 +254,13 @@ impl Parts {
 
     /// The part with the highest bound, and its row.
     pub fn highest(&self) -> (usize, Part) {
-        let [mut part, ..] = self.rows;
-        let mut highest = 0;
-        for (row, other) in self.rows.iter().enumerate().take(self.end) {
-            if other.bound > part.bound {
-                (highest, part) = (row, *other);
+        let (mut highest, mut bound) = (0, f32::NEG_INFINITY);
+        for (row, part) in self.rows.iter().enumerate().take(self.end) {
+            if part.bound > bound {
+                (highest, bound) = (row, part.bound);
             }
         }
-        (highest, part)
+        (highest, self.part(highest))
     }
 
     /// The row of the sample with a parameter.
@@ -298,6 +296,12 @@ impl Parts {
             part
         })
     }
+}
+
+/// Square of the distance from a point to a triangle.
+pub(super) fn square(point: Vec3, corners: &[Vec3; 3]) -> f32 {
+    let pair = AxisPoint(point).closest_on_triangle(corners, f32::INFINITY);
+    pair.map_or(f32::INFINITY, |pair| pair.distance_squared)
 }
 
 /// Upper bound, between two places, on the smaller of two convex functions, from their values there.
