@@ -73,7 +73,7 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     /// from the first node on.
     ///
     /// Where a capsule's axis crosses the surface, up to 27 more searches find the depth, with no more node tests than the
-    /// tree has nodes. Where they do not suffice, the interval is wider than the tolerance.
+    /// tree has nodes, or 3,072 if that is more. Where they do not suffice, the interval is wider than the tolerance.
     ///
     /// Cost: the budget at most; typical counts are in the repository's `docs/benchmarks.md`.
     ///

@@ -131,6 +131,47 @@ fn the_closest_of_tracked_pairs_is_that_of_whole_queries() {
     }
 }
 
+/// A chain that turns around a heart, so that each of its links is closest for a while: no tick finds a link that rested
+/// long, since some tests are made ahead.
+#[test]
+fn no_tick_pays_for_a_long_rest() {
+    let mesh = generate::heart(2_000).expect("a valid size").mesh;
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut odometer = Odometer::new(&tree);
+    let surface = odometer.start(rows.as_slice());
+    for options in [Options::new(), Options::new().unsigned()] {
+        let mut trackers: Vec<Tracked> =
+            (0..8).map(|_| Tracked::new(&tree).expect("deep enough")).collect();
+        let (mut most, mut falls, mut links) = (0, 0, [0; 8]);
+        for tick in 0..20_000 {
+            let turn = 0.0007 * tick as f32;
+            let (sin, cos) = turn.sin_cos();
+            let (middle, along) = (90.0 * Vec3::new(cos, sin, 0.3), Vec3::new(-sin, cos, 0.2));
+            let slide = 60.0 * (0.37 * turn).sin();
+            let joint = |at: usize| middle + along * (20.0 * at as f32 - 80.0 + slide);
+            let capsules: [Capsule; 8] = [0, 1, 2, 3, 4, 5, 6, 7]
+                .map(|at| Capsule::new(joint(at), joint(at + 1), 2.0).expect("finite"));
+            let mut pairs: Vec<_> = trackers
+                .iter_mut()
+                .zip(&capsules)
+                .map(|(tracker, capsule)| (tracker, &surface, capsule))
+                .collect();
+            let found = Tracker::closest_of(&mut pairs, &options).expect("an answer");
+            let found = found.expect("eight pairs");
+            links[found.pair] += 1;
+            if tick > 0 {
+                most = most.max(found.closest.node_tests);
+                falls += u32::from(found.fallback.is_some());
+            }
+        }
+        println!("{most} node tests, {falls} whole queries, {links:?} ticks");
+        assert!(links.iter().filter(|&&ticks| ticks > 50).count() >= 3, "{links:?}");
+        assert!(falls == 0 && most < 250, "{falls} {most}");
+    }
+}
+
 #[test]
 fn no_pairs_have_no_closest() {
     let none = Tracked::closest_of::<Moved<'_, [Vec3]>, Capsule>(&mut [], &Options::new());

@@ -7,7 +7,8 @@
 //! tolerance. The axis stays on one side between two places where it meets the surface, and parts outside are not searched.
 //! A point is searched only if no triangle a few steps from those of its neighbours shows that it is no deeper.
 //!
-//! The work is bounded: it takes no more node tests than the tree has nodes, and then ends with the interval so far.
+//! The work is bounded: it takes no more node tests than the tree has nodes, or 3,072 if that is more, and then ends with
+//! the interval so far.
 //!
 //! A tracker keeps the bounds. Tool and surface change a depth by at most their motion, so the next tick looks only at
 //! the parts whose bounds have come above the deepest point by more than the tolerance.
@@ -41,6 +42,9 @@ const LEAST_TOLERANCE: f32 = 32.0;
 
 /// Most points of the axis that are searched.
 const LOOKS: u32 = 27;
+
+/// Node tests that any depth may take, however small the tree.
+const LEAST_WORK: u32 = 3_072;
 
 /// Node tests that take as long as the work for a point of the axis besides its search. Without them a budget would not
 /// bound a tracker's tick, which may look at many points and triangles without a search.
@@ -86,7 +90,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         let mut options = *options;
         options.stretch = options.stretch.or_else(|| vertices.stretch());
         let Budget { node_tests, triangle_tests } = &mut options.budget;
-        let most = tree.header().nodes;
+        let most = tree.header().nodes.max(LEAST_WORK);
         *node_tests = node_tests.saturating_sub(meeting.node_tests).min(most);
         *triangle_tests = triangle_tests.saturating_sub(meeting.triangle_tests);
         let (meeting, answer) = (*meeting, *meeting);
@@ -228,8 +232,9 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     ) -> Result<f32, QueryError> {
         loop {
             let enough = known.map_or(self.deepest, |(depth, _)| depth) + tolerance;
-            let (row, part) = parts.highest();
-            let is_enough = !(part.bound > enough);
+            let row = parts.highest();
+            let (next, bound, split) = parts.state(row);
+            let is_enough = !(bound > enough);
             if let Some((_, at)) = known.filter(|_| is_enough) {
                 known = None;
                 if let Some(row) = parts.row_of(at) {
@@ -238,16 +243,16 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
                 continue;
             }
             if is_enough {
-                return Ok(part.bound);
+                return Ok(bound);
             }
-            let ends = [row, part.next];
+            let ends = [row, next];
             let is_closest = ends.iter().all(|&row| parts.sample(row).fit == Fit::Closest);
-            let Some(split) = part.split.filter(|_| is_closest) else {
+            let Some(split) = split.filter(|_| is_closest) else {
                 if self.is_spent() {
-                    return Ok(part.bound);
+                    return Ok(bound);
                 }
                 for row in ends {
-                    if part.split.is_none() {
+                    if split.is_none() {
                         self.place(parts, row)?;
                     } else {
                         self.walk(parts, row)?;
@@ -256,11 +261,11 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
                 self.renew(parts, row, enough);
                 continue;
             };
-            let Some(place) = self.room(parts, enough) else { return Ok(part.bound) };
-            let (from, to) = (part.from, parts.sample(part.next));
+            let Some(place) = self.room(parts, enough) else { return Ok(bound) };
+            let (from, to) = (parts.sample(row), parts.sample(next));
             let is_first = known.take().is_some();
-            if is_first && larger(from.depth, to.depth) >= part.bound {
-                let row = if from.depth >= part.bound { row } else { part.next };
+            if is_first && larger(from.depth, to.depth) >= bound {
+                let row = if from.depth >= bound { row } else { next };
                 self.look_again(parts, row)?;
                 continue;
             }
@@ -273,9 +278,9 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             }
             let enough = self.deepest + tolerance;
             let before = self.part(from, &middle, place, enough);
-            let after = self.part(middle, &to, part.next, enough);
-            parts.set(row, before.below(part.bound));
-            parts.push(after.below(part.bound));
+            let after = self.part(middle, &to, next, enough);
+            parts.set(row, before.below(bound));
+            parts.push(after.below(bound));
         }
     }
 

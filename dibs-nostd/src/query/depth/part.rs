@@ -101,17 +101,17 @@ impl Part {
 
     /// The part up to `to`. A bound that is no higher than `enough` is not lowered further.
     pub fn new(mut from: Sample, to: &Sample, next: usize, enough: f32, touches: &Touches) -> Self {
-        let (length, mut to) = (to.along - from.along, *to);
+        let length = to.along - from.along;
         // A depth changes by at most the length moved.
         from.depth = smaller(from.depth, to.depth + length);
-        to.depth = smaller(to.depth, from.depth + length);
+        let to_depth = smaller(to.depth, from.depth + length);
         let part =
             |bound, split, distances| Self { from, next, bound, split: Some(split), distances };
         let span = to.on_axis - from.on_axis;
         let point = |along: f32| from.on_axis + span * ((along - from.along) / length);
         // Points nearer to an outside sample than its distance are outside too.
         let (mut first, mut last) =
-            (from.along + above_zero(-from.depth), to.along - above_zero(-to.depth));
+            (from.along + above_zero(-from.depth), to.along - above_zero(-to_depth));
         let (mut beside, mut distances) = (0.0, 0);
         let (ahead, behind) = (touches.ahead(from.along), touches.behind(to.along));
         if ahead.from < to.along
@@ -129,7 +129,7 @@ impl Part {
             let middle = (from.along + to.along) * 0.5;
             return part(beside, middle, distances);
         }
-        let slope = (from.depth + to.depth + length) * 0.5;
+        let slope = (from.depth + to_depth + length) * 0.5;
         let middle = (first + last) * 0.5;
         if slope <= enough {
             return part(larger(beside, slope), middle, distances);
@@ -252,15 +252,20 @@ impl Parts {
         }
     }
 
-    /// The part with the highest bound, and its row.
-    pub fn highest(&self) -> (usize, Part) {
+    /// The row of the part with the highest bound.
+    pub fn highest(&self) -> usize {
         let (mut highest, mut bound) = (0, f32::NEG_INFINITY);
         for (row, part) in self.rows.iter().enumerate().take(self.end) {
             if part.bound > bound {
                 (highest, bound) = (row, part.bound);
             }
         }
-        (highest, self.part(highest))
+        highest
+    }
+
+    /// The row of the next part, this one's bound, and the length along the axis at which it is divided next.
+    pub fn state(&self, row: usize) -> (usize, f32, Option<f32>) {
+        self.rows.get(row).map_or((0, 0.0, None), |part| (part.next, part.bound, part.split))
     }
 
     /// The row of the sample with a parameter.

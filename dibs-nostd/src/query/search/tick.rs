@@ -42,6 +42,8 @@ pub(in crate::query) struct Tick<'s, 't, 'f, I, V: ?Sized, T> {
     now: u32,
     /// Taken off a bound before it is stored.
     margin: f32,
+    /// Distance from the axis beyond which nothing is searched.
+    limit: f32,
     facing: Facing,
 }
 
@@ -84,6 +86,7 @@ impl Facing {
 }
 
 impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I, V, T> {
+    /// A tick that looks for surface within `separation` (mm) of the tool.
     #[inline(always)]
     pub fn new(
         mut search: Search<'s, 't, I, V, T>,
@@ -91,6 +94,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         unit: Unit,
         now: u32,
         budget: Budget,
+        separation: f32,
     ) -> Self {
         // A tick tests each node's sphere, each leaf's plane and each triangle's plane twice at most.
         let header = search.tree.header();
@@ -98,8 +102,10 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         search.budget.node_tests = if budget.node_tests < most { budget.node_tests } else { most };
         search.left.node_tests = search.budget.node_tests;
         let margin = search.slack + search.coordinate_slack;
+        let limit =
+            if separation < f32::INFINITY { search.limit_to(separation) } else { f32::INFINITY };
         let facing = Facing::new(&search);
-        Self { search, front, unit, now, margin, facing }
+        Self { search, front, unit, now, margin, limit, facing }
     }
 
     /// Tests the bounds that run out with a motion of `moved` units. Returns the closest triangle too, where one was
@@ -160,7 +166,8 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             }
         }
         self.close_some(1)?;
-        let closest = self.finish(f32::INFINITY)?;
+        let is_beyond = self.limit < f32::INFINITY && self.search.is_beyond(self.limit);
+        let closest = self.finish(if is_beyond { self.limit } else { f32::INFINITY })?;
         Ok(Outcome::Answer { closest, is_complete: true, restarted })
     }
 

@@ -92,6 +92,8 @@ struct Last {
     clear: f32,
     /// The side was asked for.
     is_signed: bool,
+    /// Units moved since a search of several pairs last came to its end; less than [`FARTHEST`].
+    stale: u32,
 }
 
 /// The answer of a tick.
@@ -182,6 +184,17 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         tool: &T,
         options: &Options,
     ) -> Result<Tracked, QueryError> {
+        self.within(surface, tool, options, f32::INFINITY)
+    }
+
+    /// The closest pair; of pairs that are farther than `separation` (mm), only that they are.
+    fn within<S: MovingSurface + ?Sized, T: Tool>(
+        &mut self,
+        surface: &S,
+        tool: &T,
+        options: &Options,
+        separation: f32,
+    ) -> Result<Tracked, QueryError> {
         let travel = surface.travel();
         let moved = self.moved(tool, travel);
         self.last = None;
@@ -200,7 +213,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         let touched = Some(&mut self.touched);
         let search =
             Search::start(&self.tree, &mut self.stack, surface, tool, options, first, touched)?;
-        let tick = Tick::new(search, self.front.borrow(), self.unit, self.now, options.budget);
+        let front = self.front.borrow();
+        let tick = Tick::new(search, front, self.unit, self.now, options.budget, separation);
         let (outcome, best) = tick.run(moved)?;
         let best = best.map(TriangleRow);
         self.triangle = best.or(self.triangle);
@@ -308,7 +322,13 @@ impl Last {
             Side::Undefined(NoSide::NotAsked) => (clear, false),
             _ => (clear, true),
         };
-        Self { start, span, length: tool.axis_length(), travel, clear, is_signed }
+        Self { start, span, length: tool.axis_length(), travel, clear, is_signed, stale: 0 }
+    }
+
+    /// The distance within which nothing is certain to be, after a motion.
+    fn clear_after(&self, moved: f32) -> f32 {
+        let clear = self.clear - moved * (1.0 + 4.0 * f32::EPSILON);
+        clear - clear.abs() * f32::EPSILON
     }
 
     /// Most that a point of the axis has moved, in units: the larger of the ends' steps. For another tool, the distance

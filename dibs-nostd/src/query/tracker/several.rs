@@ -1,9 +1,24 @@
 //! Several trackers: the closest of all pairs. A pair that is certain to be farther is not looked at.
 
 use super::{Tracked, Tracker};
-use crate::query::{NoSide, Options, Proximity, Side};
+use crate::query::{Budget, NoSide, Options, Proximity, Side};
 use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Tool};
+
+/// Most tests made ahead in a tick, less one.
+const AHEAD: Budget = Budget { node_tests: 64, triangle_tests: 16 };
+
+/// How much farther than the closest pair others are shown to be, in units: an eighth to a sixteenth of the root sphere's
+/// radius.
+const LEAD: i32 = 1 << 21;
+
+/// A bound on a pair that is not searched.
+struct Bound {
+    /// No separation is less; negative infinity if nothing is known.
+    apart: f32,
+    /// Motion since the pair was last searched to the end.
+    stale: f32,
+}
 
 impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OPENED> {
     /// The closest of several pairs of a surface and a tool, each with a tracker of its own; `None` for an empty slice. A
@@ -11,7 +26,8 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
     ///
     /// A pair is passed over while it is certain to be farther than the closest one: its distance when it was last
     /// searched, less the motion since. A tool that was outside a closed surface then is outside still. Pairs inside or
-    /// crossing are searched at every tick.
+    /// crossing are searched at every tick. In a tick with few tests, the pair whose certainty ends first is searched
+    /// ahead for up to 65 tests more, only as far as it has to be, so that no tick finds a pair that rested long.
     ///
     /// The interval begins at the least lower end of all pairs, the accuracy is the worst, the tests are those of all. The
     /// side is not known ([`NoSide::CutShort`]) if the budget left that of any pair open.
@@ -53,14 +69,22 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
     ) -> Result<Option<Tracked>, QueryError> {
         let Some(first) = Self::nearest(pairs, options) else { return Ok(None) };
         let mut found: Option<Tracked> = None;
+        // The pair with the least lead for each motion since it was searched; none if all have four times as much.
+        let (mut ahead, mut lead_ahead, mut stale_ahead) = (None, 4.0, 1.0);
         let mut rest = *options;
         let others = (0..pairs.len()).filter(|&at| at != first);
         for at in [first].into_iter().chain(others) {
             let Some((tracker, surface, tool)) = pairs.get_mut(at) else { continue };
-            if let Some(best) = &found
-                && tracker.apart(*surface, *tool, options) >= best.closest.separation
-            {
-                continue;
+            if let Some(best) = &found {
+                let Bound { apart, stale } = tracker.bound(*surface, *tool, options);
+                let lead = apart - best.closest.separation;
+                if lead >= 0.0 {
+                    // Written so that a lead of zero counts.
+                    if stale * lead_ahead >= lead * stale_ahead {
+                        (ahead, lead_ahead, stale_ahead) = (Some(at), lead, stale);
+                    }
+                    continue;
+                }
             }
             let tracked = tracker.closest(*surface, *tool, &rest)?;
             let own = &tracked.closest;
@@ -68,7 +92,47 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
             let own = Tracked { pair: at, ..tracked };
             found = Some(found.map_or(own, |found| found.and(own)));
         }
+        if let (Some(found), Some(at)) = (&mut found, ahead)
+            && rest.budget.node_tests > 0
+            && found.closest.node_tests < 2 * AHEAD.node_tests
+            && let Some((tracker, surface, tool)) = pairs.get_mut(at)
+        {
+            let tests = tracker.look_ahead(*surface, *tool, found.closest.separation, &rest)?;
+            let Proximity { node_tests, triangle_tests, .. } = &mut found.closest;
+            *node_tests = node_tests.saturating_add(tests.node_tests);
+            *triangle_tests = triangle_tests.saturating_add(tests.triangle_tests);
+        }
         Ok(found)
+    }
+
+    /// Searches a pair for a part of the way, so that less is left for the tick that needs it. What was certain of it
+    /// stays. Returns the tests made.
+    fn look_ahead<S: MovingSurface + ?Sized, T: Tool>(
+        &mut self,
+        surface: &S,
+        tool: &T,
+        closest: f32,
+        options: &Options,
+    ) -> Result<Budget, QueryError> {
+        let Budget { node_tests, triangle_tests } = options.budget;
+        let options = options.budget(Budget {
+            node_tests: node_tests.min(AHEAD.node_tests),
+            triangle_tests: triangle_tests.min(AHEAD.triangle_tests),
+        });
+        let (Some(before), Ok(moved)) = (self.last, self.moved(tool, surface.travel())) else {
+            return Ok(Budget { node_tests: 0, triangle_tests: 0 });
+        };
+        let clear = before.clear_after(self.unit.length(moved as i32));
+        let separation = closest + self.unit.length(LEAD);
+        let found = self.within(surface, tool, &options.unsigned(), separation)?.closest;
+        if let Some(last) = &mut self.last {
+            if last.clear < clear {
+                (last.clear, last.stale) = (clear, before.stale.saturating_add(moved));
+            }
+            // A tool that has not touched the surface since is on the same side.
+            last.is_signed = before.is_signed && clear > 0.0;
+        }
+        Ok(Budget { node_tests: found.node_tests, triangle_tests: found.triangle_tests })
     }
 
     /// Index of the pair that may be closest.
@@ -78,7 +142,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
     ) -> Option<usize> {
         let (mut nearest, mut least) = (None, f32::INFINITY);
         for (at, (tracker, surface, tool)) in pairs.iter().enumerate() {
-            let apart = tracker.apart(*surface, *tool, options);
+            let Bound { apart, .. } = tracker.bound(*surface, *tool, options);
             if nearest.is_none() || apart < least {
                 (nearest, least) = (Some(at), apart);
             }
@@ -86,19 +150,21 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
         nearest
     }
 
-    /// A lower bound on the separation, without a search; negative infinity if nothing is known.
-    fn apart<S: MovingSurface + ?Sized, T: Tool>(
+    /// The bound on the separation that holds without a search.
+    fn bound<S: MovingSurface + ?Sized, T: Tool>(
         &self,
         surface: &S,
         tool: &T,
         options: &Options,
-    ) -> f32 {
+    ) -> Bound {
+        const NONE: Bound = Bound { apart: f32::NEG_INFINITY, stale: 0.0 };
         let last = self.last.filter(|last| last.is_signed || !options.is_signed);
-        let Some(last) = last else { return f32::NEG_INFINITY };
-        let Ok(moved) = self.moved(tool, surface.travel()) else { return f32::NEG_INFINITY };
-        let moved = self.unit.length(moved as i32) * (1.0 + 4.0 * f32::EPSILON);
-        let apart = last.clear - moved - surface.position_error() - tool.radius();
-        if apart.is_nan() { f32::NEG_INFINITY } else { apart }
+        let Some(last) = last else { return NONE };
+        let Ok(moved) = self.moved(tool, surface.travel()) else { return NONE };
+        let clear = last.clear_after(self.unit.length(moved as i32));
+        let apart = clear - surface.position_error() - tool.radius();
+        let apart = if apart.is_nan() { f32::NEG_INFINITY } else { apart };
+        Bound { apart, stale: self.unit.length(last.stale.saturating_add(moved) as i32) }
     }
 }
 
