@@ -159,7 +159,7 @@ fn document(parts: &BTreeMap<&str, u64>, queries: f64) -> Result<String> {
         (".side", "closest pair and side"),
         (".signed", "and the depth of a crossing axis"),
         (".contacts", "and all contacts within 5 mm"),
-        (".chain", "closest pair of eight capsules"),
+        (".chain", "closest pair and side of eight capsules"),
         (".modes.8", "closest pair, the surface moved by 8 modes"),
         (".modes.24", "closest pair, 24 modes"),
     ] {
