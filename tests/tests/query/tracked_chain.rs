@@ -3,10 +3,11 @@
 use dibs_build::{Builder, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
-    Budget, Capsule, Contacts, Moved, NoSide, Odometer, Options, Query, QueryError, Side, Tracker,
+    Budget, Capsule, Contacts, Moved, NoSide, Odometer, Options, Query, QueryError, Side, Sphere,
+    Tracker,
 };
 use dibs_tests::deform::unit;
-use dibs_tests::surfaces::ball;
+use dibs_tests::surfaces::{ball, sheet};
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -170,6 +171,38 @@ fn no_tick_pays_for_a_long_rest() {
         assert!(links.iter().filter(|&&ticks| ticks > 50).count() >= 3, "{links:?}");
         assert!(falls == 0 && most < 250, "{falls} {most}");
     }
+}
+
+/// Around the border of an open sheet a tool comes to its other side without touching it, and is the deepest of all there.
+#[test]
+fn a_resting_link_is_seen_to_pass_around_a_border() {
+    let mesh = sheet(20, 80.0, |_, _| 0.0);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut odometer = Odometer::new(&tree);
+    let surface = odometer.start(rows.as_slice());
+    let [mut still, mut moving] = [(); 2].map(|()| Tracked::new(&tree).expect("deep enough"));
+    let mut single = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let options = Options::new();
+    let near = Sphere::new(Vec3::new(0.0, 0.0, 3.0), 1.0).expect("finite");
+    let mut behind = 0;
+    for tick in 0..4_000 {
+        // Half a circle around the border at y = 40, from above to below.
+        let (sin, cos) = (std::f32::consts::PI * tick as f32 / 4_000.0).sin_cos();
+        let far = Sphere::new(Vec3::new(1.0, 15.0 + 60.0 * sin, 20.0 * cos), 1.0).expect("finite");
+        let mut pairs = [(&mut still, &surface, &near), (&mut moving, &surface, &far)];
+        let found = Tracker::closest_of(&mut pairs, &options).expect("an answer").expect("two");
+        let whole = [near, far].map(|tool| {
+            single.closest(rows.as_slice(), &tool, &options).expect("an answer").separation
+        });
+        let least = whole[0].min(whole[1]);
+        // A bound that rested holds until the motion since it was found has used it up.
+        behind += u32::from(least < 0.0 && found.closest.separation > 0.0);
+        assert!(least < 0.0 || (found.closest.separation - least).abs() < 0.01, "{tick}");
+    }
+    println!("{behind} ticks until the other side is seen");
+    assert!(behind < 400, "{behind}");
 }
 
 #[test]

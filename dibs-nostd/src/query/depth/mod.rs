@@ -16,19 +16,19 @@
 mod known;
 mod part;
 mod touches;
+mod walk;
 
 use glam::Vec3;
 
 use super::search::{Search, Touched, UNTIL, Waiting};
 use super::side::{self, NoSide, Side};
 use super::{Budget, Options, Proximity};
-use crate::math::sqrt::sqrt;
 use crate::tool::{AxisPoint, Tool};
 use crate::unavailable::QueryError;
 use crate::{Index, Tree, TriangleRow, VertexTable};
 pub(super) use known::Known;
 use known::Point;
-use part::{Fit, Part, Parts, Sample, larger, smaller};
+use part::{Fit, Part, Parts, Sample, larger};
 use touches::Touches;
 
 /// A limit that no search reaches before its end.
@@ -52,9 +52,6 @@ const LOOK_COST: u32 = 16;
 
 /// Node tests that take as long as a point's distance to one triangle.
 const DISTANCE_COST: u32 = 3;
-
-/// Most steps from a remembered triangle to a closer neighbour.
-const STEPS: u32 = 4;
 
 /// The search for the deepest point of a tool's axis.
 pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
@@ -326,82 +323,6 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             parts.join(self.deepest_at, enough);
         }
         parts.free()
-    }
-
-    /// Reads the corners of a remembered sample's triangle.
-    fn place(&self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
-        let mut sample = parts.sample(row);
-        if let (Fit::Remembered, Some(TriangleRow(row))) = (sample.fit, sample.triangle) {
-            let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
-            (sample.corners, sample.fit) = (self.corners(corners)?, Fit::Near);
-        }
-        parts.set_sample(row, sample);
-        Ok(())
-    }
-
-    /// Moves a remembered sample's triangle to neighbours that are closer now.
-    fn walk(&mut self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
-        let mut sample = parts.sample(row);
-        if sample.fit != Fit::Closest {
-            self.descend(&mut sample, 0.0)?;
-            parts.set_sample(row, sample);
-        }
-        Ok(())
-    }
-
-    /// Moves a sample's triangle to closer neighbours, until none is closer or the distance is within `enough`.
-    fn descend(&mut self, sample: &mut Sample, enough: f32) -> Result<(), QueryError> {
-        let (mut least, mut distances) = (sample.square(sample.on_axis), 1);
-        let mut before = None;
-        for _ in 0..STEPS {
-            let Some(TriangleRow(from)) = sample.triangle.filter(|_| least > enough * enough)
-            else {
-                break;
-            };
-            let neighbours = (0..3).filter_map(|edge| self.tree.row_across(from, edge));
-            for row in neighbours.filter(|&row| before != Some(row)) {
-                let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
-                let corners = self.corners(corners)?;
-                let square = part::square(sample.on_axis, &corners);
-                distances += 1;
-                if square < least {
-                    least = square;
-                    (sample.triangle, sample.corners) = (Some(TriangleRow(row)), corners);
-                }
-            }
-            if sample.triangle == Some(TriangleRow(from)) {
-                break;
-            }
-            before = Some(from);
-        }
-        sample.fit = Fit::Closest;
-        sample.depth = smaller(sample.depth, sqrt(least));
-        self.spend(distances * DISTANCE_COST);
-        Ok(())
-    }
-
-    /// A point of the axis between two samples, with a triangle found by steps from theirs. Its depth is no more than
-    /// that triangle's distance. It is good enough if it is no deeper than `enough`.
-    fn between(
-        &mut self,
-        along: f32,
-        [near, far]: [&Sample; 2],
-        enough: f32,
-    ) -> Result<Sample, QueryError> {
-        let parameter = along / self.tool.axis_length();
-        let at = |this: &Self, end: &Sample| {
-            this.at(parameter, end.depth + (along - end.along).abs(), end)
-        };
-        let mut closest = at(self, near);
-        self.descend(&mut closest, enough)?;
-        if closest.depth > enough {
-            let mut other = at(self, far);
-            self.descend(&mut other, enough)?;
-            if other.depth < closest.depth {
-                closest = other;
-            }
-        }
-        Ok(closest)
     }
 
     /// Searches a point of the axis. Out of budget, returns the sample as it is. A point that is no deeper than `enough`

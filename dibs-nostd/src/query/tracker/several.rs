@@ -114,23 +114,29 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
         closest: f32,
         options: &Options,
     ) -> Result<Budget, QueryError> {
+        let (Some(before), Ok(moved)) = (self.last, self.moved(tool, surface.travel())) else {
+            return Ok(Budget { node_tests: 0, triangle_tests: 0 });
+        };
+        let clear = before.clear_after(self.unit.length(moved as i32));
+        // A tool that has not touched a closed surface since is on the same side.
+        let keeps_side = before.is_signed && clear > 0.0 && self.tree.is_closed();
+        let (options, separation) = if options.is_signed && !keeps_side {
+            (*options, f32::INFINITY)
+        } else {
+            (options.unsigned(), closest + self.unit.length(LEAD))
+        };
         let Budget { node_tests, triangle_tests } = options.budget;
         let options = options.budget(Budget {
             node_tests: node_tests.min(AHEAD.node_tests),
             triangle_tests: triangle_tests.min(AHEAD.triangle_tests),
         });
-        let (Some(before), Ok(moved)) = (self.last, self.moved(tool, surface.travel())) else {
-            return Ok(Budget { node_tests: 0, triangle_tests: 0 });
-        };
-        let clear = before.clear_after(self.unit.length(moved as i32));
-        let separation = closest + self.unit.length(LEAD);
-        let found = self.within(surface, tool, &options.unsigned(), separation)?.closest;
+        let found = self.within(surface, tool, &options, separation)?.closest;
         if let Some(last) = &mut self.last {
+            last.is_signed |= keeps_side;
             if last.clear < clear {
-                (last.clear, last.stale) = (clear, before.stale.saturating_add(moved));
+                (last.clear, last.is_signed) = (clear, before.is_signed);
+                last.stale = before.stale.saturating_add(moved);
             }
-            // A tool that has not touched the surface since is on the same side.
-            last.is_signed = before.is_signed && clear > 0.0;
         }
         Ok(Budget { node_tests: found.node_tests, triangle_tests: found.triangle_tests })
     }
