@@ -5,7 +5,8 @@
 //! two points bound the depth between them. The search divides the part of the axis with the highest bound (Piyavskii
 //! and Shubert, with this second bound added) until no part can be deeper than the deepest point found by more than the
 //! tolerance. The axis stays on one side between two places where it meets the surface, and parts outside are not searched.
-//! A point is searched only if no triangle a few steps from those of its neighbours shows that it is no deeper.
+//! Steps from the triangles of the two points beside it often find one that shows a point to be no deeper. Such a point is
+//! not searched.
 //!
 //! The work is bounded: it takes no more node tests than the tree has nodes, or 3,072 if that is more, and then ends with
 //! the interval so far.
