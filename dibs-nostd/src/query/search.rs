@@ -1,6 +1,7 @@
 //! One search: the tests of nodes, leaves and triangles, and the best pair so far.
 
 mod finish;
+mod heights;
 mod low;
 mod near;
 mod roots;

@@ -100,6 +100,7 @@ fn no_contact_is_missing_and_none_is_doubled() {
         ("flat", sheet(20, 60.0, |_, _| 0.0)),
         ("concave", sheet(24, 60.0, |x, y| 0.01 * (x * x + y * y))),
         ("waves", sheet(40, 60.0, |x, y| 2.5 * (0.4 * x).sin() * (0.3 * y).cos())),
+        ("rough", sheet(40, 60.0, |x, y| ((12.9898 * x + 78.233 * y).sin() * 43_758.547).fract())),
     ];
     let poses = if cfg!(debug_assertions) { 10 } else { 120 };
     let (mut checked, mut several) = (0, 0);
@@ -109,7 +110,7 @@ fn no_contact_is_missing_and_none_is_doubled() {
         let tree = built.tree::<u16>().expect("valid");
         let triangles = surfaces::triangles(&tree);
         let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
-        let mut contacts = Contacts::<32, 2048>::new();
+        let mut contacts = Contacts::<128, 2048>::new();
         for _ in 0..poses {
             let [a, b, c] = triangles[rng.usize(..triangles.len())].map(|v| rows[v as usize]);
             let normal = (b - a).cross(c - a).normalize_or_zero();

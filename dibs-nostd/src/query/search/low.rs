@@ -12,6 +12,7 @@
 use glam::Vec3;
 
 use super::Search;
+use super::heights::Heights;
 use crate::tool::Tool;
 use crate::tree::format::MAX_LEAF_TRIANGLES;
 use crate::unavailable::QueryError;
@@ -23,10 +24,18 @@ const MOST: usize = MAX_LEAF_TRIANGLES as usize;
 const MAX_RING: u32 = 256;
 
 /// A vertex, and the square of its distance. Vertices that are equally far are in the order of their rows.
-#[derive(Clone, Copy, PartialEq, PartialOrd)]
+#[derive(Clone, Copy)]
 struct Corner {
     square: f32,
     vertex: u32,
+}
+
+impl Corner {
+    /// Whether this one is lower than another.
+    #[inline(always)]
+    fn is_below(self, other: Self) -> bool {
+        self.square < other.square || self.square == other.square && self.vertex < other.vertex
+    }
 }
 
 /// A triangle, seen from the axis.
@@ -50,22 +59,17 @@ enum Dip {
     Anywhere,
 }
 
-/// Vertices that have a lower one next to them.
-struct Higher {
-    vertices: [u32; 3 * MOST],
-    count: usize,
+/// A leaf's triangles, and the vertices seen, from leaf to leaf.
+pub(super) struct Low {
+    leaf: [Seen; MOST],
+    heights: Heights,
 }
 
-impl Higher {
-    fn insert(&mut self, vertex: u32) {
-        if let Some(place) = self.vertices.get_mut(self.count) {
-            *place = vertex;
-            self.count += 1;
-        }
-    }
-
-    fn contains(&self, vertex: u32) -> bool {
-        self.vertices.iter().take(self.count).any(|&other| other == vertex)
+impl Low {
+    pub const fn new() -> Self {
+        let corner = Corner { square: f32::INFINITY, vertex: 0 };
+        let none = Seen { corner, index: 0, low: f32::INFINITY, dip: Dip::Nowhere };
+        Self { leaf: [none; MOST], heights: Heights::new() }
     }
 }
 
@@ -77,30 +81,23 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         first: u32,
         count: u32,
         ridge: f32,
+        low: &mut Low,
         visit: &mut impl FnMut(u32, f32) -> f32,
     ) -> Result<bool, QueryError> {
         let corrupt = QueryError::Corrupt { row: first };
-        let none = Seen {
-            corner: Corner { square: f32::INFINITY, vertex: 0 },
-            index: 0,
-            low: f32::INFINITY,
-            dip: Dip::Nowhere,
-        };
-        let mut leaf = [none; MOST];
-        let mut higher = Higher { vertices: [0; 3 * MOST], count: 0 };
+        let Low { leaf, heights } = low;
         let tree = self.tree;
         let triangles = tree.triangles(first, count).ok_or(corrupt)?;
-        for ((seen, rows), triangle) in leaf.iter_mut().zip(triangles).zip(first..) {
-            *seen = self.see(triangle, rows, ridge, &mut higher)?;
+        for (seen, rows) in leaf.iter_mut().zip(triangles) {
+            *seen = self.see(rows, ridge, heights)?;
         }
         for (seen, triangle) in leaf.iter().take(count as usize).zip(first..) {
             if seen.low > self.cutoff_squared {
                 continue;
             }
             let is_low = match seen.dip {
-                Dip::Nowhere if higher.contains(seen.corner.vertex) => Some(false),
-                Dip::Nowhere => self.is_low(triangle, seen, &mut higher)?,
-                Dip::Edge(edge) => self.dips(triangle, edge, seen.low)?,
+                Dip::Nowhere => self.is_low(triangle, seen, heights)?,
+                Dip::Edge(edge) => self.dips(triangle, edge, seen.low, heights)?,
                 Dip::Anywhere => Some(true),
             };
             match is_low {
@@ -121,39 +118,26 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
 
     /// Compares a triangle's corners.
     #[inline(always)]
-    fn see(
-        &self,
-        triangle: u32,
-        rows: [u32; 3],
-        ridge: f32,
-        higher: &mut Higher,
-    ) -> Result<Seen, QueryError> {
+    fn see(&self, rows: [u32; 3], ridge: f32, heights: &mut Heights) -> Result<Seen, QueryError> {
         let [a, b, c] = rows;
-        let positions = [self.position(a)?, self.position(b)?, self.position(c)?];
-        let towards = positions.map(|position| self.tool.axis_to(position));
-        let squares = towards.map(|to| to.dot(to));
-        let [p, q, r] = squares;
-        // Written so that NaN is refused.
-        let is_finite = p + q + r <= f32::MAX;
-        if !is_finite {
-            return Err(QueryError::Position { vertex: self.not_finite(triangle) });
-        }
+        let (p, at_a) = self.height(heights, a)?;
+        let (q, at_b) = self.height(heights, b)?;
+        let (r, at_c) = self.height(heights, c)?;
         let (a, b, c) = (
             Corner { square: p, vertex: a },
             Corner { square: q, vertex: b },
             Corner { square: r, vertex: c },
         );
-        let [at_a, at_b, at_c] = positions;
-        let [to_a, to_b, to_c] = towards;
-        let (index, corner, next, last, gradient, origin, along, across) = if a < b && a < c {
-            (0, a, b, c, to_a, at_a, at_b, at_c)
-        } else if b < c {
-            (1, b, c, a, to_b, at_b, at_c, at_a)
+        let (index, corner, next, last, origin, along, across) = if a.is_below(b) && a.is_below(c) {
+            (0, a, b, c, at_a, at_b, at_c)
+        } else if b.is_below(c) {
+            (1, b, c, a, at_b, at_c, at_a)
         } else {
-            (2, c, a, b, to_c, at_c, at_a, at_b)
+            (2, c, a, b, at_c, at_a, at_b)
         };
-        higher.insert(next.vertex);
-        higher.insert(last.vertex);
+        heights.settle(next.vertex);
+        heights.settle(last.vertex);
+        let gradient: Vec3 = self.tool.axis_to(origin);
         let (along, across) = (gradient.dot(along - origin), gradient.dot(across - origin));
         let least = if along < across { along } else { across };
         // The rounding of a rise is less than the tilt's slack, and so is that of the square.
@@ -174,17 +158,20 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(Seen { corner, index, low, dip })
     }
 
-    /// Whether no vertex next to a triangle's lowest corner is lower, and no triangle around it comes before. `None`
-    /// without budget.
+    /// Whether no vertex next to a triangle's lowest corner is lower, and no triangle around it is known to have been
+    /// visited. `None` without budget.
     fn is_low(
         &mut self,
         triangle: u32,
         seen: &Seen,
-        higher: &mut Higher,
+        heights: &mut Heights,
     ) -> Result<Option<bool>, QueryError> {
+        let lowest = seen.corner.vertex;
+        if heights.is_settled(lowest) {
+            return Ok(Some(false));
+        }
         let tree = self.tree;
         let (mut row, mut corner, mut is_back) = (triangle, seen.index, false);
-        let mut is_first = true;
         for _ in 0..MAX_RING {
             let edge = if is_back { before(corner) } else { corner };
             let Some((next, other)) = tree.across(row, edge) else {
@@ -200,38 +187,44 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             }
             let Some(left) = self.left.node_tests.checked_sub(1) else { return Ok(None) };
             self.left.node_tests = left;
-            is_first &= triangle < next;
             (row, corner) = (next, if is_back { other } else { after(other) });
             let new = if is_back { before(corner) } else { after(corner) };
-            if self.corner(row, new)? < seen.corner {
-                higher.insert(seen.corner.vertex);
+            if self.corner(row, new, heights)?.is_below(seen.corner) {
+                heights.settle(lowest);
                 return Ok(Some(false));
             }
         }
-        Ok(Some(is_first))
+        heights.settle(lowest);
+        Ok(Some(true))
     }
 
     /// Whether the vertex beyond an edge is not lower than the triangle. `None` without budget.
-    fn dips(&mut self, triangle: u32, edge: u32, low: f32) -> Result<Option<bool>, QueryError> {
+    fn dips(
+        &mut self,
+        triangle: u32,
+        edge: u32,
+        low: f32,
+        heights: &mut Heights,
+    ) -> Result<Option<bool>, QueryError> {
         let Some((row, other)) = self.tree.across(triangle, edge) else { return Ok(Some(true)) };
         let Some(left) = self.left.node_tests.checked_sub(1) else { return Ok(None) };
         self.left.node_tests = left;
-        let beyond = self.corner(row, before(other))?;
+        let beyond = self.corner(row, before(other), heights)?;
         Ok(Some(!(beyond.square < low)))
     }
 
     /// A triangle's corner.
-    fn corner(&self, triangle: u32, index: u32) -> Result<Corner, QueryError> {
+    fn corner(
+        &self,
+        triangle: u32,
+        index: u32,
+        heights: &mut Heights,
+    ) -> Result<Corner, QueryError> {
         let corrupt = QueryError::Corrupt { row: triangle };
         let rows = self.tree.triangle(triangle).ok_or(corrupt)?;
         let &vertex = rows.get(index as usize).ok_or(corrupt)?;
-        let towards: Vec3 = self.tool.axis_to(self.position(vertex)?);
-        let square = towards.dot(towards);
-        if square <= f32::MAX {
-            Ok(Corner { square, vertex })
-        } else {
-            Err(QueryError::Position { vertex })
-        }
+        let (square, _) = self.height(heights, vertex)?;
+        Ok(Corner { square, vertex })
     }
 }
 

@@ -1,5 +1,6 @@
 //! All low triangles within a distance, instead of the closest.
 
+use super::low::Low;
 use super::{Search, Waiting};
 use crate::Budget;
 use crate::math::sqrt::sqrt;
@@ -19,6 +20,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         mut visit: impl FnMut(u32, f32) -> f32,
     ) -> Result<(f32, Budget), QueryError> {
         self.set_limit(limit);
+        let mut low = Low::new();
         while let Some(top) = self.waiting.checked_sub(1) {
             self.waiting = top;
             let &Waiting { lower, link } =
@@ -35,7 +37,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             };
             self.left.node_tests = left;
             let is_done = if is_leaf {
-                self.visit_low(first, count, ridge, &mut visit)?
+                self.visit_low(first, count, ridge, &mut low, &mut visit)?
             } else {
                 self.wait_for_children(lower, first, count)?;
                 true
