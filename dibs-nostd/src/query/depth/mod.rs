@@ -29,7 +29,7 @@ use crate::unavailable::QueryError;
 use crate::{Index, Tree, TriangleRow, VertexTable};
 pub(super) use known::Known;
 use known::Point;
-use part::{Fit, Part, Parts, Sample, larger};
+use part::{Bound, Fit, Part, Parts, Sample, larger};
 use touches::Touches;
 
 /// A limit that no search reaches before its end.
@@ -63,7 +63,7 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
     /// With the rest of the query's budget.
     options: Options,
     /// The pair in which the axis meets the surface.
-    meeting: Proximity,
+    meeting: &'s Proximity,
     /// The places where the axis meets the surface.
     touches: Touches,
     /// The deepest point so far.
@@ -83,7 +83,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         vertices: &'s V,
         tool: &'s T,
         options: &Options,
-        meeting: &Proximity,
+        meeting: &'s Proximity,
     ) -> Self {
         let mut options = *options;
         options.stretch = options.stretch.or_else(|| vertices.stretch());
@@ -91,7 +91,6 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         let most = tree.header().nodes.max(LEAST_WORK);
         *node_tests = node_tests.saturating_sub(meeting.node_tests).min(most);
         *triangle_tests = triangle_tests.saturating_sub(meeting.triangle_tests);
-        let (meeting, answer) = (*meeting, *meeting);
         let (deepest, deepest_at) = (0.0, f32::NAN);
         Self {
             tree,
@@ -101,7 +100,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             options,
             meeting,
             touches: Touches::ANYWHERE,
-            answer,
+            answer: *meeting,
             deepest,
             deepest_at,
             looks: 0,
@@ -111,7 +110,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     /// The answer with side, signed separation, and the deepest point's pair. `known` is the last tick's search, and
     /// then this one.
     pub fn run(
-        mut self,
+        &mut self,
         touched: &Touched,
         mut known: Option<&mut Known>,
     ) -> Result<Proximity, QueryError> {
@@ -126,9 +125,16 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             return self.finish(reach);
         }
         self.find_touches(touched)?;
-        let (mut parts, deepest) = match known.as_deref_mut().and_then(Known::now) {
-            Some((points, deepest)) => (self.resume(points)?, Some(deepest)),
-            None => (self.begin(reach, tolerance)?, None),
+        let mut parts = Parts::new();
+        let deepest = match known.as_deref_mut().and_then(Known::now) {
+            Some((points, deepest)) => {
+                self.resume(&mut parts, points);
+                Some(deepest)
+            }
+            None => {
+                self.begin(&mut parts, reach, tolerance)?;
+                None
+            }
         };
         let bound = self.divide(&mut parts, tolerance, deepest)?;
         if let Some(known) = known {
@@ -139,7 +145,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
 
     /// The most that any point of the axis can be deep, by its distance from the point that meets the surface.
     fn reach(&self) -> f32 {
-        let (length, meeting) = (self.tool.axis_length(), &self.meeting);
+        let (length, meeting) = (self.tool.axis_length(), self.meeting);
         let along = meeting.axis_parameter * length;
         larger(along, length - along) + meeting.axis_distance + meeting.accuracy
     }
@@ -168,14 +174,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     }
 
     /// The parts between the axis' ends and the places where it meets the surface.
-    fn begin(&mut self, reach: f32, tolerance: f32) -> Result<Parts, QueryError> {
+    fn begin(&mut self, parts: &mut Parts, reach: f32, tolerance: f32) -> Result<(), QueryError> {
         let meeting = self.meeting;
         let depth = meeting.axis_distance + meeting.accuracy;
-        let Proximity { axis_parameter, triangle, corners, .. } = meeting;
+        let &Proximity { axis_parameter, triangle, corners, .. } = meeting;
         let crossing = self.sample(axis_parameter, depth, triangle, corners)?;
         let start = self.end(0.0, &crossing, tolerance)?;
         let end = self.end(1.0, &crossing, tolerance)?;
-        let mut parts = Parts::new();
         parts.push(Part::remembered(start, 1, reach));
         for place in self.touches.places() {
             let row = place.triangle.0;
@@ -188,7 +193,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         }
         parts.push(Part::remembered(end, 0, 0.0));
         parts.end();
-        Ok(parts)
+        Ok(())
     }
 
     /// The sample of an end of the axis; not searched if it is outside for certain.
@@ -204,8 +209,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     }
 
     /// The parts of the last tick.
-    fn resume(&mut self, points: &[Point]) -> Result<Parts, QueryError> {
-        let mut parts = Parts::new();
+    fn resume(&mut self, parts: &mut Parts, points: &[Point]) {
         for point in points {
             let Point { parameter, depth, bound, triangle } = *point;
             let triangle = Some(triangle);
@@ -216,7 +220,6 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             parts.push(Part::remembered(from, parts.count() + 1, bound));
         }
         parts.end();
-        Ok(parts)
     }
 
     /// Divides the part with the highest bound until none is above the deepest point by more than the tolerance.
@@ -275,18 +278,18 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
                 middle = self.look(middle, until)?;
             }
             let enough = self.deepest + tolerance;
-            let before = self.part(from, &middle, place, enough);
-            let after = self.part(middle, &to, next, enough);
-            parts.set(row, before.below(bound));
-            parts.push(after.below(bound));
+            let before = self.bound(&from, &middle, enough);
+            let after = self.bound(&middle, &to, enough);
+            parts.set(row, Part::new(from, place, &before, bound));
+            parts.push(Part::new(middle, next, &after, bound));
         }
     }
 
-    /// The part between two samples.
-    fn part(&mut self, from: Sample, to: &Sample, next: usize, enough: f32) -> Part {
-        let part = Part::new(from, to, next, enough, &self.touches);
-        self.spend(part.distances * DISTANCE_COST);
-        part
+    /// The bound between two samples.
+    fn bound(&mut self, from: &Sample, to: &Sample, enough: f32) -> Bound {
+        let bound = Bound::between(from, to, enough, &self.touches);
+        self.spend(bound.distances * DISTANCE_COST);
+        bound
     }
 
     /// Bounds a remembered part anew.
@@ -409,11 +412,11 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     }
 
     /// The answer, where no point of the axis is deeper than `bound`.
-    fn finish(self, bound: f32) -> Result<Proximity, QueryError> {
-        let Self { mut answer, meeting, .. } = self;
+    fn finish(&self, bound: f32) -> Result<Proximity, QueryError> {
+        let Self { mut answer, meeting, .. } = *self;
         if self.deepest <= 0.0 {
             let on_axis = self.tool.axis_point(meeting.axis_parameter);
-            let at = side::of_point(self.tree, self.vertices, &meeting, on_axis)?;
+            let at = side::of_point(self.tree, self.vertices, meeting, on_axis)?;
             answer.direction = at.outward;
             answer.point_on_tool = on_axis - at.outward * self.tool.radius();
         }

@@ -82,7 +82,18 @@ pub(super) struct Part {
     pub bound: f32,
     /// Length along the axis at which it is divided next; `None` if the bound is an earlier tick's.
     pub split: Option<f32>,
-    /// Distances to triangles that the bound took.
+}
+
+/// A bound on the depth between two samples.
+#[derive(Clone, Copy)]
+pub(super) struct Bound {
+    /// The first sample is no deeper.
+    pub depth: f32,
+    /// No point between them is deeper.
+    pub bound: f32,
+    /// Length along the axis at which to divide.
+    pub split: f32,
+    /// Distances to triangles that it took.
     pub distances: u32,
 }
 
@@ -91,27 +102,29 @@ impl Part {
 
     /// A remembered part.
     pub const fn remembered(from: Sample, next: usize, bound: f32) -> Self {
-        Self { from, next, bound, split: None, distances: 0 }
+        Self { from, next, bound, split: None }
     }
 
-    /// The part, which is within one that is no deeper than `bound`.
-    pub fn below(self, bound: f32) -> Self {
-        Self { bound: smaller(self.bound, bound), ..self }
+    /// The part with a bound of its own, within one that is no deeper than `most`.
+    pub fn new(mut from: Sample, next: usize, own: &Bound, most: f32) -> Self {
+        from.depth = own.depth;
+        Self { from, next, bound: smaller(own.bound, most), split: Some(own.split) }
     }
+}
 
-    /// The part up to `to`. A bound that is no higher than `enough` is not lowered further.
-    pub fn new(mut from: Sample, to: &Sample, next: usize, enough: f32, touches: &Touches) -> Self {
+impl Bound {
+    /// The bound between two samples. One that is no higher than `enough` is not lowered further.
+    pub fn between(from: &Sample, to: &Sample, enough: f32, touches: &Touches) -> Self {
         let length = to.along - from.along;
         // A depth changes by at most the length moved.
-        from.depth = smaller(from.depth, to.depth + length);
-        let to_depth = smaller(to.depth, from.depth + length);
-        let part =
-            |bound, split, distances| Self { from, next, bound, split: Some(split), distances };
+        let depth = smaller(from.depth, to.depth + length);
+        let to_depth = smaller(to.depth, depth + length);
+        let part = |bound, split, distances| Self { depth, bound, split, distances };
         let span = to.on_axis - from.on_axis;
         let point = |along: f32| from.on_axis + span * ((along - from.along) / length);
         // Points nearer to an outside sample than its distance are outside too.
         let (mut first, mut last) =
-            (from.along + above_zero(-from.depth), to.along - above_zero(-to_depth));
+            (from.along + above_zero(-depth), to.along - above_zero(-to_depth));
         let (mut beside, mut distances) = (0.0, 0);
         let (ahead, behind) = (touches.ahead(from.along), touches.behind(to.along));
         if ahead.from < to.along
@@ -129,7 +142,7 @@ impl Part {
             let middle = (from.along + to.along) * 0.5;
             return part(beside, middle, distances);
         }
-        let slope = (from.depth + to_depth + length) * 0.5;
+        let slope = (depth + to_depth + length) * 0.5;
         let middle = (first + last) * 0.5;
         if slope <= enough {
             return part(larger(beside, slope), middle, distances);
@@ -286,10 +299,17 @@ impl Parts {
 
     /// Bounds a remembered part anew. Returns the distances to triangles that it took.
     pub fn renew(&mut self, row: usize, enough: f32, touches: &Touches) -> u32 {
-        let Part { from, next, bound, .. } = self.part(row);
-        let new = Part::new(from, &self.sample(next), next, enough, touches);
-        self.set(row, new.below(bound));
-        new.distances
+        let Some((from, next)) = self.rows.get(row).map(|part| (&part.from, part.next)) else {
+            return 0;
+        };
+        let Some(to) = self.rows.get(next).map(|part| &part.from) else { return 0 };
+        let own = Bound::between(from, to, enough, touches);
+        if let Some(part) = self.rows.get_mut(row) {
+            part.from.depth = own.depth;
+            part.bound = smaller(own.bound, part.bound);
+            part.split = Some(own.split);
+        }
+        own.distances
     }
 
     /// The parts from the axis' start to its end.

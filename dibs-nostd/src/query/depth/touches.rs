@@ -117,25 +117,34 @@ impl Touches {
 
     /// Adds a place, joined with those that it overlaps.
     fn insert(&mut self, mut place: Place) {
-        let mut all = Self::NONE;
-        let mut is_added = false;
-        for other in self.places.iter().take(self.count) {
-            if other.last < place.first {
-                all.push(*other);
-            } else if other.first > place.last {
-                if !is_added {
-                    all.push(place);
-                    is_added = true;
-                }
-                all.push(*other);
-            } else {
-                place = place.joined(other);
+        let known = self.places.get(..self.count).unwrap_or_default();
+        let from = known.iter().take_while(|other| other.last < place.first).count();
+        let mut to = from;
+        while let Some(other) = known.get(to)
+            && other.first <= place.last
+        {
+            place = place.joined(other);
+            to += 1;
+        }
+        if to == from {
+            for behind in self.places.iter_mut().take(self.count).skip(from) {
+                core::mem::swap(behind, &mut place);
+            }
+            self.push(place);
+            return;
+        }
+        if let Some(joined) = self.places.get_mut(from) {
+            *joined = place;
+        }
+        let removed = to - from - 1;
+        for at in to..self.count {
+            if let Some(&behind) = self.places.get(at)
+                && let Some(free) = self.places.get_mut(at - removed)
+            {
+                *free = behind;
             }
         }
-        if !is_added {
-            all.push(place);
-        }
-        *self = all;
+        self.count -= removed;
     }
 
     /// Adds a place behind the others; if there is no room, to the last one.
@@ -221,5 +230,50 @@ impl Free {
     fn between(self, one: Option<bool>, other: Option<bool>) -> Self {
         let is_outside = one.or(other) == Some(true) && other.or(one) == Some(true);
         Self { is_outside, ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
+    use fastrand::Rng;
+
+    use super::*;
+
+    #[test]
+    fn places_that_overlap_are_one() {
+        let mut rng = Rng::with_seed(7);
+        let (mut joined, mut full) = (0, 0);
+        for _ in 0..2_000 {
+            let mut touches = Touches::NONE;
+            let mut expected = Vec::<(f32, f32)>::new();
+            for _ in 0..rng.usize(1..20) {
+                let first = rng.f32() * 100.0;
+                let last = first + rng.f32() * 8.0;
+                touches.insert(Place { first, last, ..Place::unknown(0.0) });
+                let (apart, over): (Vec<_>, Vec<_>) =
+                    expected.into_iter().partition(|&(a, b)| b < first || a > last);
+                joined += usize::from(over.len() > 1);
+                let one = over
+                    .iter()
+                    .fold((first, last), |one, other| (one.0.min(other.0), one.1.max(other.1)));
+                expected = apart;
+                expected.push(one);
+                expected.sort_by(|a, b| a.0.total_cmp(&b.0));
+                // The last two are one where there is no room.
+                if expected.len() > PLACES
+                    && let Some((_, last)) = expected.pop()
+                {
+                    full += 1;
+                    expected[PLACES - 1].1 = last;
+                }
+                let found: Vec<_> = touches.places().map(|at| (at.first, at.last)).collect();
+                assert_eq!(found, expected);
+            }
+        }
+        assert!(joined > 100 && full > 100, "{joined} {full}");
     }
 }

@@ -110,7 +110,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
 
     /// Tests the bounds that run out with a motion of `moved` units. Returns the closest triangle too, where one was
     /// tested.
-    pub fn run(mut self, moved: u32) -> Result<(Outcome, Option<u32>), QueryError> {
+    pub fn run(&mut self, moved: u32) -> Result<(Outcome, Option<u32>), QueryError> {
         let outcome = self.test_all_due(moved)?;
         Ok((outcome, self.search.best.map(|_| self.search.best_triangle)))
     }

@@ -214,7 +214,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         let search =
             Search::start(&self.tree, &mut self.stack, surface, tool, options, first, touched)?;
         let front = self.front.borrow();
-        let tick = Tick::new(search, front, self.unit, self.now, options.budget, separation);
+        let mut tick = Tick::new(search, front, self.unit, self.now, options.budget, separation);
         let (outcome, best) = tick.run(moved)?;
         let best = best.map(TriangleRow);
         self.triangle = best.or(self.triangle);
