@@ -205,6 +205,44 @@ fn a_resting_link_is_seen_to_pass_around_a_border() {
     assert!(behind < 400, "{behind}");
 }
 
+/// While one tool is deep inside, another sinks in and is passed over, since it is less deep. Once the first has left, the
+/// other is the deepest.
+#[test]
+fn a_resting_link_that_sinks_in_is_inside() {
+    let mesh = ball(3);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut odometer = Odometer::new(&tree);
+    let surface = odometer.start(rows.as_slice());
+    let [mut leaving, mut sinking] = [(); 2].map(|()| Tracked::new(&tree).expect("deep enough"));
+    let mut single = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let options = Options::new();
+    let centre = rows.iter().sum::<Vec3>() / rows.len() as f32;
+    let size = rows[0].distance(centre);
+    let mut passed_over = 0;
+    for tick in 0..1_200 {
+        let time = tick as f32 / 1_000.0;
+        let depths =
+            [if time < 1.0 { 0.7 } else { 0.7 - 4.0 * (time - 1.0) }, time.min(1.0) * 0.4 - 0.05];
+        let at = |along, depth| Sphere::new(centre + along * size * (1.0 - depth), 0.02 * size);
+        let tools =
+            [at(Vec3::X, depths[0]), at(Vec3::Y, depths[1])].map(|tool| tool.expect("finite"));
+        let mut pairs = [(&mut leaving, &surface, &tools[0]), (&mut sinking, &surface, &tools[1])];
+        let found = Tracker::closest_of(&mut pairs, &options).expect("an answer").expect("two");
+        let whole = tools.map(|tool| {
+            single.closest(rows.as_slice(), &tool, &options).expect("an answer").separation
+        });
+        let least = whole[0].min(whole[1]);
+        assert!(
+            (found.closest.separation - least).abs() < 1e-3 * size,
+            "{tick}: {found:?} {whole:?}"
+        );
+        passed_over += u32::from(whole[1] < 0.0 && found.searched == 1);
+    }
+    assert!(passed_over > 100, "{passed_over}");
+}
+
 #[test]
 fn no_pairs_have_no_closest() {
     let none = Tracked::closest_of::<Moved<'_, [Vec3]>, Capsule>(&mut [], &Options::new());
