@@ -20,15 +20,16 @@ use crate::query::tracker::front::{FrontMut, NOWHERE, Place, UNUSED, is_before};
 use crate::surface::motion::{FAR, Unit};
 use crate::tree::format::{Link, Node};
 use crate::unavailable::QueryError;
-use crate::{Index, Proximity, Tool, Tree, VertexTable};
+use crate::{Index, Proximity, Tool, Tree, TriangleRow, VertexTable};
 
 /// A motion of this many units, at most a 64th of the root sphere's radius, may be too much for the front.
 const LARGE_STEP: u32 = 1 << 18;
 
 /// The outcome of a tick.
 pub(in crate::query) enum Outcome {
-    /// An answer; whether every bound due was tested; whether the front started anew.
-    Answer { closest: Proximity, is_complete: bool, restarted: bool },
+    /// What was not searched is no closer to the axis than `lower`. Whether every bound due was tested; whether the front
+    /// started anew.
+    Ended { lower: f32, is_complete: bool, restarted: bool },
     /// The front has no free place; the tests made until then.
     Full { tests: Budget },
 }
@@ -108,15 +109,9 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         Self { search, front, unit, now, margin, limit, facing }
     }
 
-    /// Tests the bounds that run out with a motion of `moved` units. Returns the closest triangle too, where one was
-    /// tested.
-    pub fn run(&mut self, moved: u32) -> Result<(Outcome, Option<u32>), QueryError> {
-        let outcome = self.test_all_due(moved)?;
-        Ok((outcome, self.search.best.map(|_| self.search.best_triangle)))
-    }
-
+    /// Tests the bounds that run out with a motion of `moved` units.
     #[inline(always)]
-    fn test_all_due(&mut self, moved: u32) -> Result<Outcome, QueryError> {
+    pub fn run(&mut self, moved: u32) -> Result<Outcome, QueryError> {
         let corrupt = QueryError::Corrupt { row: 0 };
         self.search.waiting = 0;
         if self.search.best.is_none()
@@ -150,8 +145,8 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                     self.put_back_waiting().ok_or(corrupt)?;
                     self.search.leave_unfinished();
                     let least = self.unit.length(self.front.least(self.now));
-                    let closest = self.finish(if least > 0.0 { least } else { 0.0 })?;
-                    return Ok(Outcome::Answer { closest, is_complete: false, restarted });
+                    let lower = if least > 0.0 { least } else { 0.0 };
+                    return Ok(Outcome::Ended { lower, is_complete: false, restarted });
                 }
                 Visit::Full => {
                     // What is due beyond this node would stay due, and the front full.
@@ -167,8 +162,13 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         }
         self.close_some(1)?;
         let is_beyond = self.limit < f32::INFINITY && self.search.is_beyond(self.limit);
-        let closest = self.finish(if is_beyond { self.limit } else { f32::INFINITY })?;
-        Ok(Outcome::Answer { closest, is_complete: true, restarted })
+        let lower = if is_beyond { self.limit } else { f32::INFINITY };
+        Ok(Outcome::Ended { lower, is_complete: true, restarted })
+    }
+
+    /// The closest triangle, where one was tested.
+    pub fn triangle(&self) -> Option<TriangleRow> {
+        self.search.best.map(|_| TriangleRow(self.search.best_triangle))
     }
 
     /// A bound whose key is not beyond this is due.
@@ -182,7 +182,9 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         self.now.wrapping_add(self.unit.down(bound - self.margin))
     }
 
-    fn finish(&mut self, lower: f32) -> Result<Proximity, QueryError> {
+    /// The answer, where what was not searched is no closer to the axis than `lower`.
+    #[inline(always)]
+    pub fn finish(&mut self, lower: f32) -> Result<Proximity, QueryError> {
         if let Some(place) = *self.front.best {
             let key = self.key(sqrt(self.search.best_squared));
             *self.key_of(place).ok_or(QueryError::Corrupt { row: 0 })? = key;

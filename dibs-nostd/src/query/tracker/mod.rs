@@ -215,15 +215,15 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
             Search::start(&self.tree, &mut self.stack, surface, tool, options, first, touched)?;
         let front = self.front.borrow();
         let mut tick = Tick::new(search, front, self.unit, self.now, options.budget, separation);
-        let (outcome, best) = tick.run(moved)?;
-        let best = best.map(TriangleRow);
+        let outcome = tick.run(moved)?;
+        let best = tick.triangle();
         self.triangle = best.or(self.triangle);
         let (closest, is_complete) = match outcome {
-            Outcome::Answer { closest, is_complete, restarted } => {
+            Outcome::Ended { lower, is_complete, restarted } => {
                 if restarted {
                     fallback = Some(Fallback::Jump);
                 }
-                (closest, is_complete)
+                (tick.finish(lower)?, is_complete)
             }
             Outcome::Full { tests } => {
                 fallback = Some(Fallback::Full);
