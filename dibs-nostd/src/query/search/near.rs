@@ -74,7 +74,10 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 continue;
             }
             let distance = sqrt(squared);
-            if let Link::Leaf { first, count } = Link::decode(node.link) {
+            // The plane goes through the pin: it rejects no leaf whose pin is within the cutoff.
+            if squared > self.cutoff_squared
+                && let Link::Leaf { first, count } = Link::decode(node.link)
+            {
                 let plane = self.plane_across(normal, position, distance);
                 if plane.beyond(tree, self.vertices, first, count).ok_or(corrupt)? == count {
                     continue;
