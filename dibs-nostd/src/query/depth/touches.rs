@@ -127,7 +127,7 @@ impl Touches {
             to += 1;
         }
         if to == from {
-            for behind in self.places.iter_mut().take(self.count).skip(from) {
+            for behind in self.places.get_mut(from..self.count).unwrap_or_default() {
                 core::mem::swap(behind, &mut place);
             }
             self.push(place);
