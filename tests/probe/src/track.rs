@@ -51,7 +51,7 @@ pub const TREE_BYTES: usize = 5 << 19;
 pub const VERTICES: usize = 26_000;
 const STACK: usize = 128;
 /// Opened nodes that the tracker remembers.
-pub const OPENED: usize = 256;
+pub const OPENED: usize = 512;
 
 /// Memory for a tree and two frames.
 pub struct Memory {

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 use dibs_build::{Builder, IndexWidth, generate};
-use probe::track::tick;
+use probe::track::{OPENED, tick};
 use xtask::steps::Outcome;
 
 use crate::harness::figures::Figures;
@@ -46,8 +46,9 @@ pub const CHECK: Check = Check {
             criterion: TIMING,
             bound: Bound::Is(0.0),
             unit: "ticks but the first",
-            limits: "As above. 256 opened nodes are remembered.",
+            limits: "As above. The tracker has places for {m7.track.places} opened nodes.",
         },
+        note("m7.track.places"),
         golden("m7.track.held.mean"),
         golden("m7.track.held.largest"),
         Promise {
@@ -138,6 +139,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
             }
             figures.note("m7.track.whole", mean(&|tick| tick.whole).round());
             figures.note("m7.track.ticks", f64::from(TICKS));
+            figures.note("m7.track.places", OPENED as f64);
         }
         apart = ticks.iter().fold(apart, |apart, tick| apart.max(tick.apart));
         // A capsule of a chain that was far for long may have moved too far.
