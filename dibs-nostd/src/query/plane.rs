@@ -48,4 +48,34 @@ impl Plane {
         }
         Some(count)
     }
+
+    /// The least distance of a leaf's vertices beyond the plane, in units of the normal's length; not above zero if a
+    /// vertex is not beyond. `None` if the leaf's bytes are bad.
+    #[inline(never)]
+    pub fn excess<I: Index, V: VertexTable + ?Sized>(
+        &self,
+        tree: &Tree<'_, I>,
+        vertices: &V,
+        first: u32,
+        count: u32,
+    ) -> Option<f32> {
+        let along = |row| vertices.position(row).map(|position| self.normal.dot(position));
+        let mut triangles = tree.triangles(first, count)?;
+        let [a, b, c] = triangles.next()?;
+        let mut lowest = least([along(a)?, along(b)?, along(c)?]);
+        for [_, _, corner] in triangles {
+            if !(lowest > self.limit) {
+                break;
+            }
+            lowest = least([along(corner)?, lowest, lowest]);
+        }
+        Some(lowest - self.limit)
+    }
+}
+
+/// The least of three; not a number if one is not.
+#[inline(always)]
+pub(super) fn least([a, b, c]: [f32; 3]) -> f32 {
+    let lower = if a > b { b } else { a };
+    if lower > c { c } else { lower }
 }

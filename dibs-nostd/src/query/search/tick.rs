@@ -9,18 +9,21 @@
 //! this one: so both errors are covered, whatever their scales. Both slacks include 16 * 2^-24 of the coordinates,
 //! since each frame may round positions anew.
 
+mod facing;
+
 use glam::Vec3;
 
-use super::slack::ACCURACY;
+use facing::Facing;
+
 use super::{Search, Step, THIRD, Waiting};
 use crate::math::sqrt::sqrt;
 use crate::query::Budget;
-use crate::query::plane::Plane;
+use crate::query::plane::least;
 use crate::query::tracker::front::{FrontMut, NOWHERE, Place, UNUSED, is_before};
 use crate::surface::motion::{FAR, Unit};
 use crate::tree::format::{Link, Node};
 use crate::unavailable::QueryError;
-use crate::{Index, Proximity, Tool, Tree, TriangleRow, VertexTable};
+use crate::{Index, Proximity, Tool, TriangleRow, VertexTable};
 
 /// A motion of this many units, at most a 64th of the root sphere's radius, may be too much for the front.
 const LARGE_STEP: u32 = 1 << 18;
@@ -46,44 +49,6 @@ pub(in crate::query) struct Tick<'s, 't, 'f, I, V: ?Sized, T> {
     /// Distance from the axis beyond which nothing is searched.
     limit: f32,
     facing: Facing,
-}
-
-/// The plane across the closest pair. Most triangles around the pair are beyond it, and triangles that share the
-/// closest point are not nearer; neither need an exact test.
-struct Facing {
-    start: Vec3,
-    /// From the axis to the closest triangle, of length 1; zero where there is none, or they touch.
-    normal: Vec3,
-    /// The farthest that the axis reaches along the normal, from its start.
-    foremost: f32,
-    /// Triangles farther than this along the normal cannot be closer than the closest by more than the accuracy.
-    within: f32,
-}
-
-impl Facing {
-    /// The plane of the closest pair so far.
-    #[inline(always)]
-    fn new<I: Index, V: VertexTable + ?Sized, T: Tool>(search: &Search<'_, '_, I, V, T>) -> Self {
-        let start = search.tool.axis_start();
-        let none = Self { start, normal: Vec3::ZERO, foremost: 0.0, within: f32::INFINITY };
-        let Some(pair) = search.best else { return none };
-        let across = pair.on_surface - pair.on_axis;
-        let length = sqrt(across.dot(across));
-        if !(length > search.slack) {
-            return none;
-        }
-        let normal = across / length;
-        let end = normal.dot(search.tool.axis_span());
-        let foremost = if end > 0.0 { end } else { 0.0 };
-        let within = sqrt(pair.distance_squared) - ACCURACY * search.scale;
-        Self { start, normal, foremost, within }
-    }
-
-    /// No point of a triangle is closer to the axis than this.
-    #[inline(always)]
-    fn lowest(&self, corners: &[Vec3; 3]) -> f32 {
-        least(corners.map(|corner| self.normal.dot(corner - self.start))) - self.foremost
-    }
 }
 
 impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I, V, T> {
@@ -440,31 +405,6 @@ enum Visit {
     Full,
 }
 
-impl Plane {
-    /// The least distance of a leaf's vertices beyond the plane, in units of the normal's length; not above zero if a
-    /// vertex is not beyond. `None` if the leaf's bytes are bad.
-    #[inline(never)]
-    fn excess<I: Index, V: VertexTable + ?Sized>(
-        &self,
-        tree: &Tree<'_, I>,
-        vertices: &V,
-        first: u32,
-        count: u32,
-    ) -> Option<f32> {
-        let along = |row| vertices.position(row).map(|position| self.normal.dot(position));
-        let mut triangles = tree.triangles(first, count)?;
-        let [a, b, c] = triangles.next()?;
-        let mut lowest = least([along(a)?, along(b)?, along(c)?]);
-        for [_, _, corner] in triangles {
-            if !(lowest > self.limit) {
-                break;
-            }
-            lowest = least([along(corner)?, lowest, lowest]);
-        }
-        Some(lowest - self.limit)
-    }
-}
-
 /// Takes the first element out of a set.
 #[inline(always)]
 fn next(set: &mut u32) -> Option<u8> {
@@ -472,13 +412,6 @@ fn next(set: &mut u32) -> Option<u8> {
     let at = set.trailing_zeros() as u8;
     *set = rest;
     Some(at)
-}
-
-/// The least of three; not a number if one is not.
-#[inline(always)]
-fn least([a, b, c]: [f32; 3]) -> f32 {
-    let lower = if a > b { b } else { a };
-    if lower > c { c } else { lower }
 }
 
 const _: () = assert!(FAR > LARGE_STEP as i32);
