@@ -16,6 +16,7 @@
 
 mod known;
 mod part;
+mod start;
 mod touches;
 mod walk;
 
@@ -28,7 +29,6 @@ use crate::tool::{AxisPoint, Tool};
 use crate::unavailable::QueryError;
 use crate::{Index, Tree, TriangleRow, VertexTable};
 pub(super) use known::Known;
-use known::Point;
 use part::{Bound, Fit, Part, Parts, Sample, larger};
 use touches::Touches;
 
@@ -148,78 +148,6 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         let (length, meeting) = (self.tool.axis_length(), self.meeting);
         let along = meeting.axis_parameter * length;
         larger(along, length - along) + meeting.axis_distance + meeting.accuracy
-    }
-
-    /// Finds the places where the axis meets the triangles that a search found to touch it.
-    fn find_touches(&mut self, touched: &Touched) -> Result<(), QueryError> {
-        let Some(rows) = touched.rows() else { return Ok(()) };
-        // A tracker's accuracy is larger than a search's, for which the closest triangle may be no touched one.
-        let closest = self.meeting.triangle.filter(|_| rows.is_empty());
-        self.touches = Touches::NONE;
-        for row in rows.iter().copied().chain(closest.map(|TriangleRow(row)| row)) {
-            if self.is_spent() {
-                self.touches = Touches::ANYWHERE;
-                break;
-            }
-            let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
-            let corners = self.corners(corners)?;
-            if let Some(pair) = self.tool.closest_on_triangle(&corners, f32::INFINITY) {
-                let accuracy = self.meeting.accuracy;
-                let touches = &mut self.touches;
-                let distances = touches.add(self.tool, TriangleRow(row), &corners, &pair, accuracy);
-                self.spend((1 + distances) * DISTANCE_COST);
-            }
-        }
-        Ok(())
-    }
-
-    /// The parts between the axis' ends and the places where it meets the surface.
-    fn begin(&mut self, parts: &mut Parts, reach: f32, tolerance: f32) -> Result<(), QueryError> {
-        let meeting = self.meeting;
-        let depth = meeting.axis_distance + meeting.accuracy;
-        let &Proximity { axis_parameter, triangle, corners, .. } = meeting;
-        let crossing = self.sample(axis_parameter, depth, triangle, corners)?;
-        let start = self.end(0.0, &crossing, tolerance)?;
-        let end = self.end(1.0, &crossing, tolerance)?;
-        parts.push(Part::remembered(start, 1, reach));
-        for place in self.touches.places() {
-            let row = place.triangle.0;
-            let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
-            let touch = self.sample(place.parameter, depth, Some(place.triangle), corners)?;
-            parts.push(Part::remembered(touch, parts.count() + 1, reach));
-        }
-        if parts.count() < 2 {
-            parts.push(Part::remembered(crossing, 2, reach));
-        }
-        parts.push(Part::remembered(end, 0, 0.0));
-        parts.end();
-        Ok(())
-    }
-
-    /// The sample of an end of the axis; not searched if it is outside for certain.
-    fn end(&mut self, parameter: f32, near: &Sample, tolerance: f32) -> Result<Sample, QueryError> {
-        let along = parameter * self.tool.axis_length();
-        let (ahead, behind) = (self.touches.ahead(along), self.touches.behind(along));
-        let way = if parameter > 0.0 { behind } else { ahead };
-        if way.is_outside && way.from == along {
-            return Ok(self.at(parameter, 0.0, near));
-        }
-        let most = near.depth + (along - near.along).abs();
-        self.look(self.at(parameter, most, near), self.deepest + tolerance)
-    }
-
-    /// The parts of the last tick.
-    fn resume(&mut self, parts: &mut Parts, points: &[Point]) {
-        for point in points {
-            let Point { parameter, depth, bound, triangle } = *point;
-            let triangle = Some(triangle);
-            let from = self.at(parameter, depth, &Sample { triangle, ..Sample::NONE });
-            if depth < 0.0 {
-                self.touches.add_outside(from.along);
-            }
-            parts.push(Part::remembered(from, parts.count() + 1, bound));
-        }
-        parts.end();
     }
 
     /// Divides the part with the highest bound until none is above the deepest point by more than the tolerance.

@@ -1,0 +1,90 @@
+//! The parts of the axis that a search begins with: between the places where it meets the surface, or the last tick's.
+
+use super::known::Point;
+use super::part::{Part, Parts, Sample};
+use super::touches::Touches;
+use super::{DISTANCE_COST, Depth};
+use crate::query::Proximity;
+use crate::query::search::Touched;
+use crate::tool::Tool;
+use crate::unavailable::QueryError;
+use crate::{Index, TriangleRow, VertexTable};
+
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
+    /// Finds the places where the axis meets the triangles that a search found to touch it.
+    pub(super) fn find_touches(&mut self, touched: &Touched) -> Result<(), QueryError> {
+        let Some(rows) = touched.rows() else { return Ok(()) };
+        // A tracker's accuracy is larger than a search's, for which the closest triangle may be no touched one.
+        let closest = self.meeting.triangle.filter(|_| rows.is_empty());
+        self.touches = Touches::NONE;
+        for row in rows.iter().copied().chain(closest.map(|TriangleRow(row)| row)) {
+            if self.is_spent() {
+                self.touches = Touches::ANYWHERE;
+                break;
+            }
+            let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
+            let corners = self.corners(corners)?;
+            if let Some(pair) = self.tool.closest_on_triangle(&corners, f32::INFINITY) {
+                let accuracy = self.meeting.accuracy;
+                let touches = &mut self.touches;
+                let distances = touches.add(self.tool, TriangleRow(row), &corners, &pair, accuracy);
+                self.spend((1 + distances) * DISTANCE_COST);
+            }
+        }
+        Ok(())
+    }
+
+    /// The parts between the axis' ends and the places where it meets the surface.
+    pub(super) fn begin(
+        &mut self,
+        parts: &mut Parts,
+        reach: f32,
+        tolerance: f32,
+    ) -> Result<(), QueryError> {
+        let meeting = self.meeting;
+        let depth = meeting.axis_distance + meeting.accuracy;
+        let &Proximity { axis_parameter, triangle, corners, .. } = meeting;
+        let crossing = self.sample(axis_parameter, depth, triangle, corners)?;
+        let start = self.end(0.0, &crossing, tolerance)?;
+        let end = self.end(1.0, &crossing, tolerance)?;
+        parts.push(Part::remembered(start, 1, reach));
+        for place in self.touches.places() {
+            let row = place.triangle.0;
+            let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
+            let touch = self.sample(place.parameter, depth, Some(place.triangle), corners)?;
+            parts.push(Part::remembered(touch, parts.count() + 1, reach));
+        }
+        if parts.count() < 2 {
+            parts.push(Part::remembered(crossing, 2, reach));
+        }
+        parts.push(Part::remembered(end, 0, 0.0));
+        parts.end();
+        Ok(())
+    }
+
+    /// The sample of an end of the axis; not searched if it is outside for certain.
+    fn end(&mut self, parameter: f32, near: &Sample, tolerance: f32) -> Result<Sample, QueryError> {
+        let along = parameter * self.tool.axis_length();
+        let (ahead, behind) = (self.touches.ahead(along), self.touches.behind(along));
+        let way = if parameter > 0.0 { behind } else { ahead };
+        if way.is_outside && way.from == along {
+            return Ok(self.at(parameter, 0.0, near));
+        }
+        let most = near.depth + (along - near.along).abs();
+        self.look(self.at(parameter, most, near), self.deepest + tolerance)
+    }
+
+    /// The parts of the last tick.
+    pub(super) fn resume(&mut self, parts: &mut Parts, points: &[Point]) {
+        for point in points {
+            let Point { parameter, depth, bound, triangle } = *point;
+            let triangle = Some(triangle);
+            let from = self.at(parameter, depth, &Sample { triangle, ..Sample::NONE });
+            if depth < 0.0 {
+                self.touches.add_outside(from.along);
+            }
+            parts.push(Part::remembered(from, parts.count() + 1, bound));
+        }
+        parts.end();
+    }
+}
