@@ -28,7 +28,8 @@ pub const ANSWER_WORDS: usize = 6;
 /// Largest tree, in bytes.
 pub const TREE_BYTES: usize = 2 << 20;
 const STACK: usize = 128;
-const OPENED: usize = 256;
+/// Opened nodes that the tracker remembers.
+pub const OPENED: usize = 256;
 
 type Follower = Tracker<'static, u16, STACK, OPENED>;
 

@@ -9,7 +9,7 @@ use dibs_tests::method::Probe;
 use dibs_tests::motions::trembling;
 use dibs_tests::streams::{Beat, TICK_RATE};
 use glam::Vec3;
-use probe::weights::{ANSWER_WORDS, command};
+use probe::weights::{ANSWER_WORDS, OPENED, command};
 use xtask::steps::Outcome;
 
 use crate::harness::figures::Figures;
@@ -65,8 +65,9 @@ pub const CHECK: Check = Check {
             criterion: TIMING,
             bound: Bound::Is(0.0),
             unit: "ticks but the first",
-            limits: "As above. 256 opened nodes are remembered.",
+            limits: "As above. The tracker has places for {m7.track.modes.places} opened nodes.",
         },
+        note("m7.track.modes.places"),
     ],
 };
 
@@ -139,6 +140,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
         apart = ticks.iter().fold(apart, |apart, tick| apart.max(f32::from_bits(tick[5])));
     }
     figures.note("m7.track.modes.ticks", f64::from(TICKS));
+    figures.note("m7.track.modes.places", OPENED as f64);
     figures.note("m7.track.modes.apart", f64::from((apart * 1e4).round() / 1e4));
     figures.note("m7.track.modes.fallbacks", fallbacks as f64);
     Ok(Outcome::Passed)
