@@ -103,7 +103,7 @@ fn no_contact_is_missing_and_none_is_doubled() {
         ("rough", sheet(40, 60.0, |x, y| ((12.9898 * x + 78.233 * y).sin() * 43_758.547).fract())),
     ];
     let poses = if cfg!(debug_assertions) { 10 } else { 120 };
-    let (mut checked, mut several) = (0, 0);
+    let (mut checked, mut crossing, mut several) = (0, 0, 0);
     for (seed, (name, mesh)) in (1..).zip(shapes) {
         let mut rng = Rng::with_seed(seed);
         let (built, rows) = build(&mesh);
@@ -122,14 +122,18 @@ fn no_contact_is_missing_and_none_is_doubled() {
             let closest = query
                 .contacts(rows.as_slice(), &tool, MARGIN, &Options::cold(), &mut contacts)
                 .expect("an answer");
-            if closest.side != Side::Outside {
+            let is_crossing = closest.side == Side::Crossing;
+            if !is_crossing && closest.side != Side::Outside {
                 continue;
             }
             checked += 1;
+            crossing += usize::from(is_crossing);
             let (truth, label) = valleys(&rows, &triangles, [from, to]);
             assert!(contacts.bound() >= MARGIN && !contacts.is_full());
             let mut found = vec![0; truth.len()];
-            for contact in contacts.iter() {
+            // The first contact of an axis that crosses is its deepest point, and stands for where it crosses.
+            let accuracy = f64::from(contacts.accuracy());
+            for contact in contacts.iter().skip(usize::from(is_crossing)) {
                 let valley = label[contact.triangle.0 as usize];
                 found[valley] += 1;
                 let off = f64::from(contact.separation + radius) - truth[valley].distance;
@@ -144,7 +148,8 @@ fn no_contact_is_missing_and_none_is_doubled() {
             let slack = 0.01;
             for (count, valley) in found.iter().zip(&truth) {
                 let reach = f64::from(MARGIN + radius);
-                let is_clear = valley.distance < reach - slack && valley.up > 0.05;
+                let is_apart = !is_crossing || valley.distance > accuracy;
+                let is_clear = is_apart && valley.distance < reach - slack && valley.up > 0.05;
                 let is_parted = valley.ridge > RIDGE + slack;
                 assert!(!is_clear || !is_parted || *count == 1, "{name}: {count} of {valley:?}");
                 assert!(*count <= 1, "{name}: {count} of {valley:?}");
@@ -152,8 +157,8 @@ fn no_contact_is_missing_and_none_is_doubled() {
             several += usize::from(contacts.len() > 1);
         }
     }
-    println!("{checked} poses outside, {several} with several contacts");
-    assert!(checked > poses * 3 && several > checked / 20);
+    println!("{checked} poses, {crossing} cross, {several} with several contacts");
+    assert!(checked > poses * 3 && crossing > checked / 20 && several > checked / 20);
 }
 
 /// Most of several thousand triangles within the margin lead down to a contact, and are not kept.
@@ -193,6 +198,38 @@ fn a_flat_wall_along_a_capsule_is_one_contact() {
         assert_eq!(contacts.len(), 1, "{contacts:?}");
         let contact = contacts.iter().next().expect("one");
         assert!((contact.separation - 3.0).abs() < 1e-4 && contact.normal.z > 0.999);
+    }
+}
+
+/// At the tip of a cone the axis is on the inner side of the triangles behind, which are as close as those before it.
+#[test]
+fn the_tip_of_a_cone_is_a_contact_from_all_around() {
+    let around = |at: u32| {
+        let (sin, cos) = (std::f32::consts::TAU * at as f32 / 8.0).sin_cos();
+        Vec3::new(2.0 * cos, 2.0 * sin, 0.0)
+    };
+    let tip = Vec3::Z * 10.0;
+    let positions = [tip, Vec3::ZERO].into_iter().chain((0..8).map(around)).collect();
+    let sides = (0..8).map(|at| [0, 2 + at, 2 + (at + 1) % 8]);
+    let base = (0..8).map(|at| [1, 2 + (at + 1) % 8, 2 + at]);
+    let cone = Mesh { positions, triangles: sides.chain(base).collect(), ..Mesh::default() };
+    let (built, rows) = build(&cone);
+    let tree = built.tree::<u16>().expect("valid");
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut contacts = Contacts::<8>::new();
+    for turn in 0..64 {
+        for tilt in 0..7 {
+            let (sin, cos) = (0.2 * tilt as f32).sin_cos();
+            let (y, x) = (0.1 * turn as f32).sin_cos();
+            let centre = tip + 2.0 * Vec3::new(sin * x, sin * y, cos);
+            let tool = Sphere::new(centre, 0.5).expect("valid");
+            let answer =
+                query.contacts(rows.as_slice(), &tool, 3.0, &Options::cold(), &mut contacts);
+            assert_eq!(answer.expect("an answer").side, Side::Outside);
+            assert_eq!(contacts.len(), 1, "{turn} {tilt}: {contacts:?}");
+            let contact = contacts.iter().next().expect("one");
+            assert!((contact.separation - 1.5).abs() < 1e-4, "{contact:?}");
+        }
     }
 }
 

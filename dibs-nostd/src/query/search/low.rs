@@ -23,6 +23,10 @@ const MOST: usize = MAX_LEAF_TRIANGLES as usize;
 /// Most triangles that are turned through around a vertex.
 const MAX_RING: u32 = 256;
 
+/// Square of the sine of a triangle's angle below which its normal is not trusted, and of an angle to its plane that is
+/// not: 2^-8.
+const SLIVER: f32 = 1.0 / 65_536.0;
+
 /// A vertex, and the square of its distance. Vertices that are equally far are in the order of their rows.
 #[derive(Clone, Copy)]
 struct Corner {
@@ -105,9 +109,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 Some(false) => continue,
                 Some(true) => (),
             }
+            let corners = self.corners(triangle)?;
+            if !matches!(seen.dip, Dip::Nowhere) && self.is_inside(&corners) {
+                continue;
+            }
             let Some(left) = self.left.triangle_tests.checked_sub(1) else { return Ok(false) };
             self.left.triangle_tests = left;
-            let corners = self.corners(triangle)?;
             if let Some(pair) = self.tool.closest_on_triangle(&corners, self.cutoff_squared) {
                 let limit = visit(triangle, pair.distance_squared);
                 self.set_limit(limit);
@@ -156,6 +163,28 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         };
         let low = if least >= self.tilt_slack { corner.square - self.tilt_slack } else { low };
         Ok(Seen { corner, index, low, dip })
+    }
+
+    /// Whether the axis is on the inner side of a triangle of a closed surface, wherever it is closest to the triangle. No
+    /// contact is there: if the closest point is on an edge, and the axis outside, it is above the edge's other triangle.
+    ///
+    /// Above a point that moves along a line, the closest point of the axis moves one way. So it is nowhere higher above
+    /// the triangle than above one of the corners.
+    #[inline(always)]
+    fn is_inside(&self, corners: &[Vec3; 3]) -> bool {
+        let &[a, b, c] = corners;
+        let (ab, ac) = (b - a, c - a);
+        let normal = ab.cross(ac);
+        let square = normal.length_squared();
+        let is_clear = square > SLIVER * ab.length_squared() * ac.length_squared();
+        let slack = self.slack + self.coordinate_slack;
+        let is_below = |&corner: &Vec3| {
+            let towards = self.tool.axis_to(corner);
+            let depth = normal.dot(towards);
+            let doubt = slack * slack + SLIVER * towards.length_squared();
+            depth > 0.0 && depth * depth > doubt * square
+        };
+        self.tree.is_closed() && is_clear && corners.iter().all(is_below)
     }
 
     /// Whether no vertex next to a triangle's lowest corner is lower, and no triangle around it is known to have been
