@@ -110,8 +110,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 Some(true) => (),
             }
             let corners = self.corners(triangle)?;
-            if !matches!(seen.dip, Dip::Nowhere) && self.is_inside(&corners) {
-                continue;
+            if !matches!(seen.dip, Dip::Nowhere) {
+                let Some(left) = self.left.node_tests.checked_sub(1) else { return Ok(false) };
+                self.left.node_tests = left;
+                if self.is_inside(&corners) {
+                    continue;
+                }
             }
             let Some(left) = self.left.triangle_tests.checked_sub(1) else { return Ok(false) };
             self.left.triangle_tests = left;
