@@ -20,6 +20,7 @@ mod triangle;
 pub(crate) use axis_point::AxisPoint;
 pub use capsule::Capsule;
 pub use sphere::Sphere;
+pub(crate) use triangle::SLIVER;
 
 use core::fmt;
 use glam::Vec3;

@@ -35,7 +35,7 @@ use super::{AxisPair, clamp};
 use glam::Vec3;
 
 /// Square of the sine below which two directions count as nearly parallel: 2^-16.
-pub(super) const SLIVER: f32 = 1.0 / 65_536.0;
+pub(crate) const SLIVER: f32 = 1.0 / 65_536.0;
 /// Square of the sine below which the axis counts as parallel to the plane: 2^-24.
 const PARALLEL: f32 = 1.0 / 16_777_216.0;
 /// Squared lengths below this divide nothing: 2^-100, the square of 1e-15.

@@ -173,6 +173,20 @@ fn no_tick_pays_for_a_long_rest() {
     }
 }
 
+/// The tracked answer for two pairs, and the separations of whole queries.
+fn closest_of_two(
+    pairs: &mut [(&mut Tracked<'_>, &Moved<'_, [Vec3]>, &Sphere); 2],
+    single: &mut Query<'_, u16, MAX_STACK>,
+) -> (dibs_nostd::Tracked, [f32; 2]) {
+    let options = Options::new();
+    let whole = [0, 1].map(|at| {
+        let (_, surface, tool) = &pairs[at];
+        single.closest(*surface, *tool, &options).expect("an answer").separation
+    });
+    let found = Tracker::closest_of(pairs, &options).expect("an answer").expect("two pairs");
+    (found, whole)
+}
+
 /// Around the border of an open sheet a tool comes to its other side without touching it, and is the deepest of all there.
 #[test]
 fn a_resting_link_is_seen_to_pass_around_a_border() {
@@ -184,7 +198,6 @@ fn a_resting_link_is_seen_to_pass_around_a_border() {
     let surface = odometer.start(rows.as_slice());
     let [mut still, mut moving] = [(); 2].map(|()| Tracked::new(&tree).expect("deep enough"));
     let mut single = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
-    let options = Options::new();
     let near = Sphere::new(Vec3::new(0.0, 0.0, 3.0), 1.0).expect("finite");
     let mut behind = 0;
     for tick in 0..4_000 {
@@ -192,10 +205,7 @@ fn a_resting_link_is_seen_to_pass_around_a_border() {
         let (sin, cos) = (std::f32::consts::PI * tick as f32 / 4_000.0).sin_cos();
         let far = Sphere::new(Vec3::new(1.0, 15.0 + 60.0 * sin, 20.0 * cos), 1.0).expect("finite");
         let mut pairs = [(&mut still, &surface, &near), (&mut moving, &surface, &far)];
-        let found = Tracker::closest_of(&mut pairs, &options).expect("an answer").expect("two");
-        let whole = [near, far].map(|tool| {
-            single.closest(rows.as_slice(), &tool, &options).expect("an answer").separation
-        });
+        let (found, whole) = closest_of_two(&mut pairs, &mut single);
         let least = whole[0].min(whole[1]);
         // A bound that rested holds until the motion since it was found has used it up.
         behind += u32::from(least < 0.0 && found.closest.separation > 0.0);
@@ -217,7 +227,6 @@ fn a_resting_link_that_sinks_in_is_inside() {
     let surface = odometer.start(rows.as_slice());
     let [mut leaving, mut sinking] = [(); 2].map(|()| Tracked::new(&tree).expect("deep enough"));
     let mut single = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
-    let options = Options::new();
     let centre = rows.iter().sum::<Vec3>() / rows.len() as f32;
     let size = rows[0].distance(centre);
     let mut passed_over = 0;
@@ -229,10 +238,7 @@ fn a_resting_link_that_sinks_in_is_inside() {
         let tools =
             [at(Vec3::X, depths[0]), at(Vec3::Y, depths[1])].map(|tool| tool.expect("finite"));
         let mut pairs = [(&mut leaving, &surface, &tools[0]), (&mut sinking, &surface, &tools[1])];
-        let found = Tracker::closest_of(&mut pairs, &options).expect("an answer").expect("two");
-        let whole = tools.map(|tool| {
-            single.closest(rows.as_slice(), &tool, &options).expect("an answer").separation
-        });
+        let (found, whole) = closest_of_two(&mut pairs, &mut single);
         let least = whole[0].min(whole[1]);
         assert!(
             (found.closest.separation - least).abs() < 1e-3 * size,

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::part::{larger, smaller};
 use crate::TriangleRow;
 use crate::math::sqrt::sqrt;
-use crate::tool::{AxisPair, AxisPoint, Tool};
+use crate::tool::{AxisPair, AxisPoint, SLIVER, Tool};
 
 /// Most places told apart.
 const PLACES: usize = 8;
@@ -16,9 +16,6 @@ const INCLINED: f32 = 1.0 / 256.0;
 
 /// Times that a length is halved.
 const HALVINGS: u32 = 8;
-
-/// Square of the sine of a triangle's angle below which its normal is not trusted: 2^-8, as in its distances.
-const SLIVER: f32 = 1.0 / 65_536.0;
 
 /// The places where an axis may meet the surface. No two overlap.
 #[derive(Clone, Copy, Debug)]

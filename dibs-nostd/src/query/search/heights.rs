@@ -1,7 +1,7 @@
 //! Heights: the squares of vertices' distances from the axis.
 //!
-//! Triangles share their corners with others of the leaf, and of the leaves around. So what is known of a vertex is kept
-//! in a place of a small table until another vertex takes the place.
+//! A vertex is a corner of several triangles, of one leaf and of the leaves around it. A small table keeps the vertices
+//! seen last, each until another takes its place.
 
 use glam::Vec3;
 

@@ -13,7 +13,7 @@ use glam::Vec3;
 
 use super::Search;
 use super::heights::Heights;
-use crate::tool::Tool;
+use crate::tool::{SLIVER, Tool};
 use crate::tree::format::MAX_LEAF_TRIANGLES;
 use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
@@ -22,10 +22,6 @@ use crate::{Index, VertexTable};
 const MOST: usize = MAX_LEAF_TRIANGLES as usize;
 /// Most triangles that are turned through around a vertex.
 const MAX_RING: u32 = 256;
-
-/// Square of the sine of a triangle's angle below which its normal is not trusted, and of an angle to its plane that is
-/// not: 2^-8.
-const SLIVER: f32 = 1.0 / 65_536.0;
 
 /// A vertex, and the square of its distance. Vertices that are equally far are in the order of their rows.
 #[derive(Clone, Copy)]
@@ -110,7 +106,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 Some(true) => (),
             }
             let corners = self.corners(triangle)?;
-            if !matches!(seen.dip, Dip::Nowhere) {
+            // A triangle that stands for its lowest corner is kept: others there may face the tool.
+            if tree.is_closed() && !matches!(seen.dip, Dip::Nowhere) {
                 let Some(left) = self.left.node_tests.checked_sub(1) else { return Ok(false) };
                 self.left.node_tests = left;
                 if self.is_inside(&corners) {
@@ -188,7 +185,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             let doubt = slack * slack + SLIVER * towards.length_squared();
             depth > 0.0 && depth * depth > doubt * square
         };
-        self.tree.is_closed() && is_clear && corners.iter().all(is_below)
+        is_clear && corners.iter().all(is_below)
     }
 
     /// Whether no vertex next to a triangle's lowest corner is lower, and no triangle around it is known to have been

@@ -30,8 +30,8 @@ const LARGE_STEP: u32 = 1 << 18;
 
 /// The outcome of a tick.
 pub(in crate::query) enum Outcome {
-    /// What was not searched is no closer to the axis than `lower`. Whether every bound due was tested; whether the front
-    /// started anew.
+    /// No part of the surface that was not searched is closer to the axis than `lower`. Whether every bound due was tested;
+    /// whether the front started anew.
     Ended { lower: f32, is_complete: bool, restarted: bool },
     /// The front has no free place; the tests made until then.
     Full { tests: Budget },
@@ -147,7 +147,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         self.now.wrapping_add(self.unit.down(bound - self.margin))
     }
 
-    /// The answer, where what was not searched is no closer to the axis than `lower`.
+    /// The answer. No part of the surface that was not searched is closer to the axis than `lower`.
     #[inline(always)]
     pub fn finish(&mut self, lower: f32) -> Result<Proximity, QueryError> {
         if let Some(place) = *self.front.best {

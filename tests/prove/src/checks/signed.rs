@@ -58,7 +58,7 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Poses whose figures are compared with the recorded ones, whatever the effort.
+/// Number of poses of the golden figures: the same at every effort, so that each run compares with the record.
 const SAMPLE: usize = 1_000;
 
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
