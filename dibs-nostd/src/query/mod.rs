@@ -164,7 +164,8 @@ fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
         return Ok(found);
     }
     if is_touching && tool.axis_length() > 0.0 {
-        let mut depth = Depth::new(tree, stack, vertices, tool, options, &found);
+        let (known, around) = known.map(Known::now).unzip();
+        let mut depth = Depth::new(tree, stack, vertices, tool, options, &found, around);
         let mut found = depth.run(touched, known)?;
         found.accuracy += error;
         return Ok(found);

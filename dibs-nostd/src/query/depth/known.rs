@@ -5,6 +5,7 @@
 
 use super::part::{Part, Parts, larger};
 use crate::TriangleRow;
+use crate::query::search::Around;
 use crate::surface::motion::Unit;
 
 /// Most points remembered, so that the next search has room for more.
@@ -23,28 +24,37 @@ pub(super) struct Point {
     pub triangle: TriangleRow,
 }
 
-/// The points of the last depth.
+/// The last depth.
 #[derive(Clone, Debug)]
 pub(in crate::query) struct Known {
+    points: Points,
+    around: Around,
+    unit: Unit,
+    /// Motion of tool and surface since then, in units.
+    moved: u32,
+}
+
+/// The points of the last depth.
+#[derive(Clone, Debug)]
+pub(in crate::query) struct Points {
     points: [Point; KEPT],
     count: usize,
     /// Depth of the deepest point; 0 if no point was inside.
     deepest: f32,
     /// Its parameter; not a number if no point was inside.
     at: f32,
-    unit: Unit,
-    /// Motion of tool and surface since then, in units.
-    moved: u32,
 }
 
 impl Known {
     pub const fn new(unit: Unit) -> Self {
         let none = Point { parameter: 0.0, depth: 0.0, bound: 0.0, triangle: TriangleRow(0) };
-        Self { points: [none; KEPT], count: 0, deepest: 0.0, at: f32::NAN, unit, moved: 0 }
+        let points = Points { points: [none; KEPT], count: 0, deepest: 0.0, at: f32::NAN };
+        Self { points, around: Around::new(), unit, moved: 0 }
     }
 
     pub fn forget(&mut self) {
-        self.count = 0;
+        self.points.count = 0;
+        self.around.forget();
     }
 
     /// Tool and surface have moved.
@@ -55,18 +65,30 @@ impl Known {
         }
     }
 
-    /// The points from the axis' start to its end, with their bounds as of now, and a depth and the parameter of
-    /// the point that has it.
-    pub(super) fn now(&mut self) -> Option<(&[Point], (f32, f32))> {
+    /// The points with their bounds as of now, and the leaves around the deepest one.
+    pub fn now(&mut self) -> (&mut Points, &mut Around) {
         if self.moved > 0 {
             let moved = self.unit.length(self.moved as i32) * (1.0 + 4.0 * f32::EPSILON);
-            for point in &mut self.points {
+            let Points { points, deepest, .. } = &mut self.points;
+            for point in points {
                 point.depth = raised(point.depth, moved);
                 point.bound = raised(point.bound, moved);
             }
-            self.deepest = (self.deepest - moved) * (1.0 - f32::EPSILON);
+            *deepest = (*deepest - moved) * (1.0 - f32::EPSILON);
+            self.around.add_motion(moved);
             self.moved = 0;
         }
+        (&mut self.points, &mut self.around)
+    }
+}
+
+impl Points {
+    pub(super) fn forget(&mut self) {
+        self.count = 0;
+    }
+
+    /// The points from the axis' start to its end, and a depth and the parameter of the point that has it.
+    pub(super) fn last(&self) -> Option<(&[Point], (f32, f32))> {
         let points = self.points.get(..self.count)?;
         (points.len() > 1).then_some((points, (larger(self.deepest, 0.0), self.at)))
     }
@@ -74,7 +96,7 @@ impl Known {
     /// Remembers the parts of a search, of which the point at the parameter `at` is deepest.
     pub(super) fn keep(&mut self, parts: &mut Parts, deepest: f32, at: f32) {
         while parts.count() > KEPT && parts.join(at, f32::INFINITY) {}
-        (self.count, self.moved, self.deepest, self.at) = (0, 0, deepest, at);
+        (self.count, self.deepest, self.at) = (0, deepest, at);
         for (place, part) in self.points.iter_mut().zip(parts.in_order()) {
             let Part { from, bound, .. } = part;
             let Some(triangle) = from.triangle else { return self.forget() };

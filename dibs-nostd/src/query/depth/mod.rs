@@ -22,13 +22,13 @@ mod walk;
 
 use glam::Vec3;
 
-use super::search::{Search, Touched, UNTIL, Waiting};
+use super::search::{Around, Search, Touched, UNTIL, Waiting};
 use super::side::{self, NoSide, Side};
 use super::{Budget, Options, Proximity};
 use crate::tool::{AxisPoint, Tool};
 use crate::unavailable::QueryError;
 use crate::{Index, Tree, TriangleRow, VertexTable};
-pub(super) use known::Known;
+pub(super) use known::{Known, Points};
 use part::{Bound, Fit, Part, Parts, Sample, larger};
 use touches::Touches;
 
@@ -73,6 +73,8 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
     deepest_at: f32,
     /// Points searched.
     looks: u32,
+    /// The leaves around the deepest point of the last tick.
+    around: Option<&'s mut Around>,
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> {
@@ -84,6 +86,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         tool: &'s T,
         options: &Options,
         meeting: &'s Proximity,
+        around: Option<&'s mut Around>,
     ) -> Self {
         let mut options = *options;
         options.stretch = options.stretch.or_else(|| vertices.stretch());
@@ -104,6 +107,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             deepest,
             deepest_at,
             looks: 0,
+            around,
         }
     }
 
@@ -112,7 +116,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     pub fn run(
         &mut self,
         touched: &Touched,
-        mut known: Option<&mut Known>,
+        known: Option<&mut Points>,
     ) -> Result<Proximity, QueryError> {
         let least = LEAST_TOLERANCE * self.meeting.accuracy;
         let default = larger(self.tool.axis_length() * TOLERANCE, least);
@@ -126,7 +130,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         }
         self.find_touches(touched)?;
         let mut parts = Parts::new();
-        let deepest = match known.as_deref_mut().and_then(Known::now) {
+        let deepest = match known.as_deref().and_then(Points::last) {
             Some((points, deepest)) => {
                 self.resume(&mut parts, points);
                 Some(deepest)
@@ -268,9 +272,17 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         let Some(node_tests) = node_tests.checked_sub(1) else { return Ok(sample) };
         let options = self.options.budget(Budget { node_tests, triangle_tests });
         let (point, first) = (AxisPoint(on_axis), sample.triangle);
-        let search =
+        let mut search =
             Search::start(self.tree, self.stack, self.vertices, &point, &options, first, None)?;
+        let mut around = self.around.as_deref_mut().filter(|_| enough == EXACT);
+        let wider = around.as_deref_mut().and_then(|around| {
+            around.move_to(parameter, self.tool.axis_length());
+            search.begin_around(around)
+        });
         let found = search.run::<UNTIL>(enough)?;
+        if let (Some(around), Some(wider)) = (around, wider) {
+            around.keep(&found, wider);
+        }
         self.options.budget = Budget {
             node_tests: node_tests.saturating_sub(found.node_tests.saturating_sub(1)),
             triangle_tests: triangle_tests.saturating_sub(found.triangle_tests),
