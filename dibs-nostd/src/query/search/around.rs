@@ -14,7 +14,7 @@ use crate::{Index, Proximity, Tool, VertexTable};
 const MOST: usize = 32;
 
 /// A search goes as much farther as tool and surface move in so many ticks, but not more than twice as far.
-const TICKS: f32 = 16.0;
+const TICKS: f32 = 8.0;
 
 /// The leaves around a point.
 #[derive(Clone, Debug)]
