@@ -53,8 +53,9 @@ impl Known {
     }
 
     pub fn forget(&mut self) {
-        self.points.count = 0;
+        self.points.forget();
         self.around.forget();
+        self.moved = 0;
     }
 
     /// Tool and surface have moved.
@@ -110,4 +111,24 @@ impl Points {
 fn raised(bound: f32, moved: f32) -> f32 {
     let sum = bound + moved;
     sum + sum.abs() * f32::EPSILON
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Tree;
+
+    #[test]
+    fn no_motion_brings_back_a_forgotten_depth() {
+        let mesh = dibs_build::generate::heart(320).unwrap().mesh;
+        let built = dibs_build::Builder::new().build(&mesh).unwrap();
+        let mut known = Known::new(Unit::of(&Tree::<u16>::from_bytes(built.blob()).unwrap()));
+        for _ in 0..5 {
+            known.add_motion(u32::MAX / 3);
+            known.forget();
+        }
+        known.add_motion(1 << 31);
+        let (points, around) = known.now();
+        assert!(points.last().is_none() && around.beyond <= 0.0);
+    }
 }

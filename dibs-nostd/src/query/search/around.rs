@@ -23,7 +23,7 @@ pub(in crate::query) struct Around {
     leaves: [u32; MOST],
     count: usize,
     /// All other leaves are at least as far as this from the point; 0 if that is not known.
-    beyond: f32,
+    pub beyond: f32,
     /// Where the point is on its axis: 0 at the start, 1 at the end.
     parameter: f32,
     /// The motion of the last tick.
