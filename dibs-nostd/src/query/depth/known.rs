@@ -55,15 +55,12 @@ impl Known {
     pub fn forget(&mut self) {
         self.points.forget();
         self.around.forget();
-        self.moved = 0;
     }
 
     /// Tool and surface have moved.
     pub fn add_motion(&mut self, units: u32) {
-        self.moved = self.moved.saturating_add(units);
-        if self.moved > i32::MAX as u32 {
-            self.forget();
-        }
+        // More than the surface is large: no bound survives it.
+        self.moved = self.moved.saturating_add(units).min(i32::MAX as u32);
     }
 
     /// The points with their bounds as of now, and the leaves around the deepest one.
