@@ -311,6 +311,37 @@ fn a_short_list_and_a_short_budget_state_what_still_holds() {
     assert!(cut_short > 20, "{cut_short}");
 }
 
+/// A contact at a vertex is found once its neighbours are seen, which a budget may prevent.
+#[test]
+fn no_budget_hides_a_contact_at_a_vertex() {
+    let spikes = sheet(12, 40.0, |x, y| 2.0 * (7.1 * x).sin() * (5.3 * y).cos());
+    let (built, rows) = build(&spikes);
+    let tree = built.tree::<u16>().expect("valid");
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut contacts = |y, node_tests| {
+        let (start, end) = (Vec3::new(-15.0, y, 4.0), Vec3::new(15.0, y + 2.0, 4.5));
+        let tool = Capsule::new(start, end, 1.0).expect("valid");
+        let options = Options::cold().budget(Budget { node_tests, triangle_tests: u32::MAX });
+        let mut found = Contacts::<64>::new();
+        query.contacts(rows.as_slice(), &tool, MARGIN, &options, &mut found).expect("an answer");
+        (found.iter().map(|at| at.separation).collect::<Vec<_>>(), found.bound())
+    };
+    let mut bounded = 0;
+    for y in (-36..36).map(|y| 0.5 * y as f32) {
+        let (all, _) = contacts(y, u32::MAX);
+        for budget in 0..800 {
+            let (found, bound) = contacts(y, budget);
+            let below = all.iter().filter(|&&at| at < bound);
+            assert!(
+                below.clone().all(|at| found.contains(at)),
+                "{y} {budget} {bound}: {found:?} {all:?}"
+            );
+            bounded += usize::from(bound < MARGIN && below.count() > 0);
+        }
+    }
+    assert!(bounded > 20, "{bounded}");
+}
+
 /// Inside the surface, the nearest triangle found within a short budget may be on the far side: its force would point
 /// inwards.
 #[test]

@@ -10,75 +10,187 @@ use crate::unavailable::QueryError;
 use crate::{Index, Tool, VertexTable};
 
 /// Places of the table. Neighbouring vertices have rows close together, and the last bits of a row are its place.
-const PLACES: usize = 32;
+const PLACES: usize = 64;
 
 /// No vertex has this row.
+const NOBODY: u32 = u32::MAX;
+/// No triangle stands for the vertex yet.
 const NONE: u32 = u32::MAX;
+/// No triangle need stand for the vertex: a lower one is next to it.
+const SETTLED: u32 = u32::MAX - 1;
 
 /// A vertex seen from the axis.
 #[derive(Clone, Copy)]
 pub(super) struct Vertex {
-    row: u32,
+    pub row: u32,
     /// The square of its distance.
     pub square: f32,
     pub position: Vec3,
-    /// Whether a lower vertex is known to be next to it, or a triangle around it was visited.
-    is_settled: bool,
+    /// The shortest vector from the axis.
+    pub towards: Vec3,
+    /// A triangle whose lowest corner it is, or [`NONE`], or [`SETTLED`].
+    standing: u32,
+}
+
+impl Vertex {
+    const UNSEEN: Self = Self {
+        row: NOBODY,
+        square: f32::INFINITY,
+        position: Vec3::ZERO,
+        towards: Vec3::ZERO,
+        standing: NONE,
+    };
+
+    /// The triangle that stands for the vertex, until a lower one is seen next to it.
+    #[inline(always)]
+    pub const fn standing(&self) -> Option<u32> {
+        if self.standing < SETTLED { Some(self.standing) } else { None }
+    }
+}
+
+/// The place of a vertex in the table.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) struct Place(usize);
+
+impl Place {
+    /// The place that a vertex has if no other corner of its triangle has it.
+    const fn of(row: u32) -> Self {
+        Self(row as usize % PLACES)
+    }
+
+    const fn next(self) -> Self {
+        Self((self.0 + 1) % PLACES)
+    }
+
+    /// The places of a triangle's corners, each another one.
+    #[inline(always)]
+    fn of_corners([a, b, c]: [u32; 3]) -> [Self; 3] {
+        let (first, mut second, mut third) = (Self::of(a), Self::of(b), Self::of(c));
+        if second == first {
+            second = second.next();
+        }
+        let is_taken = |place| place == first || place == second;
+        if is_taken(third) {
+            third = third.next();
+            if is_taken(third) {
+                third = third.next();
+            }
+        }
+        [first, second, third]
+    }
+
+    pub fn all() -> impl Iterator<Item = Self> {
+        (0..PLACES).map(Self)
+    }
 }
 
 /// The vertices seen last.
-pub(super) struct Heights([Vertex; PLACES]);
+pub(super) struct Heights {
+    places: [Vertex; PLACES],
+    /// Those that have lost their place while a triangle stood for them: at most one for each corner of a triangle.
+    lost: [Vertex; 3],
+    losses: usize,
+}
 
 impl Heights {
     pub const fn new() -> Self {
-        let none = Vertex { row: NONE, square: 0.0, position: Vec3::ZERO, is_settled: false };
-        Self([none; PLACES])
+        Self { places: [Vertex::UNSEEN; PLACES], lost: [Vertex::UNSEEN; 3], losses: 0 }
     }
 
     #[inline(always)]
-    fn place(&mut self, row: u32) -> &mut Vertex {
-        let Self(places) = self;
-        &mut places[row as usize % PLACES]
+    pub const fn at(&self, Place(at): Place) -> &Vertex {
+        &self.places[at % PLACES]
     }
 
-    /// Whether a vertex is known to have a lower one next to it, or a triangle around it was visited.
+    /// A lower vertex is next to the one here.
     #[inline(always)]
-    pub fn is_settled(&mut self, row: u32) -> bool {
-        let vertex = self.place(row);
-        vertex.row == row && vertex.is_settled
+    pub fn settle(&mut self, Place(at): Place) {
+        self.places[at % PLACES].standing = SETTLED;
     }
 
+    /// A triangle stands for the vertex here, its lowest corner, if none does.
     #[inline(always)]
-    pub fn settle(&mut self, row: u32) {
-        let vertex = self.place(row);
-        if vertex.row == row {
-            vertex.is_settled = true;
+    pub fn stand(&mut self, Place(at): Place, triangle: u32) {
+        let vertex = &mut self.places[at % PLACES];
+        if vertex.standing == NONE {
+            vertex.standing = triangle;
         }
+    }
+
+    /// The last vertex that has lost its place.
+    #[inline(always)]
+    pub fn lost(&self) -> Option<&Vertex> {
+        self.lost.get(self.losses.checked_sub(1)?)
+    }
+
+    /// The last vertex that has lost its place is done with.
+    pub fn found(&mut self) {
+        self.losses = self.losses.saturating_sub(1);
+    }
+
+    /// The least square of a vertex that a triangle stands for.
+    pub fn least_standing(&self) -> f32 {
+        let lost = self.lost.iter().take(self.losses);
+        let standing = self.places.iter().chain(lost).filter(|vertex| vertex.standing().is_some());
+        standing.fold(
+            f32::INFINITY,
+            |least, vertex| {
+                if vertex.square < least { vertex.square } else { least }
+            },
+        )
     }
 }
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// A vertex's height and position.
+    /// The places of a triangle's corners, seen now if they were not.
     #[inline(always)]
-    pub(super) fn height(
+    pub(super) fn places(
         &self,
         heights: &mut Heights,
-        row: u32,
-    ) -> Result<(f32, Vec3), QueryError> {
-        let vertex = heights.place(row);
-        if vertex.row != row {
-            let position = self.position(row)?;
-            let towards = self.tool.axis_to(position);
-            let square = towards.dot(towards);
-            // Written so that NaN is refused.
-            let is_finite = square <= f32::MAX;
-            if !is_finite {
-                return Err(QueryError::Position { vertex: row });
-            }
-            *vertex = Vertex { row, square, position, is_settled: false };
-        }
-        Ok((vertex.square, vertex.position))
+        [a, b, c]: [u32; 3],
+    ) -> Result<[Place; 3], QueryError> {
+        let [first, second, third] = Place::of_corners([a, b, c]);
+        self.look(heights, first, a)?;
+        self.look(heights, second, b)?;
+        self.look(heights, third, c)?;
+        Ok([first, second, third])
     }
+
+    /// Looks at a vertex, unless it is in its place.
+    #[inline(always)]
+    fn look(&self, heights: &mut Heights, Place(at): Place, row: u32) -> Result<(), QueryError> {
+        let vertex = &mut heights.places[at % PLACES];
+        if vertex.row == row {
+            return Ok(());
+        }
+        if vertex.standing().is_some()
+            && let Some(place) = heights.lost.get_mut(heights.losses)
+        {
+            *place = *vertex;
+            heights.losses += 1;
+        }
+        let position = self.position(row)?;
+        let towards = self.tool.axis_to(position);
+        let square = finite(row, towards.dot(towards))?;
+        *vertex = Vertex { row, square, position, towards, standing: NONE };
+        Ok(())
+    }
+
+    /// A vertex's height.
+    #[inline(always)]
+    pub(super) fn height(&self, heights: &Heights, row: u32) -> Result<f32, QueryError> {
+        let vertex = heights.at(Place::of(row));
+        if vertex.row == row {
+            return Ok(vertex.square);
+        }
+        finite(row, self.tool.axis_distance_squared(self.position(row)?))
+    }
+}
+
+/// The square of a vertex's distance. Written so that NaN is refused.
+#[inline(always)]
+fn finite(vertex: u32, square: f32) -> Result<f32, QueryError> {
+    if square <= f32::MAX { Ok(square) } else { Err(QueryError::Position { vertex }) }
 }
 
 #[cfg(test)]
@@ -86,13 +198,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_known_of_a_vertex_is_not_taken_for_another() {
-        let mut heights = Heights::new();
-        let (one, other) = (5, 5 + PLACES as u32);
-        heights.place(one).row = one;
-        heights.settle(other);
-        assert!(!heights.is_settled(one));
-        heights.settle(one);
-        assert!(heights.is_settled(one) && !heights.is_settled(other));
+    fn no_two_corners_of_a_triangle_have_one_place() {
+        let near = || (0..6).chain(PLACES as u32 - 3..PLACES as u32 + 3);
+        for (a, b) in near().flat_map(|a| near().map(move |b| (a, b))) {
+            for c in near() {
+                let [first, second, third] = Place::of_corners([a, b, c]);
+                assert!(first != second && second != third && third != first, "{a} {b} {c}");
+            }
+        }
     }
 }

@@ -12,38 +12,18 @@
 use glam::Vec3;
 
 use super::Search;
-use super::heights::Heights;
+use super::heights::{Heights, Place, Vertex};
 use crate::tool::{SLIVER, Tool};
-use crate::tree::format::MAX_LEAF_TRIANGLES;
 use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
 
-/// Most triangles of a leaf.
-const MOST: usize = MAX_LEAF_TRIANGLES as usize;
 /// Most triangles that are turned through around a vertex.
 const MAX_RING: u32 = 256;
 
-/// A vertex, and the square of its distance. Vertices that are equally far are in the order of their rows.
-#[derive(Clone, Copy)]
-struct Corner {
-    square: f32,
-    vertex: u32,
-}
-
-impl Corner {
-    /// Whether this one is lower than another.
-    #[inline(always)]
-    fn is_below(self, other: Self) -> bool {
-        self.square < other.square || self.square == other.square && self.vertex < other.vertex
-    }
-}
-
 /// A triangle, seen from the axis.
-#[derive(Clone, Copy)]
 struct Seen {
-    /// Its lowest corner, and that corner's index.
-    corner: Corner,
-    index: u32,
+    /// The place of its lowest corner.
+    lowest: Place,
     /// Lower bound on the square of its distance.
     low: f32,
     /// Where it may be lower than its lowest corner.
@@ -51,7 +31,7 @@ struct Seen {
 }
 
 /// Where a triangle may be lower than its lowest corner, by more than counts.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 enum Dip {
     Nowhere,
     /// Along one edge, towards another corner.
@@ -59,67 +39,79 @@ enum Dip {
     Anywhere,
 }
 
-/// A leaf's triangles, and the vertices seen, from leaf to leaf.
-pub(super) struct Low {
-    leaf: [Seen; MOST],
-    heights: Heights,
-}
-
-impl Low {
-    pub const fn new() -> Self {
-        let corner = Corner { square: f32::INFINITY, vertex: 0 };
-        let none = Seen { corner, index: 0, low: f32::INFINITY, dip: Dip::Nowhere };
-        Self { leaf: [none; MOST], heights: Heights::new() }
-    }
-}
-
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// Visits a leaf's triangles within the cutoff that may be the lowest of their surroundings, but for ridges of
     /// `ridge`. A visit returns the next limit. Returns whether the budget was enough.
+    ///
+    /// Triangles that stand for their lowest corners are visited later, once these lose their places in the table.
+    #[inline(never)]
     pub(super) fn visit_low(
         &mut self,
         first: u32,
         count: u32,
         ridge: f32,
-        low: &mut Low,
+        heights: &mut Heights,
         visit: &mut impl FnMut(u32, f32) -> f32,
     ) -> Result<bool, QueryError> {
         let corrupt = QueryError::Corrupt { row: first };
-        let Low { leaf, heights } = low;
         let tree = self.tree;
-        let triangles = tree.triangles(first, count).ok_or(corrupt)?;
-        for (seen, rows) in leaf.iter_mut().zip(triangles) {
-            *seen = self.see(rows, ridge, heights)?;
-        }
-        for (seen, triangle) in leaf.iter().take(count as usize).zip(first..) {
-            if seen.low > self.cutoff_squared {
-                continue;
-            }
-            let is_low = match seen.dip {
-                Dip::Nowhere => self.is_low(triangle, seen, heights)?,
-                Dip::Edge(edge) => self.dips(triangle, edge, seen.low, heights)?,
-                Dip::Anywhere => Some(true),
-            };
-            match is_low {
-                None => return Ok(false),
-                Some(false) => continue,
-                Some(true) => (),
-            }
-            let corners = self.corners(triangle)?;
-            // A triangle that stands for its lowest corner is kept: others there may face the tool.
-            if tree.is_closed() && !matches!(seen.dip, Dip::Nowhere) {
-                let Some(left) = self.left.node_tests.checked_sub(1) else { return Ok(false) };
-                self.left.node_tests = left;
-                if self.is_inside(&corners) {
-                    continue;
+        for (triangle, rows) in (first..).zip(tree.triangles(first, count).ok_or(corrupt)?) {
+            let seen = self.see(rows, ridge, heights)?;
+            let is_low = if seen.low > self.cutoff_squared {
+                Some(false)
+            } else {
+                match seen.dip {
+                    Dip::Nowhere => {
+                        heights.stand(seen.lowest, triangle);
+                        Some(false)
+                    }
+                    Dip::Edge(edge) => self.dips(triangle, edge, seen.low, heights)?,
+                    Dip::Anywhere => self.is_outside(triangle)?,
                 }
+            };
+            let Some(is_low) = is_low else { return Ok(false) };
+            if is_low && !self.visit_triangle(triangle, visit)? {
+                return Ok(false);
             }
-            let Some(left) = self.left.triangle_tests.checked_sub(1) else { return Ok(false) };
-            self.left.triangle_tests = left;
-            if let Some(pair) = self.tool.closest_on_triangle(&corners, self.cutoff_squared) {
-                let limit = visit(triangle, pair.distance_squared);
-                self.set_limit(limit);
+            while let Some(&vertex) = heights.lost() {
+                if !self.visit_standing(&vertex, heights, visit)? {
+                    return Ok(false);
+                }
+                heights.found();
             }
+        }
+        Ok(true)
+    }
+
+    /// Visits the triangle that stands for a vertex, unless a lower one is next to that. Others around it may face the
+    /// tool, so it is visited on either side. Returns whether the budget was enough.
+    pub(super) fn visit_standing(
+        &mut self,
+        vertex: &Vertex,
+        heights: &Heights,
+        visit: &mut impl FnMut(u32, f32) -> f32,
+    ) -> Result<bool, QueryError> {
+        let Some(triangle) = vertex.standing() else { return Ok(true) };
+        match self.is_lowest(triangle, vertex, heights)? {
+            None => Ok(false),
+            Some(false) => Ok(true),
+            Some(true) => self.visit_triangle(triangle, visit),
+        }
+    }
+
+    /// Tests a triangle exactly. Returns whether the budget was enough.
+    #[inline(always)]
+    fn visit_triangle(
+        &mut self,
+        triangle: u32,
+        visit: &mut impl FnMut(u32, f32) -> f32,
+    ) -> Result<bool, QueryError> {
+        let Some(left) = self.left.triangle_tests.checked_sub(1) else { return Ok(false) };
+        self.left.triangle_tests = left;
+        let corners = self.corners(triangle)?;
+        if let Some(pair) = self.tool.closest_on_triangle(&corners, self.cutoff_squared) {
+            let limit = visit(triangle, pair.distance_squared);
+            self.set_limit(limit);
         }
         Ok(true)
     }
@@ -127,33 +119,31 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// Compares a triangle's corners.
     #[inline(always)]
     fn see(&self, rows: [u32; 3], ridge: f32, heights: &mut Heights) -> Result<Seen, QueryError> {
-        let [a, b, c] = rows;
-        let (p, at_a) = self.height(heights, a)?;
-        let (q, at_b) = self.height(heights, b)?;
-        let (r, at_c) = self.height(heights, c)?;
-        let (a, b, c) = (
-            Corner { square: p, vertex: a },
-            Corner { square: q, vertex: b },
-            Corner { square: r, vertex: c },
-        );
-        let (index, corner, next, last, origin, along, across) = if a.is_below(b) && a.is_below(c) {
-            (0, a, b, c, at_a, at_b, at_c)
-        } else if b.is_below(c) {
-            (1, b, c, a, at_b, at_c, at_a)
-        } else {
-            (2, c, a, b, at_c, at_a, at_b)
+        let [a, b, c] = self.places(heights, rows)?;
+        let is_below = |one: Place, other: Place| {
+            let (one, other) = (heights.at(one), heights.at(other));
+            one.square < other.square || one.square == other.square && one.row < other.row
         };
-        heights.settle(next.vertex);
-        heights.settle(last.vertex);
-        let gradient: Vec3 = self.tool.axis_to(origin);
-        let (along, across) = (gradient.dot(along - origin), gradient.dot(across - origin));
+        let (index, lowest, next, last) = if is_below(a, b) && is_below(a, c) {
+            (0, a, b, c)
+        } else if is_below(b, c) {
+            (1, b, c, a)
+        } else {
+            (2, c, a, b)
+        };
+        heights.settle(next);
+        heights.settle(last);
+        let &Vertex { square, position, towards, .. } = heights.at(lowest);
+        let rise = |to: Place| towards.dot(heights.at(to).position - position);
+        let (along, across) = (rise(next), rise(last));
         let least = if along < across { along } else { across };
+        if least >= self.tilt_slack {
+            return Ok(Seen { lowest, low: square - self.tilt_slack, dip: Dip::Nowhere });
+        }
         // The rounding of a rise is less than the tilt's slack, and so is that of the square.
         let fall = if least < 0.0 { -2.0 * least } else { 0.0 } + 3.0 * self.tilt_slack;
-        let low = corner.square - fall;
         let quarter = 0.25 * ridge * ridge;
-        let is_shallow = (fall + quarter) * (fall + quarter) <= ridge * ridge * corner.square;
-        let dip = if least >= self.tilt_slack || is_shallow {
+        let dip = if (fall + quarter) * (fall + quarter) <= ridge * ridge * square {
             Dip::Nowhere
         } else if across >= self.tilt_slack {
             Dip::Edge(index)
@@ -162,8 +152,18 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         } else {
             Dip::Anywhere
         };
-        let low = if least >= self.tilt_slack { corner.square - self.tilt_slack } else { low };
-        Ok(Seen { corner, index, low, dip })
+        Ok(Seen { lowest, low: square - fall, dip })
+    }
+
+    /// Whether a triangle of a closed surface is seen from outside, as far as known. `None` without budget.
+    #[inline(always)]
+    fn is_outside(&mut self, triangle: u32) -> Result<Option<bool>, QueryError> {
+        if !self.tree.is_closed() {
+            return Ok(Some(true));
+        }
+        let Some(left) = self.left.node_tests.checked_sub(1) else { return Ok(None) };
+        self.left.node_tests = left;
+        Ok(Some(!self.is_inside(&self.corners(triangle)?)))
     }
 
     /// Whether the axis is on the inner side of a triangle of a closed surface, wherever it is closest to the triangle. No
@@ -188,20 +188,23 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         is_clear && corners.iter().all(is_below)
     }
 
-    /// Whether no vertex next to a triangle's lowest corner is lower, and no triangle around it is known to have been
-    /// visited. `None` without budget.
-    fn is_low(
+    /// Whether no vertex next to a triangle's lowest corner is lower. `None` without budget.
+    fn is_lowest(
         &mut self,
         triangle: u32,
-        seen: &Seen,
-        heights: &mut Heights,
+        vertex: &Vertex,
+        heights: &Heights,
     ) -> Result<Option<bool>, QueryError> {
-        let lowest = seen.corner.vertex;
-        if heights.is_settled(lowest) {
-            return Ok(Some(false));
-        }
         let tree = self.tree;
-        let (mut row, mut corner, mut is_back) = (triangle, seen.index, false);
+        let rows = tree.triangle(triangle).ok_or(QueryError::Corrupt { row: triangle })?;
+        let start = if rows[0] == vertex.row {
+            0
+        } else if rows[1] == vertex.row {
+            1
+        } else {
+            2
+        };
+        let (mut row, mut corner, mut is_back) = (triangle, start, false);
         for _ in 0..MAX_RING {
             let edge = if is_back { before(corner) } else { corner };
             let Some((next, other)) = tree.across(row, edge) else {
@@ -209,7 +212,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 if is_back {
                     break;
                 }
-                (row, corner, is_back) = (triangle, seen.index, true);
+                (row, corner, is_back) = (triangle, start, true);
                 continue;
             };
             if next == triangle {
@@ -219,12 +222,11 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             self.left.node_tests = left;
             (row, corner) = (next, if is_back { other } else { after(other) });
             let new = if is_back { before(corner) } else { after(corner) };
-            if self.corner(row, new, heights)?.is_below(seen.corner) {
-                heights.settle(lowest);
+            let (new, square) = self.corner(row, new, heights)?;
+            if square < vertex.square || square == vertex.square && new < vertex.row {
                 return Ok(Some(false));
             }
         }
-        heights.settle(lowest);
         Ok(Some(true))
     }
 
@@ -234,27 +236,30 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         triangle: u32,
         edge: u32,
         low: f32,
-        heights: &mut Heights,
+        heights: &Heights,
     ) -> Result<Option<bool>, QueryError> {
-        let Some((row, other)) = self.tree.across(triangle, edge) else { return Ok(Some(true)) };
-        let Some(left) = self.left.node_tests.checked_sub(1) else { return Ok(None) };
-        self.left.node_tests = left;
-        let beyond = self.corner(row, before(other), heights)?;
-        Ok(Some(!(beyond.square < low)))
+        if let Some((row, other)) = self.tree.across(triangle, edge) {
+            let Some(left) = self.left.node_tests.checked_sub(1) else { return Ok(None) };
+            self.left.node_tests = left;
+            let (_, beyond) = self.corner(row, before(other), heights)?;
+            if beyond < low {
+                return Ok(Some(false));
+            }
+        }
+        self.is_outside(triangle)
     }
 
-    /// A triangle's corner.
+    /// The row and the height of a triangle's corner.
     fn corner(
         &self,
         triangle: u32,
         index: u32,
-        heights: &mut Heights,
-    ) -> Result<Corner, QueryError> {
+        heights: &Heights,
+    ) -> Result<(u32, f32), QueryError> {
         let corrupt = QueryError::Corrupt { row: triangle };
         let rows = self.tree.triangle(triangle).ok_or(corrupt)?;
         let &vertex = rows.get(index as usize).ok_or(corrupt)?;
-        let (square, _) = self.height(heights, vertex)?;
-        Ok(Corner { square, vertex })
+        Ok((vertex, self.height(heights, vertex)?))
     }
 }
 

@@ -1,6 +1,6 @@
 //! All low triangles within a distance, instead of the closest.
 
-use super::low::Low;
+use super::heights::{Heights, Place};
 use super::{Search, Waiting};
 use crate::Budget;
 use crate::math::sqrt::sqrt;
@@ -20,7 +20,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         mut visit: impl FnMut(u32, f32) -> f32,
     ) -> Result<(f32, Budget), QueryError> {
         self.set_limit(limit);
-        let mut low = Low::new();
+        let mut heights = Heights::new();
         while let Some(top) = self.waiting.checked_sub(1) {
             self.waiting = top;
             let &Waiting { lower, link } =
@@ -32,18 +32,27 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 Link::Children { first, count } => (first, count, false),
                 Link::Leaf { first, count } => (first, count, true),
             };
-            let Some(left) = self.left.node_tests.checked_sub(count) else {
-                return Ok((self.least_waiting(lower), self.made()));
-            };
-            self.left.node_tests = left;
-            let is_done = if is_leaf {
-                self.visit_low(first, count, ridge, &mut low, &mut visit)?
-            } else {
-                self.wait_for_children(lower, first, count)?;
-                true
-            };
+            let mut is_done = false;
+            if let Some(left) = self.left.node_tests.checked_sub(count) {
+                self.left.node_tests = left;
+                is_done = if is_leaf {
+                    self.visit_low(first, count, ridge, &mut heights, &mut visit)?
+                } else {
+                    self.wait_for_children(lower, first, count)?;
+                    true
+                };
+            }
             if !is_done {
-                return Ok((self.least_waiting(lower), self.made()));
+                let (waiting, standing) =
+                    (self.least_waiting(lower), least_standing(&heights, ridge));
+                let least = if standing < waiting { standing } else { waiting };
+                return Ok((least, self.made()));
+            }
+        }
+        for place in Place::all() {
+            let vertex = *heights.at(place);
+            if !self.visit_standing(&vertex, &heights, &mut visit)? {
+                return Ok((least_standing(&heights, ridge), self.made()));
             }
         }
         Ok((f32::INFINITY, self.made()))
@@ -89,4 +98,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         }
         Ok(())
     }
+}
+
+/// Lower bound on the distances of the triangles that stand for a vertex: they dip below it by half a ridge at most.
+fn least_standing(heights: &Heights, ridge: f32) -> f32 {
+    sqrt(heights.least_standing()) - 0.5 * ridge
 }
