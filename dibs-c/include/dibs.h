@@ -34,7 +34,7 @@
 /**
  * Bytes of a list's storage.
  */
-#define DIBS_CONTACTS_SIZE 10240
+#define DIBS_CONTACTS_SIZE 16384
 
 /**
  * Contacts that a list holds: of more, the deepest.

@@ -1,11 +1,14 @@
 //! The traversal: the closest pair between a tool and the surface as it is now.
 
+mod axis;
 mod chain;
 mod contacts;
 mod cost;
 mod cost_m7;
 mod cost_x86_64;
 mod depth;
+#[cfg(test)]
+mod distances;
 mod normal;
 mod options;
 mod plane;

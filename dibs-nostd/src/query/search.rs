@@ -5,6 +5,7 @@ mod finish;
 mod heights;
 mod low;
 mod near;
+mod range;
 mod roots;
 mod slack;
 mod tick;
@@ -14,6 +15,7 @@ mod wide;
 use glam::Vec3;
 
 pub(super) use around::Around;
+pub(super) use range::RangeFront;
 pub(super) use tick::{Outcome, Tick};
 pub(super) use touched::Touched;
 pub(super) use wide::WideSearch;

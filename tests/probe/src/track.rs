@@ -73,16 +73,27 @@ impl Default for Memory {
     }
 }
 
-/// The trackers of a chain, in a static: they are larger than the board's stack.
-pub struct Trackers([Option<Follower>; LINKS]);
+/// The trackers of a chain, and the contacts of a tracker and a whole query, in a static: they are larger than the
+/// board's stack.
+pub struct Trackers {
+    links: [Option<Follower>; LINKS],
+    lists: [Contacts<8>; 2],
+}
 
 type Follower = Tracker<'static, u16, STACK, OPENED>;
+
+/// The sizes that the documentation states.
+#[cfg(target_pointer_width = "32")]
+const _: () = {
+    assert!(size_of::<Contacts<8>>() == 88 * 8 + 28 * 512 + 136);
+    assert!(size_of::<Follower>() <= 8 * STACK + 44 * OPENED + 884);
+};
 
 impl Trackers {
     /// None yet.
     #[must_use]
     pub const fn new() -> Self {
-        Self([const { None }; LINKS])
+        Self { links: [const { None }; LINKS], lists: [Contacts::new(), Contacts::new()] }
     }
 }
 
@@ -99,7 +110,7 @@ impl Default for Trackers {
 /// [`Fault`] where the script makes no sense, or a query fails.
 pub fn run<const KINDS: u32>(
     memory: &'static mut Memory,
-    Trackers(trackers): &mut Trackers,
+    Trackers { links, lists }: &mut Trackers,
     machine: &mut impl Machine,
 ) -> Result<(), Fault> {
     let length = word(machine)? as usize;
@@ -109,11 +120,11 @@ pub fn run<const KINDS: u32>(
     let count = tree.vertex_count() as usize;
     let [before, after] = frames.each_mut().map(|rows| rows.get_mut(..count));
     let (mut before, mut after) = (before.ok_or(Fault)?, after.ok_or(Fault)?);
-    for tracker in &mut *trackers {
+    for tracker in &mut *links {
         place(&tree, tracker)?;
     }
     let query = Query::new(&tree).map_err(|_| Fault)?;
-    let mut session = Session { query, trackers, last: None };
+    let mut session = Session { query, trackers: links, lists, last: None };
     let mut odometer = Odometer::new(&tree);
     let mut stretch: Option<MeasuredStretch> = None;
     let mut next = word(machine)?;
@@ -142,6 +153,7 @@ fn place(tree: &Tree<'static, u16>, tracker: &mut Option<Follower>) -> Result<()
 struct Session<'s, 't> {
     query: Query<'t, u16, STACK>,
     trackers: &'s mut [Option<Follower>; LINKS],
+    lists: &'s mut [Contacts<8>; 2],
     last: Option<TriangleRow>,
 }
 
@@ -203,7 +215,7 @@ impl Session<'_, '_> {
             tick::SIDE => options.depth_tolerance(f32::INFINITY),
             _ => options.unsigned(),
         };
-        let mut contacts = Contacts::<8>::new();
+        let [list, whole_list] = &mut *self.lists;
         let (took, found) = if kind & tick::CHAIN != 0 {
             let chain = [
                 first,
@@ -232,7 +244,7 @@ impl Session<'_, '_> {
             let tracked = if kind & tick::CONTACTS == 0 {
                 tracker.closest(surface, &first, &options)
             } else {
-                tracker.contacts(surface, &first, MARGIN, &options, &mut contacts)
+                tracker.contacts(surface, &first, MARGIN, &options, list)
             };
             let took = machine.clock().wrapping_sub(before);
             let tracked = tracked.map_err(|_| Fault)?;
@@ -244,7 +256,7 @@ impl Session<'_, '_> {
         let whole = if kind & tick::CONTACTS == 0 {
             self.query.closest(surface, &first, &options)
         } else {
-            self.query.contacts(surface, &first, MARGIN, &options, &mut contacts)
+            self.query.contacts(surface, &first, MARGIN, &options, whole_list)
         };
         let whole_took = machine.clock().wrapping_sub(before);
         let whole = whole.map_err(|_| Fault)?;

@@ -17,6 +17,8 @@ mod side;
 mod slack;
 mod swept;
 mod tracked_chain;
+mod tracked_contacts;
 mod tracked_depth;
 mod tracker;
+mod wanderer;
 mod wide;

@@ -1,52 +1,14 @@
-//! Several trackers and a tracker's contacts against whole queries: the same answers, most pairs not looked at.
+//! Several trackers against whole queries: the same answers, most pairs not looked at.
 
 use dibs_build::{Builder, generate};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{
-    Budget, Capsule, Contacts, Moved, NoSide, Odometer, Options, Query, QueryError, Side, Sphere,
-    Tracker,
-};
-use dibs_tests::deform::unit;
+use dibs_nostd::{Budget, Capsule, Moved, NoSide, Odometer, Options, Query, Side, Sphere, Tracker};
 use dibs_tests::surfaces::{ball, sheet};
-use fastrand::Rng;
 use glam::Vec3;
 
+use crate::wanderer::Wanderer;
+
 type Tracked<'t> = Tracker<'t, u16, MAX_STACK, 256>;
-
-/// A chain of eight capsules that bends, and wanders through two hearts beside each other.
-struct Wanderer {
-    joints: [Vec3; 9],
-    rng: Rng,
-    time: f32,
-}
-
-impl Wanderer {
-    fn new(seed: u64) -> Self {
-        let joints = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|at| Vec3::new(14.0 * at as f32, 80.0, 30.0));
-        Self { joints, rng: Rng::with_seed(seed), time: 0.0 }
-    }
-
-    /// Steps as a rule, rests or leaps now and then. Returns the capsules.
-    fn step(&mut self) -> [Capsule; 8] {
-        let rng = &mut self.rng;
-        let far = match rng.u32(..200) {
-            0 => 60.0,
-            1..20 => 0.0,
-            _ => 0.4,
-        };
-        self.time += 0.002;
-        let wave = |rate: f32, size: f32| size * (rate * self.time).sin();
-        let goal = Vec3::new(85.0 + wave(1.0, 120.0), wave(1.7, 60.0), 30.0 + wave(2.3, 60.0));
-        let centre = self.joints.iter().sum::<Vec3>() / 9.0;
-        let all = far * ((goal - centre).normalize_or_zero() + 0.3 * unit(rng));
-        for joint in &mut self.joints {
-            *joint += all + 0.1 * far.min(1.0) * unit(rng);
-        }
-        let joints = self.joints;
-        [0, 1, 2, 3, 4, 5, 6, 7]
-            .map(|at| Capsule::new(joints[at], joints[at + 1], 2.0).expect("finite"))
-    }
-}
 
 #[test]
 fn the_closest_of_tracked_pairs_is_that_of_whole_queries() {
@@ -280,52 +242,4 @@ fn a_pair_whose_side_was_not_asked_for_is_not_passed_over() {
     assert_eq!((found.pair, found.closest.side), (1, Side::Inside), "{found:?}");
     // Inside, it is asked at every tick.
     assert_eq!(ask(&Options::new()).pair, 1);
-}
-
-#[test]
-fn contacts_of_a_tracker_are_those_of_a_query() {
-    let generate::MovingMesh { mesh, motion } = generate::heart(2_000).expect("a valid size");
-    let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
-    let tree = built.tree::<u16>().expect("16-bit indices");
-    let mut tracker = Tracked::new(&tree).expect("deep enough");
-    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
-    let mut chain = Wanderer::new(2);
-    let frames: Vec<_> = motion.frames.iter().map(|frame| built.to_rows(frame)).collect();
-    let mut odometer = Odometer::new(&tree);
-    let (mut own, mut whole) = (Contacts::<64, 2048>::new(), Contacts::<64, 2048>::new());
-    let mut step = None;
-    let (mut compared, mut fronts) = (0, 0);
-    for tick in 0..if cfg!(debug_assertions) { 100 } else { 3_000 } {
-        let tool = chain.step()[0];
-        let frame = tick / 30 % frames.len();
-        let next = (frame + 1) % frames.len();
-        if tick % 30 == 0 {
-            step = Some(odometer.step(frames[frame].as_slice(), frames[next].as_slice()));
-        }
-        let step = step.as_ref().expect("the first tick has a frame");
-        let surface = step.at((tick % 30) as f32 / 30.0);
-        let options = Options::new();
-        let found = tracker.contacts(&surface, &tool, 8.0, &options, &mut own);
-        let found = found.expect("an answer");
-        let closest = query.contacts(&surface, &tool, 8.0, &Options::cold(), &mut whole);
-        let closest = closest.expect("an answer");
-        assert_eq!(found.closest.side, closest.side, "{tick}");
-        assert_eq!(own.len(), whole.len(), "{tick}: {own:?} {whole:?}");
-        for (one, other) in own.iter().zip(whole.iter()) {
-            assert!((one.separation - other.separation).abs() < 0.05, "{tick}: {one:?} {other:?}");
-        }
-        compared += own.len();
-        fronts += usize::from(found.fallback.is_none());
-    }
-    println!("{compared} contacts, {fronts} ticks by the front");
-    if !cfg!(debug_assertions) {
-        assert!(compared > 400 && fronts > 2_000, "{compared} {fronts}");
-    }
-    let refused = {
-        let surface = odometer.start(frames[0].as_slice());
-        let tool = chain.step()[0];
-        tracker.contacts(&surface, &tool, -1.0, &Options::new(), &mut own)
-    };
-    assert!(matches!(refused, Err(QueryError::Margin { .. })), "{refused:?}");
-    assert!(own.is_empty());
 }

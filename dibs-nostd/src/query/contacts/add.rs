@@ -2,10 +2,11 @@
 
 use glam::Vec3;
 
-use super::basins::Near;
+use super::basins::{Basins, Near};
+use super::low::Found;
 use super::{Contact, Contacts};
 use crate::math::sqrt::sqrt;
-use crate::query::search::{Search, Waiting};
+use crate::query::search::RangeFront;
 use crate::query::side::{self, Side};
 use crate::query::{NoSide, Options, Proximity};
 use crate::unavailable::QueryError;
@@ -59,14 +60,20 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         result
     }
 
-    /// Adds the contacts of a pair. Returns the tests made.
-    pub(in crate::query) fn add<I: Index, V: VertexTable + ?Sized, T: Tool>(
+    /// Adds the contacts of a pair, from the low triangles that `find` enters. Returns the tests made.
+    #[inline(always)]
+    pub(super) fn add_from<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         pair: &Pair<'_, I, V, T>,
-        stack: &mut [Waiting],
         options: &Options,
+        find: impl FnOnce(
+            &mut Basins<NEAR>,
+            &mut RangeFront<NEAR>,
+            f32,
+            f32,
+        ) -> Result<Found, QueryError>,
     ) -> Result<Budget, QueryError> {
-        let Self { found, basins } = self;
+        let Self { found, basins, front } = self;
         let &Pair { tree, vertices, tool, closest, .. } = pair;
         let margin = found.margin;
         if closest.accuracy > found.accuracy {
@@ -81,17 +88,9 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             }
             return Ok(Budget { node_tests: 0, triangle_tests: 0 });
         }
-        basins.clear();
         let ridge = (margin * RIDGE) + 2.0 * accuracy;
         let limit = tool.radius() + margin + ridge;
-        let mut complete = limit;
-        let search = Search::start(tree, stack, vertices, tool, options, None, None)?;
-        let (beyond, mut made) = search.each_low(limit, ridge, |row, square| {
-            if let Some(farthest) = basins.push(Near { square, row }) {
-                complete = sqrt(farthest);
-            }
-            complete
-        })?;
+        let Found { complete, beyond, tests: mut made } = find(basins, front, limit, ridge)?;
         let is_crossing = closest.side == Side::Crossing;
         if is_crossing && let Some(contact) = pair.contact(closest) {
             found.insert(contact);

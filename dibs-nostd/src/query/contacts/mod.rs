@@ -3,9 +3,11 @@
 mod add;
 mod basins;
 mod list;
+mod low;
 
 use glam::Vec3;
 
+use super::search::RangeFront;
 use super::{Options, Proximity, Query};
 use crate::unavailable::{QueryError, Unavailable};
 use crate::{Index, Tool, TriangleRow, VertexTable};
@@ -62,8 +64,11 @@ impl Contact {
     };
 }
 
-/// Up to `N` contacts, deepest first, and a bound on the others. A query compares up to `NEAR` triangles, 16 bytes
-/// each: those near a contact, and some with no lower vertex next to theirs.
+/// Up to `N` contacts, deepest first, and a bound on the others. A query compares up to `NEAR` triangles: those near a
+/// contact, and some with no lower vertex next to theirs. A tracker remembers up to `NEAR` opened nodes of the tree in
+/// the list, some hundred as a rule.
+///
+/// RAM on a 32-bit processor: 88 bytes for each of the `N`, 28 for each of the `NEAR`, and 136.
 ///
 /// Make it once, in a `static` or at start-up, and use it at every tick.
 ///
@@ -88,6 +93,8 @@ impl Contact {
 pub struct Contacts<const N: usize, const NEAR: usize = 512> {
     found: List<N>,
     basins: Basins<NEAR>,
+    /// Of a tracker's last search.
+    front: RangeFront<NEAR>,
 }
 
 impl<const N: usize, const NEAR: usize> Default for Contacts<N, NEAR> {
@@ -100,7 +107,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     /// An empty list.
     #[must_use]
     pub const fn new() -> Self {
-        Self { found: List::new(), basins: Basins::new() }
+        Self { found: List::new(), basins: Basins::new(), front: RangeFront::new() }
     }
 
     /// The contacts, deepest first.

@@ -10,7 +10,7 @@ use crate::unavailable::QueryError;
 use crate::{Index, Tool, VertexTable};
 
 /// Places of the table. Neighbouring vertices have rows close together, and the last bits of a row are its place.
-const PLACES: usize = 64;
+const PLACES: usize = 128;
 
 /// No vertex has this row.
 const NOBODY: u32 = u32::MAX;

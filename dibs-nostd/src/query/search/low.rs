@@ -41,7 +41,8 @@ enum Dip {
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// Visits a leaf's triangles within the cutoff that may be the lowest of their surroundings, but for ridges of
-    /// `ridge`. A visit returns the next limit. Returns whether the budget was enough.
+    /// `ridge`. A visit returns the next limit. Returns the least lower bound on the square of a triangle's distance;
+    /// `None` if the budget was not enough.
     ///
     /// Triangles that stand for their lowest corners are visited later, once these lose their places in the table.
     #[inline(never)]
@@ -52,11 +53,15 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         ridge: f32,
         heights: &mut Heights,
         visit: &mut impl FnMut(u32, f32) -> f32,
-    ) -> Result<bool, QueryError> {
+    ) -> Result<Option<f32>, QueryError> {
         let corrupt = QueryError::Corrupt { row: first };
         let tree = self.tree;
+        let mut least = f32::INFINITY;
         for (triangle, rows) in (first..).zip(tree.triangles(first, count).ok_or(corrupt)?) {
             let seen = self.see(rows, ridge, heights)?;
+            if seen.low < least {
+                least = seen.low;
+            }
             let is_low = if seen.low > self.cutoff_squared {
                 Some(false)
             } else {
@@ -69,18 +74,18 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                     Dip::Anywhere => self.is_outside(triangle)?,
                 }
             };
-            let Some(is_low) = is_low else { return Ok(false) };
+            let Some(is_low) = is_low else { return Ok(None) };
             if is_low && !self.visit_triangle(triangle, visit)? {
-                return Ok(false);
+                return Ok(None);
             }
             while let Some(&vertex) = heights.lost() {
                 if !self.visit_standing(&vertex, heights, visit)? {
-                    return Ok(false);
+                    return Ok(None);
                 }
                 heights.found();
             }
         }
-        Ok(true)
+        Ok(Some(least))
     }
 
     /// Visits the triangle that stands for a vertex, unless a lower one is next to that. Others around it may face the

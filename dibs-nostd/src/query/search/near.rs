@@ -36,7 +36,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             if let Some(left) = self.left.node_tests.checked_sub(count) {
                 self.left.node_tests = left;
                 is_done = if is_leaf {
-                    self.visit_low(first, count, ridge, &mut heights, &mut visit)?
+                    self.visit_low(first, count, ridge, &mut heights, &mut visit)?.is_some()
                 } else {
                     self.wait_for_children(lower, first, count)?;
                     true
@@ -49,17 +49,29 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 return Ok((least, self.made()));
             }
         }
+        let is_done = self.visit_rest(&heights, &mut visit)?;
+        let least = if is_done { f32::INFINITY } else { least_standing(&heights, ridge) };
+        Ok((least, self.made()))
+    }
+
+    /// Visits the triangles that still stand for a vertex. Returns whether the budget was enough.
+    #[inline(always)]
+    pub(super) fn visit_rest(
+        &mut self,
+        heights: &Heights,
+        visit: &mut impl FnMut(u32, f32) -> f32,
+    ) -> Result<bool, QueryError> {
         for place in Place::all() {
-            let vertex = *heights.at(place);
-            if !self.visit_standing(&vertex, &heights, &mut visit)? {
-                return Ok((least_standing(&heights, ridge), self.made()));
+            let vertex = heights.at(place);
+            if vertex.standing().is_some() && !self.visit_standing(vertex, heights, visit)? {
+                return Ok(false);
             }
         }
-        Ok((f32::INFINITY, self.made()))
+        Ok(true)
     }
 
     /// The tests made so far.
-    fn made(&self) -> Budget {
+    pub(super) fn made(&self) -> Budget {
         self.budget.less(self.left.node_tests, self.left.triangle_tests)
     }
 
@@ -101,6 +113,6 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
 }
 
 /// Lower bound on the distances of the triangles that stand for a vertex: they dip below it by half a ridge at most.
-fn least_standing(heights: &Heights, ridge: f32) -> f32 {
+pub(super) fn least_standing(heights: &Heights, ridge: f32) -> f32 {
     sqrt(heights.least_standing()) - 0.5 * ridge
 }

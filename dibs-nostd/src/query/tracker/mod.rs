@@ -5,13 +5,11 @@ mod several;
 #[cfg(test)]
 mod tests;
 
-use glam::Vec3;
-
+use super::axis::Axis;
 use super::contacts::Pair;
 use super::depth::Known;
 use super::search::{Outcome, Search, Tick, Touched, WHOLE, Waiting};
 use super::{Budget, Contacts, NoSide, Options, Proximity, Side, signed};
-use crate::math::sqrt::sqrt;
 use crate::surface::motion::Unit;
 use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Tool, Travel, Tree, TriangleRow};
@@ -84,9 +82,7 @@ pub struct Tracker<'t, I, const STACK: usize, const OPENED: usize> {
 /// Tool and surface at the last tick.
 #[derive(Clone, Copy, Debug)]
 struct Last {
-    start: Vec3,
-    span: Vec3,
-    length: f32,
+    axis: Axis,
     travel: Travel,
     /// No point of the surface is closer to the axis, unless the tool may be inside: then negative infinity.
     clear: f32,
@@ -240,8 +236,14 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
 
     /// The closest pair, and all contacts within `margin` (mm): those of [`Query::contacts`](crate::Query::contacts).
     ///
-    /// Cost: that of [`closest`](Self::closest), and where the surface is within the margin a range search, which has no
-    /// memory of the last tick.
+    /// Where the surface is within the margin, a range search finds the others. The list remembers its front: the nodes that
+    /// it opened, and for how long their other children are beyond the margin. So give a tracker the same list at every
+    /// tick. A tick starts the front anew if the list was last filled by another tracker, the tick before ran out of
+    /// budget, or motion has opened more nodes than there are places (`NEAR`). Where the budget ends, the list's bound can be
+    /// less than a query's, which looks at near parts first.
+    ///
+    /// Cost: that of [`closest`](Self::closest), a few instructions for each opened node, and what a query takes to compare
+    /// the triangles within the margin.
     ///
     /// # Errors
     /// Those of [`Query::contacts`](crate::Query::contacts).
@@ -271,7 +273,12 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
             options.budget(options.budget.less(closest.node_tests, closest.triangle_tests));
         let pair =
             Pair { tree: &self.tree, vertices: surface, tool, closest, surface: 0, number: 0 };
-        contacts.add(&pair, &mut self.stack, &options)?;
+        match surface.travel() {
+            Some(travel) => {
+                contacts.add_tracked(&pair, &mut self.stack, &options, travel, self.unit)?
+            }
+            None => contacts.add(&pair, &mut self.stack, &options)?,
+        };
         Ok(tracked)
     }
 
@@ -301,7 +308,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         let last = self.last.ok_or(Fallback::Start)?;
         let surface = travel.and_then(|travel| travel.since(&last.travel));
         let surface = surface.ok_or(Fallback::Surface)?;
-        let moved = surface.saturating_add(u64::from(last.step(tool, self.unit)));
+        let moved = surface.saturating_add(u64::from(last.axis.step(tool, self.unit)));
         if moved.saturating_add(u64::from(self.behind)) > u64::from(FARTHEST) {
             return Err(Fallback::Jump);
         }
@@ -311,7 +318,6 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
 
 impl Last {
     fn new(tool: &impl Tool, travel: Travel, closest: &Proximity) -> Self {
-        let (start, span) = (tool.axis_start(), tool.axis_span());
         let clear = closest.lower + tool.radius() - closest.accuracy;
         let (clear, is_signed) = match closest.side {
             Side::Inside
@@ -322,28 +328,12 @@ impl Last {
             Side::Undefined(NoSide::NotAsked) => (clear, false),
             _ => (clear, true),
         };
-        Self { start, span, length: tool.axis_length(), travel, clear, is_signed, stale: 0 }
+        Self { axis: Axis::of(tool), travel, clear, is_signed, stale: 0 }
     }
 
     /// The distance within which nothing is certain to be, after a motion.
     fn clear_after(&self, moved: f32) -> f32 {
         let clear = self.clear - moved * (1.0 + 4.0 * f32::EPSILON);
         clear - clear.abs() * f32::EPSILON
-    }
-
-    /// Most that a point of the axis has moved, in units: the larger of the ends' steps. For another tool, the distance
-    /// between the axes' points.
-    #[inline(always)]
-    fn step(&self, tool: &impl Tool, unit: Unit) -> u32 {
-        const U: f32 = 1.0 / 16_777_216.0;
-        let (start, end) = (tool.axis_start() - self.start, tool.axis_span() - self.span);
-        if start == Vec3::ZERO && end == Vec3::ZERO {
-            return 0;
-        }
-        let (start, end) = (start.length_squared(), (start + end).length_squared());
-        let larger = if start > end { start } else { end };
-        // A span is within 2^-23 of the length, each difference within 2^-24 of itself.
-        let rounding = 8.0 * U * (tool.axis_length() + self.length);
-        unit.up(sqrt(larger) * (1.0 + 16.0 * U) + rounding)
     }
 }

@@ -7,34 +7,13 @@ use std::vec::Vec;
 
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use fastrand::Rng;
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use super::Tracker;
 use super::front::{NOWHERE, UNUSED};
+use crate::query::distances::{distance, least};
 use crate::tree::format::Link;
-use crate::{Budget, Capsule, Odometer, Options, Sphere, Tool, Tree, measure_stretch};
-
-/// Distance from a tool's axis, in f64.
-fn distance(tool: &impl Tool, point: Vec3) -> f64 {
-    let start = tool.axis_start().as_dvec3();
-    let span: DVec3 = tool.axis_span().as_dvec3();
-    let offset = point.as_dvec3() - start;
-    let along = offset.dot(span) / span.length_squared().max(f64::MIN_POSITIVE);
-    (offset - span * along.clamp(0.0, 1.0)).length()
-}
-
-/// The least distance of any vertex below a link.
-fn least(tree: &Tree<'_, u16>, link: Link, far: &impl Fn(u32) -> f64) -> f64 {
-    match link {
-        Link::Children { first, count } => (first..first + count)
-            .map(|row| least(tree, tree.node(row).expect("a node").2, far))
-            .fold(f64::INFINITY, f64::min),
-        Link::Leaf { first, count } => (first..first + count)
-            .flat_map(|row| tree.triangle(row).expect("a triangle"))
-            .map(far)
-            .fold(f64::INFINITY, f64::min),
-    }
-}
+use crate::{Budget, Capsule, Odometer, Options, Sphere, Tree, measure_stretch};
 
 /// A bound in the front.
 struct Bound {

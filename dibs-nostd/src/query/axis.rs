@@ -1,0 +1,37 @@
+//! A tool's axis at an earlier tick.
+
+use glam::Vec3;
+
+use crate::Tool;
+use crate::math::sqrt::sqrt;
+use crate::surface::motion::Unit;
+
+/// An axis as it was.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Axis {
+    start: Vec3,
+    span: Vec3,
+    length: f32,
+}
+
+impl Axis {
+    pub fn of(tool: &impl Tool) -> Self {
+        Self { start: tool.axis_start(), span: tool.axis_span(), length: tool.axis_length() }
+    }
+
+    /// Most that a point of the axis has moved, in units: the larger of the ends' steps. For another tool, the distance
+    /// between the axes' points.
+    #[inline(always)]
+    pub fn step(&self, tool: &impl Tool, unit: Unit) -> u32 {
+        const U: f32 = 1.0 / 16_777_216.0;
+        let (start, end) = (tool.axis_start() - self.start, tool.axis_span() - self.span);
+        if start == Vec3::ZERO && end == Vec3::ZERO {
+            return 0;
+        }
+        let (start, end) = (start.length_squared(), (start + end).length_squared());
+        let larger = if start > end { start } else { end };
+        // A span is within 2^-23 of the length, each difference within 2^-24 of itself.
+        let rounding = 8.0 * U * (tool.axis_length() + self.length);
+        unit.up(sqrt(larger) * (1.0 + 16.0 * U) + rounding)
+    }
+}

@@ -1,0 +1,107 @@
+//! The low triangles of a pair: found anew, or from the front of the last search on.
+
+use super::Contacts;
+use super::add::Pair;
+use super::basins::{Basins, Near};
+use crate::math::sqrt::sqrt;
+use crate::query::Options;
+use crate::query::search::{Search, Waiting};
+use crate::surface::motion::Unit;
+use crate::unavailable::QueryError;
+use crate::{Budget, Index, Tool, Travel, VertexTable};
+
+/// The end of a search for low triangles. All that are closer than both distances were entered.
+pub(super) struct Found {
+    /// There was no room for triangles that are farther.
+    pub complete: f32,
+    /// Triangles that are farther were not visited.
+    pub beyond: f32,
+    pub tests: Budget,
+}
+
+impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
+    /// Adds the contacts of a pair. Returns the tests made.
+    pub(in crate::query) fn add<I: Index, V: VertexTable + ?Sized, T: Tool>(
+        &mut self,
+        pair: &Pair<'_, I, V, T>,
+        stack: &mut [Waiting],
+        options: &Options,
+    ) -> Result<Budget, QueryError> {
+        self.add_from(pair, options, |basins, _, limit, ridge| {
+            each_low(pair, stack, options, basins, limit, ridge)
+        })
+    }
+
+    /// The same for a surface that carries its motion. Parts that the last search showed to be far are not looked at.
+    pub(in crate::query) fn add_tracked<I: Index, V: VertexTable + ?Sized, T: Tool>(
+        &mut self,
+        pair: &Pair<'_, I, V, T>,
+        stack: &mut [Waiting],
+        options: &Options,
+        travel: Travel,
+        unit: Unit,
+    ) -> Result<Budget, QueryError> {
+        self.add_from(pair, options, |basins, front, limit, ridge| {
+            let mut front = front.moved_to(pair.tool, travel, unit);
+            let mut low = Low::new(basins, limit);
+            let &Pair { tree, vertices, tool, .. } = pair;
+            let search = Search::start(tree, stack, vertices, tool, options, None, None)?;
+            let visit = |row, square| low.add(row, square);
+            let (beyond, tests) = search.each_low_from(&mut front, limit, ridge, visit)?;
+            if let Some(beyond) = beyond {
+                if beyond == f32::INFINITY {
+                    front.keep(pair.tool, travel);
+                }
+                return Ok(Found { complete: low.complete, beyond, tests });
+            }
+            // The front has no room for this range.
+            let Budget { node_tests, triangle_tests } = tests;
+            let rest = options.budget(options.budget.less(node_tests, triangle_tests));
+            let found = each_low(pair, stack, &rest, basins, limit, ridge)?;
+            let tests = Budget {
+                node_tests: node_tests.saturating_add(found.tests.node_tests),
+                triangle_tests: triangle_tests.saturating_add(found.tests.triangle_tests),
+            };
+            Ok(Found { tests, ..found })
+        })
+    }
+}
+
+/// Enters the low triangles within a limit.
+fn each_low<I: Index, V: VertexTable + ?Sized, T: Tool, const NEAR: usize>(
+    pair: &Pair<'_, I, V, T>,
+    stack: &mut [Waiting],
+    options: &Options,
+    basins: &mut Basins<NEAR>,
+    limit: f32,
+    ridge: f32,
+) -> Result<Found, QueryError> {
+    let mut low = Low::new(basins, limit);
+    let &Pair { tree, vertices, tool, .. } = pair;
+    let search = Search::start(tree, stack, vertices, tool, options, None, None)?;
+    let (beyond, tests) = search.each_low(limit, ridge, |row, square| low.add(row, square))?;
+    Ok(Found { complete: low.complete, beyond, tests })
+}
+
+/// The low triangles, as they are found.
+struct Low<'b, const NEAR: usize> {
+    basins: &'b mut Basins<NEAR>,
+    /// All that are closer are entered.
+    complete: f32,
+}
+
+impl<'b, const NEAR: usize> Low<'b, NEAR> {
+    fn new(basins: &'b mut Basins<NEAR>, limit: f32) -> Self {
+        basins.clear();
+        Self { basins, complete: limit }
+    }
+
+    /// Enters a triangle. Returns the distance from which on others would have no room.
+    #[inline(always)]
+    fn add(&mut self, row: u32, square: f32) -> f32 {
+        if let Some(farthest) = self.basins.push(Near { square, row }) {
+            self.complete = sqrt(farthest);
+        }
+        self.complete
+    }
+}

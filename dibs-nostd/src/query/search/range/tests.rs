@@ -1,0 +1,120 @@
+//! Compares every bound in the front of a range search with the distances of all vertices below it.
+
+extern crate std;
+
+use std::vec::Vec;
+
+use dibs_build::{Builder, generate};
+use fastrand::Rng;
+use glam::Vec3;
+
+use super::{RangeFront, Search};
+use crate::query::distances::{distance, least};
+use crate::query::search::Waiting;
+use crate::surface::motion::Unit;
+use crate::tree::format::Link;
+use crate::unavailable::QueryError;
+use crate::{Budget, Capsule, MovingSurface, Odometer, Options, Tree};
+
+const LIMIT: f32 = 6.0;
+const RIDGE: f32 = 0.1;
+
+/// The bounds in the front, in mm: none exceeds the distance of the nearest vertex below it, and after a whole search none
+/// is less than the limit, but for rounding. All triangles are below one of them, or in a leaf within the range, and no triangle twice.
+fn bounds<const M: usize>(
+    front: &RangeFront<M>,
+    tree: &Tree<'_, u16>,
+    far: &impl Fn(u32) -> f64,
+) -> Vec<f64> {
+    let unit = Unit::of(tree);
+    let (mut bounds, mut seen) = (Vec::new(), std::vec![0; tree.triangle_count() as usize]);
+    for node in &front.nodes[..front.state.count] {
+        let Link::Children { first, count } = Link::decode(node.link) else { unreachable!() };
+        let bound = f64::from(unit.length(node.key.wrapping_sub(front.state.now) as i32));
+        for slot in (0..count).filter(|slot| node.opened >> slot & 1 == 0) {
+            let link = tree.node(first + slot).expect("a node").2;
+            count_triangles(tree, link, &mut seen);
+            if node.near >> slot & 1 == 0 {
+                let distance = least(tree, link, far);
+                assert!(bound <= distance, "{node:?} {slot}: {bound} {distance}");
+                assert!(
+                    bound > f64::from(LIMIT) - 1e-4,
+                    "{node:?} {slot}: {bound} was not looked at"
+                );
+                bounds.push(distance - bound);
+            }
+        }
+    }
+    assert!(seen.iter().all(|&times| times == 1));
+    bounds
+}
+
+fn count_triangles(tree: &Tree<'_, u16>, link: Link, seen: &mut [u32]) {
+    match link {
+        Link::Children { first, count } => (first..first + count)
+            .for_each(|row| count_triangles(tree, tree.node(row).expect("a node").2, seen)),
+        Link::Leaf { first, count } => {
+            (first..first + count).for_each(|row| seen[row as usize] += 1);
+        }
+    }
+}
+
+#[test]
+fn no_bound_of_a_range_exceeds_the_distance() {
+    let generate::MovingMesh { mesh, motion } = generate::heart(1_280).expect("a valid size");
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("builds");
+    let tree = Tree::<u16>::from_bytes(built.blob()).expect("valid");
+    let positions: Vec<Vec<Vec3>> =
+        motion.frames.iter().map(|frame| built.to_rows(frame)).collect();
+    let mut odometer = Odometer::new(&tree);
+    let mut rng = Rng::with_seed(16);
+    let mut vector = |size: f32| Vec3::from([(); 3].map(|()| (rng.f32() - 0.5) * size));
+    let mut stack = [Waiting { lower: 0.0, link: 0 }; 128];
+    let mut front = RangeFront::<256>::new();
+    // The odometer wraps soon.
+    front.state.now = u32::MAX - (1 << 22);
+    let (mut tip, mut span) = (Vec3::new(50.0, 0.0, 20.0), Vec3::new(30.0, 20.0, 40.0));
+    let (mut checked, mut kept) = (0, 0);
+    for (number, pair) in positions.windows(2).cycle().take(60).enumerate() {
+        let [before, after] = pair else { unreachable!() };
+        let step = odometer.step(before.as_slice(), after.as_slice());
+        for tick in 0..8 {
+            // Every other frame the tool rests; now and then it leaps.
+            if number % 2 == 0 {
+                let size = if tick == 7 { 10.0 } else { 0.5 };
+                (tip, span) = (tip * 0.999 + vector(size), span * 0.999 + vector(size));
+            }
+            let tool = Capsule::new(tip, tip + span, 2.0).expect("a valid capsule");
+            let share = tick as f32 / 8.0;
+            let surface = step.at(share);
+            let travel = surface.travel().expect("measured");
+            let mut search = |options: &Options| {
+                let search = Search::start(&tree, &mut stack, &surface, &tool, options, None, None);
+                let mut moved = front.moved_to(&tool, travel, Unit::of(&tree));
+                kept += usize::from(moved.state.count > 0);
+                let visit = |_, _| LIMIT;
+                let search = search.expect("valid");
+                let (beyond, _) = search.each_low_from(&mut moved, LIMIT, RIDGE, visit)?;
+                let is_whole = beyond == Some(f32::INFINITY);
+                if is_whole {
+                    moved.keep(&tool, travel);
+                }
+                Ok::<_, QueryError>(is_whole)
+            };
+            // Budgets that end anywhere, until one is enough.
+            let budgets = if tick == 4 { 0..2_000 } else { 2_000..2_001 };
+            let is_whole = budgets.into_iter().any(|node_tests| {
+                let budget = Budget { node_tests, triangle_tests: 999 };
+                search(&Options::cold().budget(budget)).expect("an answer")
+            });
+            assert!(is_whole);
+            let at = |row: u32| {
+                let (a, b) = (before[row as usize].as_dvec3(), after[row as usize].as_dvec3());
+                (a + (b - a) * f64::from(share)).as_vec3()
+            };
+            checked += bounds(&front, &tree, &|row| distance(&tool, at(row))).len();
+        }
+    }
+    std::println!("{checked} bounds, {kept} fronts kept, {:?}", front.state);
+    assert!(checked > 20_000 && kept > 300 && front.state.now < 1 << 31);
+}

@@ -1,0 +1,157 @@
+//! A tracker's contacts against those of whole queries.
+
+use dibs_build::{Builder, generate};
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{
+    Budget, Contact, Contacts, MovingSurface, Odometer, Options, Query, QueryError, Sphere, Tool,
+    Tracker,
+};
+use fastrand::Rng;
+
+use crate::wanderer::Wanderer;
+
+/// Least separation of a tool whose axis does not cross, with rounding to spare.
+const LEAST_OUTSIDE: f32 = -1.999;
+
+/// How far contacts are looked for, in mm.
+const MARGIN: f32 = 8.0;
+
+type Tracked<'t> = Tracker<'t, u16, MAX_STACK, 256>;
+
+#[test]
+fn contacts_of_a_tracker_are_those_of_a_query() {
+    let generate::MovingMesh { mesh, motion } = generate::heart(2_000).expect("a valid size");
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let mut tracker = Tracked::new(&tree).expect("deep enough");
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut chain = Wanderer::new(2);
+    let frames: Vec<_> = motion.frames.iter().map(|frame| built.to_rows(frame)).collect();
+    let mut odometer = Odometer::new(&tree);
+    let (mut own, mut whole) = (Contacts::<64, 2048>::new(), Contacts::<64, 2048>::new());
+    let mut step = None;
+    let (mut compared, mut fronts) = (0, 0);
+    for tick in 0..if cfg!(debug_assertions) { 100 } else { 3_000 } {
+        let tool = chain.step()[0];
+        let frame = tick / 30 % frames.len();
+        let next = (frame + 1) % frames.len();
+        if tick % 30 == 0 {
+            step = Some(odometer.step(frames[frame].as_slice(), frames[next].as_slice()));
+        }
+        let step = step.as_ref().expect("the first tick has a frame");
+        let surface = step.at((tick % 30) as f32 / 30.0);
+        let options = Options::new();
+        let found = tracker.contacts(&surface, &tool, MARGIN, &options, &mut own);
+        let found = found.expect("an answer");
+        let closest = query.contacts(&surface, &tool, MARGIN, &Options::cold(), &mut whole);
+        let closest = closest.expect("an answer");
+        assert_eq!(found.closest.side, closest.side, "{tick}");
+        assert_eq!(own.len(), whole.len(), "{tick}: {own:?} {whole:?}");
+        for (one, other) in own.iter().zip(whole.iter()) {
+            assert!((one.separation - other.separation).abs() < 0.05, "{tick}: {one:?} {other:?}");
+        }
+        compared += own.len();
+        fronts += usize::from(found.fallback.is_none());
+    }
+    println!("{compared} contacts, {fronts} ticks by the front");
+    if !cfg!(debug_assertions) {
+        assert!(compared > 400 && fronts > 2_000, "{compared} {fronts}");
+    }
+    let refused = {
+        let surface = odometer.start(frames[0].as_slice());
+        let tool = chain.step()[0];
+        tracker.contacts(&surface, &tool, -1.0, &Options::new(), &mut own)
+    };
+    assert!(matches!(refused, Err(QueryError::Margin { .. })), "{refused:?}");
+    assert!(own.is_empty());
+}
+
+/// Contacts of one list that another lacks, of those whose separation is less than `bound`. The pair of an axis that
+/// crosses, found to a tolerance, is not compared.
+fn missing<'c>(
+    from: impl Iterator<Item = &'c Contact>,
+    list: &(impl Iterator<Item = &'c Contact> + Clone),
+    bound: f32,
+) -> usize {
+    let is_same = |one: &Contact, other: &Contact| {
+        (one.separation - other.separation).abs() < 1e-3
+            && one.point_on_surface.distance(other.point_on_surface) < 0.5
+    };
+    let below = from.filter(|one| one.separation > LEAST_OUTSIDE && one.separation < bound);
+    below.filter(|one| !list.clone().any(|other| is_same(one, other))).count()
+}
+
+/// Compares a tracker's contacts with a whole query's. Adds the contacts compared, and those missing or of nothing.
+fn compare<S: MovingSurface, T: Tool, const NEAR: usize>(
+    tracker: &mut Tracked<'_>,
+    surface: &S,
+    tool: &T,
+    options: &Options,
+    list: &mut Contacts<64, NEAR>,
+    [compared, wrong]: &mut [usize; 2],
+) {
+    let mut query = Query::<u16, MAX_STACK>::new(tracker.tree()).expect("deep enough");
+    let mut whole = Contacts::<64, 2048>::new();
+    let expected = query.contacts(surface, tool, MARGIN, &Options::cold(), &mut whole);
+    expected.expect("an answer");
+    tracker.contacts(surface, tool, MARGIN, options, list).expect("an answer");
+    let bound = list.bound() - 2.0 * list.accuracy();
+    *compared += whole.iter().filter(|one| one.separation < bound).count();
+    *wrong += missing(whole.iter(), &list.iter(), bound)
+        + missing(list.iter(), &whole.iter(), whole.bound());
+}
+
+#[test]
+fn contacts_survive_leaps_rests_budgets_and_other_trackers() {
+    let generate::MovingMesh { mesh, motion } = generate::heart(2_000).expect("a valid size");
+    let heart = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
+    // The same surface in another tree: a list may go from one to the other.
+    let other = Builder::new().stretch(1.8).build(&mesh).expect("a valid mesh");
+    let trees = [&heart, &other].map(|built| built.tree::<u16>().expect("16-bit indices"));
+    let frames = [&heart, &other].map(|built| -> Vec<_> {
+        motion.frames.iter().map(|frame| built.to_rows(frame)).collect()
+    });
+    let [mut one, mut two] = [0, 1].map(|at| Tracked::new(&trees[at]).expect("deep enough"));
+    let mut odometers = [0, 1].map(|at| Odometer::new(&trees[at]));
+    // Too short for any front, for most, and long enough.
+    let (mut short, mut middle, mut long) =
+        (Contacts::<64, 24>::new(), Contacts::<64, 96>::new(), Contacts::<64, 2048>::new());
+    let (mut chain, mut rng) = (Wanderer::new(5), Rng::with_seed(16));
+    let mut found = [0; 2];
+    for frame in 0..if cfg!(debug_assertions) { 4 } else { 300 } {
+        let now = [0, 1].map(|at| frames[at][frame % frames[at].len()].as_slice());
+        let next = [0, 1].map(|at| frames[at][(frame + 1) % frames[at].len()].as_slice());
+        // Now and then the odometer starts anew.
+        if rng.u32(..20) == 0 {
+            odometers[0].start(frames[0][0].as_slice());
+        }
+        let steps = [0, 1].map(|at| odometers[at].step(now[at], next[at]));
+        for tick in 0..30 {
+            let tool = chain.step()[rng.u32(..40) as usize / 39];
+            // Not asked at every tick.
+            if rng.u32(..4) == 0 {
+                continue;
+            }
+            let share = tick as f32 / 30.0;
+            let options = match rng.u32(..8) {
+                0 => Options::new()
+                    .budget(Budget { node_tests: rng.u32(..800), triangle_tests: rng.u32(..100) }),
+                _ => Options::new(),
+            };
+            let (tracker, step) =
+                if rng.u32(..12) == 0 { (&mut two, &steps[1]) } else { (&mut one, &steps[0]) };
+            let surface = step.at(share);
+            let tip = Sphere::new(tool.start(), 2.0).expect("a valid sphere");
+            match rng.u32(..30) {
+                0..3 => compare(tracker, &surface, &tip, &options, &mut long, &mut found),
+                3..10 => compare(tracker, &surface, &tool, &options, &mut short, &mut found),
+                10..20 => compare(tracker, &surface, &tool, &options, &mut middle, &mut found),
+                _ => compare(tracker, &surface, &tool, &options, &mut long, &mut found),
+            }
+        }
+    }
+    let [compared, wrong] = found;
+    println!("{compared} contacts");
+    assert_eq!(wrong, 0, "contacts missing or of nothing, of {compared}");
+    assert!(cfg!(debug_assertions) || compared > 500, "{compared}");
+}
