@@ -7,7 +7,9 @@ use std::time::Instant;
 use anyhow::{Result, ensure};
 use dibs_build::{Builder, BuiltTree, Mesh, Motion};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Capsule, Contacts, Index, Odometer, Options, Query, Side, Tree, measure_stretch};
+use dibs_nostd::{
+    Capsule, Contacts, Index, Odometer, Options, Query, Side, Tracker, Tree, measure_stretch,
+};
 use dibs_tests::method::Probe;
 use dibs_tests::streams::{Beat, Pulse};
 use glam::Vec3;
@@ -15,7 +17,7 @@ use glam::Vec3;
 use super::brain::STRETCH;
 use super::facts;
 use super::markdown::number;
-use super::names::DIBS;
+use super::names::{DIBS, TRACKER};
 use super::plan::{self, Plan, Progress};
 use super::record::{Cell, Record, Records};
 use super::statistics::{Summary, repeatable_worst};
@@ -38,6 +40,10 @@ const TOOL: [f32; 2] = [2.5, 60.0];
 
 /// Contacts that are kept, and triangles that are compared.
 type List = Contacts<16, 4_096>;
+/// Opened nodes that the tracker remembers.
+const OPENED: usize = 4_096;
+/// A query, and a tracker.
+const METHODS: [(&str, &str); 2] = [(DIBS, "`Query`"), (TRACKER, "`Tracker`")];
 
 /// Where the tool goes.
 const PATHS: [&str; 2] = ["over the surface", "through the middle"];
@@ -63,8 +69,23 @@ pub fn run(plan: &Plan, options: &plan::Options, records: &mut Records) -> Resul
     Ok(())
 }
 
-/// Follows a path, and records it.
+/// Follows a path with each method, and records it.
 fn follow<I: Index>(
+    cell: &Cell,
+    mesh: &Mesh,
+    built: &BuiltTree,
+    tree: &Tree<'_, I>,
+    ticks: u32,
+    records: &mut Records,
+) -> Result<()> {
+    for (method, _) in METHODS {
+        follow_with(method, cell, mesh, built, tree, ticks, records)?;
+    }
+    Ok(())
+}
+
+fn follow_with<I: Index>(
+    method: &str,
     cell: &Cell,
     mesh: &Mesh,
     built: &BuiltTree,
@@ -76,6 +97,7 @@ fn follow<I: Index>(
     let rest = Motion { frames: vec![mesh.positions.clone()], ..Motion::default() };
     let (beat, outline) = (Beat::new(&rest), Outline::of(&built.to_rows(&mesh.positions)));
     let mut query = Query::<I, MAX_STACK>::new(tree)?;
+    let mut tracker = Box::new(Tracker::<I, MAX_STACK, OPENED>::new(tree)?);
     let mut list = Box::new(List::new());
     let frame = |number: u32| -> Result<_> {
         let mut positions = Vec::new();
@@ -109,7 +131,11 @@ fn follow<I: Index>(
             let both = before.1.or_larger(after.1);
             let options = both.map_or(Options::new(), |both| Options::new().stretch(both));
             let start = Instant::now();
-            let closest = query.contacts(&surface, &tool, MARGIN, &options, &mut list)?;
+            let closest = if method == TRACKER {
+                tracker.contacts(&surface, &tool, MARGIN, &options, &mut list)?.closest
+            } else {
+                query.contacts(&surface, &tool, MARGIN, &options, &mut list)?
+            };
             times.push(start.elapsed().as_secs_f64() * 1e6);
             ensure!(list.bound() >= MARGIN, "tick {tick}: contacts only within {}", list.bound());
             contacts.push(list.len() as f64);
@@ -118,7 +144,7 @@ fn follow<I: Index>(
         }
     }
     let mut put = |metric: &str, values: &[f64], unit: &str| {
-        records.push(Record::summary(cell, DIBS, metric, &Summary::of(values), unit));
+        records.push(Record::summary(cell, method, metric, &Summary::of(values), unit));
     };
     put("time", &times, "us");
     put("contacts", &contacts, "contacts");
@@ -176,15 +202,17 @@ pub fn table(page: &mut String, records: &Records) {
     let _ = writeln!(
         page,
         "Recorded by `{}` on {}, commit {}, {}.\n\n\
-         | surface | triangles | tool | ticks | mean | p99 | worst | worst of the fastest passes \
-         | contacts | axis crosses |\n|---|---|---|---|---|---|---|---|---|---|",
+         | surface | triangles | tool | asked | ticks | mean | p99 | worst \
+         | worst of the fastest passes | contacts | axis crosses |\n|---|---|---|---|---|---|---|---|---|---|---|",
         fact("command"),
         fact("machine"),
         fact("commit"),
         fact("date")
     );
     for (mesh, triangles) in meshes {
-        for path in PATHS {
+        for (path, (method, asked)) in
+            PATHS.into_iter().flat_map(|path| METHODS.map(|method| (path, method)))
+        {
             let cell = Cell::new(EXPERIMENT, &mesh, triangles as usize, path);
             let get = |metric| {
                 records.0.iter().find(|r| {
@@ -193,8 +221,9 @@ pub fn table(page: &mut String, records: &Records) {
                         r.mesh.as_str(),
                         r.triangles,
                         r.tool.as_str(),
+                        r.method.as_str(),
                         r.metric.as_str(),
-                    ) == (EXPERIMENT, mesh.as_str(), cell.triangles, path, metric)
+                    ) == (EXPERIMENT, mesh.as_str(), cell.triangles, path, method, metric)
                 })
             };
             let (Some(time), Some(worst), Some(contacts), Some(crossing)) =
@@ -204,7 +233,7 @@ pub fn table(page: &mut String, records: &Records) {
             };
             let _ = writeln!(
                 page,
-                "| {mesh} | {triangles} | {path} | {} | {} | {} | {} | {} | {} | {:.0} % |",
+                "| {mesh} | {triangles} | {path} | {asked} | {} | {} | {} | {} | {} | {} | {:.0} % |",
                 time.n,
                 number(time.mean),
                 number(time.p99),
@@ -218,7 +247,8 @@ pub fn table(page: &mut String, records: &Records) {
 }
 
 const HEAD: &str = "\n## Table 5: contacts with a deforming brain\n\n\
-    All contacts within 5 mm of a capsule, cold at every tick (`Query::contacts`), with side and depth, in µs. \
+    All contacts within 5 mm of a capsule, with side and depth, in µs: of `Query::contacts`, which remembers only the \
+    last triangle, and of `Tracker::contacts`. \
     The brain pulses in long waves; frames come 30 times a second, each tick is interpolated between the last two. \
     Not in it are the arrival of a frame and its measurement, once a frame: see table 4. Over the surface the tip \
     goes once around the brain, from 4 mm inside to 6 mm outside; through the middle it is the tool of table 3, which \
