@@ -77,7 +77,7 @@ pub const CHECK: Check = Check {
             criterion: TIMING,
             bound: Bound::Golden,
             unit: "instructions; 99 % below {m7.track.contacts.99}, at most {m7.track.contacts.largest}",
-            limits: "As above. Contacts within the margin take a range search at every tick.",
+            limits: "As above. The list remembers which parts of the surface are beyond the margin; all within it are compared.",
         },
         note("m7.track.contacts.99"),
         golden("m7.track.contacts.largest"),
