@@ -29,6 +29,8 @@ pub mod stretch;
 #[cfg(feature = "builder")]
 pub mod surfaces;
 pub mod tree_bytes;
+#[cfg(feature = "builder")]
+pub mod wanderer;
 
 /// The README's code: it compiles, and its control loop runs.
 #[cfg(doctest)]

@@ -20,5 +20,4 @@ mod tracked_chain;
 mod tracked_contacts;
 mod tracked_depth;
 mod tracker;
-mod wanderer;
 mod wide;

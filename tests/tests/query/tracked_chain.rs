@@ -6,7 +6,7 @@ use dibs_nostd::{Budget, Capsule, Moved, NoSide, Odometer, Options, Query, Side,
 use dibs_tests::surfaces::{ball, sheet};
 use glam::Vec3;
 
-use crate::wanderer::Wanderer;
+use dibs_tests::wanderer::Wanderer;
 
 type Tracked<'t> = Tracker<'t, u16, MAX_STACK, 256>;
 

@@ -8,7 +8,7 @@ use dibs_nostd::{
 };
 use fastrand::Rng;
 
-use crate::wanderer::Wanderer;
+use dibs_tests::wanderer::Wanderer;
 
 /// Least separation of a tool whose axis does not cross, with rounding to spare.
 const LEAST_OUTSIDE: f32 = -1.999;

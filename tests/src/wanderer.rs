@@ -1,9 +1,10 @@
-//! A tool that wanders.
+//! A chain of tools that wanders.
 
 use dibs_nostd::Capsule;
-use dibs_tests::deform::unit;
 use fastrand::Rng;
 use glam::Vec3;
+
+use crate::deform::unit;
 
 /// A chain of eight capsules that bends, and wanders through two hearts beside each other.
 pub struct Wanderer {
@@ -13,12 +14,17 @@ pub struct Wanderer {
 }
 
 impl Wanderer {
+    /// A straight chain above the hearts.
+    #[must_use]
     pub fn new(seed: u64) -> Self {
         let joints = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|at| Vec3::new(14.0 * at as f32, 80.0, 30.0));
         Self { joints, rng: Rng::with_seed(seed), time: 0.0 }
     }
 
     /// Steps as a rule, rests or leaps now and then. Returns the capsules.
+    ///
+    /// # Panics
+    /// Never: its joints stay finite.
     pub fn step(&mut self) -> [Capsule; 8] {
         let rng = &mut self.rng;
         let far = match rng.u32(..200) {
