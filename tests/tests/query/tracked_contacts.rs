@@ -30,7 +30,7 @@ fn contacts_of_a_tracker_are_those_of_a_query() {
     let mut odometer = Odometer::new(&tree);
     let (mut own, mut whole) = (Contacts::<64, 2048>::new(), Contacts::<64, 2048>::new());
     let mut step = None;
-    let (mut compared, mut fronts) = (0, 0);
+    let (mut compared, mut fronts, mut restarts) = (0, 0, 0);
     for tick in 0..if cfg!(debug_assertions) { 100 } else { 3_000 } {
         let tool = chain.step()[0];
         let frame = tick / 30 % frames.len();
@@ -41,7 +41,10 @@ fn contacts_of_a_tracker_are_those_of_a_query() {
         let step = step.as_ref().expect("the first tick has a frame");
         let surface = step.at((tick % 30) as f32 / 30.0);
         let options = Options::new();
+        let opened = own.opened();
         let found = tracker.contacts(&surface, &tool, MARGIN, &options, &mut own);
+        // A front that is kept only grows.
+        restarts += usize::from(own.opened() < opened);
         let found = found.expect("an answer");
         let closest = query.contacts(&surface, &tool, MARGIN, &Options::cold(), &mut whole);
         let closest = closest.expect("an answer");
@@ -53,9 +56,10 @@ fn contacts_of_a_tracker_are_those_of_a_query() {
         compared += own.len();
         fronts += usize::from(found.fallback.is_none());
     }
-    println!("{compared} contacts, {fronts} ticks by the front");
+    println!("{compared} contacts, {fronts} ticks by the front, {restarts} of the range anew");
     if !cfg!(debug_assertions) {
         assert!(compared > 400 && fronts > 2_000, "{compared} {fronts}");
+        assert!(own.opened() > 0 && restarts < 30, "{} {restarts}", own.opened());
     }
     let refused = {
         let surface = odometer.start(frames[0].as_slice());

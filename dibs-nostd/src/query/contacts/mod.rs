@@ -166,6 +166,13 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         self.found.is_full
     }
 
+    /// Of `NEAR` places, those that a tracker's last search used for opened nodes. Once they are more than three
+    /// quarters, the next search starts anew.
+    #[must_use]
+    pub const fn opened(&self) -> u32 {
+        self.front.opened()
+    }
+
     /// Sets each contact's velocity to that of the surface there, from a table of the vertices' velocities (mm/s).
     ///
     /// # Errors

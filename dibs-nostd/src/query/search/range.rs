@@ -73,6 +73,11 @@ impl<const M: usize> RangeFront<M> {
         Self { nodes: [none; M], state: State { count: 0, now: 0, last: None } }
     }
 
+    /// Number of opened nodes.
+    pub const fn opened(&self) -> u32 {
+        self.state.count as u32
+    }
+
     /// The front after the motion since its last search.
     pub fn moved_to(&mut self, tool: &impl Tool, travel: Travel, unit: Unit) -> RangeFrontMut<'_> {
         let Self { nodes, state } = self;
