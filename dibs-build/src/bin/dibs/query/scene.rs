@@ -90,22 +90,36 @@ impl<'a> Surface<'a> {
         tree: &Tree<'_, I>,
         tool: &impl Tool,
         margin: Option<f32>,
-        Room(contacts): &mut Room,
+        room: &mut Room,
     ) -> Result<Found> {
         let positions = self.positions.as_slice();
         let mut query = Query::<I, STACK>::new(tree)?;
         let Some(margin) = margin else {
             return Ok(Found::new(query.closest(positions, tool, &self.options)?));
         };
+        let contacts = room.list();
         let closest = query.contacts(positions, tool, margin, &self.options, contacts)?;
         let bound = contacts.bound();
         Ok(Found { contacts: contacts.iter().copied().collect(), bound, ..Found::new(closest) })
     }
 }
 
-/// Room for the contacts of a pair: a quarter of a megabyte, for any number of poses.
+type List = Contacts<64, 16_384>;
+
+/// Room for the contacts of a pair, once it is needed: half a megabyte, for any number of poses.
 #[derive(Default)]
-pub struct Room(Box<Contacts<64, 16_384>>);
+pub struct Room(Option<Box<List>>);
+
+impl Room {
+    fn list(&mut self) -> &mut List {
+        /// A separate function, since the list passes over the stack: nothing of it is left there when work is split.
+        #[inline(never)]
+        fn empty() -> Box<List> {
+            Box::new(List::new())
+        }
+        self.0.get_or_insert_with(empty)
+    }
+}
 
 /// What one tool finds on one surface.
 struct Found {
