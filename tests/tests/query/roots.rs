@@ -204,6 +204,29 @@ fn sides_and_contacts_are_those_of_every_part() {
 }
 
 #[test]
+fn a_trackers_contacts_are_those_of_every_part_however_short_the_list() {
+    let crumbs: Vec<Mesh> = (0..60).map(|at| moved(&crumb(), Vec3::X * 4.0 * at as f32)).collect();
+    let mesh = joined(&crumbs);
+    let built = build(&mesh);
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut odometer = Odometer::new(&tree);
+    let surface = odometer.start(rows.as_slice());
+    let mut tracker = Tracker::<u16, MAX_STACK, 64>::new(&tree).expect("deep enough");
+    // The roots have no place in the one list, and all have in the other.
+    let (mut short, mut long) = (Contacts::<32, 6>::new(), Contacts::<32, 64>::new());
+    for at in 0..60 {
+        let tool = Sphere::new(Vec3::new(4.0 * at as f32 + 0.3, 0.4, 4.0), 1.0).expect("valid");
+        tracker.contacts(&surface, &tool, 2.0, &Options::new(), &mut short).expect("an answer");
+        tracker.contacts(&surface, &tool, 2.0, &Options::new(), &mut long).expect("an answer");
+        assert_eq!((short.opened(), long.opened()), (6, 8));
+        assert_eq!((short.len(), short.bound()), (1, 2.0), "{at}");
+        let triangle = |list: &Contacts<32, 64>| list.iter().next().map(|contact| contact.triangle);
+        assert_eq!(short.iter().next().map(|contact| contact.triangle), triangle(&long));
+    }
+}
+
+#[test]
 fn a_tree_holds_so_many_roots_and_no_more() {
     let crumbs = |count: u32| -> Vec<Mesh> {
         (0..count).map(|at| moved(&crumb(), Vec3::X * 5.0 * at as f32)).collect()

@@ -159,3 +159,28 @@ fn contacts_survive_leaps_rests_budgets_and_other_trackers() {
     assert_eq!(wrong, 0, "contacts missing or of nothing, of {compared}");
     assert!(cfg!(debug_assertions) || compared > 500, "{compared}");
 }
+
+#[test]
+fn no_budget_hides_contacts_for_which_the_front_has_no_place() {
+    let mesh = generate::heart(2_000).expect("a valid size").mesh;
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut tracker = Tracked::new(&tree).expect("deep enough");
+    let mut odometer = Odometer::new(&tree);
+    let surface = odometer.start(rows.as_slice());
+    let mut list = Contacts::<64, 4>::new();
+    let mut found = [0; 2];
+    for row in (0..tree.vertex_count()).step_by(97) {
+        let at = rows[row as usize] * 1.05;
+        let tool = Sphere::new(at, 2.0).expect("a valid sphere");
+        for node_tests in (0..600).step_by(3) {
+            let options = Options::new().budget(Budget { node_tests, triangle_tests: 1_000 });
+            compare(&mut tracker, &surface, &tool, &options, &mut list, &mut found);
+        }
+    }
+    let [compared, wrong] = found;
+    println!("{compared} contacts below the lists' bounds");
+    assert_eq!(wrong, 0, "contacts missing or of nothing, of {compared}");
+    assert!(compared > 500, "{compared}");
+}

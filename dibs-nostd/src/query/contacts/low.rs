@@ -28,7 +28,12 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         options: &Options,
     ) -> Result<Budget, QueryError> {
         self.add_from(pair, options, |basins, _, limit, ridge| {
-            each_low(pair, stack, options, basins, limit, ridge)
+            let mut low = Low::new(basins, limit);
+            let &Pair { tree, vertices, tool, .. } = pair;
+            let search = Search::start(tree, stack, vertices, tool, options, None, None)?;
+            let visit = |row, square| low.add(row, square);
+            let (beyond, tests) = search.each_low(limit, ridge, visit)?;
+            Ok(Found { complete: low.complete, beyond, tests })
         })
     }
 
@@ -48,39 +53,12 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             let search = Search::start(tree, stack, vertices, tool, options, None, None)?;
             let visit = |row, square| low.add(row, square);
             let (beyond, tests) = search.each_low_from(&mut front, limit, ridge, visit)?;
-            if let Some(beyond) = beyond {
-                if beyond == f32::INFINITY {
-                    front.keep(pair.tool, travel);
-                }
-                return Ok(Found { complete: low.complete, beyond, tests });
+            if beyond == f32::INFINITY {
+                front.keep(pair.tool, travel);
             }
-            // The front has no room for this range.
-            let Budget { node_tests, triangle_tests } = tests;
-            let rest = options.budget(options.budget.less(node_tests, triangle_tests));
-            let found = each_low(pair, stack, &rest, basins, limit, ridge)?;
-            let tests = Budget {
-                node_tests: node_tests.saturating_add(found.tests.node_tests),
-                triangle_tests: triangle_tests.saturating_add(found.tests.triangle_tests),
-            };
-            Ok(Found { tests, ..found })
+            Ok(Found { complete: low.complete, beyond, tests })
         })
     }
-}
-
-/// Enters the low triangles within a limit.
-fn each_low<I: Index, V: VertexTable + ?Sized, T: Tool, const NEAR: usize>(
-    pair: &Pair<'_, I, V, T>,
-    stack: &mut [Waiting],
-    options: &Options,
-    basins: &mut Basins<NEAR>,
-    limit: f32,
-    ridge: f32,
-) -> Result<Found, QueryError> {
-    let mut low = Low::new(basins, limit);
-    let &Pair { tree, vertices, tool, .. } = pair;
-    let search = Search::start(tree, stack, vertices, tool, options, None, None)?;
-    let (beyond, tests) = search.each_low(limit, ridge, |row, square| low.add(row, square))?;
-    Ok(Found { complete: low.complete, beyond, tests })
 }
 
 /// The low triangles, as they are found.

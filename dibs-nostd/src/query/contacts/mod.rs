@@ -166,8 +166,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         self.found.is_full
     }
 
-    /// Of `NEAR` places, those that a tracker's last search used for opened nodes. Once they are more than three
-    /// quarters, the next search starts anew.
+    /// Of `NEAR` places, those that a tracker's last search used for opened nodes. Once all are used, the next search
+    /// starts anew; nodes for which there is no place are searched as a query does.
     #[must_use]
     pub const fn opened(&self) -> u32 {
         self.front.opened()

@@ -21,6 +21,26 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     ) -> Result<(f32, Budget), QueryError> {
         self.set_limit(limit);
         let mut heights = Heights::new();
+        let least = match self.visit_waiting(ridge, &mut heights, &mut visit)? {
+            Some(waiting) => {
+                let standing = least_standing(&heights, ridge);
+                if standing < waiting { standing } else { waiting }
+            }
+            None if self.visit_rest(&heights, &mut visit)? => f32::INFINITY,
+            None => least_standing(&heights, ridge),
+        };
+        Ok((least, self.made()))
+    }
+
+    /// Visits what is below the waiting subtrees. Returns a lower bound on the distance of the rest if the budget was not
+    /// enough.
+    #[inline(always)]
+    pub(super) fn visit_waiting(
+        &mut self,
+        ridge: f32,
+        heights: &mut Heights,
+        visit: &mut impl FnMut(u32, f32) -> f32,
+    ) -> Result<Option<f32>, QueryError> {
         while let Some(top) = self.waiting.checked_sub(1) {
             self.waiting = top;
             let &Waiting { lower, link } =
@@ -36,22 +56,17 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             if let Some(left) = self.left.node_tests.checked_sub(count) {
                 self.left.node_tests = left;
                 is_done = if is_leaf {
-                    self.visit_low(first, count, ridge, &mut heights, &mut visit)?.is_some()
+                    self.visit_low(first, count, ridge, heights, visit)?.is_some()
                 } else {
                     self.wait_for_children(lower, first, count)?;
                     true
                 };
             }
             if !is_done {
-                let (waiting, standing) =
-                    (self.least_waiting(lower), least_standing(&heights, ridge));
-                let least = if standing < waiting { standing } else { waiting };
-                return Ok((least, self.made()));
+                return Ok(Some(self.least_waiting(lower)));
             }
         }
-        let is_done = self.visit_rest(&heights, &mut visit)?;
-        let least = if is_done { f32::INFINITY } else { least_standing(&heights, ridge) };
-        Ok((least, self.made()))
+        Ok(None)
     }
 
     /// Visits the triangles that still stand for a vertex. Returns whether the budget was enough.

@@ -3,14 +3,14 @@
 //! It has the nodes that were opened. Of their children some are opened themselves, some are leaves within the range, and
 //! the others are farther: one bound for those of a node runs out by an odometer, as in a tracker's front (see
 //! [`tick`](super::tick), also for rounding). Leaves within the range are looked at in every tick, all others once the
-//! bound has run out. Nodes that were opened stay so until the front starts anew.
+//! bound has run out. Nodes that were opened stay so until no place is left; then the front starts anew.
 
 #[cfg(test)]
 mod tests;
 
-use super::Search;
 use super::heights::Heights;
 use super::near::least_standing;
+use super::{Search, Waiting};
 use crate::math::sqrt::sqrt;
 use crate::query::axis::Axis;
 use crate::query::tracker::front::is_before;
@@ -59,14 +59,6 @@ pub(in crate::query) struct RangeFrontMut<'f> {
     unit: Unit,
 }
 
-/// The outcome of a look at the children of an opened node.
-enum Look {
-    Done,
-    OutOfBudget,
-    /// More nodes had to be opened than there are places.
-    Full,
-}
-
 impl<const M: usize> RangeFront<M> {
     pub const fn new() -> Self {
         let none = Opened { link: 0, key: 0, opened: 0, near: 0 };
@@ -86,8 +78,7 @@ impl<const M: usize> RangeFront<M> {
             Some(surface.saturating_add(u64::from(axis.step(tool, unit))))
         });
         match moved {
-            // A quarter of the places is for the nodes that this search opens.
-            Some(moved) if moved <= JUMP && state.count <= M - M / 4 => {
+            Some(moved) if moved <= JUMP && state.count < M => {
                 state.now = state.now.wrapping_add(moved as u32);
             }
             _ => state.count = 0,
@@ -132,19 +123,20 @@ impl RangeFrontMut<'_> {
 }
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// As [`each_low`](Self::each_low), from the front of the last search on. `None` instead of a distance if the front
-    /// has no room; then not all are visited.
+    /// As [`each_low`](Self::each_low), from the front of the last search on. Nodes for which there is no place are searched
+    /// without.
     pub fn each_low_from(
         mut self,
         front: &mut RangeFrontMut<'_>,
         limit: f32,
         ridge: f32,
         mut visit: impl FnMut(u32, f32) -> f32,
-    ) -> Result<(Option<f32>, Budget), QueryError> {
+    ) -> Result<(f32, Budget), QueryError> {
         self.set_limit(limit);
         if front.state.count == 0 && front.start(self.tree.roots()).is_none() {
-            return Ok((None, self.made()));
+            return self.each_low(limit, ridge, visit);
         }
+        self.waiting = 0;
         let mut heights = Heights::new();
         let mut threshold = front.threshold(self.cutoff + self.coordinate_slack);
         let mut at = 0;
@@ -154,14 +146,10 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 at += 1;
                 continue;
             }
-            if is_due {
-                match self.look_farther(front, at, node)? {
-                    Look::Done => (),
-                    Look::OutOfBudget => break,
-                    Look::Full => return Ok((None, self.made())),
-                }
-            }
-            if !self.visit_near(front, at, ridge, &mut heights, &mut visit)? {
+            let is_done = (!is_due || self.look_farther(front, at, node)?)
+                && self.visit_waiting(ridge, &mut heights, &mut visit)?.is_none()
+                && self.visit_near(front, at, ridge, &mut heights, &mut visit)?;
+            if !is_done {
                 break;
             }
             // A visit may have lowered the cutoff.
@@ -171,19 +159,20 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         if at < front.state.count || !self.visit_rest(&heights, &mut visit)? {
             let (beyond, standing) = (self.least_from(front, at)?, least_standing(&heights, ridge));
             let least = if standing < beyond { standing } else { beyond };
-            return Ok((Some(least), self.made()));
+            return Ok((least, self.made()));
         }
-        Ok((Some(f32::INFINITY), self.made()))
+        Ok((f32::INFINITY, self.made()))
     }
 
-    /// Tests the children that were farther.
+    /// Tests the children that were farther. Those for which there is no place wait on the stack. Returns whether the budget
+    /// was enough.
     #[inline(always)]
     fn look_farther(
         &mut self,
         front: &mut RangeFrontMut<'_>,
         at: usize,
         node: Opened,
-    ) -> Result<Look, QueryError> {
+    ) -> Result<bool, QueryError> {
         let (now, unit, tree) = (front.state.now, front.unit, self.tree);
         let margin = self.slack + self.coordinate_slack;
         let later = |bound: f32| {
@@ -202,7 +191,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 continue;
             }
             let Some(left) = self.left.node_tests.checked_sub(1) else {
-                return Ok(Look::OutOfBudget);
+                return Ok(false);
             };
             self.left.node_tests = left;
             let position = self.position(child.pin)?;
@@ -214,11 +203,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             if !(own > self.cutoff) {
                 match Link::decode(child.link) {
                     Link::Children { .. } => {
-                        if front.open(child.link, key).is_none() {
-                            return Ok(Look::Full);
+                        if front.open(child.link, key).is_some() {
+                            opened |= bit;
+                            continue;
                         }
-                        opened |= bit;
-                        continue;
+                        let subtree = Waiting { lower: own, link: child.link };
+                        self.push(0, subtree).ok_or(corrupt)?;
                     }
                     Link::Leaf { first, count } => {
                         let plane = self.plane_across(normal, position, distance);
@@ -237,7 +227,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             }
         }
         *front.nodes.get_mut(at).ok_or(corrupt)? = Opened { link, key: least, opened, near };
-        Ok(Look::Done)
+        Ok(true)
     }
 
     /// Visits the leaves of an opened node within the range. Returns whether the budget was enough.

@@ -238,9 +238,9 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
     ///
     /// Where the surface is within the margin, a range search finds the others. The list remembers its front: the nodes that
     /// it opened, and for how long their other children are beyond the margin. So give a tracker the same list at every
-    /// tick. A tick starts the front anew if the list was last filled by another tracker, the tick before ran out of
-    /// budget, or motion has opened too many nodes ([`Contacts::opened`]). Where the budget ends, the list's bound can be
-    /// less than a query's, which looks at near parts first.
+    /// tick. The front starts anew for another surface, for a tool as far from the last as a 16th of the root sphere's radius,
+    /// after a search that ran out of budget, and once all of the list's places are used ([`Contacts::opened`]). Where the
+    /// budget ends, the list's bound can be less than a query's, which looks at near parts first.
     ///
     /// Cost: that of [`closest`](Self::closest), a few instructions for each opened node, and what a query takes to compare
     /// the triangles within the margin.

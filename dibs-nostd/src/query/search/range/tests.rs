@@ -20,7 +20,8 @@ const LIMIT: f32 = 6.0;
 const RIDGE: f32 = 0.1;
 
 /// The bounds in the front, in mm: none exceeds the distance of the nearest vertex below it, and after a whole search none
-/// is less than the limit, but for rounding. All triangles are below one of them, or in a leaf within the range, and no triangle twice.
+/// is less than the limit, but for rounding. All triangles are below one of them, or in a leaf within the range, and no
+/// triangle twice.
 fn bounds<const M: usize>(
     front: &RangeFront<M>,
     tree: &Tree<'_, u16>,
@@ -95,7 +96,7 @@ fn no_bound_of_a_range_exceeds_the_distance() {
                 let visit = |_, _| LIMIT;
                 let search = search.expect("valid");
                 let (beyond, _) = search.each_low_from(&mut moved, LIMIT, RIDGE, visit)?;
-                let is_whole = beyond == Some(f32::INFINITY);
+                let is_whole = beyond == f32::INFINITY;
                 if is_whole {
                     moved.keep(&tool, travel);
                 }
