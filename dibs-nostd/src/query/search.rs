@@ -96,10 +96,6 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     touching_squared: f32,
     /// The triangles that the axis may meet, once the search has ended.
     touched: Option<&'s mut Touched>,
-    /// The leaves visited, of a search of the kind [`UNTIL`].
-    around: Option<&'s mut Around>,
-    /// Its subtrees are visited if they are no farther than this beyond the cutoff.
-    wider: f32,
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T> {
@@ -195,8 +191,6 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             best_triangle: u32::MAX,
             touching_squared: if is_asked { accuracy * accuracy } else { -1.0 },
             touched,
-            around: None,
-            wider: 0.0,
         };
         search.lower_cutoff_to_pin(all.nearest.row, all.nearest.distance);
         if let Some(TriangleRow(triangle)) = first
@@ -221,17 +215,20 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             self.waiting = top;
             let &Waiting { lower, link } =
                 self.stack.get(top).ok_or(QueryError::Corrupt { row: top as u32 })?;
-            if lower > self.reach::<KIND>() {
+            if lower > self.cutoff {
                 continue;
             }
             if KIND == UNTIL && self.cutoff <= limit {
-                return self.finish(self.least_waiting(lower));
+                return self.finish(0.0);
             }
             let step = match Link::decode(link) {
-                Link::Children { first, count } => self.expand::<KIND>(lower, first, count)?,
-                Link::Leaf { first, count } => self.leaf::<KIND>(first, count)?,
+                Link::Children { first, count } => self.expand(lower, first, count)?,
+                Link::Leaf { first, count } => self.leaf(first, count)?,
             };
             if matches!(step, Step::OutOfBudget) {
+                if KIND == UNTIL {
+                    return self.finish(0.0);
+                }
                 self.leave_unfinished();
                 let least = self.least_waiting(lower);
                 let is_beyond = KIND == WITHIN && self.is_beyond(limit) && limit < least;
@@ -254,12 +251,6 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     /// No triangle was found within `limit` of the axis. A limit that is not a number limits nothing.
     fn is_beyond(&self, limit: f32) -> bool {
         self.best.is_none_or(|pair| pair.distance_squared > limit * limit)
-    }
-
-    /// Nothing farther than this is visited.
-    #[inline(always)]
-    fn reach<const KIND: u8>(&self) -> f32 {
-        if KIND == UNTIL { self.cutoff + self.wider } else { self.cutoff }
     }
 
     /// The least lower bound of the waiting subtrees and of one that was not finished.
@@ -309,12 +300,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     /// Tests the spheres of a node's children, and the planes of those that are leaves; pushes the rest. Each child's
     /// bound is at least its parent's, so the certified bound never falls.
     #[inline(always)]
-    fn expand<const KIND: u8>(
-        &mut self,
-        parent: f32,
-        first: u32,
-        count: u32,
-    ) -> Result<Step, QueryError> {
+    fn expand(&mut self, parent: f32, first: u32, count: u32) -> Result<Step, QueryError> {
         let corrupt = QueryError::Corrupt { row: first };
         let Some(left) = self.left.node_tests.checked_sub(count) else {
             return Ok(Step::OutOfBudget);
@@ -327,7 +313,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             let radius = node.radius_code as f32 * self.radius_scale;
             let normal = self.tool.axis_to(position);
             let squared = normal.dot(normal);
-            let far = self.reach::<KIND>() + radius;
+            let far = self.cutoff + radius;
             // A NaN counts as near: the leaves below name the vertex that it comes from.
             if squared > far * far {
                 continue;
@@ -339,7 +325,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
                 && let Some(left) = self.left.node_tests.checked_sub(1)
             {
                 self.left.node_tests = left;
-                let plane = self.plane_at(self.reach::<KIND>(), normal, position, distance);
+                let plane = self.plane_across(normal, position, distance);
                 let beyond = plane.beyond(tree, self.vertices, first, count).ok_or(corrupt)?;
                 if beyond == count {
                     continue;
@@ -355,7 +341,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     /// Tests a leaf that no waiting subtree is nearer than: its vertices against one plane; then each triangle, from
     /// the first that the plane does not reject, against the same plane and a plane of its own.
     #[inline(always)]
-    fn leaf<const KIND: u8>(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
+    fn leaf(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
         let Some(left) = self.left.node_tests.checked_sub(1) else {
             return Ok(Step::OutOfBudget);
         };
@@ -365,18 +351,10 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         let position = self.position(corner)?;
         let normal = self.tool.axis_to(position);
         let length = sqrt(normal.dot(normal));
-        let patch_plane = self.plane_at(self.reach::<KIND>(), normal, position, length);
+        let patch_plane = self.plane_across(normal, position, length);
         let beyond = patch_plane.beyond(self.tree, self.vertices, first, count).ok_or(corrupt)?;
         if beyond == count {
             return Ok(Step::Done);
-        }
-        if KIND == UNTIL
-            && let Some(around) = &mut self.around
-        {
-            // Leaves that are not remembered are not worth a wider search.
-            if !around.push(Link::Leaf { first, count }) {
-                self.wider = 0.0;
-            }
         }
         let tree = self.tree;
         let (first, count) = (first + beyond, count - beyond);
@@ -419,14 +397,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     /// The plane perpendicular to the shortest vector from the axis to a point, of this length.
     #[inline(always)]
     fn plane_across(&self, normal: Vec3, point: Vec3, length: f32) -> Plane {
-        self.plane_at(self.cutoff, normal, point, length)
-    }
-
-    /// The same for another cutoff.
-    #[inline(always)]
-    fn plane_at(&self, cutoff: f32, normal: Vec3, point: Vec3, length: f32) -> Plane {
         let on_axis = point - normal;
-        let beyond = (cutoff + self.coordinate_slack) * length;
+        let beyond = (self.cutoff + self.coordinate_slack) * length;
         Plane { normal, limit: normal.dot(on_axis) + beyond + self.tilt_slack }
     }
 

@@ -3,7 +3,7 @@
 //! A depth changes by at most the motion of tool and surface. So every bound of the last tick still holds, plus that
 //! motion: only parts of the axis whose bounds have come above the deepest point are looked at again.
 
-use super::part::{Part, Parts, larger};
+use super::part::{Part, Parts};
 use crate::TriangleRow;
 use crate::query::search::Around;
 use crate::surface::motion::Unit;
@@ -39,16 +39,14 @@ pub(in crate::query) struct Known {
 pub(in crate::query) struct Points {
     points: [Point; KEPT],
     count: usize,
-    /// Depth of the deepest point; 0 if no point was inside.
+    /// The deepest point's parameter; not a number if no point was inside.
     deepest: f32,
-    /// Its parameter; not a number if no point was inside.
-    at: f32,
 }
 
 impl Known {
     pub const fn new(unit: Unit) -> Self {
         let none = Point { parameter: 0.0, depth: 0.0, bound: 0.0, triangle: TriangleRow(0) };
-        let points = Points { points: [none; KEPT], count: 0, deepest: 0.0, at: f32::NAN };
+        let points = Points { points: [none; KEPT], count: 0, deepest: f32::NAN };
         Self { points, around: Around::new(), unit, moved: 0 }
     }
 
@@ -67,12 +65,10 @@ impl Known {
     pub fn now(&mut self) -> (&mut Points, &mut Around) {
         if self.moved > 0 {
             let moved = self.unit.length(self.moved as i32) * (1.0 + 4.0 * f32::EPSILON);
-            let Points { points, deepest, .. } = &mut self.points;
-            for point in points {
+            for point in &mut self.points.points {
                 point.depth = raised(point.depth, moved);
                 point.bound = raised(point.bound, moved);
             }
-            *deepest = (*deepest - moved) * (1.0 - f32::EPSILON);
             self.around.add_motion(moved);
             self.moved = 0;
         }
@@ -85,16 +81,17 @@ impl Points {
         self.count = 0;
     }
 
-    /// The points from the axis' start to its end, and a depth and the parameter of the point that has it.
-    pub(super) fn last(&self) -> Option<(&[Point], (f32, f32))> {
-        let points = self.points.get(..self.count)?;
-        (points.len() > 1).then_some((points, (larger(self.deepest, 0.0), self.at)))
+    /// The points from the axis' start to its end, and the deepest one's parameter, if a bound is still below `reach`.
+    pub(super) fn below(&self, reach: f32) -> Option<(&[Point], f32)> {
+        let (_, points) = self.points.get(..self.count)?.split_last()?;
+        let is_known = points.iter().any(|point| point.bound < reach);
+        is_known.then_some((self.points.get(..self.count)?, self.deepest))
     }
 
-    /// Remembers the parts of a search, of which the point at the parameter `at` is deepest.
-    pub(super) fn keep(&mut self, parts: &mut Parts, deepest: f32, at: f32) {
-        while parts.count() > KEPT && parts.join(at, f32::INFINITY) {}
-        (self.count, self.deepest, self.at) = (0, deepest, at);
+    /// Remembers the parts of a search, of which the point at the parameter `deepest` is that.
+    pub(super) fn keep(&mut self, parts: &mut Parts, deepest: f32) {
+        while parts.count() > KEPT && parts.join(deepest, f32::INFINITY) {}
+        (self.count, self.deepest) = (0, deepest);
         for (place, part) in self.points.iter_mut().zip(parts.in_order()) {
             let Part { from, bound, .. } = part;
             let Some(triangle) = from.triangle else { return self.forget() };
@@ -125,7 +122,7 @@ mod tests {
             known.forget();
         }
         known.add_motion(1 << 31);
-        let (points, around) = known.now();
-        assert!(points.last().is_none() && around.beyond <= 0.0);
+        let (points, _) = known.now();
+        assert!(points.below(f32::INFINITY).is_none());
     }
 }

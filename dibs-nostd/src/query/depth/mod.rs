@@ -130,7 +130,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         }
         self.find_touches(touched)?;
         let mut parts = Parts::new();
-        let deepest = match known.as_deref().and_then(Points::last) {
+        let last = match known.as_deref().and_then(|known| known.below(reach)) {
             Some((points, deepest)) => {
                 self.resume(&mut parts, points);
                 Some(deepest)
@@ -140,9 +140,9 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
                 None
             }
         };
-        let bound = self.divide(&mut parts, tolerance, deepest)?;
+        let bound = self.divide(&mut parts, tolerance, last)?;
         if let Some(known) = known {
-            known.keep(&mut parts, self.deepest, self.deepest_at);
+            known.keep(&mut parts, self.deepest_at);
         }
         self.finish(bound)
     }
@@ -154,28 +154,22 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         larger(along, length - along) + meeting.axis_distance + meeting.accuracy
     }
 
-    /// Divides the part with the highest bound until none is above the deepest point by more than the tolerance.
-    /// Returns the highest bound. At least one point is searched. Until then a depth and the parameter of the point that
-    /// has it may be known.
+    /// Looks at the last tick's deepest point, then divides the part with the highest bound until none is above the
+    /// deepest point by more than the tolerance. Returns the highest bound.
     fn divide(
         &mut self,
         parts: &mut Parts,
         tolerance: f32,
-        mut known: Option<(f32, f32)>,
+        last: Option<f32>,
     ) -> Result<f32, QueryError> {
+        if let Some(row) = last.and_then(|at| parts.row_of(at)) {
+            self.look_again(parts, row)?;
+        }
         loop {
-            let enough = known.map_or(self.deepest, |(depth, _)| depth) + tolerance;
+            let enough = self.deepest + tolerance;
             let row = parts.highest();
             let (next, bound, split) = parts.state(row);
-            let is_enough = !(bound > enough);
-            if let Some((_, at)) = known.filter(|_| is_enough) {
-                known = None;
-                if let Some(row) = parts.row_of(at) {
-                    self.look_again(parts, row)?;
-                }
-                continue;
-            }
-            if is_enough {
+            if !(bound > enough) {
                 return Ok(bound);
             }
             let ends = [row, next];
@@ -196,18 +190,11 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             };
             let Some(place) = self.room(parts, enough) else { return Ok(bound) };
             let (from, to) = (parts.sample(row), parts.sample(next));
-            let is_first = known.take().is_some();
-            if is_first && larger(from.depth, to.depth) >= bound {
-                let row = if from.depth >= bound { row } else { next };
-                self.look_again(parts, row)?;
-                continue;
-            }
             let is_nearer = split - from.along < to.along - split;
             let ends = if is_nearer { [&from, &to] } else { [&to, &from] };
-            let until = if is_first { EXACT } else { enough };
-            let mut middle = self.between(split, ends, until)?;
-            if middle.depth > until {
-                middle = self.look(middle, until)?;
+            let mut middle = self.between(split, ends, enough)?;
+            if middle.depth > enough {
+                middle = self.look(middle, enough)?;
             }
             let enough = self.deepest + tolerance;
             let before = self.bound(&from, &middle, enough);
@@ -242,9 +229,12 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         self.options.budget.node_tests == 0
     }
 
-    /// Searches a sample's point to the end.
+    /// Searches the point of a sample to the end; the leaves around it are remembered.
     fn look_again(&mut self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
         let sample = parts.sample(row);
+        if let Some(around) = &mut self.around {
+            around.move_to(sample.parameter, self.tool.axis_length());
+        }
         let sample = self.look(sample, EXACT)?;
         parts.set_sample(row, sample);
         Ok(())
@@ -272,17 +262,17 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         let Some(node_tests) = node_tests.checked_sub(1) else { return Ok(sample) };
         let options = self.options.budget(Budget { node_tests, triangle_tests });
         let (point, first) = (AxisPoint(on_axis), sample.triangle);
-        let mut search =
+        let search =
             Search::start(self.tree, self.stack, self.vertices, &point, &options, first, None)?;
-        let mut around = self.around.as_deref_mut().filter(|_| enough == EXACT);
-        let wider = around.as_deref_mut().and_then(|around| {
-            around.move_to(parameter, self.tool.axis_length());
-            search.begin_around(around)
-        });
-        let found = search.run::<UNTIL>(enough)?;
-        if let (Some(around), Some(wider)) = (around, wider) {
-            around.keep(&found, wider);
-        }
+        // A bound that is just low enough would not be so at the next tick.
+        let enough = if self.around.is_some() { EXACT } else { enough };
+        let length = self.tool.axis_length();
+        let around = self.around.as_deref_mut();
+        let found = match around.map(|around| (around.way_to(parameter, length), around)) {
+            Some((way, around)) if search.is_among(around, way) => search.among(around, way)?,
+            Some((way, around)) if way <= 0.0 => search.gather(around)?,
+            _ => search.run::<UNTIL>(enough)?,
+        };
         self.options.budget = Budget {
             node_tests: node_tests.saturating_sub(found.node_tests.saturating_sub(1)),
             triangle_tests: triangle_tests.saturating_sub(found.triangle_tests),

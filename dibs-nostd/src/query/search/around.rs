@@ -1,95 +1,273 @@
 //! The leaves around a point of the axis.
 //!
-//! A search that goes farther than the closest triangle leaves them. Until tool and surface have moved so far, the closest
-//! triangle is in one of them, and the next ticks look at no others.
+//! A search that goes farther than the closest triangle gathers them, each with a bound. Until tool and surface have moved
+//! too far, the closest triangle is in one of them, and the next ticks look only at those whose bounds have run out.
 //!
-//! Rounding. The distance beyond is stored less the slack of its own search, and compared with the cutoff, which has the
-//! slack of this one.
+//! Rounding. A bound is stored less the slack of its own search, and compared with the cutoff, which has the slack of this
+//! one.
 
-use super::{Search, Waiting};
+use super::{Search, THIRD, Waiting};
+use crate::math::sqrt::sqrt;
+use crate::query::plane::{Plane, least};
 use crate::tree::format::Link;
+use crate::unavailable::QueryError;
 use crate::{Index, Proximity, Tool, VertexTable};
 
 /// Most of them.
-const MOST: usize = 32;
+const MOST: usize = 48;
 
-/// A search goes as much farther as tool and surface move in so many ticks, but not more than twice as far.
-const TICKS: f32 = 8.0;
+/// A search goes as much farther as tool and surface move in so many ticks, but not more than twice as far, and less where
+/// there are too many leaves.
+const TICKS: f32 = 60.0;
 
 /// The leaves around a point.
 #[derive(Clone, Debug)]
 pub(in crate::query) struct Around {
-    /// Their links.
-    leaves: [u32; MOST],
+    leaves: [Leaf; MOST],
+    /// More than there are places if some were lost.
     count: usize,
-    /// All other leaves are at least as far as this from the point; 0 if that is not known.
-    pub beyond: f32,
+    /// Motion of tool and surface, and of the point along its axis, since they were gathered.
+    moved: f32,
+    /// All other leaves were at least as far as this; 0 if that is not known.
+    beyond: f32,
     /// Where the point is on its axis: 0 at the start, 1 at the end.
     parameter: f32,
     /// The motion of the last tick.
-    moved: f32,
+    step: f32,
+}
+
+/// A leaf.
+#[derive(Clone, Copy, Debug)]
+struct Leaf {
+    link: u32,
+    /// It was at least as far as this when the leaves were gathered.
+    bound: f32,
 }
 
 impl Around {
     pub const fn new() -> Self {
-        Self { leaves: [0; MOST], count: 0, beyond: 0.0, parameter: 0.0, moved: 0.0 }
+        let leaves = [Leaf { link: 0, bound: 0.0 }; MOST];
+        Self { leaves, count: 0, moved: 0.0, beyond: 0.0, parameter: 0.0, step: 0.0 }
     }
 
     pub fn forget(&mut self) {
-        self.beyond = 0.0;
+        (self.count, self.moved, self.beyond) = (0, 0.0, 0.0);
     }
 
     /// Tool and surface have moved.
     pub fn add_motion(&mut self, moved: f32) {
-        self.beyond = (self.beyond - moved) * (1.0 - f32::EPSILON);
-        self.moved = moved;
+        self.moved = sum(self.moved, moved);
+        self.step = moved;
     }
 
-    /// The point is another one of its axis, which is as long as this.
+    /// The way from the point to another one of its axis, which is as long as `length`.
+    pub fn way_to(&self, parameter: f32, length: f32) -> f32 {
+        (parameter - self.parameter).abs() * length * (1.0 + 4.0 * f32::EPSILON)
+    }
+
+    /// The point is another one of its axis.
     pub fn move_to(&mut self, parameter: f32, length: f32) {
-        let moved = (parameter - self.parameter).abs() * length;
-        self.beyond -= moved * (1.0 + 4.0 * f32::EPSILON);
+        self.moved = sum(self.moved, self.way_to(parameter, length));
         self.parameter = parameter;
     }
 
-    /// Whether there was room.
-    #[inline(always)]
-    pub(super) fn push(&mut self, leaf: Link) -> bool {
-        let place = self.leaves.get_mut(self.count);
-        let has_room = place.is_some();
-        if let Some(place) = place {
-            *place = leaf.encode();
+    fn push(&mut self, leaf: Leaf) {
+        if let Some(place) = self.leaves.get_mut(self.count) {
+            *place = leaf;
         }
         self.count = self.count.saturating_add(1);
-        has_room
     }
 
-    /// The search for the closest pair `found` has ended. It left all leaves that are less than `wider` farther.
-    pub fn keep(&mut self, found: &Proximity, wider: f32) {
-        let is_known = !found.is_cut_short() && self.count <= MOST;
-        self.beyond = if is_known { found.axis_distance + wider } else { 0.0 };
+    /// Keeps the leaves that may be within `distance`.
+    fn keep_within(&mut self, distance: f32) {
+        let mut kept = 0;
+        for at in 0..self.count {
+            if let Some(&leaf) = self.leaves.get(at)
+                && !(leaf.bound > distance)
+                && let Some(place) = self.leaves.get_mut(kept)
+            {
+                *place = leaf;
+                kept += 1;
+            }
+        }
+        self.count = kept;
     }
 }
 
-impl<'s, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, '_, I, V, T> {
-    /// Begins with the leaves in `around` alone, if all others are beyond the cutoff. If not, the search will leave them
-    /// there: all that are less than the width returned farther than the closest one.
-    pub fn begin_around(&mut self, around: &'s mut Around) -> Option<f32> {
-        if self.cutoff + self.coordinate_slack <= around.beyond
-            && let Some(leaves) = around.leaves.get(..around.count)
-            && let Some(places) = self.stack.get_mut(..leaves.len())
-        {
-            for (place, &link) in places.iter_mut().zip(leaves.iter().rev()) {
-                *place = Waiting { lower: 0.0, link };
-            }
-            self.waiting = leaves.len();
-            return None;
-        }
-        around.count = 0;
-        around.forget();
-        let width = TICKS * around.moved;
-        self.wider = if width < self.cutoff { width } else { self.cutoff };
-        self.around = Some(around);
-        Some(self.wider - self.slack - self.coordinate_slack)
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
+    /// Whether a point that is this way from that of the leaves is closest to one of them.
+    pub fn is_among(&self, around: &Around, way: f32) -> bool {
+        self.cutoff + self.coordinate_slack + sum(around.moved, way) <= around.beyond
     }
+
+    /// Searches these leaves alone.
+    pub fn among(mut self, around: &mut Around, way: f32) -> Result<Proximity, QueryError> {
+        let moved = sum(around.moved, way);
+        let slack = self.slack + self.coordinate_slack;
+        for leaf in around.leaves.iter_mut().take(around.count) {
+            if leaf.bound - moved > self.cutoff + self.coordinate_slack {
+                continue;
+            }
+            let Link::Leaf { first, count } = Link::decode(leaf.link) else {
+                return Err(QueryError::Corrupt { row: leaf.link });
+            };
+            let Some(bound) = self.leaf_bound(first, count)? else { return self.finish(0.0) };
+            let bound = (bound - slack - way + around.moved) * (1.0 - f32::EPSILON);
+            if bound > leaf.bound {
+                leaf.bound = bound;
+            }
+        }
+        self.finish(f32::INFINITY)
+    }
+
+    /// Searches the tree, and gathers the leaves around the point.
+    pub fn gather(mut self, around: &mut Around) -> Result<Proximity, QueryError> {
+        around.forget();
+        let slack = self.slack + self.coordinate_slack;
+        let mut wider = TICKS * around.step;
+        if wider > self.cutoff {
+            wider = self.cutoff;
+        }
+        while let Some(top) = self.waiting.checked_sub(1) {
+            self.waiting = top;
+            let &Waiting { lower, link } =
+                self.stack.get(top).ok_or(QueryError::Corrupt { row: top as u32 })?;
+            if lower > self.cutoff + wider {
+                continue;
+            }
+            let (first, count) = match Link::decode(link) {
+                Link::Leaf { first, count } => (first, count),
+                Link::Children { first, count } => {
+                    if !self.wait_for(lower, first, count, wider)? {
+                        return self.finish(0.0);
+                    }
+                    continue;
+                }
+            };
+            let Some(own) = self.leaf_bound(first, count)? else { return self.finish(0.0) };
+            let bound = (if own > lower { own } else { lower }) - slack;
+            if around.count == MOST {
+                wider *= 0.5;
+                around.keep_within(self.cutoff + wider - slack);
+            }
+            if !(bound > self.cutoff + wider - slack) {
+                around.push(Leaf { link, bound });
+            }
+        }
+        let found = self.finish(f32::INFINITY)?;
+        if around.count <= MOST {
+            around.beyond = found.axis_distance + wider - 2.0 * slack;
+        }
+        Ok(found)
+    }
+
+    /// Tests the spheres of a node's children. Returns whether the budget was enough.
+    fn wait_for(
+        &mut self,
+        parent: f32,
+        first: u32,
+        count: u32,
+        wider: f32,
+    ) -> Result<bool, QueryError> {
+        let corrupt = QueryError::Corrupt { row: first };
+        let Some(left) = self.left.node_tests.checked_sub(count) else { return Ok(false) };
+        self.left.node_tests = left;
+        let (base, tree) = (self.waiting, self.tree);
+        for node in tree.records(first, count).ok_or(corrupt)? {
+            let distance = sqrt(self.tool.axis_distance_squared(self.position(node.pin)?));
+            let own = distance - node.radius_code as f32 * self.radius_scale;
+            // A NaN counts as near: the leaves below name the vertex that it comes from.
+            if own > self.cutoff + wider {
+                continue;
+            }
+            self.lower_cutoff_to_pin(node.pin, distance);
+            let lower = if own > parent { own } else { parent };
+            self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;
+        }
+        Ok(true)
+    }
+
+    /// Tests a leaf; a lower bound on its distance, or `None` out of budget.
+    fn leaf_bound(&mut self, first: u32, count: u32) -> Result<Option<f32>, QueryError> {
+        let Some(left) = self.left.node_tests.checked_sub(1) else { return Ok(None) };
+        self.left.node_tests = left;
+        let corrupt = QueryError::Corrupt { row: first };
+        let [corner, ..] = self.tree.triangle(first).ok_or(corrupt)?;
+        let position = self.position(corner)?;
+        let normal = self.tool.axis_to(position);
+        let length = sqrt(normal.dot(normal));
+        let plane = self.plane_across(normal, position, length);
+        let excess = plane.excess(self.tree, self.vertices, first, count).ok_or(corrupt)?;
+        if excess > 0.0 {
+            return Ok(Some(self.cutoff + excess / length));
+        }
+        let mut bound = f32::INFINITY;
+        for (triangle, corners) in (first..).zip(self.tree.triangles(first, count).ok_or(corrupt)?)
+        {
+            let Some(own) = self.triangle_bound(triangle, corners, &plane, length)? else {
+                return Ok(None);
+            };
+            if own < bound {
+                bound = own;
+            }
+        }
+        Ok(Some(bound))
+    }
+
+    /// Tests a triangle against its leaf's plane, whose normal is `length` long, against one of its own, and exactly; a
+    /// lower bound on its distance, or `None` out of budget.
+    #[inline(always)]
+    fn triangle_bound(
+        &mut self,
+        triangle: u32,
+        corners: [u32; 3],
+        leaf_plane: &Plane,
+        length: f32,
+    ) -> Result<Option<f32>, QueryError> {
+        if triangle == self.best_triangle {
+            return Ok(Some(sqrt(self.best_squared)));
+        }
+        let (Some(left), Some(triangles_left)) =
+            (self.left.node_tests.checked_sub(1), self.left.triangle_tests.checked_sub(1))
+        else {
+            return Ok(None);
+        };
+        self.left.node_tests = left;
+        let [a, b, c] = corners;
+        let corners = [self.position(a)?, self.position(b)?, self.position(c)?];
+        let excess = |plane: &Plane| least(corners.map(|at| plane.normal.dot(at))) - plane.limit;
+        let from_leaf = excess(leaf_plane);
+        if from_leaf > 0.0 {
+            return Ok(Some(self.cutoff + from_leaf / length));
+        }
+        let [a, b, c] = corners;
+        let middle = (a + b + c) * THIRD;
+        let normal = self.tool.axis_to(middle);
+        let length = sqrt(normal.dot(normal));
+        let plane = self.plane_across(normal, middle, length);
+        if plane.limit.is_nan() {
+            return Err(QueryError::Position { vertex: self.not_finite(triangle) });
+        }
+        let own = excess(&plane);
+        if own > 0.0 {
+            return Ok(Some(self.cutoff + own / length));
+        }
+        self.left.triangle_tests = triangles_left;
+        let Some(pair) = self.tool.closest_on_triangle(&corners, f32::INFINITY) else {
+            return Err(QueryError::Position { vertex: self.not_finite(triangle) });
+        };
+        let distance = sqrt(pair.distance_squared);
+        if pair.distance_squared < self.best_squared {
+            self.best_squared = pair.distance_squared;
+            self.best_triangle = triangle;
+            self.best = Some(pair);
+            self.lower_cutoff(distance);
+        }
+        Ok(Some(distance))
+    }
+}
+
+/// The sum of two lengths, rounded up.
+fn sum(a: f32, b: f32) -> f32 {
+    (a + b) * (1.0 + f32::EPSILON)
 }
