@@ -114,34 +114,25 @@ impl Touches {
 
     /// Adds a place, joined with those that it overlaps.
     fn insert(&mut self, mut place: Place) {
-        let known = self.places.get(..self.count).unwrap_or_default();
-        let from = known.iter().take_while(|other| other.last < place.first).count();
-        let mut to = from;
-        while let Some(other) = known.get(to)
-            && other.first <= place.last
-        {
-            place = place.joined(other);
-            to += 1;
-        }
-        if to == from {
-            for behind in self.places.get_mut(from..self.count).unwrap_or_default() {
-                core::mem::swap(behind, &mut place);
-            }
-            self.push(place);
-            return;
-        }
-        if let Some(joined) = self.places.get_mut(from) {
-            *joined = place;
-        }
-        let removed = to - from - 1;
-        for at in to..self.count {
-            if let Some(&behind) = self.places.get(at)
-                && let Some(free) = self.places.get_mut(at - removed)
-            {
-                *free = behind;
+        let mut apart = 0;
+        for at in 0..self.count {
+            let Some(&other) = self.places.get(at) else { break };
+            if other.last < place.first || other.first > place.last {
+                if let Some(kept) = self.places.get_mut(apart) {
+                    *kept = other;
+                }
+                apart += 1;
+            } else {
+                place = place.joined(&other);
             }
         }
-        self.count -= removed;
+        self.count = apart;
+        for other in self.places.iter_mut().take(apart) {
+            if other.first > place.first {
+                core::mem::swap(other, &mut place);
+            }
+        }
+        self.push(place);
     }
 
     /// Adds a place behind the others; if there is no room, to the last one.
