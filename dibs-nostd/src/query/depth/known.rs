@@ -83,12 +83,13 @@ impl Points {
 
     /// The points from the axis' start to its end, and the deepest one's parameter, if a bound is still below `reach`.
     pub(super) fn below(&self, reach: f32) -> Option<(&[Point], f32)> {
-        let (_, points) = self.points.get(..self.count)?.split_last()?;
-        let is_known = points.iter().any(|point| point.bound < reach);
-        is_known.then_some((self.points.get(..self.count)?, self.deepest))
+        let points = self.points.get(..self.count)?;
+        let (_end, parts) = points.split_last()?;
+        let is_known = parts.iter().any(|part| part.bound < reach);
+        is_known.then_some((points, self.deepest))
     }
 
-    /// Remembers the parts of a search, of which the point at the parameter `deepest` is that.
+    /// Remembers the parts of a search, and the parameter of its deepest point.
     pub(super) fn keep(&mut self, parts: &mut Parts, deepest: f32) {
         while parts.count() > KEPT && parts.join(deepest, f32::INFINITY) {}
         (self.count, self.deepest) = (0, deepest);

@@ -251,8 +251,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         parts.free()
     }
 
-    /// Searches a point of the axis. Out of budget, returns the sample as it is. A point that is no deeper than `enough`
-    /// is not searched to the end.
+    /// Searches a point of the axis. Out of budget, returns the sample as it is. Only a tracker searches a point to the
+    /// end that is no deeper than `enough`.
     fn look(&mut self, sample: Sample, enough: f32) -> Result<Sample, QueryError> {
         self.looks += 1;
         self.spend(LOOK_COST);

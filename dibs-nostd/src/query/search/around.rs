@@ -95,7 +95,7 @@ impl Around {
 }
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// Whether a point that is this way from that of the leaves is closest to one of them.
+    /// Whether the leaves hold the closest triangle. The search's point is as far as `way` from theirs.
     pub fn is_among(&self, around: &Around, way: f32) -> bool {
         self.cutoff + self.coordinate_slack + sum(around.moved, way) <= around.beyond
     }

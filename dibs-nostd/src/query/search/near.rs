@@ -32,7 +32,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok((least, self.made()))
     }
 
-    /// Visits what is below the waiting subtrees. Returns a lower bound on the distance of the rest if the budget was not
+    /// Visits the triangles of the waiting subtrees. Returns a lower bound on the distance of the rest if the budget was not
     /// enough.
     #[inline(always)]
     pub(super) fn visit_waiting(
