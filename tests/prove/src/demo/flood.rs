@@ -31,6 +31,11 @@ const FLOOD_A_TICK: usize = 20;
 const STORM_EVERY: u32 = 50;
 const STORM: usize = 150;
 
+/// Ticks between two calms, and their ticks: a frame needs all of its packets, and without calms it is a matter of luck,
+/// and of the computer's load, whether any comes through.
+pub const CALM_EVERY: u32 = 1_000;
+pub const CALM: u32 = 100;
+
 /// The sender's addresses.
 const SENDER: ([u8; 6], [u8; 4], u16) = ([2, 0, 0, 0, 0, 2], [10, 0, 2, 2], 5001);
 
@@ -83,7 +88,7 @@ impl Wire {
         Ok(Self { socket: self.socket.try_clone()?, sent: Arc::clone(&self.sent) })
     }
 
-    /// Floods the controller until it ends. Returns the frames sent.
+    /// Floods the controller until it ends, with calms. Returns the frames sent.
     pub fn flood(&self, link: &Link, seed: u64) -> Result<u64> {
         let mut rng = Rng::with_seed(seed);
         let (mut tick, mut count) = (0, 0);
@@ -95,6 +100,9 @@ impl Wire {
             }
             let is_storm = now / STORM_EVERY != tick / STORM_EVERY;
             tick = now;
+            if now % CALM_EVERY >= CALM_EVERY - CALM {
+                continue;
+            }
             let storm = rng.usize(..KINDS.len());
             for _ in 0..if is_storm { STORM } else { FLOOD_A_TICK } {
                 let kind = if is_storm { storm } else { rng.usize(..KINDS.len()) };

@@ -5,7 +5,7 @@ mod check;
 mod contacts;
 pub mod debugger;
 mod faults;
-mod flood;
+pub mod flood;
 pub mod freshness;
 pub mod machine;
 mod plot;
