@@ -114,7 +114,7 @@
 /**
  * Bytes of a surface's storage besides its vertices.
  */
-#define DIBS_SURFACE_BASE 368
+#define DIBS_SURFACE_BASE 384
 
 /**
  * Bytes of a surface's storage for each vertex: two positions.

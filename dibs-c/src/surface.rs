@@ -16,7 +16,7 @@ use crate::border::{DIBS_ALIGNMENT, Kind, Storage};
 use crate::code::dibs_code;
 
 /// Bytes of a surface's storage besides its vertices.
-pub const DIBS_SURFACE_BASE: usize = 368;
+pub const DIBS_SURFACE_BASE: usize = 384;
 
 /// Bytes of a surface's storage for each vertex: two positions.
 pub const DIBS_SURFACE_VERTEX: usize = 24;

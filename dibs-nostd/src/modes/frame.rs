@@ -146,8 +146,8 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         let Some(step) = &self.step else { return *self };
         let share = clamped(self.age as f32 / step.interval as f32, 1.0);
         let weights = step.before.towards(&self.weights, share, self.surface.modes());
-        let travel = step.from.beyond((share * step.units as f32) as u64, 0);
-        self.moved(weights, travel, f32::NAN)
+        let travel = step.from.along((share * step.units as f32) as u64);
+        self.moved(weights, Some(travel), f32::NAN)
     }
 
     /// The surface now, if every weight has kept its velocity since the last frame: on time, and wrong by the change of
@@ -164,7 +164,7 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         }
         let share = step.ahead(self.age);
         let weights = self.weights.towards(&step.end, share, modes);
-        let travel = travel.beyond(0, (share * step.units_ahead as f32) as i64);
+        let travel = travel.beside((share * step.units_ahead as f32) as u64);
         // The change of the motion may have been none by chance. False for NaN.
         let [before, now] = step.shown;
         let shown = if before > now { before } else { now };
@@ -181,10 +181,9 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         (self.shown >= 0.0).then_some(self.shown)
     }
 
-    fn moved(&self, weights: Weights<K>, travel: Travel, shown: f32) -> Self {
+    fn moved(&self, weights: Weights<K>, travel: Option<Travel>, shown: f32) -> Self {
         let surface = weights.surface(self.surface.modes());
-        let (travel, step) = (Some(travel), None);
-        Self { surface, weights, travel, step, shown, is_frame: false, ..*self }
+        Self { surface, weights, travel, step: None, shown, is_frame: false, ..*self }
     }
 }
 

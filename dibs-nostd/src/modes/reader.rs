@@ -111,7 +111,7 @@ impl<const K: usize> Last<K> {
         let interval = elapsed(received, before.received);
         let weights = [&before.weights, &weights];
         let step = Step::new(modes, reach, weights, (from, interval), before.step.as_ref());
-        now.travel = Some(from.beyond(step.units, 0));
+        now.travel = Some(from.along(step.units));
         now.step = (interval > 0).then_some(step);
         now
     }

@@ -21,7 +21,8 @@ pub use monitor::StretchMonitor;
 #[cfg(feature = "modes")]
 pub(crate) use motion::farthest;
 #[cfg(feature = "bus")]
-pub(crate) use motion::largest_step;
+#[cfg(feature = "bus")]
+pub(crate) use motion::{largest_change, largest_step};
 use regions::{of_regions, region_rows};
 
 /// Why a stretch could not be measured, or the limit that it exceeds.

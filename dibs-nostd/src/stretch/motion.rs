@@ -2,6 +2,9 @@
 
 use core::ops::Range;
 
+#[cfg(feature = "bus")]
+use glam::Vec3;
+
 use super::StretchError;
 use crate::math::sqrt::sqrt;
 use crate::surface::VertexTable;
@@ -30,6 +33,35 @@ pub(crate) fn largest_step<V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
         }
     }
     largest
+}
+
+/// The largest squares of the last step of these rows, and of its difference from a `share` of the step before; or
+/// `largest` and `off` if those are larger. NaN where a position is NaN.
+///
+/// Steps are compared, not positions: their rounding is that of a step, wherever the surface is.
+#[cfg(feature = "bus")]
+#[inline(never)]
+pub(crate) fn largest_change<V: VertexTable + ?Sized>(
+    (now, before, earlier): (&V, &V, &V),
+    share: f32,
+    rows: Range<u32>,
+    (mut largest, mut off): (f32, f32),
+) -> (f32, f32) {
+    for row in rows {
+        let (Some(now), Some(before)) = (now.position(row), before.position(row)) else { break };
+        let Some(earlier) = earlier.position(row) else { break };
+        let step = now - before;
+        let change = step - (before - earlier) * share;
+        let [step, change] = [step, change].map(Vec3::length_squared);
+        // Written so that a NaN is kept.
+        if !(step <= largest) {
+            largest = step;
+        }
+        if !(change <= off) {
+            off = change;
+        }
+    }
+    (largest, off)
 }
 
 /// Names the first of these rows that moved farther than `limit`.

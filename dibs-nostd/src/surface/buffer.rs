@@ -30,10 +30,15 @@ pub struct Ahead {
     pub sigma: f32,
     /// Largest distance (mm) of a vertex of this frame from its extrapolation by the two frames before; NaN if unknown.
     pub shown: f32,
+    /// Units of the odometer from the frame before to that place, along the way of those two.
+    pub passed: u32,
+    /// Units from there to this frame, at most; the largest number if unknown.
+    pub off: u32,
 }
 
 impl Ahead {
-    pub(crate) const UNKNOWN: Self = Self { sigma: f32::NAN, shown: f32::NAN };
+    pub(crate) const UNKNOWN: Self =
+        Self { sigma: f32::NAN, shown: f32::NAN, passed: 0, off: u32::MAX };
 }
 
 /// One position, as bits of `f32`.
@@ -98,7 +103,7 @@ pub struct Buffer<P: ?Sized> {
     /// The odometer's reading, all zero if there is none.
     travel: [AtomicU32; Travel::WORDS],
     /// The numbers of [`Ahead`].
-    ahead: [AtomicU32; 2],
+    ahead: [AtomicU32; 4],
     positions: P,
 }
 
@@ -111,7 +116,7 @@ impl<const N: usize> Buffer<[Position; N]> {
             position_error: AtomicU32::new(0),
             stretch: [const { AtomicU32::new(0) }; MeasuredStretch::WORDS],
             travel: [const { AtomicU32::new(0) }; Travel::WORDS],
-            ahead: [const { AtomicU32::new(0) }; 2],
+            ahead: [const { AtomicU32::new(0) }; 4],
             positions: [const { Position([const { AtomicU32::new(0) }; 3]) }; N],
         }
     }
@@ -157,16 +162,17 @@ impl<P: Rows + ?Sized> Buffer<P> {
         for (at, word) in self.travel.iter().zip(words) {
             at.store(word, Ordering::Relaxed);
         }
-        let [sigma, shown] = &self.ahead;
-        sigma.store(ahead.sigma.to_bits(), Ordering::Relaxed);
-        shown.store(ahead.shown.to_bits(), Ordering::Relaxed);
+        let Ahead { sigma, shown, passed, off } = ahead;
+        for (at, word) in self.ahead.iter().zip([sigma.to_bits(), shown.to_bits(), passed, off]) {
+            at.store(word, Ordering::Relaxed);
+        }
     }
 
     /// That of a labelled frame.
     pub(super) fn ahead(&self) -> Ahead {
-        let [sigma, shown] =
-            self.ahead.each_ref().map(|word| f32::from_bits(word.load(Ordering::Relaxed)));
-        Ahead { sigma, shown }
+        let [sigma, shown, passed, off] =
+            self.ahead.each_ref().map(|word| word.load(Ordering::Relaxed));
+        Ahead { sigma: f32::from_bits(sigma), shown: f32::from_bits(shown), passed, off }
     }
 
     pub(super) fn label(&self) -> FrameLabel {

@@ -3,6 +3,7 @@
 mod age;
 mod atomic;
 mod buffer;
+mod course;
 mod error;
 mod frames;
 mod latest;

@@ -8,6 +8,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use glam::Vec3;
 
+use super::course::Course;
 use super::moving::Step;
 use crate::math::sqrt::sqrt;
 use crate::{Index, MeasuredStretch, Tree, VertexTable};
@@ -51,11 +52,13 @@ pub struct Travel {
     /// Length along the path through all frames, in the tree's units.
     reading: u64,
     /// Distance from that path, of an extrapolated surface; 0 for a frame.
-    aside: i64,
+    aside: u32,
+    /// The extrapolated surface's step from the frame before.
+    course: Course,
 }
 
 impl Travel {
-    /// The farthest that a vertex can have moved between two readings, in the tree's [`Unit`]; `None` if the
+    /// The farthest that a vertex can have moved since an earlier reading, in the tree's [`Unit`]; `None` if the
     /// motion was not measured all the way.
     #[inline]
     pub(crate) fn since(&self, before: &Self) -> Option<u64> {
@@ -64,10 +67,14 @@ impl Travel {
         }
         let along = self.reading.abs_diff(before.reading);
         if along == 0 {
-            return Some(self.aside.abs_diff(before.aside));
+            return Some(self.aside.abs_diff(before.aside).into());
         }
-        let aside = self.aside.unsigned_abs().saturating_add(before.aside.unsigned_abs());
-        Some(along.saturating_add(aside))
+        let asides = u64::from(self.aside) + u64::from(before.aside);
+        let farthest = along.saturating_add(asides);
+        match self.course.since(self.reading.wrapping_sub(before.reading), before.aside) {
+            Some(units) if units < farthest => Some(units),
+            _ => Some(farthest),
+        }
     }
 
     /// Units from an earlier reading of a frame to this one's; `None` if the motion was not measured all the way.
@@ -78,7 +85,7 @@ impl Travel {
 
     /// The reading at the start of an unbroken run of measurements.
     pub(crate) fn start(tree: u32) -> Self {
-        Self { tree, chain: next_chain(), reading: 0, aside: 0 }
+        Self { tree, chain: next_chain(), reading: 0, aside: 0, course: Course::NONE }
     }
 
     /// The reading of a frame as words, for its label.
@@ -89,7 +96,8 @@ impl Travel {
     /// The inverse of [`to_words`](Self::to_words). Memory that was never written has no reading.
     pub(super) fn from_words([tree, chain, low, high]: [u32; Travel::WORDS]) -> Option<Self> {
         let reading = u64::from(high) << 32 | u64::from(low);
-        (chain != NO_CHAIN).then_some(Self { tree, chain, reading, aside: 0 })
+        let start = Self { tree, chain, reading, aside: 0, course: Course::NONE };
+        (chain != NO_CHAIN).then_some(start)
     }
 
     /// Words that a frame's reading takes.
@@ -100,13 +108,23 @@ impl Travel {
     #[cfg(feature = "bus")]
     pub(crate) fn after_step(self, unit: &TravelUnit, farthest: f32) -> Option<Self> {
         let units = unit.unit.units_of_step(farthest)?;
-        (self.tree == unit.tree).then(|| self.beyond(units, 0))
+        (self.tree == unit.tree).then(|| self.along(units))
     }
 
-    /// This reading, `along` units farther on the path and `aside` units off it.
-    pub(crate) fn beyond(self, along: u64, aside: i64) -> Self {
-        let reading = self.reading.saturating_add(along);
-        Self { reading, aside: self.aside.saturating_add(aside), ..self }
+    /// A frame's reading, so many units farther on the path.
+    pub(crate) fn along(self, units: u64) -> Self {
+        Self { reading: self.reading.saturating_add(units), ..self }
+    }
+
+    /// That of a surface so many units off the path; `None` if they are too many to count.
+    pub(crate) fn beside(self, units: u64) -> Option<Self> {
+        let aside = u32::try_from(units).ok()?;
+        Some(Self { aside, ..self })
+    }
+
+    /// This reading, of a surface on a course.
+    pub(super) const fn on(self, course: Course) -> Self {
+        Self { course, ..self }
     }
 }
 
@@ -181,6 +199,12 @@ pub struct TravelUnit {
 impl TravelUnit {
     pub(crate) const fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
         Self { tree: tree.checksum(), unit: Unit::of(tree) }
+    }
+
+    /// The units of a step whose square was rounded to nearest, rounded up; `None` if it is not finite.
+    #[cfg(feature = "bus")]
+    pub(crate) fn units_of_step(&self, squared: f32) -> Option<u64> {
+        self.unit.units_of_step(squared)
     }
 
     /// A length in units, rounded up.
@@ -327,7 +351,7 @@ impl Odometer {
         let start = || Travel::start(self.tree);
         let from_last = self.travel.filter(|_| self.digest == from.0).unwrap_or_else(start);
         let (from, units) = if is_measured { (from_last, units) } else { (start(), 0) };
-        let travel = from.beyond(units, 0);
+        let travel = from.along(units);
         self.digest = to.0;
         self.travel = Some(travel);
         Step { before, after, from, travel, units, is_measured, length }

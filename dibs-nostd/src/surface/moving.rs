@@ -7,6 +7,7 @@
 use glam::Vec3;
 
 use super::buffer::Ahead;
+use super::course::Course;
 use super::motion::{Moved, MovingSurface, Travel};
 use crate::{MeasuredStretch, VertexTable};
 
@@ -108,7 +109,7 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
         let share = clamped(share, 1.0);
         // Off by less than a few units, within a tracker's slack.
         let along = (share * units as f32) as u64;
-        let travel = Some(from.beyond(along, 0));
+        let travel = Some(from.along(along));
         Self { before, after, share, travel, ahead: Ahead::UNKNOWN }
     }
 
@@ -121,8 +122,14 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
         units: u64,
     ) -> Self {
         let share = clamped(share, FARTHEST);
-        let travel = Some(last.beyond(0, (share * units as f32) as i64));
+        let travel = last.beside((share * units as f32) as u64);
         Self { before, after, share: 1.0 + share, travel, ahead: Ahead::UNKNOWN }
+    }
+
+    /// The same on a course.
+    pub(super) fn on(mut self, course: Course) -> Self {
+        self.travel = self.travel.map(|travel| travel.on(course));
+        self
     }
 
     /// The same with what was measured of the later frame.

@@ -5,10 +5,12 @@ use glam::Vec3;
 
 use super::age::elapsed;
 use super::atomic::{AtomicU32, Ordering};
-use super::buffer::{Buffer, FrameLabel};
+use super::buffer::{Ahead, Buffer, FrameLabel};
+use super::course::Course;
 use super::frames::{Buffers, Frames, READING, published};
 use super::motion::{MovingSurface, Travel};
 use super::moving::Between;
+use super::moving::{FARTHEST, clamped};
 use super::{Ageing, FrameAge, Latest, MeasuredStretch, VertexTable};
 
 /// The end that reads: owned by the control tick.
@@ -107,14 +109,13 @@ impl<'f, const N: usize> FrameGuard<'f, N, Frames<N, 3>> {
     /// so long, would be stretched beyond the tree's limit.
     #[must_use]
     pub fn extrapolated(&self) -> Between<'_, ContinuousView<'f, N>, ContinuousView<'f, N>> {
-        let (mut ahead, before) = (self.view.buffer.ahead(), self.before.buffer.ahead());
-        // The change of the motion may have been none by chance. False for NaN.
-        if before.shown > ahead.shown {
-            ahead.shown = before.shown;
-        }
+        let (ahead, before) = (self.view.buffer.ahead(), self.before.buffer.ahead());
         match self.last_step() {
             Some(step) if ahead.sigma >= 0.0 => {
-                step.outside([&self.before, &self.view], self.age).measured(ahead)
+                // The change of the motion may have been none by chance. False for NaN.
+                let is_worse = before.shown > ahead.shown;
+                let shown = if is_worse { before.shown } else { ahead.shown };
+                step.outside([&self.before, &self.view], self.age, Ahead { shown, ..ahead })
             }
             _ => Between::held(&self.view, self.view.travel()),
         }
@@ -203,13 +204,29 @@ impl LastStep {
         Between::inside(before, after, self.share(age), self.from, self.units)
     }
 
-    /// The surface `age` after the later frame, if every vertex keeps its velocity.
-    pub fn outside<'v, V: VertexTable>(
+    /// The surface `age` after the later frame, if every vertex keeps its velocity. `ahead` was measured of that.
+    fn outside<'v, V: VertexTable>(
         &self,
         [before, after]: [&'v V; 2],
         age: u32,
+        ahead: Ahead,
     ) -> Between<'v, V, V> {
-        Between::outside(before, after, self.share(age), self.travel, self.units)
+        let share = clamped(self.share(age), FARTHEST);
+        let course = Course::new(self.units, &ahead, share);
+        let between = Between::outside(before, after, share, self.travel, self.units);
+        between.on(course).measured(ahead)
+    }
+
+    /// The share of the step that an extrapolation adds to the later frame after this time.
+    #[cfg(feature = "bus")]
+    pub fn ahead(&self, age: u32) -> f32 {
+        clamped(self.share(age), FARTHEST)
+    }
+
+    /// Units of the odometer from the earlier frame to the later.
+    #[cfg(feature = "bus")]
+    pub const fn units(&self) -> u64 {
+        self.units
     }
 
     fn share(&self, age: u32) -> f32 {

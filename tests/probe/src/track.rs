@@ -85,8 +85,8 @@ type Follower = Tracker<'static, u16, STACK, OPENED>;
 /// The sizes that the documentation states.
 #[cfg(target_pointer_width = "32")]
 const _: () = {
-    assert!(size_of::<Contacts<8>>() == 88 * 8 + 28 * 512 + 136);
-    assert!(size_of::<Follower>() <= 8 * STACK + 44 * OPENED + 1_120);
+    assert!(size_of::<Contacts<8>>() == 88 * 8 + 28 * 512 + 144);
+    assert!(size_of::<Follower>() <= 8 * STACK + 44 * OPENED + 1_128);
 };
 
 impl Trackers {

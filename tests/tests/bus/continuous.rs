@@ -277,7 +277,7 @@ fn without_the_time_nothing_moves_on() {
     let frame = reader.read().expect("published");
     let surface = frame.extrapolated();
     assert!(off(&positions(&surface), &motion[3], &motion[3], 1.0) < 1e-4);
-    assert_eq!(surface.travel(), frame.travel());
+    assert_eq!(surface.share(), 1.0);
     assert_eq!(frame.interpolated().share(), 0.0);
     drop(frame);
     // Two frames of one time have no velocity.

@@ -22,7 +22,7 @@ pub use collector::LastHeartbeat;
 pub use error::ReceiveError;
 pub use health::BusHealth;
 use health::FrameName;
-use step::Step;
+use step::{Earlier, Step};
 
 /// Assembles frames of `N` vertices from packets, and publishes the complete and admitted ones.
 ///
@@ -351,10 +351,11 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
         if let (Some(front), Some(_)) = (&front, &unit) {
             let two = self.writer.last_two();
             let age = front.time_to(frame.captured());
-            let expected = two.as_ref().and_then(|[before, last]| {
-                Some(LastStep::between(before, last)?.outside([before, last], age))
+            let earlier = two.as_ref().and_then(|[before, last]| {
+                let step = LastStep::between(before, last)?;
+                Some(Earlier { frame: before, units: step.units(), share: step.ahead(age) })
             });
-            work = self.step.compare(&back, front, expected.as_ref(), ready, work);
+            work = self.step.compare(&back, front, earlier.as_ref(), ready, work);
             if frame.is_complete && self.step.compared() < ready {
                 return Ok(Advance::Pending);
             }
@@ -380,10 +381,8 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
                 };
                 let before = front.and_then(|front| front.travel());
                 let travel = unit.map(|unit| self.step.travel(&unit, before));
-                let ahead = Ahead {
-                    sigma: self.gate.ahead().map_or(f32::NAN, |ahead| ahead.sigma()),
-                    shown: self.step.shown_error(),
-                };
+                let sigma = self.gate.ahead().map_or(f32::NAN, |ahead| ahead.sigma());
+                let ahead = Ahead { sigma, ..self.step.ahead(unit.as_ref()) };
                 self.writer.set_label(label, travel, ahead);
                 self.is_admitted = true;
                 Ok(self.publish())

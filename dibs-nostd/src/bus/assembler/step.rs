@@ -4,8 +4,11 @@
 //! published: so no gate, and no user, can understate it.
 
 use crate::math::sqrt::sqrt;
-use crate::stretch::largest_step;
-use crate::surface::{Travel, TravelUnit, VertexTable};
+use crate::stretch::{largest_change, largest_step};
+use crate::surface::{Ahead, Travel, TravelUnit, VertexTable};
+
+/// Most units of a step that is extrapolated: more than 32 times the root sphere's radius.
+const MOST: u64 = 1 << 30;
 
 /// The rows compared so far, and the squares of the largest step and of the largest distance from the extrapolation.
 #[derive(Debug)]
@@ -13,30 +16,44 @@ pub(super) struct Step {
     rows: u32,
     largest: f32,
     off: f32,
+    /// Units of the odometer between the two frames before, and the share of them that the extrapolation adds.
+    units: u64,
+    share: f32,
+}
+
+/// The frame before the published one, from which the frame in work is extrapolated.
+pub(super) struct Earlier<'f, V: ?Sized> {
+    pub frame: &'f V,
+    /// Units from it to the published frame, and the share of the way that is added.
+    pub units: u64,
+    pub share: f32,
 }
 
 impl Step {
     pub const fn new() -> Self {
-        Self { rows: 0, largest: 0.0, off: 0.0 }
+        Self { rows: 0, largest: 0.0, off: 0.0, units: 0, share: 0.0 }
     }
 
-    /// Compares at most `work` of the rows below `ready` with those before, and with those `expected` by the two frames
-    /// before, if there are two. Returns the work left.
-    pub fn compare<V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
+    /// Compares at most `work` of the rows below `ready` with those before, and with the places that these would have if
+    /// they had gone on as from an earlier frame, if there is one. Returns the work left.
+    pub fn compare<V: VertexTable + ?Sized>(
         &mut self,
         now: &V,
         before: &V,
-        expected: Option<&W>,
+        earlier: Option<&Earlier<'_, V>>,
         ready: u32,
         work: u32,
     ) -> u32 {
         let waiting = ready.saturating_sub(self.rows);
         let rows = if waiting < work { waiting } else { work };
         let end = self.rows.saturating_add(rows);
-        self.largest = largest_step(now, before, self.rows..end, self.largest);
-        self.off = match expected {
-            Some(expected) => largest_step(now, expected, self.rows..end, self.off),
-            None => f32::NAN,
+        let range = self.rows..end;
+        (self.largest, self.off) = match earlier {
+            Some(&Earlier { frame, units, share }) => {
+                (self.units, self.share) = (units, share);
+                largest_change((now, before, frame), share, range, (self.largest, self.off))
+            }
+            None => (largest_step(now, before, range, self.largest), f32::NAN),
         };
         self.rows = end;
         work.saturating_sub(rows)
@@ -46,9 +63,19 @@ impl Step {
         self.rows
     }
 
-    /// The largest distance of a row from the expected one; NaN where nothing was expected.
-    pub fn shown_error(&self) -> f32 {
-        sqrt(self.off)
+    /// The distance of the frame from the extrapolation, where there was one; its stretch is not known here.
+    pub fn ahead(&self, unit: Option<&TravelUnit>) -> Ahead {
+        let units = |squared| unit?.units_of_step(squared);
+        let known = match (units(self.largest), units(self.off)) {
+            (Some(step), Some(off)) if self.units < MOST && step < MOST && off < MOST => {
+                // The distance is the difference of two steps, each rounded by a few parts in 2^24.
+                let rounding = (2 * self.units + step) / (1 << 18) + 2;
+                Some(((self.share * self.units as f32) as u32, (off + rounding) as u32))
+            }
+            _ => None,
+        };
+        let (passed, off) = known.unwrap_or((0, Ahead::UNKNOWN.off));
+        Ahead { shown: sqrt(self.off), passed, off, ..Ahead::UNKNOWN }
     }
 
     /// The odometer's reading after the step from a frame with the reading `before`; a start where that is unknown, or
