@@ -5,8 +5,8 @@ use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 use dibs_nostd::{
-    Advance, Assembler, FrameLabel, FrameReader, Frames, Gate, MovingSurface, Options, Query,
-    Sphere, SurfaceLimits, Tracker, Tree, Unchecked, VertexTable,
+    Advance, Assembler, FrameLabel, FrameReader, Frames, Gate, Options, Query, Sphere,
+    SurfaceLimits, Tracker, Tree, Unchecked, VertexTable,
 };
 use dibs_tests::bus::collect;
 use dibs_tests::deform::unit;
