@@ -10,7 +10,8 @@ use super::reach::Reach;
 use super::{ModalSurface, Modes};
 use crate::surface::motion::sealed::Sealed;
 use crate::surface::{
-    FARTHEST, FrameLabel, MeasuredStretch, MovingSurface, Travel, VertexTable, clamped,
+    Ahead, Course, FARTHEST, FrameLabel, MeasuredStretch, MovingSurface, Travel, VertexTable,
+    clamped,
 };
 
 /// The weights of a surface, and a bound on its stretch.
@@ -57,6 +58,8 @@ pub(super) struct Step<const K: usize> {
     units_ahead: u64,
     /// Distances of the frame before and of this one from their extrapolations; NaN if unknown.
     shown: [f32; 2],
+    /// The latter in units.
+    ahead: Ahead,
 }
 
 impl<const K: usize> Step<K> {
@@ -71,25 +74,39 @@ impl<const K: usize> Step<K> {
         last: Option<&Self>,
     ) -> Self {
         let mut end = *now;
-        for ((end, before), mode) in end.values.iter_mut().zip(&before.values).zip(modes.modes()) {
-            let ahead = *end + (*end - before) * FARTHEST;
-            let ahead = if ahead > mode.low { ahead } else { mode.low };
-            *end = if ahead < mode.high { ahead } else { mode.high };
+        // A quarter of the change of weights that would leave their ranges: no more than such a weight is itself.
+        let rest = Weights { values: [0.0; K], stretch: None };
+        let mut cut = rest;
+        let ends = end.values.iter_mut().zip(&mut cut.values);
+        for (((end, cut), before), mode) in ends.zip(&before.values).zip(modes.modes()) {
+            let far = *end + (*end - before) * FARTHEST;
+            let near = if far > mode.low { far } else { mode.low };
+            *end = if near < mode.high { near } else { mode.high };
+            *cut = (far - *end) / 4.0;
         }
         end.stretch = Some(modes.bound(&end.values));
         let surface = now.surface(modes);
         let units = |other: &Weights<K>| {
             modes.travel.units_of(reach.between(&other.surface(modes), &surface))
         };
-        let shown = match last {
-            Some(last) => {
-                let expected = before.towards(&last.end, last.ahead(interval), modes);
-                [last.shown[1], reach.between(&expected.surface(modes), &surface)]
+        let (step, units_ahead) = (units(before), units(&end));
+        let (mut shown, mut ahead) = ([f32::NAN; 2], Ahead::UNKNOWN);
+        if let Some(last) = last {
+            let share = last.ahead(interval);
+            let expected = before.towards(&last.end, share, modes);
+            shown = [last.shown[1], reach.between(&expected.surface(modes), &surface)];
+            // Weights and shares are rounded by a few parts in 2^24.
+            let rounding = (units(&rest) + step + last.units_ahead) / (1 << 20);
+            // At the end, where the error has grown threefold, the surface is off its course by all that was cut.
+            let cut = reach.between(&rest.surface(modes), &cut.surface(modes)) * (4.0 / 3.0);
+            let off = units(&expected) + modes.travel.units_of(cut) + rounding + 2;
+            let passed = (share * last.units_ahead as f32) as u64;
+            if let (Ok(passed), Ok(off)) = (passed.try_into(), off.try_into()) {
+                ahead = Ahead { passed, off, ..ahead };
             }
-            None => [f32::NAN; 2],
-        };
-        let (units, units_ahead) = (units(before), units(&end));
-        Self { before: *before, end, interval, from, units, units_ahead, shown }
+        }
+        let (before, units) = (*before, step);
+        Self { before, end, interval, from, units, units_ahead, shown, ahead }
     }
 
     /// Part of the way to the end after so long.
@@ -164,7 +181,9 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         }
         let share = step.ahead(self.age);
         let weights = self.weights.towards(&step.end, share, modes);
+        let course = Course::new(step.units, &step.ahead, share * FARTHEST);
         let travel = travel.beside((share * step.units_ahead as f32) as u64);
+        let travel = travel.map(|travel| travel.on(course));
         // The change of the motion may have been none by chance. False for NaN.
         let [before, now] = step.shown;
         let shown = if before > now { before } else { now };

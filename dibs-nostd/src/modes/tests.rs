@@ -90,3 +90,41 @@ fn no_vertex_moves_farther_than_the_odometer_says() {
         assert!(found > 100.0 && stated < 3.0 * found, "{sums:?}");
     }
 }
+
+/// Of weights that swing through their ranges and rest at their ends for a while, at a steady rate of frames: an
+/// extrapolated surface moves no farther at a new frame than its odometer says, and not much less.
+#[test]
+fn a_steady_extrapolation_moves_by_its_error() {
+    let built = surface();
+    let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
+    let modes = Modes::of(&tree).unwrap();
+    let frames = Frames::<MODES>::new();
+    let (mut writer, reader) = frames.split().unwrap();
+    let mut reader = ModalReader::new(reader, &modes).unwrap();
+    let unit = Unit::of(&tree);
+    let mut before: Option<ModalFrame<'_, MODES>> = None;
+    let mut sums = [0.0; 2];
+    for epoch in 1..600_u16 {
+        let weights: [f32; MODES] = core::array::from_fn(|mode| {
+            let [low, high] = modes.range(mode).unwrap();
+            let swing = libm::sinf(f32::from(epoch) * 0.08 + mode as f32) * 0.75;
+            (low + (high - low) * (0.5 + swing)).clamp(low, high)
+        });
+        let received = u32::from(epoch) * 17;
+        publish(&mut writer, &weights, epoch.into(), received);
+        for age in 4..21 {
+            let surface = reader.latest(received + age).of_any_age().unwrap().extrapolated();
+            if let Some(before) = &before {
+                let units = surface.travel().unwrap().since(&before.travel().unwrap());
+                let (stated, found) = (unit.length(units.unwrap() as i32), moved(before, &surface));
+                assert!(found <= stated + 1e-4, "{epoch}, {age}: {found} {stated}");
+                if age == 4 {
+                    sums = [sums[0] + found, sums[1] + stated];
+                }
+            }
+            before = Some(surface);
+        }
+    }
+    let [found, stated] = sums;
+    assert!(found > 100.0 && stated < 2.0 * found, "{sums:?}");
+}

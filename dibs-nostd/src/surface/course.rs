@@ -10,7 +10,7 @@ use super::buffer::Ahead;
 /// The course of the frames one earlier, as far as an extrapolated surface is along it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub(super) struct Course {
+pub(crate) struct Course {
     /// Units of the odometer from the frame before to the surface's; 0 if there is no course.
     units: u32,
     /// Units from the frame before on the earlier course: `(1 + t) r` times the length of `b - a`.

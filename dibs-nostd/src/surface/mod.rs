@@ -16,9 +16,11 @@ mod vertices;
 pub(crate) use age::Ageing;
 #[cfg(feature = "modes")]
 pub(crate) use age::elapsed;
-#[cfg(feature = "bus")]
+#[cfg(any(feature = "bus", feature = "modes"))]
 pub(crate) use buffer::Ahead;
 pub use buffer::{Buffer, FrameLabel, Position};
+#[cfg(feature = "modes")]
+pub(crate) use course::Course;
 pub use error::{OutOfTableError, PublishError, SplitError};
 pub use frames::{BorrowedFrames, Buffers, FrameWriter, Frames};
 pub use latest::{FrameAge, Latest};

@@ -123,7 +123,7 @@ impl Travel {
     }
 
     /// This reading, of a surface on a course.
-    pub(super) const fn on(self, course: Course) -> Self {
+    pub(crate) const fn on(self, course: Course) -> Self {
         Self { course, ..self }
     }
 }
