@@ -251,7 +251,7 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
         query_bytes_per_triangle: tree.query_bytes() as f64 / f64::from(tree.triangle_count()),
         adjacency_bytes: tree.adjacency_bytes(),
         flash_bytes: length,
-        ram_bytes: (24 * vertices as usize + 101).next_multiple_of(4),
+        ram_bytes: (24 * vertices as usize + 117).next_multiple_of(4),
         stack_bytes: 8 * tree.stack() as usize,
         modes: Modes::of(tree).ok().map(|modes| ModesSummary {
             count: modes.count(),
