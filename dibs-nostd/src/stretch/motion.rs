@@ -38,7 +38,8 @@ pub(crate) fn largest_step<V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
 /// The largest squares of the last step of these rows, and of its difference from a `share` of the step before; or
 /// `largest` and `off` if those are larger. NaN where a position is NaN.
 ///
-/// Steps are compared, not positions: their rounding is that of a step, wherever the surface is.
+/// The difference is that of two steps, not of two positions, because a step far from the origin is rounded less than a
+/// position.
 #[cfg(feature = "bus")]
 #[inline(never)]
 pub(crate) fn largest_change<V: VertexTable + ?Sized>(

@@ -43,7 +43,7 @@ impl<S: MovingSurface + ?Sized> MovingSurface for &S {
 /// The reading of a surface's odometer.
 ///
 /// Two readings of one odometer bound the distance that any vertex moved between them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Travel {
     tree: u32,
@@ -56,6 +56,16 @@ pub struct Travel {
     /// The extrapolated surface's step from the frame before.
     course: Course,
 }
+
+/// Of one place on the odometer, however the surface came there.
+impl PartialEq for Travel {
+    fn eq(&self, other: &Self) -> bool {
+        let place = |travel: &Self| (travel.tree, travel.chain, travel.reading, travel.aside);
+        place(self) == place(other)
+    }
+}
+
+impl Eq for Travel {}
 
 impl Travel {
     /// The farthest that a vertex can have moved since an earlier reading, in the tree's [`Unit`]; `None` if the

@@ -5,8 +5,8 @@ use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 use dibs_nostd::{
-    Advance, Assembler, FrameLabel, FrameReader, Frames, Gate, Options, Query, Sphere,
-    SurfaceLimits, Tracker, Tree, Unchecked, VertexTable,
+    Advance, Assembler, FrameLabel, FrameReader, Frames, Gate, MovingSurface, Options, Query,
+    Sphere, SurfaceLimits, Tracker, Tree, Unchecked, VertexTable,
 };
 use dibs_tests::bus::collect;
 use dibs_tests::deform::unit;
@@ -277,7 +277,7 @@ fn without_the_time_nothing_moves_on() {
     let frame = reader.read().expect("published");
     let surface = frame.extrapolated();
     assert!(off(&positions(&surface), &motion[3], &motion[3], 1.0) < 1e-4);
-    assert_eq!(surface.share(), 1.0);
+    assert_eq!(surface.travel(), frame.travel());
     assert_eq!(frame.interpolated().share(), 0.0);
     drop(frame);
     // Two frames of one time have no velocity.
