@@ -1,7 +1,7 @@
 //! The builder, for a `build.rs` and the `dibs` program.
 
-use dibs_nostd::Index;
 use dibs_nostd::format::{MAX_CHILDREN, MAX_LEAF_TRIANGLES};
+use dibs_nostd::{Index, Unit};
 
 use crate::array::{BuiltTree, Facts, flatten};
 use crate::construct::{Cluster, Construction, Constructor, Surface, widen};
@@ -36,6 +36,7 @@ pub struct Builder<'p> {
     stretch: f32,
     limits: Option<Vec<f32>>,
     labels: Option<Vec<u8>>,
+    unit: Option<Unit>,
     construction: Construction,
     paths: Option<Paths>,
     leaf_triangles: Option<usize>,
@@ -73,6 +74,7 @@ impl<'p> Builder<'p> {
             stretch: 1.5,
             limits: None,
             labels: None,
+            unit: None,
             construction: Construction::Geodesic,
             paths: None,
             leaf_triangles: None,
@@ -109,6 +111,14 @@ impl<'p> Builder<'p> {
     #[must_use]
     pub fn labels(mut self, labels: Vec<u8>) -> Self {
         self.labels = Some(labels);
+        self
+    }
+
+    /// The unit of the mesh's file, which the tree keeps so that a frame in another one is refused. It scales nothing: a
+    /// mesh is in millimetres, and an [`Import`](crate::Import) brings the unit that it was read in.
+    #[must_use]
+    pub fn unit(mut self, unit: Unit) -> Self {
+        self.unit = Some(unit);
         self
     }
 
@@ -188,23 +198,20 @@ impl<'p> Builder<'p> {
     /// # Errors
     /// [`BuildError`] names the defect of the mesh or the options.
     pub fn build(&self, surface: &(impl RestSurface + ?Sized)) -> Result<BuiltTree, BuildError> {
-        let (mesh, error) = (surface.mesh(), surface.position_error());
-        self.check(mesh)?;
+        self.check(surface.mesh())?;
+        let is_small = surface.mesh().positions.len() <= u16::MAX_VERTICES as usize;
         match self.index {
-            IndexWidth::Bits16 => self.build_with::<u16>(mesh, error),
-            IndexWidth::Bits32 => self.build_with::<u32>(mesh, error),
-            IndexWidth::Fitting if mesh.positions.len() <= u16::MAX_VERTICES as usize => {
-                self.build_with::<u16>(mesh, error)
-            }
-            IndexWidth::Fitting => self.build_with::<u32>(mesh, error),
+            IndexWidth::Bits16 => self.build_with::<u16>(surface),
+            IndexWidth::Fitting if is_small => self.build_with::<u16>(surface),
+            IndexWidth::Bits32 | IndexWidth::Fitting => self.build_with::<u32>(surface),
         }
     }
 
     fn build_with<I: Index>(
         &self,
-        mesh: &Mesh,
-        position_error: f32,
+        surface: &(impl RestSurface + ?Sized),
     ) -> Result<BuiltTree, BuildError> {
+        let mesh = surface.mesh();
         let vertices = mesh.positions.len();
         if vertices > I::MAX_VERTICES as usize {
             let (most, bits) = (I::MAX_VERTICES, 8 * I::BYTES);
@@ -223,7 +230,9 @@ impl<'p> Builder<'p> {
             paths: paths.kind(),
             stretch,
             shares: &shares,
-            position_error,
+            position_error: surface.position_error(),
+            unit: self.unit.or(surface.unit()),
+            file_triangles: surface.file_triangles(),
             with_order: self.with_order,
             with_rest: self.with_rest,
             with_metric: self.with_metric,

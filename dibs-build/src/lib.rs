@@ -38,7 +38,6 @@ pub mod stream;
 mod stretch;
 #[cfg(feature = "stream")]
 pub mod transport;
-mod unit;
 mod write;
 
 pub use array::{BuiltTree, ModesSummary, Summary, summarise};
@@ -57,8 +56,8 @@ pub use script::{MeshSource, TreeScript, tree};
 pub use stretch::{
     Beyond, LimitsError, LimitsErrorKind, MotionStretch, Needed, read_limits, write_limits,
 };
-pub use unit::Unit;
 pub use write::{WriteError, WriteErrorKind, write_atomically};
 
+pub use dibs_nostd::Unit;
 /// The vectors in this interface.
 pub use glam;

@@ -1,5 +1,6 @@
 //! The surface in its rest shape: positions and triangles.
 
+use dibs_nostd::Unit;
 use glam::{DVec3, Vec3};
 
 /// A triangle mesh: fixed connectivity, and the positions of one frame.
@@ -38,6 +39,16 @@ pub trait RestSurface {
 
     /// Largest error of a vertex (in the mesh's unit, not negative).
     fn position_error(&self) -> f32;
+
+    /// The unit of its file, whose lengths became millimetres; `None` where it has no file.
+    fn unit(&self) -> Option<Unit> {
+        None
+    }
+
+    /// Triangles of its file, those too that were dropped.
+    fn file_triangles(&self) -> usize {
+        self.mesh().triangles.len()
+    }
 }
 
 impl RestSurface for Mesh {
@@ -57,6 +68,14 @@ impl<S: RestSurface> RestSurface for &S {
 
     fn position_error(&self) -> f32 {
         (**self).position_error()
+    }
+
+    fn unit(&self) -> Option<Unit> {
+        (**self).unit()
+    }
+
+    fn file_triangles(&self) -> usize {
+        (**self).file_triangles()
     }
 }
 

@@ -1235,6 +1235,18 @@ typedef struct {
    * Largest distance (mm) of a vertex from its place in the mesh's file.
    */
   float position_error;
+  /**
+   * Vertices of the mesh's file, those of no triangle too: positions of a frame in the file's order.
+   */
+  uint32_t file_vertices;
+  /**
+   * Triangles of the mesh's file, those too that the builder dropped.
+   */
+  uint32_t file_triangles;
+  /**
+   * Unit of the mesh's file: 0 not known, 1 mm, 2 cm, 3 m, 4 inch, 5 micrometre. All lengths of the tree are in mm.
+   */
+  uint8_t unit;
 } dibs_tree_facts;
 
 /**

@@ -2,7 +2,7 @@
 
 use core::ffi::c_void;
 
-use dibs_nostd::{Scrub, Tree, TriangleRow};
+use dibs_nostd::{Scrub, Tree, TriangleRow, Unit};
 
 use crate::border::{Handle, Input, Kind, Output, Storage};
 use crate::code::dibs_code;
@@ -43,6 +43,12 @@ pub struct dibs_tree_facts {
     pub stretch: f32,
     /// Largest distance (mm) of a vertex from its place in the mesh's file.
     pub position_error: f32,
+    /// Vertices of the mesh's file, those of no triangle too: positions of a frame in the file's order.
+    pub file_vertices: u32,
+    /// Triangles of the mesh's file, those too that the builder dropped.
+    pub file_triangles: u32,
+    /// Unit of the mesh's file: 0 not known, 1 mm, 2 cm, 3 m, 4 inch, 5 micrometre. All lengths of the tree are in mm.
+    pub unit: u8,
 }
 
 /// Validates the bytes of a tree, and makes the tree that every other object is made with.
@@ -88,6 +94,9 @@ pub extern "C" fn dibs_tree_get_facts(
             checksum: tree.checksum(),
             stretch: tree.stretch(),
             position_error: tree.position_error(),
+            file_vertices: tree.file_vertex_count(),
+            file_triangles: tree.file_triangle_count(),
+            unit: tree.unit().map_or(0, Unit::code),
         });
         Ok(())
     })

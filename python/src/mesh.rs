@@ -114,11 +114,7 @@ fn options(reading: Reading) -> PyResult<(ReadOptions, bool)> {
 
 /// A unit by its name on the command line.
 pub fn unit(name: &str) -> PyResult<Unit> {
-    match name {
-        "mm" => Ok(Unit::Millimetre),
-        "cm" => Ok(Unit::Centimetre),
-        "m" => Ok(Unit::Metre),
-        "in" => Ok(Unit::Inch),
-        _ => Err(invalid(format!("unit is '{name}'; give 'mm', 'cm', 'm' or 'in'"))),
-    }
+    let unit = Unit::ALL.into_iter().find(|unit| unit.symbol() == name);
+    let wrong = || invalid(format!("unit is '{name}'; give 'mm', 'cm', 'm', 'in' or 'um'"));
+    unit.ok_or_else(wrong)
 }

@@ -9,7 +9,7 @@ use dibs_nostd::format::CRC;
 #[must_use]
 pub fn section(bytes: &[u8], kind: u32) -> (usize, usize) {
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
-    let row = (0..word(48) as usize).map(|r| 64 + 12 * r).find(|&at| word(at) == kind);
+    let row = (0..word(48) as usize).map(|r| 80 + 12 * r).find(|&at| word(at) == kind);
     let at = row.expect("the section is there");
     (word(at + 4) as usize, word(at + 8) as usize)
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use dibs_nostd::format::PathKind;
 use dibs_nostd::glam::{DVec3, Vec3};
 use dibs_nostd::modes::Modes;
-use dibs_nostd::{FormatError, Index, Tree, TriangleRow};
+use dibs_nostd::{FormatError, Index, Tree, TriangleRow, Unit};
 
 use crate::error::BuildError;
 use crate::write_atomically;
@@ -59,6 +59,12 @@ pub struct Summary {
     pub labels: usize,
     /// The point of the mesh's file (mm) that the tree's coordinates count from.
     pub origin: [f64; 3],
+    /// The unit of the mesh's file, if the builder was told: `mm`, `cm`, `m`, `in` or `um`. The tree is in millimetres.
+    pub unit: Option<&'static str>,
+    /// Vertices of the mesh's file, those of no triangle too: positions of a frame.
+    pub file_vertices: u32,
+    /// Triangles of the mesh's file, those too that were dropped.
+    pub file_triangles: u32,
     /// Identity of the mesh, as vertex packets carry it.
     pub mesh_id: u32,
     /// Flash that a query reads: nodes and triangles.
@@ -246,6 +252,9 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
         mean_edge: mean_edge(tree),
         labels: labels(tree),
         origin: tree.origin(),
+        unit: tree.unit().map(Unit::symbol),
+        file_vertices: tree.file_vertex_count(),
+        file_triangles: tree.file_triangle_count(),
         mesh_id: tree.mesh_id(),
         query_bytes: tree.query_bytes(),
         query_bytes_per_triangle: tree.query_bytes() as f64 / f64::from(tree.triangle_count()),

@@ -1,7 +1,7 @@
 //! From a tree of sections to the flat array: ordered, rounded up, written.
 
 use dibs_nostd::format::{CRC, HEADER_BYTES, Join, Link, MAGIC, PathKind, VERSION, field, section};
-use dibs_nostd::{Index, Tree};
+use dibs_nostd::{Index, Tree, Unit};
 use glam::DVec3;
 
 use super::adjacency::adjacency;
@@ -76,6 +76,8 @@ pub(crate) struct Facts<'a> {
     pub stretch: f32,
     pub shares: &'a Shares,
     pub position_error: f32,
+    pub unit: Option<Unit>,
+    pub file_triangles: usize,
     pub with_order: bool,
     pub with_rest: bool,
     pub with_metric: bool,
@@ -168,6 +170,9 @@ pub(crate) fn flatten<I: Index>(
         (field::POSITION_ERROR, facts.position_error.to_bits()),
         (field::ORIGIN, has_origin.into()),
         (field::OTHER_ROOTS, roots.len() as u32 - 1),
+        (field::UNIT, facts.unit.map_or(0, Unit::code).into()),
+        (field::FILE_VERTICES, mesh.positions.len() as u32),
+        (field::FILE_TRIANGLES, u32::try_from(facts.file_triangles).unwrap_or(u32::MAX)),
     ] {
         put_word(&mut header, at, word);
     }

@@ -32,7 +32,7 @@ pub(super) fn write(
     }
     let mut digest = CRC.digest();
     digest.update(&bytes[..field::CHECKSUM]);
-    digest.update(&bytes[HEADER_BYTES..]);
+    digest.update(&bytes[field::CHECKSUM + 4..]);
     put_word(&mut bytes, field::CHECKSUM, digest.finalize());
     Ok(bytes)
 }

@@ -34,10 +34,12 @@ pub(crate) fn import(
     let is_stl = matches!(format, Format::StlAscii | Format::StlBinary);
     let mut report = Report {
         format,
+        unit: options.unit,
         extension_disagrees: false,
         vertices: 0,
         unreferenced_vertices: 0,
         triangles: 0,
+        file_triangles: 0,
         polygons_triangulated: 0,
         polygons_not_simple: 0,
         welded: 0,
@@ -54,6 +56,7 @@ pub(crate) fn import(
         position_error: position_error(raw, place.origin),
     };
     let (faces, short) = triangles(raw, &mut report)?;
+    report.file_triangles = faces.len();
     let mut surface = Surface { positions, faces, short };
     check_scale(raw, format)?;
     report.extent =

@@ -36,7 +36,7 @@ pub use report::{Format, Report};
 
 use crate::mesh::{Mesh, RestSurface};
 use crate::rounding::round_up;
-use crate::unit::Unit;
+use dibs_nostd::Unit;
 use glam::DVec3;
 pub(crate) use place::Place;
 use raw::Raw;
@@ -90,6 +90,14 @@ impl RestSurface for Import {
 
     fn position_error(&self) -> f32 {
         round_up(self.report.position_error)
+    }
+
+    fn unit(&self) -> Option<Unit> {
+        Some(self.report.unit)
+    }
+
+    fn file_triangles(&self) -> usize {
+        self.report.file_triangles
     }
 }
 

@@ -1,6 +1,7 @@
 //! The counts and warnings of an import.
 
-use serde::Serialize;
+use dibs_nostd::Unit;
+use serde::{Serialize, Serializer};
 use std::fmt;
 
 /// The format of a mesh: of a file, or none.
@@ -80,6 +81,9 @@ impl fmt::Display for Format {
 pub struct Report {
     /// The content's format.
     pub format: Format,
+    /// The unit of the file's lengths, which became millimetres.
+    #[serde(serialize_with = "symbol")]
+    pub unit: Unit,
     /// Whether the file name's extension disagrees.
     pub extension_disagrees: bool,
     /// Rows of the mesh's vertex table.
@@ -88,6 +92,8 @@ pub struct Report {
     pub unreferenced_vertices: usize,
     /// Triangles of the mesh.
     pub triangles: usize,
+    /// Triangles of the file, those too that were dropped; polygons count as the triangles that they were cut into.
+    pub file_triangles: usize,
     /// Faces with more than three corners, cut into triangles.
     pub polygons_triangulated: usize,
     /// Of these, faces that touch or cross themselves in their plane, or have no area: cut into a fan.
@@ -117,6 +123,10 @@ pub struct Report {
     /// Largest distance of a vertex from its position in the file, by rounding to f32; in the mesh's unit, 0 for files
     /// that hold f32. The tree adds it to the accuracy of every answer.
     pub position_error: f64,
+}
+
+fn symbol<S: Serializer>(unit: &Unit, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(unit.symbol())
 }
 
 impl Report {

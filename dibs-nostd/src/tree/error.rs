@@ -52,6 +52,11 @@ pub enum FormatError {
         /// The section's kind, see [`crate::format::section`].
         kind: u32,
     },
+    /// A section of a kind that this crate does not read, and must not skip.
+    Kind {
+        /// The section's kind.
+        kind: u32,
+    },
     /// A node's children do not follow those of the node before it.
     NodeOrder {
         /// Row of the first child that is out of place.
@@ -146,6 +151,12 @@ impl fmt::Display for FormatError {
                 write!(f, "header field at {offset} holds {value:#x}, which is not valid")
             }
             Self::Section { kind } => write!(f, "section {kind} is missing or has a wrong size"),
+            Self::Kind { kind } => {
+                write!(
+                    f,
+                    "section {kind} is of a kind that this library does not read: use a newer one"
+                )
+            }
             Self::NodeOrder { node } => write!(f, "node {node} is out of order"),
             Self::Pin { node, pin } => write!(f, "node {node} is pinned to missing vertex {pin}"),
             Self::Radius { node, code } => write!(f, "node {node} has radius code {code}"),

@@ -4,7 +4,7 @@ use crate::tree::format::field as at;
 use crate::tree::format::{
     CRC, HEADER_BYTES, MAGIC, MAX_ROOTS, MAX_STACK, PathKind, VERSION, u32_at,
 };
-use crate::tree::{FormatError, Index};
+use crate::tree::{FormatError, Index, Unit};
 
 /// The header's fields that a query needs.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +24,10 @@ pub(crate) struct Header {
     pub other_roots: u32,
     /// Rows of the section table.
     pub sections: u32,
+    /// The code of the file's unit.
+    pub unit: u32,
+    pub file_vertices: u32,
+    pub file_triangles: u32,
     pub checksum: u32,
 }
 
@@ -42,6 +46,9 @@ impl Header {
             (at::ORIGIN, self.origin),
             (at::OTHER_ROOTS, self.other_roots),
             (at::SECTIONS, self.sections),
+            (at::UNIT, self.unit),
+            (at::FILE_VERTICES, self.file_vertices),
+            (at::FILE_TRIANGLES, self.file_triangles),
             (at::CHECKSUM, self.checksum),
         ] {
             if u32_at(bytes, offset) != Some(value) {
@@ -55,6 +62,9 @@ impl Header {
         Ok(())
     }
 }
+
+/// The largest code of a unit.
+const MAX_UNIT: u32 = Unit::Micrometre.code() as u32;
 
 /// A header field. The length was checked, so it exists.
 const fn field(bytes: &[u8], offset: usize) -> Result<u32, FormatError> {
@@ -106,9 +116,13 @@ pub(super) const fn read<I: Index>(bytes: &[u8]) -> Result<Header, FormatError> 
         origin: tri!(field(bytes, at::ORIGIN)),
         other_roots: tri!(field(bytes, at::OTHER_ROOTS)),
         sections: tri!(field(bytes, at::SECTIONS)),
+        unit: tri!(field(bytes, at::UNIT)),
+        file_vertices: tri!(field(bytes, at::FILE_VERTICES)),
+        file_triangles: tri!(field(bytes, at::FILE_TRIANGLES)),
         checksum: tri!(field(bytes, at::CHECKSUM)),
     };
-    let last = tri!(field(bytes, at::LAST));
+    let [first_reserved, last_reserved] = at::RESERVED;
+    let reserved = [tri!(field(bytes, first_reserved)), tri!(field(bytes, last_reserved))];
     let wrong = if header.vertices == 0 || header.vertices > I::MAX_VERTICES {
         Some((at::VERTICES, header.vertices))
     } else if header.triangles == 0 || header.triangles >= 1 << 28 {
@@ -127,8 +141,16 @@ pub(super) const fn read<I: Index>(bytes: &[u8]) -> Result<Header, FormatError> 
         Some((at::ORIGIN, header.origin))
     } else if header.other_roots >= MAX_ROOTS || header.other_roots >= header.nodes {
         Some((at::OTHER_ROOTS, header.other_roots))
-    } else if last != 0 {
-        Some((at::LAST, last))
+    } else if header.unit > MAX_UNIT {
+        Some((at::UNIT, header.unit))
+    } else if header.file_vertices < header.vertices || header.file_vertices > I::MAX_VERTICES {
+        Some((at::FILE_VERTICES, header.file_vertices))
+    } else if header.file_triangles < header.triangles {
+        Some((at::FILE_TRIANGLES, header.file_triangles))
+    } else if reserved[0] != 0 {
+        Some((first_reserved, reserved[0]))
+    } else if reserved[1] != 0 {
+        Some((last_reserved, reserved[1]))
     } else {
         None
     };

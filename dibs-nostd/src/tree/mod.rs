@@ -19,6 +19,7 @@ mod row;
 mod scrub;
 pub(crate) mod sections;
 mod stored;
+mod unit;
 mod validate;
 
 pub use error::FormatError;
@@ -27,6 +28,7 @@ pub use index::Index;
 pub use row::{TriangleRow, VertexNumber};
 pub use scrub::{CorruptTreeError, Scrub};
 pub use stored::TreeBytes;
+pub use unit::Unit;
 
 use core::iter;
 use core::marker::PhantomData;
@@ -126,6 +128,26 @@ impl<'a, I: Index> Tree<'a, I> {
     #[must_use]
     pub const fn triangle_count(&self) -> u32 {
         self.header.triangles
+    }
+
+    /// Vertices of the mesh's file, those of no triangle too: positions that a frame in the file's order has. Of STL, which
+    /// does not number them, its distinct positions.
+    #[must_use]
+    pub const fn file_vertex_count(&self) -> u32 {
+        self.header.file_vertices
+    }
+
+    /// Triangles of the mesh's file, those too that the builder dropped; polygons count as the triangles that they were
+    /// cut into.
+    #[must_use]
+    pub const fn file_triangle_count(&self) -> u32 {
+        self.header.file_triangles
+    }
+
+    /// The unit of the mesh's file; `None` where the builder was not told. The tree's lengths are in millimetres.
+    #[must_use]
+    pub const fn unit(&self) -> Option<Unit> {
+        Unit::from_code(self.header.unit as u8)
     }
 
     /// Number of nodes: inner ones, leaves and the roots.

@@ -3,7 +3,7 @@
 use core::fmt;
 
 use crate::tree::format::field::CHECKSUM;
-use crate::tree::format::{CRC, HEADER_BYTES, u32_at};
+use crate::tree::format::{CRC, u32_at};
 
 /// An endless background check of a tree's bytes against their checksum.
 ///
@@ -82,7 +82,7 @@ impl<'a> Scrub<'a> {
         // The checksum does not cover itself.
         let skipped = CHECKSUM.saturating_sub(self.at);
         let before = part.get(..skipped).unwrap_or(part);
-        let after = part.get(HEADER_BYTES.saturating_sub(self.at)..).unwrap_or_default();
+        let after = part.get((CHECKSUM + 4).saturating_sub(self.at)..).unwrap_or_default();
         self.digest.update(before);
         self.digest.update(after);
         self.at = self.at.saturating_add(part.len());

@@ -85,9 +85,11 @@ pub(crate) const fn find<'a, I: Index>(
             });
         };
         let mut slot = 0;
+        let mut is_known = kind & section::SKIPPABLE != 0;
         while slot < COUNT {
             let rule = rules[slot];
             if rule.kind == kind {
+                is_known = true;
                 let part = format::range(bytes, offset, length);
                 let placed = (offset as usize).is_multiple_of(SECTION_ALIGN)
                     && offset as usize >= HEADER_BYTES
@@ -101,6 +103,9 @@ pub(crate) const fn find<'a, I: Index>(
                 found[slot] = part;
             }
             slot += 1;
+        }
+        if !is_known {
+            return Err(FormatError::Kind { kind });
         }
         row += 1;
     }

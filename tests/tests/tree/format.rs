@@ -1,6 +1,6 @@
 //! The tree's bytes against their specification, `docs/format.md`, and against corruption.
 
-use dibs_build::{BuildError, Builder, BuiltTree, IndexWidth, Mesh, generate};
+use dibs_build::{BuildError, Builder, BuiltTree, IndexWidth, Mesh, ReadOptions, Unit, generate};
 use dibs_nostd::format::{CRC, Link, MAX_STACK};
 use dibs_nostd::{FormatError, Options, Query, QueryError, Sphere, Tree, TriangleRow};
 use dibs_tests::tree_bytes::{reseal, section};
@@ -47,11 +47,12 @@ fn every_field_and_section_stands_where_the_specification_says() {
         let (mesh, built) = heart(index);
         let bytes = built.blob();
         assert_eq!(&bytes[..4], b"DIBS");
-        assert_eq!(bytes[4..8], [4, 0, width as u8, 1]);
+        assert_eq!(bytes[4..8], [5, 0, width as u8, 1]);
         let (vertices, triangles, nodes) = (word(bytes, 12), word(bytes, 16), word(bytes, 20));
         assert_eq!(triangles as usize, mesh.triangles.len());
         assert_eq!(vertices as usize, mesh.positions.len());
         assert_eq!(word(bytes, 52) as usize, bytes.len());
+        assert_eq!([56, 64, 68, 72, 76].map(|at| word(bytes, at)), [0, vertices, triangles, 0, 0]);
         assert_eq!(section(bytes, 1).1, nodes as usize * (2 * width + 4));
         assert_eq!(section(bytes, 2).1, triangles as usize * 3 * width);
         let (order, length) = section(bytes, 3);
@@ -103,9 +104,9 @@ fn a_wrong_value_with_a_right_checksum_is_named() {
     assert!(matches!(Tree::<u32>::from_bytes(bytes), Err(FormatError::Width { found: 2, .. })));
     assert!(matches!(refuse(0, 0), FormatError::Magic { .. }));
     assert!(matches!(refuse(4, 0x0102_0002), FormatError::Version { found: 2 }));
-    assert!(matches!(refuse(4, 0x0702_0004), FormatError::Field { offset: 7, value: 7 }));
+    assert!(matches!(refuse(4, 0x0702_0005), FormatError::Field { offset: 7, value: 7 }));
     for (at, value) in
-        [(12, 0), (12, 65_537), (16, 0), (20, 0), (24, 513), (40, 2), (44, 64), (56, 1)]
+        [(12, 0), (12, 65_537), (16, 0), (20, 0), (24, 513), (40, 2), (44, 64), (56, 6), (56, 256)]
     {
         let expected = FormatError::Field { offset: at as u8, value };
         assert_eq!(refuse(at, value), expected, "field at {at}");
@@ -119,8 +120,18 @@ fn a_wrong_value_with_a_right_checksum_is_named() {
     }
     assert!(matches!(refuse(40, 1), FormatError::Section { kind: 9 }));
     assert!(matches!(refuse(20, word(bytes, 20) - 1), FormatError::Section { kind: 1 }));
-    assert!(matches!(refuse(64, 99), FormatError::Section { kind: 1 }));
-    assert!(matches!(refuse(68, 7), FormatError::Section { kind: 1 }));
+    for (at, value) in
+        [(64, word(bytes, 12) - 1), (64, 65_537), (68, word(bytes, 16) - 1), (72, 1), (76, 1)]
+    {
+        let expected = FormatError::Field { offset: at as u8, value };
+        assert_eq!(refuse(at, value), expected, "field at {at}");
+    }
+    // The kinds that are reserved, and those of newer libraries, must not be skipped unless they say so.
+    for kind in [0, 11, 12, 99, (1 << 31) - 1] {
+        assert_eq!(refuse(80, kind), FormatError::Kind { kind });
+    }
+    assert_eq!(refuse(80, 1 << 31 | 1), FormatError::Section { kind: 1 });
+    assert!(matches!(refuse(84, 7), FormatError::Section { kind: 1 }));
     assert!(matches!(refuse(24, word(bytes, 24) - 1), FormatError::Stack { .. }));
     assert!(matches!(refuse(24, word(bytes, 24) + 1), FormatError::Stack { .. }));
     assert!(matches!(refuse(nodes, 0xFFFF_FFFF), FormatError::Pin { node: 0, pin: 0xFFFF }));
@@ -357,12 +368,43 @@ fn labels_are_stored_by_row() {
     let built = Builder::new().labels(labels).build(&mesh).unwrap();
     assert_eq!(built.summary().mesh_id, plain.summary().mesh_id);
     assert_eq!(plain.tree::<u16>().unwrap().label(TriangleRow(0)), None);
-    let table = 64 + 12 * (word(built.blob(), 48) - 1) as usize;
+    let table = 80 + 12 * (word(built.blob(), 48) - 1) as usize;
     assert_eq!(word(built.blob(), table), 10);
     for wrong in [0, 319, 321] {
         let bytes = with_word(built.blob(), table + 8, wrong);
         assert!(matches!(Tree::<u16>::from_bytes(&bytes), Err(FormatError::Section { kind: 10 })));
     }
+}
+
+/// A tree keeps its file's unit and counts, whatever was dropped, and the builder's word goes before the file's.
+#[test]
+fn the_files_unit_and_counts_are_stored() {
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_Z];
+    // One triangle is degenerate, one a duplicate; the last vertex is of no triangle.
+    let triangles = [[0, 1, 1], [0, 1, 2], [1, 2, 0], [0, 2, 3]];
+    let plain = Mesh {
+        positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+        triangles: vec![[0, 1, 2]],
+        ..Mesh::default()
+    };
+    let facts = |built: BuiltTree| {
+        let tree = built.tree::<u16>().expect("valid");
+        (tree.unit(), tree.file_vertex_count(), tree.file_triangle_count())
+    };
+    assert_eq!(facts(Builder::new().build(&plain).expect("valid")), (None, 3, 1));
+    for unit in Unit::ALL {
+        let import = ReadOptions { unit, ..ReadOptions::default() };
+        let import = import.check(&corners, &triangles).expect("a mesh");
+        let built = Builder::new().build(&import).expect("valid");
+        assert_eq!(word(built.blob(), 56), u32::from(unit.code()));
+        let tree = built.tree::<u16>().expect("valid");
+        assert_eq!((tree.vertex_count(), tree.triangle_count()), (4, 2));
+        assert_eq!(facts(built), (Some(unit), 5, 4));
+        let told = Builder::new().unit(unit).build(&plain).expect("valid");
+        assert_eq!(facts(told).0, Some(unit));
+        assert_eq!(Unit::from_code(unit.code()), Some(unit));
+    }
+    assert_eq!([0, 6, 255].map(Unit::from_code), [None; 3]);
 }
 
 /// A triangle's corners, by the mesh's numbers, and its label.

@@ -41,6 +41,7 @@ enum UnitName {
     Cm,
     M,
     In,
+    Um,
 }
 
 impl Lengths {
@@ -50,6 +51,7 @@ impl Lengths {
             UnitName::Cm => Unit::Centimetre,
             UnitName::M => Unit::Metre,
             UnitName::In => Unit::Inch,
+            UnitName::Um => Unit::Micrometre,
         }
     }
 

@@ -70,6 +70,8 @@ pub fn print(summary: &Summary) {
     if s.labels > 0 {
         println!("labels   {} different", s.labels);
     }
+    let unit = s.unit.map_or_else(String::new, |unit| format!(" in {unit}"));
+    println!("file     {} vertices, {} triangles{unit}", s.file_vertices, s.file_triangles);
     println!("mesh id  {:08x}", s.mesh_id);
     println!(
         "flash    {} bytes; of these a query reads {} ({:.1} a triangle)",

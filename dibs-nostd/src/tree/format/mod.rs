@@ -15,10 +15,10 @@ use super::Index;
 #[doc(hidden)]
 pub const MAGIC: [u8; 4] = *b"DIBS";
 /// Version of the layout that this crate reads.
-pub const VERSION: u16 = 4;
+pub const VERSION: u16 = 5;
 /// Bytes of the fixed header; the section table follows it.
 #[doc(hidden)]
-pub const HEADER_BYTES: usize = 64;
+pub const HEADER_BYTES: usize = 80;
 /// Bytes of one row of the section table: kind, offset, length.
 #[doc(hidden)]
 pub const SECTION_BYTES: usize = 12;
@@ -81,10 +81,16 @@ pub mod field {
     pub const SECTIONS: usize = 48;
     /// Bytes of the whole tree.
     pub const LENGTH: usize = 52;
-    /// Zero.
-    pub const LAST: usize = 56;
+    /// The code of the file's [`Unit`](super::super::Unit), one byte, and three of zero.
+    pub const UNIT: usize = 56;
     /// The checksum of every other byte.
     pub const CHECKSUM: usize = 60;
+    /// Vertices of the mesh's file.
+    pub const FILE_VERTICES: usize = 64;
+    /// Triangles of the mesh's file.
+    pub const FILE_TRIANGLES: usize = 68;
+    /// Zero, two words.
+    pub const RESERVED: [usize; 2] = [72, 76];
 }
 
 /// CRC-32 (ISO-HDLC, that of zlib and Ethernet) of trees and bus packets, by a table of 1 KiB.
@@ -121,6 +127,12 @@ pub mod section {
     pub const ORIGIN: u32 = 9;
     /// A label of every triangle, one byte (optional).
     pub const LABELS: u32 = 10;
+    /// Reserved: coarse nodes that carry the vertices, of an embedded surface.
+    pub const COARSE_NODES: u32 = 11;
+    /// Reserved: the solids that roots bound, their shells and cavities.
+    pub const SOLIDS: u32 = 12;
+    /// The bit of kinds that a reader skips where it does not know them.
+    pub const SKIPPABLE: u32 = 1 << 31;
 }
 
 /// How geodesic radii were measured, and so which stretch bounds their growth.
