@@ -345,6 +345,7 @@ pub(crate) const fn neighbour_code<I: Index>(adjacency: &[u8], row: u32, edge: u
 }
 
 /// The code of a border edge.
+#[doc(hidden)]
 #[must_use]
 pub const fn no_neighbour<I: Index>() -> u32 {
     if I::BYTES == 2 { 0xFFFF } else { u32::MAX }
