@@ -1,0 +1,65 @@
+//! The odometer goes on from the frame measured last, and from no other.
+
+extern crate std;
+
+use std::prelude::rust_2024::*;
+
+use dibs_build::{Builder, generate};
+use fastrand::Rng;
+use glam::Vec3;
+
+use super::Odometer;
+use crate::{MovingSurface, Tree};
+
+/// A change of a frame.
+type Change = fn(&mut [Vec3], &mut Rng);
+
+/// Changes that a sum of products without a shift, or one of rows in any order, takes for none.
+const CHANGES: [Change; 9] = [
+    |rows, _| rows.iter_mut().for_each(|row| row.x = -row.x),
+    |rows, _| rows.iter_mut().for_each(|row| *row = Vec3::new(-row.x, -row.y, row.z)),
+    |rows, _| rows.iter_mut().for_each(|row| *row = -*row),
+    |rows, _| rows.iter_mut().for_each(|row| *row = Vec3::new(row.y, row.x, row.z)),
+    |rows, _| rows.reverse(),
+    |rows, _| rows.rotate_right(1),
+    // Two signs of neighbours.
+    |rows, rng| {
+        let row = rng.usize(1..rows.len());
+        for row in [row - 1, row] {
+            let axis = rng.usize(..3);
+            rows[row][axis] = -rows[row][axis];
+        }
+    },
+    |rows, rng| {
+        let row = rng.usize(1..rows.len());
+        rows.swap(row - 1, row);
+    },
+    |rows, rng| {
+        let (row, axis) = (rng.usize(..rows.len()), rng.usize(..3));
+        rows[row][axis] = f32::from_bits(rows[row][axis].to_bits() ^ 1 << rng.u32(..31));
+    },
+];
+
+#[test]
+fn an_odometer_starts_anew_with_any_other_frame() {
+    let mesh = generate::heart(320).unwrap().mesh;
+    let built = Builder::new().stretch(1.5).build(&mesh).unwrap();
+    let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
+    let rows = built.to_rows(&mesh.positions);
+    assert!(rows.len().is_multiple_of(2), "an even number of signs changes");
+    let next: Vec<Vec3> = rows.iter().map(|row| *row + Vec3::Y * 1e-3).collect();
+    let mut rng = Rng::with_seed(1);
+    for trial in 0..200 {
+        let mut odometer = Odometer::new(&tree);
+        let first = odometer.start(rows.as_slice()).travel().unwrap();
+        let mut other = rows.clone();
+        CHANGES[trial % CHANGES.len()](&mut other, &mut rng);
+        let step = odometer.step(other.as_slice(), next.as_slice());
+        assert_eq!(step.after().travel().unwrap().since(&first), None, "change {trial}");
+        // And it goes on with the frame that it measured last, wherever that lies.
+        let before = step.after().travel().unwrap();
+        let copy = next.clone();
+        let step = odometer.step(copy.as_slice(), rows.as_slice());
+        assert!(step.after().travel().unwrap().since(&before).is_some_and(|units| units > 0));
+    }
+}
