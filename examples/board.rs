@@ -6,6 +6,7 @@ use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_semihosting::debug;
+use dibs_nostd::Millis;
 
 const DATA: usize = 0x4000_4000;
 const STATE: usize = DATA + 4;
@@ -21,8 +22,8 @@ const RECEIVE_ENABLE: u32 = 1 << 1 | 1 << 3;
 #[allow(dead_code, reason = "only RTIC asks")]
 pub const NVIC_PRIO_BITS: u8 = 3;
 
-/// Ticks without a surface after which an example gives up.
-pub const PATIENCE: u32 = 20_000;
+/// Time without a surface after which an example gives up.
+pub const PATIENCE: Millis = Millis(20_000);
 
 /// Counts of `SysTick` in a tick of 1 ms.
 const TICK: u32 = 25_000;

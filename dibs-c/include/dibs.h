@@ -958,7 +958,7 @@ typedef struct {
 } dibs_watch;
 
 /**
- * The machine's limits. Times are in the receiver's clock's unit.
+ * The machine's limits. Times are in ms.
  */
 typedef struct {
   /**
@@ -990,7 +990,7 @@ typedef struct {
    */
   dibs_watch forgeries;
   /**
-   * Largest speed of any point of the tissue, in mm per unit of the clock; at least 0.
+   * Largest speed of any point of the tissue, in mm per ms (m/s); at least 0.
    */
   float tissue_speed;
   /**
@@ -1026,7 +1026,7 @@ typedef struct {
 } dibs_age;
 
 /**
- * The health of the bus. `UINT32_MAX` for a time that is not known.
+ * The health of the bus. Times in ms, `UINT32_MAX` for one that is not known.
  */
 typedef struct {
   /**
@@ -1545,8 +1545,8 @@ dibs_code dibs_reader_init(void *storage, size_t size, dibs_surface *surface, di
  * after the tick's queries.
  *
  * @param reader  The reader.
- * @param now     The receiver's clock.
- * @param limit   The greatest age, in the clock's unit; UINT32_MAX leaves the age to the fail-safe machine.
+ * @param now     The receiver's clock, in ms; wraps.
+ * @param limit   The greatest age, in ms; UINT32_MAX leaves the age to the fail-safe machine.
  * @param frame   The frame that holds it; what it held before is released.
  * @param age     Receives its age, also where it is too old; or null.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE`, `DIBS_CODE_STALE`, `DIBS_CODE_HELD` where another frame holds one of this
@@ -1559,7 +1559,7 @@ dibs_code dibs_reader_latest(dibs_reader *reader,
                              dibs_age *age);
 
 /**
- * The health of the bus at `now`, on the receiver's clock.
+ * The health of the bus at `now`, on the receiver's clock in ms.
  */
 dibs_code dibs_reader_link(dibs_reader *reader, uint32_t now, dibs_link *link);
 

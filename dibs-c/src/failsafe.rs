@@ -4,7 +4,7 @@ use core::ffi::c_void;
 
 use bytemuck::AnyBitPattern;
 use dibs_nostd::failsafe::{FailSafe, LimitError, Limits, Observation, State, Watch};
-use dibs_nostd::{Proximity, QueryError, Unavailable};
+use dibs_nostd::{Millis, Proximity, QueryError, Unavailable};
 
 use crate::border::{Handle, Input, Kind, Output, Storage};
 use crate::code::dibs_code;
@@ -39,18 +39,33 @@ pub struct dibs_watch {
     pub safe: u32,
 }
 
+impl dibs_watch {
+    const OFF: (u32, u32) = (u32::MAX, u32::MAX);
+}
+
 impl TryFrom<dibs_watch> for Watch {
     type Error = LimitError;
 
     fn try_from(dibs_watch { degraded, safe }: dibs_watch) -> Result<Self, LimitError> {
-        if degraded == u32::MAX && safe == u32::MAX {
+        if (degraded, safe) == dibs_watch::OFF {
             return Ok(Self::OFF);
         }
-        Self::new(degraded, safe)
+        Self::new(Millis(degraded), Millis(safe))
     }
 }
 
-/// The machine's limits. Times are in the receiver's clock's unit.
+impl TryFrom<dibs_watch> for Watch<u32> {
+    type Error = LimitError;
+
+    fn try_from(dibs_watch { degraded, safe }: dibs_watch) -> Result<Self, LimitError> {
+        if (degraded, safe) == dibs_watch::OFF {
+            return Ok(Self::OFF);
+        }
+        Self::count(degraded, safe)
+    }
+}
+
+/// The machine's limits. Times are in ms.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_limits {
@@ -68,7 +83,7 @@ pub struct dibs_limits {
     pub source_age: dibs_watch,
     /// Forged packets since the last frame was published.
     pub forgeries: dibs_watch,
-    /// Largest speed of any point of the tissue, in mm per unit of the clock; at least 0.
+    /// Largest speed of any point of the tissue, in mm per ms (m/s); at least 0.
     pub tissue_speed: f32,
     /// Frames in a row that recover: 1 to 65,535.
     pub recovery_frames: u32,

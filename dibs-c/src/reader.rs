@@ -3,8 +3,8 @@
 use core::ffi::c_void;
 
 use bytemuck::AnyBitPattern;
-use dibs_nostd::FrameAge;
 use dibs_nostd::failsafe::Link;
+use dibs_nostd::{FrameAge, Millis};
 
 use crate::border::{Handle, Kind, Output, Storage};
 use crate::code::dibs_code;
@@ -45,7 +45,7 @@ impl From<Option<FrameAge>> for dibs_age {
     fn from(frame: Option<FrameAge>) -> Self {
         match frame {
             None => Self { is_published: 0, epoch: 0, received: 0, age: 0 },
-            Some(FrameAge { epoch, received, age }) => {
+            Some(FrameAge { epoch, received: Millis(received), age: Millis(age) }) => {
                 Self { is_published: 1, epoch, received, age }
             }
         }
@@ -54,11 +54,15 @@ impl From<Option<FrameAge>> for dibs_age {
 
 impl From<dibs_age> for Option<FrameAge> {
     fn from(dibs_age { is_published, epoch, received, age }: dibs_age) -> Self {
-        (is_published != 0).then_some(FrameAge { epoch, received, age })
+        (is_published != 0).then_some(FrameAge {
+            epoch,
+            received: Millis(received),
+            age: Millis(age),
+        })
     }
 }
 
-/// The health of the bus. `UINT32_MAX` for a time that is not known.
+/// The health of the bus. Times in ms, `UINT32_MAX` for one that is not known.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_link {
@@ -79,14 +83,28 @@ pub struct dibs_link {
 impl From<Link> for dibs_link {
     fn from(link: Link) -> Self {
         let Link { silence, heartbeat, rejections, forgeries, transit, source_age } = link;
-        Self { silence, heartbeat, rejections, forgeries, transit, source_age }
+        Self {
+            silence: silence.0,
+            heartbeat: heartbeat.0,
+            rejections,
+            forgeries,
+            transit: transit.0,
+            source_age: source_age.0,
+        }
     }
 }
 
 impl From<dibs_link> for Link {
     fn from(link: dibs_link) -> Self {
         let dibs_link { silence, heartbeat, rejections, forgeries, transit, source_age } = link;
-        Self { silence, heartbeat, rejections, forgeries, transit, source_age }
+        Self {
+            silence: Millis(silence),
+            heartbeat: Millis(heartbeat),
+            rejections,
+            forgeries,
+            transit: Millis(transit),
+            source_age: Millis(source_age),
+        }
     }
 }
 
@@ -116,8 +134,8 @@ pub extern "C" fn dibs_reader_init(
 /// after the tick's queries.
 ///
 /// @param reader  The reader.
-/// @param now     The receiver's clock.
-/// @param limit   The greatest age, in the clock's unit; UINT32_MAX leaves the age to the fail-safe machine.
+/// @param now     The receiver's clock, in ms; wraps.
+/// @param limit   The greatest age, in ms; UINT32_MAX leaves the age to the fail-safe machine.
 /// @param frame   The frame that holds it; what it held before is released.
 /// @param age     Receives its age, also where it is too old; or null.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE`, `DIBS_CODE_STALE`, `DIBS_CODE_HELD` where another frame holds one of this
@@ -135,16 +153,16 @@ pub extern "C" fn dibs_reader_latest(
         frame.table = Table::Empty;
         let (age, mut reader) = (age.check_if_any()?, reader.open()?);
         let hold = reader.surface.hold()?;
-        let latest = reader.reader.latest(now);
+        let latest = reader.reader.latest(Millis(now));
         if let Some(age) = age {
             age.set(latest.frame().into());
         }
-        frame.table = Table::Held(Held::new(latest.within(limit)?, hold));
+        frame.table = Table::Held(Held::new(latest.within(Millis(limit))?, hold));
         Ok(())
     })
 }
 
-/// The health of the bus at `now`, on the receiver's clock.
+/// The health of the bus at `now`, on the receiver's clock in ms.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_reader_link(
     reader: *mut dibs_reader,
@@ -153,7 +171,7 @@ pub extern "C" fn dibs_reader_link(
 ) -> dibs_code {
     dibs_code::of(|| {
         let (link, reader) = (link.check()?, reader.open()?);
-        link.set(reader.surface.link.read(now).into());
+        link.set(reader.surface.link.read(Millis(now)).into());
         Ok(())
     })
 }

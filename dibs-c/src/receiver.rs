@@ -5,7 +5,8 @@ use core::ffi::c_void;
 use bytemuck::AnyBitPattern;
 use dibs_nostd::wire::{Deframer, Event, NoMac, encode_status, enframe, framed_bytes};
 use dibs_nostd::{
-    Advance, Assembler, BorrowedFrames, Progress, StretchMonitor, SurfaceLimits, VertexTable,
+    Advance, Assembler, BorrowedFrames, Millis, Progress, StretchMonitor, SurfaceLimits,
+    VertexTable,
 };
 
 use crate::border::{Handle, Input, Kind, Output, Storage};
@@ -154,7 +155,7 @@ pub extern "C" fn dibs_receiver_accept(
 ) -> dibs_code {
     dibs_code::of(|| {
         let (progress, mut receiver) = (progress.check_if_any()?, receiver.open()?);
-        let outcome = receiver.assembler.accept(packet.slice(length)?, now);
+        let outcome = receiver.assembler.accept(packet.slice(length)?, Millis(now));
         receiver.note();
         let outcome = outcome?.into();
         if let Some(progress) = progress {
@@ -183,7 +184,7 @@ pub extern "C" fn dibs_receiver_byte(
         let dibs_receiver { assembler, deframer, .. } = &mut *receiver;
         let outcome: Result<_, dibs_code> = match deframer.push(byte) {
             None => Ok(dibs_progress::None),
-            Some(Ok(packet)) => match assembler.accept(packet, now) {
+            Some(Ok(packet)) => match assembler.accept(packet, Millis(now)) {
                 Ok(progress) => Ok(progress.into()),
                 Err(error) => Err(error.into()),
             },
@@ -275,7 +276,7 @@ pub extern "C" fn dibs_receiver_status(
     dibs_code::of(|| {
         let (length, mut out) = (length.check()?, out.places(capacity)?);
         let mut receiver = receiver.open()?;
-        let status = receiver.assembler.status(now, safety);
+        let status = receiver.assembler.status(Millis(now), safety);
         let (counters, mac) = (receiver.assembler.counters(), receiver.assembler.mac());
         let (mut packet, mut line) = ([0; STATUS], [0; DIBS_STATUS]);
         let packet = encode_status(receiver.mesh_id, &status, counters, mac, &mut packet);

@@ -87,8 +87,8 @@ pub use stretch::{
 };
 pub use surface::{
     Between, FrameAge, FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames, Latest,
-    MeasuredStretch, Moved, MovingSurface, Odometer, OutOfTableError, PublishError,
-    QuantisedVertices, REGIONS, SplitError, Step, Travel, VertexTable,
+    MeasuredStretch, Millis, Moved, MovingSurface, Odometer, OutOfTableError, PublishError,
+    QuantisedVertices, REGIONS, SplitError, Step, Ticks, Travel, VertexTable,
 };
 /// Surfaces of a size that no type has, for the C interface. They may change with any version.
 #[doc(hidden)]

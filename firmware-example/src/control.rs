@@ -7,14 +7,15 @@ use dibs_nostd::constraint::{ForbiddenRegion, GainError, SpringDamper};
 use dibs_nostd::failsafe::{FailSafe, LimitError, Observation};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
-    Budget, Capsule, Cost, FrameAge, Options, Proximity, QueryError, Tool, Unavailable, VertexTable,
+    Budget, Capsule, Cost, FrameAge, Millis, Options, Proximity, QueryError, Ticks, Tool,
+    Unavailable, VertexTable,
 };
 
 use crate::surface::{self, TREE};
 #[cfg(not(feature = "wide"))]
 use crate::telemetry::fallback_code;
 use crate::telemetry::{Tick, cause_code};
-use crate::{BusStatus, TICK_RATE, Trust, instrument};
+use crate::{BusStatus, TICK_RATE, Trust, instrument, time_of};
 
 /// The budget of a query: more than the closest pair on the heart needs, and within a tick on every admitted surface. It
 /// is less than [`Cost`] would allow, because a position of a moving surface is a sum of two.
@@ -57,7 +58,7 @@ pub struct Control {
     wall: ForbiddenRegion,
     failsafe: FailSafe,
     bus: &'static BusStatus,
-    tick: u32,
+    tick: Ticks,
     /// The last tick's instrument, for its velocity.
     before: Option<Capsule>,
 }
@@ -80,40 +81,41 @@ impl Control {
             wall: ForbiddenRegion::new(spring, MARGIN).map_err(SetupError::Gain)?,
             failsafe: FailSafe::new(trust.limits().map_err(SetupError::Limit)?),
             bus,
-            tick: 0,
+            tick: Ticks(0),
             before: None,
         })
     }
 
-    /// Number of the next tick.
+    /// The time of the next tick.
     #[must_use]
-    pub fn now(&self) -> u32 {
-        self.tick
+    pub const fn now(&self) -> Millis {
+        time_of(self.tick)
     }
 
     /// Skips ticks, so that a test reaches a pose at once.
-    pub const fn skip(&mut self, ticks: u32) {
-        self.tick = self.tick.wrapping_add(ticks);
+    pub const fn skip(&mut self, ticks: Ticks) {
+        self.tick = self.tick.after(ticks);
     }
 
     /// Runs one tick. `clock` is any free-running counter; it only measures the query.
     pub fn tick(&mut self, clock: impl Fn() -> u32) -> Tick {
-        let mut record = Tick { kind: Tick::KIND, tick: self.tick, ..Tick::zeroed() };
+        let (tick, now) = (self.tick.0 as u32, time_of(self.tick));
+        let mut record = Tick { kind: Tick::KIND, tick, ..Tick::zeroed() };
         record.triangle = u32::MAX;
         record.shown_error = -1.0;
         record.bytes = self.bus.bytes();
         record.frames_published = self.bus.published();
         record.rejected = self.bus.rejected();
 
-        let tool = instrument(self.tick).ok();
+        let tool = instrument(tick).ok();
         let before = self.before;
         self.before = tool;
         let (frame, answer) = match &tool {
-            Some(tool) => self.ask(tool, clock, &mut record),
+            Some(tool) => self.ask(tool, now, clock, &mut record),
             // The pose is not finite, so no query is possible.
             None => (None, Err(Unavailable::NotFinite)),
         };
-        let link = self.bus.link.read(self.tick);
+        let link = self.bus.link.read(now);
         let mut verdict = self.failsafe.step(&Observation {
             frame,
             link,
@@ -144,10 +146,10 @@ impl Control {
         record.state = verdict.state as u32;
         record.cause = verdict.cause.map_or(0, |cause| cause_code(&cause));
         record.margin = verdict.margin;
-        record.silence = link.silence;
+        record.silence = link.silence.0;
         (record.read_epoch, record.read_digest) = self.bus.fingerprint();
         record.force = force.force.to_array();
-        self.tick = self.tick.wrapping_add(1);
+        self.tick = self.tick.after(Ticks(1));
         record
     }
 
@@ -155,13 +157,14 @@ impl Control {
     fn ask(
         &mut self,
         tool: &Capsule,
+        now: Millis,
         clock: impl Fn() -> u32,
         record: &mut Tick,
     ) -> (Option<FrameAge>, Result<Proximity, Unavailable>) {
         record.tool_start = tool.start().to_array();
         record.tool_end = tool.end().to_array();
         record.tool_radius = tool.radius();
-        let latest = self.surface.latest(self.tick);
+        let latest = self.surface.latest(now);
         let age = latest.frame();
         // The fail-safe machine decides how old a surface may be.
         let frame = match latest.of_any_age() {
@@ -170,7 +173,7 @@ impl Control {
         };
         let label = frame.label();
         record.epoch = label.epoch;
-        record.age = age.map_or(u32::MAX, |age| age.age);
+        record.age = age.map_or(u32::MAX, |age| age.age.0);
         let surface = frame.extrapolated();
         record.epoch_before = surface.before().epoch().unwrap_or(label.epoch);
         record.share = surface.share();

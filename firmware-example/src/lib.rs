@@ -25,6 +25,10 @@ pub mod telemetry;
 mod trust;
 mod upkeep;
 
+use core::num::NonZeroU32;
+
+use dibs_nostd::{Millis, Ticks};
+
 pub use control::{
     BUDGET, Control, DAMPING, MARGIN, MAX_FORCE, STIFFNESS, SetupError, TICK_INSTRUCTIONS,
 };
@@ -40,3 +44,10 @@ dibs_nostd::include_tree!("surface");
 
 /// Control ticks a second.
 pub const TICK_RATE: u32 = 1_000;
+
+/// The receiver's clock at so many control ticks after the start.
+#[must_use]
+pub const fn time_of(ticks: Ticks) -> Millis {
+    const RATE: NonZeroU32 = NonZeroU32::new(TICK_RATE).unwrap();
+    ticks.at_rate(RATE)
+}

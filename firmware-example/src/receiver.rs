@@ -1,11 +1,11 @@
 //! Bus reception: bytes in, published frames and statuses out.
 
 use dibs_nostd::wire::{Counters, Deframer, encode_status, enframe, framed_bytes};
-use dibs_nostd::{Advance, Progress, StretchError, SurfaceLimits};
+use dibs_nostd::{Advance, Millis, Progress, StretchError, SurfaceLimits};
 
+use crate::BusStatus;
 use crate::fingerprint::Fingerprint;
 use crate::surface::{self, CENTRE, REACH};
-use crate::{BusStatus, TICK_RATE};
 
 /// Largest packet on the bus, in bytes: 167 quantised vertices.
 pub const MTU: usize = 1024;
@@ -16,13 +16,13 @@ pub const STATUS_MTU: usize = 96;
 /// Largest status on a serial line.
 pub const STATUS_FRAMED: usize = framed_bytes(STATUS_MTU);
 
-/// Ticks between two statuses to the sender, unless a frame was published or refused before.
-const REPORT_INTERVAL: u32 = TICK_RATE / 10;
+/// Time between two statuses to the sender, unless a frame was published or refused before.
+const REPORT_INTERVAL: Millis = Millis(100);
 
 /// Limit on the coordinates, as a multiple of the rest shape's size.
 const ROOM: f32 = 4.0;
 
-/// Limit on a vertex's speed, in mm a tick: twice the generated heart's top speed in real time, 1.57 mm in a thirtieth
+/// Limit on a vertex's speed, in mm a millisecond: twice the generated heart's top speed in real time, 1.57 mm in a thirtieth
 /// of a second. Over the emulated serial line it beats in slow motion, over Ethernet in real time.
 const SPEED: f32 = 0.1;
 
@@ -43,8 +43,8 @@ pub struct Receiver {
     assembler: surface::continuous::Receiver<'static>,
     fingerprint: Fingerprint,
     status: &'static BusStatus,
-    /// Tick of the last status.
-    reported: u32,
+    /// Time of the last status.
+    reported: Millis,
     /// A frame was published or refused since.
     has_news: bool,
 }
@@ -66,19 +66,19 @@ impl Receiver {
             assembler: surface::continuous::receiver(tree, writer, limits)?,
             fingerprint: Fingerprint::new(),
             status,
-            reported: 0,
+            reported: Millis(0),
             has_news: false,
         })
     }
 
-    /// Takes one byte. `tick` is the present control tick, from which a surface's age counts.
-    pub fn byte(&mut self, byte: u8, tick: u32) {
+    /// Takes one byte. `now` is the time of the present control tick, from which a surface's age counts.
+    pub fn byte(&mut self, byte: u8, now: Millis) {
         self.status.count_bytes(1);
         match self.deframer.push(byte) {
             None => return,
             // Rejections are counted by cause in the assembler.
             Some(Ok(packet)) => {
-                let outcome = self.assembler.accept(packet, tick);
+                let outcome = self.assembler.accept(packet, now);
                 self.has_news |= outcome == Ok(Progress::Hello);
             }
             Some(Err(error)) => self.assembler.count_framing(&error),
@@ -87,9 +87,9 @@ impl Receiver {
     }
 
     /// Takes one packet, from a bus that keeps packets apart. Returns whether it was a good one of this surface.
-    pub fn packet(&mut self, packet: &[u8], tick: u32) -> bool {
+    pub fn packet(&mut self, packet: &[u8], now: Millis) -> bool {
         self.status.count_bytes(u32::try_from(packet.len()).unwrap_or(u32::MAX));
-        let outcome = self.assembler.accept(packet, tick);
+        let outcome = self.assembler.accept(packet, now);
         self.has_news |= outcome == Ok(Progress::Hello);
         self.share();
         outcome.is_ok()
@@ -135,24 +135,28 @@ impl Receiver {
         self.assembler.gate().tree().mesh_id()
     }
 
-    /// The status for the sender, of at most `N` bytes; `None` unless due. `tick` is the present control tick, 1 ms.
+    /// The status for the sender, of at most `N` bytes; `None` unless due. `now` is the time of the present control tick.
     pub fn status<'b, const N: usize>(
         &mut self,
-        tick: u32,
+        now: Millis,
         packet: &'b mut [u8; N],
     ) -> Option<&'b [u8]> {
-        if !self.has_news && tick.wrapping_sub(self.reported) < REPORT_INTERVAL {
+        if !self.has_news && now.since(self.reported) < REPORT_INTERVAL {
             return None;
         }
-        (self.reported, self.has_news) = (tick, false);
-        let status = self.assembler.status(tick, self.status.safety());
+        (self.reported, self.has_news) = (now, false);
+        let status = self.assembler.status(now, self.status.safety());
         let (counters, mac) = (self.assembler.counters(), self.assembler.mac());
         Some(encode_status(self.mesh_id(), &status, counters, mac, packet))
     }
 
     /// The same, framed for a serial line.
-    pub fn report<'b>(&mut self, tick: u32, line: &'b mut [u8; STATUS_FRAMED]) -> Option<&'b [u8]> {
+    pub fn report<'b>(
+        &mut self,
+        now: Millis,
+        line: &'b mut [u8; STATUS_FRAMED],
+    ) -> Option<&'b [u8]> {
         let mut packet = [0; STATUS_MTU];
-        enframe(self.status(tick, &mut packet)?, line)
+        enframe(self.status(now, &mut packet)?, line)
     }
 }

@@ -1,8 +1,7 @@
 //! How far a surface is trusted, by the bus that brings it.
 
+use dibs_nostd::Millis;
 use dibs_nostd::failsafe::{LimitError, Limits, Watch};
-
-use crate::TICK_RATE;
 
 /// Frames refused or damaged in a row after which the state is degraded, and after which it is safe.
 const REJECTIONS: (u32, u32) = (10, 30);
@@ -14,21 +13,21 @@ const FORGERIES: (u32, u32) = (0, 100);
 /// Frames in a row that recover. Nobody acknowledges here; a real robot leaves `automatic` out.
 const RECOVERY_FRAMES: u16 = 1;
 
-/// The limits of one bus. A pair is the number of ticks after which the state is degraded, and after which the output
+/// The limits of one bus. A pair is the time in ms after which the state is degraded, and after which the output
 /// is safe.
 #[derive(Clone, Copy, Debug)]
 pub struct Trust {
     /// Age of the surface, which counts from its frame's first packet.
     pub age: (u32, u32),
-    /// Ticks without any good packet.
+    /// Time without any good packet.
     pub silence: (u32, u32),
-    /// Ticks without a heartbeat.
+    /// Time without a heartbeat.
     pub heartbeat: (u32, u32),
-    /// Ticks that a frame may have been on its way, by the status that it echoes.
+    /// Time that a frame may have been on its way, by the status that it echoes.
     pub transit: (u32, u32),
-    /// Age in ms that a frame may have when its sender sends it: a source that stands still while its sender lives.
+    /// Age that a frame may have when its sender sends it: a source that stands still while its sender lives.
     pub source_age: (u32, u32),
-    /// Largest speed of the tissue, in mm a tick.
+    /// Largest speed of the tissue, in mm a millisecond.
     pub tissue_speed: f32,
 }
 
@@ -36,12 +35,12 @@ impl Trust {
     /// The emulated serial line: it takes one to three seconds for a frame, and so brings a heart slowed down some fifty
     /// times.
     pub const SERIAL: Self = Self {
-        age: (4 * TICK_RATE, 6 * TICK_RATE),
-        silence: (TICK_RATE, 2 * TICK_RATE),
-        heartbeat: (TICK_RATE, 3 * TICK_RATE),
+        age: (4_000, 6_000),
+        silence: (1_000, 2_000),
+        heartbeat: (1_000, 3_000),
         // Statuses go out every 100 ms, and the line brings a begin packet in some milliseconds more.
-        transit: (TICK_RATE / 2, TICK_RATE),
-        source_age: (TICK_RATE, 2 * TICK_RATE),
+        transit: (500, 1_000),
+        source_age: (1_000, 2_000),
         tissue_speed: 0.001,
     };
 
@@ -50,9 +49,9 @@ impl Trust {
     pub const ETHERNET: Self = Self {
         age: (60, 120),
         silence: (40, 80),
-        heartbeat: (TICK_RATE, 3 * TICK_RATE),
-        transit: (TICK_RATE / 5, TICK_RATE / 2),
-        source_age: (TICK_RATE / 5, TICK_RATE / 2),
+        heartbeat: (1_000, 3_000),
+        transit: (200, 500),
+        source_age: (200, 500),
         tissue_speed: 0.05,
     };
 
@@ -68,13 +67,15 @@ impl Trust {
         }
         macro_rules! watch {
             ($pair:expr) => {
-                tri!(Watch::new($pair.0, $pair.1))
+                tri!(Watch::new(Millis($pair.0), Millis($pair.1)))
             };
         }
         let limits = tri!(Limits::new(watch!(self.age), self.tissue_speed));
         let limits = tri!(limits.recovery(RECOVERY_FRAMES)).silence(watch!(self.silence));
-        let limits = limits.heartbeat(watch!(self.heartbeat)).rejections(watch!(REJECTIONS));
+        let limits = limits
+            .heartbeat(watch!(self.heartbeat))
+            .rejections(tri!(Watch::count(REJECTIONS.0, REJECTIONS.1)));
         let limits = limits.transit(watch!(self.transit)).source_age(watch!(self.source_age));
-        Ok(limits.forgeries(watch!(FORGERIES)).automatic())
+        Ok(limits.forgeries(tri!(Watch::count(FORGERIES.0, FORGERIES.1))).automatic())
     }
 }

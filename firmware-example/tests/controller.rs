@@ -7,13 +7,13 @@ use controller::surface::{self, continuous::Surface};
 use controller::telemetry::{Tick, cause_code};
 use controller::{BusStatus, Control, MTU, Receiver, Trust};
 use dibs_build::{Builder, generate};
-use dibs_nostd::Unavailable;
 use dibs_nostd::failsafe::State;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
     Encoding, FrameEncoder, FrameId, Freshness, NoMac, QuantisedBox, encode_heartbeat, enframe,
     framed_bytes,
 };
+use dibs_nostd::{Millis, Ticks, Unavailable};
 use dibs_tests::oracle::{Instrument, exhaustive};
 use dibs_tests::sides;
 
@@ -66,8 +66,8 @@ impl Sender {
     }
 
     /// A frame as the bytes of the bus, captured and sent at `now`, right after a status.
-    fn bytes(&mut self, epoch: u32, now: u32) -> Vec<u8> {
-        self.sent(epoch, Freshness { age_ms: 0, echo: Some(now) })
+    fn bytes(&mut self, epoch: u32, now: Millis) -> Vec<u8> {
+        self.sent(epoch, Freshness { age_ms: 0, echo: Some(now.0) })
     }
 
     /// A frame as the bytes of the bus, as fresh as it says.
@@ -156,7 +156,7 @@ fn every_answer_is_that_of_whole_frames() {
 fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
     let (mut receiver, mut control, bus) = controller();
     let mut sender = Sender::new();
-    let mut feed = |bytes: &[u8], now: u32| {
+    let mut feed = |bytes: &[u8], now: Millis| {
         for &byte in bytes {
             receiver.byte(byte, now);
             while receiver.work() {}
@@ -181,9 +181,9 @@ fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
         let expected = match silence {
             _ if silence <= SILENCE_WARNING => (State::Nominal, 0),
             _ if silence <= SILENCE_LIMIT => {
-                (State::Degraded, cause_code(&Unavailable::LinkLost { silence }))
+                (State::Degraded, cause_code(&Unavailable::LinkLost { silence: Millis(silence) }))
             }
-            _ => (State::Safe, cause_code(&Unavailable::LinkLost { silence })),
+            _ => (State::Safe, cause_code(&Unavailable::LinkLost { silence: Millis(silence) })),
         };
         assert_eq!((tick.state, tick.cause), (expected.0 as u32, expected.1), "after {silence}");
         sender.check(&tick);
@@ -225,13 +225,13 @@ fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
 fn a_late_frame_an_old_one_and_a_row_of_refused_ones_make_the_output_safe() {
     let (mut receiver, mut control, _bus) = controller();
     let mut sender = Sender::new();
-    control.skip(100_000);
+    control.skip(Ticks(100_000));
     let mut epoch = 0;
     let mut after = |freshness: &dyn Fn(u32) -> Freshness, is_damaged: bool| {
         // A good frame comes after so long that it is not too fast for the one before.
-        control.skip(if is_damaged { 100 } else { 4_000 });
+        control.skip(Ticks(if is_damaged { 100 } else { 4_000 }));
         epoch += 1;
-        let mut bytes = sender.sent(epoch, freshness(control.now()));
+        let mut bytes = sender.sent(epoch, freshness(control.now().0));
         if is_damaged {
             bytes[9_000] ^= 4;
         }
@@ -248,8 +248,8 @@ fn a_late_frame_an_old_one_and_a_row_of_refused_ones_make_the_output_safe() {
     let unknown = |_| Freshness { age_ms: 0, echo: None };
     let (nominal, safe) = ((State::Nominal as u32, 0), State::Safe as u32);
     let degraded = State::Degraded as u32;
-    let delayed = cause_code(&Unavailable::Delayed { transit: 0 });
-    let stale = cause_code(&Unavailable::SourceStale { age: 0 });
+    let delayed = cause_code(&Unavailable::Delayed { transit: Millis(0) });
+    let stale = cause_code(&Unavailable::SourceStale { age: Millis(0) });
     let rejected = cause_code(&Unavailable::Rejections { streak: 0 });
 
     assert_eq!(after(&unknown, false), (safe, delayed), "who knows how long it was on its way");

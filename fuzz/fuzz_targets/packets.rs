@@ -2,7 +2,7 @@
 //! is a sequence of packets, each after its length; packets of odd length get a right checksum.
 #![no_main]
 
-use dibs_nostd::{Assembler, Frames, Unchecked, VertexTable};
+use dibs_nostd::{Millis, Assembler, Frames, Unchecked, VertexTable};
 use dibs_nostd::wire::Deframer;
 use dibs_tests::bus::{MESH, N, reseal};
 use libfuzzer_sys::fuzz_target;
@@ -24,10 +24,10 @@ fuzz_target!(|input: &[u8]| {
             packet.to_vec()
         };
         // Any outcome is right, except a panic.
-        let _ = assembler.accept(&sealed, now);
+        let _ = assembler.accept(&sealed, Millis(now));
         for &byte in packet {
             if let Some(Ok(framed)) = deframer.push(byte) {
-                let _ = assembler.accept(framed, now);
+                let _ = assembler.accept(framed, Millis(now));
             }
         }
         if let Some(frame) = reader.read() {

@@ -9,8 +9,8 @@ use std::hint::black_box;
 use dibs_nostd::constraint::{ForbiddenRegion, GainError, SpringDamper};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
-    Assembler, Budget, Capsule, Frames, Options, Proximity, QuantisedVertices, Query, Scrub,
-    Sphere, Tool, Tree, Unavailable, Unchecked, VertexTable, measure_stretch,
+    Assembler, Budget, Capsule, Frames, Millis, Options, Proximity, QuantisedVertices, Query,
+    Scrub, Sphere, Tool, Tree, Unavailable, Unchecked, VertexTable, measure_stretch,
 };
 use dibs_tests::bus::{MESH, N, frame};
 use gungraun::prelude::*;
@@ -139,7 +139,7 @@ fn bus(quantised: bool) -> Bus {
 #[bench::float(args = (false,), setup = bus)]
 #[bench::quantised(args = (true,), setup = bus)]
 fn accept_forty_vertices((mut assembler, packets): Bus) -> usize {
-    packets.iter().filter(|packet| black_box(assembler.accept(packet, 0)).is_ok()).count()
+    packets.iter().filter(|packet| black_box(assembler.accept(packet, Millis(0))).is_ok()).count()
 }
 
 fn quantised() -> Vec<[u16; 3]> {

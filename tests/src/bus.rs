@@ -3,7 +3,7 @@
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{CHECKSUM_BYTES, Encoding, FrameEncoder, FrameId, Mac, QuantisedBox};
 use dibs_nostd::{
-    Advance, Assembler, FrameReader, Frames, Gate, ReceiveError, Unchecked, VertexTable,
+    Advance, Assembler, FrameReader, Frames, Gate, Millis, ReceiveError, Unchecked, VertexTable,
 };
 
 /// Mesh id of the packets.
@@ -106,7 +106,7 @@ pub fn give_at<G: Gate, M: Mac, const N: usize>(
     packet: &[u8],
     now: u32,
 ) -> Result<Option<u32>, ReceiveError> {
-    assembler.accept(packet, now)?;
+    assembler.accept(packet, Millis(now))?;
     for _ in 0..1000 {
         match assembler.advance(7)? {
             Advance::Published { epoch } => return Ok(Some(epoch)),

@@ -4,7 +4,7 @@ use std::net::UdpSocket;
 use std::time::Duration;
 
 use dibs_nostd::modes::{ModalGate, ModalReader, Modes};
-use dibs_nostd::{Advance, Assembler, Frames, Tree, VertexTable};
+use dibs_nostd::{Advance, Assembler, Frames, Millis, Tree, VertexTable};
 use serde_json::Value;
 
 use crate::program::{dibs, fails, json, succeeds};
@@ -75,7 +75,7 @@ fn weights_are_streamed() {
     let motion = dibs_build::Motion::read_pc2(folder.join("heart.pc2")).unwrap();
     let (mut buffer, mut published) = ([0; 2048], 0);
     while let Ok(length) = socket.recv(&mut buffer) {
-        assembler.accept(&buffer[..length], 0).unwrap();
+        assembler.accept(&buffer[..length], Millis(0)).unwrap();
         let Ok(Advance::Published { .. }) = assembler.advance(u32::MAX) else { continue };
         let (frame, recorded) = (reader.read().unwrap(), &motion.frames[published]);
         for row in 0..tree.vertex_count() {

@@ -9,7 +9,7 @@ use std::path::Path;
 use dibs_build::glam::{DVec3, Vec3};
 use dibs_build::{Format, Mesh, Motion, WriteErrorKind, generate};
 use dibs_nostd::wire::{Deframer, NoMac};
-use dibs_nostd::{Advance, Assembler, Frames, StretchMonitor, Tree, VertexTable};
+use dibs_nostd::{Advance, Assembler, Frames, Millis, StretchMonitor, Tree, VertexTable};
 use serde_json::Value;
 
 use crate::program::{fails, json, succeeds};
@@ -200,7 +200,7 @@ fn a_far_motion_is_sent_from_the_origin() {
         let mut deframer = Deframer::<1024>::new();
         for byte in receiver.join().unwrap() {
             if let Some(packet) = deframer.push(byte) {
-                assembler.accept(packet.unwrap(), 0).unwrap();
+                assembler.accept(packet.unwrap(), Millis(0)).unwrap();
             }
             while assembler.advance(1_000).unwrap() != Advance::Idle {}
         }

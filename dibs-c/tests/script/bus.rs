@@ -8,8 +8,8 @@ use dibs_nostd::failsafe::{FailSafe, Limits, LinkStatus, Observation, State, Wat
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, QuantisedBox};
 use dibs_nostd::{
-    Advance, Assembler, Capsule, Frames, Options, Progress, Query, ReceiveError, StretchError,
-    SurfaceLimits, Tree, Unavailable,
+    Advance, Assembler, Capsule, Frames, Millis, Options, Progress, Query, ReceiveError,
+    StretchError, SurfaceLimits, Tree, Unavailable,
 };
 
 use super::print::Line;
@@ -92,9 +92,12 @@ pub fn answers(built: &BuiltTree, events: &[Event]) -> Vec<String> {
         Assembler::for_tree(writer, &tree, SurfaceLimits::reach_mm(300.0)).expect("a metric");
     let link = LinkStatus::new();
     let mut query = Query::<_, 512>::new(&tree).expect("a stack");
-    let watch = |degraded, safe| Watch::new(degraded, safe).expect("limits");
+    let watch = |degraded, safe| Watch::new(Millis(degraded), Millis(safe)).expect("limits");
     let limits = Limits::new(watch(40, 80), 0.1).and_then(|limits| limits.recovery(2));
-    let limits = limits.expect("limits").silence(watch(30, 100)).rejections(watch(1, 10));
+    let limits = limits
+        .expect("limits")
+        .silence(watch(30, 100))
+        .rejections(Watch::count(1, 10).expect("limits"));
     let mut machine = FailSafe::new(limits.automatic());
     let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
     let wall = ForbiddenRegion::new(spring, 5.0).expect("a margin");
@@ -103,7 +106,7 @@ pub fn answers(built: &BuiltTree, events: &[Event]) -> Vec<String> {
 
     let answer = |event: &Event| match event {
         Event::Packet(now, bytes) => {
-            let accepted = receiver.accept(bytes, *now);
+            let accepted = receiver.accept(bytes, Millis(*now));
             let mut checked = receiver.advance(200);
             while checked == Ok(Advance::Pending) {
                 checked = receiver.advance(200);
@@ -118,7 +121,7 @@ pub fn answers(built: &BuiltTree, events: &[Event]) -> Vec<String> {
             format!("packet {code} {progress} {refused} {advance}")
         }
         Event::Tick(now, tool) => {
-            let latest = reader.latest(*now);
+            let latest = reader.latest(Millis(*now));
             let frame = latest.frame();
             let mut tracked = String::new();
             let found = latest.of_any_age().and_then(|surface| {
@@ -126,7 +129,7 @@ pub fn answers(built: &BuiltTree, events: &[Event]) -> Vec<String> {
                 tracked = track.answer(&surface, tool) + "\n";
                 Ok(found)
             });
-            let link = link.read(*now);
+            let link = link.read(Millis(*now));
             let seen = Observation { frame, link, query_error: None, is_tree_corrupt: false };
             let verdict = machine.step(&seen);
             let admitted = found.and_then(|found| verdict.admit(found));
@@ -139,7 +142,7 @@ pub fn answers(built: &BuiltTree, events: &[Event]) -> Vec<String> {
                 State::Degraded => 1,
                 State::Safe => 2,
             };
-            let age = frame.map_or(0, |frame| frame.age);
+            let age = frame.map_or(0, |frame| frame.age.0);
             let mut line = Line::new(&format!("tick {outcome} {state} {cause} {age}"));
             line.floats(&[verdict.margin]);
             if let Ok(found) = &admitted {

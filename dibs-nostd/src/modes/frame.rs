@@ -10,8 +10,8 @@ use super::reach::Reach;
 use super::{ModalSurface, Modes};
 use crate::surface::motion::sealed::Sealed;
 use crate::surface::{
-    Ahead, Course, FARTHEST, FrameLabel, MeasuredStretch, MovingSurface, Travel, VertexTable,
-    clamped,
+    Ahead, Course, FARTHEST, FrameLabel, MeasuredStretch, Millis, MovingSurface, Travel,
+    VertexTable, clamped,
 };
 
 /// The weights of a surface, and a bound on its stretch.
@@ -50,7 +50,7 @@ pub(super) struct Step<const K: usize> {
     /// The end of the extrapolation, its weights within their ranges.
     end: Weights<K>,
     /// Time from the frame before to this one, on the receiver's clock.
-    interval: u32,
+    interval: Millis,
     /// The odometer's reading at the frame before.
     from: Travel,
     /// Units of the odometer from the frame before to this one, and from this one to the end.
@@ -70,7 +70,7 @@ impl<const K: usize> Step<K> {
         modes: &Modes<'_>,
         reach: &Reach<K>,
         [before, now]: [&Weights<K>; 2],
-        (from, interval): (Travel, u32),
+        (from, interval): (Travel, Millis),
         last: Option<&Self>,
     ) -> Self {
         let mut end = *now;
@@ -110,8 +110,8 @@ impl<const K: usize> Step<K> {
     }
 
     /// Part of the way to the end after so long.
-    fn ahead(&self, age: u32) -> f32 {
-        clamped(age as f32 / self.interval as f32, FARTHEST) / FARTHEST
+    fn ahead(&self, age: Millis) -> f32 {
+        clamped(age.0 as f32 / self.interval.0 as f32, FARTHEST) / FARTHEST
     }
 }
 
@@ -127,7 +127,7 @@ pub struct ModalFrame<'a, const K: usize> {
     travel: Option<Travel>,
     step: Option<Step<K>>,
     /// Age of the frame when it was read.
-    age: u32,
+    age: Millis,
     is_frame: bool,
     shown: f32,
 }
@@ -140,7 +140,7 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         weights: &Weights<K>,
         travel: Option<Travel>,
         step: Option<Step<K>>,
-        age: u32,
+        age: Millis,
     ) -> Self {
         let surface = weights.surface(modes);
         let (is_frame, shown) = (true, f32::NAN);
@@ -161,7 +161,7 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
     #[must_use]
     pub fn interpolated(&self) -> Self {
         let Some(step) = &self.step else { return *self };
-        let share = clamped(self.age as f32 / step.interval as f32, 1.0);
+        let share = clamped(self.age.0 as f32 / step.interval.0 as f32, 1.0);
         let weights = step.before.towards(&self.weights, share, self.surface.modes());
         let travel = step.from.along((share * step.units as f32) as u64);
         self.moved(weights, Some(travel), f32::NAN)

@@ -3,7 +3,9 @@
 use super::frame::{Step, Weights};
 use super::reach::Reach;
 use super::{ModalFrame, Modes, WeightsError};
-use crate::surface::{FrameGuard, FrameLabel, FrameReader, Latest, Travel, VertexTable, elapsed};
+use crate::surface::{
+    FrameGuard, FrameLabel, FrameReader, Latest, Millis, Travel, VertexTable, elapsed,
+};
 
 /// Reads published weights as surfaces. The double buffer is [`Frames`](crate::Frames) of `K` rows, with one weight in
 /// each.
@@ -25,7 +27,7 @@ pub struct ModalReader<'f, 'a, const K: usize> {
 struct Last<const K: usize> {
     weights: Weights<K>,
     epoch: u32,
-    received: u32,
+    received: Millis,
     /// `None` for weights out of range.
     travel: Option<Travel>,
     step: Option<Step<K>>,
@@ -51,7 +53,7 @@ impl<'f, 'a, const K: usize> ModalReader<'f, 'a, K> {
     ///
     /// The weights are copied, so frames can be published while this one is kept, unlike with [`FrameReader::latest`].
     #[inline]
-    pub fn latest(&mut self, now: u32) -> Latest<ModalFrame<'a, K>> {
+    pub fn latest(&mut self, now: Millis) -> Latest<ModalFrame<'a, K>> {
         let Self { frames, modes, reach, last } = self;
         frames.latest(now).map(|frame| next(modes, reach, last, &frame))
     }
@@ -112,7 +114,7 @@ impl<const K: usize> Last<K> {
         let weights = [&before.weights, &weights];
         let step = Step::new(modes, reach, weights, (from, interval), before.step.as_ref());
         now.travel = Some(from.along(step.units));
-        now.step = (interval > 0).then_some(step);
+        now.step = (interval > Millis(0)).then_some(step);
         now
     }
 }

@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::{ModalFrame, ModalReader, Modes};
 use crate::surface::motion::Unit;
-use crate::{FrameLabel, FrameWriter, Frames, MovingSurface, Tree, VertexTable};
+use crate::{FrameLabel, FrameWriter, Frames, Millis, MovingSurface, Tree, VertexTable};
 
 pub(super) const MODES: usize = 8;
 
@@ -39,6 +39,7 @@ fn publish(writer: &mut FrameWriter<'_, MODES>, weights: &[f32], epoch: u32, rec
     for weight in weights {
         writer.push(Vec3::new(*weight, 0.0, 0.0)).unwrap();
     }
+    let received = Millis(received);
     let label = FrameLabel { epoch, received, position_error: 0.0, stretch: None };
     writer.publish(label).unwrap();
 }
@@ -70,7 +71,7 @@ fn no_vertex_moves_farther_than_the_odometer_says() {
         publish(&mut writer, &weights, epoch, received);
         for _ in 0..rng.u32(1..8) {
             now = now.wrapping_add(rng.u32(0..6));
-            let frame = reader.latest(now).of_any_age().unwrap();
+            let frame = reader.latest(Millis(now)).of_any_age().unwrap();
             let surfaces = [frame, frame.interpolated(), frame.extrapolated()];
             for ((surface, before), sums) in surfaces.iter().zip(&mut before).zip(&mut sums) {
                 if let Some(before) = before {
@@ -113,7 +114,8 @@ fn a_steady_extrapolation_moves_by_its_error() {
         let received = u32::from(epoch) * 17;
         publish(&mut writer, &weights, epoch.into(), received);
         for age in 4..21 {
-            let surface = reader.latest(received + age).of_any_age().unwrap().extrapolated();
+            let surface =
+                reader.latest(Millis(received + age)).of_any_age().unwrap().extrapolated();
             if let Some(before) = &before {
                 let units = surface.travel().unwrap().since(&before.travel().unwrap());
                 let (stated, found) = (unit.length(units.unwrap() as i32), moved(before, &surface));

@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use super::{StretchError, measure_stretch};
-use crate::surface::{MeasuredStretch, TravelUnit, VertexTable};
+use crate::surface::{MeasuredStretch, Millis, TravelUnit, VertexTable};
 use crate::tree::{Index, Tree};
 
 /// The part of the published surface that a frame changes.
@@ -34,7 +34,7 @@ pub struct Arriving<'a, V: ?Sized> {
     /// Number of final rows. It only grows within a frame, and is the number of all rows once the frame is complete.
     pub ready: u32,
     /// The published surface, and the time from its capture to this one's; `None` before the first.
-    pub before: Option<(&'a V, u32)>,
+    pub before: Option<(&'a V, Millis)>,
 }
 
 impl<'a, V: ?Sized> Arriving<'a, V> {
@@ -81,7 +81,7 @@ pub trait Gate {
         None
     }
 
-    /// The largest speed of any vertex that the gate admits, in mm per unit of the receiver's clock: see
+    /// The largest speed of any vertex that the gate admits, in mm per millisecond: see
     /// [`SurfaceLimits::speed`](crate::SurfaceLimits::speed). Infinite for a gate that compares no frames.
     fn speed_limit(&self) -> f32 {
         f32::INFINITY

@@ -10,7 +10,7 @@
 ///
 /// ```
 /// use dibs_nostd::SurfaceLimits;
-/// // 300 mm around the origin, and 0.2 mm a tick of 1 ms: a beating heart.
+/// // 300 mm around the origin, and 0.2 mm a millisecond: a beating heart.
 /// let limits = SurfaceLimits::reach_mm(300.0).speed(0.2);
 /// assert_eq!(limits, SurfaceLimits::reach_mm(300.0).speed(0.2).shrinkage(0.25));
 /// ```
@@ -31,8 +31,8 @@ impl SurfaceLimits {
         Self { reach, speed: f32::INFINITY, shrinkage: 0.25 }
     }
 
-    /// The largest speed of any vertex, in mm per unit of the receiver's clock: from one published frame to the next a
-    /// vertex may move by the speed times the time between their captures plus one unit.
+    /// The largest speed of any vertex, in mm per millisecond (m/s): from one published frame to the next a
+    /// vertex may move by the speed times the time between their captures plus one millisecond.
     ///
     /// After a refused frame the published one ages, which a [`FailSafe`](crate::failsafe::FailSafe) watches, and later
     /// frames may be farther from it. Frames that were delayed and come in a burst seem faster than they are: allow for

@@ -35,7 +35,7 @@ const BLOCKS: usize = 32;
 /// ```
 /// use dibs_build::{Builder, generate};
 /// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
-/// use dibs_nostd::{Advance, Assembler, Frames, SurfaceLimits, Tree};
+/// use dibs_nostd::{Advance, Assembler, Frames, Millis, SurfaceLimits, Tree};
 ///
 /// let generate::MovingMesh { mesh: heart, motion } = generate::heart(320)?;
 /// let built = Builder::new().stretch(1.5).build(&heart)?;
@@ -43,14 +43,14 @@ const BLOCKS: usize = 32;
 ///
 /// static FRAMES: Frames<162> = Frames::new();
 /// let (writer, mut reader) = FRAMES.split()?;
-/// let limits = SurfaceLimits::reach_mm(300.0).speed(0.2); // mm, mm a tick
+/// let limits = SurfaceLimits::reach_mm(300.0).speed(0.2); // mm, mm a millisecond
 /// let mut assembler = Assembler::for_tree(writer, &tree, limits)?;
 /// let rows = built.to_rows(&motion.frames[9]);
 /// let id = FrameId { mesh_id: tree.mesh_id(), session: 1, epoch: 1 };
 /// let mut sender = FrameEncoder::<_, 512>::new(id, Encoding::Float, rows.as_slice())?;
 /// let mut buffer = [0; 512];
 /// while let Some(packet) = sender.next_packet(&mut buffer) {
-///     assembler.accept(packet, 0)?;
+///     assembler.accept(packet, Millis(0))?;
 ///     assembler.advance(60)?; // at most 60 rows and triangles
 /// }
 /// while assembler.advance(60)? == Advance::Pending {}

@@ -7,12 +7,12 @@ use glam::Vec3;
 
 use super::StretchError;
 use crate::math::sqrt::sqrt;
-use crate::surface::VertexTable;
+use crate::surface::{Millis, VertexTable};
 
 /// Most that a vertex may move in this time (mm); infinite without a limit.
-pub(crate) const fn farthest(speed: f32, elapsed: u32) -> f32 {
-    // One unit more than the time, because the clock counts whole units.
-    speed * (elapsed as f32 + 1.0)
+pub(crate) const fn farthest(speed: f32, elapsed: Millis) -> f32 {
+    // One millisecond more than the time, because the clock counts whole ones.
+    speed * (elapsed.0 as f32 + 1.0)
 }
 
 /// The largest squared distance of these rows from their previous positions, or `largest` if that is larger. NaN where

@@ -4,9 +4,9 @@ use core::fmt;
 
 use glam::Vec3;
 
-use super::MeasuredStretch;
 use super::atomic::{AtomicU32, Ordering};
 use super::motion::Travel;
+use super::{MeasuredStretch, Millis};
 
 /// The facts about a published frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,7 +15,7 @@ pub struct FrameLabel {
     /// Number of the frame, given by the sender; wraps.
     pub epoch: u32,
     /// Arrival of the frame's first packet, less the age that the surface then had, on the receiver's clock (wraps).
-    pub received: u32,
+    pub received: Millis,
     /// Largest distance of a vertex from the sender's position, in mm: the quantisation on the wire. A separation is
     /// off by at most as much.
     pub position_error: f32,
@@ -149,7 +149,7 @@ impl<P: Rows + ?Sized> Buffer<P> {
 
     pub(super) fn set_label(&self, label: FrameLabel, travel: Option<Travel>, ahead: Ahead) {
         self.epoch.store(label.epoch, Ordering::Relaxed);
-        self.received.store(label.received, Ordering::Relaxed);
+        self.received.store(label.received.0, Ordering::Relaxed);
         self.position_error.store(label.position_error.to_bits(), Ordering::Relaxed);
         let words = match label.stretch {
             Some(measured) => measured.to_words(),
@@ -178,7 +178,7 @@ impl<P: Rows + ?Sized> Buffer<P> {
     pub(super) fn label(&self) -> FrameLabel {
         FrameLabel {
             epoch: self.epoch.load(Ordering::Relaxed),
-            received: self.received.load(Ordering::Relaxed),
+            received: Millis(self.received.load(Ordering::Relaxed)),
             position_error: self.position_error(),
             stretch: self.stretch(),
         }

@@ -53,7 +53,7 @@ const PUBLISHED: u32 = 8;
 /// RAM: 12 bytes a vertex and buffer, plus some 50 a buffer. All zero at start, so it lies in `.bss`.
 ///
 /// ```
-/// use dibs_nostd::{FrameLabel, Frames, VertexTable, glam::Vec3};
+/// use dibs_nostd::{FrameLabel, Frames, Millis, VertexTable, glam::Vec3};
 ///
 /// static FRAMES: Frames<2> = Frames::new();
 /// let (mut writer, mut reader) = FRAMES.split().expect("split once");
@@ -62,16 +62,16 @@ const PUBLISHED: u32 = 8;
 /// writer.begin();
 /// writer.push(Vec3::X).unwrap();
 /// writer.push(Vec3::Y).unwrap();
-/// let label = FrameLabel { epoch: 7, received: 1000, position_error: 0.0, stretch: None };
+/// let label = FrameLabel { epoch: 7, received: Millis(1000), position_error: 0.0, stretch: None };
 /// writer.publish(label).unwrap();
 ///
 /// let frame = reader.read().unwrap();
 /// assert_eq!(frame.position(1), Some(Vec3::Y));
 /// assert_eq!(frame.label().epoch, 7);
 /// # drop(frame);
-/// let latest = reader.latest(1008); // the receiver's clock
-/// assert_eq!(latest.frame().unwrap().age, 8);
-/// assert!(latest.within(50).is_ok());
+/// let latest = reader.latest(Millis(1008)); // the receiver's clock
+/// assert_eq!(latest.frame().unwrap().age, Millis(8));
+/// assert!(latest.within(Millis(50)).is_ok());
 /// ```
 #[derive(Debug)]
 pub struct Frames<const N: usize, const BUFFERS: usize = 2> {

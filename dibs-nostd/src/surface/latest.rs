@@ -1,20 +1,21 @@
 //! The newest surface with its age, for a control tick.
 
+use super::Millis;
 use crate::unavailable::Unavailable;
 
 /// The frame published last and its age, for surfaces of vertices and of modes.
 ///
-/// A frame received up to 16 units ahead of the clock has age 0: another core may have stamped it. A frame farther
-/// ahead is old. No frame grows younger, if its age is read at least once in 2^31 units.
+/// A frame received up to 16 ms ahead of the clock has age 0: another core may have stamped it. A frame farther
+/// ahead is old. No frame grows younger, if its age is read at least once in 2^31 ms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FrameAge {
     /// Number of the frame; wraps.
     pub epoch: u32,
     /// Arrival of its first packet, on the receiver's clock, less the age that it then had; wraps.
-    pub received: u32,
-    /// Time since then, in the clock's unit.
-    pub age: u32,
+    pub received: Millis,
+    /// Time since then.
+    pub age: Millis,
 }
 
 /// The surface published last, if any, from [`FrameReader::latest`](crate::FrameReader::latest) or
@@ -35,12 +36,12 @@ impl<S> Latest<S> {
         Latest { surface: self.surface.map(|(surface, frame)| (of(surface), frame)) }
     }
 
-    /// The surface, if it is not older than `limit` (in the clock's unit).
+    /// The surface, if it is not older than `limit`.
     ///
     /// # Errors
     /// [`Unavailable::NoSurface`] before the first was published, [`Unavailable::Stale`] with its age.
     #[inline]
-    pub fn within(self, limit: u32) -> Result<S, Unavailable> {
+    pub fn within(self, limit: Millis) -> Result<S, Unavailable> {
         match self.surface {
             None => Err(Unavailable::NoSurface),
             Some((_, FrameAge { age, .. })) if age > limit => Err(Unavailable::Stale { age }),
@@ -55,7 +56,7 @@ impl<S> Latest<S> {
     /// [`Unavailable::NoSurface`] before the first was published.
     #[inline]
     pub fn of_any_age(self) -> Result<S, Unavailable> {
-        self.within(u32::MAX)
+        self.within(Millis::MAX)
     }
 
     /// Its frame and age; `None` before the first was published.

@@ -1,6 +1,5 @@
 //! The current surface: vertex tables, and the double buffer that frames arrive in.
 
-mod age;
 mod atomic;
 mod buffer;
 mod course;
@@ -11,11 +10,9 @@ mod measured;
 pub(crate) mod motion;
 mod moving;
 mod reader;
+mod time;
 mod vertices;
 
-pub(crate) use age::Ageing;
-#[cfg(feature = "modes")]
-pub(crate) use age::elapsed;
 #[cfg(any(feature = "bus", feature = "modes"))]
 pub(crate) use buffer::Ahead;
 pub use buffer::{Buffer, FrameLabel, Position};
@@ -33,4 +30,8 @@ pub(crate) use moving::{FARTHEST, clamped};
 #[cfg(feature = "bus")]
 pub(crate) use reader::LastStep;
 pub use reader::{FrameGuard, FrameReader, FrameView};
+pub(crate) use time::Ageing;
+#[cfg(any(feature = "bus", feature = "modes"))]
+pub(crate) use time::elapsed;
+pub use time::{Millis, Ticks};
 pub use vertices::{QuantisedVertices, VertexTable};

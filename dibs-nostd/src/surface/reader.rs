@@ -3,7 +3,6 @@
 
 use glam::Vec3;
 
-use super::age::elapsed;
 use super::atomic::{AtomicU32, Ordering};
 use super::buffer::{Ahead, Buffer, FrameLabel};
 use super::course::Course;
@@ -11,7 +10,8 @@ use super::frames::{Buffers, Frames, READING, published};
 use super::motion::{MovingSurface, Travel};
 use super::moving::Between;
 use super::moving::{FARTHEST, clamped};
-use super::{Ageing, FrameAge, Latest, MeasuredStretch, VertexTable};
+use super::time::elapsed;
+use super::{Ageing, FrameAge, Latest, MeasuredStretch, Millis, VertexTable};
 
 /// The end that reads: owned by the control tick.
 #[derive(Debug)]
@@ -29,7 +29,7 @@ impl<'f, const N: usize, F: Buffers> FrameReader<'f, N, F> {
     /// The published frame and its age at `now`, on the receiver's clock. [`Latest::within`] a limit gives the frame,
     /// held as by [`read`](Self::read).
     #[inline]
-    pub fn latest(&mut self, now: u32) -> Latest<FrameGuard<'_, N, F>> {
+    pub fn latest(&mut self, now: Millis) -> Latest<FrameGuard<'_, N, F>> {
         let (epoch_before, before) = self.ageing;
         let Some(mut guard) = read(self.frames) else { return Latest::new(None) };
         let FrameLabel { epoch, received, .. } = guard.label();
@@ -58,7 +58,7 @@ fn read<const N: usize, F: Buffers>(frames: &F) -> Option<FrameGuard<'_, N, F>> 
         return None;
     };
     let [view, before] = [buffer, before].map(FrameView::published);
-    Some(FrameGuard { state: frames.state(), view, before, age: 0 })
+    Some(FrameGuard { state: frames.state(), view, before, age: Millis(0) })
 }
 
 /// The published frame, held still: a [`VertexTable`] that carries its measured stretch and its position error.
@@ -69,7 +69,7 @@ pub struct FrameGuard<'f, const N: usize, F: Buffers = Frames<N>> {
     /// The frame before, if there are three buffers.
     before: FrameView<'f, N, F>,
     /// Age of the frame when it was read.
-    age: u32,
+    age: Millis,
 }
 
 impl<const N: usize, F: Buffers> FrameGuard<'_, N, F> {
@@ -81,7 +81,7 @@ impl<const N: usize, F: Buffers> FrameGuard<'_, N, F> {
 
     /// Its age when it was read.
     #[cfg(feature = "modes")]
-    pub(crate) const fn age(&self) -> u32 {
+    pub(crate) const fn age(&self) -> Millis {
         self.age
     }
 }
@@ -180,7 +180,7 @@ pub(crate) struct LastStep {
     travel: Travel,
     units: u64,
     /// Time between the two, on the receiver's clock, above 0.
-    interval: u32,
+    interval: Millis,
 }
 
 impl LastStep {
@@ -192,14 +192,14 @@ impl LastStep {
         let (from, travel) = (before.travel()?, after.travel()?);
         let units = travel.after(&from)?;
         let interval = before.time_to(after.label().received);
-        (interval > 0).then_some(Self { from, travel, units, interval })
+        (interval > Millis(0)).then_some(Self { from, travel, units, interval })
     }
 
     /// The surface between the two, `age` after the later, less the time between them.
     fn inside<'v, V: VertexTable>(
         &self,
         [before, after]: [&'v V; 2],
-        age: u32,
+        age: Millis,
     ) -> Between<'v, V, V> {
         Between::inside(before, after, self.share(age), self.from, self.units)
     }
@@ -208,7 +208,7 @@ impl LastStep {
     fn outside<'v, V: VertexTable>(
         &self,
         [before, after]: [&'v V; 2],
-        age: u32,
+        age: Millis,
         ahead: Ahead,
     ) -> Between<'v, V, V> {
         let share = clamped(self.share(age), FARTHEST);
@@ -219,7 +219,7 @@ impl LastStep {
 
     /// The share of the step that an extrapolation adds to the later frame after this time.
     #[cfg(feature = "bus")]
-    pub fn ahead(&self, age: u32) -> f32 {
+    pub fn ahead(&self, age: Millis) -> f32 {
         clamped(self.share(age), FARTHEST)
     }
 
@@ -229,8 +229,8 @@ impl LastStep {
         self.units
     }
 
-    fn share(&self, age: u32) -> f32 {
-        age as f32 / self.interval as f32
+    fn share(&self, age: Millis) -> f32 {
+        age.0 as f32 / self.interval.0 as f32
     }
 }
 
@@ -267,8 +267,8 @@ impl<'f, const N: usize, F: Buffers> FrameView<'f, N, F> {
     }
 
     /// Time from this frame to one with the stamp `received`.
-    pub(crate) fn time_to(&self, received: u32) -> u32 {
-        elapsed(received, self.buffer.received.load(Ordering::Relaxed))
+    pub(crate) fn time_to(&self, received: Millis) -> Millis {
+        elapsed(received, Millis(self.buffer.received.load(Ordering::Relaxed)))
     }
 }
 

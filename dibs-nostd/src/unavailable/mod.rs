@@ -6,6 +6,8 @@ use core::fmt;
 
 pub use query::QueryError;
 
+use crate::surface::Millis;
+
 /// Why there is no proximity to act on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -15,8 +17,8 @@ pub enum Unavailable {
     NoSurface,
     /// The surface is older than allowed.
     Stale {
-        /// Its age, on the receiver's clock.
-        age: u32,
+        /// Its age.
+        age: Millis,
     },
     /// The query failed.
     Query(QueryError),
@@ -24,13 +26,13 @@ pub enum Unavailable {
     CorruptTree,
     /// No good packet came within the time allowed.
     LinkLost {
-        /// Time since the last one, on the receiver's clock.
-        silence: u32,
+        /// Time since the last one.
+        silence: Millis,
     },
     /// No heartbeat came within the time allowed.
     HeartbeatLost {
-        /// Time since the last one, on the receiver's clock.
-        silence: u32,
+        /// Time since the last one.
+        silence: Millis,
     },
     /// More frames were refused or damaged than allowed since the last publication.
     Rejections {
@@ -39,13 +41,13 @@ pub enum Unavailable {
     },
     /// The surface was on its way for longer than allowed, or for an unknown time.
     Delayed {
-        /// From the status that it echoes to its arrival, on the receiver's clock.
-        transit: u32,
+        /// From the status that it echoes to its arrival; [`Millis::MAX`] if it echoes none.
+        transit: Millis,
     },
     /// The surface was older than allowed when it was sent: its source stands still.
     SourceStale {
         /// Its age then.
-        age: u32,
+        age: Millis,
     },
     /// More packets were forged than allowed since the last publication.
     Forgeries {

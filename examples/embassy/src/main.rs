@@ -15,7 +15,7 @@ use cortex_m_semihosting::hprintln;
 use dibs_nostd::constraint::{ForbiddenRegion, SpringDamper};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::Deframer;
-use dibs_nostd::{Advance, Budget, Capsule, Cost, Error, Options, SurfaceLimits};
+use dibs_nostd::{Advance, Budget, Capsule, Cost, Error, Millis, Options, SurfaceLimits};
 use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
@@ -28,7 +28,7 @@ const OPTIONS: Options =
     Options::new().budget(Budget::for_instructions(400_000, &Cost::M7_CAPSULE));
 
 static CONTROL: InterruptExecutor = InterruptExecutor::new();
-static TICK: Signal<CriticalSectionRawMutex, u32> = Signal::new();
+static TICK: Signal<CriticalSectionRawMutex, Millis> = Signal::new();
 static BYTES: Pipe<CriticalSectionRawMutex, 4096> = Pipe::new();
 /// Control ticks so far: the time, in ms.
 static NOW: AtomicU32 = AtomicU32::new(0);
@@ -52,7 +52,7 @@ async fn bus() -> Result<(), Error> {
         let count = BYTES.read(&mut bytes).await;
         for &byte in &bytes[..count] {
             if let Some(Ok(packet)) = deframer.push(byte) {
-                let _counted = receiver.accept(packet, NOW.load(Ordering::Relaxed));
+                let _counted = receiver.accept(packet, Millis(NOW.load(Ordering::Relaxed)));
             }
         }
         while receiver.advance(100) == Ok(Advance::Pending) {}
@@ -82,7 +82,7 @@ async fn control(mut reader: heart::Reader, mut query: heart::Query, wall: Forbi
         let now = TICK.wait().await;
         let (tip, top) = (Vec3::new(32.0, 0.0, 60.0), Vec3::new(32.0, 0.0, 150.0));
         let Ok(tool) = Capsule::new(tip, top, 2.5) else { end(false) };
-        let surface = reader.latest(now).within(2_000);
+        let surface = reader.latest(now).within(Millis(2_000));
         let closest = surface.and_then(|surface| Ok(query.closest(&surface, &tool, &OPTIONS)?));
         let force = wall.force(&closest, Vec3::ZERO).force;
         if let Ok(closest) = closest {
@@ -97,7 +97,7 @@ async fn control(mut reader: heart::Reader, mut query: heart::Query, wall: Forbi
 
 #[exception]
 fn SysTick() {
-    TICK.signal(NOW.fetch_add(1, Ordering::Relaxed));
+    TICK.signal(Millis(NOW.fetch_add(1, Ordering::Relaxed)));
 }
 
 extern "C" fn uart() {

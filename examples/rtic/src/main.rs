@@ -29,7 +29,7 @@ mod app {
     use dibs_nostd::constraint::{ForbiddenRegion, SpringDamper};
     use dibs_nostd::glam::Vec3;
     use dibs_nostd::wire::Deframer;
-    use dibs_nostd::{Budget, Capsule, Cost, Error, Options, SurfaceLimits};
+    use dibs_nostd::{Budget, Capsule, Cost, Error, Millis, Options, SurfaceLimits};
 
     use crate::board::{self, end};
     use crate::{SURFACE, heart};
@@ -80,7 +80,8 @@ mod app {
         board::acknowledge();
         while let Some(byte) = board::byte() {
             if let Some(Ok(packet)) = cx.local.deframer.push(byte) {
-                let _counted = cx.local.receiver.accept(packet, NOW.load(Ordering::Relaxed));
+                let _counted =
+                    cx.local.receiver.accept(packet, Millis(NOW.load(Ordering::Relaxed)));
             }
             let _pending = cx.local.receiver.advance(100);
         }
@@ -88,10 +89,10 @@ mod app {
 
     #[task(binds = SysTick, priority = 2, local = [reader, query, wall])]
     fn control(cx: control::Context) {
-        let now = NOW.fetch_add(1, Ordering::Relaxed);
+        let now = Millis(NOW.fetch_add(1, Ordering::Relaxed));
         let (tip, top) = (Vec3::new(32.0, 0.0, 60.0), Vec3::new(32.0, 0.0, 150.0));
         let Ok(tool) = Capsule::new(tip, top, 2.5) else { end(false) };
-        let surface = cx.local.reader.latest(now).within(2_000);
+        let surface = cx.local.reader.latest(now).within(Millis(2_000));
         let closest =
             surface.and_then(|surface| Ok(cx.local.query.closest(&surface, &tool, &OPTIONS)?));
         let force = cx.local.wall.force(&closest, Vec3::ZERO).force;

@@ -61,7 +61,7 @@ fn idle(mut receiver: Receiver, mut bus: Bus) -> ! {
     let mut status = [0; bus::STATUS_MTU];
     let mut upkeep = Upkeep::new(&BUS);
     loop {
-        bus.poll(tick::now(), |packet| take(&mut receiver, packet));
+        bus.poll(tick::now().0, |packet| take(&mut receiver, packet));
         receiver.work();
         upkeep.step();
         if let Some(status) = receiver.status(tick::now(), &mut status) {

@@ -2,11 +2,12 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use controller::{Control, TICK_RATE};
+use controller::{Control, TICK_RATE, time_of};
 use cortex_m::Peripherals;
 use cortex_m::peripheral::scb::SystemHandler;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{DWT, SYST};
+use dibs_nostd::{Millis, Ticks};
 
 use crate::clocks;
 use crate::exclusive::Exclusive;
@@ -43,9 +44,9 @@ pub static WATCH: Watch = Watch {
     force: [const { AtomicU32::new(0) }; 3],
 };
 
-/// Ticks so far: the controller's time in ms.
-pub fn now() -> u32 {
-    WATCH.ticks.load(Ordering::Relaxed)
+/// The controller's time: that of the ticks so far.
+pub fn now() -> Millis {
+    time_of(Ticks(WATCH.ticks.load(Ordering::Relaxed).into()))
 }
 
 /// Starts the ticks.

@@ -20,7 +20,7 @@ use cortex_m::peripheral::{DCB, DWT, Peripherals, SYST};
 use cortex_m_rt::entry;
 use cortex_m_semihosting::{debug, hprintln};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Budget, Capsule, Cost, FrameLabel, Options, Proximity};
+use dibs_nostd::{Budget, Capsule, Cost, FrameLabel, Millis, Options, Proximity};
 
 const POSES: u32 = 2_000;
 
@@ -52,7 +52,7 @@ fn measure() -> Result<(), &'static str> {
         let position = tree.rest_position(row).ok_or("the tree has no rest shape")?;
         writer.push(position).map_err(|_| "more vertices than rows")?;
     }
-    let label = FrameLabel { epoch: 1, received: 0, position_error: 0.0, stretch: None };
+    let label = FrameLabel { epoch: 1, received: Millis(0), position_error: 0.0, stretch: None };
     writer.publish(label).map_err(|_| "the frame is not complete")?;
     let frame = reader.read().ok_or("nothing is published")?;
 

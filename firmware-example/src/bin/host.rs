@@ -13,6 +13,7 @@ use std::{env, thread};
 use anyhow::{Context, Result, anyhow};
 use controller::telemetry::{MAX_FRAMED, Summary, frame};
 use controller::{BusStatus, Control, Receiver, STATUS_FRAMED, TICK_RATE, Trust, Upkeep, surface};
+use dibs_nostd::Millis;
 use dibs_nostd::wire::{Counters, Event};
 
 /// Slices of background work between two looks at the bus.
@@ -20,7 +21,7 @@ const SLICES: u32 = 1_000;
 
 static FRAMES: surface::continuous::Surface = surface::continuous::Surface::new();
 static BUS: BusStatus = BusStatus::new();
-static TICKS: AtomicU32 = AtomicU32::new(0);
+static NOW: AtomicU32 = AtomicU32::new(0);
 static COUNTERS: Mutex<Counters> = Mutex::new(Counters::new());
 
 fn main() -> Result<()> {
@@ -39,12 +40,12 @@ fn main() -> Result<()> {
         let (mut buffer, mut line) = ([0; 1024], [0; STATUS_FRAMED]);
         let mut upkeep = Upkeep::new(&BUS);
         loop {
-            let tick = TICKS.load(Ordering::Relaxed);
+            let now = Millis(NOW.load(Ordering::Relaxed));
             match bus.read(&mut buffer) {
                 Ok(0) => return,
                 Ok(bytes) => {
                     for &byte in &buffer[..bytes] {
-                        receiver.byte(byte, tick);
+                        receiver.byte(byte, now);
                         while receiver.work() {}
                     }
                 }
@@ -57,7 +58,7 @@ fn main() -> Result<()> {
                 upkeep.step();
             }
             *counters() = *receiver.counters();
-            let status = receiver.report(tick, &mut line).unwrap_or_default();
+            let status = receiver.report(now, &mut line).unwrap_or_default();
             if bus.write_all(status).is_err() {
                 return;
             }
@@ -73,7 +74,7 @@ fn main() -> Result<()> {
     for tick in 0..ticks {
         thread::sleep((start + period * tick).saturating_duration_since(Instant::now()));
         let record = control.tick(|| 0);
-        TICKS.store(control.now(), Ordering::Relaxed);
+        NOW.store(control.now().0, Ordering::Relaxed);
         out.write_all(frame(&record, &mut line).context("a record fits its line")?)?;
         out.flush()?;
     }

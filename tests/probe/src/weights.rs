@@ -5,7 +5,7 @@
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::modes::{ModalReader, Modes};
 use dibs_nostd::{
-    Capsule, FrameLabel, FrameWriter, Frames, Options, Query, Tracker, Tree, TriangleRow,
+    Capsule, FrameLabel, FrameWriter, Frames, Millis, Options, Query, Tracker, Tree, TriangleRow,
 };
 
 use crate::{Fault, Machine, point, put, word};
@@ -83,7 +83,7 @@ pub fn run<const K: usize>(
                 let radius = f32::from_bits(word(machine)?);
                 let tool = Capsule::new(start, end, radius).map_err(|_| Fault)?;
                 let before = machine.clock();
-                let frame = reader.latest(now).of_any_age().map_err(|_| Fault)?;
+                let frame = reader.latest(Millis(now)).of_any_age().map_err(|_| Fault)?;
                 let surface = frame.interpolated();
                 let found = tracker
                     .closest(&surface, &tool, &Options::cold().unsigned())
@@ -121,7 +121,7 @@ fn publish<const K: usize>(
     epoch: u32,
     machine: &mut impl Machine,
 ) -> Result<(), Fault> {
-    let received = word(machine)?;
+    let received = Millis(word(machine)?);
     let mut weights = [0.0; K];
     for weight in &mut weights {
         *weight = f32::from_bits(word(machine)?);

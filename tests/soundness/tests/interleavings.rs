@@ -3,7 +3,7 @@
 #![cfg(loom)]
 
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{FrameLabel, Frames, PublishError, VertexTable};
+use dibs_nostd::{FrameLabel, Frames, Millis, PublishError, VertexTable};
 use loom::cell::UnsafeCell;
 use loom::thread;
 
@@ -27,7 +27,7 @@ impl Beside {
 /// A label whose fields carry the frame's epoch and the number of its buffer.
 fn label(epoch: u32, buffer: usize) -> FrameLabel {
     let position_error = buffer as f32;
-    FrameLabel { epoch, received: epoch + 100, position_error, stretch: None }
+    FrameLabel { epoch, received: Millis(epoch + 100), position_error, stretch: None }
 }
 
 fn position(epoch: u32) -> Vec3 {

@@ -13,7 +13,7 @@ use dibs_nostd::wire::{
     AesCmac, Code, Content, Direction, Encoding, FrameEncoder, FrameId, Freshness, Mac, NoMac,
     encode_heartbeat, encode_status,
 };
-use dibs_nostd::{Advance, Assembler, FrameReader, Frames, ReceiveError, Unchecked};
+use dibs_nostd::{Advance, Assembler, FrameReader, Frames, Millis, ReceiveError, Unchecked};
 use dibs_tests::bus::*;
 
 const KEY: [u8; 16] = *b"a secret of ours";
@@ -44,7 +44,7 @@ fn work<M: Mac>(assembler: &mut Guarded<M>) -> Option<u32> {
 }
 
 fn status<M: Mac>(assembler: &mut Guarded<M>, now: u32, safety: u8) -> Vec<u8> {
-    let status = assembler.status(now, safety);
+    let status = assembler.status(Millis(now), safety);
     encode_status(MESH, &status, assembler.counters(), assembler.mac(), &mut [0; 256]).to_vec()
 }
 
@@ -104,7 +104,7 @@ impl<M: Mac + 'static> Source<M> {
         self.pipe.answer(&status(assembler, now, safety));
         let heard = self.sender.poll();
         for packet in self.pipe.sent() {
-            let _ = assembler.accept(&packet, now);
+            let _ = assembler.accept(&packet, Millis(now));
         }
         heard
     }
@@ -129,7 +129,7 @@ impl<M: Mac + 'static> Source<M> {
 fn deliver<M: Mac>(assembler: &mut Guarded<M>, packets: &[Vec<u8>], now: u32) -> Option<u32> {
     let mut published = None;
     for packet in packets {
-        let _ = assembler.accept(packet, now);
+        let _ = assembler.accept(packet, Millis(now));
         published = published.or(work(assembler));
     }
     published
@@ -154,10 +154,10 @@ fn a_replayed_begin_displaces_nothing() {
             if epoch == 20 && place == 5 {
                 continue; // lost by itself
             }
-            let _ = assembler.accept(packet, now);
+            let _ = assembler.accept(packet, Millis(now));
             if epoch > 20 && place == 0 {
                 for _ in 0..2 {
-                    let replayed = assembler.accept(&recorded, now);
+                    let replayed = assembler.accept(&recorded, Millis(now));
                     assert_eq!(replayed, Err(ReceiveError::Stale { epoch: 20 }));
                 }
             }
@@ -176,7 +176,7 @@ fn a_sender_is_not_locked_out_of_its_session() {
         let (mut assembler, _reader) = guarded(mac());
         for packet in tagged(FrameId { session: 9, ..id(ahead) }, &surface(1), Freshness::default())
         {
-            assembler.accept(&packet, 0).unwrap();
+            assembler.accept(&packet, Millis(0)).unwrap();
         }
         assert_eq!(work(&mut assembler), Some(ahead));
         let mut source = Source::new(9, keyed);
@@ -265,23 +265,24 @@ fn delay_shows_whoever_is_delayed() {
         source.set_clock(start);
         source.sender.send_captured(&surface(1), Duration::from_millis(12)).unwrap();
         for packet in source.pipe.sent() {
-            assembler.accept(&packet, start + 2 + frames_late).unwrap();
+            assembler.accept(&packet, Millis(start + 2 + frames_late)).unwrap();
         }
         assert!(work(&mut assembler).is_some());
         let health = assembler.health();
-        assert_eq!(health.transit, 32 + frames_late + statuses_late);
-        assert_eq!(health.source_age, 12);
-        let age = assembler.status(start + 2 + frames_late + 5, 1).published.unwrap().age_ms;
+        assert_eq!(health.transit, Millis(32 + frames_late + statuses_late));
+        assert_eq!(health.source_age, Millis(12));
+        let age =
+            assembler.status(Millis(start + 2 + frames_late + 5), 1).published.unwrap().age_ms;
         assert_eq!(age, 12 + 5, "the age counts from the capture");
     }
     // A sender that heard no status, and senders that echo a clock which this receiver has not reached.
     for echo in [None, Some(1001), Some(1 << 31)] {
         let (mut assembler, _reader) = guarded(mac());
         for packet in tagged(id(1), &surface(1), Freshness { age_ms: 3, echo }) {
-            assembler.accept(&packet, 1000).unwrap();
+            assembler.accept(&packet, Millis(1000)).unwrap();
         }
         assert!(work(&mut assembler).is_some());
-        assert_eq!(assembler.health().transit, u32::MAX);
+        assert_eq!(assembler.health().transit, Millis::MAX);
     }
 }
 
@@ -295,13 +296,13 @@ fn a_frozen_source_grows_old() {
         let moment = if n < 5 { n } else { 5 };
         assert!(source.frame(&mut assembler, moment, 1000 * n).is_some());
         let age = 1000 * n.saturating_sub(5);
-        assert_eq!(assembler.health().source_age, age);
-        assert_eq!(reader.latest(1000 * n + 7).frame().unwrap().age, age + 7);
+        assert_eq!(assembler.health().source_age, Millis(age));
+        assert_eq!(reader.latest(Millis(1000 * n + 7)).frame().unwrap().age, Millis(age + 7));
     }
     assert!(source.frame(&mut assembler, 5, 200_000).is_some());
-    assert_eq!(assembler.health().source_age, 65_535, "or more");
+    assert_eq!(assembler.health().source_age, Millis(65_535), "or more");
     assert!(source.frame(&mut assembler, 6, 200_001).is_some());
-    assert_eq!(assembler.health().source_age, 0);
+    assert_eq!(assembler.health().source_age, Millis(0));
 }
 
 /// Two frames of one session and epoch, both with genuine tags, are mixed. The mixture is refused: the digest sums
@@ -427,14 +428,17 @@ fn a_forgery_is_verified_once_and_counted_apart() {
         FrameEncoder::<_, 64>::partial(id(2), Encoding::Float, &rows[..], 1, &rows[..]).unwrap();
     let partial = collect(encoder.with_mac(wrong).unwrap());
     for n in 1..=10 {
-        assert_eq!(assembler.accept(&partial[0], n), Err(ReceiveError::Forged { epoch: 2 }));
+        assert_eq!(
+            assembler.accept(&partial[0], Millis(n)),
+            Err(ReceiveError::Forged { epoch: 2 })
+        );
         assert_eq!(counting.1.get(), n);
         let health = assembler.health();
         assert_eq!((health.forgeries, health.rejections, health.packet), (n, 0, None));
     }
     let genuine = tagged(id(1), &rows, Freshness::default());
     for (n, packet) in (11..).zip(&genuine) {
-        assembler.accept(packet, n).unwrap();
+        assembler.accept(packet, Millis(n)).unwrap();
         assert_eq!(counting.1.get(), n);
     }
     assert!(work(&mut assembler).is_some());
@@ -446,16 +450,16 @@ fn a_forgery_is_verified_once_and_counted_apart() {
 fn repetitions_are_no_sign_of_life() {
     let (mut assembler, _reader) = bus();
     let packets = frame(1, true);
-    assembler.accept(&packets[0], 5).unwrap();
+    assembler.accept(&packets[0], Millis(5)).unwrap();
     let beat = encode_heartbeat(&id(1), 1, &NoMac, &mut [0; 64]).to_vec();
-    assembler.accept(&beat, 6).unwrap();
+    assembler.accept(&beat, Millis(6)).unwrap();
     let hello = dibs_nostd::wire::encode_hello(&id(1), 3, &mut [0; 64]).to_vec();
     for now in 7..100 {
         for packet in [&packets[0], &beat, &hello] {
-            let _ = assembler.accept(packet, now);
+            let _ = assembler.accept(packet, Millis(now));
         }
     }
     let health = assembler.health();
-    assert_eq!((health.packet, health.heartbeat), (Some(6), Some(6)));
-    assert_eq!(assembler.status(100, 1).answer, 3);
+    assert_eq!((health.packet, health.heartbeat), (Some(Millis(6)), Some(Millis(6))));
+    assert_eq!(assembler.status(Millis(100), 1).answer, 3);
 }

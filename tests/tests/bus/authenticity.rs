@@ -4,7 +4,7 @@ use dibs_nostd::wire::{
     AesCmac, Body, Counters, Encoding, Event, FrameEncoder, FrameId, Mac, NoMac, Packet, Status,
     TAG_BYTES, WeightsEncoder, encode_heartbeat, encode_status,
 };
-use dibs_nostd::{Assembler, FrameReader, Frames, Progress, ReceiveError, Unchecked};
+use dibs_nostd::{Assembler, FrameReader, Frames, Millis, Progress, ReceiveError, Unchecked};
 use dibs_tests::bus::*;
 use proptest::prelude::*;
 
@@ -176,12 +176,12 @@ fn heartbeats_and_statuses_are_under_the_tag() {
     let other = encode_heartbeat(&id(9), 1, &mac().with_challenge(1), &mut buffer).to_vec();
     assert_eq!(genuine.len(), 48);
     for packet in [&forged, &other] {
-        assert_eq!(assembler.accept(packet, 0), Err(ReceiveError::Forged { epoch: 9 }));
+        assert_eq!(assembler.accept(packet, Millis(0)), Err(ReceiveError::Forged { epoch: 9 }));
     }
-    assert_eq!(assembler.accept(&genuine, 0), Ok(Progress::Heartbeat));
-    assert_eq!(assembler.accept(&genuine, 0), Err(ReceiveError::Stale { epoch: 9 }));
+    assert_eq!(assembler.accept(&genuine, Millis(0)), Ok(Progress::Heartbeat));
+    assert_eq!(assembler.accept(&genuine, Millis(0)), Err(ReceiveError::Stale { epoch: 9 }));
 
-    let status = assembler.status(0, 1);
+    let status = assembler.status(Millis(0), 1);
     assert_eq!(status.challenge, CHALLENGE);
     let packet = encode_status(MESH, &status, assembler.counters(), &mac(), &mut buffer).to_vec();
     assert_eq!(packet.len(), 64, "two counters");
@@ -203,7 +203,7 @@ fn a_status_states_the_challenge_in_use() {
     assert_eq!(mac().challenge(), CHALLENGE);
     assert_eq!(<&AesCmac>::challenge(&&mac()), CHALLENGE);
     assert_eq!(NoMac.challenge(), 0);
-    assert_eq!(bus().0.status(0, 1).challenge, 0);
+    assert_eq!(bus().0.status(Millis(0), 1).challenge, 0);
 }
 
 proptest! {

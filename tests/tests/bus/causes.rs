@@ -5,7 +5,7 @@ use dibs_nostd::wire::{
     Content, Counters, Encoding, Event, NoMac, PacketError, QuantisedBox, Status, StreamError,
     WeightsEncoder, encode_status,
 };
-use dibs_nostd::{Progress, ReceiveError, VertexTable};
+use dibs_nostd::{Millis, Progress, ReceiveError, VertexTable};
 use dibs_tests::bus::*;
 
 /// A packet with some bytes changed, and a right checksum.
@@ -271,7 +271,7 @@ fn damage_to_the_stream_is_counted_too() {
     assert_eq!(assembler.counters().rejected(), 1);
     let good = frame(1, true);
     give(&mut assembler, &good[0]).unwrap();
-    assert_eq!(assembler.accept(&good[0], 0), Ok(Progress::Duplicate));
+    assert_eq!(assembler.accept(&good[0], Millis(0)), Ok(Progress::Duplicate));
     assert_eq!(assembler.counters().of(Event::Duplicate), 1);
     assert_eq!(assembler.counters().rejected(), 1, "a duplicate is none");
 }

@@ -9,7 +9,8 @@ use dibs_nostd::wire::{
     Rows, StreamError, enframe, framed_bytes,
 };
 use dibs_nostd::{
-    Advance, Arriving, Changed, Gate, Progress, ReceiveError, StretchError, Verdict, VertexTable,
+    Advance, Arriving, Changed, Gate, Millis, Progress, ReceiveError, StretchError, Verdict,
+    VertexTable,
 };
 use dibs_tests::bus::*;
 
@@ -24,7 +25,7 @@ fn every_frame_arrives_as_it_was_sent() {
             // 18 + 4 bytes of a packet are not vertices.
             assert_eq!(packets.len(), 2 + N.div_ceil(42 / if quantised { 6 } else { 12 }));
             for (i, packet) in packets.iter().enumerate() {
-                let progress = assembler.accept(packet, 1000 * epoch + i as u32).unwrap();
+                let progress = assembler.accept(packet, Millis(1000 * epoch + i as u32)).unwrap();
                 let is_last = i + 1 == packets.len();
                 assert_eq!(progress == Progress::Complete { epoch }, is_last);
                 let advance = assembler.advance(1);
@@ -33,7 +34,11 @@ fn every_frame_arrives_as_it_was_sent() {
             }
             let frame = reader.read().unwrap();
             assert_eq!(frame.label().epoch, epoch);
-            assert_eq!(frame.label().received, 1000 * epoch, "the clock at the begin packet");
+            assert_eq!(
+                frame.label().received,
+                Millis(1000 * epoch),
+                "the clock at the begin packet"
+            );
             let error = frame.label().position_error;
             assert_eq!(error > 0.0, quantised);
             for (vertex, sent) in positions.iter().enumerate() {
@@ -233,13 +238,13 @@ fn a_frame_is_checked_in_slices_and_then_published() {
     let (mut assembler, mut reader) = bus_with(gate);
     let packets = frame(1, false);
     for packet in &packets {
-        assembler.accept(packet, 0).unwrap();
+        assembler.accept(packet, Millis(0)).unwrap();
         assert!(matches!(assembler.advance(2), Ok(Advance::Idle | Advance::Pending)));
     }
     assert_eq!((began.get(), moved.get(), done.get()), (1, N as u32, 0));
     let next = frame(2, false);
-    assert_eq!(assembler.accept(&next[0], 0), Err(ReceiveError::Busy { epoch: 2 }));
-    assert_eq!(assembler.accept(&next[1], 0), Err(ReceiveError::Unexpected { epoch: 2 }));
+    assert_eq!(assembler.accept(&next[0], Millis(0)), Err(ReceiveError::Busy { epoch: 2 }));
+    assert_eq!(assembler.accept(&next[1], Millis(0)), Err(ReceiveError::Unexpected { epoch: 2 }));
     // 2 of 100 units of work were done after each packet.
     let left = 100 - 2 * packets.len() as u32;
     for _ in 0..left / 2 - 1 {
@@ -260,10 +265,10 @@ fn a_frame_that_meets_a_read_is_held_and_published_later() {
     let guard = reader.read().unwrap();
     let second = frame(2, true);
     for packet in &second {
-        assembler.accept(packet, 0).unwrap();
+        assembler.accept(packet, Millis(0)).unwrap();
     }
     assert_eq!(assembler.advance(9), Ok(Advance::Held { epoch: 2 }));
-    assert_eq!(assembler.accept(second.last().unwrap(), 0), Ok(Progress::Duplicate));
+    assert_eq!(assembler.accept(second.last().unwrap(), Millis(0)), Ok(Progress::Duplicate));
     assert_eq!(assembler.advance(9), Ok(Advance::Held { epoch: 2 }));
     assert_eq!(guard.label().epoch, 1);
     drop(guard);
@@ -272,13 +277,13 @@ fn a_frame_that_meets_a_read_is_held_and_published_later() {
     // The next frame's begin publishes a held frame, too.
     let guard = reader.read().unwrap();
     for packet in frame(3, false) {
-        assembler.accept(&packet, 0).unwrap();
+        assembler.accept(&packet, Millis(0)).unwrap();
     }
     assert_eq!(assembler.advance(9), Ok(Advance::Held { epoch: 3 }));
     let fourth = frame(4, false);
-    assert_eq!(assembler.accept(&fourth[0], 0), Err(ReceiveError::Busy { epoch: 4 }));
+    assert_eq!(assembler.accept(&fourth[0], Millis(0)), Err(ReceiveError::Busy { epoch: 4 }));
     drop(guard);
-    assert_eq!(assembler.accept(&fourth[0], 0), Ok(Progress::Begun { epoch: 4 }));
+    assert_eq!(assembler.accept(&fourth[0], Millis(0)), Ok(Progress::Begun { epoch: 4 }));
     assert_eq!(published(&mut reader).unwrap().0, 3);
     assert_eq!(assembler.counters().of(Event::Abandoned), 0);
 }

@@ -5,8 +5,8 @@ use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 use dibs_nostd::{
-    Advance, Assembler, FrameLabel, FrameReader, Frames, Gate, MovingSurface, Options, Query,
-    Sphere, SurfaceLimits, Tracker, Tree, Unchecked, VertexTable,
+    Advance, Assembler, FrameLabel, FrameReader, Frames, Gate, Millis, MovingSurface, Options,
+    Query, Sphere, SurfaceLimits, Tracker, Tree, Unchecked, VertexTable,
 };
 use dibs_tests::bus::collect;
 use dibs_tests::deform::unit;
@@ -50,7 +50,7 @@ fn send<G: Gate>(
     }
     let work = rng.u32(1..60);
     for packet in packets {
-        let _ = bus.accept(&packet, now);
+        let _ = bus.accept(&packet, Millis(now));
         let _ = bus.advance(work);
     }
     let is_pending = |_: &u32| bus.advance(work) == Ok(Advance::Pending);
@@ -114,7 +114,7 @@ fn the_surface_between_frames_is_where_the_frames_put_it() {
             }
             tool += unit(&mut rng) * 0.3;
             let tool = Sphere::new(tool + shift, 2.0).expect("valid");
-            let frame = reader.latest(now).of_any_age().expect("published");
+            let frame = reader.latest(Millis(now)).of_any_age().expect("published");
             let age = now.wrapping_sub(*received) as f32;
             let surfaces = [frame.interpolated(), frame.extrapolated()];
             for (number, (surface, tracker)) in surfaces.iter().zip(&mut trackers).enumerate() {
@@ -163,7 +163,7 @@ fn the_surface_between_frames_is_where_the_frames_put_it() {
             rows[rng.usize(..ROWS)] += Vec3::splat(300.0);
         }
         if send(&mut bus, tree.mesh_id(), epoch, &rows, base, now, &mut rng) {
-            let shown = reader.latest(now).of_any_age().expect("published");
+            let shown = reader.latest(Millis(now)).of_any_age().expect("published");
             let shown = shown.extrapolated().shown_error();
             let mut exact = errors;
             if let [.., (_, t0, a), (_, t1, b)] = known.as_slice() {
@@ -207,7 +207,7 @@ fn a_surface_is_held_where_its_extrapolation_would_tear() {
         (1..).zip([(0.0, false), (0.1, true), (0.3, false), (0.25, true), (0.4, false)])
     {
         assert!(send(&mut bus, tree.mesh_id(), epoch, &longer(by), None, 20 * epoch, &mut rng));
-        let frame = reader.latest(20 * epoch + 10).of_any_age().expect("published");
+        let frame = reader.latest(Millis(20 * epoch + 10)).of_any_age().expect("published");
         let surface = frame.extrapolated();
         assert_eq!(surface.share(), if is_moving { 1.5 } else { 1.0 }, "{epoch}");
         assert!(surface.stretch().expect("measured").sigma() <= 1.5001);
@@ -223,7 +223,7 @@ fn a_surface_of_unknown_motion_is_held() {
     let (_, motion, built) = heart();
     let tree = built.tree::<u16>().expect("16-bit indices");
     let is_held = |reader: &mut Reader, now| {
-        let frame = reader.latest(now).of_any_age().expect("published");
+        let frame = reader.latest(Millis(now)).of_any_age().expect("published");
         let surfaces = [frame.interpolated(), frame.extrapolated()];
         surfaces.map(|surface| surface.share() == 1.0 && surface.shown_error().is_none())
     };
@@ -233,7 +233,8 @@ fn a_surface_of_unknown_motion_is_held() {
     for epoch in 0..4 {
         writer.begin();
         motion[epoch as usize].iter().for_each(|&row| writer.push(row).expect("in the table"));
-        let label = FrameLabel { epoch, received: 20 * epoch, position_error: 0.0, stretch: None };
+        let label =
+            FrameLabel { epoch, received: Millis(20 * epoch), position_error: 0.0, stretch: None };
         writer.publish(label).expect("complete");
         assert_eq!(is_held(&mut reader, 20 * epoch + 5), [true; 2]);
     }
@@ -282,6 +283,6 @@ fn without_the_time_nothing_moves_on() {
     drop(frame);
     // Two frames of one time have no velocity.
     assert!(send(&mut bus, tree.mesh_id(), 4, &motion[4], None, 60, &mut rng));
-    let frame = reader.latest(70).of_any_age().expect("published");
+    let frame = reader.latest(Millis(70)).of_any_age().expect("published");
     assert_eq!((frame.extrapolated().share(), frame.interpolated().share()), (1.0, 1.0));
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder};
-use dibs_nostd::{Advance, Assembler, FrameReader, Frames, Unchecked, VertexTable};
+use dibs_nostd::{Advance, Assembler, FrameReader, Frames, Millis, Unchecked, VertexTable};
 use dibs_tests::bus::*;
 
 /// Rows of the surface: three packets.
@@ -75,7 +75,7 @@ fn every_sequence_of_packets_of_two_frames() {
             let now = 40 * place;
             let (epoch, which) = (letter / 5 + 1, (letter % 5) as usize);
             let packet = &frames[letter as usize / 5][which];
-            let _ = assembler.accept(packet, now);
+            let _ = assembler.accept(packet, Millis(now));
             let advance = assembler.advance(1);
             let expected = model.take(epoch, which, now);
             let published = match advance {
@@ -123,13 +123,13 @@ fn no_row_that_was_not_sent_is_published() {
             for end in 2..=4_u16 {
                 let buffers = Frames::<SMALL>::new();
                 let (mut assembler, mut reader) = receiver(&buffers);
-                assembler.accept(&begin, 0).unwrap();
+                assembler.accept(&begin, Millis(0)).unwrap();
                 let mut digest = share(&begin);
                 let mut sent = [const { Vec::new() }; SMALL];
                 for place in 0..length {
                     let letter = case / (letters.len() as u32).pow(place) % letters.len() as u32;
                     let packet = &letters[letter as usize];
-                    if assembler.accept(packet, 0) == Ok(dibs_nostd::Progress::Stored) {
+                    if assembler.accept(packet, Millis(0)) == Ok(dibs_nostd::Progress::Stored) {
                         digest = digest.wrapping_add(share(packet));
                         for row in 0..usize::from(packet[14]) {
                             let at = 18 + 12 * row;
@@ -139,7 +139,7 @@ fn no_row_that_was_not_sent_is_published() {
                     }
                 }
                 let commit = raw(4, 1, 1, [end, 0], 0, &digest.to_le_bytes());
-                let _ = assembler.accept(&commit, 0);
+                let _ = assembler.accept(&commit, Millis(0));
                 let is_published = matches!(assembler.advance(1), Ok(Advance::Published { .. }));
                 *outcomes.entry(is_published).or_insert(0_u32) += 1;
                 if let Some(frame) = reader.read() {

@@ -6,7 +6,8 @@ use dibs_nostd::wire::{
     encode_heartbeat, encode_status,
 };
 use dibs_nostd::{
-    Advance, Assembler, Frames, LastHeartbeat, Progress, ReceiveError, Unchecked, VertexTable,
+    Advance, Assembler, Frames, LastHeartbeat, Millis, Progress, ReceiveError, Unchecked,
+    VertexTable,
 };
 use dibs_tests::bus::*;
 
@@ -95,7 +96,7 @@ fn a_newer_frame_supersedes_an_unfinished_one() {
         for packet in &first[..5] {
             give(&mut bus.0, packet).unwrap();
         }
-        assert_eq!(bus.0.accept(&second[0], 0), Ok(Progress::Begun { epoch }));
+        assert_eq!(bus.0.accept(&second[0], Millis(0)), Ok(Progress::Begun { epoch }));
         assert_eq!(bus.0.counters().of(Event::Abandoned), 1);
         // The rest of the first frame is refused, also its begin.
         assert_eq!(give(&mut bus.0, &first[0]), Err(ReceiveError::Stale { epoch: 1 }));
@@ -153,7 +154,7 @@ fn the_sequence_is_used_up_to_its_end() {
     let mut buffer = [0; 64];
     let mut packets = 0;
     while let Some(packet) = encoder.next_packet(&mut buffer) {
-        assembler.accept(packet, 0).unwrap();
+        assembler.accept(packet, Millis(0)).unwrap();
         packets += 1;
     }
     assert_eq!(packets, 65_536);
@@ -175,18 +176,24 @@ fn heartbeats_are_in_order_and_wrap() {
     assert_eq!(assembler.last_heartbeat(), None);
     for (beat, received) in [(u32::MAX - 1, 5), (u32::MAX, 6), (0, u32::MAX), (9, 0)] {
         let packet = heartbeat(3, 77, beat);
-        assert_eq!(assembler.accept(&packet, received), Ok(Progress::Heartbeat));
-        let last = LastHeartbeat { session: 3, beat, epoch: 77, received };
+        assert_eq!(assembler.accept(&packet, Millis(received)), Ok(Progress::Heartbeat));
+        let last = LastHeartbeat { session: 3, beat, epoch: 77, received: Millis(received) };
         assert_eq!(assembler.last_heartbeat(), Some(last));
         for replayed in [beat, beat.wrapping_sub(1), beat ^ (1 << 31)] {
             let packet = heartbeat(3, 78, replayed);
-            assert_eq!(assembler.accept(&packet, 0), Err(ReceiveError::Stale { epoch: 78 }));
+            assert_eq!(
+                assembler.accept(&packet, Millis(0)),
+                Err(ReceiveError::Stale { epoch: 78 })
+            );
         }
         assert_eq!(assembler.last_heartbeat(), Some(last));
     }
     // A later session counts from its own start; an earlier one is refused.
-    assert_eq!(assembler.accept(&heartbeat(4, 1, 0), 1), Ok(Progress::Heartbeat));
-    assert_eq!(assembler.accept(&heartbeat(3, 99, 10), 1), Err(ReceiveError::Stale { epoch: 99 }));
+    assert_eq!(assembler.accept(&heartbeat(4, 1, 0), Millis(1)), Ok(Progress::Heartbeat));
+    assert_eq!(
+        assembler.accept(&heartbeat(3, 99, 10), Millis(1)),
+        Err(ReceiveError::Stale { epoch: 99 })
+    );
     assert_eq!(assembler.counters().of(Event::Heartbeat), 5);
 }
 
@@ -194,32 +201,32 @@ fn heartbeats_are_in_order_and_wrap() {
 #[test]
 fn a_published_frame_decides_whose_heartbeats_count() {
     let mut bus = bus();
-    bus.0.accept(&heartbeat(0x5000_0000, 1, 1), 0).unwrap();
+    bus.0.accept(&heartbeat(0x5000_0000, 1, 1), Millis(0)).unwrap();
     let ours = heartbeat(6, 1, 1);
-    assert_eq!(bus.0.accept(&ours, 0), Err(ReceiveError::Stale { epoch: 1 }));
+    assert_eq!(bus.0.accept(&ours, Millis(0)), Err(ReceiveError::Stale { epoch: 1 }));
     assert_eq!(send(&mut bus, 6, 1), Ok(Some(1)));
     assert_eq!(bus.0.last_heartbeat(), None);
-    assert_eq!(bus.0.accept(&ours, 0), Ok(Progress::Heartbeat));
-    assert_eq!(bus.0.accept(&heartbeat(5, 1, 9), 0), Err(ReceiveError::Stale { epoch: 1 }));
+    assert_eq!(bus.0.accept(&ours, Millis(0)), Ok(Progress::Heartbeat));
+    assert_eq!(bus.0.accept(&heartbeat(5, 1, 9), Millis(0)), Err(ReceiveError::Stale { epoch: 1 }));
 }
 
 #[test]
 fn a_status_says_what_was_published() {
     let mut bus = bus();
-    let nothing = bus.0.status(50, 3);
+    let nothing = bus.0.status(Millis(50), 3);
     assert_eq!((nothing.published, nothing.wants_whole, nothing.safety), (None, false, 3));
     for packet in frame_of(0x0009_0001, 5) {
-        bus.0.accept(&packet, 100).unwrap();
+        bus.0.accept(&packet, Millis(100)).unwrap();
     }
     bus.0.advance(9).unwrap();
-    let status = bus.0.status(130, 1);
+    let status = bus.0.status(Millis(130), 1);
     assert_eq!(status.number, nothing.number + 1);
     let shown = status.published.unwrap();
     assert_eq!((shown.session, shown.epoch, shown.age_ms), (0x0009_0001, 5, 30));
     assert_eq!(shown.stretch, None);
     // The age does not go back when the clock wraps.
     let ages = [0x8000_0000, 0xFFFF_FFFF, 99, 130, 0x8000_0000]
-        .map(|now| bus.0.status(now, 1).published.unwrap().age_ms);
+        .map(|now| bus.0.status(Millis(now), 1).published.unwrap().age_ms);
     assert_eq!(ages, [0x8000_0000 - 100, u32::MAX - 100, u32::MAX, u32::MAX, u32::MAX]);
 }
 
@@ -235,7 +242,7 @@ fn statuses_carry_all_counters_in_turn() {
     let mut copy = Counters::new();
     let mut statuses = 0;
     while copy != *bus.0.counters() {
-        let status = bus.0.status(1, 0);
+        let status = bus.0.status(Millis(1), 0);
         let mut buffer = [0; 64];
         let packet = encode_status(MESH, &status, bus.0.counters(), &NoMac, &mut buffer);
         let Body::Status(report) = Packet::decode(packet).unwrap().body else { panic!() };

@@ -3,7 +3,8 @@
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, Event, FrameEncoder, FrameId, QuantisedBox};
 use dibs_nostd::{
-    Advance, Assembler, FrameReader, Frames, ReceiveError, StretchMonitor, Unchecked, VertexTable,
+    Advance, Assembler, FrameReader, Frames, Millis, ReceiveError, StretchMonitor, Unchecked,
+    VertexTable,
 };
 use dibs_tests::bus::*;
 use fastrand::Rng;
@@ -96,15 +97,15 @@ fn another_base_is_refused_and_a_whole_frame_asked_for() {
     };
     let base = |epoch| Err(ReceiveError::Base { epoch });
     assert_eq!(give(&mut assembler, &onto(1, 1, 0)), base(0), "nothing is published");
-    assert!(assembler.status(0, 0).wants_whole);
+    assert!(assembler.status(Millis(0), 0).wants_whole);
     for packet in frame(5, false) {
-        assert!(assembler.status(0, 0).wants_whole);
+        assert!(assembler.status(Millis(0), 0).wants_whole);
         give(&mut assembler, &packet).unwrap();
     }
-    assert!(!assembler.status(0, 0).wants_whole);
+    assert!(!assembler.status(Millis(0), 0).wants_whole);
     for (session, epoch, of) in [(1, 6, 4), (1, 6, 6), (2, 6, 5), (0x0001_0001, 6, 5)] {
         assert_eq!(give(&mut assembler, &onto(session, epoch, of)), base(of));
-        assert!(assembler.status(0, 0).wants_whole);
+        assert!(assembler.status(Millis(0), 0).wants_whole);
     }
     assert_eq!(assembler.counters().of(Event::Base), 5);
     assert_eq!(give(&mut assembler, &onto(1, 6, 5)), Ok(None));
@@ -170,7 +171,7 @@ fn copying_is_bounded_and_rows_wait_for_it() {
     let (mut assembler, mut reader) = large();
     let mut positions: Vec<Vec3> = (0..ROWS).map(|i| Vec3::splat(i as f32)).collect();
     for packet in packets::<64>(1, Encoding::Float, &positions) {
-        assembler.accept(&packet, 0).unwrap();
+        assembler.accept(&packet, Millis(0)).unwrap();
     }
     assert_eq!(assembler.advance(1), Ok(Advance::Published { epoch: 1 }));
     let held = positions.clone();
@@ -178,17 +179,20 @@ fn copying_is_bounded_and_rows_wait_for_it() {
     positions[250].x = -2.0;
     let packets = partial(2, Encoding::Float, &positions, 1, &held);
     // Before the first partial frame nothing was copied.
-    assembler.accept(&packets[0], 0).unwrap();
-    assert_eq!(assembler.accept(&packets[1], 0), Err(ReceiveError::NotReady { first: 10 }));
-    assert!(assembler.status(0, 0).wants_whole);
+    assembler.accept(&packets[0], Millis(0)).unwrap();
+    assert_eq!(assembler.accept(&packets[1], Millis(0)), Err(ReceiveError::NotReady { first: 10 }));
+    assert!(assembler.status(Millis(0), 0).wants_whole);
     assert_eq!(assembler.advance(10), Ok(Advance::Idle));
-    assert_eq!(assembler.accept(&packets[1], 0), Err(ReceiveError::NotReady { first: 10 }));
+    assert_eq!(assembler.accept(&packets[1], Millis(0)), Err(ReceiveError::NotReady { first: 10 }));
     assert_eq!(assembler.advance(1), Ok(Advance::Idle));
-    assert!(assembler.accept(&packets[1], 0).is_ok());
-    assert_eq!(assembler.accept(&packets[2], 0), Err(ReceiveError::NotReady { first: 250 }));
+    assert!(assembler.accept(&packets[1], Millis(0)).is_ok());
+    assert_eq!(
+        assembler.accept(&packets[2], Millis(0)),
+        Err(ReceiveError::NotReady { first: 250 })
+    );
     assert_eq!(assembler.advance(240), Ok(Advance::Idle));
-    assert!(assembler.accept(&packets[2], 0).is_ok());
-    assert!(assembler.accept(&packets[3], 0).is_ok());
+    assert!(assembler.accept(&packets[2], Millis(0)).is_ok());
+    assert!(assembler.accept(&packets[3], Millis(0)).is_ok());
     // 49 rows are left to copy.
     assert_eq!(assembler.advance(48), Ok(Advance::Pending));
     assert_eq!(assembler.advance(1), Ok(Advance::Pending));
@@ -201,7 +205,7 @@ fn copying_is_bounded_and_rows_wait_for_it() {
     let held = positions.clone();
     positions[299].y = 7.0;
     for packet in partial(3, Encoding::Float, &positions, 2, &held) {
-        assembler.accept(&packet, 0).unwrap();
+        assembler.accept(&packet, Millis(0)).unwrap();
     }
     assert_eq!(assembler.advance(1), Ok(Advance::Published { epoch: 3 }));
     assert_eq!(read(&mut reader), positions);

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use dibs_nostd::ReceiveError;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Deframer, Encoding, Event, Packet, QuantisedBox, enframe, framed_bytes};
+use dibs_nostd::{Millis, ReceiveError};
 use dibs_tests::bus::*;
 use proptest::prelude::*;
 
@@ -97,7 +97,7 @@ proptest! {
     fn arbitrary_bytes_are_survived(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
         let _ = Packet::decode(&bytes);
         let (mut assembler, _reader) = bus();
-        let _ = assembler.accept(&bytes, 0);
+        let _ = assembler.accept(&bytes, Millis(0));
         let mut deframer = Deframer::<64>::new();
         for &byte in &bytes {
             if let Some(Ok(packet)) = deframer.push(byte) {

@@ -5,8 +5,8 @@ use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 use dibs_nostd::{
-    Advance, Assembler, Fallback, FrameLabel, Frames, Gate, MovingSurface, Odometer, Options,
-    Query, Sphere, StretchMonitor, SurfaceLimits, Tracker, Tree, VertexTable,
+    Advance, Assembler, Fallback, FrameLabel, Frames, Gate, Millis, MovingSurface, Odometer,
+    Options, Query, Sphere, StretchMonitor, SurfaceLimits, Tracker, Tree, VertexTable,
 };
 use dibs_tests::bus::collect;
 use dibs_tests::deform::unit;
@@ -63,7 +63,7 @@ fn a_tracker_knows_the_motion_of_published_frames() {
             packets.swap(1, 2);
         }
         for packet in packets {
-            if assembler.accept(&packet, epoch).is_err() {
+            if assembler.accept(&packet, Millis(epoch)).is_err() {
                 counts[0] += 1;
             }
             let work = rng.u32(1..60);
@@ -146,7 +146,7 @@ fn follow<G: Gate>(tree: &Tree<'_, u16>, rest: &[Vec3], gate: G) {
         let id = FrameId { mesh_id: tree.mesh_id(), session: 1, epoch };
         for packet in collect(FrameEncoder::<_, 512>::new(id, Encoding::Float, &rows[..]).unwrap())
         {
-            assembler.accept(&packet, 0).expect("taken");
+            assembler.accept(&packet, Millis(0)).expect("taken");
         }
         while assembler.advance(3).expect("within the limits") == Advance::Pending {}
         assert_eq!(assembler.published(), Some(id));
@@ -174,7 +174,7 @@ fn a_frame_published_by_hand_has_no_known_motion() {
     let (mut writer, mut reader) = frames.split().expect("once");
     writer.begin();
     rows.iter().for_each(|&row| writer.push(row).expect("in the table"));
-    let label = FrameLabel { epoch: 1, received: 0, position_error: 0.0, stretch: None };
+    let label = FrameLabel { epoch: 1, received: Millis(0), position_error: 0.0, stretch: None };
     writer.publish(label).expect("complete");
     assert_eq!(reader.read().expect("published").travel(), None);
     let limits = SurfaceLimits::reach_mm(1_000.0);
@@ -184,7 +184,7 @@ fn a_frame_published_by_hand_has_no_known_motion() {
         let id = FrameId { mesh_id: tree.mesh_id(), session: 1, epoch };
         for packet in collect(FrameEncoder::<_, 512>::new(id, Encoding::Float, &rows[..]).unwrap())
         {
-            assembler.accept(&packet, 0).expect("taken");
+            assembler.accept(&packet, Millis(0)).expect("taken");
         }
         while assembler.advance(100).expect("within the limits") == Advance::Pending {}
         let frame = reader.read().expect("published");

@@ -5,8 +5,8 @@ use dibs_build::modes::ModalFit;
 use dibs_nostd::modes::{Memo, ModalGate, ModalReader, Modes};
 use dibs_nostd::wire::{self, Encoding, Event, FrameEncoder, FrameId, WeightsEncoder};
 use dibs_nostd::{
-    Advance, Arriving, Assembler, Changed, Frames, Gate, Options, Query, ReceiveError, Sphere,
-    StretchError, Tree, Verdict, measure_stretch,
+    Advance, Arriving, Assembler, Changed, Frames, Gate, Millis, Options, Query, ReceiveError,
+    Sphere, StretchError, Tree, Verdict, measure_stretch,
 };
 use dibs_tests::bus::reseal;
 use dibs_tests::modal::{anywhere, positions, small};
@@ -57,7 +57,7 @@ impl Bus {
     fn send(&mut self, epoch: u32, weights: &[f32]) -> Result<Advance, ReceiveError> {
         let packets = self.packets(epoch, weights);
         packets.iter().try_fold(Advance::Idle, |_, packet| {
-            self.assembler.accept(packet, 7 * epoch)?;
+            self.assembler.accept(packet, Millis(7 * epoch))?;
             self.assembler.advance(u32::MAX)
         })
     }
@@ -70,13 +70,13 @@ fn weights_come_over_the_bus() {
     assert!(bus.reader.read().is_none());
     for (epoch, weights) in (1..).zip(bus.recorded.clone()) {
         assert_eq!(bus.send(epoch, &weights), Ok(Advance::Published { epoch }));
-        let frame = bus.reader.latest(7 * epoch + 3);
+        let frame = bus.reader.latest(Millis(7 * epoch + 3));
         let age = frame.frame().expect("published").age;
-        let frame = frame.within(3).expect("published");
+        let frame = frame.within(Millis(3)).expect("published");
         let surface = bus.modes.surface::<4>(&weights).expect("recorded");
         assert_eq!(positions(&frame), positions(&surface));
         let label = frame.label();
-        assert_eq!((label.epoch, label.received, age), (epoch, 7 * epoch, 3));
+        assert_eq!((label.epoch, label.received, age), (epoch, Millis(7 * epoch), Millis(3)));
         assert_eq!(label.position_error, bus.modes.position_error());
         let bound = bus.modes.stretch_bound(&weights).expect("recorded");
         assert_eq!(label.stretch.expect("bounded").sigma(), bound.sigma());
@@ -115,8 +115,8 @@ fn hostile_frames_of_weights_are_rejected_and_counted() {
             let at = wire::HEADER_BYTES + 4 * mode;
             packets[1][at..at + 4].copy_from_slice(&weight.to_le_bytes());
             let hostile = reseal(packets[1].clone());
-            assert!(bus.assembler.accept(&packets[0], 0).is_ok());
-            let outcome = bus.assembler.accept(&hostile, 0);
+            assert!(bus.assembler.accept(&packets[0], Millis(0)).is_ok());
+            let outcome = bus.assembler.accept(&hostile, Millis(0));
             assert_eq!(outcome, Err(ReceiveError::NotFinite { row }));
         }
     }
@@ -129,12 +129,12 @@ fn hostile_frames_of_weights_are_rejected_and_counted() {
     let mut vertices = FrameEncoder::<_, 64>::new(id, Encoding::Float, &[Vec3::ZERO; 4][..]);
     let mut buffer = [0; 64];
     let begin = vertices.as_mut().expect("can be sent").next_packet(&mut buffer).expect("begins");
-    assert_eq!(bus.assembler.accept(begin, 0), Err(ReceiveError::Encoding));
+    assert_eq!(bus.assembler.accept(begin, Millis(0)), Err(ReceiveError::Encoding));
     // Two frames' packets under one number.
     let mixed = [bus.packets(99, &good), bus.packets(99, &bus.recorded[8])];
-    assert!(bus.assembler.accept(&mixed[0][0], 0).is_ok());
-    assert!(bus.assembler.accept(&mixed[1][1], 0).is_ok());
-    let outcome = bus.assembler.accept(&mixed[0][2], 0);
+    assert!(bus.assembler.accept(&mixed[0][0], Millis(0)).is_ok());
+    assert!(bus.assembler.accept(&mixed[1][1], Millis(0)).is_ok());
+    let outcome = bus.assembler.accept(&mixed[0][2], Millis(0));
     assert!(matches!(outcome, Err(ReceiveError::Digest { .. })), "{outcome:?}");
     assert_eq!(positions(&bus.reader.read().expect("stays")), published);
     assert_eq!(bus.reader.read().expect("stays").label().epoch, 1);
@@ -150,7 +150,7 @@ fn a_receiver_of_vertices_refuses_weights() {
     let mut encoder = WeightsEncoder::<64>::new(id, &weights).expect("can be sent");
     let mut buffer = [0; 64];
     let begin = encoder.next_packet(&mut buffer).expect("begins");
-    assert_eq!(assembler.accept(begin, 0), Err(ReceiveError::Encoding));
+    assert_eq!(assembler.accept(begin, Millis(0)), Err(ReceiveError::Encoding));
 }
 
 /// A surface whose bound exceeds the limit is measured. Exactly the surfaces within the limit are admitted, whatever

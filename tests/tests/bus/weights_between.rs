@@ -8,7 +8,7 @@ use dibs_nostd::glam::Vec3;
 use dibs_nostd::modes::{ModalFrame, ModalGate, ModalReader, Modes};
 use dibs_nostd::wire::{FrameId, WeightsEncoder};
 use dibs_nostd::{
-    Advance, Arriving, Assembler, Changed, Fallback, FrameLabel, FrameWriter, Frames, Gate,
+    Advance, Arriving, Assembler, Changed, Fallback, FrameLabel, FrameWriter, Frames, Gate, Millis,
     MovingSurface, Options, Query, Sphere, StretchError, Tracker, Tree, Unchecked, Verdict,
     VertexTable, measure_stretch,
 };
@@ -43,7 +43,7 @@ fn send<G: Gate>(bus: &mut Bus<G>, mesh_id: u32, epoch: u32, weights: &[f32], no
     let mut encoder = WeightsEncoder::<64>::new(id, weights).expect("can be sent");
     let (mut buffer, mut outcome) = ([0; 64], Ok(Advance::Idle));
     while let (Some(packet), Ok(_)) = (encoder.next_packet(&mut buffer), &outcome) {
-        let accepted = bus.accept(packet, now);
+        let accepted = bus.accept(packet, Millis(now));
         outcome = accepted.and_then(|_| bus.advance(u32::MAX));
     }
     outcome == Ok(Advance::Published { epoch })
@@ -141,7 +141,7 @@ fn the_surface_between_frames_of_weights_is_where_they_put_it() {
             }
             tool += unit(&mut rng) * 0.3;
             let tool = Sphere::new(tool, 2.0).expect("valid");
-            let frame = reader.latest(now).of_any_age().expect("published");
+            let frame = reader.latest(Millis(now)).of_any_age().expect("published");
             let (received, last) = known.last().expect("read");
             let age = f64::from(now.wrapping_sub(*received));
             let surfaces = [frame, frame.interpolated(), frame.extrapolated()];
@@ -200,6 +200,7 @@ fn the_surface_between_frames_of_weights_is_where_they_put_it() {
 }
 
 fn label(epoch: u32, received: u32) -> FrameLabel {
+    let received = Millis(received);
     FrameLabel { epoch, received, position_error: 0.0, stretch: None }
 }
 
@@ -235,7 +236,7 @@ fn weights_out_of_range_have_no_motion() {
         ];
         for (epoch, (weights, expected)) in (0..).zip(frames) {
             publish(&mut writer, weights, label(epoch, 20 * epoch));
-            let frame = reader.latest(20 * epoch + 10).of_any_age().expect("published");
+            let frame = reader.latest(Millis(20 * epoch + 10)).of_any_age().expect("published");
             for surface in [frame, frame.interpolated(), frame.extrapolated()] {
                 assert_eq!(surface.travel().is_some(), !std::ptr::eq(weights, &raw const bad));
             }
@@ -258,7 +259,7 @@ fn frames_of_one_label_are_told_apart() {
     for _ in 0..50 {
         let weights = anywhere(&modes, &mut rng);
         publish(&mut writer, &weights, label(7, 20));
-        let frame = reader.latest(30).of_any_age().expect("published");
+        let frame = reader.latest(Millis(30)).of_any_age().expect("published");
         let exact =
             exact(&modes, &weights.iter().map(|weight| f64::from(*weight)).collect::<Vec<_>>());
         assert!(off(&frame, &exact) < 1e-2);
@@ -284,7 +285,7 @@ fn without_a_time_between_frames_nothing_moves() {
         let weights: Vec<f32> =
             anywhere(&modes, &mut rng).iter().map(|weight| weight * 0.02).collect();
         assert!(send(&mut bus, tree.mesh_id(), epoch, &weights, now));
-        let frame = reader.latest(now + 5).of_any_age().expect("published");
+        let frame = reader.latest(Millis(now + 5)).of_any_age().expect("published");
         assert_eq!(same(&frame, frame.interpolated()), is_held, "{epoch}");
         assert_eq!(same(&frame, frame.extrapolated()), is_held, "{epoch}");
         let frame = reader.read().expect("published");
@@ -309,7 +310,7 @@ fn an_extrapolation_ends_at_the_ends_of_the_ranges() {
         assert!(send(&mut bus, tree.mesh_id(), 1, &at(0.2), 20));
         assert!(reader.read().is_some());
         assert!(send(&mut bus, tree.mesh_id(), 2, &at(0.7), 40));
-        let frame = reader.latest(80).of_any_age().expect("published");
+        let frame = reader.latest(Millis(80)).of_any_age().expect("published");
         let moved = frame.extrapolated();
         if moved.epoch().is_none() {
             let last = at(1.0).map(f64::from);

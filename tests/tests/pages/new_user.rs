@@ -63,7 +63,7 @@ const DEVICE: &str = r#"
 #![no_std]
 #![no_main]
 
-use dibs_nostd::Capsule;
+use dibs_nostd::{Capsule, Millis};
 use dibs_nostd::constraint::ConstraintForce;
 use dibs_nostd::glam::Vec3;
 
@@ -71,10 +71,10 @@ dibs_nostd::include_tree!("heart");
 static SURFACE: heart::Surface = heart::Surface::new();
 
 fn apply(_: ConstraintForce) {}
-fn receive() -> (&'static [u8], u32) { (&[], 0) }
-fn pose() -> (Capsule, Vec3, u32) {
+fn receive() -> (&'static [u8], Millis) { (&[], Millis(0)) }
+fn pose() -> (Capsule, Vec3, Millis) {
     match Capsule::new(Vec3::ZERO, Vec3::X, 2.5) {
-        Ok(tool) => (tool, Vec3::ZERO, 0),
+        Ok(tool) => (tool, Vec3::ZERO, Millis(0)),
         Err(_) => loop {},
     }
 }

@@ -3,8 +3,8 @@
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
-    Capsule, Contacts, FrameLabel, FrameReader, Frames, MeasuredStretch, MovingSurface, Odometer,
-    Options, Proximity, Query, QueryError, Tracker, Tree, VertexTable, measure_stretch,
+    Capsule, Contacts, FrameLabel, FrameReader, Frames, MeasuredStretch, Millis, MovingSurface,
+    Odometer, Options, Proximity, Query, QueryError, Tracker, Tree, VertexTable, measure_stretch,
 };
 use glam::Vec3;
 
@@ -48,7 +48,7 @@ fn publish<'f>(
     for &row in rows {
         writer.push(row).expect("room");
     }
-    let label = FrameLabel { epoch: 7, received: 0, position_error: ERROR, stretch };
+    let label = FrameLabel { epoch: 7, received: Millis(0), position_error: ERROR, stretch };
     writer.publish(label).expect("complete");
     reader
 }

@@ -4,11 +4,17 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
-    FrameAge, FrameLabel, FrameReader, Frames, PublishError, SplitError, Unavailable, VertexTable,
+    FrameAge, FrameLabel, FrameReader, Frames, Millis, PublishError, SplitError, Unavailable,
+    VertexTable,
 };
 
 fn label(epoch: u32) -> FrameLabel {
-    FrameLabel { epoch, received: epoch.wrapping_mul(3), position_error: 0.5, stretch: None }
+    FrameLabel {
+        epoch,
+        received: Millis(epoch.wrapping_mul(3)),
+        position_error: 0.5,
+        stretch: None,
+    }
 }
 
 /// Every vertex carries the epoch and its own number.
@@ -104,13 +110,16 @@ fn age_is_right_over_a_wrap_of_the_clock() {
     let (mut writer, mut reader) = frames.split().unwrap();
     writer.begin();
     writer.push(Vec3::ZERO).unwrap();
-    writer.publish(FrameLabel { received: u32::MAX - 4, ..label(1) }).unwrap();
+    writer.publish(FrameLabel { received: Millis(u32::MAX - 4), ..label(1) }).unwrap();
     assert_eq!(
-        reader.latest(5).frame(),
-        Some(FrameAge { epoch: 1, received: u32::MAX - 4, age: 10 })
+        reader.latest(Millis(5)).frame(),
+        Some(FrameAge { epoch: 1, received: Millis(u32::MAX - 4), age: Millis(10) })
     );
-    assert!(reader.latest(5).within(10).is_ok());
-    assert_eq!(reader.latest(5).within(9).err(), Some(Unavailable::Stale { age: 10 }));
+    assert!(reader.latest(Millis(5)).within(Millis(10)).is_ok());
+    assert_eq!(
+        reader.latest(Millis(5)).within(Millis(9)).err(),
+        Some(Unavailable::Stale { age: Millis(10) })
+    );
 }
 
 /// The clock may wrap any number of times: a frame's age never falls.
@@ -119,7 +128,7 @@ fn a_frame_does_not_grow_young_again() {
     let frames = Frames::<1>::new();
     let (mut writer, mut reader) = frames.split().unwrap();
     writer.push(Vec3::ZERO).unwrap();
-    writer.publish(FrameLabel { received: 1000, ..label(1) }).unwrap();
+    writer.publish(FrameLabel { received: Millis(1000), ..label(1) }).unwrap();
     let (mut clock, mut last) = (1000_u32, 0);
     for step in 0..50_u64 {
         let age = age(&mut reader, clock);
@@ -131,12 +140,12 @@ fn a_frame_does_not_grow_young_again() {
     }
     // The next frame is young.
     writer.push(Vec3::ZERO).unwrap();
-    writer.publish(FrameLabel { received: clock, ..label(2) }).unwrap();
+    writer.publish(FrameLabel { received: Millis(clock), ..label(2) }).unwrap();
     assert_eq!(age(&mut reader, clock.wrapping_add(7)), 7);
 }
 
 fn age<const N: usize>(reader: &mut FrameReader<'_, N>, now: u32) -> u32 {
-    reader.latest(now).frame().expect("published").age
+    reader.latest(Millis(now)).frame().expect("published").age.0
 }
 
 /// Another core may have stamped the frame a little later than this one read its clock: such a frame is new. A frame
@@ -151,7 +160,7 @@ fn a_frame_from_the_future_is_new_or_old_but_never_in_between() {
         writer.publish(FrameLabel { received, ..label(epoch) }).unwrap();
     };
     for (epoch, ahead) in (1..).zip([1, 16, 17, 1 << 10, 1 << 25, 1 << 30, 1 << 31]) {
-        publish(5_u32.wrapping_add(ahead), epoch);
+        publish(Millis(5_u32.wrapping_add(ahead)), epoch);
         let age = age(&mut reader, 5);
         assert!(if ahead <= 16 { age == 0 } else { age >= 1 << 31 }, "{ahead} ahead: {age}");
     }

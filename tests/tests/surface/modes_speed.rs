@@ -5,7 +5,7 @@ use dibs_build::{Builder, BuiltTree};
 use dibs_nostd::modes::{ModalGate, ModalReader, Modes};
 use dibs_nostd::wire::{Event, FrameId, WeightsEncoder};
 use dibs_nostd::{
-    Advance, Arriving, Assembler, Changed, Frames, Gate, ReceiveError, StretchError,
+    Advance, Arriving, Assembler, Changed, Frames, Gate, Millis, ReceiveError, StretchError,
     StretchMonitor, SurfaceLimits, Tree, VertexTable,
 };
 use dibs_tests::motions::trembling;
@@ -57,7 +57,7 @@ fn a_modal_surface_that_jumps_is_too_fast() {
         let (mut buffer, mut outcome) = ([0; 64], Ok(Advance::Idle));
         // A frame may be refused before its last packet.
         while let Some(packet) = encoder.next_packet(&mut buffer) {
-            assembler.accept(packet, 7 * epoch).expect("well formed");
+            assembler.accept(packet, Millis(7 * epoch)).expect("well formed");
             outcome = assembler.advance(u32::MAX);
             if outcome.is_err() {
                 break;
@@ -117,7 +117,7 @@ fn the_limit_on_the_speed_of_modes_is_exact() {
             let exact = monitor.clone().limits(limits);
             let mut gate = ModalGate::<_, MODES>::new(&modes, exact).expect("four modes");
             gate.begin(Changed::Whole);
-            let before = Some((&before[..], 4));
+            let before = Some((&before[..], Millis(4)));
             let verdict = gate.advance(Arriving { surface: &now[..], ready: 4, before }, u32::MAX);
             let is_fast = matches!(verdict, Err(StretchError::TooFast { .. }));
             assert_eq!(is_fast, !may_pass, "{share} of {step}: {verdict:?}");

@@ -7,8 +7,8 @@ use dibs_build::{Builder, BuiltTree, Motion, generate};
 use dibs_nostd::glam::{Quat, Vec3};
 use dibs_nostd::wire::{Encoding, Event, FrameId};
 use dibs_nostd::{
-    Advance, Arriving, Assembler, Changed, FrameReader, Frames, Gate, ReceiveError, StretchError,
-    StretchMonitor, SurfaceLimits, Tree, Verdict, VertexTable,
+    Advance, Arriving, Assembler, Changed, FrameReader, Frames, Gate, Millis, ReceiveError,
+    StretchError, StretchMonitor, SurfaceLimits, Tree, Verdict, VertexTable,
 };
 use dibs_tests::bus::collect;
 
@@ -41,7 +41,7 @@ impl Bus {
         let encoder =
             dibs_nostd::wire::FrameEncoder::<_, 256>::new(id, Encoding::Float, rows).unwrap();
         for packet in collect(encoder) {
-            self.assembler.accept(&packet, now)?;
+            self.assembler.accept(&packet, Millis(now))?;
             self.assembler.advance(work)?;
         }
         while self.assembler.advance(work)? == Advance::Pending {}

@@ -10,7 +10,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use dibs_nostd::wire::{AesCmac, Mac, NoMac, encode_status};
-use dibs_nostd::{Assembler, Frames, Tree};
+use dibs_nostd::{Assembler, Frames, Millis, Tree};
 use serde_json::Value;
 
 use receiver::{Bytes, Datagrams, Link, Seen, receive};
@@ -341,7 +341,7 @@ fn a_receiver_that_acknowledges_nothing_is_named() {
     while child.try_wait().unwrap().is_none() {
         assert!(start.elapsed() < PATIENCE, "the program waits for ever");
         let _ = link.receive();
-        let status = deaf.status(start.elapsed().as_millis() as u32, 1);
+        let status = deaf.status(Millis(start.elapsed().as_millis() as u32), 1);
         let mut buffer = [0; 256];
         link.reply(encode_status(mesh, &status, deaf.counters(), &NoMac, &mut buffer));
         std::thread::sleep(Duration::from_millis(20));

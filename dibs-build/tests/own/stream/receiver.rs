@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use dibs_build::Motion;
 use dibs_nostd::wire::{Deframer, Event, Mac, encode_status, enframe, framed_bytes};
 use dibs_nostd::{
-    Advance, Assembler, Frames, Progress, ReceiveError, StretchMonitor, Tree, VertexTable,
+    Advance, Assembler, Frames, Millis, Progress, ReceiveError, StretchMonitor, Tree, VertexTable,
 };
 
 use super::{FRAMES, N, PATIENCE};
@@ -116,7 +116,7 @@ pub fn receive<M: Mac>(
         for packet in packets.unwrap_or_default() {
             seen.largest = seen.largest.max(packet.len());
             let now = start.elapsed().as_millis() as u32;
-            match assembler.accept(&packet, now) {
+            match assembler.accept(&packet, Millis(now)) {
                 Ok(Progress::Begun { .. }) => seen.last_begun = Some(Instant::now()),
                 Ok(_) | Err(ReceiveError::Forged { .. } | ReceiveError::Unexpected { .. }) => (),
                 Err(rejection) => panic!("{rejection}"),
@@ -146,7 +146,7 @@ pub fn receive<M: Mac>(
         }
         if reported.is_none_or(|at| at.elapsed() > Duration::from_millis(20)) {
             reported = Some(Instant::now());
-            let status = assembler.status(start.elapsed().as_millis() as u32, 1);
+            let status = assembler.status(Millis(start.elapsed().as_millis() as u32), 1);
             let mut buffer = [0; 1024];
             let (id, counters) = (tree.mesh_id(), assembler.counters());
             link.reply(encode_status(id, &status, counters, assembler.mac(), &mut buffer));

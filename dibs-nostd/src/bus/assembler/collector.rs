@@ -9,6 +9,7 @@ use crate::bus::wire::{
     Begin, Commit, Content, Counters, Event, FrameId, Heartbeat, Mac, Packet, PublishedStatus,
     Status, StreamError, is_newer,
 };
+use crate::surface::{Millis, elapsed};
 
 /// The frame in work.
 #[derive(Clone, Copy, Debug)]
@@ -16,9 +17,9 @@ pub(super) struct Frame {
     pub id: FrameId,
     pub begin: Begin,
     /// The receiver's clock at the begin.
-    received: u32,
+    received: Millis,
     /// The receiver's clock at the last packet that was taken.
-    touched: u32,
+    touched: Millis,
     /// Checksum of the begin packet: tells a repeated begin from a restarted sender's.
     begin_checksum: u32,
     /// Sum of the packets' shares so far.
@@ -34,11 +35,11 @@ pub(super) struct Frame {
 #[derive(Clone, Copy, Debug)]
 struct Published {
     id: FrameId,
-    captured: u32,
-    source_age: u32,
-    transit: u32,
+    captured: Millis,
+    source_age: Millis,
+    transit: Millis,
     /// The greatest age that was reported: a wrap of the clock does not make it young again.
-    oldest: u32,
+    oldest: Millis,
 }
 
 /// The last heartbeat.
@@ -52,7 +53,7 @@ pub struct LastHeartbeat {
     /// The newest epoch that the sender had begun.
     pub epoch: u32,
     /// The receiver's clock when it came.
-    pub received: u32,
+    pub received: Millis,
 }
 
 /// Decides which packets and frames to take, and counts them.
@@ -68,15 +69,15 @@ pub(super) struct Collector {
     /// The nonce of the last hello.
     answer: u32,
     /// The receiver's clock at the packet in work, and at the last packet and heartbeat that were taken.
-    now: u32,
-    packet: Option<u32>,
-    heartbeat_at: Option<u32>,
+    now: Millis,
+    packet: Option<Millis>,
+    heartbeat_at: Option<Millis>,
     trouble: Trouble,
     pub counters: Counters,
 }
 
-/// Time (ms) without a packet after which an earlier frame may replace the one in work.
-const PATIENCE: u32 = 100;
+/// Time without a packet after which an earlier frame may replace the one in work.
+const PATIENCE: Millis = Millis(100);
 
 impl Collector {
     pub const fn new(mesh_id: u32) -> Self {
@@ -88,7 +89,7 @@ impl Collector {
             wants_whole: false,
             statuses: 0,
             answer: 0,
-            now: 0,
+            now: Millis(0),
             packet: None,
             heartbeat_at: None,
             trouble: Trouble::new(),
@@ -97,7 +98,7 @@ impl Collector {
     }
 
     /// Sets the clock.
-    pub const fn set_now(&mut self, now: u32) {
+    pub const fn set_now(&mut self, now: Millis) {
         self.now = now;
     }
 
@@ -129,7 +130,7 @@ impl Collector {
     pub fn health(&self) -> BusHealth {
         let (transit, source_age) = match &self.published {
             Some(published) => (published.transit, published.source_age),
-            None => (u32::MAX, u32::MAX),
+            None => (Millis::MAX, Millis::MAX),
         };
         let (rejections, forgeries) = self.trouble.counts();
         BusHealth {
@@ -177,7 +178,7 @@ impl Collector {
             if frame.is_complete {
                 return Err(ReceiveError::Busy { epoch });
             }
-            if frame.id.is_after(&id) && self.now.wrapping_sub(frame.touched) < PATIENCE {
+            if frame.id.is_after(&id) && self.now.since(frame.touched) < PATIENCE {
                 return Err(ReceiveError::Stale { epoch });
             }
             self.counters.count(Event::Abandoned);
@@ -315,14 +316,15 @@ impl Collector {
         self.frame = None;
         self.wants_whole = false;
         let freshness = frame.begin.freshness;
-        let transit = freshness.echo.map(|echo| frame.received.wrapping_sub(echo));
+        // An echo from the future comes from another run of this receiver.
+        let transit = freshness.echo.map(|echo| elapsed(frame.received, Millis(echo)));
+        let transit = transit.filter(|transit| transit.0 <= i32::MAX as u32);
         self.published = Some(Published {
             id: frame.id,
             captured: frame.captured(),
-            source_age: u32::from(freshness.age_ms),
-            // An echo from the future comes from another run of this receiver.
-            transit: transit.filter(|&transit| transit <= i32::MAX as u32).unwrap_or(u32::MAX),
-            oldest: 0,
+            source_age: Millis(freshness.age_ms.into()),
+            transit: transit.unwrap_or(Millis::MAX),
+            oldest: Millis(0),
         });
         self.trouble = Trouble::new();
         // The published session is the sender's: a heartbeat of another one was stray.
@@ -343,21 +345,27 @@ impl Collector {
     }
 
     /// The status for the sender; `stretch` is the published frame's.
-    pub fn status(&mut self, now: u32, safety: u8, stretch: Option<f32>, challenge: u32) -> Status {
+    pub fn status(
+        &mut self,
+        now: Millis,
+        safety: u8,
+        stretch: Option<f32>,
+        challenge: u32,
+    ) -> Status {
         let number = self.statuses;
         self.statuses = number.wrapping_add(1);
         let published = self.published.as_mut().map(|published| {
-            let age = now.wrapping_sub(published.captured);
-            published.oldest = if age < published.oldest { u32::MAX } else { age };
+            let age = now.since(published.captured);
+            published.oldest = if age < published.oldest { Millis::MAX } else { age };
             PublishedStatus {
                 session: published.id.session,
                 epoch: published.id.epoch,
-                age_ms: published.oldest,
+                age_ms: published.oldest.0,
                 stretch,
             }
         });
         let Self { wants_whole, answer, .. } = *self;
-        Status { published, wants_whole, safety, number, clock: now, answer, challenge }
+        Status { published, wants_whole, safety, number, clock: now.0, answer, challenge }
     }
 }
 
@@ -373,8 +381,8 @@ impl Misplaced {
 
 impl Frame {
     /// The receiver's clock at the surface's capture, if the begin took no time on its way.
-    pub fn captured(&self) -> u32 {
-        self.received.wrapping_sub(u32::from(self.begin.freshness.age_ms))
+    pub fn captured(&self) -> Millis {
+        self.received.before(Millis(self.begin.freshness.age_ms.into()))
     }
 
     /// The place of rows; `None` for a repeated packet.

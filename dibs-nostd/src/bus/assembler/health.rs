@@ -2,27 +2,28 @@
 
 use super::ReceiveError;
 use crate::bus::wire::{FrameId, Packet, is_newer};
+use crate::surface::Millis;
 
 /// The health of the bus, as the receiver sees it, for [`LinkStatus::set`](crate::failsafe::LinkStatus::set). Times are
-/// on the receiver's clock, in ms.
+/// on the receiver's clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct BusHealth {
     /// Time of the last packet taken; repeated packets and hellos do not count.
-    pub packet: Option<u32>,
+    pub packet: Option<Millis>,
     /// Time of the last heartbeat taken.
-    pub heartbeat: Option<u32>,
+    pub heartbeat: Option<Millis>,
     /// Frames refused or damaged since the last publication, each counted once, however many of its packets were
     /// rejected. Forged packets, packets of other meshes, and packets of frames that are over do not count.
     pub rejections: u32,
     /// Packets without a genuine tag since the last frame was published.
     pub forgeries: u32,
     /// Time from the status that the published frame echoes to the arrival of its begin packet: an upper bound on the
-    /// way of each. `u32::MAX` where it echoes none.
-    pub transit: u32,
+    /// way of each. [`Millis::MAX`] where it echoes none.
+    pub transit: Millis,
     /// Age of the published frame when it was sent, as the sender stated it.
-    pub source_age: u32,
+    pub source_age: Millis,
 }
 
 /// The part of a frame's name that every packet carries.

@@ -13,7 +13,7 @@ use crate::bus::wire::{
 };
 use crate::stretch::{Arriving, Gate, StretchError, StretchMonitor, SurfaceLimits, Verdict};
 use crate::surface::{
-    Ahead, Buffers, FrameLabel, FrameView, FrameWriter, Frames, LastStep, PublishError,
+    Ahead, Buffers, FrameLabel, FrameView, FrameWriter, Frames, LastStep, Millis, PublishError,
 };
 use crate::tree::{Index, Tree};
 
@@ -45,7 +45,7 @@ use step::{Earlier, Step};
 ///
 /// ```
 /// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
-/// use dibs_nostd::{Advance, Assembler, Frames, Unchecked, VertexTable, glam::Vec3};
+/// use dibs_nostd::{Advance, Assembler, Frames, Millis, Unchecked, VertexTable, glam::Vec3};
 ///
 /// static FRAMES: Frames<3> = Frames::new();
 /// let (writer, mut reader) = FRAMES.split().unwrap();
@@ -56,7 +56,7 @@ use step::{Earlier, Step};
 /// let mut sender = FrameEncoder::<_, 64>::new(id, Encoding::Float, &positions[..]).unwrap();
 /// let mut buffer = [0; 64];
 /// while let Some(packet) = sender.next_packet(&mut buffer) {
-///     assembler.accept(packet, 0).unwrap();
+///     assembler.accept(packet, Millis(0)).unwrap();
 /// }
 /// assert_eq!(assembler.advance(100), Ok(Advance::Published { epoch: 1 }));
 /// assert_eq!(reader.read().unwrap().position(2), Some(Vec3::Z));
@@ -202,7 +202,7 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
         }
     }
 
-    /// Takes one packet, whole. `now` is the receiver's clock in ms (wraps). The frame's label keeps its value at the
+    /// Takes one packet, whole. `now` is the receiver's clock. The frame's label keeps its value at the
     /// begin packet, less the age that the frame had when it was sent.
     ///
     /// Cost: O(bytes).
@@ -210,7 +210,7 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
     /// # Errors
     /// [`ReceiveError`] names why the packet or its frame was not taken; the event has been counted.
     #[inline]
-    pub fn accept(&mut self, packet: &[u8], now: u32) -> Result<Progress, ReceiveError> {
+    pub fn accept(&mut self, packet: &[u8], now: Millis) -> Result<Progress, ReceiveError> {
         self.collector.set_now(now);
         let packet = match Packet::decode(packet) {
             Ok(packet) => packet,
@@ -272,8 +272,8 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
     }
 
     /// The receiver's status for the sender: [`encode_status`](crate::wire::encode_status) makes a packet
-    /// of it. `now` in ms; `safety` as in [`Status::safety`].
-    pub fn status(&mut self, now: u32, safety: u8) -> Status {
+    /// of it. `safety` as in [`Status::safety`].
+    pub fn status(&mut self, now: Millis, safety: u8) -> Status {
         let stretch = self.writer.front().and_then(|front| front.label().stretch);
         let stretch = stretch.map(|stretch| stretch.sigma());
         self.collector.status(now, safety, stretch, self.mac.challenge())

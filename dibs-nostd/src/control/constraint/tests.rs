@@ -5,6 +5,7 @@ extern crate std;
 use proptest::prelude::*;
 
 use super::*;
+use crate::surface::Millis;
 use crate::unavailable::QueryError;
 use crate::{NoSide, Side, TriangleRow};
 
@@ -102,7 +103,7 @@ fn the_guide_pulls_and_pushes() {
 fn the_hold_damps_and_says_why() {
     let reasons = [
         Unavailable::NoSurface,
-        Unavailable::Stale { age: 80 },
+        Unavailable::Stale { age: Millis(80) },
         Unavailable::Query(QUERY),
         Unavailable::NoDirection,
         Unavailable::NotFinite,

@@ -9,7 +9,7 @@ use crate::unavailable::Unavailable;
 pub(super) struct Freshness {
     transit: Watch,
     source_age: Watch,
-    forgeries: Watch,
+    forgeries: Watch<u32>,
 }
 
 impl Freshness {
@@ -47,7 +47,7 @@ impl Limits {
 
     /// Limits on the forged packets since the last frame was published.
     #[must_use]
-    pub const fn forgeries(mut self, watch: Watch) -> Self {
+    pub const fn forgeries(mut self, watch: Watch<u32>) -> Self {
         self.freshness.forgeries = watch;
         self
     }

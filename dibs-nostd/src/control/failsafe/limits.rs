@@ -4,50 +4,59 @@ use core::fmt;
 
 use super::State;
 use super::freshness::Freshness;
+use crate::surface::Millis;
 
-/// Two limits on one input: beyond the first the state is degraded, beyond the second safe.
+/// Two limits on one input, a time or a count: beyond the first the state is degraded, beyond the second safe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Watch {
-    degraded: u32,
-    safe: u32,
+pub struct Watch<T = Millis> {
+    degraded: T,
+    safe: T,
 }
 
 /// A time of half the clock's range or more is ambiguous.
 const LONGEST: u32 = i32::MAX as u32;
 
-impl Watch {
-    /// An input that is not watched.
-    pub const OFF: Self = Self { degraded: u32::MAX, safe: u32::MAX };
+/// A quantity that a [`Watch`] has limits on.
+#[doc(hidden)]
+pub trait Watched: Copy + PartialOrd + sealed::Sealed {
+    /// Its largest value.
+    const MOST: Self;
+}
 
-    /// Values above `degraded` lead to the degraded state, values above `safe` to the safe state. In the clock's unit,
-    /// or a number of rejections.
-    ///
-    /// # Errors
-    /// [`LimitError`] when `safe` is below `degraded`, or not below 2^31.
-    pub const fn new(degraded: u32, safe: u32) -> Result<Self, LimitError> {
-        if degraded > safe {
-            Err(LimitError::Order { degraded, safe })
-        } else if safe >= LONGEST {
-            Err(LimitError::TooLong { safe })
-        } else {
-            Ok(Self { degraded, safe })
-        }
-    }
+impl Watched for Millis {
+    const MOST: Self = Self::MAX;
+}
+
+impl Watched for u32 {
+    const MOST: Self = Self::MAX;
+}
+
+mod sealed {
+    use crate::surface::Millis;
+
+    pub trait Sealed {}
+    impl Sealed for Millis {}
+    impl Sealed for u32 {}
+}
+
+impl<T: Watched> Watch<T> {
+    /// An input that is not watched.
+    pub const OFF: Self = Self { degraded: T::MOST, safe: T::MOST };
 
     /// The first limit.
     #[must_use]
-    pub const fn degraded(&self) -> u32 {
+    pub const fn degraded(&self) -> T {
         self.degraded
     }
 
     /// The second limit.
     #[must_use]
-    pub const fn safe(&self) -> u32 {
+    pub const fn safe(&self) -> T {
         self.safe
     }
 
-    pub(super) const fn level(&self, value: u32) -> State {
+    pub(super) fn level(&self, value: T) -> State {
         if value > self.safe {
             State::Safe
         } else if value > self.degraded {
@@ -55,6 +64,43 @@ impl Watch {
         } else {
             State::Nominal
         }
+    }
+}
+
+impl Watch {
+    /// Limits on a time: longer ones than `degraded` lead to the degraded state, longer ones than `safe` to the safe
+    /// state.
+    ///
+    /// # Errors
+    /// [`LimitError`] when `safe` is below `degraded`, or not below 2^31 ms.
+    pub const fn new(degraded: Millis, safe: Millis) -> Result<Self, LimitError> {
+        match check(degraded.0, safe.0) {
+            Ok(()) => Ok(Self { degraded, safe }),
+            Err(error) => Err(error),
+        }
+    }
+}
+
+impl Watch<u32> {
+    /// Limits on a count of frames or packets, in the same way.
+    ///
+    /// # Errors
+    /// [`LimitError`] when `safe` is below `degraded`, or not below 2^31.
+    pub const fn count(degraded: u32, safe: u32) -> Result<Self, LimitError> {
+        match check(degraded, safe) {
+            Ok(()) => Ok(Self { degraded, safe }),
+            Err(error) => Err(error),
+        }
+    }
+}
+
+const fn check(degraded: u32, safe: u32) -> Result<(), LimitError> {
+    if degraded > safe {
+        Err(LimitError::Order { degraded, safe })
+    } else if safe >= LONGEST {
+        Err(LimitError::TooLong { safe })
+    } else {
+        Ok(())
     }
 }
 
@@ -68,7 +114,7 @@ pub struct Limits {
     pub(super) age: Watch,
     pub(super) silence: Watch,
     pub(super) heartbeat: Watch,
-    pub(super) rejections: Watch,
+    pub(super) rejections: Watch<u32>,
     pub(super) freshness: Freshness,
     tissue_speed: f32,
     recovery_frames: u16,
@@ -76,14 +122,13 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Limits on the surface's age, and the largest speed of any of its points, in mm per unit of the clock (for a
-    /// clock of milliseconds: in m/s). 0 adds no margin for age.
+    /// Limits on the surface's age, and the largest speed of any of its points, in mm per millisecond (m/s). 0 adds no margin for age.
     ///
     /// # Errors
     /// [`LimitError`] if the age is not watched, or the speed is negative or not finite.
     pub const fn new(age: Watch, tissue_speed: f32) -> Result<Self, LimitError> {
-        if age.safe == u32::MAX {
-            return Err(LimitError::TooLong { safe: age.safe });
+        if age.safe.0 == u32::MAX {
+            return Err(LimitError::TooLong { safe: age.safe.0 });
         }
         if !(tissue_speed >= 0.0 && tissue_speed.is_finite()) {
             return Err(LimitError::Speed { tissue_speed });
@@ -114,7 +159,7 @@ impl Limits {
 
     /// Limits on the frames refused or damaged since the last publication, each counted once.
     #[must_use]
-    pub const fn rejections(self, watch: Watch) -> Self {
+    pub const fn rejections(self, watch: Watch<u32>) -> Self {
         Self { rejections: watch, ..self }
     }
 
@@ -155,9 +200,9 @@ impl Limits {
 
     /// Distance that tissue may move within an age, in mm, rounded up.
     #[must_use]
-    pub fn margin(&self, age: u32) -> f32 {
+    pub fn margin(&self, age: Millis) -> f32 {
         // Conversion and product each round by at most half an epsilon.
-        age as f32 * self.tissue_speed * (1.0 + 2.0 * f32::EPSILON)
+        age.0 as f32 * self.tissue_speed * (1.0 + 2.0 * f32::EPSILON)
     }
 }
 

@@ -35,10 +35,10 @@
 //!
 //! # Time
 //!
-//! Times are in any unit, and may wrap: the control tick's number will do. With a surface received at tick `r` and
-//! nothing after it, the first safe step is that of tick `r + safe + 1`, where `safe` is the second limit on age: never
+//! Times are [`Millis`] on the receiver's clock, which wraps; a count of control [`Ticks`](crate::Ticks) becomes one by
+//! its rate. With a surface received at `r` and nothing after it, the first safe step is one at `r + safe + 1` or later, where `safe` is the second limit on age: never
 //! later, and exactly then unless another input comes first. Ages of surface, packets and heartbeats follow one rule,
-//! that of [`FrameAge`]: a stamp up to 16 units ahead of the clock is new, one farther ahead is old, and what was found
+//! that of [`FrameAge`]: a stamp up to 16 ms ahead of the clock is new, one farther ahead is old, and what was found
 //! old stays old when the clock comes around.
 
 mod freshness;
@@ -52,10 +52,10 @@ mod tests;
 use core::fmt;
 
 use crate::query::Proximity;
-use crate::surface::FrameAge;
+use crate::surface::{FrameAge, Millis};
 use crate::unavailable::{QueryError, Unavailable};
 
-pub use limits::{LimitError, Limits, Watch};
+pub use limits::{LimitError, Limits, Watch, Watched};
 pub use link::Link;
 #[cfg(feature = "bus")]
 pub use status::LinkStatus;
@@ -118,15 +118,16 @@ impl Verdict {
 /// The state machine.
 ///
 /// ```
-/// use dibs_nostd::FrameAge;
+/// use dibs_nostd::{FrameAge, Millis};
 /// use dibs_nostd::failsafe::{FailSafe, Limits, Link, Observation, State, Watch};
 ///
-/// // Ticks of 1 ms: degraded after 50, safe after 200; tissue at up to 0.1 mm a tick.
-/// let limits = Limits::new(Watch::new(50, 200)?, 0.1)?.recovery(2)?.automatic();
+/// // Degraded after 50 ms, safe after 200; tissue at up to 0.1 mm a millisecond.
+/// let limits = Limits::new(Watch::new(Millis(50), Millis(200))?, 0.1)?.recovery(2)?.automatic();
 /// let mut machine = FailSafe::new(limits);
 /// let link = Link::CLEAR;
-/// let mut state = |now: u32, epoch, received| {
-///     let frame = Some(FrameAge { epoch, received, age: now - received }); // from `Latest::frame`
+/// let mut state = |now: u32, epoch, received: u32| {
+///     let (age, received) = (Millis(now - received), Millis(received));
+///     let frame = Some(FrameAge { epoch, received, age }); // from `Latest::frame`
 ///     let seen = Observation { frame, link, query_error: None, is_tree_corrupt: false };
 ///     machine.step(&seen).state
 /// };
@@ -142,7 +143,7 @@ pub struct FailSafe {
     state: State,
     cause: Option<Unavailable>,
     /// Epoch and clock of the last step's frame.
-    frame: Option<(u32, u32)>,
+    frame: Option<(u32, Millis)>,
     /// Frames since the last step that was not clear; stops at the number needed.
     run: u16,
     acknowledged: bool,
@@ -176,7 +177,7 @@ impl FailSafe {
 
     /// One control tick. Cost: O(1), two comparisons for each input.
     pub fn step(&mut self, seen: &Observation) -> Verdict {
-        let age = seen.frame.map_or(u32::MAX, |frame| frame.age);
+        let age = seen.frame.map_or(Millis::MAX, |frame| frame.age);
         let (level, cause) = self.worst(seen, age);
 
         let frame = seen.frame.map(|frame| (frame.epoch, frame.received));
@@ -235,7 +236,7 @@ impl FailSafe {
     }
 
     /// The level that the inputs of this step require, and its first cause.
-    fn worst(&self, seen: &Observation, age: u32) -> (State, Option<Unavailable>) {
+    fn worst(&self, seen: &Observation, age: Millis) -> (State, Option<Unavailable>) {
         let (link, limits) = (seen.link, &self.limits);
         let mut worst = (State::Nominal, None);
         let stale = Unavailable::Stale { age };

@@ -4,7 +4,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use super::Link;
 use crate::bus::BusHealth;
-use crate::surface::Ageing;
+use crate::surface::{Ageing, Millis};
 
 /// The bus interrupt's notes for the control tick. Meant for a `static`.
 ///
@@ -12,22 +12,22 @@ use crate::surface::Ageing;
 ///
 /// ```
 /// use dibs_nostd::wire::{FrameId, NoMac, encode_heartbeat};
-/// use dibs_nostd::{Assembler, Frames, Unchecked, failsafe::LinkStatus};
+/// use dibs_nostd::{Assembler, Frames, Millis, Unchecked, failsafe::LinkStatus};
 ///
 /// static FRAMES: Frames<3> = Frames::new();
 /// static LINK: LinkStatus = LinkStatus::new();
-/// assert_eq!(LINK.read(5).silence, u32::MAX, "nothing came yet");
+/// assert_eq!(LINK.read(Millis(5)).silence, Millis::MAX, "nothing came yet");
 ///
 /// // Bus interrupt: after each call of `accept` or `advance`.
 /// let (writer, _reader) = FRAMES.split().unwrap();
 /// let mut assembler = Assembler::new(writer, Unchecked, 0xB0D1, 1000.0);
 /// let mut buffer = [0; 64];
 /// let id = FrameId { mesh_id: 0xB0D1, session: 1, epoch: 0 };
-/// assembler.accept(encode_heartbeat(&id, 1, &NoMac, &mut buffer), 10).unwrap();
+/// assembler.accept(encode_heartbeat(&id, 1, &NoMac, &mut buffer), Millis(10)).unwrap();
 /// LINK.set(&assembler.health());
 ///
 /// // Control interrupt.
-/// assert_eq!(LINK.read(12).silence, 2);
+/// assert_eq!(LINK.read(Millis(12)).silence, Millis(2));
 /// ```
 #[derive(Debug)]
 pub struct LinkStatus {
@@ -60,25 +60,25 @@ impl Stamp {
         }
     }
 
-    fn set(&self, at: Option<u32>) {
-        if let Some(at) = at {
+    fn set(&self, at: Option<Millis>) {
+        if let Some(Millis(at)) = at {
             self.at.store(at, Ordering::Relaxed);
             self.came.store(1, Ordering::Release);
         }
     }
 
-    /// Time since the last; `u32::MAX` before the first.
-    fn age(&self, now: u32) -> u32 {
+    /// Time since the last; [`Millis::MAX`] before the first.
+    fn age(&self, now: Millis) -> Millis {
         if self.came.load(Ordering::Acquire) == 0 {
-            return u32::MAX;
+            return Millis::MAX;
         }
         let before = Ageing {
-            stamp: self.aged.load(Ordering::Relaxed),
-            oldest: self.oldest.load(Ordering::Relaxed),
+            stamp: Millis(self.aged.load(Ordering::Relaxed)),
+            oldest: Millis(self.oldest.load(Ordering::Relaxed)),
         };
-        let Ageing { stamp, oldest } = before.at(now, self.at.load(Ordering::Relaxed));
-        self.aged.store(stamp, Ordering::Relaxed);
-        self.oldest.store(oldest, Ordering::Relaxed);
+        let Ageing { stamp, oldest } = before.at(now, Millis(self.at.load(Ordering::Relaxed)));
+        self.aged.store(stamp.0, Ordering::Relaxed);
+        self.oldest.store(oldest.0, Ordering::Relaxed);
         oldest
     }
 }
@@ -103,21 +103,21 @@ impl LinkStatus {
         self.heartbeat.set(health.heartbeat);
         self.rejections.store(health.rejections, Ordering::Relaxed);
         self.forgeries.store(health.forgeries, Ordering::Relaxed);
-        self.transit.store(health.transit, Ordering::Relaxed);
-        self.source_age.store(health.source_age, Ordering::Relaxed);
+        self.transit.store(health.transit.0, Ordering::Relaxed);
+        self.source_age.store(health.source_age.0, Ordering::Relaxed);
     }
 
-    /// The health of the bus at `now`. One reader, which calls it at least once in 2^31 units of the clock: then a lost
+    /// The health of the bus at `now`. One reader, which calls it at least once in 2^31 ms: then a lost
     /// link stays lost when the clock wraps.
     #[must_use]
-    pub fn read(&self, now: u32) -> Link {
+    pub fn read(&self, now: Millis) -> Link {
         Link {
             silence: self.packet.age(now),
             heartbeat: self.heartbeat.age(now),
             rejections: self.rejections.load(Ordering::Relaxed),
             forgeries: self.forgeries.load(Ordering::Relaxed),
-            transit: self.transit.load(Ordering::Relaxed),
-            source_age: self.source_age.load(Ordering::Relaxed),
+            transit: Millis(self.transit.load(Ordering::Relaxed)),
+            source_age: Millis(self.source_age.load(Ordering::Relaxed)),
         }
     }
 }

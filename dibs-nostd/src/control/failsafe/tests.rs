@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use super::{FailSafe, LimitError, Limits, Link, LinkStatus, Observation, State, Verdict, Watch};
 use crate::bus::BusHealth;
-use crate::surface::{Ageing, FrameAge};
+use crate::surface::{Ageing, FrameAge, Millis};
 use crate::unavailable::{QueryError, Unavailable};
 
 const QUERY: QueryError = QueryError::Corrupt { row: 7 };
@@ -16,14 +16,21 @@ const QUERY: QueryError = QueryError::Corrupt { row: 7 };
 const AGE: Watch = watch(50, 200);
 const SILENCE: Watch = watch(20, 100);
 const HEARTBEAT: Watch = watch(30, 150);
-const REJECTIONS: Watch = watch(3, 9);
+const REJECTIONS: Watch<u32> = count(3, 9);
 const TRANSIT: Watch = watch(300, 900);
 const SOURCE_AGE: Watch = watch(40, 80);
-const FORGERIES: Watch = watch(5, 50);
+const FORGERIES: Watch<u32> = count(5, 50);
 const SPEED: f32 = 0.125;
 
 const fn watch(degraded: u32, safe: u32) -> Watch {
-    match Watch::new(degraded, safe) {
+    match Watch::new(Millis(degraded), Millis(safe)) {
+        Ok(watch) => watch,
+        Err(_) => panic!("limits in the wrong order"),
+    }
+}
+
+const fn count(degraded: u32, safe: u32) -> Watch<u32> {
+    match Watch::count(degraded, safe) {
         Ok(watch) => watch,
         Err(_) => panic!("limits in the wrong order"),
     }
@@ -47,8 +54,9 @@ const GOOD: Link = Link::CLEAR;
 
 /// A step at `now` with a surface of this epoch and age.
 fn seen(now: u32, epoch: u32, age: u32) -> Observation {
+    let (now, age) = (Millis(now), Millis(age));
     Observation {
-        frame: Some(FrameAge { epoch, received: now.wrapping_sub(age), age }),
+        frame: Some(FrameAge { epoch, received: now.before(age), age }),
         link: GOOD,
         query_error: None,
         is_tree_corrupt: false,
@@ -88,14 +96,16 @@ fn requests() -> Vec<(State, Observation, Option<Unavailable>)> {
         Some(Unavailable::CorruptTree),
     ));
     for (level, age) in [(Nominal, 50), (Degraded, 51), (Degraded, 200), (Safe, 201)] {
-        let cause = (level != Nominal).then_some(Unavailable::Stale { age });
+        let cause = (level != Nominal).then_some(Unavailable::Stale { age: Millis(age) });
         all.push((level, seen(2000, 100, age), cause));
     }
     for (level, silence) in [(Nominal, 20), (Degraded, 21), (Degraded, 100), (Safe, 101)] {
+        let silence = Millis(silence);
         let cause = (level != Nominal).then_some(Unavailable::LinkLost { silence });
         all.push((level, with(Link { silence, ..GOOD }), cause));
     }
     for (level, silence) in [(Nominal, 30), (Degraded, 31), (Degraded, 150), (Safe, 151)] {
+        let silence = Millis(silence);
         let cause = (level != Nominal).then_some(Unavailable::HeartbeatLost { silence });
         all.push((level, with(Link { heartbeat: silence, ..GOOD }), cause));
     }
@@ -104,10 +114,12 @@ fn requests() -> Vec<(State, Observation, Option<Unavailable>)> {
         all.push((level, with(Link { rejections: streak, ..GOOD }), cause));
     }
     for (level, transit) in [(Nominal, 300), (Degraded, 301), (Degraded, 900), (Safe, 901)] {
+        let transit = Millis(transit);
         let cause = (level != Nominal).then_some(Unavailable::Delayed { transit });
         all.push((level, with(Link { transit, ..GOOD }), cause));
     }
     for (level, age) in [(Nominal, 40), (Degraded, 41), (Degraded, 80), (Safe, 81)] {
+        let age = Millis(age);
         let cause = (level != Nominal).then_some(Unavailable::SourceStale { age });
         all.push((level, with(Link { source_age: age, ..GOOD }), cause));
     }
@@ -117,8 +129,8 @@ fn requests() -> Vec<(State, Observation, Option<Unavailable>)> {
     }
     all.push((
         Safe,
-        with(Link { silence: u32::MAX, ..GOOD }),
-        Some(Unavailable::LinkLost { silence: u32::MAX }),
+        with(Link { silence: Millis::MAX, ..GOOD }),
+        Some(Unavailable::LinkLost { silence: Millis::MAX }),
     ));
     all
 }
@@ -201,9 +213,9 @@ fn safe_comes_exactly_one_tick_after_the_limit_whatever_the_clock_shows() {
         }
         let first = |state| states.iter().position(|&s| s == state);
         assert_eq!(first(State::Nominal), Some(0));
-        assert_eq!(first(State::Degraded), Some(AGE.degraded() as usize + 1));
-        assert_eq!(first(State::Safe), Some(AGE.safe() as usize + 1));
-        assert!(states[AGE.safe() as usize + 1..].iter().all(|&s| s == State::Safe));
+        assert_eq!(first(State::Degraded), Some(AGE.degraded().0 as usize + 1));
+        assert_eq!(first(State::Safe), Some(AGE.safe().0 as usize + 1));
+        assert!(states[AGE.safe().0 as usize + 1..].iter().all(|&s| s == State::Safe));
         // A surface that looks fresh again recovers nothing.
         assert_eq!(machine.step(&seen(start, 1, 0)).state, State::Safe);
     }
@@ -213,7 +225,7 @@ fn safe_comes_exactly_one_tick_after_the_limit_whatever_the_clock_shows() {
 fn the_margin_is_age_times_speed_in_every_state_that_acts() {
     let mut machine = FailSafe::new(Limits::new(AGE, SPEED).unwrap().automatic());
     let mut before = -1.0;
-    for age in 0..=AGE.safe() {
+    for age in 0..=AGE.safe().0 {
         let verdict = machine.step(&seen(1000 + age, 1, age));
         let exact = f64::from(age) * f64::from(SPEED);
         assert!(f64::from(verdict.margin) >= exact, "rounded up");
@@ -223,7 +235,7 @@ fn the_margin_is_age_times_speed_in_every_state_that_acts() {
     }
     let limits = Limits::new(watch(1, i32::MAX as u32 - 1), 0.3).unwrap();
     for age in [16_777_217, 33_554_435, i32::MAX as u32 - 1] {
-        assert!(f64::from(limits.margin(age)) >= f64::from(age) * f64::from(0.3_f32));
+        assert!(f64::from(limits.margin(Millis(age))) >= f64::from(age) * f64::from(0.3_f32));
     }
 }
 
@@ -231,16 +243,16 @@ fn the_margin_is_age_times_speed_in_every_state_that_acts() {
 fn a_slow_second_core_is_not_an_old_surface() {
     let mut machine = FailSafe::new(Limits::new(AGE, SPEED).unwrap().automatic());
     // The receiver's clock is ahead by one.
-    let age = Ageing::default().at(1000, 1001).oldest;
-    let verdict = machine.step(&seen(1000, 1, age));
+    let age = Ageing::default().at(Millis(1000), Millis(1001)).oldest;
+    let verdict = machine.step(&seen(1000, 1, age.0));
     assert_eq!((verdict.state, verdict.margin), (State::Nominal, 0.0));
 }
 
 #[test]
 fn limits_that_no_machine_can_have_are_named() {
-    assert_eq!(Watch::new(5, 4), Err(LimitError::Order { degraded: 5, safe: 4 }));
+    assert_eq!(Watch::count(5, 4), Err(LimitError::Order { degraded: 5, safe: 4 }));
     let long = 1 << 31;
-    assert_eq!(Watch::new(5, long), Err(LimitError::TooLong { safe: long }));
+    assert_eq!(Watch::new(Millis(5), Millis(long)), Err(LimitError::TooLong { safe: long }));
     assert_eq!(Limits::new(Watch::OFF, 0.0), Err(LimitError::TooLong { safe: u32::MAX }));
     for tissue_speed in [-1.0, f32::INFINITY] {
         assert_eq!(Limits::new(AGE, tissue_speed), Err(LimitError::Speed { tissue_speed }));
@@ -266,8 +278,8 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
         8 => Just(GOOD),
         1 => (0_u32..120, 0_u32..170, 0_u32..12)
             .prop_map(|(silence, heartbeat, rejections)| Link {
-                silence,
-                heartbeat,
+                silence: Millis(silence),
+                heartbeat: Millis(heartbeat),
                 rejections,
                 ..GOOD
             }),
@@ -288,14 +300,14 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 
 fn run(steps: &[Step], limits: Limits, start: u32) -> (Vec<Observation>, Vec<Verdict>, Vec<bool>) {
     let mut machine = FailSafe::new(limits);
-    let (mut now, mut epoch, mut stamp) = (start, 0_u32, None);
+    let (mut now, mut epoch, mut stamp) = (Millis(start), 0_u32, None);
     let mut ageing = Ageing::default();
     let (mut observations, mut verdicts, mut acknowledged) = (Vec::new(), Vec::new(), Vec::new());
     for step in steps {
-        now = now.wrapping_add(step.wait);
+        now = now.after(Millis(step.wait));
         if step.new_frame {
             epoch = epoch.wrapping_add(1);
-            stamp = Some(now.wrapping_sub(step.delay));
+            stamp = Some(now.before(Millis(step.delay)));
             ageing = Ageing::default();
         }
         let frame = stamp.map(|received| {
@@ -315,13 +327,14 @@ fn run(steps: &[Step], limits: Limits, start: u32) -> (Vec<Observation>, Vec<Ver
 /// Whether an observation is beyond its first (`strict`) or second limits, computed anew.
 fn is_beyond(seen: &Observation, second: bool) -> bool {
     let limit = |watch: Watch| if second { watch.safe() } else { watch.degraded() };
+    let most = if second { REJECTIONS.safe() } else { REJECTIONS.degraded() };
     let Some(frame) = seen.frame else { return true };
     seen.query_error.is_some()
         || seen.is_tree_corrupt
         || frame.age > limit(AGE)
         || seen.link.silence > limit(SILENCE)
         || seen.link.heartbeat > limit(HEARTBEAT)
-        || seen.link.rejections > limit(REJECTIONS)
+        || seen.link.rejections > most
 }
 
 proptest! {
@@ -385,34 +398,34 @@ fn lost_heartbeats_stay_lost_over_the_whole_range_of_the_clock() {
         link.set(&health(start, start));
         let mut machine = FailSafe::new(limits(1, true));
         let mut now = start;
-        assert_eq!(machine.step(&observe(now, 0, link.read(now))).state, State::Nominal);
+        assert_eq!(machine.step(&observe(now, 0, link.read(Millis(now)))).state, State::Nominal);
         for epoch in 1..100 {
             now = now.wrapping_add(step);
             link.set(&health(now, start));
-            let verdict = machine.step(&observe(now, epoch, link.read(now)));
+            let verdict = machine.step(&observe(now, epoch, link.read(Millis(now))));
             assert_eq!(verdict.state, State::Safe, "{start}: {epoch} steps of {step}");
             // Includes the ticks in which the clock comes around to the last heartbeat.
-            let again = link.read(start.wrapping_add(epoch % 40).wrapping_sub(20));
+            let again = link.read(Millis(start.wrapping_add(epoch % 40).wrapping_sub(20)));
             if u64::from(epoch) * u64::from(step) > 1 << 32 {
-                assert_eq!(again.heartbeat, u32::MAX, "{start}: {epoch} steps of {step}");
+                assert_eq!(again.heartbeat, Millis::MAX, "{start}: {epoch} steps of {step}");
             }
         }
         // A heartbeat ends it.
         now = now.wrapping_add(1);
         link.set(&health(now, now));
-        assert_eq!(machine.step(&observe(now, 1000, link.read(now))).state, State::Nominal);
+        assert_eq!(machine.step(&observe(now, 1000, link.read(Millis(now)))).state, State::Nominal);
     }
 }
 
 /// A bus on which a packet and a heartbeat came at these times.
 fn health(packet: u32, heartbeat: u32) -> BusHealth {
     BusHealth {
-        packet: Some(packet),
-        heartbeat: Some(heartbeat),
+        packet: Some(Millis(packet)),
+        heartbeat: Some(Millis(heartbeat)),
         rejections: 0,
         forgeries: 0,
-        transit: 0,
-        source_age: 0,
+        transit: Millis(0),
+        source_age: Millis(0),
     }
 }
 

@@ -12,7 +12,8 @@ use glam::Vec3;
 use crate::surface::motion::{Travel, Unit};
 use crate::wire::{Encoding, FrameEncoder, FrameId, NoMac};
 use crate::{
-    Advance, Assembler, Frames, MovingSurface, StretchMonitor, SurfaceLimits, Tree, VertexTable,
+    Advance, Assembler, Frames, Millis, MovingSurface, StretchMonitor, SurfaceLimits, Tree,
+    VertexTable,
 };
 
 /// Vertices of the heart of 320 triangles.
@@ -39,7 +40,7 @@ fn send(bus: &mut Bus<'_>, mesh_id: u32, epoch: u32, rows: &[Vec3], now: u32) {
     let mut packets = FrameEncoder::<_, 512>::new(id, Encoding::Float, rows).unwrap();
     let mut packet = [0; 512];
     while let Some(packet) = packets.next_packet(&mut packet) {
-        bus.accept(packet, now).unwrap();
+        bus.accept(packet, Millis(now)).unwrap();
     }
     while bus.advance(100).unwrap() == Advance::Pending {}
     assert_eq!(bus.published(), Some(id));
@@ -102,7 +103,7 @@ fn follow(motion: Motion) {
         let mut tick = if is_steady { now.wrapping_add(4) } else { now };
         for _ in 0..if is_steady { 17 } else { rng.u32(..4) } {
             tick = tick.wrapping_add(if is_steady { 1 } else { rng.u32(..8) });
-            let frame = reader.latest(tick).of_any_age().unwrap();
+            let frame = reader.latest(Millis(tick)).of_any_age().unwrap();
             let surface = frame.extrapolated();
             let travel = surface.travel().unwrap();
             let found = positions(&surface);
@@ -154,7 +155,7 @@ fn the_order_of_two_readings_does_not_matter() {
         let now = 16 * u32::from(epoch);
         send(&mut bus, tree.mesh_id(), epoch.into(), &rows, now);
         for age in [0, 8, 24] {
-            let frame = reader.latest(now + age).of_any_age().unwrap();
+            let frame = reader.latest(Millis(now + age)).of_any_age().unwrap();
             let surface = frame.extrapolated();
             seen.push((surface.travel().unwrap(), positions(&surface)));
         }

@@ -9,6 +9,7 @@ use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{NVIC, Peripherals, SYST};
 use cortex_m_rt::exception;
 use dibs_nostd::wire::Event;
+use dibs_nostd::{Millis, Ticks};
 use heapless::spsc::Producer;
 
 use crate::exclusive::Exclusive;
@@ -91,7 +92,7 @@ pub fn background(packet: &mut [u8; STATUS_MTU]) -> Option<&[u8]> {
     let status = RECEIVER.with(|receiver| {
         let receiver = receiver.as_mut()?;
         receiver.work();
-        receiver.status(ticks(), packet)
+        receiver.status(now(), packet)
     });
     if let (Some(before), Some(after)) = (before, own_time()) {
         BUS_MASKED.fetch_max(after.wrapping_sub(before), Ordering::Relaxed);
@@ -103,7 +104,7 @@ pub fn background(packet: &mut [u8; STATUS_MTU]) -> Option<&[u8]> {
 
 /// Takes a packet that the idle loop found in a frame. Returns whether it was a good one.
 pub fn take(packet: &[u8]) -> bool {
-    let taken = RECEIVER.with(|receiver| Some(receiver.as_mut()?.packet(packet, ticks())));
+    let taken = RECEIVER.with(|receiver| Some(receiver.as_mut()?.packet(packet, now())));
     taken.flatten().unwrap_or(false)
 }
 
@@ -124,6 +125,11 @@ pub fn stop() {
     NVIC::mask(BusInterrupt);
     // SAFETY: SysTick belongs to this module; one write of its control register.
     unsafe { (*SYST::PTR).csr.write(0) };
+}
+
+/// The time: that of the control ticks run so far.
+fn now() -> Millis {
+    controller::time_of(Ticks(ticks().into()))
 }
 
 /// Control ticks run so far.
@@ -214,7 +220,7 @@ pub extern "C" fn bus_interrupt() {
     RECEIVER.with(|receiver| {
         while let Some(byte) = uart::BUS.read() {
             if let Some(receiver) = receiver {
-                receiver.byte(byte, ticks());
+                receiver.byte(byte, now());
             }
         }
     });

@@ -16,7 +16,9 @@ use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
     AesCmac, Counters, Deframer, Event, Mac, encode_status, enframe, framed_bytes,
 };
-use dibs_nostd::{Advance, Assembler, FrameReader, Frames, StretchMonitor, Tree, VertexTable};
+use dibs_nostd::{
+    Advance, Assembler, FrameReader, Frames, Millis, StretchMonitor, Tree, VertexTable,
+};
 pub use probe::bus::MTU;
 use probe::bus::{KEY, RECEIVER, VERTICES, WORK};
 
@@ -233,13 +235,13 @@ impl<M: Mac> Receiver for Controller<'_, M> {
     fn status(&mut self) -> Vec<u8> {
         let mesh_id = TREE.summary().mesh_id;
         self.now = self.now.wrapping_add(FRAME_MS);
-        let status = self.assembler.status(self.now, 0);
+        let status = self.assembler.status(Millis(self.now), 0);
         let (counters, mac) = (*self.assembler.counters(), self.assembler.mac());
         encode_status(mesh_id, &status, &counters, mac, &mut [0; MTU]).to_vec()
     }
 
     fn message(&mut self, packet: &[u8], log: &Log) {
-        let _ = self.assembler.accept(packet, self.now);
+        let _ = self.assembler.accept(packet, Millis(self.now));
         self.work(log);
     }
 
@@ -247,7 +249,7 @@ impl<M: Mac> Receiver for Controller<'_, M> {
         for &byte in bytes {
             match self.deframer.push(byte) {
                 None => continue,
-                Some(Ok(packet)) => drop(self.assembler.accept(packet, self.now)),
+                Some(Ok(packet)) => drop(self.assembler.accept(packet, Millis(self.now))),
                 Some(Err(error)) => self.assembler.count_framing(&error),
             }
             self.work(log);

@@ -22,7 +22,7 @@ use cortex_m_rt::entry;
 use dibs_nostd::format::CRC;
 use dibs_nostd::wire::{AesCmac, Deframer, Mac, NoMac, encode_status, enframe, framed_bytes};
 use dibs_nostd::{
-    Advance, Assembler, FrameReader, FrameWriter, Frames, StretchMonitor, Tree, VertexTable,
+    Advance, Assembler, FrameReader, FrameWriter, Frames, Millis, StretchMonitor, Tree, VertexTable,
 };
 use exit::exit;
 use probe::bus::{HEAD_BYTES, KEY, MTU, RECEIVER, REPORT_MTU, VERTICES, WORK};
@@ -93,7 +93,7 @@ impl<'t, M: Mac> Receiver<'t, M> {
                 let now = self.now();
                 match self.deframer.push(byte) {
                     None => continue,
-                    Some(Ok(packet)) => drop(self.assembler.accept(packet, now)),
+                    Some(Ok(packet)) => drop(self.assembler.accept(packet, Millis(now))),
                     Some(Err(error)) => self.assembler.count_framing(&error),
                 }
                 has_work = true;
@@ -141,7 +141,7 @@ impl<'t, M: Mac> Receiver<'t, M> {
         for (place, word) in head.as_chunks_mut().0.iter_mut().zip(words) {
             *place = word.to_le_bytes();
         }
-        let status = self.assembler.status(self.now(), 0);
+        let status = self.assembler.status(Millis(self.now()), 0);
         let mut packet = [0; REPORT_MTU];
         let counters = self.assembler.counters();
         let packet =

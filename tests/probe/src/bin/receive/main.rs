@@ -20,7 +20,7 @@ use core::cell::RefCell;
 use cortex_m::interrupt::{self, Mutex};
 use cortex_m_rt::entry;
 use dibs_nostd::wire::{AesCmac, Mac, NoMac};
-use dibs_nostd::{Advance, Assembler, Frames, StretchMonitor, Tree};
+use dibs_nostd::{Advance, Assembler, Frames, Millis, StretchMonitor, Tree};
 use exit::exit;
 use probe::receive::{ANSWER_WORDS, KEY, TAGGED, TREE_BYTES, UNTAGGED, VERTICES};
 
@@ -100,7 +100,7 @@ fn frame<M: Mac>(
         let length = word(script)? as usize;
         script.read(buffer.get_mut(..length.next_multiple_of(4))?)?;
         let packet = buffer.get(..length)?;
-        accept.time(|| assembler.accept(packet, 0)).ok()?;
+        accept.time(|| assembler.accept(packet, Millis(0))).ok()?;
         if number < packets && number.checked_rem(every)? == 0 {
             check.time(|| assembler.advance(SLICE)).ok()?;
         }

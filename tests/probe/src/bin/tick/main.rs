@@ -16,6 +16,7 @@ mod files;
 use controller::surface::{self, continuous::Surface};
 use controller::{BusStatus, Control, Receiver, Trust};
 use cortex_m_rt::entry;
+use dibs_nostd::Ticks;
 use exit::exit;
 use probe::tick::{ANSWER_WORDS, BYTES, END, SKIP, TICK};
 
@@ -38,7 +39,7 @@ fn run(tree: &'static surface::Tree) -> Option<()> {
     let mut answers = files::Output::create()?;
     loop {
         match word(&mut script)? {
-            SKIP => control.skip(word(&mut script)?),
+            SKIP => control.skip(Ticks(word(&mut script)?.into())),
             BYTES => {
                 let count = word(&mut script)?;
                 for _ in 0..count {

@@ -21,7 +21,9 @@ use cortex_m::peripheral::{Peripherals, SYST};
 use cortex_m_rt::{entry, exception};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{FrameLabel, FrameWriter, Frames, Options, Query, Sphere, Tree, VertexTable};
+use dibs_nostd::{
+    FrameLabel, FrameWriter, Frames, Millis, Options, Query, Sphere, Tree, VertexTable,
+};
 use exit::exit;
 
 /// Vertices of the surface: an octahedron's, split three times.
@@ -72,8 +74,12 @@ impl Sender {
         self.next += SHARE;
         if self.next >= VERTICES {
             self.next = 0;
-            let label =
-                FrameLabel { epoch: self.epoch, received: 0, position_error: 0.0, stretch: None };
+            let label = FrameLabel {
+                epoch: self.epoch,
+                received: Millis(0),
+                position_error: 0.0,
+                stretch: None,
+            };
             let counter = if self.writer.publish(label).is_ok() { &PUBLISHED } else { &PUT_OFF };
             counter.fetch_add(1, Ordering::Relaxed);
         }
