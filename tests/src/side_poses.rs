@@ -5,12 +5,12 @@ use std::ops::AddAssign;
 
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Capsule, NoSide, Options, Query, Side, Sphere};
+use dibs_nostd::{Capsule, NoSide, Options, Proximity, Query, Side, Sphere};
 use fastrand::Rng;
 use glam::Vec3;
 
 use crate::deform::unit;
-use crate::oracle::{Instrument, exhaustive};
+use crate::oracle::{Instrument, OraclePair, exhaustive};
 use crate::sides;
 use crate::surfaces::{self, ball};
 
@@ -191,13 +191,35 @@ pub fn judge(surface: &Closed, seed: u64) -> Tally {
             tally.self_cut += 1;
         }
         tally.inside += usize::from(inside);
-        let signed = if inside { -pair.axis_distance } else { pair.axis_distance };
-        let truth = signed - f64::from(radius);
-        let off = (f64::from(found.separation) - truth).abs();
+        let off = off(&rows, &triangles, &tool, &pair, inside, &found);
         if inside != says || off > f64::from(found.accuracy) {
             tally.wrong += 1;
             println!("{}: {tool:?} inside: {inside}, off {off}, {found:?}", surface.name);
         }
     }
     tally
+}
+
+/// How far an answer's interval is from the true separation of a tool on a known side.
+fn off(
+    rows: &[Vec3],
+    triangles: &[[u32; 3]],
+    tool: &Instrument,
+    pair: &OraclePair,
+    inside: bool,
+    found: &Proximity,
+) -> f64 {
+    const POINTS: u32 = 16;
+    let signed = if inside { -pair.axis_distance } else { pair.axis_distance };
+    let high = signed - f64::from(tool.radius);
+    // An axis inside counts by its deepest point. Where the surface cuts itself, a point of the axis may have no depth.
+    let deepest = (inside && tool.start != tool.end)
+        .then(|| sides::deepest_separation(rows, triangles, tool, POINTS));
+    let (low, high) = match deepest {
+        Some(Some((low, deepest))) => (low, deepest.min(high)),
+        Some(None) => (f64::NEG_INFINITY, high),
+        None => (high, high),
+    };
+    let (lower, upper) = (f64::from(found.lower), f64::from(found.separation));
+    (lower - high).max(low - upper)
 }

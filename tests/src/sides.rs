@@ -105,23 +105,10 @@ fn along(a: DVec3, b: DVec3, point: DVec3) -> f64 {
     ((point - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0)
 }
 
-/// The signed separation of a tool whose axis does not cross a closed surface, given its unsigned closest pair.
+/// An interval that holds the signed separation of a tool whose axis crosses a closed surface or is inside, from the
+/// depths of `points + 1` points of the axis.
 #[must_use]
-pub fn separation(
-    positions: &[Vec3],
-    triangles: &[[u32; 3]],
-    tool: &Instrument,
-    pair: &OraclePair,
-) -> Option<f64> {
-    let inside = is_inside(positions, triangles, pair.on_axis)?;
-    let signed = if inside { -pair.axis_distance } else { pair.axis_distance };
-    Some(signed - f64::from(tool.radius))
-}
-
-/// An interval that holds the signed separation of a tool whose axis crosses a closed surface, from the depths of
-/// `points + 1` points of the axis.
-#[must_use]
-pub fn crossing_separation(
+pub fn deepest_separation(
     positions: &[Vec3],
     triangles: &[[u32; 3]],
     tool: &Instrument,
@@ -154,11 +141,16 @@ pub fn signed_separation(
 ) -> (f64, f64) {
     const POINTS: u32 = 8;
     let (distance, radius) = (pair.axis_distance, f64::from(tool.radius));
-    if distance > accuracy {
-        let found = separation(positions, triangles, tool, pair).map(|x| (x, x));
-        return found.unwrap_or((-distance - radius, distance - radius));
-    }
     let length = f64::from(tool.start.distance(tool.end));
-    let crossing = crossing_separation(positions, triangles, tool, POINTS);
-    (crossing.map_or(-radius - length, |(low, _)| low), -radius)
+    let most = -radius - distance - length;
+    let low = || deepest_separation(positions, triangles, tool, POINTS).map_or(most, |(low, _)| low);
+    if distance <= accuracy {
+        return (low(), -radius);
+    }
+    match is_inside(positions, triangles, pair.on_axis) {
+        Some(false) => (distance - radius, distance - radius),
+        Some(true) if length > 0.0 => (low(), -distance - radius),
+        Some(true) => (-distance - radius, -distance - radius),
+        None => (most, distance - radius),
+    }
 }

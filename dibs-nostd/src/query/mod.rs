@@ -166,27 +166,30 @@ fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
         found.accuracy += error;
         return Ok(found);
     }
-    if is_touching && tool.axis_length() > 0.0 {
-        let (known, around) = known.map(Known::now).unzip();
-        let mut depth = Depth::new(tree, stack, vertices, tool, options, &found, around);
-        let mut found = depth.run(touched, known)?;
-        found.accuracy += error;
-        return Ok(found);
+    let has_length = tool.axis_length() > 0.0;
+    if !(is_touching && has_length) {
+        let on_axis = tool.axis_point(found.axis_parameter);
+        let at = side::of_point(tree, vertices, &found, on_axis)?;
+        found.side = at.side;
+        if at.outward != Vec3::ZERO {
+            found.direction = at.outward;
+            found.point_on_tool = on_axis - at.outward * tool.radius();
+        }
+        if !(at.side == Side::Inside && has_length) {
+            if let Some(known) = known {
+                known.forget();
+            }
+            if at.side == Side::Inside {
+                found.separation = -found.axis_distance - tool.radius();
+                found.lower = found.separation;
+            }
+            found.accuracy += error;
+            return Ok(found);
+        }
     }
-    if let Some(known) = known {
-        known.forget();
-    }
-    let on_axis = tool.axis_point(found.axis_parameter);
-    let at = side::of_point(tree, vertices, &found, on_axis)?;
-    found.side = at.side;
-    if at.outward != Vec3::ZERO {
-        found.direction = at.outward;
-        found.point_on_tool = on_axis - at.outward * tool.radius();
-    }
-    if at.side == Side::Inside {
-        found.separation = -found.axis_distance - tool.radius();
-        found.lower = found.separation;
-    }
+    let (known, around) = known.map(Known::now).unzip();
+    let mut found =
+        Depth::new(tree, stack, vertices, tool, options, &found, around).run(touched, known)?;
     found.accuracy += error;
     Ok(found)
 }

@@ -48,7 +48,8 @@ fn the_answer_of_a_chain_is_that_of_its_tools_one_by_one() {
                 let least = each.iter().map(|one| one.separation).fold(f32::INFINITY, f32::min);
                 let lower = each.iter().map(|one| one.lower).fold(f32::INFINITY, f32::min);
                 let length = chain.iter().map(Tool::axis_length).fold(0.0, f32::max);
-                let tolerance = if found.side == Side::Crossing { length / 512.0 } else { 0.0 };
+                let is_deep = matches!(found.side, Side::Crossing | Side::Inside);
+                let tolerance = if is_deep { length / 512.0 } else { 0.0 };
                 let off = 2.0 * found.accuracy + tolerance;
                 assert!((found.separation - least).abs() <= off, "{found:?} {each:?}");
                 assert!((each[number].separation - least).abs() <= off, "{number} {each:?}");

@@ -48,7 +48,7 @@ fn depths_are_those_of_dense_sampling() {
     const POINTS: u32 = 120;
     let surfaces = closed();
     let count = poses() / 60;
-    let (mut crossing, mut wide, mut cut, mut searches) = (0, 0, 0, 0_u64);
+    let (mut crossing, mut inside, mut wide, mut cut, mut searches) = (0, 0, 0, 0, 0_u64);
     for (seed, surface) in (1..).zip(surfaces.iter().filter(|s| s.mesh.triangles.len() < 1_000)) {
         let mut rng = Rng::with_seed(seed);
         let tree = surface.built.tree::<u16>().expect("valid");
@@ -63,10 +63,10 @@ fn depths_are_those_of_dense_sampling() {
             let tool = Instrument::capsule(at, far, radius);
             let found = query.closest(rows.as_slice(), &capsule, &Options::cold());
             let found = found.expect("an answer");
-            if found.side != Side::Crossing {
+            if !matches!(found.side, Side::Crossing | Side::Inside) {
                 continue;
             }
-            let truth = sides::crossing_separation(&rows, &triangles, &tool, POINTS);
+            let truth = sides::deepest_separation(&rows, &triangles, &tool, POINTS);
             let Some((low, high)) = truth else { continue };
             let accuracy = f64::from(found.accuracy);
             let (lower, upper) = (f64::from(found.lower), f64::from(found.separation));
@@ -76,7 +76,11 @@ fn depths_are_those_of_dense_sampling() {
                 continue;
             }
             assert!(holds, "{}: {tool:?} {found:?} {low} {high}", surface.name);
-            crossing += 1;
+            if found.side == Side::Inside {
+                inside += 1;
+            } else {
+                crossing += 1;
+            }
             // The side alone costs the closest pair, and leaves the depth between two ends.
             let [side, plain] =
                 [Options::cold().depth_tolerance(f32::INFINITY), Options::cold().unsigned()].map(
@@ -85,7 +89,7 @@ fn depths_are_those_of_dense_sampling() {
                     },
                 );
             let touches = Side::Undefined(NoSide::BelowAccuracy);
-            assert!(side.side == Side::Crossing || side.side == touches, "{side:?}");
+            assert!(side.side == found.side || side.side == touches, "{side:?}");
             assert_eq!(
                 (side.node_tests, side.triangle_tests),
                 (plain.node_tests, plain.triangle_tests)
@@ -107,10 +111,11 @@ fn depths_are_those_of_dense_sampling() {
         }
     }
     println!(
-        "{crossing} axes cross, {wide} depths wider than the tolerance, {cut} along a surface that cuts itself, \
+        "{crossing} axes cross, {inside} are inside, {wide} depths wider than the tolerance, {cut} along a surface that cuts itself, \
          {} node tests in the mean",
-        searches / crossing.max(1)
+        searches / (crossing + inside).max(1)
     );
+    assert!(inside as usize > count / 100);
     assert!(crossing as usize > count / 10 && wide * 50 < crossing as usize);
 }
 

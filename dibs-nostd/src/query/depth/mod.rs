@@ -1,4 +1,4 @@
-//! The depth of a capsule's axis below the surface that it crosses.
+//! The depth of a capsule's axis that crosses the surface or is inside: the largest of any of its points.
 //!
 //! The depth along the axis, positive inside and negative outside, changes by at most the length moved, and is at most
 //! the distance to any one triangle of the surface. That distance is convex along the axis, so the triangles closest to
@@ -62,8 +62,10 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
     tool: &'s T,
     /// With the rest of the query's budget.
     options: Options,
-    /// The pair in which the axis meets the surface.
-    meeting: &'s Proximity,
+    /// The closest pair, in which a crossing axis meets the surface.
+    closest: &'s Proximity,
+    /// The whole axis is inside.
+    is_inside: bool,
     /// The places where the axis meets the surface.
     touches: Touches,
     /// The deepest point so far.
@@ -78,32 +80,35 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> {
-    /// A search for a tool whose axis meets the surface in the pair `meeting`.
+    /// A search for a tool whose axis meets the surface in the pair `closest`, or is inside by that pair's side.
     pub fn new(
         tree: &'s Tree<'t, I>,
         stack: &'s mut [Waiting],
         vertices: &'s V,
         tool: &'s T,
         options: &Options,
-        meeting: &'s Proximity,
+        closest: &'s Proximity,
         around: Option<&'s mut Around>,
     ) -> Self {
         let mut options = *options;
         options.stretch = options.stretch.or_else(|| vertices.stretch());
         let Budget { node_tests, triangle_tests } = &mut options.budget;
         let most = tree.header().nodes.max(LEAST_WORK);
-        *node_tests = node_tests.saturating_sub(meeting.node_tests).min(most);
-        *triangle_tests = triangle_tests.saturating_sub(meeting.triangle_tests);
-        let (deepest, deepest_at) = (0.0, f32::NAN);
+        *node_tests = node_tests.saturating_sub(closest.node_tests).min(most);
+        *triangle_tests = triangle_tests.saturating_sub(closest.triangle_tests);
+        let is_inside = closest.side == Side::Inside;
+        let (deepest, deepest_at) =
+            if is_inside { (closest.axis_distance, closest.axis_parameter) } else { (0.0, f32::NAN) };
         Self {
             tree,
             stack,
             vertices,
             tool,
             options,
-            meeting,
+            closest,
+            is_inside,
             touches: Touches::ANYWHERE,
-            answer: *meeting,
+            answer: *closest,
             deepest,
             deepest_at,
             looks: 0,
@@ -118,11 +123,11 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         touched: &Touched,
         known: Option<&mut Points>,
     ) -> Result<Proximity, QueryError> {
-        let least = LEAST_TOLERANCE * self.meeting.accuracy;
+        let least = LEAST_TOLERANCE * self.closest.accuracy;
         let default = larger(self.tool.axis_length() * TOLERANCE, least);
         let tolerance = self.options.depth_tolerance.unwrap_or(default);
         let reach = self.reach();
-        if reach <= tolerance {
+        if reach <= self.deepest + tolerance {
             if let Some(known) = known {
                 known.forget();
             }
@@ -147,11 +152,11 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         self.finish(bound)
     }
 
-    /// The most that any point of the axis can be deep, by its distance from the point that meets the surface.
+    /// The most that any point of the axis can be deep, by its distance from the closest point.
     fn reach(&self) -> f32 {
-        let (length, meeting) = (self.tool.axis_length(), self.meeting);
-        let along = meeting.axis_parameter * length;
-        larger(along, length - along) + meeting.axis_distance + meeting.accuracy
+        let (length, closest) = (self.tool.axis_length(), self.closest);
+        let along = closest.axis_parameter * length;
+        larger(along, length - along) + closest.axis_distance + closest.accuracy
     }
 
     /// Looks at the last tick's deepest point, then divides the part with the highest bound until none is above the
@@ -343,15 +348,18 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
 
     /// The answer, where no point of the axis is deeper than `bound`.
     fn finish(&self, bound: f32) -> Result<Proximity, QueryError> {
-        let Self { mut answer, meeting, .. } = *self;
-        if self.deepest <= 0.0 {
-            let on_axis = self.tool.axis_point(meeting.axis_parameter);
-            let at = side::of_point(self.tree, self.vertices, meeting, on_axis)?;
-            answer.direction = at.outward;
-            answer.point_on_tool = on_axis - at.outward * self.tool.radius();
+        let Self { mut answer, closest, is_inside, .. } = *self;
+        if !is_inside {
+            if self.deepest <= 0.0 {
+                let on_axis = self.tool.axis_point(closest.axis_parameter);
+                let at = side::of_point(self.tree, self.vertices, closest, on_axis)?;
+                answer.direction = at.outward;
+                answer.point_on_tool = on_axis - at.outward * self.tool.radius();
+            }
+            let crosses = closest.axis_distance <= 0.0 || self.deepest > answer.accuracy;
+            answer.side =
+                if crosses { Side::Crossing } else { Side::Undefined(NoSide::BelowAccuracy) };
         }
-        let crosses = meeting.axis_distance <= 0.0 || self.deepest > answer.accuracy;
-        answer.side = if crosses { Side::Crossing } else { Side::Undefined(NoSide::BelowAccuracy) };
         let most = if bound > self.deepest { bound } else { self.deepest };
         answer.separation = -self.tool.radius() - self.deepest;
         answer.lower = -self.tool.radius() - most;

@@ -13,9 +13,13 @@ use crate::{Index, TriangleRow, VertexTable};
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
     /// Finds the places where the axis meets the triangles that a search found to touch it.
     pub(super) fn find_touches(&mut self, touched: &Touched) -> Result<(), QueryError> {
+        if self.is_inside {
+            self.touches = Touches::NONE;
+            return Ok(());
+        }
         let Some(rows) = touched.rows() else { return Ok(()) };
         // A tracker's accuracy is larger than a search's, for which the closest triangle may be no touched one.
-        let closest = self.meeting.triangle.filter(|_| rows.is_empty());
+        let closest = self.closest.triangle.filter(|_| rows.is_empty());
         self.touches = Touches::NONE;
         for row in rows.iter().copied().chain(closest.map(|TriangleRow(row)| row)) {
             if self.is_spent() {
@@ -25,7 +29,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
             let corners = self.corners(corners)?;
             if let Some(pair) = self.tool.closest_on_triangle(&corners, f32::INFINITY) {
-                let accuracy = self.meeting.accuracy;
+                let accuracy = self.closest.accuracy;
                 let touches = &mut self.touches;
                 let distances = touches.add(self.tool, TriangleRow(row), &corners, &pair, accuracy);
                 self.spend((1 + distances) * DISTANCE_COST);
@@ -41,12 +45,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         reach: f32,
         tolerance: f32,
     ) -> Result<(), QueryError> {
-        let meeting = self.meeting;
-        let depth = meeting.axis_distance + meeting.accuracy;
-        let &Proximity { axis_parameter, triangle, corners, .. } = meeting;
-        let crossing = self.sample(axis_parameter, depth, triangle, corners)?;
-        let start = self.end(0.0, &crossing, tolerance)?;
-        let end = self.end(1.0, &crossing, tolerance)?;
+        let &Proximity { axis_parameter, axis_distance, accuracy, triangle, corners, .. } =
+            self.closest;
+        let depth = axis_distance + accuracy;
+        let closest = self.sample(axis_parameter, depth, triangle, corners)?;
+        let start = self.end(0.0, &closest, tolerance)?;
+        let end = self.end(1.0, &closest, tolerance)?;
         parts.push(Part::remembered(start, 1, reach));
         for place in self.touches.places() {
             let row = place.triangle.0;
@@ -54,16 +58,25 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             let touch = self.sample(place.parameter, depth, Some(place.triangle), corners)?;
             parts.push(Part::remembered(touch, parts.count() + 1, reach));
         }
-        if parts.count() < 2 {
-            parts.push(Part::remembered(crossing, 2, reach));
+        let is_end = self.is_searched(0.0) || self.is_searched(1.0);
+        if parts.count() < 2 && !is_end {
+            parts.push(Part::remembered(closest, 2, reach));
         }
         parts.push(Part::remembered(end, 0, 0.0));
         parts.end();
         Ok(())
     }
 
-    /// The sample of an end of the axis; not searched if it is outside for certain.
+    /// The point is that of the closest pair of an axis inside, which as a rule is one of its ends.
+    fn is_searched(&self, parameter: f32) -> bool {
+        self.is_inside && self.closest.axis_parameter == parameter
+    }
+
+    /// The sample of an end of the axis; not searched if it is known, or outside for certain.
     fn end(&mut self, parameter: f32, near: &Sample, tolerance: f32) -> Result<Sample, QueryError> {
+        if self.is_searched(parameter) {
+            return Ok(*near);
+        }
         let along = parameter * self.tool.axis_length();
         let (ahead, behind) = (self.touches.ahead(along), self.touches.behind(along));
         let way = if parameter > 0.0 { behind } else { ahead };
