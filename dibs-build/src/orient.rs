@@ -233,7 +233,7 @@ impl Edges {
 }
 
 /// The volume that triangles enclose, negative if they face inwards. Computed relative to one of their vertices.
-fn volume(mesh: &Mesh, triangles: impl IntoIterator<Item = usize>) -> f64 {
+pub(crate) fn volume(mesh: &Mesh, triangles: impl IntoIterator<Item = usize>) -> f64 {
     let origin = mesh.positions.first().copied().unwrap_or_default().as_dvec3();
     let of = |triangle: usize| {
         let [a, b, c] =
@@ -244,7 +244,7 @@ fn volume(mesh: &Mesh, triangles: impl IntoIterator<Item = usize>) -> f64 {
 }
 
 /// Whether a closed part of a surface winds around a point: by the solid angle of its triangles.
-fn winds(mesh: &Mesh, part: &[usize], point: DVec3) -> bool {
+pub(crate) fn winds(mesh: &Mesh, part: &[usize], point: DVec3) -> bool {
     let solid_angle = |&triangle: &usize| {
         let [a, b, c] =
             mesh.triangles[triangle].map(|v| mesh.positions[v as usize].as_dvec3() - point);

@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::adjacency::adjacency;
 use super::metric::{metric, with_lowest_bit};
 use super::sections::{put_word, write};
+use super::solids::solids;
 use crate::Mesh;
 use crate::construct::{Cluster, Content};
 use crate::error::BuildError;
@@ -145,7 +146,11 @@ pub(crate) fn flatten<I: Index>(
     if facts.with_adjacency
         && let Some(neighbours) = adjacency::<I>(&flat.triangles)
     {
+        let counts = roots.iter().map(Cluster::triangles);
+        let solids = (roots.len() > 1)
+            .then(|| solids::<I>(mesh, counts, &flat.triangles, &neighbours));
         sections.push((section::ADJACENCY, neighbours));
+        sections.extend(solids.map(|solids| (section::SOLIDS, solids)));
     }
     if has_origin {
         sections.push((section::ORIGIN, origin));

@@ -8,6 +8,7 @@ mod metric;
 mod modal;
 mod module;
 mod sections;
+mod solids;
 
 pub use emit::{BuiltTree, ModesSummary, Summary, summarise};
 pub(crate) use flatten::{Facts, flatten};

@@ -14,7 +14,9 @@ mod options;
 mod plane;
 mod proximity;
 mod search;
+mod separation;
 mod side;
+mod solids;
 mod swept;
 mod tracker;
 
@@ -27,11 +29,9 @@ pub use side::{NoSide, Side};
 pub use swept::{Sweep, Swept};
 pub use tracker::{Fallback, Tracked, Tracker};
 
-use glam::Vec3;
-
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
-use depth::{Depth, Known};
+use separation::signed;
 use search::{Search, Touched, WHOLE, Waiting, WideSearch};
 
 /// A query on one tree, with the fixed stack that its traversal needs: 8 bytes an entry.
@@ -134,62 +134,4 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         self.triangle = found.triangle.or(self.triangle);
         signed(&self.tree, &mut self.stack, vertices, tool, options, found, (&self.touched, None))
     }
-}
-
-/// Adds the side, and the signed separation that follows from it. Both take the table's positions as exact; their
-/// position error is added to the accuracy last. `touched` are the triangles that the
-/// axis may meet, `known` a tracker's memory of the last tick's depth.
-#[inline(never)]
-fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
-    tree: &Tree<'_, I>,
-    stack: &mut [Waiting],
-    vertices: &V,
-    tool: &T,
-    options: &Options,
-    mut found: Proximity,
-    (touched, known): (&Touched, Option<&mut Known>),
-) -> Result<Proximity, QueryError> {
-    let error = vertices.position_error();
-    // No triangle is closer than one that is touched, so its side is certain without the rest of the budget.
-    let is_touching = found.triangle.is_some() && found.axis_distance <= found.accuracy;
-    let reason = if !options.is_signed {
-        Some(NoSide::NotAsked)
-    } else if !tree.has_adjacency() {
-        Some(NoSide::NoAdjacency)
-    } else if found.is_cut_short() && !is_touching {
-        Some(NoSide::CutShort)
-    } else {
-        None
-    };
-    if let Some(reason) = reason {
-        found.side = Side::Undefined(reason);
-        found.accuracy += error;
-        return Ok(found);
-    }
-    let has_length = tool.axis_length() > 0.0;
-    if !(is_touching && has_length) {
-        let on_axis = tool.axis_point(found.axis_parameter);
-        let at = side::of_point(tree, vertices, &found, on_axis)?;
-        found.side = at.side;
-        if at.outward != Vec3::ZERO {
-            found.direction = at.outward;
-            found.point_on_tool = on_axis - at.outward * tool.radius();
-        }
-        if !(at.side == Side::Inside && has_length) {
-            if let Some(known) = known {
-                known.forget();
-            }
-            if at.side == Side::Inside {
-                found.separation = -found.axis_distance - tool.radius();
-                found.lower = found.separation;
-            }
-            found.accuracy += error;
-            return Ok(found);
-        }
-    }
-    let (known, around) = known.map(Known::now).unzip();
-    let mut found =
-        Depth::new(tree, stack, vertices, tool, options, &found, around).run(touched, known)?;
-    found.accuracy += error;
-    Ok(found)
 }

@@ -27,6 +27,7 @@ use super::plane::Plane;
 use super::{Budget, Options};
 use crate::math::sqrt::sqrt;
 use crate::tool::{AxisPair, Tool};
+use crate::tree::RootSet;
 use crate::tree::format::Link;
 use crate::unavailable::QueryError;
 use crate::{Index, MeasuredStretch, Proximity, Tree, TriangleRow, VertexTable};
@@ -109,6 +110,22 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         tool: &'s T,
         options: &Options,
         first: Option<TriangleRow>,
+        touched: Option<&'s mut Touched>,
+    ) -> Result<Self, QueryError> {
+        Self::start_in(RootSet::ALL, tree, stack, vertices, tool, options, first, touched)
+    }
+
+    /// A search below some roots; the triangle `first` must be below one of them.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    pub fn start_in(
+        roots: RootSet,
+        tree: &'s Tree<'t, I>,
+        stack: &'s mut [Waiting],
+        vertices: &'s V,
+        tool: &'s T,
+        options: &Options,
+        first: Option<TriangleRow>,
         mut touched: Option<&'s mut Touched>,
     ) -> Result<Self, QueryError> {
         let header = tree.header();
@@ -135,7 +152,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             (None, Some(measured)) => sigma(&measured)?,
             (None, None) => header.stretch,
         };
-        let root = tree.record(0).ok_or(QueryError::Corrupt { row: 0 })?;
+        let row = roots.first();
+        let root = tree.record(row).ok_or(QueryError::Corrupt { row })?;
         let radius_scale = header.radius_unit * stretch;
         let radius = root.radius_code as f32 * radius_scale;
         let pin = vertices.position(root.pin).ok_or(QueryError::Corrupt { row: root.pin })?;
@@ -147,7 +165,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             nearest: NearestPin { row: root.pin, distance },
         };
         if header.other_roots > 0 {
-            all = all.with_others(tree, stack, vertices, tool, radius_scale)?;
+            all = all.with_others(tree, stack, vertices, tool, radius_scale, roots)?;
         }
         let scale = all.reach + 2.0 * tool.axis_length() + tool.radius();
         let coordinates = 2.0 * all.coordinate + scale;

@@ -18,6 +18,7 @@ mod index;
 mod row;
 mod scrub;
 pub(crate) mod sections;
+mod shells;
 mod stored;
 mod unit;
 mod validate;
@@ -27,6 +28,7 @@ pub use format::PathKind;
 pub use index::Index;
 pub use row::{TriangleRow, VertexNumber};
 pub use scrub::{CorruptTreeError, Scrub};
+pub(crate) use shells::RootSet;
 pub use stored::TreeBytes;
 pub use unit::Unit;
 
@@ -73,6 +75,7 @@ impl<'a, I: Index> Tree<'a, I> {
         if tri!(adjacency::check(&tree)) {
             tree.closed = header.checksum;
         }
+        tri!(shells::check(&tree));
         Ok(tree)
     }
 

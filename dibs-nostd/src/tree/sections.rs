@@ -4,7 +4,7 @@
 
 use crate::tree::format::{
     self, HEADER_BYTES, LIMIT_BYTES, METRIC_BYTES, ORIGIN_BYTES, SECTION_ALIGN, SECTION_BYTES,
-    node_bytes, section, triangle_bytes,
+    SOLID_BYTES, node_bytes, section, triangle_bytes,
 };
 use crate::tree::header::Header;
 use crate::tree::{FormatError, Index};
@@ -22,6 +22,7 @@ pub(crate) struct Sections<'a> {
     pub adjacency: &'a [u8],
     pub origin: &'a [u8],
     pub labels: &'a [u8],
+    pub solids: &'a [u8],
 }
 
 /// A section's length, and whether it is required.
@@ -43,11 +44,11 @@ impl Rule {
     }
 }
 
-const COUNT: usize = 10;
+const COUNT: usize = 11;
 
 /// In the order of [`Sections`]' fields.
 const fn rules<I: Index>(header: &Header) -> [Rule; COUNT] {
-    let Header { vertices, triangles, nodes, origin, .. } = *header;
+    let Header { vertices, triangles, nodes, origin, other_roots, .. } = *header;
     [
         Rule::required(section::NODES, nodes, node_bytes::<I>()),
         Rule::required(section::TRIANGLES, triangles, triangle_bytes::<I>()),
@@ -61,6 +62,8 @@ const fn rules<I: Index>(header: &Header) -> [Rule; COUNT] {
         // Where the header has none, the section must be absent or empty.
         Rule { required: origin == 1, ..Rule::optional(section::ORIGIN, origin, ORIGIN_BYTES) },
         Rule::optional(section::LABELS, triangles, 1),
+        // `shells::check` checks it.
+        Rule::optional(section::SOLIDS, other_roots.saturating_add(1), SOLID_BYTES),
     ]
 }
 
@@ -121,8 +124,21 @@ pub(crate) const fn find<'a, I: Index>(
         }
         slot += 1;
     }
-    let [nodes, triangles, order, rest, metric, limits, modes, adjacency, origin, labels] = parts;
-    Ok(Sections { nodes, triangles, order, rest, metric, limits, modes, adjacency, origin, labels })
+    let [nodes, triangles, order, rest, metric, limits, modes, adjacency, origin, labels, solids] =
+        parts;
+    Ok(Sections {
+        nodes,
+        triangles,
+        order,
+        rest,
+        metric,
+        limits,
+        modes,
+        adjacency,
+        origin,
+        labels,
+        solids,
+    })
 }
 
 impl<'a> Sections<'a> {
@@ -139,8 +155,9 @@ impl<'a> Sections<'a> {
             adjacency,
             origin,
             labels,
+            solids,
         } = *self;
-        [nodes, triangles, order, rest, metric, limits, modes, adjacency, origin, labels]
+        [nodes, triangles, order, rest, metric, limits, modes, adjacency, origin, labels, solids]
     }
 
     /// Checks that each section is still at its place in the bytes.

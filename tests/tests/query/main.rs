@@ -15,6 +15,7 @@ mod roots;
 mod shown_budgets;
 mod side;
 mod slack;
+mod solids;
 mod swept;
 mod tracked_chain;
 mod tracked_contacts;

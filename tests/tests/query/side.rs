@@ -54,10 +54,11 @@ fn depths_are_those_of_dense_sampling() {
         let tree = surface.built.tree::<u16>().expect("valid");
         let triangles = surfaces::triangles(&tree);
         let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
-        for _ in 0..count / 4 {
+        for _ in 0..count {
             let rows = surface.built.to_rows(&bent(&surface.mesh, &mut rng));
             let at = point(&rows, &triangles, &mut rng);
-            let far = at + unit(&mut rng) * 60.0 * rng.f32();
+            let most = if rng.bool() { 60.0 } else { 5.0 };
+            let far = at + unit(&mut rng) * most * rng.f32();
             let radius = 2.0 * rng.f32();
             let capsule = Capsule::new(at, far, radius).expect("valid");
             let tool = Instrument::capsule(at, far, radius);
@@ -100,7 +101,7 @@ fn depths_are_those_of_dense_sampling() {
             // The stated depth is the depth of the stated point.
             let deepest = capsule.axis_point(found.axis_parameter);
             let depth = sides::depth(&rows, &triangles, deepest).expect("a clear side");
-            let stated = -upper - f64::from(radius);
+            let stated = -f64::from(found.separation) - f64::from(radius);
             let off = (depth.max(0.0) - stated).abs();
             assert!(stated == 0.0 || off <= accuracy, "{}: off {off} {found:?}", surface.name);
             let tolerance = (capsule.axis_length() / 512.0).max(32.0 * found.accuracy);
@@ -115,7 +116,7 @@ fn depths_are_those_of_dense_sampling() {
          {} node tests in the mean",
         searches / (crossing + inside).max(1)
     );
-    assert!(inside as usize > count / 100);
+    assert!(inside as usize > count / 6);
     assert!(crossing as usize > count / 10 && wide * 50 < crossing as usize);
 }
 

@@ -7,6 +7,7 @@ use super::part::{Part, Parts};
 use crate::TriangleRow;
 use crate::query::search::Around;
 use crate::surface::motion::Unit;
+use crate::tree::RootSet;
 
 /// Most points remembered, so that the next search has room for more.
 const KEPT: usize = 20;
@@ -29,6 +30,8 @@ pub(super) struct Point {
 pub(in crate::query) struct Known {
     points: Points,
     around: Around,
+    /// Roots of the shells that decided.
+    roots: RootSet,
     unit: Unit,
     /// Motion of tool and surface since then, in units.
     moved: u32,
@@ -47,7 +50,7 @@ impl Known {
     pub const fn new(unit: Unit) -> Self {
         let none = Point { parameter: 0.0, depth: 0.0, bound: 0.0, triangle: TriangleRow(0) };
         let points = Points { points: [none; KEPT], count: 0, deepest: f32::NAN };
-        Self { points, around: Around::new(), unit, moved: 0 }
+        Self { points, around: Around::new(), roots: RootSet::ALL, unit, moved: 0 }
     }
 
     pub fn forget(&mut self) {
@@ -61,8 +64,12 @@ impl Known {
         self.moved = self.moved.saturating_add(units).min(i32::MAX as u32);
     }
 
-    /// The points with their bounds as of now, and the leaves around the deepest one.
-    pub fn now(&mut self) -> (&mut Points, &mut Around) {
+    /// The points with their bounds as of now, and the leaves around the deepest one, if the same shells decide.
+    pub fn now(&mut self, roots: RootSet) -> (&mut Points, &mut Around) {
+        if self.roots != roots {
+            self.forget();
+            self.roots = roots;
+        }
         if self.moved > 0 {
             let moved = self.unit.length(self.moved as i32) * (1.0 + 4.0 * f32::EPSILON);
             for point in &mut self.points.points {
@@ -123,7 +130,7 @@ mod tests {
             known.forget();
         }
         known.add_motion(1 << 31);
-        let (points, _) = known.now();
+        let (points, _) = known.now(RootSet::ALL);
         assert!(points.below(f32::INFINITY).is_none());
     }
 }

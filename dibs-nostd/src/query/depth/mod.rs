@@ -26,6 +26,7 @@ use super::search::{Around, Search, Touched, UNTIL, Waiting};
 use super::side::{self, NoSide, Side};
 use super::{Budget, Options, Proximity};
 use crate::tool::{AxisPoint, Tool};
+use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, Tree, TriangleRow, VertexTable};
 pub(super) use known::{Known, Points};
@@ -77,10 +78,14 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
     looks: u32,
     /// The leaves around the deepest point of the last tick.
     around: Option<&'s mut Around>,
+    /// Roots of the shells that decide.
+    roots: RootSet,
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> {
-    /// A search for a tool whose axis meets the surface in the pair `closest`, or is inside by that pair's side.
+    /// A search for a tool whose axis meets the surface in the pair `closest`, or is inside by that pair's side, below
+    /// some roots.
+    #[allow(clippy::too_many_arguments)]
     pub fn new(
         tree: &'s Tree<'t, I>,
         stack: &'s mut [Waiting],
@@ -89,6 +94,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         options: &Options,
         closest: &'s Proximity,
         around: Option<&'s mut Around>,
+        roots: RootSet,
     ) -> Self {
         let mut options = *options;
         options.stretch = options.stretch.or_else(|| vertices.stretch());
@@ -113,6 +119,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             deepest_at,
             looks: 0,
             around,
+            roots,
         }
     }
 
@@ -268,7 +275,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         let options = self.options.budget(Budget { node_tests, triangle_tests });
         let (point, first) = (AxisPoint(on_axis), sample.triangle);
         let search =
-            Search::start(self.tree, self.stack, self.vertices, &point, &options, first, None)?;
+            Search::start_in(self.roots, self.tree, self.stack, self.vertices, &point, &options, first, None)?;
         // A bound that is just low enough would not be so at the next tick.
         let enough = if self.around.is_some() { EXACT } else { enough };
         let length = self.tool.axis_length();

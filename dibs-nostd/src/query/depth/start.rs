@@ -7,6 +7,7 @@ use super::{DISTANCE_COST, Depth};
 use crate::query::Proximity;
 use crate::query::search::Touched;
 use crate::tool::Tool;
+use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, TriangleRow, VertexTable};
 
@@ -22,6 +23,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         let closest = self.closest.triangle.filter(|_| rows.is_empty());
         self.touches = Touches::NONE;
         for row in rows.iter().copied().chain(closest.map(|TriangleRow(row)| row)) {
+            if self.roots != RootSet::ALL && !self.roots.contains(self.tree.root_of(row)) {
+                continue;
+            }
             if self.is_spent() {
                 self.touches = Touches::ANYWHERE;
                 break;

@@ -6,6 +6,7 @@
 use super::{NearestPin, Waiting};
 use crate::math::sqrt::sqrt;
 use crate::tool::Tool;
+use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, Tree, VertexTable};
 
@@ -21,7 +22,7 @@ pub(super) struct Roots {
 }
 
 impl Roots {
-    /// Adds the other roots to the first, and pushes them, nearest on top.
+    /// Adds the other roots of a set to its first, and pushes them, nearest on top.
     #[cold]
     #[inline(never)]
     pub fn with_others<I: Index, V: VertexTable + ?Sized, T: Tool>(
@@ -31,8 +32,10 @@ impl Roots {
         vertices: &V,
         tool: &T,
         radius_scale: f32,
+        roots: RootSet,
     ) -> Result<Self, QueryError> {
-        for row in 1..=tree.header().other_roots {
+        let others = roots.first().saturating_add(1)..=tree.header().other_roots;
+        for row in others.filter(|&row| roots.contains(row)) {
             let root = tree.record(row).ok_or(QueryError::Corrupt { row })?;
             let pin = vertices.position(root.pin).ok_or(QueryError::Corrupt { row: root.pin })?;
             let distance = sqrt(tool.axis_distance_squared(pin));

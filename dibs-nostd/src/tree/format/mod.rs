@@ -48,6 +48,10 @@ pub const MAX_LIMIT_CODE: u32 = 0xFFFF;
 #[doc(hidden)]
 pub const ORIGIN_BYTES: usize = 24;
 
+/// Bytes of one row of the solids section: a root's first triangle, and the root of its solid's outer shell.
+#[doc(hidden)]
+pub const SOLID_BYTES: usize = 8;
+
 /// Byte offsets of the header's fields. Numbers are little-endian, of four bytes unless stated otherwise.
 #[doc(hidden)]
 pub mod field {
@@ -129,7 +133,7 @@ pub mod section {
     pub const LABELS: u32 = 10;
     /// Reserved: coarse nodes that carry the vertices, of an embedded surface.
     pub const COARSE_NODES: u32 = 11;
-    /// Reserved: the solids that roots bound, their shells and cavities.
+    /// The first triangle and the solid of every root (of a tree with several roots and adjacency).
     pub const SOLIDS: u32 = 12;
     /// The bit of kinds that a reader skips where it does not know them.
     pub const SKIPPABLE: u32 = 1 << 31;

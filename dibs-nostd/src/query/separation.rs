@@ -1,0 +1,94 @@
+//! The signed separation: the least signed distance of any point of the tool's axis, less the radius.
+//!
+//! The signed distance of a point is negative inside. It changes by at most the motion of point and surface, and so does
+//! the least of an axis. Where the axis is outside, the closest pair has it; where it crosses or is inside, the deepest point.
+
+use glam::Vec3;
+
+use super::depth::{Depth, Known};
+use super::search::{Touched, Waiting};
+use super::side::{self, NoSide, Side};
+use super::{Options, Proximity, solids};
+use crate::tree::RootSet;
+use crate::unavailable::QueryError;
+use crate::{Index, Tool, Tree, VertexTable};
+
+/// A query's arguments.
+pub(super) struct Asked<'a, 't, I, V: ?Sized, T> {
+    pub tree: &'a Tree<'t, I>,
+    pub vertices: &'a V,
+    pub tool: &'a T,
+    pub options: &'a Options,
+}
+
+/// Adds the side, and the signed separation that follows from it. Both take the table's positions as exact; their
+/// position error is added to the accuracy last. `touched` are the triangles that the
+/// axis may meet, `known` a tracker's memory of the last tick's depth.
+#[inline(never)]
+pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
+    tree: &Tree<'_, I>,
+    stack: &mut [Waiting],
+    vertices: &V,
+    tool: &T,
+    options: &Options,
+    mut found: Proximity,
+    memory: (&Touched, Option<&mut Known>),
+) -> Result<Proximity, QueryError> {
+    let asked = Asked { tree, vertices, tool, options };
+    let mut found = if !options.is_signed {
+        found.side = Side::Undefined(NoSide::NotAsked);
+        found
+    } else if !tree.has_adjacency() {
+        found.side = Side::Undefined(NoSide::NoAdjacency);
+        found
+    } else if tree.header().other_roots > 0 {
+        solids::signed(&asked, stack, &found, memory)?
+    } else {
+        asked.signed(stack, found, memory, RootSet::ALL)?
+    };
+    found.accuracy += vertices.position_error();
+    Ok(found)
+}
+
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
+    /// The signed answer by the shells of some roots, of which `found` is the closest pair.
+    #[inline(always)]
+    pub fn signed(
+        &self,
+        stack: &mut [Waiting],
+        mut found: Proximity,
+        (touched, known): (&Touched, Option<&mut Known>),
+        roots: RootSet,
+    ) -> Result<Proximity, QueryError> {
+        let &Self { tree, vertices, tool, options } = self;
+        // No triangle is closer than one that is touched, so its side is certain without the rest of the budget.
+        let is_touching = found.triangle.is_some() && found.axis_distance <= found.accuracy;
+        if found.is_cut_short() && !is_touching {
+            found.side = Side::Undefined(NoSide::CutShort);
+            return Ok(found);
+        }
+        let has_length = tool.axis_length() > 0.0;
+        if !(is_touching && has_length) {
+            let on_axis = tool.axis_point(found.axis_parameter);
+            let at = side::of_point(tree, vertices, &found, on_axis)?;
+            found.side = at.side;
+            if at.outward != Vec3::ZERO {
+                found.direction = at.outward;
+                found.point_on_tool = on_axis - at.outward * tool.radius();
+            }
+            if !(at.side == Side::Inside && has_length) {
+                if let Some(known) = known {
+                    known.forget();
+                }
+                if at.side == Side::Inside {
+                    found.separation = -found.axis_distance - tool.radius();
+                    found.lower = found.separation;
+                }
+                return Ok(found);
+            }
+        }
+        let (known, around) = known.map(|known| known.now(roots)).unzip();
+        let mut depth = Depth::new(tree, stack, vertices, tool, options, &found, around, roots);
+        depth.run(touched, known)
+    }
+}

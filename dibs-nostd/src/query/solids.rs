@@ -1,0 +1,100 @@
+//! The signed separation from several solids: the least from any of them.
+//!
+//! Each solid has a sign of its own, by its own closest sheet: where solids overlap, or one holds another, the closest
+//! sheet of all decides nothing. The least of their separations changes by no more than tool and surface move, as each
+//! of them does.
+
+use super::search::{Search, Touched, WHOLE, Waiting};
+use super::separation::Asked;
+use super::side::{NoSide, Side};
+use super::{Proximity, depth};
+use crate::math::sqrt::sqrt;
+use crate::tree::RootSet;
+use crate::unavailable::QueryError;
+use crate::{Index, Tool, VertexTable};
+
+/// The signed answer, where `closest` is the closest pair of all shells.
+#[cold]
+#[inline(never)]
+pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
+    asked: &Asked<'_, '_, I, V, T>,
+    stack: &mut [Waiting],
+    closest: &Proximity,
+    memory: (&Touched, Option<&mut depth::Known>),
+) -> Result<Proximity, QueryError> {
+    let &Asked { tree, vertices, tool, options } = asked;
+    let root = closest.triangle.map_or(0, |row| tree.root_of(row.0));
+    let nearest = tree.shells_of(root);
+    let mut answer = asked.signed(stack, *closest, memory, nearest)?;
+    if answer.side == Side::Undefined(NoSide::CutShort) {
+        return Ok(answer);
+    }
+    let stretch = options.stretch.or_else(|| vertices.stretch());
+    let stretch = stretch.map_or(tree.stretch(), |measured| measured.sigma());
+    for solid in 0..=tree.header().other_roots {
+        let is_closest = tree.solid_of(root) == Some(solid);
+        if tree.solid_of(solid) != Some(solid) || is_closest {
+            continue;
+        }
+        let (pin, radius, _) = tree.node(solid).ok_or(QueryError::Corrupt { row: solid })?;
+        let pin = vertices.position(pin).ok_or(QueryError::Corrupt { row: pin })?;
+        // A solid lies in the sphere of its outer shell. The rounding of both sides is less than the accuracy.
+        let apart = sqrt(tool.axis_distance_squared(pin)) - radius * stretch;
+        if apart > closest.accuracy {
+            continue;
+        }
+        let roots = tree.shells_of(solid);
+        let other = of_solid(asked, stack, &answer, roots)?;
+        answer = nearer(answer, other, tool);
+    }
+    answer.axis_distance = closest.axis_distance;
+    Ok(answer)
+}
+
+/// The signed answer of one solid, with the budget less the tests of the answer so far.
+fn of_solid<I: Index, V: VertexTable + ?Sized, T: Tool>(
+    asked: &Asked<'_, '_, I, V, T>,
+    stack: &mut [Waiting],
+    answer: &Proximity,
+    roots: RootSet,
+) -> Result<Proximity, QueryError> {
+    let &Asked { tree, vertices, tool, options } = asked;
+    let rest = options.budget(options.budget.less(answer.node_tests, answer.triangle_tests));
+    let asked = Asked { options: &rest, ..*asked };
+    let mut touched = Touched::new();
+    let memory = Some(&mut touched);
+    let search = Search::start_in(roots, tree, stack, vertices, tool, &rest, None, memory)?;
+    let found = search.run::<WHOLE>(f32::INFINITY)?;
+    asked.signed(stack, found, (&touched, None), roots)
+}
+
+/// The nearer of the answers of two solids, with the interval and the tests of both. The tool is inside if it is inside one
+/// of them, and on no known side if that of another one is not known.
+fn nearer(one: Proximity, other: Proximity, tool: &impl Tool) -> Proximity {
+    let is_nearer = other.separation < one.separation;
+    let (mut nearer, farther) = if is_nearer { (other, one) } else { (one, other) };
+    nearer.lower = least(nearer.lower, least_possible(&farther, tool));
+    if farther.accuracy > nearer.accuracy {
+        nearer.accuracy = farther.accuracy;
+    }
+    nearer.node_tests = nearer.node_tests.saturating_add(farther.node_tests);
+    nearer.triangle_tests = nearer.triangle_tests.saturating_add(farther.triangle_tests);
+    if nearer.side == Side::Outside && matches!(farther.side, Side::Undefined(_)) {
+        nearer.side = farther.side;
+        nearer.lower = least(nearer.separation, farther.lower);
+    }
+    nearer
+}
+
+/// The least separation that an answer leaves possible. Without a side, an axis may be inside, no deeper than its closest
+/// point and its length.
+fn least_possible(answer: &Proximity, tool: &impl Tool) -> f32 {
+    match answer.side {
+        Side::Undefined(_) => -(answer.axis_distance + tool.axis_length()) - tool.radius(),
+        _ => answer.lower,
+    }
+}
+
+fn least(one: f32, other: f32) -> f32 {
+    if other < one { other } else { one }
+}
