@@ -129,7 +129,7 @@
 /**
  * Bytes of a tracker's storage besides its vertices.
  */
-#define DIBS_TRACKER_BASE 16896
+#define DIBS_TRACKER_BASE 16960
 
 /**
  * Bytes of a tracker's storage for each vertex: the surface as it is, and as it was.

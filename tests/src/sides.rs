@@ -143,7 +143,8 @@ pub fn signed_separation(
     let (distance, radius) = (pair.axis_distance, f64::from(tool.radius));
     let length = f64::from(tool.start.distance(tool.end));
     let most = -radius - distance - length;
-    let low = || deepest_separation(positions, triangles, tool, POINTS).map_or(most, |(low, _)| low);
+    let low =
+        || deepest_separation(positions, triangles, tool, POINTS).map_or(most, |(low, _)| low);
     if distance <= accuracy {
         return (low(), -radius);
     }

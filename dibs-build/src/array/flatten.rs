@@ -147,8 +147,8 @@ pub(crate) fn flatten<I: Index>(
         && let Some(neighbours) = adjacency::<I>(&flat.triangles)
     {
         let counts = roots.iter().map(Cluster::triangles);
-        let solids = (roots.len() > 1)
-            .then(|| solids::<I>(mesh, counts, &flat.triangles, &neighbours));
+        let solids =
+            (roots.len() > 1).then(|| solids::<I>(mesh, counts, &flat.triangles, &neighbours));
         sections.push((section::ADJACENCY, neighbours));
         sections.extend(solids.map(|solids| (section::SOLIDS, solids)));
     }

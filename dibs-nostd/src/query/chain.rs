@@ -3,13 +3,11 @@
 use glam::Vec3;
 
 use super::contacts::Pair;
+use super::passed::{self, Passed};
 use super::search::{Search, WITHIN};
 use super::{Contacts, NoSide, Options, Proximity, Query, Side};
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, TriangleRow, VertexTable};
-
-/// Tools that may be passed over: one for each bit of a set.
-const PASSED: usize = 64;
 
 /// The closest pair of a chain of tools and the surfaces of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,9 +68,9 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
 
     /// The closest pair between the surface and a chain of tools; `None` for an empty slice.
     ///
-    /// A tool is searched no farther than the closest so far, and again without that limit if another one is found
-    /// inside or crossing. That suffices for a chain, whose axes touch each other: it cannot have one tool outside and
-    /// another one inside unless one of them crosses the surface. Query tools that do not touch one by one.
+    /// A tool is searched no farther than the closest so far, and again without that limit if it may be inside. One link of
+    /// a chain is not, if the next one is outside of a closed surface and neither meets it. So tools that do not touch each
+    /// other, and all tools at an open surface, cost as much as one by one.
     ///
     /// Cost: the budget at most, for all tools together, and a node test a tool.
     ///
@@ -234,31 +232,30 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         tools: &[T],
         mut near: impl FnMut(&mut Self, &mut Scene, usize, &Proximity) -> Result<(), QueryError>,
     ) -> Result<(), QueryError> {
-        scene.enter();
+        scene.enter(self.tree.has_adjacency(), self.tree.is_closed());
         let (nearest, _) = self.nearest(vertices, tools, &scene.options);
-        let (mut passed, mut best) = (0_u64, None);
+        let (mut passed, mut best) = (Passed::new(), None);
         for number in nearest_first(nearest, tools.len()) {
             let Some(tool) = tools.get(number) else { continue };
-            let limit = if number < PASSED { scene.limit() } else { f32::INFINITY };
+            let limit = if number < passed::MOST { scene.limit() } else { f32::INFINITY };
             let (found, is_farther) = self.within(vertices, tool, limit, &scene.options)?;
             scene.add(surface, number, found, &mut best);
-            if is_farther {
-                // Outside if the chain is.
-                passed |= 1_u64.checked_shl(number as u32).unwrap_or(0);
-            } else {
+            let is_outside = found.side == Side::Outside;
+            if is_outside || is_farther {
+                passed.add(number, found.lower + tool.radius() - found.accuracy, is_outside);
+            }
+            if !is_farther {
                 scene.is_cut_short |= found.side == Side::Undefined(NoSide::CutShort);
                 near(self, scene, number, &found)?;
             }
         }
-        if !scene.is_outside {
-            for (number, tool) in tools.iter().enumerate().take(PASSED) {
-                if passed >> number & 1 != 0 {
-                    let found =
-                        self.closest_within(vertices, tool, f32::INFINITY, &scene.options)?;
-                    scene.add(surface, number, found, &mut best);
-                    scene.is_cut_short |= found.side == Side::Undefined(NoSide::CutShort);
-                    near(self, scene, number, &found)?;
-                }
+        if scene.has_sides {
+            for number in passed.unsure(tools) {
+                let Some(tool) = tools.get(number) else { continue };
+                let found = self.closest_within(vertices, tool, f32::INFINITY, &scene.options)?;
+                scene.add(surface, number, found, &mut best);
+                scene.is_cut_short |= found.side == Side::Undefined(NoSide::CutShort);
+                near(self, scene, number, &found)?;
             }
         }
         self.triangle = best.and_then(|best: Proximity| best.triangle).or(self.triangle);
@@ -318,6 +315,8 @@ struct Scene {
     is_entered: bool,
     /// No tool was found inside or crossing the present surface.
     is_outside: bool,
+    /// The present surface has sides, which are asked for.
+    has_sides: bool,
     /// The budget ended before the side of a tool was known.
     is_cut_short: bool,
 }
@@ -334,14 +333,16 @@ impl Scene {
             margin: f32::NEG_INFINITY,
             is_entered: false,
             is_outside: true,
+            has_sides: false,
             is_cut_short: false,
         }
     }
 
-    /// The next surface.
-    fn enter(&mut self) {
-        self.is_entered = !self.options.is_signed;
-        self.is_outside = true;
+    /// The next surface. The sides of an open one are those of its closest sheets, which may be far.
+    fn enter(&mut self, has_sides: bool, is_closed: bool) {
+        self.has_sides = has_sides && self.options.is_signed;
+        self.is_entered = !self.has_sides;
+        self.is_outside = is_closed || !self.has_sides;
     }
 
     /// A tool outside that is farther than this is not the closest; infinite while the chain may be inside, where

@@ -11,6 +11,7 @@ mod depth;
 mod distances;
 mod normal;
 mod options;
+mod passed;
 mod plane;
 mod proximity;
 mod search;
@@ -31,8 +32,8 @@ pub use tracker::{Fallback, Tracked, Tracker};
 
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
-use separation::signed;
 use search::{Search, Touched, WHOLE, Waiting, WideSearch};
+use separation::signed;
 
 /// A query on one tree, with the fixed stack that its traversal needs: 8 bytes an entry.
 ///
@@ -75,8 +76,9 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     /// triangle, unless `options` say otherwise. Pins are vertices of the surface, so their distances are upper bounds
     /// from the first node on.
     ///
-    /// Where a capsule's axis crosses the surface, up to 27 more searches find the depth, with no more node tests than the
+    /// Where a capsule's axis crosses the surface or is inside, up to 27 more searches find the depth, with no more node tests than the
     /// tree has nodes, or 3,072 if that is more. Where they do not suffice, the interval is wider than the tolerance.
+    /// Of a tree with several solids, each whose sphere the axis reaches takes a search of its own.
     ///
     /// Cost: the budget at most; typical counts are in the repository's `docs/benchmarks.md`.
     ///

@@ -17,14 +17,14 @@ use crate::TriangleRow;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct Proximity {
-    /// Separation of the best pair found: the upper end of the certified interval. With `d`, the distance from the
-    /// tool's axis to the surface, and `r`, the tool's radius: `d - r` outside, negative where they overlap; `-d - r`
-    /// inside; and where the axis crosses the surface, `-D - r`, with the largest distance `D` of any of its points
-    /// inside. Where the surface cuts itself, the inside is that of the closest sheet, and `D` no certain one: it jumps
-    /// along the axis.
+    /// The upper end of the certified interval: the least signed distance of any point of the tool's axis, less the
+    /// radius `r`. With `d`, the distance from the axis to the surface, it is `d - r` outside; where the axis crosses or is
+    /// inside `-D - r`, with the largest distance `D` of any of its points inside. It changes by no more than tool and
+    /// surface move. Of several solids it is the least: one geometry has one answer, as one tree or as a scene. Where the
+    /// surface cuts itself, the inside is that of the closest sheet, and `D` no certain one: it jumps along the axis.
     pub separation: f32,
     /// Lower end of the certified interval. Equals `separation` unless the budget ran out, or the axis crosses the
-    /// surface: then it is lower by at most [`Options::depth_tolerance`](crate::Options::depth_tolerance), or by more
+    /// surface or is inside: then it is lower by at most [`Options::depth_tolerance`](crate::Options::depth_tolerance), or by more
     /// if the budget or 28 points of the axis were not enough.
     pub lower: f32,
     /// No separation above is off by more than this: the f32 rounding of coordinates this large.
@@ -33,7 +33,7 @@ pub struct Proximity {
     pub side: Side,
     /// Distance from the tool's axis (a sphere's centre, a capsule's segment) to the surface: 0 where it crosses.
     pub axis_distance: f32,
-    /// The surface's point of the closest pair; where the axis crosses, the closest to its deepest point.
+    /// The surface's point of the closest pair; where the axis crosses or is inside, the closest to its deepest point.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub point_on_surface: Vec3,
     /// The tool's point of the closest pair, on the tool's own surface.
@@ -41,8 +41,7 @@ pub struct Proximity {
     pub point_on_tool: Vec3,
     /// Unit vector that leads out: from `point_on_surface` to the tool's axis outside, from the axis to
     /// `point_on_surface` inside and where it crosses. Next to contact it is the surface's pseudonormal; zero where
-    /// there is none. It can jump where two parts of the surface are equally near (the medial axis), and where a
-    /// capsule's second end passes through the surface.
+    /// there is none. It can jump where two parts of the surface are equally near (the medial axis).
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub direction: Vec3,
     /// Parameter of the pair along the tool's axis: 0 at its start, 1 at its end; 0 for a sphere.

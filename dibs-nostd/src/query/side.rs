@@ -16,11 +16,11 @@ use crate::{Index, Tree, TriangleRow, VertexTable};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Side {
-    /// The axis is outside.
+    /// The axis is outside, of all solids.
     Outside,
-    /// The whole axis is inside.
+    /// The whole axis is inside, of the solid with the least separation.
     Inside,
-    /// The axis crosses the surface.
+    /// The axis crosses the surface of that solid.
     Crossing,
     /// Not known. Separations are then those of a tool outside.
     Undefined(NoSide),

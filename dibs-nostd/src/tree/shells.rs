@@ -34,6 +34,11 @@ impl RootSet {
         self.0.trailing_zeros()
     }
 
+    /// A number that tells the shells of one solid, or all, from others.
+    pub const fn key(self) -> u32 {
+        if self.0 == Self::ALL.0 { u32::MAX } else { self.first() }
+    }
+
     const fn with(self, root: u32) -> Self {
         Self(self.0 | Self::of(root).0)
     }

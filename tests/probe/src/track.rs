@@ -86,7 +86,7 @@ type Follower = Tracker<'static, u16, STACK, OPENED>;
 #[cfg(target_pointer_width = "32")]
 const _: () = {
     assert!(size_of::<Contacts<8>>() == 88 * 8 + 28 * 512 + 144);
-    assert!(size_of::<Follower>() <= 8 * STACK + 44 * OPENED + 1_128);
+    assert!(size_of::<Follower>() <= 8 * STACK + 44 * OPENED + 1_152);
 };
 
 impl Trackers {

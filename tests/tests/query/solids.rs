@@ -10,7 +10,7 @@ use dibs_nostd::{Capsule, Odometer, Options, Proximity, Query, Side, Sphere, Tra
 use dibs_tests::deform::unit;
 use dibs_tests::oracle::{Instrument, exhaustive};
 use dibs_tests::sides;
-use dibs_tests::surfaces::{ball, cuboid};
+use dibs_tests::surfaces::{ball, cuboid, sheet};
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -204,8 +204,11 @@ fn one_geometry_has_one_answer_as_a_tree_and_as_a_scene() {
         let each: Vec<BuiltTree> =
             case.parts.iter().map(|part| Builder::new().build(part).expect("valid")).collect();
         let trees: Vec<Tree<u16>> = each.iter().map(|built| built.tree().expect("valid")).collect();
-        let tables: Vec<Vec<Vec3>> =
-            each.iter().zip(&case.parts).map(|(built, part)| built.to_rows(&part.positions)).collect();
+        let tables: Vec<Vec<Vec3>> = each
+            .iter()
+            .zip(&case.parts)
+            .map(|(built, part)| built.to_rows(&part.positions))
+            .collect();
         let mut queries: Vec<_> =
             trees.iter().map(|tree| Query::<u16, MAX_STACK>::new(tree).expect("deep")).collect();
         for _ in 0..200 {
@@ -213,8 +216,11 @@ fn one_geometry_has_one_answer_as_a_tree_and_as_a_scene() {
             let half = unit(&mut rng) * 12.0 * rng.f32();
             let tool = capsule(middle - half, middle + half);
             let one = query.closest(rows.as_slice(), &tool, &Options::cold()).expect("an answer");
-            let mut scene: Vec<_> =
-                queries.iter_mut().zip(&tables).map(|(query, rows)| (query, rows.as_slice())).collect();
+            let mut scene: Vec<_> = queries
+                .iter_mut()
+                .zip(&tables)
+                .map(|(query, rows)| (query, rows.as_slice()))
+                .collect();
             let many = Query::closest_in_scene(&mut scene, &[tool], &Options::cold());
             let many = many.expect("an answer").expect("a pair").proximity;
             if matches!(one.side, Side::Undefined(_)) || matches!(many.side, Side::Undefined(_)) {
@@ -223,6 +229,61 @@ fn one_geometry_has_one_answer_as_a_tree_and_as_a_scene() {
             assert_eq!(one.side == Side::Outside, many.side == Side::Outside, "{one:?} {many:?}");
             let apart = jump(&one, &many, 0.0);
             assert!(apart <= 0.0, "{} {tool:?}: {apart} {one:?} {many:?}", case.name);
+        }
+    }
+}
+
+/// Tools that do not touch each other, on solids and on open sheets that face the same way.
+#[test]
+fn the_closest_of_several_tools_is_that_of_each() {
+    let plates = [0.0, 10.0].map(|height| {
+        let plate = sheet(8, 40.0, |_, _| height);
+        assert!(!plate.triangles.is_empty());
+        plate
+    });
+    let plates = Case::new("plates", plates.to_vec(), 0);
+    let mut rng = Rng::with_seed(5);
+    for case in CASES.iter().chain([&plates]) {
+        let tree = case.built.tree::<u16>().expect("valid");
+        let rows = case.built.to_rows(&joined(&case.parts).positions);
+        let mut odometer = Odometer::new(&tree);
+        let surface = odometer.start(rows.as_slice());
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        for _ in 0..12 {
+            let mut trackers =
+                [(); 3].map(|()| Tracker::<u16, MAX_STACK, 256>::new(&tree).expect("deep enough"));
+            let starts = [(); 3].map(|()| unit(&mut rng) * 40.0 * rng.f32());
+            let halves = [(); 3].map(|()| unit(&mut rng) * 4.0 * rng.f32());
+            let ways = [(); 3].map(|()| unit(&mut rng) * 30.0 * rng.f32());
+            for step in 0..20 {
+                let tools = [0, 1, 2].map(|tool| {
+                    let middle = starts[tool] + ways[tool] * (step as f32 / 20.0);
+                    capsule(middle - halves[tool], middle + halves[tool])
+                });
+                let each = tools.map(|tool| {
+                    query.closest(rows.as_slice(), &tool, &Options::cold()).expect("an answer")
+                });
+                let of = query.closest_of(rows.as_slice(), &tools, &Options::new());
+                let of = of.expect("an answer").expect("a tool").proximity;
+                let [one, other, third] = &mut trackers;
+                let mut pairs = [
+                    (one, &surface, &tools[0]),
+                    (other, &surface, &tools[1]),
+                    (third, &surface, &tools[2]),
+                ];
+                let tracked = Tracker::closest_of(&mut pairs, &Options::new());
+                let tracked = tracked.expect("an answer").expect("a tool").closest;
+                let is_known = |found: &Proximity| !matches!(found.side, Side::Undefined(_));
+                if !each.iter().chain([&of, &tracked]).all(is_known) {
+                    continue;
+                }
+                let closest = each.into_iter().min_by(|a, b| a.separation.total_cmp(&b.separation));
+                let closest = closest.expect("three tools");
+                for found in [of, tracked] {
+                    let apart = jump(&closest, &found, 0.0);
+                    assert!(apart <= 0.0, "{}: {tools:?} {apart} {found:?} {each:?}", case.name);
+                }
+            }
         }
     }
 }

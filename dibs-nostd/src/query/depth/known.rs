@@ -30,8 +30,8 @@ pub(super) struct Point {
 pub(in crate::query) struct Known {
     points: Points,
     around: Around,
-    /// Roots of the shells that decided.
-    roots: RootSet,
+    /// The key of the shells that decided.
+    shells: u32,
     unit: Unit,
     /// Motion of tool and surface since then, in units.
     moved: u32,
@@ -50,7 +50,7 @@ impl Known {
     pub const fn new(unit: Unit) -> Self {
         let none = Point { parameter: 0.0, depth: 0.0, bound: 0.0, triangle: TriangleRow(0) };
         let points = Points { points: [none; KEPT], count: 0, deepest: f32::NAN };
-        Self { points, around: Around::new(), roots: RootSet::ALL, unit, moved: 0 }
+        Self { points, around: Around::new(), shells: RootSet::ALL.key(), unit, moved: 0 }
     }
 
     pub fn forget(&mut self) {
@@ -66,9 +66,9 @@ impl Known {
 
     /// The points with their bounds as of now, and the leaves around the deepest one, if the same shells decide.
     pub fn now(&mut self, roots: RootSet) -> (&mut Points, &mut Around) {
-        if self.roots != roots {
+        if self.shells != roots.key() {
             self.forget();
-            self.roots = roots;
+            self.shells = roots.key();
         }
         if self.moved > 0 {
             let moved = self.unit.length(self.moved as i32) * (1.0 + 4.0 * f32::EPSILON);

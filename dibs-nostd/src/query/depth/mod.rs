@@ -103,8 +103,11 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         *node_tests = node_tests.saturating_sub(closest.node_tests).min(most);
         *triangle_tests = triangle_tests.saturating_sub(closest.triangle_tests);
         let is_inside = closest.side == Side::Inside;
-        let (deepest, deepest_at) =
-            if is_inside { (closest.axis_distance, closest.axis_parameter) } else { (0.0, f32::NAN) };
+        let (deepest, deepest_at) = if is_inside {
+            (closest.axis_distance, closest.axis_parameter)
+        } else {
+            (0.0, f32::NAN)
+        };
         Self {
             tree,
             stack,
@@ -274,8 +277,16 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         let Some(node_tests) = node_tests.checked_sub(1) else { return Ok(sample) };
         let options = self.options.budget(Budget { node_tests, triangle_tests });
         let (point, first) = (AxisPoint(on_axis), sample.triangle);
-        let search =
-            Search::start_in(self.roots, self.tree, self.stack, self.vertices, &point, &options, first, None)?;
+        let search = Search::start_in(
+            self.roots,
+            self.tree,
+            self.stack,
+            self.vertices,
+            &point,
+            &options,
+            first,
+            None,
+        )?;
         // A bound that is just low enough would not be so at the next tick.
         let enough = if self.around.is_some() { EXACT } else { enough };
         let length = self.tool.axis_length();

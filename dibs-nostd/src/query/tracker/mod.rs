@@ -40,7 +40,7 @@ const FARTHEST: u32 = 1 << 29;
 /// Where the axis crosses the surface, it remembers which parts of the axis cannot be deepest, and searches those points
 /// that may have become so.
 ///
-/// RAM: 8 bytes for each entry of the stack, 44 for each opened node, and 1,128.
+/// RAM: 8 bytes for each entry of the stack, 44 for each opened node, and 1,152.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -229,7 +229,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         let memory = (&self.touched, Some(&mut self.known));
         let closest = signed(&self.tree, &mut self.stack, surface, tool, options, closest, memory)?;
         self.behind = if is_complete { 0 } else { self.behind.saturating_add(moved) };
-        self.last = travel.map(|travel| Last::new(tool, travel, &closest));
+        let is_closed = self.tree.is_closed();
+        self.last = travel.map(|travel| Last::new(tool, travel, &closest, is_closed));
         let opened = self.front.borrow().used() as u32;
         Ok(Tracked { closest, fallback, opened, pair: 0, searched: 1 })
     }
@@ -317,16 +318,14 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
 }
 
 impl Last {
-    fn new(tool: &impl Tool, travel: Travel, closest: &Proximity) -> Self {
+    fn new(tool: &impl Tool, travel: Travel, closest: &Proximity, is_closed: bool) -> Self {
         let clear = closest.lower + tool.radius() - closest.accuracy;
         let (clear, is_signed) = match closest.side {
-            Side::Inside
-            | Side::Crossing
-            | Side::Undefined(NoSide::BelowAccuracy | NoSide::CutShort) => {
-                (f32::NEG_INFINITY, true)
-            }
             Side::Undefined(NoSide::NotAsked) => (clear, false),
-            _ => (clear, true),
+            Side::Undefined(NoSide::NoAdjacency) => (clear, true),
+            // Only a closed surface must be touched on the way in: the side of an open one is that of the closest sheet.
+            Side::Outside if is_closed => (clear, true),
+            _ => (f32::NEG_INFINITY, true),
         };
         Self { axis: Axis::of(tool), travel, clear, is_signed, stale: 0 }
     }

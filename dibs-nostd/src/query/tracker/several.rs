@@ -26,7 +26,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
     ///
     /// A pair is passed over while it is certain to be farther than the closest one: its distance when it was last
     /// searched, less the motion since. A tool that was outside a closed surface then is outside still. Pairs inside or
-    /// crossing are searched at every tick. In a tick with few tests, the pair whose certainty ends first is searched
+    /// crossing are searched at every tick, and so are all of an open surface, whose side may change without contact. In a tick with few tests, the pair whose certainty ends first is searched
     /// ahead for up to 65 tests more, only as far as it has to be, so that no tick finds a pair that rested long.
     ///
     /// The interval begins at the least lower end of all pairs, the accuracy is the worst, the tests are those of all. The
