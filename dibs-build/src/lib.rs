@@ -16,6 +16,7 @@ mod array;
 mod builder;
 mod components;
 mod construct;
+mod crossing;
 mod error;
 mod export;
 #[cfg(feature = "stream")]
@@ -43,6 +44,7 @@ mod write;
 pub use array::{BuiltTree, ModesSummary, Summary, summarise};
 pub use builder::{Builder, IndexWidth};
 pub use construct::Construction;
+pub use crossing::{CrossingParts, crossing_parts};
 pub use error::BuildError;
 pub use labels::{LabelsError, LabelsErrorKind, read_labels};
 pub use mesh::{Mesh, Motion, RestSurface};

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use dibs_build::glam::DVec3;
-use dibs_build::{Builder, Import, ReadOptions, Unit, check_winding, orient};
+use dibs_build::{Builder, Import, ReadOptions, Unit, check_winding, crossing_parts, orient};
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
@@ -71,7 +71,9 @@ impl Mesh {
 
     fn warnings(&self) -> Vec<String> {
         let winding = check_winding(&self.import.mesh).err().map(|error| error.to_string());
-        self.import.report.warnings().chain(winding).collect()
+        let crossing = crossing_parts(&self.import.mesh);
+        let crossing = crossing.iter().map(ToString::to_string);
+        self.import.report.warnings().chain(winding).chain(crossing).collect()
     }
 
     fn build(

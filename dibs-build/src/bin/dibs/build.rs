@@ -6,7 +6,7 @@ use anyhow::{Result, anyhow, bail};
 use clap::ValueEnum;
 use dibs_build::{
     Beyond, Builder, BuiltTree, Construction, Group, Import, IndexWidth, Mesh, Needed, Paths,
-    check_winding, orient, read_labels, read_limits,
+    check_winding, crossing_parts, orient, read_labels, read_limits,
 };
 use std::path::{Path, PathBuf};
 
@@ -97,6 +97,7 @@ pub fn run(args: &Args) -> Result<()> {
     };
     let Import { mesh, report, groups } = &import;
     let winding = check_winding(mesh).err().map(|error| error.to_string());
+    let crossing = crossing_parts(mesh);
     let limits = args.limits.as_ref().map(|path| read_limits(path, mesh)).transpose()?;
     let labels = match (&args.labels, groups) {
         (Some(path), _) => Some(read_labels(path, mesh)?),
@@ -124,7 +125,8 @@ pub fn run(args: &Args) -> Result<()> {
         tree.write_blob(&args.output)?;
     }
     let summary = tree.summary();
-    let warnings = || winding.clone().into_iter().chain(summary.warnings());
+    let crossing = || crossing.iter().map(ToString::to_string);
+    let warnings = || winding.clone().into_iter().chain(crossing()).chain(summary.warnings());
     for warning in warnings() {
         eprintln!("warning: {name}: {warning}");
     }
