@@ -1,7 +1,7 @@
 //! The builder, for a `build.rs` and the `dibs` program.
 
-use dibs_nostd::format::{MAX_CHILDREN, MAX_LEAF_TRIANGLES};
-use dibs_nostd::{Index, Unit};
+use dibs_nostd::Index;
+use dibs_nostd::format::{MAX_CHILDREN, MAX_LEAF_TRIANGLES, Unit};
 
 use crate::array::{BuiltTree, Facts, flatten};
 use crate::construct::{Cluster, Construction, Constructor, Surface, widen};

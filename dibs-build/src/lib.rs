@@ -60,6 +60,6 @@ pub use stretch::{
 };
 pub use write::{WriteError, WriteErrorKind, write_atomically};
 
-pub use dibs_nostd::Unit;
+pub use dibs_nostd::format::Unit;
 /// The vectors in this interface.
 pub use glam;

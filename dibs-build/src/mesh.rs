@@ -1,6 +1,6 @@
 //! The surface in its rest shape: positions and triangles.
 
-use dibs_nostd::Unit;
+use dibs_nostd::format::Unit;
 use glam::{DVec3, Vec3};
 
 /// A triangle mesh: fixed connectivity, and the positions of one frame.

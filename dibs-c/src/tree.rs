@@ -2,7 +2,8 @@
 
 use core::ffi::c_void;
 
-use dibs_nostd::{Scrub, Tree, TriangleRow, Unit};
+use dibs_nostd::format::Unit;
+use dibs_nostd::{Scrub, Tree, TriangleRow};
 
 use crate::border::{Handle, Input, Kind, Output, Storage};
 use crate::code::dibs_code;

@@ -3,10 +3,10 @@
 use std::collections::HashSet;
 use std::path::Path;
 
-use dibs_nostd::format::PathKind;
+use dibs_nostd::format::{PathKind, Unit};
 use dibs_nostd::glam::{DVec3, Vec3};
 use dibs_nostd::modes::Modes;
-use dibs_nostd::{FormatError, Index, Tree, TriangleRow, Unit};
+use dibs_nostd::{FormatError, Index, Tree, TriangleRow};
 
 use crate::error::BuildError;
 use crate::write_atomically;

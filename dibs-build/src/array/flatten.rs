@@ -1,7 +1,9 @@
 //! From a tree of sections to the flat array: ordered, rounded up, written.
 
-use dibs_nostd::format::{CRC, HEADER_BYTES, Join, Link, MAGIC, PathKind, VERSION, field, section};
-use dibs_nostd::{Index, Tree, Unit};
+use dibs_nostd::format::{
+    CRC, HEADER_BYTES, Join, Link, MAGIC, PathKind, Unit, VERSION, field, section,
+};
+use dibs_nostd::{Index, Tree};
 use glam::DVec3;
 
 use super::adjacency::adjacency;

@@ -36,7 +36,7 @@ pub use report::{Format, Report};
 
 use crate::mesh::{Mesh, RestSurface};
 use crate::rounding::round_up;
-use dibs_nostd::Unit;
+use dibs_nostd::format::Unit;
 use glam::DVec3;
 pub(crate) use place::Place;
 use raw::Raw;

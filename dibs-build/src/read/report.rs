@@ -1,6 +1,6 @@
 //! The counts and warnings of an import.
 
-use dibs_nostd::Unit;
+use dibs_nostd::format::Unit;
 use serde::{Serialize, Serializer};
 use std::fmt;
 

@@ -30,7 +30,7 @@ pub use row::{TriangleRow, VertexNumber};
 pub use scrub::{CorruptTreeError, Scrub};
 pub(crate) use shells::RootSet;
 pub use stored::TreeBytes;
-pub use unit::Unit;
+pub(crate) use unit::Unit;
 
 use core::iter;
 use core::marker::PhantomData;

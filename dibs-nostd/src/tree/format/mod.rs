@@ -6,6 +6,7 @@
 mod metric;
 pub(crate) mod several;
 
+pub use super::unit::Unit;
 pub use metric::{Join, Metric};
 pub(crate) use metric::{metric, metric_row};
 
@@ -85,7 +86,7 @@ pub mod field {
     pub const SECTIONS: usize = 48;
     /// Bytes of the whole tree.
     pub const LENGTH: usize = 52;
-    /// The code of the file's [`Unit`](super::super::Unit), one byte, and three of zero.
+    /// The code of the file's [`Unit`](super::Unit), one byte, and three of zero.
     pub const UNIT: usize = 56;
     /// The checksum of every other byte.
     pub const CHECKSUM: usize = 60;
