@@ -8,7 +8,8 @@ use crate::construct::{Cluster, Construction, Constructor, Surface, widen};
 use crate::error::BuildError;
 use crate::geodesic::{Graph, Topology};
 use crate::mesh::{Mesh, RestSurface};
-use crate::rest::{Paths, Shares, has_area};
+use crate::rest::{Paths, SHARED, Shares, has_area, least_limits};
+use crate::rounding::round_up;
 
 /// Width of the vertex indices in the tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -88,6 +89,9 @@ impl<'p> Builder<'p> {
     }
 
     /// The largest stretch that the tree must cover: a factor of at least 1.
+    ///
+    /// A limit that the controller's arithmetic cannot tell from the rest shape becomes the least that it can: 1.0006, and
+    /// up to 1.016 where triangles have corners sharper than 10 degrees. So a rigid tissue's limit is 1.
     #[must_use]
     pub fn stretch(mut self, limit: f32) -> Self {
         self.stretch = limit;
@@ -98,7 +102,8 @@ impl<'p> Builder<'p> {
     ///
     /// Tissue stretches much in few places, so limits for each triangle make spheres smaller everywhere else.
     /// [`MotionStretch::limits`](crate::MotionStretch::limits) derives them from a recorded motion. Along-surface
-    /// distances are weighted by the limits, and the tree's own limit is the largest.
+    /// distances are weighted by the limits, and the tree's own limit is the largest. The least limit is as
+    /// [`stretch`](Self::stretch) has it, for each triangle.
     #[must_use]
     pub fn limits(mut self, limits: Vec<f32>) -> Self {
         self.limits = Some(limits);
@@ -222,8 +227,20 @@ impl<'p> Builder<'p> {
             _ => Paths::default(),
         });
         let (stretch, shares) = match &self.limits {
-            Some(limits) => Shares::of(limits),
+            Some(limits) => {
+                let least = least_limits(mesh, paths.kind()).map(round_up);
+                let limits: Vec<f32> =
+                    limits.iter().zip(least).map(|(&l, least)| l.max(least)).collect();
+                Shares::of(&limits)
+            }
             None => (self.stretch, Shares::default()),
+        };
+        // Beyond this no rest shape needs more.
+        let stretch = if shares.is_uniform() && stretch < 1.02 {
+            let least = least_limits(mesh, paths.kind()).fold(1.0, f64::max) * SHARED;
+            stretch.max(round_up(least))
+        } else {
+            stretch
         };
         let roots = self.construct(mesh, paths, &shares)?;
         let facts = Facts {

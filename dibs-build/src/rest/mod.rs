@@ -1,10 +1,12 @@
 //! The rest shape of each triangle, and its stretch limit, for along-surface distances, stretch, the stored metric and
 //! the growth of modes.
 
+mod floor;
 mod paths;
 mod shape;
 mod shares;
 
+pub(crate) use floor::{SHARED, least_limits};
 pub use paths::Paths;
 pub(crate) use shape::{RestShape, has_area};
 pub(crate) use shares::Shares;

@@ -8,7 +8,8 @@ use rayon::prelude::*;
 pub use file::{LimitsError, LimitsErrorKind, read_limits, write_limits};
 
 use crate::motion::MotionMismatchError;
-use crate::rest::RestShape;
+use crate::rest::{RestShape, SHARED, least_limits};
+use crate::rounding::round_up;
 use crate::{Mesh, Motion, Paths};
 
 /// The stretch of each triangle of a mesh in a recorded motion.
@@ -28,6 +29,8 @@ use crate::{Mesh, Motion, Paths};
 #[derive(Clone, Debug)]
 pub struct MotionStretch {
     triangles: Vec<Needed>,
+    /// The factor by which the controller may take each triangle's stretch for more than it is.
+    rounding: Vec<f64>,
 }
 
 /// The largest stretch of a triangle in a motion.
@@ -93,7 +96,8 @@ impl MotionStretch {
             worst
         };
         let triangles = (0..mesh.triangles.len()).into_par_iter().map(needed).collect();
-        Ok(Self { triangles })
+        let rounding = least_limits(mesh, paths.kind()).collect();
+        Ok(Self { triangles, rounding })
     }
 
     /// The largest stretch of each triangle of the mesh.
@@ -119,14 +123,15 @@ impl MotionStretch {
         self.ranked()[0]
     }
 
-    /// Limits for the builder: each triangle's largest stretch, at least 1, plus `margin` (0.1: a tenth), plus a
-    /// ten-thousandth for the rounding of the controller's measurement.
+    /// Limits for the builder: each triangle's largest stretch, at least 1, plus `margin` (0.1: a tenth), plus the rounding
+    /// of the controller's measurement: 0.0006, and up to 0.016 for a triangle with a sharp corner. A tree with them
+    /// admits every frame of the motion, even with a margin of 0.
     #[must_use]
     pub fn limits(&self, margin: f32) -> Vec<f32> {
-        let limit = |needed: &Needed| {
-            (needed.stretch.max(1.0) * (1.0 + f64::from(margin)) * ROUNDING) as f32
+        let limit = |(needed, rounding): (&Needed, &f64)| {
+            round_up(needed.stretch.max(1.0) * (1.0 + f64::from(margin)) * SHARED * rounding)
         };
-        self.triangles.iter().map(limit).collect()
+        self.triangles.iter().zip(&self.rounding).map(limit).collect()
     }
 
     /// The triangle that is stretched farthest beyond its limit; `None` if none is.
@@ -136,16 +141,16 @@ impl MotionStretch {
     #[must_use]
     pub fn beyond(&self, limits: &[f32]) -> Option<Beyond> {
         assert_eq!(limits.len(), self.triangles.len(), "a limit for each triangle");
+        // The builder raises limits to what the controller can tell from the rest shape.
+        let limits =
+            limits.iter().zip(&self.rounding).map(|(&limit, &least)| limit.max(round_up(least)));
         let all = self.triangles.iter().zip(limits);
-        let all = all.map(|(&needed, &limit)| Beyond { needed, limit });
+        let all = all.map(|(&needed, limit)| Beyond { needed, limit });
         let worst = all.max_by(|a, b| a.share().total_cmp(&b.share()))?;
         // NaN counts as beyond.
         if worst.share() <= 1.0 { None } else { Some(worst) }
     }
 }
-
-/// Allowance for the rounding of the controller's measurement, beside the margin.
-const ROUNDING: f64 = 1.0001;
 
 /// The stretch of a triangle against its rest shape.
 fn stretch(rest: [DVec3; 3], now: [DVec3; 3], paths: Paths) -> f64 {

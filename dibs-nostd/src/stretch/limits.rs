@@ -44,7 +44,7 @@ impl SurfaceLimits {
     }
 
     /// The least size of each of the [`REGIONS`](crate::REGIONS), as a part of its size at rest; 0 for no limit. The
-    /// size is the root mean square of an edge of each triangle (triangles with a smaller stretch limit count less). It
+    /// size is the root mean square of an edge of each triangle, whatever the triangles' stretch limits. It
     /// is checked from the first frame on, so a collapsed surface, one of zeros, or one in metres instead of
     /// millimetres is refused at once.
     #[must_use]

@@ -121,7 +121,7 @@ pub fn measure_stretch<I: Index, V: VertexTable + ?Sized>(
     for worst in &mut regions {
         let end = triangles.min(first + rows);
         *worst = Worst::none(first);
-        rows::scan(tree, vertices, first..end, tree.vertex_count(), worst, &mut rows::Room::any())?;
+        rows::scan(tree, vertices, first..end, tree.vertex_count(), worst, &mut 0.0)?;
         first = end;
     }
     Ok(of_regions(tree, &regions, vertices.epoch()))

@@ -7,7 +7,7 @@ use super::pass::{ALL, Pass};
 use super::regions::region_rows;
 use super::{Arriving, Changed, Gate, StretchError, SurfaceLimits, Verdict, check_tables};
 use crate::surface::{Between, MeasuredStretch, REGIONS, TravelUnit, VertexTable};
-use crate::tree::{Index, Tree};
+use crate::tree::{Index, Tree, TriangleRow};
 
 /// Blocks of vertex rows, at most: they mark the rows that a partial frame moved.
 const BLOCKS: usize = 32;
@@ -28,7 +28,7 @@ const BLOCKS: usize = 32;
 /// `now + 2 (now - before)`, with the published frame before. By convexity the two bound the stretch of all surfaces on
 /// the way.
 ///
-/// Cost: [`advance`](Gate::advance) checks at most `work` rows and triangles, plus O([`REGIONS`]). RAM: half a kilobyte
+/// Cost: [`advance`](Gate::advance) checks at most `work` rows and triangles, plus O([`REGIONS`]). RAM: 600 bytes
 /// at most, whatever the surface, and 300 bytes more with the extrapolation. [`new`](Self::new) makes one pass over the
 /// triangles.
 ///
@@ -75,6 +75,8 @@ pub struct StretchMonitor<'t, I, const SURFACES: usize = 1> {
     is_beyond: bool,
     speed: f32,
     shrinkage: f32,
+    /// The square of each region's size at rest.
+    rest: [f32; REGIONS],
     /// Blocks of rows still to be compared with the published ones, and the next row of the first of them.
     blocks_left: u32,
     next_row: u32,
@@ -110,6 +112,7 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
         let last = tree.vertex_count().saturating_sub(1);
         let block_shift = (u32::BITS - last.leading_zeros()).saturating_sub(BLOCKS.ilog2());
         let mut touched = [0; BLOCKS];
+        let mut rest = [0.0; REGIONS];
         let rows = region_rows(tree);
         let (mut region, mut end) = (1u32, rows);
         for triangle in 0..tree.triangle_count() {
@@ -117,6 +120,9 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
                 (region, end) = (region << 1, end.saturating_add(rows));
             }
             let corners = tree.triangle(triangle).ok_or(StretchError::Corrupt { row: triangle })?;
+            if let Some(size) = rest.get_mut(region.trailing_zeros() as usize) {
+                *size += squared_edge(tree, triangle);
+            }
             for corner in corners {
                 let block = touched.get_mut((corner >> block_shift) as usize);
                 *block.ok_or(StretchError::Corrupt { row: triangle })? |= region;
@@ -132,6 +138,7 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
             is_beyond: false,
             speed: limits.speed,
             shrinkage: limits.shrinkage,
+            rest,
             blocks_left: ALL,
             next_row: 0,
         })
@@ -216,7 +223,7 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
         }
         let surface = Between::ahead(before, surface);
         // Beyond the limit, or not finite: no extrapolation.
-        let measured = ahead.advance(self.tree, &surface, ready, 0.0, work);
+        let measured = ahead.advance(self.tree, &surface, ready, (0.0, &self.rest), work);
         self.is_beyond = measured.is_err();
         let is_done = measured.is_ok_and(|(_, is_done)| is_done);
         self.ahead = is_done.then(|| ahead.measured(self.tree, None));
@@ -267,9 +274,9 @@ impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
         let (work, is_compared) = self.compare(arriving, work)?;
         // Half of the work each, so that both keep up with the frame.
         let ahead = if SURFACES > 1 { work / 2 } else { 0 };
-        let (tree, shrinkage) = (self.tree, self.shrinkage);
+        let (tree, size) = (self.tree, (self.shrinkage, &self.rest));
         let Some(own) = self.passes.first_mut() else { return Ok(Verdict::Pending) };
-        let (left, is_measured) = own.advance(tree, surface, ready, shrinkage, work - ahead)?;
+        let (left, is_measured) = own.advance(tree, surface, ready, size, work - ahead)?;
         let is_ahead =
             SURFACES == 1 || self.look_ahead(before, surface, ready, ahead.saturating_add(left));
         if !is_complete || !is_compared || !is_measured || !is_ahead {
@@ -296,4 +303,13 @@ impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
             pass.published();
         }
     }
+}
+
+/// The square of the edge from a triangle's centre to its third corner at rest. The metric has it times the square of the
+/// triangle's limit as a part of the tree's.
+fn squared_edge<I: Index>(tree: &Tree<'_, I>, row: u32) -> f32 {
+    let [.., second] = tree.metric(row).map_or([0.0; 3], |metric| metric.squares);
+    let limit = tree.stretch_limit(TriangleRow(row)).unwrap_or(tree.stretch());
+    let part = limit / tree.stretch();
+    second / (part * part)
 }

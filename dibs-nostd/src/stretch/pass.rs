@@ -4,7 +4,6 @@ use core::ops::Range;
 
 use super::kernel::Worst;
 use super::regions::{of_regions, region_rows};
-use super::rows::Room;
 use super::{StretchError, rows};
 use crate::surface::{MeasuredStretch, REGIONS, VertexTable};
 use crate::tree::{Index, Tree, TriangleRow};
@@ -26,8 +25,8 @@ pub(super) struct Pass {
     unpublished: u32,
     /// The next triangle of the region that is being measured.
     next: u32,
-    /// [`Room`]'s sum of that region.
-    room: f32,
+    /// The sum of the squares of an edge of each triangle of that region.
+    size: f32,
     regions: [Worst; REGIONS],
 }
 
@@ -37,7 +36,7 @@ impl Pass {
             left: ALL,
             unpublished: ALL,
             next: NONE,
-            room: 0.0,
+            size: 0.0,
             regions: [Worst::none(u32::MAX); REGIONS],
         }
     }
@@ -59,13 +58,13 @@ impl Pass {
     }
 
     /// Measures at most `work` triangles whose corners are below row `ready`. Returns the work left, and whether all
-    /// regions are done. A region must not shrink below `shrinkage` of its size.
+    /// regions are done. A region must not shrink below `shrinkage` of its size, whose square at rest is in `rest`.
     pub fn advance<I: Index, V: VertexTable + ?Sized>(
         &mut self,
         tree: &Tree<'_, I>,
         surface: &V,
         ready: u32,
-        shrinkage: f32,
+        (shrinkage, rest): (f32, &[f32; REGIONS]),
         mut work: u32,
     ) -> Result<(u32, bool), StretchError> {
         while self.left != 0 {
@@ -87,19 +86,20 @@ impl Pass {
                     work -= 1;
                 }
                 *slot = worst;
-                self.room = 0.0;
+                self.size = 0.0;
                 self.unpublished |= 1 << region;
             }
             let stop = if rows.end - next < work { rows.end } else { next + work };
-            let mut room = Room { least: shrinkage * shrinkage, sum: self.room };
-            let at = rows::scan(tree, surface, next..stop, ready, slot, &mut room)?;
-            self.room = room.sum;
+            let mut size = self.size;
+            let at = rows::scan(tree, surface, next..stop, ready, slot, &mut size)?;
+            self.size = size;
             work -= at - next;
             if at < rows.end {
                 self.next = at;
                 return Ok((work, false));
             }
-            if !(self.room >= 0.0) {
+            let least = rest.get(region as usize).map(|rest| shrinkage * shrinkage * rest);
+            if !least.is_some_and(|least| self.size >= least) {
                 let triangle = TriangleRow(rows.start);
                 return Err(StretchError::Shrunk { triangle, limit: shrinkage });
             }

@@ -18,43 +18,28 @@ use crate::surface::VertexTable;
 use crate::tree::format::{Join, METRIC_BYTES, Metric, PathKind, metric_row};
 use crate::tree::{Index, Tree, TriangleRow, format};
 
-/// A region's room to shrink: the sum, over its triangles, of an edge's square now less `least` times that at rest (if
-/// each triangle has its own limit, times the square of its share).
-#[derive(Clone, Copy)]
-pub(super) struct Room {
-    pub least: f32,
-    pub sum: f32,
-}
-
-impl Room {
-    /// Room without a limit.
-    pub const fn any() -> Self {
-        Self { least: 0.0, sum: 0.0 }
-    }
-}
-
 /// Checks the triangles of `rows` up to the first with a corner at row `ready` or beyond. Raises `worst` where one is
-/// stretched more, and adds up `room`. Returns the next row to check.
+/// stretched more, and adds to `size` the square of an edge of each. Returns the next row to check.
 pub(super) fn scan<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     surface: &V,
     rows: Range<u32>,
     ready: u32,
     worst: &mut Worst,
-    room: &mut Room,
+    size: &mut f32,
 ) -> Result<u32, StretchError> {
     match (tree.paths(), I::BYTES) {
         (PathKind::Surface, 2) => {
-            run::<I, V, SingularValue, 6>(tree, surface, rows, ready, worst, room)
+            run::<I, V, SingularValue, 6>(tree, surface, rows, ready, worst, size)
         }
         (PathKind::Surface, _) => {
-            run::<I, V, SingularValue, 12>(tree, surface, rows, ready, worst, room)
+            run::<I, V, SingularValue, 12>(tree, surface, rows, ready, worst, size)
         }
         (PathKind::EdgePath, 2) => {
-            run::<I, V, LongestEdge, 6>(tree, surface, rows, ready, worst, room)
+            run::<I, V, LongestEdge, 6>(tree, surface, rows, ready, worst, size)
         }
         (PathKind::EdgePath, _) => {
-            run::<I, V, LongestEdge, 12>(tree, surface, rows, ready, worst, room)
+            run::<I, V, LongestEdge, 12>(tree, surface, rows, ready, worst, size)
         }
     }
 }
@@ -92,7 +77,7 @@ fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
     rows: Range<u32>,
     ready: u32,
     worst: &mut Worst,
-    room: &mut Room,
+    size: &mut f32,
 ) -> Result<u32, StretchError> {
     let (triangles, _) = tree.sections().triangles.as_chunks::<CORNERS>();
     let bytes = tree.sections().metric;
@@ -108,7 +93,7 @@ fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
                 rows.clone(),
                 ready,
                 worst,
-                room,
+                size,
             )
         }
         Err(_) => {
@@ -121,7 +106,7 @@ fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
                 rows.clone(),
                 ready,
                 worst,
-                room,
+                size,
             )
         }
     };
@@ -148,25 +133,25 @@ fn run_on<I: Index, V: VertexTable + ?Sized, M: Measure, R: MetricBits, const CO
     rows: Range<u32>,
     ready: u32,
     worst: &mut Worst,
-    room: &mut Room,
+    size: &mut f32,
 ) -> Option<u32> {
     let range = rows.start as usize..rows.end as usize;
     let (metrics, triangles) = (metrics.get(range.clone())?, triangles.get(range)?);
     let limit = squared_limit(tree.stretch());
-    let (first, largest, sum) = (rows.start, *worst, *room);
+    let (first, largest, sum) = (rows.start, *worst, *size);
     // Elsewhere it would take more instructions, not fewer.
     if cfg!(any(target_arch = "x86_64", target_arch = "aarch64"))
         && tree.sections().limits.is_empty()
         && ready as usize >= surface.len()
     {
         let row;
-        (row, *worst, room.sum) = wide::measure::<I, V, M, R, CORNERS>(
+        (row, *worst, *size) = wide::measure::<I, V, M, R, CORNERS>(
             surface, metrics, triangles, limit, first, largest, sum,
         );
         return Some(row);
     }
     let row;
-    (row, *worst, room.sum) = if tree.sections().limits.is_empty() {
+    (row, *worst, *size) = if tree.sections().limits.is_empty() {
         measure::<I, V, M, R, CORNERS, true>(
             surface, metrics, triangles, ready, limit, first, largest, sum,
         )
@@ -209,8 +194,8 @@ struct Before {
     edge: Vec3,
     /// The edge's slack under the largest square so far.
     left: f32,
-    /// The edge's room above the least square.
-    room: f32,
+    /// The edge's square.
+    square: f32,
 }
 
 /// Measures triangles, the first of them in row `first`, up to one that has a corner at row `ready` or beyond,
@@ -235,50 +220,48 @@ fn measure<
     limit: f32,
     first: u32,
     mut worst: Worst,
-    mut room: Room,
+    mut size: f32,
 ) -> (u32, Worst, f32) {
     // One comparison checks both bounds.
     let vertices = surface.len() as u32;
     let ready = if ready < vertices { ready } else { vertices };
-    let table = Table { surface, ready, limit, least: room.least };
+    let table = Table { surface, ready, limit };
     let mut row = first;
     let (Some(metric), Some(corners)) = (metrics.first(), triangles.first()) else {
-        return (row, worst, room.sum);
+        return (row, worst, size);
     };
     let Some(mut before) = table.before::<I, CORNERS>(metric, corners, worst.squared) else {
-        return (row, worst, room.sum);
+        return (row, worst, size);
     };
     // Two at a time, which saves moves of the state between them.
     let (pairs, last_metric) = metrics.as_chunks::<2>();
     let (pairs_of_corners, last_corners) = triangles.as_chunks::<2>();
     for ([m0, m1], [t0, t1]) in pairs.iter().zip(pairs_of_corners) {
         let next = table.next::<I, M, CORNERS, UNIFORM>(before, m0, t0, row, &mut worst);
-        let Some(next) = next else { return (row, worst, room.sum) };
-        room.sum += next.room;
+        let Some(next) = next else { return (row, worst, size) };
+        size += next.square;
         let next =
             table.next::<I, M, CORNERS, UNIFORM>(next, m1, t1, row.wrapping_add(1), &mut worst);
-        let Some(next) = next else { return (row.wrapping_add(1), worst, room.sum) };
-        room.sum += next.room;
+        let Some(next) = next else { return (row.wrapping_add(1), worst, size) };
+        size += next.square;
         before = next;
         row = row.wrapping_add(2);
     }
     for (metric, corners) in last_metric.iter().zip(last_corners) {
         let next = table.next::<I, M, CORNERS, UNIFORM>(before, metric, corners, row, &mut worst);
         let Some(next) = next else { break };
-        room.sum += next.room;
+        size += next.square;
         before = next;
         row = row.wrapping_add(1);
     }
-    (row, worst, room.sum)
+    (row, worst, size)
 }
 
-/// The surface to measure: vertices below row `ready`, no triangle beyond `limit`, a square; `least` is
-/// that of [`Room`].
+/// The surface to measure: vertices below row `ready`, no triangle beyond `limit`, a square.
 struct Table<'a, V: ?Sized> {
     surface: &'a V,
     ready: u32,
     limit: f32,
-    least: f32,
 }
 
 impl<V: VertexTable + ?Sized> Table<'_, V> {
@@ -299,7 +282,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let left = largest * rest - edge.length_squared();
         // A NaN fails the quick check, so that `look_closer` measures the triangle.
         let edge = if left > 0.0 { edge } else { Vec3::NAN };
-        Some(Before { centre, third: centre, edge, left, room: 0.0 })
+        Some(Before { centre, third: centre, edge, left, square: 0.0 })
     }
 
     /// Measures one triangle.
@@ -362,11 +345,10 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let third = self.corner::<I, CORNERS>(corners, 2)?;
         let edge = third - centre;
         let square = edge.length_squared();
-        let (left_second, room) =
-            (largest * rest_second - square, square - self.least * rest_second);
+        let left_second = largest * rest_second - square;
         let now = Edges { first, second: edge };
         let is_within = M::is_within(left, left_second, largest * rest_between, now);
-        is_within.then_some(Before { centre, third, edge, left: left_second, room })
+        is_within.then_some(Before { centre, third, edge, left: left_second, square })
     }
 
     /// Raises `worst` if a triangle is stretched more; `None` beyond the limit.
@@ -394,11 +376,10 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         }
         let [.., rest_second] = metric.squares;
         let square = now.second.length_squared();
-        let (left, room) =
-            (worst.squared * rest_second - square, square - self.least * rest_second);
+        let left = worst.squared * rest_second - square;
         // The triangle is within the largest now, so a value below 0 is rounding.
         let left = if left > 0.0 { left } else { 0.0 };
-        Some((Before { centre, third, edge: now.second, left, room }, worst))
+        Some((Before { centre, third, edge: now.second, left, square }, worst))
     }
 
     /// Positions of a triangle's first two corners; `None` unless both rows are below `ready`.

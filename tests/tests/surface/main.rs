@@ -1,5 +1,6 @@
 //! Surfaces that move: frames, stretch, modes, and the frames that are refused.
 
+mod as_configured;
 mod facts;
 mod frames;
 mod memory;

@@ -5,7 +5,7 @@
 
 use glam::Vec4;
 
-use super::{Before, Measure, MetricBits, Room, Table};
+use super::{Before, Measure, MetricBits, Table};
 use crate::math::vec3x4::Vec3x4;
 use crate::stretch::kernel::Worst;
 use crate::surface::VertexTable;
@@ -81,7 +81,7 @@ impl Last {
 }
 
 impl<V: VertexTable + ?Sized> Table<'_, V> {
-    /// The room of each of four triangles, if all of them are certainly not stretched beyond `sqrt(largest)`.
+    /// The square of the second edge of each of four triangles, if all of them are certainly not stretched beyond `sqrt(largest)`.
     #[inline(always)]
     fn pass_four<M: Measure>(&self, four: &Four, largest: f32) -> Option<[f32; 4]> {
         let at = |row| self.surface.position(row);
@@ -97,7 +97,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         if within & left.cmpgt(Vec4::ZERO).bitmask() != 0b1111 {
             return None;
         }
-        Some((square - Vec4::splat(self.least) * rest).to_array())
+        Some(square.to_array())
     }
 
     /// Checks four triangles at a time, up to the first four that do not all pass. Returns how many fours passed.
@@ -115,9 +115,9 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let (mut edge, mut total, mut passed) = (*last, *sum, 0);
         for (metrics, triangles) in metrics.iter().zip(triangles) {
             let Some((four, next)) = edge.next::<I, CORNERS>(metrics, triangles) else { break };
-            let Some(rooms) = self.pass_four::<M>(&four, largest) else { break };
-            for room in rooms {
-                total += room;
+            let Some(squares) = self.pass_four::<M>(&four, largest) else { break };
+            for square in squares {
+                total += square;
             }
             edge = next;
             passed += 1;
@@ -133,7 +133,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let third = self.surface.position(last.third)?;
         let edge = third - centre;
         let left = largest * last.rest - edge.length_squared();
-        Some(Before { centre, third, edge, left, room: 0.0 })
+        Some(Before { centre, third, edge, left, square: 0.0 })
     }
 }
 
@@ -152,15 +152,15 @@ pub(super) fn measure<
     limit: f32,
     first: u32,
     mut worst: Worst,
-    mut room: Room,
+    mut size: f32,
 ) -> (u32, Worst, f32) {
-    let table = Table { surface, ready: surface.len() as u32, limit, least: room.least };
+    let table = Table { surface, ready: surface.len() as u32, limit };
     let mut row = first;
     let start = metrics.first().zip(triangles.first()).and_then(|(metric, corners)| {
         let before = table.before::<I, CORNERS>(metric, corners, worst.squared)?;
         Some((before, Last::before::<I, CORNERS>(metric, corners)?))
     });
-    let Some((before, mut last)) = start else { return (row, worst, room.sum) };
+    let Some((before, mut last)) = start else { return (row, worst, size) };
     // The state before `row` where the row-by-row check was last; elsewhere it follows from `last`.
     let mut before = Some(before);
     while !metrics.is_empty() {
@@ -169,7 +169,7 @@ pub(super) fn measure<
             triangles,
             worst.squared,
             &mut last,
-            &mut room.sum,
+            &mut size,
         );
         if passed > 0 {
             before = None;
@@ -181,8 +181,8 @@ pub(super) fn measure<
         let Some(mut state) = before.or_else(|| table.after(last, worst.squared)) else { break };
         for (metric, corners) in metrics.iter().zip(triangles).take(4) {
             let next = table.next::<I, M, CORNERS, true>(state, metric, corners, row, &mut worst);
-            let Some(next) = next else { return (row, worst, room.sum) };
-            room.sum += next.room;
+            let Some(next) = next else { return (row, worst, size) };
+            size += next.square;
             state = next;
             row = row.wrapping_add(1);
         }
@@ -195,7 +195,7 @@ pub(super) fn measure<
         (last, before) = (next, Some(state));
         (metrics, triangles) = (rest, others);
     }
-    (row, worst, room.sum)
+    (row, worst, size)
 }
 
 #[cfg(test)]
@@ -276,13 +276,13 @@ mod tests {
         let (triangles, _) = tree.sections().triangles.as_chunks::<CORNERS>();
         let (metrics, triangles) = (&metrics[range.clone()], &triangles[range.clone()]);
         let (first, limit) = (range.start as u32, squared_limit(tree.stretch()));
-        let room = Room { least: 0.25, sum: 1.0 };
+        let size = 1.0;
         let wide = measure::<I, [Vec3], M, _, CORNERS>(
-            surface, metrics, triangles, limit, first, worst, room,
+            surface, metrics, triangles, limit, first, worst, size,
         );
         let ready = surface.len() as u32;
         let narrow = rows::measure::<I, [Vec3], M, _, CORNERS, true>(
-            surface, metrics, triangles, ready, limit, first, worst, room,
+            surface, metrics, triangles, ready, limit, first, worst, size,
         );
         let bits = |(row, worst, sum): (u32, Worst, f32)| {
             (row, worst.squared.to_bits(), worst.triangle, sum.to_bits())
