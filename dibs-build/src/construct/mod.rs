@@ -109,13 +109,18 @@ impl<'a> Constructor<'a> {
     fn cluster(
         &self,
         section: &Section,
-        around: Option<&Section>,
+        around: Option<(&Section, Pin)>,
         start: u32,
         depth: u32,
     ) -> Result<Cluster, BuildError> {
         let mut searches = self.take_searches();
-        searches.enter(section, around);
-        let pin = self.pin(section, &mut searches, start);
+        searches.enter(section, around.map(|(around, _)| around));
+        let mut pin = self.pin(section, &mut searches, start);
+        if let Some((_, whole)) = around
+            && !pin.radius.is_finite()
+        {
+            pin = whole;
+        }
         if section.triangles.len() <= self.leaf_triangles {
             self.give_back(searches);
             return self.leaves(section, pin, depth);
@@ -132,8 +137,8 @@ impl<'a> Constructor<'a> {
         });
         self.give_back(searches);
         let big = section.triangles.len() > PARALLEL_ABOVE;
-        let build_left = || self.cluster(&left, Some(section), borders[0], depth + 1);
-        let build_right = || self.cluster(&right, Some(section), borders[1], depth + 1);
+        let build_left = || self.cluster(&left, Some((section, pin)), borders[0], depth + 1);
+        let build_right = || self.cluster(&right, Some((section, pin)), borders[1], depth + 1);
         let (left, right) =
             if big { rayon::join(build_left, build_right) } else { (build_left(), build_right()) };
         let content = Content::Inner(vec![left?, right?]);
@@ -160,7 +165,7 @@ impl<'a> Constructor<'a> {
         } else {
             let leaves = parts.into_iter().map(|part| {
                 let part = Section::new(mesh, part);
-                self.cluster(&part, Some(section), part.vertices[0], depth + 1)
+                self.cluster(&part, Some((section, pin)), part.vertices[0], depth + 1)
             });
             Content::Inner(leaves.collect::<Result<_, _>>()?)
         };

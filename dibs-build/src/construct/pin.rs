@@ -26,9 +26,14 @@ pub(crate) fn geodesic_centre(
     searches: &mut Searches,
     start: u32,
 ) -> Pin {
-    let first = searches.search_other(surface, section, start).vertex;
-    let second = searches.search_seed(0, surface, section, first).vertex;
-    searches.search_seed(1, surface, section, second);
+    let first = searches.search_other(surface, section, start);
+    let second = searches.search_seed(0, surface, section, first.vertex);
+    searches.search_seed(1, surface, section, second.vertex);
+    let first = first.vertex;
+    if second.reached < section.vertices.len() {
+        // Its parts meet only far off: there is no sphere of its own.
+        return Pin { vertex: first, radius: f64::INFINITY };
+    }
     if section.vertices.len() <= TRY_ALL {
         return best_of_all(surface, section, searches);
     }

@@ -29,6 +29,12 @@ pub(crate) struct Surface<'a> {
     pub restricted: bool,
 }
 
+/// Most arcs, for each vertex of a section, that a search may look at for paths outside the section around it. A section
+/// whose parts only meet farther off keeps the sphere of the section around: where triangles are connected at random most
+/// sections are of that kind, and each would search the whole mesh.
+const ROUNDABOUT: usize = 1024;
+const ROUNDABOUT_LEAST: usize = 16_384;
+
 /// Memory of one thread's searches.
 #[derive(Debug)]
 pub(crate) struct Searches {
@@ -47,12 +53,19 @@ struct Members {
     section: u32,
     /// The number of the section around it; zero for the whole mesh.
     around: u32,
+    /// The vertices of the section and of the section around it, in ascending order.
+    lists: [Vec<u32>; 2],
 }
 
 impl Searches {
     pub fn new(vertices: usize) -> Self {
         Self {
-            members: Members { latest: vec![0; vertices], section: 0, around: 0 },
+            members: Members {
+                latest: vec![0; vertices],
+                section: 0,
+                around: 0,
+                lists: Default::default(),
+            },
             seeds: [Distances::new(vertices), Distances::new(vertices)],
             other: Distances::new(vertices),
         }
@@ -64,6 +77,10 @@ impl Searches {
         let members = &mut self.members;
         members.section += 2;
         members.around = if around.is_some() { members.section - 1 } else { 0 };
+        let [inside, outside] = &mut members.lists;
+        inside.clone_from(&section.vertices);
+        outside.clear();
+        outside.extend(around.iter().flat_map(|around| &around.vertices));
         for &v in around.iter().flat_map(|around| &around.vertices) {
             members.latest[v as usize] = members.around;
         }
@@ -103,15 +120,22 @@ impl Members {
         source: u32,
     ) -> Farthest {
         let latest = |v: u32| self.latest[v as usize];
-        let mut search = |least| {
-            let (graph, wanted) = (surface.graph, section.vertices.len());
+        let wanted = section.vertices.len();
+        let mut search = |least: u32, only: Option<&[u32]>, most| {
+            let graph = surface.graph;
             let is_wanted = |v| latest(v) == self.section;
-            distances.search(graph, source, wanted, is_wanted, |v| latest(v) >= least)
+            distances.search(graph, source, wanted, is_wanted, |v| latest(v) >= least, only, most)
         };
         if surface.restricted {
-            return search(self.section);
+            return search(self.section, Some(&self.lists[0]), usize::MAX);
         }
-        let farthest = search(self.around);
-        if farthest.reached == section.vertices.len() { farthest } else { search(0) }
+        if self.around == 0 {
+            return search(0, None, usize::MAX);
+        }
+        let farthest = search(self.around, Some(&self.lists[1]), usize::MAX);
+        if farthest.reached == wanted {
+            return farthest;
+        }
+        search(0, None, ROUNDABOUT * wanted + ROUNDABOUT_LEAST)
     }
 }

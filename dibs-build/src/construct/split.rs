@@ -20,7 +20,9 @@ pub(crate) fn by_geodesic(
     even: bool,
 ) -> [Vec<u32>; 2] {
     let [first, second] = &searches.seeds;
-    let nearer = |v: u32| first.get(v) - second.get(v);
+    // Vertices that no seed reached go to neither; an infinite distance must not make a NaN.
+    let reached = |distance: f64| distance.min(f64::from(f32::MAX));
+    let nearer = |v: u32| reached(first.get(v)) - reached(second.get(v));
     let key = |t: u32| -> f64 { surface.mesh.triangles[t as usize].into_iter().map(nearer).sum() };
     let keyed = section.triangles.iter().map(|&t| (key(t), t)).collect();
     let share = if even { 0.5 } else { LEAST_SHARE };

@@ -163,10 +163,8 @@ impl Unfolding<'_> {
         let [(a, at_a), (b, at_b)] = window.edge;
         let topology = self.topology;
         self.crossed.push(([at_a, at_b], self.shares.share(window.triangle)));
-        for next in topology.across(self.mesh, window.triangle, a, b) {
-            if self.flat[next as usize] {
-                continue;
-            }
+        let next = topology.across(self.mesh, window.triangle, a, b);
+        if let Some(next) = next.filter(|&next| !self.flat[next as usize]) {
             let apex = topology.apex(self.mesh, next, a, b);
             let (along, to_apex) = (self.edge(a, b), self.edge(a, apex));
             let length = along.length();

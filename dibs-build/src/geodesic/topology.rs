@@ -7,6 +7,8 @@ use crate::Mesh;
 pub(crate) struct Topology {
     start: Vec<u32>,
     around: Vec<u32>,
+    /// Across from each corner of each triangle.
+    opposite: Vec<[u32; 3]>,
 }
 
 impl Topology {
@@ -26,7 +28,7 @@ impl Topology {
                 next[corner as usize] += 1;
             }
         }
-        Self { start, around }
+        Self { start, around, opposite: opposite(mesh) }
     }
 
     /// Triangles that use a vertex.
@@ -53,15 +55,35 @@ impl Topology {
         corners.into_iter().find(|&v| v != a && v != b).unwrap_or(corners[0])
     }
 
-    /// The other triangles that share the edge `a`-`b` with a triangle.
-    pub fn across<'a>(
-        &'a self,
-        mesh: &'a Mesh,
-        triangle: u32,
-        a: u32,
-        b: u32,
-    ) -> impl Iterator<Item = u32> + 'a {
-        let shares = move |&t: &u32| t != triangle && mesh.triangles[t as usize].contains(&b);
-        self.triangles_at(a).iter().copied().filter(shares)
+    /// The triangle across an edge of exactly two triangles; `None` at a border, and at an edge of more: no chord crosses
+    /// that, since `n` triangles at an edge have `n^2` chords.
+    pub fn across(&self, mesh: &Mesh, triangle: u32, a: u32, b: u32) -> Option<u32> {
+        let corners = mesh.triangles[triangle as usize];
+        let edge = corners.into_iter().position(|v| v != a && v != b)?;
+        let other = self.opposite[triangle as usize][edge];
+        (other != NONE).then_some(other)
     }
+}
+
+/// No triangle.
+const NONE: u32 = u32::MAX;
+
+/// For each corner of each triangle, the other triangle at the edge across from it where there is exactly one.
+fn opposite(mesh: &Mesh) -> Vec<[u32; 3]> {
+    let ends = |[a, b, c]: [u32; 3]| [(b, c), (c, a), (a, b)];
+    let mut edges: Vec<((u32, u32), u32, u8)> = Vec::with_capacity(3 * mesh.triangles.len());
+    for (triangle, &corners) in (0..).zip(&mesh.triangles) {
+        for (corner, (from, to)) in (0..).zip(ends(corners)) {
+            edges.push(((from.min(to), from.max(to)), triangle, corner));
+        }
+    }
+    edges.sort_unstable();
+    let mut opposite = vec![[NONE; 3]; mesh.triangles.len()];
+    for users in edges.chunk_by(|one, other| one.0 == other.0) {
+        if let &[(_, one, at), (_, other, there)] = users {
+            opposite[one as usize][usize::from(at)] = other;
+            opposite[other as usize][usize::from(there)] = one;
+        }
+    }
+    opposite
 }
