@@ -131,6 +131,8 @@ fn spheres_cover_their_sections_up_to_the_limit() {
 /// stretches every triangle to its limit.
 #[test]
 fn spheres_cover_their_sections_up_to_each_triangles_limit() {
+    /// The builder raises lower limits to what the check can tell from the rest shape.
+    const LEAST: f32 = 1.02;
     let mesh = heart(320);
     let mut rng = Rng::with_seed(12);
     let mut narrowest = f64::INFINITY;
@@ -140,7 +142,7 @@ fn spheres_cover_their_sections_up_to_each_triangles_limit() {
         let of = |moved: &[Vec3], t: usize| stretch::of_triangle(&mesh, moved, t, kind);
         let triangles = 0..mesh.triangles.len();
         let full = deformation.apply(&mesh, kind, 2.5, &mut rng);
-        let needed = triangles.clone().map(|t| of(&full, t).max(1.0) as f32 * 1.0001).collect();
+        let needed = triangles.clone().map(|t| (of(&full, t) as f32 * 1.0001).max(LEAST)).collect();
         let random = triangles.clone().map(|_| 1.05 + rng.f32() * rng.f32() * 2.0).collect();
         for limits in [needed, random] {
             let limits: Vec<f32> = limits;
