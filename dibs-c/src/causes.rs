@@ -2,7 +2,7 @@
 
 use dibs_nostd::constraint::GainError;
 use dibs_nostd::failsafe::{AcknowledgeError, LimitError};
-use dibs_nostd::wire::{PacketError, StreamError};
+use dibs_nostd::wire::{Event, PacketError, StreamError};
 use dibs_nostd::{
     CorruptTreeError, FormatError, QueryError, ReceiveError, StretchError, ToolError, Unavailable,
 };
@@ -95,10 +95,14 @@ impl From<ReceiveError> for dibs_code {
             }
             ReceiveError::Packet(PacketError::Version { .. }) => Self::PacketVersion,
             ReceiveError::Packet(_) => Self::PacketForm,
-            ReceiveError::WrongMesh { .. } => Self::PacketMesh,
+            ReceiveError::WrongMesh { .. } | ReceiveError::OtherSurface { .. } => Self::PacketMesh,
             ReceiveError::Forged { .. } => Self::PacketForged,
             ReceiveError::Stale { .. } => Self::PacketStale,
-            ReceiveError::Unexpected { .. } => Self::PacketUnexpected,
+            ReceiveError::Refused { cause, .. }
+            | ReceiveError::Unverifiable { cause: Some(cause), .. } => cause.into(),
+            ReceiveError::Unexpected { .. } | ReceiveError::Unverifiable { .. } => {
+                Self::PacketUnexpected
+            }
             ReceiveError::Busy { .. } => Self::PacketBusy,
             ReceiveError::Base { .. } => Self::PacketBase,
             ReceiveError::NotReady { .. } => Self::PacketNotReady,
@@ -110,6 +114,26 @@ impl From<ReceiveError> for dibs_code {
             ReceiveError::Digest { .. } => Self::PacketDigest,
             ReceiveError::Stretch(error) => error.into(),
             _ => Self::PacketRefused,
+        }
+    }
+}
+
+/// The cause of packets of a frame that was refused before.
+impl From<Event> for dibs_code {
+    fn from(cause: Event) -> Self {
+        match cause {
+            Event::WrongMesh => Self::PacketMesh,
+            Event::Forged => Self::PacketForged,
+            Event::Stale => Self::PacketStale,
+            Event::Busy => Self::PacketBusy,
+            Event::Base => Self::PacketBase,
+            Event::RowCount => Self::PacketRows,
+            Event::Encoding => Self::PacketEncoding,
+            Event::Digest => Self::PacketDigest,
+            Event::Stretch => Self::StretchExceeded,
+            Event::Shrunk => Self::Shrunk,
+            Event::TooFast => Self::TooFast,
+            _ => Self::PacketUnexpected,
         }
     }
 }
@@ -132,6 +156,7 @@ impl From<LimitError> for dibs_code {
             LimitError::Order { .. } => Self::LimitOrder,
             LimitError::Speed { .. } => Self::LimitSpeed,
             LimitError::Recovery { .. } => Self::LimitRecovery,
+            LimitError::Untrippable { .. } => Self::LimitUntrippable,
             _ => Self::LimitTooLong,
         }
     }

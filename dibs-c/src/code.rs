@@ -76,7 +76,7 @@ pub enum dibs_code {
     LinkLost = 302,
     /// No heartbeat came for longer than allowed.
     HeartbeatLost = 303,
-    /// More frames were refused or damaged than allowed.
+    /// More frames were refused or abandoned than allowed.
     Rejections = 304,
     /// The surface was longer on its way than allowed.
     Delayed = 305,
@@ -146,6 +146,8 @@ pub enum dibs_code {
     LimitRecovery = 504,
     /// The acknowledgement came before the machine waited for it.
     Acknowledge = 505,
+    /// A limit is so high that its input never exceeds it.
+    LimitUntrippable = 506,
 }
 
 impl dibs_code {
@@ -229,6 +231,7 @@ impl dibs_code {
         Self::LimitSpeed,
         Self::LimitRecovery,
         Self::Acknowledge,
+        Self::LimitUntrippable,
     ];
 
     /// The code of a number from C.
@@ -273,7 +276,7 @@ impl dibs_code {
             Self::Stale => c"the surface is older than allowed",
             Self::LinkLost => c"no good packet came for longer than allowed",
             Self::HeartbeatLost => c"no heartbeat came for longer than allowed",
-            Self::Rejections => c"more frames were refused or damaged than allowed",
+            Self::Rejections => c"more frames were refused or abandoned than allowed",
             Self::Delayed => c"the surface was longer on its way than allowed",
             Self::SourceStale => c"the surface was older than allowed when it was sent",
             Self::Forgeries => c"more packets were forged than allowed",
@@ -308,6 +311,7 @@ impl dibs_code {
             Self::LimitSpeed => c"the tissue's speed is negative or not finite",
             Self::LimitRecovery => c"recovery needs at least one frame",
             Self::Acknowledge => c"the acknowledgement came too early",
+            Self::LimitUntrippable => c"a limit can never be exceeded",
         }
     }
 }

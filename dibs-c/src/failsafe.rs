@@ -75,18 +75,20 @@ pub struct dibs_limits {
     pub silence: dibs_watch,
     /// Time since the last heartbeat.
     pub heartbeat: dibs_watch,
-    /// Frames refused or damaged since the last one was published.
+    /// Frames refused or abandoned since the last one was published.
     pub rejections: dibs_watch,
     /// Time that the published frame was on its way.
     pub transit: dibs_watch,
     /// Age of the published frame when it was sent.
     pub source_age: dibs_watch,
-    /// Forged packets since the last frame was published.
+    /// Forged packets, of which 10 are forgotten each second; the limits are below 1,000.
     pub forgeries: dibs_watch,
     /// Largest speed of any point of the tissue, in mm per ms (m/s); at least 0.
     pub tissue_speed: f32,
     /// Frames in a row that recover: 1 to 65,535.
     pub recovery_frames: u32,
+    /// Steps in a row with every input within its first limit, before the one that recovers.
+    pub dwell: u32,
     /// 0 to leave the safe state by an acknowledgement alone; otherwise without one.
     pub automatic: u32,
 }
@@ -104,7 +106,8 @@ impl TryFrom<dibs_limits> for Limits {
             .rejections(given.rejections.try_into()?)
             .transit(given.transit.try_into()?)
             .source_age(given.source_age.try_into()?)
-            .forgeries(given.forgeries.try_into()?);
+            .forgeries(given.forgeries.try_into()?)?
+            .dwell(given.dwell);
         Ok(if given.automatic == 0 { limits } else { limits.automatic() })
     }
 }
@@ -115,7 +118,7 @@ impl TryFrom<dibs_limits> for Limits {
 /// @param size      Bytes of the storage.
 /// @param limits    Its limits.
 /// @param failsafe  Receives the machine's address.
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`, or a misuse.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`, `DIBS_CODE_LIMIT_UNTRIPPABLE`, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_failsafe_init(
     storage: *mut c_void,

@@ -70,9 +70,9 @@ pub struct dibs_link {
     pub silence: u32,
     /// Time since the last heartbeat.
     pub heartbeat: u32,
-    /// Frames refused or damaged since the last one was published.
+    /// Frames refused or abandoned since the last one was published.
     pub rejections: u32,
-    /// Packets without a genuine tag since then.
+    /// Packets without a genuine tag, less 10 for each second.
     pub forgeries: u32,
     /// Time that the published frame was on its way, at most.
     pub transit: u32,

@@ -1,6 +1,6 @@
 //! The bus's end of a surface: from packets to published frames.
 
-use core::ffi::c_void;
+use core::ffi::{c_char, c_void};
 
 use bytemuck::AnyBitPattern;
 use dibs_nostd::wire::{Deframer, Event, NoMac, encode_status, enframe, framed_bytes};
@@ -253,7 +253,7 @@ pub extern "C" fn dibs_receiver_advance(
     })
 }
 
-/// Writes the receiver's status for the sender: every 100 ms or so, and when a hello asks for it.
+/// Writes the receiver's status for the sender: every 100 ms or so, and as soon as a hello asks for it.
 ///
 /// @param receiver  The receiver.
 /// @param now       The receiver's clock, in ms.
@@ -330,8 +330,18 @@ pub const DIBS_EVENTS: usize = 26;
 
 const _: () = assert!(Event::ALL.len() == DIBS_EVENTS);
 
-/// The count of each event since the start, in the order of docs/wire.md: published, abandoned, duplicate,
-/// heartbeat, and from the fifth on rejections by their cause.
+/// Name of an event, in English: published, abandoned, duplicate, heartbeat, and from the fifth on rejections by their
+/// cause.
+///
+/// @param event  Its place among the counters.
+/// @return A static text; never null, also for a number that is no event.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_event_name(event: u32) -> *const c_char {
+    let event = Event::ALL.into_iter().find(|known| *known as u32 == event);
+    event.map_or(c"no event", Event::c_name).as_ptr()
+}
+
+/// The count of each event since the start, in the order of `dibs_event_name`.
 ///
 /// @param receiver  The receiver.
 /// @param counters  Room for `DIBS_EVENTS` numbers.

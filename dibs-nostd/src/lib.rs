@@ -98,7 +98,7 @@ pub use tool::{ACCURACY, AxisPair, Capsule, MAX_COORDINATE, Sphere, Tool, ToolEr
 #[doc(hidden)]
 pub use tree::format;
 pub use tree::{
-    CorruptTreeError, FormatError, Index, PathKind, Scrub, Tree, TreeBytes, TriangleRow,
-    VertexNumber,
+    CorruptTreeError, FormatError, Index, PathKind, Scrub, SurfaceFacts, Tree, TreeBytes,
+    TriangleRow, VertexNumber,
 };
 pub use unavailable::{QueryError, Unavailable};

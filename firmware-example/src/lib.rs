@@ -36,7 +36,7 @@ pub use fingerprint::fingerprint;
 pub use instrument::instrument;
 pub use receiver::{MTU, Receiver, STATUS_FRAMED, STATUS_MTU};
 pub use status::BusStatus;
-pub use trust::Trust;
+pub use trust::{DWELL, Trust};
 pub use upkeep::Upkeep;
 
 // The surface: `build.rs` emitted its tree.

@@ -3,15 +3,20 @@
 use dibs_nostd::Millis;
 use dibs_nostd::failsafe::{LimitError, Limits, Watch};
 
-/// Frames refused or damaged in a row after which the state is degraded, and after which it is safe.
+use crate::TICK_RATE;
+
+/// Frames refused or abandoned in a row after which the state is degraded, and after which it is safe.
 const REJECTIONS: (u32, u32) = (10, 30);
 
-/// Forged packets between two published frames. This bus has no tags and so no forgeries; a receiver with a key watches
-/// the same counter.
+/// Forged packets, of which ten are forgotten each second. This bus has no tags and so no forgeries; a receiver with a
+/// key watches the same number.
 const FORGERIES: (u32, u32) = (0, 100);
 
 /// Frames in a row that recover. Nobody acknowledges here; a real robot leaves `automatic` out.
 const RECOVERY_FRAMES: u16 = 1;
+
+/// Ticks in a row that must be clear before the state improves.
+pub const DWELL: u32 = TICK_RATE / 5;
 
 /// The limits of one bus. A pair is the time in ms after which the state is degraded, and after which the output
 /// is safe.
@@ -76,6 +81,7 @@ impl Trust {
             .heartbeat(watch!(self.heartbeat))
             .rejections(tri!(Watch::count(REJECTIONS.0, REJECTIONS.1)));
         let limits = limits.transit(watch!(self.transit)).source_age(watch!(self.source_age));
-        Ok(limits.forgeries(tri!(Watch::count(FORGERIES.0, FORGERIES.1))).automatic())
+        let forgeries = tri!(Watch::count(FORGERIES.0, FORGERIES.1));
+        Ok(tri!(limits.forgeries(forgeries)).dwell(DWELL).automatic())
     }
 }

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use controller::surface::{self, continuous::Surface};
 use controller::telemetry::{Tick, cause_code};
-use controller::{BusStatus, Control, MTU, Receiver, Trust};
+use controller::{BusStatus, Control, DWELL, MTU, Receiver, Trust};
 use dibs_build::{Builder, generate};
 use dibs_nostd::failsafe::State;
 use dibs_nostd::glam::Vec3;
@@ -82,7 +82,7 @@ impl Sender {
         encoder = encoder.with_freshness(freshness);
         let (mut packet, mut line, mut all) = ([0; MTU], [0; framed_bytes(MTU)], Vec::new());
         let mut beat = [0; 64];
-        let beat = encode_heartbeat(&id, epoch, &NoMac, &mut beat);
+        let beat = encode_heartbeat(&id, epoch, None, &NoMac, &mut beat);
         all.extend_from_slice(enframe(beat, &mut line).expect("room"));
         while let Some(packet) = encoder.next_packet(&mut packet) {
             all.extend_from_slice(enframe(packet, &mut line).expect("room"));
@@ -164,6 +164,9 @@ fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
     };
 
     feed(&sender.bytes(1, control.now()), control.now());
+    for _ in 0..DWELL {
+        assert_eq!(control.tick(|| 0).state, State::Safe as u32, "for the dwell");
+    }
     let mut damaged = sender.bytes(2, control.now());
     damaged[9_000] ^= 4;
     feed(&damaged, control.now());
@@ -173,11 +176,12 @@ fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
 
     // The line is cut: two seconds later, to the tick, the output is safe.
     assert_eq!(tick.state, State::Nominal as u32);
-    let cut = tick.tick;
+    // The damaged frame's other packets were the last good ones.
+    let (cut, age) = (tick.tick, tick.age);
     let mut before = tick;
     for silence in 1..SILENCE_LIMIT + 500 {
         let tick = control.tick(|| 0);
-        assert_eq!((tick.tick, tick.age), (cut + silence, silence));
+        assert_eq!((tick.tick, tick.age), (cut + silence, age + silence));
         let expected = match silence {
             _ if silence <= SILENCE_WARNING => (State::Nominal, 0),
             _ if silence <= SILENCE_LIMIT => {
@@ -195,14 +199,17 @@ fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
         before = tick;
     }
 
-    // A fresh frame recovers.
+    // A fresh frame recovers, after the dwell.
     feed(&sender.bytes(3, control.now()), control.now());
+    for _ in 0..DWELL {
+        assert_eq!(control.tick(|| 0).state, State::Safe as u32);
+    }
     let tick = control.tick(|| 0);
     assert_eq!((tick.epoch, tick.state), (3, State::Nominal as u32));
 
     // Packets come, but never a whole frame: the surface grows old.
-    let (received, mut epoch) = (tick.tick, 4);
-    for age in 1..SURFACE_AGE_LIMIT + 100 {
+    let (received, mut epoch) = (tick.tick - tick.age, 4);
+    for age in tick.age + 1..SURFACE_AGE_LIMIT + 100 {
         if age % 500 == 0 {
             feed(&sender.bytes(epoch, control.now())[..2_000], control.now());
             feed(&[0], control.now()); // ends the packet that was cut
@@ -239,6 +246,10 @@ fn a_late_frame_an_old_one_and_a_row_of_refused_ones_make_the_output_safe() {
             receiver.byte(byte, control.now());
             while receiver.work() {}
         }
+        // The state gets worse at once, and better after the dwell.
+        for _ in 0..if is_damaged { 0 } else { DWELL } {
+            control.tick(|| 0);
+        }
         let tick = control.tick(|| 0);
         assert_eq!(tick.epoch == epoch, !is_damaged);
         (tick.state, tick.cause)
@@ -267,10 +278,11 @@ fn a_late_frame_an_old_one_and_a_row_of_refused_ones_make_the_output_safe() {
         }
     }
     assert_eq!(after(&echo(0), false), nominal);
-    for streak in 1..=31 {
+    // A damaged frame counts when the next one begins.
+    for streak in 1..=32 {
         let expected = match streak {
-            ..=10 => nominal,
-            11..=30 => (degraded, rejected),
+            ..=11 => nominal,
+            12..=31 => (degraded, rejected),
             _ => (safe, rejected),
         };
         assert_eq!(after(&echo(0), true), expected, "after {streak}");

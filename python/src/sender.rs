@@ -89,7 +89,7 @@ pub struct Sender {
 type Choices = (bool, Option<f32>, u32, Option<f64>, Option<u32>);
 
 /// `key`, `receiver`, `challenge`: of the packets' tags.
-type Tags = ([u8; 16], u32, Option<u32>);
+type Tags = ([u8; 16], u32, Option<u64>);
 
 #[pymethods]
 impl Sender {

@@ -83,7 +83,7 @@ class Streams(unittest.TestCase):
 
 KEY = bytes(range(16))
 RECEIVER = 3
-CHALLENGE = 0xC0FFEE
+CHALLENGE = 0x5EED_0000_00C0_FFEE
 TO_RECEIVER, TO_SENDER = b"dibs to receiver", b"dibs to sender"
 
 
@@ -94,10 +94,10 @@ def cmac(key, message):
     return code.finalize()
 
 
-def tag(message, direction, session):
+def tag(message, direction, session, challenge=CHALLENGE):
     """The tag of all bytes before it, as docs/wire.md has it under *Authenticity*."""
     label = bytes([1]) + direction + bytes([0]) + RECEIVER.to_bytes(4, "little") + (128).to_bytes(4, "big")
-    names = CHALLENGE.to_bytes(4, "little") + session.to_bytes(4, "little")
+    names = challenge.to_bytes(8, "little") + session.to_bytes(4, "little")
     return cmac(cmac(KEY, label), names + message)[:6]
 
 
@@ -123,11 +123,14 @@ class Tags(unittest.TestCase):
             self.assertFalse(sender.is_ready)
             sender.poll()
             hello, address = line.recvfrom(2_048)
-            self.assertEqual(hello[1], 8)
+            self.assertEqual((hello[1], len(hello)), (128 + 8, 48))
+            # The sender does not know the challenge yet.
+            self.assertEqual(hello[-10:-4], tag(hello[:-10], TO_RECEIVER, 7, challenge=0))
             for is_forged in [True, False]:
                 # Nothing is published yet, a whole frame is needed.
-                body = struct.pack("<HBBIIfIII", 0, 2, 0, 1, 0, 0, CHALLENGE, 0, *struct.unpack("<I", hello[22:26]))
-                status = bytes([3, 128 + 7, 0, 0]) + hello[4:8] + bytes(10) + body + bytes(8)
+                nonce, = struct.unpack("<Q", hello[22:30])
+                body = struct.pack("<HBBIIQQ", 0, 2, 0, 1, 0, nonce, CHALLENGE) + bytes(8)
+                status = bytes([4, 128 + 9, 0, 0]) + hello[4:8] + bytes(10) + body
                 status += bytes(6) if is_forged else tag(status, TO_SENDER, 0)
                 line.sendto(status + zlib.crc32(status).to_bytes(4, "little"), address)
                 time.sleep(0.05)

@@ -132,7 +132,7 @@ pub fn raw(
     first: u32,
     body: &[u8],
 ) -> Vec<u8> {
-    let mut packet = vec![3, kind];
+    let mut packet = vec![4, kind];
     packet.extend((session as u16).to_le_bytes());
     packet.extend(MESH.to_le_bytes());
     packet.extend(epoch.to_le_bytes());
@@ -149,11 +149,14 @@ pub fn raw(
 /// A begin packet of a float frame, written by the specification alone.
 pub fn raw_begin(session: u32, epoch: u32, content: u8, rows: u32, base: u32) -> Vec<u8> {
     let mut body = ((session >> 16) as u16).to_le_bytes().to_vec();
-    body.extend([0, 0, content]);
-    body.extend(&rows.to_le_bytes()[..3]);
-    body.extend(base.to_le_bytes());
-    body.extend([0; 24]);
-    raw(1, session, epoch, [0, 0], 0, &body)
+    let rows = &rows.to_le_bytes()[..3];
+    body.extend([0, 0, content, 0]);
+    body.extend(if content == 2 { &[0; 3] } else { rows });
+    body.extend([0; 3]);
+    body.extend(if content == 2 { rows } else { &[0; 3] });
+    body.extend([0; 21]);
+    let back = if content == 1 { epoch.wrapping_sub(base) as u16 } else { 0 };
+    raw(1, session, epoch, [back, 0], 0, &body)
 }
 
 /// The checksum in a packet.

@@ -12,7 +12,7 @@
 //!
 //! let mut buffer = [0; 64];
 //! let id = FrameId { mesh_id: 0xB0D1, session: 1, epoch: 1 };
-//! let packet = encode_heartbeat(&id, 1, &NoMac, &mut buffer);
+//! let packet = encode_heartbeat(&id, 1, None, &NoMac, &mut buffer);
 //! let mut injector = Injector::new(7);
 //! assert_eq!(injector.pass(packet), [packet]);
 //! let damaged = injector.inject(Fault::FlipTwo, packet).expect("any packet can be damaged");

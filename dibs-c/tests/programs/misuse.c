@@ -221,7 +221,7 @@ static void failsafe(void) {
     dibs_proximity found = {0};
     dibs_observation seen = {.query = 12345};
     const dibs_watch off = {DIBS_UNLIMITED, DIBS_UNLIMITED};
-    dibs_limits limits = {off, off, off, off, off, off, off, 0.1f, 1, 0};
+    dibs_limits limits = {off, off, off, off, off, off, off, 0.1f, 1, 0, 0};
     EXPECT(LIMIT_TOO_LONG, dibs_failsafe_init(failsafe_memory, sizeof failsafe_memory, &limits, &machine));
     limits.age = (dibs_watch){60, 20};
     EXPECT(LIMIT_ORDER, dibs_failsafe_init(failsafe_memory, sizeof failsafe_memory, &limits, &machine));
@@ -232,6 +232,9 @@ static void failsafe(void) {
     limits.tissue_speed = -1.0f;
     EXPECT(LIMIT_SPEED, dibs_failsafe_init(failsafe_memory, sizeof failsafe_memory, &limits, &machine));
     limits.tissue_speed = 0.1f;
+    limits.forgeries = (dibs_watch){0, 1000};
+    EXPECT(LIMIT_UNTRIPPABLE, dibs_failsafe_init(failsafe_memory, sizeof failsafe_memory, &limits, &machine));
+    limits.forgeries = off;
     EXPECT(OK, dibs_failsafe_init(failsafe_memory, sizeof failsafe_memory, &limits, &machine));
     EXPECT(ARGUMENT, dibs_failsafe_step(machine, &seen, &verdict));
     EXPECT(NULL, dibs_failsafe_step(machine, NULL, &verdict));

@@ -98,7 +98,7 @@ pub fn answers(built: &BuiltTree, events: &[Event]) -> Vec<String> {
         .expect("limits")
         .silence(watch(30, 100))
         .rejections(Watch::count(1, 10).expect("limits"));
-    let mut machine = FailSafe::new(limits.automatic());
+    let mut machine = FailSafe::new(limits.dwell(3).automatic());
     let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
     let wall = ForbiddenRegion::new(spring, 5.0).expect("a margin");
 

@@ -4,6 +4,7 @@ use super::reach::Reach;
 use super::{ModalSurface, Modes, WeightsError};
 use crate::stretch::{Arriving, Changed, Gate, StretchError, Verdict, farthest};
 use crate::surface::VertexTable;
+use crate::tree::SurfaceFacts;
 
 /// Admits weights within their ranges whose surface keeps to the stretch limit, and to a speed limit: the
 /// [`Gate`] of an [`Assembler`](crate::Assembler) of modal frames.
@@ -66,6 +67,10 @@ impl<G: Gate, const K: usize> Gate for ModalGate<'_, G, K> {
 
     fn weight_range(&self, mode: u32) -> Option<[f32; 2]> {
         self.modes.range(mode as usize)
+    }
+
+    fn surface_facts(&self) -> SurfaceFacts {
+        self.exact.surface_facts()
     }
 
     fn speed_limit(&self) -> f32 {

@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use super::{StretchError, measure_stretch};
 use crate::surface::{MeasuredStretch, Millis, TravelUnit, VertexTable};
-use crate::tree::{Index, Tree};
+use crate::tree::{Index, SurfaceFacts, Tree};
 
 /// The part of the published surface that a frame changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,6 +99,11 @@ pub trait Gate {
         None
     }
 
+    /// The surface that the gate is for; the default knows nothing of it.
+    fn surface_facts(&self) -> SurfaceFacts {
+        SurfaceFacts::default()
+    }
+
     /// The error (mm) of making the surface from the frame's rows: added to the frame's position error.
     fn position_error(&self) -> f32 {
         0.0
@@ -140,5 +145,9 @@ impl<I: Index> Gate for &Tree<'_, I> {
 
     fn travel_unit(&self) -> Option<TravelUnit> {
         Some(TravelUnit::of(self))
+    }
+
+    fn surface_facts(&self) -> SurfaceFacts {
+        (**self).surface_facts()
     }
 }

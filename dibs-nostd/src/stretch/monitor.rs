@@ -7,7 +7,7 @@ use super::pass::{ALL, Pass};
 use super::regions::region_rows;
 use super::{Arriving, Changed, Gate, StretchError, SurfaceLimits, Verdict, check_tables};
 use crate::surface::{Between, MeasuredStretch, REGIONS, TravelUnit, VertexTable};
-use crate::tree::{Index, Tree, TriangleRow};
+use crate::tree::{Index, SurfaceFacts, Tree, TriangleRow};
 
 /// Blocks of vertex rows, at most: they mark the rows that a partial frame moved.
 const BLOCKS: usize = 32;
@@ -292,6 +292,10 @@ impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
 
     fn travel_unit(&self) -> Option<TravelUnit> {
         Some(TravelUnit::of(self.tree))
+    }
+
+    fn surface_facts(&self) -> SurfaceFacts {
+        self.tree.surface_facts()
     }
 
     fn speed_limit(&self) -> f32 {

@@ -12,6 +12,7 @@ macro_rules! tri {
 
 mod adjacency;
 mod error;
+mod facts;
 pub mod format;
 mod header;
 mod index;
@@ -24,6 +25,7 @@ mod unit;
 mod validate;
 
 pub use error::FormatError;
+pub use facts::SurfaceFacts;
 pub use format::PathKind;
 pub use index::Index;
 pub use row::{TriangleRow, VertexNumber};
@@ -151,6 +153,13 @@ impl<'a, I: Index> Tree<'a, I> {
     #[must_use]
     pub const fn unit(&self) -> Option<Unit> {
         Unit::from_code(self.header.unit as u8)
+    }
+
+    /// The facts by which the ends of a bus compare their surfaces.
+    #[must_use]
+    pub const fn surface_facts(&self) -> SurfaceFacts {
+        let Header { vertices, triangles, .. } = self.header;
+        SurfaceFacts { unit: self.unit(), vertices, triangles }
     }
 
     /// Number of nodes: inner ones, leaves and the roots.

@@ -29,6 +29,7 @@ static const dibs_limits limits = {
     .forgeries = {0, 100},
     .tissue_speed = 0.001f,
     .recovery_frames = 1,
+    .dwell = TICK_RATE / 5,
     /* Nobody acknowledges here; a real robot leaves this out. */
     .automatic = 1,
 };

@@ -37,6 +37,7 @@ void bus_init(dibs_tree *tree, uint32_t vertices) {
         .forgeries = off,
         .tissue_speed = 0.1f,
         .recovery_frames = 2,
+        .dwell = 3,
         .automatic = 1};
     must(dibs_surface_init(surface_memory, sizeof surface_memory, vertices, &surface));
     must(dibs_receiver_init(receiver_memory, sizeof receiver_memory, surface, tree, &surface_limits, &receiver));

@@ -1,15 +1,17 @@
 //! Packets with tags: without the right key nothing is published; replays and forgeries are counted.
 
 use dibs_nostd::wire::{
-    AesCmac, Body, Counters, Encoding, Event, FrameEncoder, FrameId, Mac, NoMac, Packet, Status,
-    TAG_BYTES, WeightsEncoder, encode_heartbeat, encode_status,
+    AesCmac, Answer, Body, Counters, Encoding, Event, FrameEncoder, FrameId, Mac, NoMac, Packet,
+    TAG_BYTES, WeightsEncoder, encode_heartbeat, encode_hello, encode_status,
 };
-use dibs_nostd::{Assembler, FrameReader, Frames, Millis, Progress, ReceiveError, Unchecked};
+use dibs_nostd::{
+    Assembler, FrameReader, Frames, Millis, Progress, ReceiveError, SurfaceFacts, Unchecked,
+};
 use dibs_tests::bus::*;
 use proptest::prelude::*;
 
 const KEY: [u8; 16] = *b"0123456789abcdef";
-const CHALLENGE: u32 = 0x00C0_FFEE;
+const CHALLENGE: u64 = 0x5EED_0000_00C0_FFEE;
 const RECEIVER: u32 = 7;
 
 type Guarded = (Assembler<'static, Unchecked, N, AesCmac>, FrameReader<'static, N>);
@@ -103,8 +105,14 @@ fn without_key_and_challenge_nothing_is_published() {
         let (mut assembler, mut reader) = guarded();
         assert_eq!(give(&mut assembler, &packets[0]), Err(ReceiveError::Forged { epoch: 1 }));
         for packet in &packets[1..] {
-            assert_eq!(give(&mut assembler, packet), Err(ReceiveError::Unexpected { epoch: 1 }));
+            let refused = match Packet::decode(packet).unwrap().is_tagged() {
+                true => ReceiveError::Unverifiable { epoch: 1, cause: Some(Event::Forged) },
+                false => ReceiveError::Forged { epoch: 1 },
+            };
+            assert_eq!(give(&mut assembler, packet), Err(refused));
         }
+        assert_eq!(assembler.health().rejections, 0);
+        let before = assembler.counters().of(Event::Forged) as usize;
         // Forgeries within a genuine frame are refused too.
         let genuine = tagged(1, 1, &mac());
         give(&mut assembler, &genuine[0]).unwrap();
@@ -116,7 +124,7 @@ fn without_key_and_challenge_nothing_is_published() {
             give(&mut assembler, packet).unwrap();
         }
         assert_eq!(published(&mut reader).unwrap().0, 1);
-        assert_eq!(assembler.counters().of(Event::Forged) as usize, packets.len() + 1);
+        assert_eq!(assembler.counters().of(Event::Forged) as usize, packets.len() + before);
     }
     // A receiver without a key takes no tags.
     let (mut open, _) = bus();
@@ -171,9 +179,9 @@ fn the_whole_session_is_under_the_tag() {
 fn heartbeats_and_statuses_are_under_the_tag() {
     let (mut assembler, _) = guarded();
     let mut buffer = [0; 64];
-    let genuine = encode_heartbeat(&id(9), 1, &mac(), &mut buffer).to_vec();
-    let forged = encode_heartbeat(&id(9), 1, &NoMac, &mut buffer).to_vec();
-    let other = encode_heartbeat(&id(9), 1, &mac().with_challenge(1), &mut buffer).to_vec();
+    let genuine = encode_heartbeat(&id(9), 1, None, &mac(), &mut buffer).to_vec();
+    let forged = encode_heartbeat(&id(9), 1, None, &NoMac, &mut buffer).to_vec();
+    let other = encode_heartbeat(&id(9), 1, None, &mac().with_challenge(1), &mut buffer).to_vec();
     assert_eq!(genuine.len(), 48);
     for packet in [&forged, &other] {
         assert_eq!(assembler.accept(packet, Millis(0)), Err(ReceiveError::Forged { epoch: 9 }));
@@ -182,28 +190,70 @@ fn heartbeats_and_statuses_are_under_the_tag() {
     assert_eq!(assembler.accept(&genuine, Millis(0)), Err(ReceiveError::Stale { epoch: 9 }));
 
     let status = assembler.status(Millis(0), 1);
-    assert_eq!(status.challenge, CHALLENGE);
+    assert_eq!(status.answer, None);
     let packet = encode_status(MESH, &status, assembler.counters(), &mac(), &mut buffer).to_vec();
-    assert_eq!(packet.len(), 64, "two counters");
+    assert_eq!(packet.len(), 64, "four counters");
     let decoded = Packet::decode(&packet).unwrap();
     let Body::Status(report) = decoded.body else { panic!() };
-    assert_eq!((report.status, report.counters.len()), (status, 2));
+    assert_eq!((report.status, report.counters.len()), (status, 4));
     assert!(decoded.is_genuine(&mac(), 0));
     assert!(!decoded.is_genuine(&mac(), 1));
     assert!(!decoded.is_genuine(&NoMac, 0));
     assert!(!decoded.is_genuine(&AesCmac::new(&[0; 16], RECEIVER, CHALLENGE), 0));
-    let plain = Status { challenge: 0, ..status };
-    let plain = encode_status(MESH, &plain, &Counters::new(), &NoMac, &mut buffer).to_vec();
+    let plain = encode_status(MESH, &status, &Counters::new(), &NoMac, &mut buffer).to_vec();
     assert!(!Packet::decode(&plain).unwrap().is_genuine(&mac(), 0));
+}
+
+/// Only who has the key gets an answer, under the tag and the receiver's challenge, once for each hello.
+#[test]
+fn hellos_and_answers_are_under_the_tag() {
+    let (mut assembler, _) = guarded();
+    let mut buffer = [0; 64];
+    let nonce = 0xFEED_0000_0000_0001;
+    let other = AesCmac::new(b"0123456789abcdeF", RECEIVER, CHALLENGE);
+    let next = AesCmac::new(&KEY, RECEIVER + 1, CHALLENGE);
+    let forged = [
+        encode_hello(&id(9), nonce, &NoMac, &mut buffer).to_vec(),
+        encode_hello(&id(9), nonce, &other, &mut buffer).to_vec(),
+        encode_hello(&id(9), nonce, &next, &mut buffer).to_vec(),
+    ];
+    for hello in &forged {
+        assert_eq!(assembler.accept(hello, Millis(0)), Err(ReceiveError::Forged { epoch: 9 }));
+        assert_eq!(assembler.status(Millis(0), 1).answer, None);
+    }
+    // The sender knows no challenge yet, or an old one.
+    for known in [0, CHALLENGE, CHALLENGE - 1] {
+        let mac = mac().with_challenge(known);
+        let hello = encode_hello(&id(9), nonce ^ known, &mac, &mut buffer).to_vec();
+        assert_eq!(hello.len(), 48);
+        assert_eq!(assembler.accept(&hello, Millis(7)), Ok(Progress::Hello));
+        let status = assembler.status(Millis(7), 1);
+        let facts = SurfaceFacts { vertices: N as u32, ..SurfaceFacts::default() };
+        let answer = Answer { nonce: nonce ^ known, challenge: CHALLENGE, surface: facts };
+        assert_eq!(status.answer, Some(answer));
+        assert_eq!(assembler.status(Millis(7), 1).answer, None, "one answer a hello");
+        let packet = encode_status(MESH, &status, assembler.counters(), &mac, &mut buffer).to_vec();
+        assert_eq!(packet.len(), 64);
+        let decoded = Packet::decode(&packet).unwrap();
+        let Body::Status(report) = decoded.body else { panic!() };
+        assert_eq!(report.status, status);
+        assert!(!decoded.is_genuine(&NoMac, 0));
+        assert_eq!(decoded.is_genuine(&self::mac(), 0), known == CHALLENGE);
+    }
+    // A hello's tag is none of a frame's: kind and direction differ.
+    let hello = encode_hello(&id(9), nonce, &mac(), &mut buffer).to_vec();
+    let mut heartbeat = hello;
+    heartbeat[1] = 0x86;
+    assert!(assembler.accept(&reseal(heartbeat), Millis(0)).is_err());
+    assert_eq!(assembler.health().rejections, 0);
 }
 
 /// The challenge is the one of the MAC in use, by value or by reference; without a MAC it is 0.
 #[test]
-fn a_status_states_the_challenge_in_use() {
+fn the_challenge_is_that_of_the_mac() {
     assert_eq!(mac().challenge(), CHALLENGE);
     assert_eq!(<&AesCmac>::challenge(&&mac()), CHALLENGE);
     assert_eq!(NoMac.challenge(), 0);
-    assert_eq!(bus().0.status(Millis(0), 1).challenge, 0);
 }
 
 proptest! {

@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
+use dibs_nostd::BusHealth;
 use dibs_nostd::format::CRC;
 
 /// The page's assumptions: vertices of the heart, rows of a packet of 1,024 bytes without and with a tag, and rates.
@@ -29,6 +30,9 @@ fn arithmetic() -> String {
     let packets = f64::from(VERTICES.div_ceil(ROWS[0]) + 1) * FRAMES_A_SECOND * HOUR;
     let heartbeats = HEARTBEATS_A_SECOND * HOUR;
     let forgeries = FORGERIES_A_SECOND * HOUR;
+    // At this rate the receiver forgets as many as come; and no watch is set higher than the most that it remembers.
+    let slow = f64::from(BusHealth::FORGERIES_A_SECOND) * HOUR;
+    let most = f64::from(BusHealth::MOST_FORGERIES);
     let mut text = String::new();
     for (name, value, unit) in [
         ("chances an hour: packets of a frame", packets, ""),
@@ -43,10 +47,15 @@ fn arithmetic() -> String {
             " an hour",
         ),
         ("with a key, 10,000 forgeries a second: a false heartbeat", forgeries * tag, " an hour"),
-        ("with a key, until 500 forgeries trip the watch: the same", 500.0 * tag, " a trip"),
+        ("with a key, forgeries that never trip the watch: a row", slow * tag * digest, " an hour"),
+        ("with a key, forgeries that never trip the watch: heartbeat", slow * tag, " an hour"),
+        ("with a key, the most that a watch lets by at once: the same", most * tag, " a trip"),
     ] {
-        writeln!(text, "{name:<59}{value:.2e}{unit}").unwrap();
+        writeln!(text, "{name:<62}{value:.2e}{unit}").unwrap();
     }
+    let trip = most / (FORGERIES_A_SECOND - f64::from(BusHealth::FORGERIES_A_SECOND));
+    writeln!(text, "with a key, 10,000 forgeries a second: safe after at most     {trip:.2} s")
+        .unwrap();
     let one_in = ALLOWANCE_AN_HOUR.recip() * heartbeats * crc;
     let damaged = grouped(one_in.ceil() as u32);
     writeln!(text, "without a key, 1e-9 an hour: at most one heartbeat damaged in {damaged}")
@@ -60,7 +69,7 @@ fn the_rates_compare_with_the_allowance_as_the_page_says() {
     let text = arithmetic();
     let is_below = |name: &str| {
         let line = text.lines().find(|line| line.starts_with(name)).expect("a line");
-        let rate: f64 = line[59..].split(' ').next().unwrap().parse().unwrap();
+        let rate: f64 = line[62..].split(' ').next().unwrap().parse().unwrap();
         rate < ALLOWANCE_AN_HOUR
     };
     assert!(is_below("without a key, damage: a row is wrong"));
@@ -69,6 +78,9 @@ fn the_rates_compare_with_the_allowance_as_the_page_says() {
     assert!(is_below("with a key, damage: a heartbeat that was none"));
     assert!(!is_below("without a key, damage: a heartbeat that was none"));
     assert!(!is_below("with a key, 10,000 forgeries a second: a false heartbeat"));
+    assert!(is_below("with a key, forgeries that never trip the watch: a row"));
+    assert!(is_below("with a key, forgeries that never trip the watch: heartbeat"));
+    assert!(is_below("with a key, the most that a watch lets by at once: the same"));
 }
 
 /// The change of the checksum's remainder by each single flipped bit of a packet.

@@ -15,6 +15,13 @@ fn edit(packet: &[u8], at: usize, value: &[u8]) -> Vec<u8> {
     reseal(packet)
 }
 
+/// Bytes of a body, all zero but one.
+fn with(bytes: usize, at: usize, value: u8) -> Vec<u8> {
+    let mut body = vec![0; bytes];
+    body[at] = value;
+    body
+}
+
 /// The rejection of a fault within frame 1, after its begin and packet 3.
 fn rejection_of(fault: &[u8]) -> ReceiveError {
     let good = frame(1, false);
@@ -47,16 +54,16 @@ fn what_is_no_packet() {
         damaged
     });
     assert!(matches!(flipped, ReceiveError::Packet(PacketError::Checksum { .. })));
-    for version in [0, 1, 2, 255] {
+    for version in [0, 1, 2, 3, 255] {
         let fault = edit(vertices, 0, &[version]);
         assert_eq!(rejection_of(&fault), packet(PacketError::Version { version }));
     }
     for (fault, expected) in [
-        (edit(vertices, 1, &[9]), PacketError::Kind { kind: 9 }),
+        // Kinds of later versions: poses and coarse nodes.
+        (edit(vertices, 1, &[10]), PacketError::Kind { kind: 10 }),
+        (edit(vertices, 1, &[11]), PacketError::Kind { kind: 11 }),
         (edit(vertices, 1, &[0]), PacketError::Kind { kind: 0 }),
-        (edit(vertices, 1, &[0x89]), PacketError::Kind { kind: 0x89 }),
-        // A hello has no tag.
-        (edit(vertices, 1, &[0x88]), PacketError::Kind { kind: 0x88 }),
+        (edit(vertices, 1, &[0x8A]), PacketError::Kind { kind: 0x8A }),
         // Length, count and padding.
         (edit(vertices, 14, &[2]), PacketError::Length { bytes: 64, expected: 48 }),
         (edit(vertices, 14, &[4]), PacketError::Length { bytes: 64, expected: 70 }),
@@ -70,7 +77,7 @@ fn what_is_no_packet() {
         ),
         (edit(vertices, 59, &[1]), PacketError::Reserved { offset: 54 }),
         (edit(commit, 27, &[1]), PacketError::Reserved { offset: 22 }),
-        (edit(&raw(2, 1, 1, [1, 0], 0, &[]), 0, &[3]), PacketError::Empty),
+        (raw(2, 1, 1, [1, 0], 0, &[]), PacketError::Empty),
         // Sequence.
         (edit(vertices, 12, &[0, 0]), PacketError::Sequence { sequence: 0 }),
         (edit(commit, 12, &[0, 0]), PacketError::Sequence { sequence: 0 }),
@@ -78,30 +85,33 @@ fn what_is_no_packet() {
         // The begin's fields.
         (edit(begin, 14, &[1]), PacketError::Reserved { offset: 14 }),
         (edit(begin, 15, &[1]), PacketError::Reserved { offset: 14 }),
+        (edit(begin, 22, &[3]), PacketError::Content { content: 3 }),
         (edit(begin, 22, &[7]), PacketError::Content { content: 7 }),
+        (edit(begin, 22, &[1]), PacketError::Sequence { sequence: 0 }),
+        (edit(begin, 23, &[6]), PacketError::Unit { unit: 6 }),
+        (edit(begin, 23, &[255]), PacketError::Unit { unit: 255 }),
         (edit(begin, 22, &[7 << 3]), PacketError::Encoding { encoding: 7 }),
         (edit(begin, 22, &[0x40]), PacketError::Reserved { offset: 22 }),
-        (edit(begin, 23, &[0; 3]), PacketError::Rows { rows: 0 }),
-        (edit(begin, 26, &[1]), PacketError::Reserved { offset: 26 }),
+        (edit(begin, 24, &[0; 3]), PacketError::Rows { rows: 0 }),
         (edit(begin, 30, &[1]), PacketError::Reserved { offset: 30 }),
         (edit(begin, 53, &[1]), PacketError::Reserved { offset: 30 }),
         (edit(begin, 22, &[1 << 3]), PacketError::Box),
         (raw_begin(1, 1, 2, 65, 0), PacketError::Rows { rows: 65 }),
+        (raw_begin(1, 1, 2, 0, 0), PacketError::Rows { rows: 0 }),
+        (edit(&raw_begin(1, 1, 2, 6, 0), 33, &[1]), PacketError::Reserved { offset: 33 }),
         (edit(&raw_begin(1, 1, 2, 6, 0), 22, &[2 | 1 << 3]), PacketError::Encoding { encoding: 1 }),
         // A heartbeat's and a status's.
         (raw(6, 1, 1, [0, 0], 0, &[0, 0, 1, 0, 0, 0, 0, 0]), PacketError::Reserved { offset: 20 }),
-        (raw(8, 1, 1, [0, 0], 0, &[0, 0, 1, 0, 0, 0, 0, 0]), PacketError::Reserved { offset: 20 }),
-        (raw(8, 1, 1, [0, 0], 1, &[0; 8]), PacketError::Reserved { offset: 15 }),
-        (
-            raw(7, 1, 1, [0, 0], 0, &{
-                let mut body = [0; 28];
-                body[2] = 4;
-                body
-            }),
-            PacketError::Reserved { offset: 20 },
-        ),
-        (raw(7, 0, 1, [0, 0], 0, &[0; 28]), PacketError::Reserved { offset: 18 }),
-        (raw(7, 0, 0, [0, 0], 256, &[0; 28]), PacketError::Reserved { offset: 16 }),
+        (raw(6, 1, 1, [0, 1], 0, &[0; 8]), PacketError::Reserved { offset: 14 }),
+        (raw(6, 1, 1, [1, 0], 0, &[0; 8]), PacketError::Sequence { sequence: 1 }),
+        (raw(8, 1, 1, [0, 0], 0, &with(12, 2, 1)), PacketError::Reserved { offset: 20 }),
+        (raw(8, 1, 1, [0, 0], 1, &[0; 12]), PacketError::Reserved { offset: 15 }),
+        (raw(7, 1, 1, [0, 0], 0, &with(20, 2, 4)), PacketError::Reserved { offset: 20 }),
+        (raw(7, 0, 1, [0, 0], 0, &[0; 20]), PacketError::Reserved { offset: 18 }),
+        (raw(7, 0, 0, [0, 0], 256, &[0; 20]), PacketError::Reserved { offset: 16 }),
+        (raw(9, 0, 0, [0, 0], 0, &with(36, 2, 4)), PacketError::Reserved { offset: 20 }),
+        (raw(9, 0, 0, [0, 0], 0, &with(36, 28, 6)), PacketError::Unit { unit: 6 }),
+        (raw(9, 0, 0, [0, 0], 0, &with(36, 35, 1)), PacketError::Reserved { offset: 53 }),
     ] {
         assert_eq!(rejection_of(&fault), packet(expected), "{fault:02x?}");
         assert_eq!(packet(expected).event(), Event::Malformed);
@@ -125,13 +135,12 @@ fn what_is_a_packet_and_not_right() {
         safety: 0,
         number: 0,
         clock: 0,
-        answer: 0,
-        challenge: 0,
+        answer: None,
     };
     let mut buffer = [0; 64];
     let status = encode_status(MESH, &status, &Counters::new(), &NoMac, &mut buffer);
-    rejected(status, ReceiveError::Unexpected { epoch: 0 });
-    rejected(&edit(begin, 23, &[41, 0, 0]), ReceiveError::RowCount { rows: 41 });
+    rejected(status, ReceiveError::ForSenders);
+    rejected(&edit(begin, 24, &[41, 0, 0]), ReceiveError::RowCount { rows: 41 });
     rejected(&frame(1, true)[1], ReceiveError::Encoding);
     let weights = WeightsEncoder::<64>::new(id(2), &[0.5; N])
         .unwrap()
@@ -194,7 +203,10 @@ fn packets_beyond_the_commit_do_not_belong() {
             1 => assert_eq!(outcome, Ok(None)),
             // The frame would be complete, but the commit's digest is the one of all packets.
             2 => assert!(matches!(outcome, Err(ReceiveError::Digest { .. }))),
-            _ => assert_eq!(outcome, Err(ReceiveError::Unexpected { epoch: 1 })),
+            _ => {
+                let cause = Event::Digest;
+                assert_eq!(outcome, Err(ReceiveError::Refused { epoch: 1, cause }));
+            }
         }
     }
     let (mut again, _) = bus();
@@ -232,7 +244,31 @@ fn a_frame_without_its_last_rows_is_not_published() {
     commit = edit(&commit, 18, &digest.to_le_bytes());
     assert_eq!(give(&mut assembler, &commit), Err(ReceiveError::RowCount { rows: 39 }));
     assert!(published(&mut reader).is_none());
-    assert_eq!(give(&mut assembler, &good[1]), Err(ReceiveError::Unexpected { epoch: 1 }));
+    let refused = ReceiveError::Refused { epoch: 1, cause: Event::RowCount };
+    assert_eq!(give(&mut assembler, &good[1]), Err(refused));
+    assert_eq!(refused.to_string(), "frame 1 was refused before: row count");
+}
+
+/// Packets of a frame whose begin was refused name its cause.
+#[test]
+fn the_cause_of_a_refused_begin_stays() {
+    let good = frame(1, false);
+    for (begin, cause) in [
+        (edit(&good[0], 24, &[41, 0, 0]), Event::RowCount),
+        (raw_begin(1, 1, 2, N as u32, 0), Event::Encoding),
+        (raw_begin(1, 1, 1, N as u32, 0), Event::Base),
+    ] {
+        let (mut assembler, _reader) = bus();
+        assert_eq!(give(&mut assembler, &begin).unwrap_err().event(), cause);
+        for packet in &good[1..] {
+            let refused = give(&mut assembler, packet);
+            assert_eq!(refused, Err(ReceiveError::Refused { epoch: 1, cause }));
+        }
+        assert_eq!(assembler.health().rejections, 1);
+        // Another frame is only unexpected.
+        let other = frame(2, false);
+        assert_eq!(give(&mut assembler, &other[1]), Err(ReceiveError::Unexpected { epoch: 2 }));
+    }
 }
 
 /// Every second packet of a frame is lost: more gaps than the receiver can note.

@@ -182,7 +182,7 @@ fn a_refused_surface_is_not_published_and_the_last_one_stays() {
             assert_eq!(rejection, ReceiveError::Stretch(StretchError::NoMetric));
             assert_eq!(assembler.advance(1), Ok(Advance::Idle), "the frame is gone");
             let late = give(&mut assembler, commit);
-            assert_eq!(late, Err(ReceiveError::Unexpected { epoch }));
+            assert_eq!(late, Err(ReceiveError::Refused { epoch, cause: Event::Stretch }));
             assert_eq!(published(&mut reader).unwrap().0, 1);
             assert_eq!(assembler.published(), Some(id(1)));
         } else {
@@ -244,7 +244,8 @@ fn a_frame_is_checked_in_slices_and_then_published() {
     assert_eq!((began.get(), moved.get(), done.get()), (1, N as u32, 0));
     let next = frame(2, false);
     assert_eq!(assembler.accept(&next[0], Millis(0)), Err(ReceiveError::Busy { epoch: 2 }));
-    assert_eq!(assembler.accept(&next[1], Millis(0)), Err(ReceiveError::Unexpected { epoch: 2 }));
+    let refused = ReceiveError::Refused { epoch: 2, cause: Event::Busy };
+    assert_eq!(assembler.accept(&next[1], Millis(0)), Err(refused));
     // 2 of 100 units of work were done after each packet.
     let left = 100 - 2 * packets.len() as u32;
     for _ in 0..left / 2 - 1 {

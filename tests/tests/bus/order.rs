@@ -29,7 +29,7 @@ fn send(assembler: &mut Bus, session: u32, epoch: u32) -> Result<Option<u32>, Re
 
 fn heartbeat(session: u32, epoch: u32, beat: u32) -> Vec<u8> {
     let id = FrameId { mesh_id: MESH, session, epoch };
-    encode_heartbeat(&id, beat, &NoMac, &mut [0; 64]).to_vec()
+    encode_heartbeat(&id, beat, None, &NoMac, &mut [0; 64]).to_vec()
 }
 
 #[test]
@@ -101,7 +101,8 @@ fn a_newer_frame_supersedes_an_unfinished_one() {
         // The rest of the first frame is refused, also its begin.
         assert_eq!(give(&mut bus.0, &first[0]), Err(ReceiveError::Stale { epoch: 1 }));
         if epoch != 1 {
-            assert_eq!(give(&mut bus.0, &first[5]), Err(ReceiveError::Unexpected { epoch: 1 }));
+            let refused = ReceiveError::Refused { epoch: 1, cause: Event::Stale };
+            assert_eq!(give(&mut bus.0, &first[5]), Err(refused));
         }
         for packet in &second[1..] {
             give(&mut bus.0, packet).unwrap();

@@ -1,7 +1,7 @@
 //! Partial frames: only the moved rows, on top of the published frame.
 
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::wire::{Encoding, Event, FrameEncoder, FrameId, QuantisedBox};
+use dibs_nostd::wire::{EncodeError, Encoding, Event, FrameEncoder, FrameId, QuantisedBox};
 use dibs_nostd::{
     Advance, Assembler, FrameReader, Frames, Millis, ReceiveError, StretchMonitor, Unchecked,
     VertexTable,
@@ -103,12 +103,19 @@ fn another_base_is_refused_and_a_whole_frame_asked_for() {
         give(&mut assembler, &packet).unwrap();
     }
     assert!(!assembler.status(Millis(0), 0).wants_whole);
-    for (session, epoch, of) in [(1, 6, 4), (1, 6, 6), (2, 6, 5), (0x0001_0001, 6, 5)] {
+    for (session, epoch, of) in [(1, 6, 4), (1, 6, 3), (2, 6, 5), (0x0001_0001, 6, 5)] {
         assert_eq!(give(&mut assembler, &onto(session, epoch, of)), base(of));
         assert!(assembler.status(Millis(0), 0).wants_whole);
     }
     assert_eq!(assembler.counters().of(Event::Base), 5);
     assert_eq!(give(&mut assembler, &onto(1, 6, 5)), Ok(None));
+    // A base that the wire cannot name.
+    for (epoch, base) in [(6, 6), (6, 7), (65_542, 6)] {
+        let encoding = Encoding::Float;
+        let frame =
+            FrameEncoder::<_, 64>::partial(id(epoch), encoding, &positions[..], base, &positions);
+        assert_eq!(frame.unwrap_err(), EncodeError::BaseEpoch { epoch: base });
+    }
     assert_eq!(published(&mut reader).unwrap().0, 5);
 }
 

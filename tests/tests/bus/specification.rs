@@ -1,8 +1,10 @@
 //! `docs/wire.md` against the code: the encoders write its test vectors, and the decoder reads them.
 
+use dibs_nostd::SurfaceFacts;
+use dibs_nostd::format::Unit;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
-    AesCmac, Body, Counters, Encoding, FrameEncoder, FrameId, Freshness, NoMac, Packet,
+    AesCmac, Answer, Body, Counters, Encoding, FrameEncoder, FrameId, Freshness, NoMac, Packet,
     PublishedStatus, QuantisedBox, Status, StatusReport, WeightsEncoder, encode_heartbeat,
     encode_hello, encode_status, enframe, framed_bytes,
 };
@@ -11,6 +13,11 @@ const ID: FrameId = FrameId { mesh_id: 0xD1B5_0001, session: 0x0003_0002, epoch:
 
 /// Age and echo of the first frame.
 const FRESHNESS: Freshness = Freshness { age_ms: 35, echo: Some(0x0001_E208) };
+/// The sender's surface in the first frame, and the receiver's.
+const SURFACE: SurfaceFacts =
+    SurfaceFacts { unit: Some(Unit::Millimetre), vertices: 2, triangles: 1 };
+const NONCE: u64 = 0x0123_4567_0BAD_CAFE;
+const CHALLENGE: u64 = 0x89AB_CDEF_00C0_FFEE;
 /// The key of the tagged packets: bytes 0 to 15.
 const KEY: [u8; 16] = 0x0001_0203_0405_0607_0809_0A0B_0C0D_0E0F_u128.to_be_bytes();
 
@@ -24,6 +31,7 @@ fn vectors() -> Vec<(&'static str, Vec<u8>)> {
     let encoding = Encoding::Quantised(grid);
     let mut whole =
         FrameEncoder::<_, 64>::new(ID, encoding, &positions[..]).unwrap().with_freshness(FRESHNESS);
+    whole = whole.with_surface(SURFACE);
     for name in ["begin", "vertices", "commit"] {
         all.push((name, whole.next_packet(&mut buffer).unwrap().to_vec()));
     }
@@ -40,32 +48,48 @@ fn vectors() -> Vec<(&'static str, Vec<u8>)> {
     }
 
     let id = FrameId { epoch: 260, ..ID };
-    let mut modal = WeightsEncoder::<64>::new(id, &[1.0, -0.5, 0.25]).unwrap();
+    let modes = SurfaceFacts { vertices: 5, ..SURFACE };
+    let modal = |id| WeightsEncoder::<64>::new(id, &[1.0, -0.5, 0.25]).unwrap().with_surface(modes);
+    let mut modal_frame = modal(id);
     for name in ["begin", "weights", "commit"] {
-        all.push((name, modal.next_packet(&mut buffer).unwrap().to_vec()));
+        all.push((name, modal_frame.next_packet(&mut buffer).unwrap().to_vec()));
     }
     assert!(whole.next_packet(&mut buffer).is_none());
     assert!(partial.next_packet(&mut buffer).is_none());
-    assert!(modal.next_packet(&mut buffer).is_none());
+    assert!(modal_frame.next_packet(&mut buffer).is_none());
 
-    all.push(("heartbeat", encode_heartbeat(&id, 7, &NoMac, &mut buffer).into()));
-    all.push(("hello", encode_hello(&id, 0x0BAD_CAFE, &mut buffer).into()));
+    let echo = FRESHNESS.echo;
+    all.push(("heartbeat", encode_heartbeat(&id, 7, echo, &NoMac, &mut buffer).into()));
+    all.push(("hello", encode_hello(&id, NONCE, &NoMac, &mut buffer).into()));
     all.push((
         "status",
         encode_status(ID.mesh_id, &status(), &counters(), &NoMac, &mut buffer).into(),
     ));
+    let plain = encode_status(ID.mesh_id, &answer(), &counters(), &NoMac, &mut buffer);
+    all.push(("answer", plain.into()));
     all.push(("stream", stream));
 
     let id = FrameId { epoch: 261, ..ID };
-    let mac = AesCmac::new(&KEY, 7, 0x00C0_FFEE);
-    let mut tagged = WeightsEncoder::<64>::new(id, &[1.0, -0.5, 0.25]).unwrap().with_mac(&mac);
+    let mac = AesCmac::new(&KEY, 7, CHALLENGE);
+    let mut tagged = modal(id).with_mac(&mac);
     for name in ["begin", "weights", "commit"] {
         all.push((name, tagged.next_packet(&mut buffer).unwrap().to_vec()));
     }
-    all.push(("heartbeat", encode_heartbeat(&id, 8, &mac, &mut buffer).into()));
+    all.push(("heartbeat", encode_heartbeat(&id, 8, None, &mac, &mut buffer).into()));
+    all.push(("hello", encode_hello(&id, NONCE, &mac, &mut buffer).into()));
     let status = encode_status(ID.mesh_id, &status(), &counters(), &mac, &mut buffer);
     all.push(("status", status.into()));
+    let answer = encode_status(ID.mesh_id, &answer(), &counters(), &mac, &mut buffer);
+    all.push(("answer", answer.into()));
     all
+}
+
+/// The status that answers the hello.
+fn answer() -> Status {
+    let answer = Answer { nonce: NONCE, challenge: CHALLENGE, surface: SURFACE };
+    let mut status = Status { number: 7, answer: Some(answer), ..status() };
+    status.published.as_mut().unwrap().stretch = None;
+    status
 }
 
 fn status() -> Status {
@@ -80,8 +104,7 @@ fn status() -> Status {
         safety: 1,
         number: 6,
         clock: 0x0001_E240,
-        answer: 0x0BAD_CAFE,
-        challenge: 0x00C0_FFEE,
+        answer: None,
     }
 }
 
@@ -121,9 +144,15 @@ fn every_vector_is_read_as_what_it_was_written_from() {
                 let is_first = packet.epoch == 258;
                 let freshness = if is_first { FRESHNESS } else { Freshness::default() };
                 assert_eq!(begin.freshness, freshness);
+                let surface = match packet.epoch {
+                    258 => SURFACE,
+                    259 => SurfaceFacts { vertices: 2, ..SurfaceFacts::default() },
+                    _ => SurfaceFacts { vertices: 5, ..SURFACE },
+                };
+                assert_eq!(begin.surface, surface);
             }
             ("hello", Body::Hello(hello)) => {
-                assert_eq!((hello.session, hello.nonce), (ID.session, 0x0BAD_CAFE));
+                assert_eq!((hello.session, hello.nonce), (ID.session, NONCE));
             }
             ("vertices", Body::Vertices(_)) | ("commit", Body::Commit(_)) => {}
             ("weights", Body::Weights(weights)) => {
@@ -137,7 +166,11 @@ fn every_vector_is_read_as_what_it_was_written_from() {
             }
             ("status", Body::Status(report)) => {
                 assert_eq!(report.status, status());
+                assert_eq!(report.counters.len(), if packet.is_tagged() { 2 } else { 5 });
                 assert_eq!(packet.epoch, 259);
+            }
+            ("answer", Body::Status(report)) => {
+                assert_eq!((report.status, packet.epoch), (answer(), 259));
             }
             (name, body) => panic!("{name} was read as {body:?}"),
         }

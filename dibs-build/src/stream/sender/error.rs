@@ -1,5 +1,6 @@
 //! Why a frame was not sent.
 
+use dibs_nostd::SurfaceFacts;
 use dibs_nostd::wire::EncodeError;
 use thiserror::Error;
 
@@ -32,6 +33,18 @@ pub enum SendError {
     Superseded {
         /// The other sender's session.
         session: u32,
+    },
+    /// The receiver has another surface.
+    #[error(
+        "the receiver's surface (mesh {:#010x}) has {}; this sender's (mesh {:#010x}) has {}: build both \
+         from one file",
+        there.0, there.1, here.0, here.1
+    )]
+    OtherSurface {
+        /// Mesh id and facts of the receiver's.
+        there: (u32, SurfaceFacts),
+        /// Mesh id and facts of this sender's.
+        here: (u32, SurfaceFacts),
     },
     /// The connection failed.
     #[error("the connection broke: {0}")]

@@ -3,14 +3,16 @@
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::Duration;
 
+use dibs_nostd::wire::Answer;
+
 /// Between two hellos with one nonce.
 const INTERVAL: Duration = Duration::from_millis(50);
 
 /// A question that waits for its answer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Greeting {
-    /// The number that the answer repeats: random, not 0.
-    nonce: u32,
+    /// The number that the answer repeats: random.
+    nonce: u64,
     /// Time of the last hello.
     sent: Option<Duration>,
 }
@@ -18,17 +20,16 @@ pub(super) struct Greeting {
 impl Greeting {
     pub fn new() -> Self {
         // Each `RandomState` is seeded anew by the operating system.
-        let random = RandomState::new().build_hasher().finish() as u32;
-        Self { nonce: if random == 0 { 1 } else { random }, sent: None }
+        Self { nonce: RandomState::new().build_hasher().finish(), sent: None }
     }
 
-    /// Whether a status with this answer was made after the question.
-    pub const fn is_answered_by(&self, answer: u32) -> bool {
-        self.nonce == answer
+    /// Whether this answer was made after the question.
+    pub const fn is_answered_by(&self, answer: &Answer) -> bool {
+        self.nonce == answer.nonce
     }
 
     /// The nonce to send, if a hello is due.
-    pub fn due(&mut self, now: Duration) -> Option<u32> {
+    pub fn due(&mut self, now: Duration) -> Option<u64> {
         let is_due = self.sent.is_none_or(|sent| now.saturating_sub(sent) >= INTERVAL);
         is_due.then(|| {
             self.sent = Some(now);

@@ -4,6 +4,7 @@ mod clock;
 mod error;
 mod frame;
 mod greeting;
+mod objection;
 mod order;
 mod reply;
 mod settings;
@@ -28,6 +29,7 @@ use crate::transport::Transport;
 use clock::Clock;
 use frame::{apply, coarsened, packets_of};
 use greeting::Greeting;
+use objection::Objection;
 
 /// Sends the frames of a moving surface, in packets of at most `MTU` bytes, and takes the receiver's statuses.
 ///
@@ -52,7 +54,7 @@ pub struct Sender<T, const MTU: usize, M = NoMac> {
     /// `None` until the receiver's challenge is known.
     mac: Option<M>,
     /// The MAC under a challenge.
-    keyed_mac: Box<dyn Fn(u32) -> M + Send>,
+    keyed_mac: Box<dyn Fn(u64) -> M + Send>,
     clock: Clock,
     /// The hello that waits for its answer.
     greeting: Option<Greeting>,
@@ -63,8 +65,10 @@ pub struct Sender<T, const MTU: usize, M = NoMac> {
     before: u32,
     /// A frame of this session was acknowledged.
     is_established: bool,
-    /// The session of another sender that has taken over.
-    superseded: Option<u32>,
+    /// Why the receiver does not want this sender's frames.
+    objection: Option<Objection>,
+    /// An answer has shown the receiver's surface to be this one.
+    is_compared: bool,
     beat: u32,
     last_beat: Option<Duration>,
     /// The last positions or weights, and the time when they first came.
@@ -100,8 +104,8 @@ impl<T: Transport, const MTU: usize> Sender<T, MTU> {
 
 impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     /// A sender of packets with tags. `keyed_mac(challenge)` returns the MAC under the receiver's challenge, which the
-    /// receiver draws when it starts and reports in its status. Until a status has come, [`poll`](Self::poll) sends
-    /// hellos, and no frame can be sent.
+    /// receiver draws when it starts and reports in its answer to a hello. Until one has come, [`poll`](Self::poll)
+    /// sends hellos, and no frame can be sent.
     ///
     /// For a receiver without a way back, which uses the challenge 0: [`challenge`](Self::challenge).
     #[must_use]
@@ -109,7 +113,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         transport: T,
         surface: SurfaceOrder,
         settings: Settings,
-        keyed_mac: impl Fn(u32) -> M + Send + 'static,
+        keyed_mac: impl Fn(u64) -> M + Send + 'static,
     ) -> Self {
         Self {
             transport,
@@ -122,7 +126,8 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
             epoch: 0,
             before: 0,
             is_established: false,
-            superseded: None,
+            objection: None,
+            is_compared: false,
             beat: 0,
             last_beat: None,
             capture: None,
@@ -137,7 +142,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     }
 
     /// Takes a challenge as the receiver's.
-    pub fn challenge(&mut self, challenge: u32) {
+    pub fn challenge(&mut self, challenge: u64) {
         self.mac = Some((self.keyed_mac)(challenge));
     }
 
@@ -219,7 +224,9 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
             None => FrameEncoder::new(id, encoding, &rows[..]),
         };
         let mac = self.mac.as_ref().ok_or(SendError::NoChallenge)?;
-        let frame = frame.and_then(|frame| frame.with_freshness(freshness).with_mac(mac));
+        let facts = self.surface.facts;
+        let frame = frame
+            .and_then(|frame| frame.with_freshness(freshness).with_surface(facts).with_mac(mac));
         let packets = packets_of::<_, MTU>(frame.map_err(SendError::Frame)?);
 
         let content = match base {
@@ -261,7 +268,8 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         let id = self.next_id();
         let mac = self.mac.as_ref().ok_or(SendError::NoChallenge)?;
         let frame = WeightsEncoder::<MTU>::new(id, weights).map_err(SendError::Frame)?;
-        let mut frame = frame.with_freshness(freshness).with_mac(mac);
+        let frame = frame.with_freshness(freshness).with_surface(self.surface.facts);
+        let mut frame = frame.with_mac(mac);
         let (mut buffer, mut packets) = ([0; MTU], Vec::new());
         while let Some(packet) = frame.next_packet(&mut buffer) {
             packets.push(packet.to_vec());
@@ -304,15 +312,15 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     /// times between two heartbeats.
     ///
     /// # Errors
-    /// [`SendError::Line`] when the connection is gone, [`SendError::Superseded`] when another sender has
-    /// taken over.
+    /// [`SendError::Line`] when the connection is gone, [`SendError::Superseded`] while another sender has taken over,
+    /// [`SendError::OtherSurface`] while the receiver has another surface.
     pub fn poll(&mut self) -> Result<(), SendError> {
         self.greet()?;
         self.heartbeat()?;
         while let Some(packet) = self.transport.receive().map_err(SendError::Line)? {
             self.take(&packet);
         }
-        self.superseded.map_or(Ok(()), |session| Err(SendError::Superseded { session }))
+        self.object()
     }
 
     /// Totals since the start.
@@ -366,11 +374,8 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
 
     /// An error unless a frame can be sent.
     fn check(&self) -> Result<(), SendError> {
-        match self.superseded {
-            Some(session) => Err(SendError::Superseded { session }),
-            None if self.is_ready() => Ok(()),
-            None => Err(SendError::NoChallenge),
-        }
+        self.object()?;
+        if self.is_ready() { Ok(()) } else { Err(SendError::NoChallenge) }
     }
 
     /// Time since these numbers last changed.
@@ -402,7 +407,8 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.beat = self.beat.wrapping_add(1);
         let mut buffer = [0; 64];
         let Some(mac) = &self.mac else { return Ok(()) };
-        let beat = encode_heartbeat(&self.id(), self.beat, mac, &mut buffer).to_vec();
+        let echo = self.status.map(|status| status.clock);
+        let beat = encode_heartbeat(&self.id(), self.beat, echo, mac, &mut buffer).to_vec();
         self.put(&beat)
     }
 

@@ -1,7 +1,7 @@
 //! The mesh's vertex of each row of the receiver's table.
 
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Index, Tree};
+use dibs_nostd::{Index, SurfaceFacts, Tree};
 
 use super::SendError;
 
@@ -9,6 +9,7 @@ use super::SendError;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SurfaceOrder {
     pub(super) mesh_id: u32,
+    pub(super) facts: SurfaceFacts,
     /// The mesh's vertex of each row.
     order: Vec<u32>,
 }
@@ -19,13 +20,14 @@ impl SurfaceOrder {
     pub fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
         let number = |row| tree.vertex_number(row).map_or(row, |number| number.0);
         let order = (0..tree.vertex_count()).map(number);
-        Self { mesh_id: tree.mesh_id(), order: order.collect() }
+        Self { mesh_id: tree.mesh_id(), facts: tree.surface_facts(), order: order.collect() }
     }
 
-    /// An order from the mesh's vertex of each row of the vertex table.
+    /// An order from the mesh's vertex of each row of the vertex table. Unit and triangles are not known.
     #[must_use]
-    pub const fn new(mesh_id: u32, order: Vec<u32>) -> Self {
-        Self { mesh_id, order }
+    pub fn new(mesh_id: u32, order: Vec<u32>) -> Self {
+        let vertices = u32::try_from(order.len()).unwrap_or(0);
+        Self { mesh_id, facts: SurfaceFacts { vertices, ..SurfaceFacts::default() }, order }
     }
 
     /// Identity of the mesh.

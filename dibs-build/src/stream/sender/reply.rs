@@ -1,8 +1,14 @@
 //! The sender's reaction to the receiver's statuses.
 
-use dibs_nostd::wire::{Body, Counters, Mac, Packet, Status, StatusReport, encode_hello, is_newer};
+use std::time::Duration;
+
+use dibs_nostd::wire::{
+    Answer, Body, Counters, Mac, Packet, PublishedStatus, Status, StatusReport, encode_hello,
+    is_newer,
+};
 
 use super::greeting::Greeting;
+use super::objection::{Cause, Objection};
 use super::{SendError, Sender};
 use crate::transport::Transport;
 
@@ -41,56 +47,124 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         &self.counters
     }
 
-    /// Sends hellos until the receiver answers, if its challenge is unknown or it may have started anew.
+    /// Sends hellos until the receiver answers, if its challenge is unknown, it may have started anew, or its objection
+    /// may be over.
     pub(super) fn greet(&mut self) -> Result<(), SendError> {
-        if !self.is_ready() {
-            self.greeting.get_or_insert_with(Greeting::new);
-        }
         let now = self.clock.now();
+        let asks_again = self.objection.as_mut().is_some_and(|objection| objection.is_due(now));
+        if !self.is_ready() || asks_again {
+            self.ask();
+        }
         let Some(nonce) = self.greeting.as_mut().and_then(|greeting| greeting.due(now)) else {
             return Ok(());
         };
         let mut buffer = [0; 64];
-        let hello = encode_hello(&self.id(), nonce, &mut buffer).to_vec();
+        // A hello's tag is the same under every challenge.
+        let mac = (self.keyed_mac)(0);
+        let hello = encode_hello(&self.id(), nonce, &mac, &mut buffer).to_vec();
         self.put(&hello)
     }
 
-    /// Takes a packet that came back. Only statuses of this mesh are for this sender.
-    pub(super) fn take(&mut self, packet: &[u8]) {
-        let Ok(packet) = Packet::decode(packet) else { return };
-        let Body::Status(report) = packet.body else { return };
-        let mac = (self.keyed_mac)(report.status.challenge);
-        let session = report.status.published.map_or(0, |published| published.session);
-        if packet.mesh_id == self.surface.mesh_id && packet.is_genuine(&mac, session) {
-            self.take_status(&report, mac);
+    fn ask(&mut self) {
+        self.greeting.get_or_insert_with(Greeting::new);
+    }
+
+    /// The receiver's objection, if it stands.
+    pub(super) fn object(&self) -> Result<(), SendError> {
+        let now = self.clock.now();
+        match self.objection.filter(|objection| now >= objection.holds_from) {
+            None => Ok(()),
+            Some(Objection { cause: Cause::Superseded { session }, .. }) => {
+                Err(SendError::Superseded { session })
+            }
+            Some(Objection { cause: Cause::OtherSurface { mesh_id, facts }, .. }) => {
+                Err(SendError::OtherSurface {
+                    there: (mesh_id, facts),
+                    here: (self.surface.mesh_id, self.surface.facts),
+                })
+            }
         }
     }
 
-    /// Takes a genuine status, if it is new: the next one of the receiver's run, or the answer to a hello. Any other is
-    /// a recording, was overtaken, or comes from a receiver that has started anew, which a hello decides.
-    fn take_status(&mut self, report: &StatusReport<'_>, mac: M) {
-        let status = report.status;
-        let is_answer =
-            self.greeting.is_some_and(|greeting| greeting.is_answered_by(status.answer));
-        let is_same = self.mac.as_ref().is_some_and(|known| known.challenge() == mac.challenge());
-        let is_later = self.status.is_none_or(|last| is_newer(status.number, last.number));
-        let is_next = is_same && is_later;
-        if !(is_answer || is_next) {
-            self.greeting.get_or_insert_with(Greeting::new);
+    /// Takes a packet that came back.
+    pub(super) fn take(&mut self, packet: &[u8]) {
+        let Ok(packet) = Packet::decode(packet) else { return };
+        let Body::Status(report) = packet.body else { return };
+        let session = report.status.published.map_or(0, |published| published.session);
+        let is_ours = packet.mesh_id == self.surface.mesh_id;
+        let Some(answer) = report.status.answer else {
+            let is_later =
+                self.status.is_none_or(|last| is_newer(report.status.number, last.number));
+            let is_genuine = self.mac.as_ref().is_some_and(|mac| packet.is_genuine(mac, session));
+            // Anything else is a recording, was overtaken, or comes from a receiver that has started anew or has another
+            // surface, which a hello decides.
+            if is_ours && is_genuine && is_later {
+                self.take_status(&report, M::TAGGED);
+            } else if is_ours || self.status.is_none() {
+                self.ask();
+            }
+            return;
+        };
+        let mac = (self.keyed_mac)(answer.challenge);
+        let is_answer = self.greeting.is_some_and(|greeting| greeting.is_answered_by(&answer));
+        if is_answer && packet.is_genuine(&mac, session) {
+            self.take_answer(packet.mesh_id, &report, &answer, mac);
+        }
+    }
+
+    /// Takes a genuine answer to the hello that waits for it.
+    fn take_answer(&mut self, mesh_id: u32, report: &StatusReport<'_>, answer: &Answer, mac: M) {
+        let facts = answer.surface;
+        let (is_ours, now) = (mesh_id == self.surface.mesh_id, self.clock.now());
+        if !is_ours || !facts.agrees_with(&self.surface.facts) {
+            // Without a key the answer may be that of another surface's receiver on the same line.
+            let is_certain = M::TAGGED || is_ours;
+            if is_certain || self.status.is_none() {
+                let wait = if is_certain { Duration::ZERO } else { self.settings.patience };
+                let cause = Cause::OtherSurface { mesh_id, facts };
+                let holds_from = match self.objection {
+                    Some(before) if before.cause == cause => before.holds_from,
+                    _ => now + wait,
+                };
+                self.objection = Some(Objection::new(cause, now, holds_from));
+            }
+            if is_certain {
+                self.greeting = None;
+            }
             return;
         }
-        if is_answer {
-            self.greeting = None;
-        }
-        if !is_next {
+        self.greeting = None;
+        self.objection = None;
+        self.is_compared = true;
+        let is_same = self.mac.as_ref().is_some_and(|known| known.challenge() == mac.challenge());
+        let is_later = self.status.is_none_or(|last| is_newer(report.status.number, last.number));
+        if !(is_same && is_later) {
             // A receiver that has started anew has no frame.
             self.mac = Some(mac);
             self.whole_wanted = true;
         }
+        self.take_status(report, true);
+    }
+
+    /// Takes a status that is new. `is_certain` where nobody else can have made it: it is under a tag, or the answer to a
+    /// hello.
+    fn take_status(&mut self, report: &StatusReport<'_>, is_certain: bool) {
+        let mut status = report.status;
+        if let (Some(_), Some(published)) = (status.answer, &mut status.published) {
+            // An answer does not state the stretch.
+            let known = self.status.and_then(|last| last.published);
+            let is_known = |last: &PublishedStatus| {
+                (last.session, last.epoch) == (published.session, published.epoch)
+            };
+            published.stretch = known.filter(is_known).and_then(|last| last.stretch);
+        }
         self.counters.update(report);
         self.status = Some(status);
         self.totals.statuses += 1;
-        self.yield_or_take_over();
+        if !self.is_compared {
+            self.ask();
+        }
+        self.yield_or_take_over(is_certain);
         let now = self.clock.now();
         let is_answered = self.whole.is_some_and(|(epoch, at)| {
             let has_come = self.acknowledged().is_some_and(|newest| !is_newer(epoch, newest));
@@ -102,14 +176,18 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     }
 
     /// Reacts to a published frame that this sender has not sent: the receiver would refuse this sender's frames for
-    /// ever.
-    fn yield_or_take_over(&mut self) {
+    /// ever. What is not certain, a hello decides.
+    fn yield_or_take_over(&mut self, is_certain: bool) {
         let Some(published) = self.status.and_then(|status| status.published) else { return };
         let own = self.settings.session;
-        if self.acknowledged().is_some() {
+        let is_ours = self.acknowledged().is_some();
+        if is_ours {
             self.is_established = true;
+        } else if !is_certain {
+            self.ask();
         } else if self.is_established && is_newer(published.session, own) {
-            self.superseded = Some(published.session);
+            let (now, cause) = (self.clock.now(), Cause::Superseded { session: published.session });
+            self.objection = Some(Objection::new(cause, now, now));
         } else if !is_newer(own, published.session) {
             // The frame is from before this sender's start, or another sender used the same session number.
             self.settings.session = published.session.wrapping_add(1);

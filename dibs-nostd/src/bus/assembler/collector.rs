@@ -6,10 +6,11 @@ use super::ReceiveError;
 use super::arrivals::{Arrivals, Misplaced, Place};
 use super::health::{BusHealth, FrameName, Trouble};
 use crate::bus::wire::{
-    Begin, Commit, Content, Counters, Event, FrameId, Heartbeat, Mac, Packet, PublishedStatus,
-    Status, StreamError, is_newer,
+    Answer, Begin, Commit, Content, Counters, Event, FrameId, Heartbeat, Hello, Mac, Packet,
+    PublishedStatus, Status, is_newer,
 };
 use crate::surface::{Millis, elapsed};
+use crate::tree::SurfaceFacts;
 
 /// The frame in work.
 #[derive(Clone, Copy, Debug)]
@@ -66,15 +67,22 @@ pub(super) struct Collector {
     wants_whole: bool,
     /// Statuses made so far.
     statuses: u32,
-    /// The nonce of the last hello.
-    answer: u32,
+    /// The nonce of the last hello, until a status answers it.
+    hello: Option<u64>,
+    /// The heartbeat refused last as not later, where nothing is under a tag.
+    straggler: Option<(u32, u32)>,
     /// The receiver's clock at the packet in work, and at the last packet and heartbeat that were taken.
     now: Millis,
     packet: Option<Millis>,
     heartbeat_at: Option<Millis>,
     trouble: Trouble,
+    /// The frame refused last, and why: the cause of its packets that follow.
+    refused: Option<(FrameName, Event)>,
     pub counters: Counters,
 }
+
+/// Most heartbeats lost between two that are taken for one sender's.
+const STRAGGLERS: u32 = 16;
 
 /// Time without a packet after which an earlier frame may replace the one in work.
 const PATIENCE: Millis = Millis(100);
@@ -88,11 +96,13 @@ impl Collector {
             heartbeat: None,
             wants_whole: false,
             statuses: 0,
-            answer: 0,
+            hello: None,
+            straggler: None,
             now: Millis(0),
             packet: None,
             heartbeat_at: None,
             trouble: Trouble::new(),
+            refused: None,
             counters: Counters::new(),
         }
     }
@@ -107,23 +117,34 @@ impl Collector {
         self.packet = Some(self.now);
     }
 
-    /// Counts a rejection, of a packet or frame with this name, where it has one.
+    /// Counts bytes that are no packet.
     #[cold]
-    pub fn refuse(&mut self, name: Option<FrameName>, rejection: &ReceiveError) {
+    pub fn refuse_bytes(&mut self, event: Event) {
+        self.counters.count(event);
+    }
+
+    /// Counts a rejection, of a frame with this name, its begin or another packet.
+    #[cold]
+    pub fn refuse<M: Mac>(&mut self, name: FrameName, is_begin: bool, rejection: &ReceiveError) {
+        if is_begin || rejection.ends_frame() {
+            self.refused = Some((name, rejection.event()));
+        }
         self.counters.count(rejection.event());
-        let in_work = self.frame.as_ref().map(|frame| FrameName::of(&frame.id));
-        self.trouble.note(name, in_work, rejection);
+        self.trouble.note(name, rejection, M::TAGGED, self.now);
     }
 
-    /// Counts bytes that were not a packet.
-    pub fn refuse_bytes(&mut self, _: &StreamError) {
-        self.counters.count(Event::Framing);
-        self.trouble.note_damage();
-    }
-
-    /// Takes a hello's nonce.
-    pub const fn hello(&mut self, nonce: u32) {
-        self.answer = nonce;
+    /// Takes a hello.
+    pub fn hello<M: Mac>(
+        &mut self,
+        packet: &Packet<'_>,
+        hello: Hello,
+        mac: &M,
+    ) -> Result<(), ReceiveError> {
+        if !packet.is_genuine(mac, hello.session) {
+            return Err(ReceiveError::Forged { epoch: packet.epoch });
+        }
+        self.hello = Some(hello.nonce);
+        Ok(())
     }
 
     /// The numbers that a fail-safe machine watches.
@@ -132,7 +153,7 @@ impl Collector {
             Some(published) => (published.transit, published.source_age),
             None => (Millis::MAX, Millis::MAX),
         };
-        let (rejections, forgeries) = self.trouble.counts();
+        let (rejections, forgeries) = self.trouble.counts(self.now);
         BusHealth {
             packet: self.packet,
             heartbeat: self.heartbeat_at,
@@ -151,7 +172,7 @@ impl Collector {
     }
 
     /// Starts a frame from a genuine begin; `None` for a repeated one. `is_acceptable` has the checks of this receiver.
-    pub fn begin(
+    pub fn begin<M: Mac>(
         &mut self,
         packet: &Packet<'_>,
         begin: Begin,
@@ -182,6 +203,7 @@ impl Collector {
                 return Err(ReceiveError::Stale { epoch });
             }
             self.counters.count(Event::Abandoned);
+            self.trouble.note_frame(FrameName::of(&frame.id), M::TAGGED);
         }
         let frame = Frame {
             id,
@@ -195,7 +217,6 @@ impl Collector {
             is_complete: false,
         };
         self.frame = Some(frame);
-        self.trouble.note_begin();
         Ok(Some(frame))
     }
 
@@ -219,13 +240,33 @@ impl Collector {
                     published.id.session as u16 == packet.session_low
                         && !is_newer(epoch, published.id.epoch)
                 });
-                Err(if is_stale {
-                    ReceiveError::Stale { epoch }
-                } else {
-                    ReceiveError::Unexpected { epoch }
-                })
+                if is_stale {
+                    return Err(ReceiveError::Stale { epoch });
+                }
+                let refused =
+                    self.refused.filter(|(name, _)| *name == FrameName::of_packet(packet));
+                let cause = refused.map(|(_, cause)| cause);
+                let unexpected = match cause {
+                    Some(cause) => ReceiveError::Refused { epoch, cause },
+                    None => ReceiveError::Unexpected { epoch },
+                };
+                match self.session_of(packet.session_low) {
+                    _ if !M::TAGGED => Err(unexpected),
+                    Some(session) if packet.is_genuine(mac, session) => Err(unexpected),
+                    None if packet.is_tagged() => Err(ReceiveError::Unverifiable { epoch, cause }),
+                    _ => Err(ReceiveError::Forged { epoch }),
+                }
             }
         }
+    }
+
+    /// The known session with this lower half.
+    fn session_of(&self, low: u16) -> Option<u32> {
+        let in_work = self.frame.as_ref().map(|frame| frame.id.session);
+        let published = self.published.as_ref().map(|published| published.id.session);
+        let alive = self.heartbeat.map(|last| last.session);
+        let mut known = [in_work, published, alive].into_iter().flatten();
+        known.find(|&session| session as u16 == low)
     }
 
     /// Notes stored rows. `Ok(true)` once the frame is complete.
@@ -289,7 +330,7 @@ impl Collector {
         heartbeat: Heartbeat,
         mac: &M,
     ) -> Result<(), ReceiveError> {
-        let Heartbeat { session, beat } = heartbeat;
+        let Heartbeat { session, beat, echo } = heartbeat;
         let epoch = packet.epoch;
         if !packet.is_genuine(mac, session) {
             return Err(ReceiveError::Forged { epoch });
@@ -303,12 +344,33 @@ impl Collector {
                 !is_newer(session, last.session)
             }
         });
-        if before_published || before_last {
+        // Without a key one stray heartbeat from the far future must not refuse all genuine ones. Two in a row that are
+        // in order are a sender's; a repeated one is not.
+        let is_in_order = !M::TAGGED
+            && self.heartbeat.is_none_or(|last| last.beat != beat)
+            && self.straggler.is_some_and(|(of, before)| {
+                of == session && (1..=STRAGGLERS).contains(&beat.wrapping_sub(before))
+            });
+        if before_published || before_last && !is_in_order {
+            self.straggler = Some((session, beat));
             return Err(ReceiveError::Stale { epoch });
         }
         self.heartbeat = Some(LastHeartbeat { session, beat, epoch, received: self.now });
-        self.heartbeat_at = Some(self.now);
+        self.note_alive(echo);
         Ok(())
+    }
+
+    /// The sender lived when it heard the status that it echoes; without an echo, when the heartbeat comes: so heartbeats
+    /// that somebody held back are as old as they are. An echo ahead of this clock is of another run, and shows nothing.
+    fn note_alive(&mut self, echo: Option<u32>) {
+        let at = echo.map_or(self.now, Millis);
+        // One that is ahead by no more than two clocks' readings may be counts as now.
+        let age = elapsed(self.now, at);
+        let at = if age == Millis(0) { self.now } else { at };
+        let is_later = self.heartbeat_at.is_none_or(|last| is_newer(at.0, last.0));
+        if age.0 <= i32::MAX as u32 && is_later {
+            self.heartbeat_at = Some(at);
+        }
     }
 
     /// The frame in work has become the published one.
@@ -319,6 +381,7 @@ impl Collector {
         // An echo from the future comes from another run of this receiver.
         let transit = freshness.echo.map(|echo| elapsed(frame.received, Millis(echo)));
         let transit = transit.filter(|transit| transit.0 <= i32::MAX as u32);
+        self.trouble.note_published(self.published.is_none());
         self.published = Some(Published {
             id: frame.id,
             captured: frame.captured(),
@@ -326,7 +389,6 @@ impl Collector {
             transit: transit.unwrap_or(Millis::MAX),
             oldest: Millis(0),
         });
-        self.trouble = Trouble::new();
         // The published session is the sender's: a heartbeat of another one was stray.
         self.heartbeat = self.heartbeat.filter(|last| last.session == frame.id.session);
         self.counters.count(Event::Published);
@@ -350,7 +412,8 @@ impl Collector {
         now: Millis,
         safety: u8,
         stretch: Option<f32>,
-        challenge: u32,
+        challenge: u64,
+        surface: SurfaceFacts,
     ) -> Status {
         let number = self.statuses;
         self.statuses = number.wrapping_add(1);
@@ -361,11 +424,11 @@ impl Collector {
                 session: published.id.session,
                 epoch: published.id.epoch,
                 age_ms: published.oldest.0,
-                stretch,
+                stretch: stretch.filter(|_| self.hello.is_none()),
             }
         });
-        let Self { wants_whole, answer, .. } = *self;
-        Status { published, wants_whole, safety, number, clock: now.0, answer, challenge }
+        let answer = self.hello.take().map(|nonce| Answer { nonce, challenge, surface });
+        Status { published, wants_whole: self.wants_whole, safety, number, clock: now.0, answer }
     }
 }
 

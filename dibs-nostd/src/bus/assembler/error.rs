@@ -4,6 +4,7 @@ use core::fmt;
 
 use crate::StretchError;
 use crate::bus::wire::{Event, PacketError};
+use crate::tree::SurfaceFacts;
 
 /// Why a packet, or the frame that it would have finished, was rejected. The frame published last
 /// stays.
@@ -18,6 +19,13 @@ pub enum ReceiveError {
         /// The mesh id in the packet.
         mesh_id: u32,
     },
+    /// A frame of a surface with another unit or size, though of the same mesh id.
+    OtherSurface {
+        /// The sender's surface.
+        sent: SurfaceFacts,
+        /// This receiver's.
+        here: SurfaceFacts,
+    },
     /// The tag is wrong, or missing where one is required.
     Forged {
         /// The packet's epoch.
@@ -29,12 +37,27 @@ pub enum ReceiveError {
         /// The packet's epoch.
         epoch: u32,
     },
-    /// Rows or a commit of a frame whose begin never came, or that was abandoned; or a packet for
-    /// senders.
+    /// Rows or a commit of a frame whose begin never came, or that was abandoned.
     Unexpected {
         /// The packet's epoch.
         epoch: u32,
     },
+    /// Rows or a commit of a frame that was refused before.
+    Refused {
+        /// The packet's epoch.
+        epoch: u32,
+        /// The event by which its begin, or the frame, was refused.
+        cause: Event,
+    },
+    /// As unexpected, and the tag cannot be verified, because nothing of the packet's session has come.
+    Unverifiable {
+        /// The packet's epoch.
+        epoch: u32,
+        /// The event by which the frame's begin was refused, if one came.
+        cause: Option<Event>,
+    },
+    /// A packet for senders.
+    ForSenders,
     /// The previous frame is complete and still being checked.
     Busy {
         /// The packet's epoch.
@@ -96,6 +119,11 @@ pub enum ReceiveError {
 }
 
 impl ReceiveError {
+    /// Whether a frame that had begun ends with this rejection.
+    pub(super) const fn ends_frame(&self) -> bool {
+        matches!(self, Self::RowCount { .. } | Self::Digest { .. } | Self::Stretch(_))
+    }
+
     /// The event that counts it.
     #[must_use]
     pub const fn event(&self) -> Event {
@@ -105,10 +133,13 @@ impl ReceiveError {
             }
             Self::Packet(PacketError::Version { .. }) => Event::Version,
             Self::Packet(_) => Event::Malformed,
-            Self::WrongMesh { .. } => Event::WrongMesh,
+            Self::WrongMesh { .. } | Self::OtherSurface { .. } => Event::WrongMesh,
             Self::Forged { .. } => Event::Forged,
             Self::Stale { .. } => Event::Stale,
-            Self::Unexpected { .. } => Event::Unexpected,
+            Self::Unexpected { .. }
+            | Self::Refused { .. }
+            | Self::Unverifiable { .. }
+            | Self::ForSenders => Event::Unexpected,
             Self::Busy { .. } => Event::Busy,
             Self::Base { .. } => Event::Base,
             Self::NotReady { .. } => Event::NotReady,
@@ -138,9 +169,22 @@ impl fmt::Display for ReceiveError {
         match self {
             Self::Packet(error) => error.fmt(f),
             Self::WrongMesh { mesh_id } => write!(f, "the packet is of mesh {mesh_id:#010x}"),
+            Self::OtherSurface { sent, here } => {
+                write!(f, "the sender's surface has {sent}; the receiver's has {here}")
+            }
             Self::Forged { epoch } => write!(f, "a packet of frame {epoch} has no genuine tag"),
             Self::Stale { epoch } => write!(f, "frame {epoch} is not later than what is here"),
             Self::Unexpected { epoch } => write!(f, "frame {epoch} is not being received"),
+            Self::Refused { epoch, cause } => {
+                write!(f, "frame {epoch} was refused before: {cause}")
+            }
+            Self::Unverifiable { epoch, cause: Some(cause) } => {
+                write!(f, "frame {epoch} was refused before: {cause}")
+            }
+            Self::Unverifiable { epoch, cause: None } => {
+                write!(f, "a packet of frame {epoch} is of a session that has not begun")
+            }
+            Self::ForSenders => write!(f, "a packet for senders came to a receiver"),
             Self::Busy { epoch } => {
                 write!(f, "frame {epoch} began while the one before was being checked")
             }

@@ -6,6 +6,9 @@ use crate::surface::Millis;
 
 /// The health of the bus, as the receiver sees it, for [`LinkStatus::set`](crate::failsafe::LinkStatus::set). Times are
 /// on the receiver's clock.
+///
+/// With a key only packets with a genuine tag count as rejections, so that nobody without it adds to them or hides any.
+/// Damage and strays count in [`Counters`](crate::wire::Counters) alone: the frames that they spoil count here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -14,10 +17,12 @@ pub struct BusHealth {
     pub packet: Option<Millis>,
     /// Time of the last heartbeat taken.
     pub heartbeat: Option<Millis>,
-    /// Frames refused or damaged since the last publication, each counted once, however many of its packets were
-    /// rejected. Forged packets, packets of other meshes, and packets of frames that are over do not count.
+    /// Frames refused, abandoned or without a begin since the last publication, each counted once. Packets of other
+    /// meshes and of frames that are over do not count.
     pub rejections: u32,
-    /// Packets without a genuine tag since the last frame was published.
+    /// Packets without a genuine tag, less [`FORGERIES_A_SECOND`](Self::FORGERIES_A_SECOND), at most
+    /// [`MOST_FORGERIES`](Self::MOST_FORGERIES). Publications change nothing but the first, which sets it to 0: until
+    /// then the sender did not know the receiver's challenge.
     pub forgeries: u32,
     /// Time from the status that the published frame echoes to the arrival of its begin packet: an upper bound on the
     /// way of each. [`Millis::MAX`] where it echoes none.
@@ -25,6 +30,18 @@ pub struct BusHealth {
     /// Age of the published frame when it was sent, as the sender stated it.
     pub source_age: Millis,
 }
+
+impl BusHealth {
+    /// Forgeries that are forgotten each second: a lasting rate up to this never trips a watch.
+    pub const FORGERIES_A_SECOND: u32 = 1_000 / DRAIN_MS;
+
+    /// The most forgeries that are remembered, so that a flood is forgotten within
+    /// `MOST_FORGERIES / FORGERIES_A_SECOND` seconds.
+    pub const MOST_FORGERIES: u32 = 1_000;
+}
+
+/// Time (ms) after which one forgery is forgotten.
+const DRAIN_MS: u32 = 100;
 
 /// The part of a frame's name that every packet carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,83 +58,95 @@ impl FrameName {
     pub const fn of_packet(packet: &Packet<'_>) -> Self {
         Self { session_low: packet.session_low, epoch: packet.epoch }
     }
-
-    const fn is_after(self, other: Self) -> bool {
-        if self.session_low == other.session_low {
-            is_newer(self.epoch, other.epoch)
-        } else {
-            self.session_low.wrapping_sub(other.session_low) as i16 > 0
-        }
-    }
 }
 
-/// The frames that went wrong since the last publication.
+/// Names of frames that are remembered as counted.
+const REMEMBERED: usize = 4;
+
+/// The frames that went wrong since the last publication, and the forgeries.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trouble {
     rejections: u32,
-    forgeries: u32,
-    last: Last,
-}
-
-/// The frame that was counted last.
-#[derive(Clone, Copy, Debug)]
-enum Last {
-    /// No frame since the last begin.
-    None,
-    /// A frame without a name: its bytes were damaged.
-    Unnamed,
-    Named(FrameName),
+    /// The frames counted last, the newest first.
+    counted: [Option<FrameName>; REMEMBERED],
+    forgeries: Bucket,
 }
 
 impl Trouble {
     pub const fn new() -> Self {
-        Self { rejections: 0, forgeries: 0, last: Last::None }
+        Self { rejections: 0, counted: [None; REMEMBERED], forgeries: Bucket::EMPTY }
     }
 
     /// Rejections and forgeries.
-    pub const fn counts(&self) -> (u32, u32) {
-        (self.rejections, self.forgeries)
+    pub const fn counts(&self, now: Millis) -> (u32, u32) {
+        (self.rejections, self.forgeries.level(now))
     }
 
-    /// A frame began.
-    pub const fn note_begin(&mut self) {
-        self.last = Last::None;
+    /// A frame was published.
+    pub const fn note_published(&mut self, is_first: bool) {
+        let forgeries = if is_first { Bucket::EMPTY } else { self.forgeries };
+        *self = Self { forgeries, ..Self::new() };
     }
 
-    /// Bytes or a packet without a name were rejected.
-    pub const fn note_damage(&mut self) {
-        if let Last::None = self.last {
-            self.rejections = self.rejections.saturating_add(1);
-            self.last = Last::Unnamed;
+    /// A packet, or the frame of this name, was rejected. With a key (`is_keyed`) every rejection that counts is of a
+    /// packet with a genuine tag.
+    pub fn note(&mut self, name: FrameName, rejection: &ReceiveError, is_keyed: bool, now: Millis) {
+        match rejection {
+            ReceiveError::Forged { .. } => self.forgeries.add(now),
+            ReceiveError::Packet(_)
+            | ReceiveError::WrongMesh { .. }
+            | ReceiveError::Stale { .. }
+            | ReceiveError::Unverifiable { .. }
+            | ReceiveError::ForSenders => (),
+            _ => self.note_frame(name, is_keyed),
         }
     }
 
-    /// A packet or frame was rejected; `in_work` names the frame in work.
-    pub fn note(
-        &mut self,
-        name: Option<FrameName>,
-        in_work: Option<FrameName>,
-        rejection: &ReceiveError,
-    ) {
-        let name = match (rejection, name) {
-            (ReceiveError::Forged { .. }, _) => {
-                self.forgeries = self.forgeries.saturating_add(1);
-                return;
-            }
-            (ReceiveError::WrongMesh { .. } | ReceiveError::Stale { .. }, _) => return,
-            (_, None) => return self.note_damage(),
-            (_, Some(name)) => name,
+    /// A frame was refused or abandoned.
+    pub fn note_frame(&mut self, name: FrameName, is_keyed: bool) {
+        let [newest, before @ ..] = &self.counted;
+        let is_recorded = |newest: &FrameName| {
+            newest.session_low == name.session_low && !is_newer(name.epoch, newest.epoch)
         };
-        // The packet is of a frame that was abandoned.
-        if in_work.is_some_and(|in_work| in_work.is_after(name)) {
-            return;
+        // Names with a genuine tag only rise, so an earlier one is a recording. Without a key the earlier one may be
+        // the genuine one.
+        let is_counted = self.counted.contains(&Some(name))
+            || is_keyed && newest.as_ref().is_some_and(is_recorded);
+        if !is_counted {
+            self.rejections = self.rejections.saturating_add(1);
+            let [second, third, _] = *before;
+            self.counted = [Some(name), *newest, second, third];
         }
-        match self.last {
-            Last::Named(last) if !name.is_after(last) => return,
-            // The damage counted already was probably this frame's.
-            Last::Unnamed => (),
-            _ => self.rejections = self.rejections.saturating_add(1),
-        }
-        self.last = Last::Named(name);
+    }
+}
+
+/// A leaky bucket.
+#[derive(Clone, Copy, Debug)]
+struct Bucket {
+    level: u32,
+    /// The receiver's clock at the last drop that left it.
+    drained: Millis,
+}
+
+impl Bucket {
+    const EMPTY: Self = Self { level: 0, drained: Millis(0) };
+
+    /// Drops that have left since; none where the clock went back.
+    const fn drops(&self, now: Millis) -> u32 {
+        let Millis(elapsed) = now.since(self.drained);
+        if elapsed > i32::MAX as u32 { 0 } else { elapsed / DRAIN_MS }
+    }
+
+    const fn level(&self, now: Millis) -> u32 {
+        self.level.saturating_sub(self.drops(now))
+    }
+
+    fn add(&mut self, now: Millis) {
+        let (level, drops) = (self.level(now), self.drops(now));
+        self.drained = match level {
+            0 => now,
+            _ => self.drained.after(Millis(drops.wrapping_mul(DRAIN_MS))),
+        };
+        self.level = if level < BusHealth::MOST_FORGERIES { level + 1 } else { level };
     }
 }

@@ -9,13 +9,13 @@ mod step;
 
 use crate::MAX_COORDINATE;
 use crate::bus::wire::{
-    Content, Counters, Event, FrameId, Mac, NoMac, Packet, Status, StreamError,
+    Body, Content, Counters, Event, FrameId, Mac, NoMac, Packet, Status, StreamError,
 };
 use crate::stretch::{Arriving, Gate, StretchError, StretchMonitor, SurfaceLimits, Verdict};
 use crate::surface::{
     Ahead, Buffers, FrameLabel, FrameView, FrameWriter, Frames, LastStep, Millis, PublishError,
 };
-use crate::tree::{Index, Tree};
+use crate::tree::{Index, SurfaceFacts, Tree};
 
 use collector::Collector;
 pub use collector::LastHeartbeat;
@@ -216,7 +216,7 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
             Ok(packet) => packet,
             Err(error) => {
                 let rejection = ReceiveError::Packet(error);
-                self.collector.refuse(None, &rejection);
+                self.collector.refuse_bytes(rejection.event());
                 return Err(rejection);
             }
         };
@@ -231,7 +231,8 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
                 }
             }
             Err(rejection) => {
-                self.collector.refuse(Some(FrameName::of_packet(&packet)), rejection);
+                let is_begin = matches!(packet.body, Body::Begin(_));
+                self.collector.refuse::<M>(FrameName::of_packet(&packet), is_begin, rejection);
             }
         }
         outcome
@@ -271,12 +272,21 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
         self.check(ready, work)
     }
 
-    /// The receiver's status for the sender: [`encode_status`](crate::wire::encode_status) makes a packet
-    /// of it. `safety` as in [`Status::safety`].
+    /// The receiver's status for the sender, or its answer to a hello that came:
+    /// [`encode_status`](crate::wire::encode_status) makes a packet of it. Make one as soon as a hello has come. `safety` as
+    /// in [`Status::safety`].
     pub fn status(&mut self, now: Millis, safety: u8) -> Status {
         let stretch = self.writer.front().and_then(|front| front.label().stretch);
         let stretch = stretch.map(|stretch| stretch.sigma());
-        self.collector.status(now, safety, stretch, self.mac.challenge())
+        let surface = self.surface_facts();
+        self.collector.status(now, safety, stretch, self.mac.challenge(), surface)
+    }
+
+    /// The facts of this receiver's surface, for comparison with the sender's.
+    fn surface_facts(&self) -> SurfaceFacts {
+        let facts = self.gate.surface_facts();
+        let is_modal = self.gate.weight_range(0).is_some();
+        if is_modal { facts } else { SurfaceFacts { vertices: self.writer.len(), ..facts } }
     }
 
     /// Name of the frame published last.
@@ -298,8 +308,8 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
     }
 
     /// Counts bytes of a stream that were no packet, as a [`Deframer`](crate::wire::Deframer) reports.
-    pub fn count_framing(&mut self, error: &StreamError) {
-        self.collector.refuse_bytes(error);
+    pub fn count_framing(&mut self, _: &StreamError) {
+        self.collector.refuse_bytes(Event::Framing);
     }
 
     /// The health of the bus, for a fail-safe machine. O(1).
@@ -367,7 +377,7 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
                 let rejection = ReceiveError::Stretch(error);
                 let name = FrameName::of(&frame.id);
                 self.collector.frame = None;
-                self.collector.refuse(Some(name), &rejection);
+                self.collector.refuse::<M>(name, false, &rejection);
                 Err(rejection)
             }
             Ok(_) if !frame.is_complete => Ok(Advance::Idle),

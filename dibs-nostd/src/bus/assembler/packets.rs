@@ -16,8 +16,13 @@ use crate::surface::{Buffers, Position};
 impl<G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'_, G, N, M, F> {
     #[inline]
     pub(super) fn take(&mut self, packet: &Packet<'_>) -> Result<Progress, ReceiveError> {
-        self.collector.check_mesh(packet)?;
         let epoch = packet.epoch;
+        // A hello of another mesh is answered, so that its sender sees the difference.
+        if let Body::Hello(hello) = packet.body {
+            self.collector.hello(packet, hello, &self.mac)?;
+            return Ok(Progress::Hello);
+        }
+        self.collector.check_mesh(packet)?;
         match packet.body {
             Body::Vertices(vertices) => self.vertices(packet, vertices),
             Body::Weights(weights) => self.weights(packet, weights),
@@ -30,11 +35,7 @@ impl<G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'_, G, N, M, F> {
                 self.collector.heartbeat(packet, heartbeat, &self.mac)?;
                 Ok(Progress::Heartbeat)
             }
-            Body::Hello(hello) => {
-                self.collector.hello(hello.nonce);
-                Ok(Progress::Hello)
-            }
-            Body::Status(_) => Err(ReceiveError::Unexpected { epoch }),
+            Body::Hello(_) | Body::Status(_) => Err(ReceiveError::ForSenders),
         }
     }
 
@@ -44,11 +45,14 @@ impl<G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'_, G, N, M, F> {
             self.publish();
         }
         let takes_weights = self.gate.weight_range(0).is_some();
+        let here = self.surface_facts();
         let is_acceptable = |begin: &Begin| {
             if begin.rows != self.writer.len() {
                 Err(ReceiveError::RowCount { rows: begin.rows })
             } else if (begin.content == Content::Modal) != takes_weights {
                 Err(ReceiveError::Encoding)
+            } else if !here.agrees_with(&begin.surface) {
+                Err(ReceiveError::OtherSurface { sent: begin.surface, here })
             } else {
                 Ok(())
             }
@@ -58,7 +62,7 @@ impl<G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'_, G, N, M, F> {
         let share = share.ok_or(ReceiveError::Forged { epoch: packet.epoch })?;
         // Even if this frame is refused, the next one must find the published rows copied.
         self.takes_partial |= is_partial;
-        let begun = self.collector.begin(packet, begin, share, is_acceptable)?;
+        let begun = self.collector.begin::<M>(packet, begin, share, is_acceptable)?;
         let Some(frame) = begun else { return Ok(Progress::Duplicate) };
         self.is_admitted = false;
         self.clean();

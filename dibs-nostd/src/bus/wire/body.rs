@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::{QuantisedBox, StatusReport};
+use crate::tree::SurfaceFacts;
 
 /// The contents of a packet.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +19,7 @@ pub enum Body<'a> {
     Commit(Commit),
     /// A sign of life from the sender.
     Heartbeat(Heartbeat),
-    /// The receiver's state: the only packet on the way back.
+    /// The receiver's state, with its counters or as the answer to a hello: all that comes back.
     Status(StatusReport<'a>),
     /// The sender's request for a status.
     Hello(Hello),
@@ -35,6 +36,8 @@ pub struct Begin {
     pub encoding: Encoding,
     /// Vertices of the surface; in a modal frame, weights.
     pub rows: u32,
+    /// The sender's surface.
+    pub surface: SurfaceFacts,
     /// The frame's freshness when this packet was made.
     pub freshness: Freshness,
 }
@@ -169,15 +172,17 @@ pub struct Heartbeat {
     pub session: u32,
     /// One more in each heartbeat of the session; wraps.
     pub beat: u32,
+    /// [`Status::clock`](super::Status::clock) of the newest status that the sender had taken; `None` before the first.
+    pub echo: Option<u32>,
 }
 
-/// The sender's request for a status. Never tagged, because a sender that does not know the challenge yet must be able
-/// to ask; it changes only the status' nonce.
+/// The sender's request for an answer. With a key its tag is under the challenge 0, because the sender may not know the
+/// receiver's yet: so nobody without the key collects answers to nonces of his own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Hello {
     /// The sender's session, all of it.
     pub session: u32,
-    /// A random number, not 0, that the status repeats, which a recorded status cannot.
-    pub nonce: u32,
+    /// A random number that the answer repeats, which a recorded answer cannot.
+    pub nonce: u64,
 }

@@ -24,7 +24,7 @@ use super::{Code, Direction, Mac};
 ///
 /// let key = *b"a secret of ours";
 /// let receiver = 7; // this controller's number
-/// let challenge = 0x5EED; // drawn at start-up; the sender reads it from the status
+/// let challenge = 0x5EED; // drawn at start-up; the sender reads it from the answer to its hello
 /// let frames = Frames::<2>::new();
 /// let (writer, mut reader) = frames.split().unwrap();
 /// let mac = AesCmac::new(&key, receiver, challenge);
@@ -50,7 +50,7 @@ use super::{Code, Direction, Mac};
 pub struct AesCmac {
     to_receiver: Cmac<Aes128>,
     to_sender: Cmac<Aes128>,
-    challenge: u32,
+    challenge: u64,
 }
 
 impl AesCmac {
@@ -60,7 +60,7 @@ impl AesCmac {
     /// number, or a counter that survives a restart. With 0, recordings of an earlier run are believed until a later
     /// session has published.
     #[must_use]
-    pub fn new(key: &[u8; 16], receiver: u32, challenge: u32) -> Self {
+    pub fn new(key: &[u8; 16], receiver: u32, challenge: u64) -> Self {
         Self {
             to_receiver: derived(key, b"dibs to receiver", receiver),
             to_sender: derived(key, b"dibs to sender", receiver),
@@ -68,9 +68,9 @@ impl AesCmac {
         }
     }
 
-    /// The same key, bound to another challenge: for a sender that has read it from a status.
+    /// The same key, bound to another challenge: for a sender that has read it from an answer.
     #[must_use]
-    pub fn with_challenge(mut self, challenge: u32) -> Self {
+    pub fn with_challenge(mut self, challenge: u64) -> Self {
         self.challenge = challenge;
         self
     }
@@ -97,18 +97,17 @@ impl Mac for AesCmac {
     const TAGGED: bool = true;
 
     fn code(&self, direction: Direction, session: u32, packet: &[u8]) -> Code {
-        let mac = match direction {
-            Direction::ToReceiver => &self.to_receiver,
-            Direction::ToSender => &self.to_sender,
+        let (mac, challenge) = match direction {
+            Direction::ToReceiver => (&self.to_receiver, self.challenge),
+            Direction::ToSender => (&self.to_sender, self.challenge),
+            Direction::Greeting => (&self.to_receiver, 0),
         };
-        let [c0, c1, c2, c3] = self.challenge.to_le_bytes();
-        let [s0, s1, s2, s3] = session.to_le_bytes();
-        let code = code(mac, &[&[c0, c1, c2, c3, s0, s1, s2, s3], packet]);
+        let code = code(mac, &[&challenge.to_le_bytes(), &session.to_le_bytes(), packet]);
         let [t0, t1, t2, t3, t4, t5, h0, h1, h2, h3, ..] = code;
         Code { tag: [t0, t1, t2, t3, t4, t5], share: u32::from_le_bytes([h0, h1, h2, h3]) }
     }
 
-    fn challenge(&self) -> u32 {
+    fn challenge(&self) -> u64 {
         self.challenge
     }
 }

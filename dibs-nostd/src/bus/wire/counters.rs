@@ -1,136 +1,109 @@
 //! A receiver's counters, in the protocol's order.
 
+use core::ffi::CStr;
 use core::fmt;
 
 use super::StatusReport;
 
-/// Events of packets and frames at a receiver, in the order of their counters on the wire.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[repr(u8)]
-pub enum Event {
+/// Defines [`Event`] from the one table of events: description, variant, name.
+macro_rules! events {
+    ($($(#[$description:meta])* $event:ident: $name:literal,)*) => {
+        /// Events of packets and frames at a receiver, in the order of their counters on the wire.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+        #[repr(u8)]
+        pub enum Event {
+            $($(#[$description])* $event,)*
+        }
+
+        impl Event {
+            /// Every event, in the order of the wire.
+            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$event),*];
+
+            /// A short name.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$event => $name,)*
+                }
+            }
+
+            /// The same for C.
+            #[doc(hidden)]
+            #[must_use]
+            pub const fn c_name(self) -> &'static CStr {
+                let name = match self {
+                    $(Self::$event => concat!($name, "\0"),)*
+                };
+                match CStr::from_bytes_with_nul(name.as_bytes()) {
+                    Ok(name) => name,
+                    Err(_) => c"",
+                }
+            }
+        }
+    };
+}
+
+events! {
     /// A frame was published.
-    Published,
+    Published: "published",
     /// A frame was abandoned because another began.
-    Abandoned,
+    Abandoned: "abandoned",
     /// A packet had come before, and was ignored.
-    Duplicate,
+    Duplicate: "duplicate",
     /// A heartbeat was taken.
-    Heartbeat,
+    Heartbeat: "heartbeat",
     /// Bytes between two zeros of a stream were not a packet.
-    Framing,
+    Framing: "framing",
     /// The checksum is wrong, or the packet is too short for one.
-    Damaged,
+    Damaged: "damaged",
     /// Another protocol version.
-    Version,
+    Version: "version",
     /// The checksum is right but the form is wrong: the sender's fault.
-    Malformed,
+    Malformed: "malformed",
     /// A packet of another mesh.
-    WrongMesh,
+    WrongMesh: "wrong mesh",
     /// The tag is wrong, or missing where one is required.
-    Forged,
+    Forged: "forged",
     /// Session or epoch not later than the published frame's.
-    Stale,
+    Stale: "stale",
     /// A packet of a frame that is not being received.
-    Unexpected,
+    Unexpected: "unexpected",
     /// A frame began while the previous one was still being checked.
-    Busy,
+    Busy: "busy",
     /// A partial frame on another base than the published frame.
-    Base,
+    Base: "base",
     /// Rows of a partial frame came before the published frame's rows were copied.
-    NotReady,
+    NotReady: "not ready",
     /// Another number of rows than this receiver's.
-    RowCount,
+    RowCount: "row count",
     /// Another content or encoding than the frame's, or than this receiver takes.
-    Encoding,
+    Encoding: "encoding",
     /// Rows outside the surface.
-    OutOfRange,
+    OutOfRange: "out of range",
     /// Rows not in the order of the packets' sequence.
-    Order,
+    Order: "order",
     /// Too many gaps in the sequence.
-    Gaps,
+    Gaps: "gaps",
     /// A coordinate that is infinite or not a number.
-    NotFinite,
+    NotFinite: "not finite",
     /// A coordinate larger than the receiver allows.
-    TooFar,
+    TooFar: "too far",
     /// The packets do not add up to the commit's digest.
-    Digest,
+    Digest: "digest",
     /// The gate refused the surface: stretched too far, or not measured.
-    Stretch,
+    Stretch: "stretch",
     /// The gate refused the surface: a region has shrunk too far.
-    Shrunk,
+    Shrunk: "shrunk",
     /// The gate refused the surface: a vertex moved too fast.
-    TooFast,
+    TooFast: "too fast",
 }
 
 impl Event {
-    /// Every event, in the order of the wire.
-    pub const ALL: [Self; 26] = [
-        Self::Published,
-        Self::Abandoned,
-        Self::Duplicate,
-        Self::Heartbeat,
-        Self::Framing,
-        Self::Damaged,
-        Self::Version,
-        Self::Malformed,
-        Self::WrongMesh,
-        Self::Forged,
-        Self::Stale,
-        Self::Unexpected,
-        Self::Busy,
-        Self::Base,
-        Self::NotReady,
-        Self::RowCount,
-        Self::Encoding,
-        Self::OutOfRange,
-        Self::Order,
-        Self::Gaps,
-        Self::NotFinite,
-        Self::TooFar,
-        Self::Digest,
-        Self::Stretch,
-        Self::Shrunk,
-        Self::TooFast,
-    ];
-
     /// Whether a packet or a frame was refused.
     #[must_use]
     pub const fn is_rejection(self) -> bool {
         self as u8 >= Self::Framing as u8
-    }
-
-    /// A short name.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Published => "published",
-            Self::Abandoned => "abandoned",
-            Self::Duplicate => "duplicate",
-            Self::Heartbeat => "heartbeat",
-            Self::Framing => "framing",
-            Self::Damaged => "damaged",
-            Self::Version => "version",
-            Self::Malformed => "malformed",
-            Self::WrongMesh => "wrong mesh",
-            Self::Forged => "forged",
-            Self::Stale => "stale",
-            Self::Unexpected => "unexpected",
-            Self::Busy => "busy",
-            Self::Base => "base",
-            Self::NotReady => "not ready",
-            Self::RowCount => "row count",
-            Self::Encoding => "encoding",
-            Self::OutOfRange => "out of range",
-            Self::Order => "order",
-            Self::Gaps => "gaps",
-            Self::NotFinite => "not finite",
-            Self::TooFar => "too far",
-            Self::Digest => "digest",
-            Self::Stretch => "stretch",
-            Self::Shrunk => "shrunk",
-            Self::TooFast => "too fast",
-        }
     }
 }
 
@@ -141,8 +114,21 @@ impl fmt::Display for Event {
 }
 
 /// One saturating counter for each [`Event`], since the receiver's start.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+///
+/// It prints those that are not 0, by name:
+///
+/// ```
+/// let mut counters = dibs_nostd::wire::Counters::new();
+/// assert_eq!(counters.to_string(), "no events");
+/// assert_eq!(format!("{counters:?}"), "{}");
+/// # use dibs_nostd::{Assembler, Frames, Unchecked};
+/// # let frames = Frames::<3>::new();
+/// # let mut assembler = Assembler::new(frames.split().unwrap().0, Unchecked, 7, 1e3);
+/// assembler.accept(&[1, 2, 3], 0).unwrap_err();
+/// assert_eq!(assembler.counters().to_string(), "damaged 1");
+/// assert_eq!(format!("{:?}", assembler.counters()), r#"{"damaged": 1}"#);
+/// ```
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Counters([u32; Event::ALL.len()]);
 
 impl Counters {
@@ -183,6 +169,40 @@ impl Counters {
     /// The counters from this index on.
     pub(super) fn from(&self, first: usize) -> &[u32] {
         self.0.get(first..).unwrap_or_default()
+    }
+}
+
+impl Counters {
+    /// Each event that happened, with its count.
+    pub fn iter(&self) -> impl Iterator<Item = (Event, u32)> {
+        Event::ALL.into_iter().zip(self.0).filter(|&(_, count)| count != 0)
+    }
+}
+
+/// The events that happened.
+impl fmt::Debug for Counters {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_map().entries(self.iter().map(|(event, count)| (event.name(), count))).finish()
+    }
+}
+
+/// The events that happened.
+impl fmt::Display for Counters {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut events = self.iter();
+        let Some((event, count)) = events.next() else { return f.write_str("no events") };
+        write!(f, "{event} {count}")?;
+        events.try_for_each(|(event, count)| write!(f, ", {event} {count}"))
+    }
+}
+
+/// The events that happened.
+#[cfg(feature = "defmt")]
+impl defmt::Format for Counters {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        for (event, count) in self.iter() {
+            defmt::write!(f, "{=str} {=u32} ", event.name(), count);
+        }
     }
 }
 

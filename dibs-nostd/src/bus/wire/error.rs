@@ -35,7 +35,7 @@ pub enum PacketError {
         /// Offset of the field's first byte.
         offset: usize,
     },
-    /// A begin, heartbeat, status or hello with a place in a frame, or another packet without one.
+    /// A packet of a frame without a place in it, a partial frame that changes itself, or another packet with a place.
     Sequence {
         /// In the packet.
         sequence: u16,
@@ -64,6 +64,11 @@ pub enum PacketError {
         /// In the packet.
         encoding: u8,
     },
+    /// A unit that this version does not have.
+    Unit {
+        /// In the packet.
+        unit: u8,
+    },
     /// A quantisation box that is not finite, or whose step is not positive.
     Box,
 }
@@ -91,6 +96,7 @@ impl fmt::Display for PacketError {
             Self::Content { content } => write!(f, "frame content {content} does not exist"),
             Self::Rows { rows } => write!(f, "a frame cannot have {rows} rows"),
             Self::Encoding { encoding } => write!(f, "position encoding {encoding} does not exist"),
+            Self::Unit { unit } => write!(f, "unit {unit} does not exist"),
             Self::Box => write!(f, "the quantisation box is not finite or its step not positive"),
         }
     }

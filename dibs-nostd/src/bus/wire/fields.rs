@@ -29,6 +29,11 @@ impl Fields<'_> {
     }
 
     #[inline(always)]
+    pub fn u64(&mut self) -> u64 {
+        u64::from_le_bytes(self.take())
+    }
+
+    #[inline(always)]
     pub fn u32(&mut self) -> u32 {
         u32::from_le_bytes(self.take())
     }

@@ -11,15 +11,15 @@ pub const TAG_BYTES: usize = 6;
 /// Sender and receiver hold the same key, the same receiver id and the same *challenge*: a number that the receiver
 /// draws when it starts and reports in its status, so that earlier recordings are not genuine.
 pub trait Mac {
-    /// Whether packets carry a tag. A receiver takes only tagged packets (and hellos), or only packets without a tag.
+    /// Whether packets carry a tag. A receiver takes only tagged packets, or only packets without a tag.
     const TAGGED: bool;
 
-    /// The code over challenge, session and packet (all bytes before the tag), under the key of this
-    /// direction. Cost: linear in the packet.
+    /// The code over challenge (0 for [`Direction::Greeting`]), session and packet (all bytes before the tag), under the
+    /// key of this direction. Cost: linear in the packet.
     fn code(&self, direction: Direction, session: u32, packet: &[u8]) -> Code;
 
     /// The challenge in use; 0 where there is none.
-    fn challenge(&self) -> u32 {
+    fn challenge(&self) -> u64 {
         0
     }
 }
@@ -31,6 +31,8 @@ pub enum Direction {
     ToReceiver,
     /// Statuses.
     ToSender,
+    /// Hellos: as to the receiver, with the challenge 0 in place of the one in use.
+    Greeting,
 }
 
 /// A packet's message authentication code.
@@ -62,7 +64,7 @@ impl<M: Mac> Mac for &M {
         (**self).code(direction, session, packet)
     }
 
-    fn challenge(&self) -> u32 {
+    fn challenge(&self) -> u64 {
         (**self).challenge()
     }
 }

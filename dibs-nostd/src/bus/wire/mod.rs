@@ -4,7 +4,7 @@
 //! [`Weights`], and one [`Commit`]. [`FrameEncoder`] and [`WeightsEncoder`] make the packets on the sender's side,
 //! [`Packet::decode`] reads one in place on the receiver's, and the [`Assembler`](crate::Assembler) makes frames of
 //! them. A [`Heartbeat`] is the sender's sign of life, a [`Status`] reports the published frame to the sender, a
-//! [`Hello`] asks for a status.
+//! [`Hello`] asks for an [`Answer`].
 //!
 //! On a byte stream each packet is framed with COBS: [`enframe`] and [`Deframer`]. On UDP a packet is
 //! one datagram, on CAN-FD one message: [`canfd`].
@@ -50,11 +50,11 @@ pub use packet::Packet;
 pub use quantised::{BoxError, QuantisedBox};
 #[doc(hidden)]
 pub use status::PublishedStatus;
-pub use status::{Status, StatusReport};
+pub use status::{Answer, Status, StatusReport};
 pub use stream::{Deframer, StreamError, enframe, framed_bytes};
 
 /// The protocol's version: the first byte of every packet.
-pub const VERSION: u8 = 3;
+pub const VERSION: u8 = 4;
 
 /// Bytes of the header that every packet starts with.
 #[doc(hidden)]
@@ -82,7 +82,7 @@ pub const MAX_CONTENT_PACKETS: u32 = 65_534;
 #[doc(hidden)]
 pub const MAX_WEIGHTS: u32 = 64;
 
-/// The packet kinds: the second byte. Others are reserved.
+/// The packet kinds: the second byte. Others are reserved: 10 for poses, 11 for coarse nodes.
 mod kind {
     pub const BEGIN: u8 = 1;
     pub const FLOAT_VERTICES: u8 = 2;
@@ -92,6 +92,8 @@ mod kind {
     pub const HEARTBEAT: u8 = 6;
     pub const STATUS: u8 = 7;
     pub const HELLO: u8 = 8;
+    /// A status that answers a hello.
+    pub const ANSWER: u8 = 9;
     /// Set in the kind of a packet that carries a tag.
     pub const TAGGED: u8 = 0x80;
 }

@@ -3,11 +3,12 @@
 use super::checksum::{checksum, scrambled};
 use super::fields::Fields;
 use super::{
-    Begin, Body, BoxError, CHECKSUM_BYTES, Commit, Content, Direction, Encoding, Freshness,
+    Answer, Begin, Body, BoxError, CHECKSUM_BYTES, Commit, Content, Direction, Encoding, Freshness,
     HEADER_BYTES, Heartbeat, Hello, MAX_ROWS, MAX_WEIGHTS, Mac, PacketError, PublishedStatus,
     QuantisedBox, Rows, Status, StatusReport, TAG_BYTES, VERSION, Vertices, Weights,
     float_position, kind, padded,
 };
+use crate::tree::{SurfaceFacts, Unit};
 
 /// A packet whose checksum and form are right. It borrows the bytes that it was decoded from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +34,7 @@ impl<'a> Packet<'a> {
     ///
     /// ```
     /// use dibs_nostd::wire::{Packet, PacketError};
-    /// assert_eq!(Packet::decode(&[3, 1, 0]), Err(PacketError::TooShort { bytes: 3 }));
+    /// assert_eq!(Packet::decode(&[4, 1, 0]), Err(PacketError::TooShort { bytes: 3 }));
     /// ```
     ///
     /// # Errors
@@ -68,8 +69,9 @@ impl<'a> Packet<'a> {
             kind::COMMIT => 4,
             kind::WEIGHTS => usize::from(count) * 4,
             kind::HEARTBEAT => 8,
-            kind::STATUS => 28 + usize::from(count) * 4,
-            kind::HELLO if !is_tagged => 8,
+            kind::STATUS => STATUS_BYTES + usize::from(count) * 4,
+            kind::HELLO => 12,
+            kind::ANSWER => 36,
             _ => return Err(PacketError::Kind { kind: tagged_kind }),
         };
         let tag_bytes = if is_tagged { TAG_BYTES } else { 0 };
@@ -93,22 +95,24 @@ impl<'a> Packet<'a> {
                     return Err(PacketError::Empty);
                 }
             }
-            kind::BEGIN | kind::STATUS => (),
+            kind::BEGIN | kind::HEARTBEAT | kind::STATUS | kind::ANSWER => (),
             _ => {
                 zero(&[count], 14)?;
                 zero(&[u8::from(first != 0)], 15)?;
             }
         }
         // Only the packets after a frame's begin have a place in it.
-        let is_placed = !matches!(kind, kind::BEGIN | kind::HEARTBEAT | kind::STATUS | kind::HELLO);
-        if is_placed != (sequence != 0) {
+        let is_placed = matches!(
+            kind,
+            kind::FLOAT_VERTICES | kind::QUANTISED_VERTICES | kind::WEIGHTS | kind::COMMIT
+        );
+        if kind != kind::BEGIN && is_placed != (sequence != 0) {
             return Err(PacketError::Sequence { sequence });
         }
+        // Some kinds have a time of the receiver's clock in place of count and first row.
+        let clock = first << 8 | u32::from(count);
         let body = match kind {
-            kind::BEGIN => {
-                let echo = first << 8 | u32::from(count);
-                Body::Begin(begin(Fields(body), session_low, echo)?)
-            }
+            kind::BEGIN => Body::Begin(begin(Fields(body), [session_low, sequence], epoch, clock)?),
             kind::FLOAT_VERTICES => {
                 Body::Vertices(Vertices { first, rows: Rows::Float(body.as_chunks().0) })
             }
@@ -117,16 +121,17 @@ impl<'a> Packet<'a> {
             }
             kind::COMMIT => Body::Commit(Commit { digest: Fields(body).u32() }),
             kind::WEIGHTS => Body::Weights(Weights { first, values: body.as_chunks().0 }),
-            kind::HEARTBEAT => {
-                let [session, beat] = words(Fields(body), session_low)?;
-                Body::Heartbeat(Heartbeat { session, beat })
-            }
+            kind::HEARTBEAT => Body::Heartbeat(heartbeat(Fields(body), session_low, clock)?),
             kind::HELLO => {
-                let [session, nonce] = words(Fields(body), session_low)?;
-                Body::Hello(Hello { session, nonce })
+                let mut fields = Fields(body);
+                let session = session_of(fields.u16(), session_low);
+                zero(&fields.take::<2>(), HEADER_BYTES + 2)?;
+                Body::Hello(Hello { session, nonce: fields.u64() })
             }
+            kind::ANSWER => Body::Status(answer(Fields(body), session_low, epoch, clock)?),
             _ => Body::Status(status(Fields(body), session_low, epoch, first)?),
         };
+        let sequence = if is_placed { sequence } else { 0 };
         Ok(Self { mesh_id, session_low, epoch, sequence, checksum: stated, body, tag })
     }
 
@@ -139,6 +144,7 @@ impl<'a> Packet<'a> {
             Some((signed, tag)) if M::TAGGED => {
                 let direction = match self.body {
                     Body::Status(_) => Direction::ToSender,
+                    Body::Hello(_) => Direction::Greeting,
                     _ => Direction::ToReceiver,
                 };
                 let code = mac.code(direction, session, signed);
@@ -151,6 +157,12 @@ impl<'a> Packet<'a> {
         }
     }
 
+    /// Whether the packet carries a tag.
+    #[must_use]
+    pub const fn is_tagged(&self) -> bool {
+        self.tag.is_some()
+    }
+
     /// Whether [`verify`](Self::verify) finds the packet genuine.
     #[must_use]
     pub fn is_genuine<M: Mac>(&self, mac: &M, session: u32) -> bool {
@@ -158,7 +170,10 @@ impl<'a> Packet<'a> {
     }
 }
 
-/// Bit of a begin's form: the word before the body is an echo.
+/// Bytes of a status before its counters.
+pub(super) const STATUS_BYTES: usize = 20;
+
+/// Bit of a begin's form, and of a heartbeat's: the word before the body is an echo.
 pub(super) const HAS_ECHO: u8 = 0x80;
 
 /// The session, whose lower half is in the header.
@@ -166,47 +181,98 @@ fn session_of(high: u16, low: u16) -> u32 {
     u32::from(high) << 16 | u32::from(low)
 }
 
-fn begin(mut fields: Fields<'_>, session_low: u16, echo: u32) -> Result<Begin, PacketError> {
+fn begin(
+    mut fields: Fields<'_>,
+    [session_low, back]: [u16; 2],
+    epoch: u32,
+    echo: u32,
+) -> Result<Begin, PacketError> {
     let session = session_of(fields.u16(), session_low);
     let (age_ms, form) = (fields.u16(), fields.u8());
-    let (rows, base_epoch) = (fields.u24(), fields.u32());
-    let (content, encoding, has_echo) = (form & 7, form >> 3 & 7, form & HAS_ECHO != 0);
+    let surface = facts(&mut fields)?;
+    let (content, encoding) = (form & 7, form >> 3 & 7);
     zero(&[form & 0x40], HEADER_BYTES + 4)?;
-    zero(&[u8::from(!has_echo && echo != 0)], 14)?;
-    let freshness = Freshness { age_ms, echo: has_echo.then_some(echo) };
-    let grid = fields.0;
-    let (origin, step) = (fields.take(), fields.take());
+    let freshness = Freshness { age_ms, echo: echo_of(form, echo)? };
     let (content, limit) = match content {
         0 => (Content::Whole, MAX_ROWS),
-        1 => (Content::Partial { base_epoch }, MAX_ROWS),
+        1 => (Content::Partial { base_epoch: epoch.wrapping_sub(u32::from(back)) }, MAX_ROWS),
         2 => (Content::Modal, MAX_WEIGHTS),
         content => return Err(PacketError::Content { content }),
+    };
+    if matches!(content, Content::Partial { .. }) != (back != 0) {
+        return Err(PacketError::Sequence { sequence: back });
+    }
+    // A modal frame's weights are counted where others have their box.
+    let offset = HEADER_BYTES + 12;
+    let (rows, offset) = match content {
+        Content::Modal => (fields.u24(), offset + 3),
+        _ => (surface.vertices, offset),
     };
     if rows == 0 || rows > limit {
         return Err(PacketError::Rows { rows });
     }
-    if !matches!(content, Content::Partial { .. }) {
-        zero(&base_epoch.to_le_bytes(), HEADER_BYTES + 8)?;
-    }
     let encoding = match encoding {
         0 => {
-            zero(grid, HEADER_BYTES + 12)?;
+            zero(fields.0, offset)?;
             Encoding::Float
         }
-        1 if content != Content::Modal => Encoding::Quantised(
-            QuantisedBox::new(float_position(&origin), float_position(&step))
-                .map_err(|BoxError { .. }| PacketError::Box)?,
-        ),
+        1 if content != Content::Modal => {
+            let (origin, step) = (fields.take(), fields.take());
+            Encoding::Quantised(
+                QuantisedBox::new(float_position(&origin), float_position(&step))
+                    .map_err(|BoxError { .. }| PacketError::Box)?,
+            )
+        }
         encoding => return Err(PacketError::Encoding { encoding }),
     };
-    Ok(Begin { session, content, encoding, rows, freshness })
+    Ok(Begin { session, content, encoding, rows, surface, freshness })
 }
 
-/// The bodies of heartbeat and hello: session and one number.
-fn words(mut fields: Fields<'_>, session_low: u16) -> Result<[u32; 2], PacketError> {
+/// The echo of a packet with these flags.
+fn echo_of(flags: u8, echo: u32) -> Result<Option<u32>, PacketError> {
+    let has_echo = flags & HAS_ECHO != 0;
+    zero(&[u8::from(!has_echo && echo != 0)], 14)?;
+    Ok(has_echo.then_some(echo))
+}
+
+fn facts(fields: &mut Fields<'_>) -> Result<SurfaceFacts, PacketError> {
+    let unit = match fields.u8() {
+        0 => None,
+        code => Some(Unit::from_code(code).ok_or(PacketError::Unit { unit: code })?),
+    };
+    Ok(SurfaceFacts { unit, vertices: fields.u24(), triangles: fields.u24() })
+}
+
+fn heartbeat(
+    mut fields: Fields<'_>,
+    session_low: u16,
+    echo: u32,
+) -> Result<Heartbeat, PacketError> {
     let session = session_of(fields.u16(), session_low);
-    zero(&fields.take::<2>(), HEADER_BYTES + 2)?;
-    Ok([session, fields.u32()])
+    let flags = fields.u8();
+    zero(&[flags & !HAS_ECHO, fields.u8()], HEADER_BYTES + 2)?;
+    Ok(Heartbeat { session, beat: fields.u32(), echo: echo_of(flags, echo)? })
+}
+
+/// The fields that every status begins with.
+fn status_head(
+    fields: &mut Fields<'_>,
+    session_low: u16,
+    epoch: u32,
+    clock: u32,
+) -> Result<Status, PacketError> {
+    let session = session_of(fields.u16(), session_low);
+    let (flags, safety) = (fields.u8(), fields.u8());
+    let (number, age_ms) = (fields.u32(), fields.u32());
+    zero(&[flags & !3], HEADER_BYTES + 2)?;
+    let published = if flags & 1 == 0 {
+        zero(&[u8::from(session != 0 || epoch != 0 || age_ms != 0)], HEADER_BYTES)?;
+        None
+    } else {
+        Some(PublishedStatus { session, epoch, age_ms, stretch: None })
+    };
+    let wants_whole = flags & 2 != 0;
+    Ok(Status { published, wants_whole, safety, number, clock, answer: None })
 }
 
 fn status(
@@ -215,24 +281,29 @@ fn status(
     epoch: u32,
     first: u32,
 ) -> Result<StatusReport<'_>, PacketError> {
-    let session = session_of(fields.u16(), session_low);
-    let (flags, safety) = (fields.u8(), fields.u8());
-    let number = fields.u32();
-    let (age_ms, stretch) = (fields.u32(), f32::from_bits(fields.u32()));
-    let (challenge, clock, answer) = (fields.u32(), fields.u32(), fields.u32());
-    zero(&[flags & !3], HEADER_BYTES + 2)?;
-    let published = if flags & 1 == 0 {
-        zero(&[u8::from(session != 0 || epoch != 0 || age_ms != 0)], HEADER_BYTES)?;
-        zero(&stretch.to_bits().to_le_bytes(), HEADER_BYTES + 12)?;
-        None
-    } else {
-        let stretch = if stretch > 0.0 { Some(stretch) } else { None };
-        Some(PublishedStatus { session, epoch, age_ms, stretch })
-    };
-    let wants_whole = flags & 2 != 0;
-    let status = Status { published, wants_whole, safety, number, clock, answer, challenge };
+    let mut status = status_head(&mut fields, session_low, epoch, 0)?;
+    let stretch = f32::from_bits(fields.u32());
+    status.clock = fields.u32();
+    match &mut status.published {
+        Some(published) => published.stretch = (stretch > 0.0).then_some(stretch),
+        None => zero(&stretch.to_bits().to_le_bytes(), HEADER_BYTES + 12)?,
+    }
     let first_counter = u8::try_from(first).map_err(|_| PacketError::Reserved { offset: 16 })?;
     Ok(StatusReport { status, first_counter, counters: fields.0.as_chunks().0 })
+}
+
+fn answer(
+    mut fields: Fields<'_>,
+    session_low: u16,
+    epoch: u32,
+    clock: u32,
+) -> Result<StatusReport<'_>, PacketError> {
+    let status = status_head(&mut fields, session_low, epoch, clock)?;
+    let (nonce, challenge) = (fields.u64(), fields.u64());
+    let surface = facts(&mut fields)?;
+    zero(fields.0, HEADER_BYTES + 35)?;
+    let answer = Some(Answer { nonce, challenge, surface });
+    Ok(StatusReport { status: Status { answer, ..status }, first_counter: 0, counters: &[] })
 }
 
 /// An error unless a reserved field, at this offset, is zero.

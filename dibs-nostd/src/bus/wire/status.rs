@@ -1,5 +1,7 @@
 //! The receiver's report to the sender.
 
+use crate::tree::SurfaceFacts;
+
 /// The frame that the receiver has published, and its needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -14,10 +16,20 @@ pub struct Status {
     pub number: u32,
     /// The receiver's clock when it made this status, in ms: the sender's next frames echo it.
     pub clock: u32,
-    /// The nonce of the last [`Hello`](super::Hello); 0 before the first.
-    pub answer: u32,
+    /// Where it answers a [`Hello`](super::Hello): the status then carries no counters and no stretch.
+    pub answer: Option<Answer>,
+}
+
+/// The answer to a hello.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Answer {
+    /// The hello's nonce.
+    pub nonce: u64,
     /// The number to which the receiver's tags are bound: [`Mac::challenge`](super::Mac::challenge).
-    pub challenge: u32,
+    pub challenge: u64,
+    /// The receiver's surface.
+    pub surface: SurfaceFacts,
 }
 
 /// The acknowledgement of a frame.
@@ -30,7 +42,7 @@ pub struct PublishedStatus {
     pub epoch: u32,
     /// Time since its first packet arrived, plus the age that it then had, in ms.
     pub age_ms: u32,
-    /// Its measured stretch, `None` where the receiver does not measure.
+    /// Its measured stretch, `None` where the receiver does not measure, and in an answer.
     pub stretch: Option<f32>,
 }
 

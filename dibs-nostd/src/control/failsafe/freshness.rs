@@ -1,6 +1,6 @@
 //! Limits on faults that the age alone does not show: delay on the way, a source that stands still, forgeries.
 
-use super::{Limits, Link, State, Watch};
+use super::{LimitError, Limits, Link, State, Watch};
 use crate::unavailable::Unavailable;
 
 /// The limits, off by default.
@@ -45,10 +45,17 @@ impl Limits {
         self
     }
 
-    /// Limits on the forged packets since the last frame was published.
-    #[must_use]
-    pub const fn forgeries(mut self, watch: Watch<u32>) -> Self {
+    /// Limits on forged packets, of which [`BusHealth::FORGERIES_A_SECOND`](crate::BusHealth::FORGERIES_A_SECOND) are
+    /// forgotten each second, whatever is published.
+    ///
+    /// # Errors
+    /// [`LimitError::Untrippable`] if the second limit is [`Link::MOST_FORGERIES`] or more, which no link reports more
+    /// of. [`Watch::OFF`] is allowed.
+    pub const fn forgeries(mut self, watch: Watch<u32>) -> Result<Self, LimitError> {
+        if watch.safe() >= Link::MOST_FORGERIES && watch.safe() != Watch::<u32>::OFF.safe() {
+            return Err(LimitError::Untrippable { safe: watch.safe() });
+        }
         self.freshness.forgeries = watch;
-        self
+        Ok(self)
     }
 }

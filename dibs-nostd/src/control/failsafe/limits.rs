@@ -106,8 +106,8 @@ const fn check(degraded: u32, safe: u32) -> Result<(), LimitError> {
 
 /// The machine's limits, and its conditions for recovery.
 ///
-/// Only the age must be watched; every other input is off by default. By default one good frame and an acknowledgement
-/// recover.
+/// Only the age must be watched; every other input is off by default. By default one good frame, 1,000 clear
+/// steps and an acknowledgement recover.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Limits {
@@ -118,8 +118,12 @@ pub struct Limits {
     pub(super) freshness: Freshness,
     tissue_speed: f32,
     recovery_frames: u16,
+    dwell: u32,
     automatic: bool,
 }
+
+/// Steps that a state lasts at least before it improves, by default: a second of a loop at 1 kHz.
+const DWELL: u32 = 1_000;
 
 impl Limits {
     /// Limits on the surface's age, and the largest speed of any of its points, in mm per millisecond (m/s). 0 adds no margin for age.
@@ -141,6 +145,7 @@ impl Limits {
             freshness: Freshness::OFF,
             tissue_speed,
             recovery_frames: 1,
+            dwell: DWELL,
             automatic: false,
         })
     }
@@ -157,7 +162,7 @@ impl Limits {
         Self { heartbeat: watch, ..self }
     }
 
-    /// Limits on the frames refused or damaged since the last publication, each counted once.
+    /// Limits on the frames refused or abandoned since the last publication, each counted once.
     #[must_use]
     pub const fn rejections(self, watch: Watch<u32>) -> Self {
         Self { rejections: watch, ..self }
@@ -172,6 +177,13 @@ impl Limits {
             return Err(LimitError::Recovery { frames });
         }
         Ok(Self { recovery_frames: frames, ..self })
+    }
+
+    /// Steps in a row with every input within its first limit, before the one that recovers: 1,000 by default. Whoever
+    /// can trip a limit at will makes the state change no more often than that. Getting worse takes no time.
+    #[must_use]
+    pub const fn dwell(self, steps: u32) -> Self {
+        Self { dwell: steps, ..self }
     }
 
     /// Leaves the safe state without an acknowledgement.
@@ -190,6 +202,12 @@ impl Limits {
     #[must_use]
     pub const fn recovery_frames(&self) -> u16 {
         self.recovery_frames
+    }
+
+    /// Steps in a row that must be clear before the one that recovers.
+    #[must_use]
+    pub const fn dwell_steps(&self) -> u32 {
+        self.dwell
     }
 
     /// The limits on age.
@@ -223,6 +241,11 @@ pub enum LimitError {
         /// The second limit.
         safe: u32,
     },
+    /// A limit that the input never exceeds.
+    Untrippable {
+        /// The second limit.
+        safe: u32,
+    },
     /// A tissue speed that is negative or not finite.
     Speed {
         /// The speed.
@@ -242,6 +265,9 @@ impl fmt::Display for LimitError {
                 write!(f, "the safe limit {safe} is below the degraded limit {degraded}")
             }
             Self::TooLong { safe } => write!(f, "a limit of {safe} is not below 2^31"),
+            Self::Untrippable { safe } => {
+                write!(f, "a limit of {safe} can never be exceeded")
+            }
             Self::Speed { tissue_speed } => write!(f, "tissue cannot move at {tissue_speed}"),
             Self::Recovery { frames } => write!(f, "{frames} frames cannot recover a surface"),
         }

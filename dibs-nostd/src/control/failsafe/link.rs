@@ -10,9 +10,9 @@ pub struct Link {
     pub silence: Millis,
     /// Time since the last heartbeat; [`Millis::MAX`] before the first.
     pub heartbeat: Millis,
-    /// Frames refused or damaged since the last publication: [`BusHealth::rejections`](crate::BusHealth::rejections).
+    /// Frames that failed since the last publication: [`BusHealth::rejections`](crate::BusHealth::rejections).
     pub rejections: u32,
-    /// Forged packets since then.
+    /// Forged packets, less 10 for each second: [`BusHealth::forgeries`](crate::BusHealth::forgeries).
     pub forgeries: u32,
     /// Time that the published frame was on its way, at most; [`Millis::MAX`] where it is unknown.
     pub transit: Millis,
@@ -30,4 +30,7 @@ impl Link {
         transit: Millis(0),
         source_age: Millis(0),
     };
+
+    /// The largest number of forgeries that is reported.
+    pub const MOST_FORGERIES: u32 = 1_000;
 }

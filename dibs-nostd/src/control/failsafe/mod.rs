@@ -18,20 +18,21 @@
 //!
 //! Each input has two limits, a [`Watch`]. *Clear* is a step at which every input is within its first
 //! limit, a surface is there, the query gave an answer and the tree is sound. The *run* counts the frames that were
-//! published since the last step that was not clear; two frames between two steps count as one.
+//! published since the last step that was not clear; two frames between two steps count as one. The *calm* counts the
+//! steps since, and is *long enough* once more than [`Limits::dwell`]'s steps were clear.
 //!
 //! | from | to | when |
 //! |---|---|---|
 //! | (start) | safe | always: no surface was published yet |
 //! | nominal | degraded | an input is beyond its first limit |
 //! | nominal, degraded | safe | an input is beyond its second limit, the query failed, the tree's bytes changed, or there is no surface |
-//! | degraded | nominal | the run reaches [`Limits::recovery`]'s frames |
+//! | degraded | nominal | the run reaches [`Limits::recovery`]'s frames, and the calm is long enough |
 //! | safe | nominal | the same, and [`FailSafe::acknowledge`] was accepted since; or alone, with [`Limits::automatic`] |
 //!
 //! From safe there is no way to degraded, and no fault recovers without new frames, so a surface that only looks fresh,
 //! because a clock wrapped, does not help. An acknowledgement is accepted only once the run is complete, and void as
 //! soon as a step is not clear, so nobody can acknowledge in advance. Recovery is manual by default, as in the da Vinci
-//! Research Kit.
+//! Research Kit. The calm bounds how often the state changes, whoever steers an input across its limit.
 //!
 //! # Time
 //!
@@ -122,7 +123,8 @@ impl Verdict {
 /// use dibs_nostd::failsafe::{FailSafe, Limits, Link, Observation, State, Watch};
 ///
 /// // Degraded after 50 ms, safe after 200; tissue at up to 0.1 mm a millisecond.
-/// let limits = Limits::new(Watch::new(Millis(50), Millis(200))?, 0.1)?.recovery(2)?.automatic();
+/// let age = Watch::new(Millis(50), Millis(200))?;
+/// let limits = Limits::new(age, 0.1)?.recovery(2)?.dwell(1).automatic();
 /// let mut machine = FailSafe::new(limits);
 /// let link = Link::CLEAR;
 /// let mut state = |now: u32, epoch, received: u32| {
@@ -146,6 +148,8 @@ pub struct FailSafe {
     frame: Option<(u32, Millis)>,
     /// Frames since the last step that was not clear; stops at the number needed.
     run: u16,
+    /// Clear steps in a row; stops above the number needed.
+    calm: u32,
     acknowledged: bool,
 }
 
@@ -159,6 +163,7 @@ impl FailSafe {
             cause: Some(Unavailable::NoSurface),
             frame: None,
             run: 0,
+            calm: 0,
             acknowledged: false,
         }
     }
@@ -187,12 +192,16 @@ impl FailSafe {
             if is_new && self.run < self.limits.recovery_frames() {
                 self.run += 1;
             }
+            if self.calm <= self.limits.dwell_steps() {
+                self.calm = self.calm.saturating_add(1);
+            }
         } else {
             self.run = 0;
+            self.calm = 0;
             self.acknowledged = false;
         }
 
-        let has_recovered = self.run >= self.limits.recovery_frames();
+        let has_recovered = self.has_recovered();
         self.state = match (self.state, level) {
             (State::Safe, _)
                 if has_recovered && (self.acknowledged || self.limits.is_automatic()) =>
@@ -226,13 +235,19 @@ impl FailSafe {
     /// # Errors
     /// [`AcknowledgeError`] unless the last step waited for it; it has no effect then.
     pub fn acknowledge(&mut self) -> Result<(), AcknowledgeError> {
-        let frames = self.limits.recovery_frames().saturating_sub(self.run);
-        if self.state == State::Safe && frames == 0 {
+        if self.state == State::Safe && self.has_recovered() {
             self.acknowledged = true;
-            Ok(())
-        } else {
-            Err(AcknowledgeError { state: self.state, frames })
+            return Ok(());
         }
+        let frames = self.limits.recovery_frames().saturating_sub(self.run);
+        let steps = self.limits.dwell_steps().saturating_add(1).saturating_sub(self.calm);
+        Err(AcknowledgeError { state: self.state, frames, steps })
+    }
+
+    /// Whether run and calm are long enough.
+    fn has_recovered(&self) -> bool {
+        let is_calm = self.calm > self.limits.dwell_steps() || self.calm == u32::MAX;
+        self.run >= self.limits.recovery_frames() && is_calm
     }
 
     /// The level that the inputs of this step require, and its first cause.
@@ -278,13 +293,19 @@ pub struct AcknowledgeError {
     pub state: State,
     /// Good frames that are still missing.
     pub frames: u16,
+    /// Clear steps that are still missing.
+    pub steps: u32,
 }
 
 impl fmt::Display for AcknowledgeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.state {
             State::Safe => {
-                write!(f, "{} good frames are missing before an acknowledgement", self.frames)
+                let Self { frames, steps, .. } = self;
+                write!(
+                    f,
+                    "{frames} good frames and {steps} clear steps are missing before an acknowledgement"
+                )
             }
             _ => write!(f, "the state is not safe: there is nothing to acknowledge"),
         }

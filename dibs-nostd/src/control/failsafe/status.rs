@@ -23,7 +23,7 @@ use crate::surface::{Ageing, Millis};
 /// let mut assembler = Assembler::new(writer, Unchecked, 0xB0D1, 1000.0);
 /// let mut buffer = [0; 64];
 /// let id = FrameId { mesh_id: 0xB0D1, session: 1, epoch: 0 };
-/// assembler.accept(encode_heartbeat(&id, 1, &NoMac, &mut buffer), Millis(10)).unwrap();
+/// assembler.accept(encode_heartbeat(&id, 1, None, &NoMac, &mut buffer), Millis(10)).unwrap();
 /// LINK.set(&assembler.health());
 ///
 /// // Control interrupt.
@@ -121,6 +121,8 @@ impl LinkStatus {
         }
     }
 }
+
+const _: () = assert!(Link::MOST_FORGERIES == BusHealth::MOST_FORGERIES);
 
 impl Default for LinkStatus {
     fn default() -> Self {

@@ -45,6 +45,8 @@ fn limits(frames: u16, automatic: bool) -> Limits {
         .transit(TRANSIT)
         .source_age(SOURCE_AGE)
         .forgeries(FORGERIES)
+        .unwrap()
+        .dwell(0)
         .recovery(frames)
         .unwrap();
     if automatic { limits.automatic() } else { limits }
@@ -202,10 +204,49 @@ fn recovery_takes_its_frames_in_a_row_and_from_safe_an_acknowledgement() {
     }
 }
 
+/// An input crosses its limit as often as it can: the state gets worse at once, and better no sooner than it may.
+#[test]
+fn the_state_improves_no_more_often_than_the_dwell_allows() {
+    let rejected =
+        |now, rejections| Observation { link: Link { rejections, ..GOOD }, ..seen(now, now, 0) };
+    let changes = |limits: Limits| {
+        let mut machine = FailSafe::new(limits);
+        let mut changes: Vec<(u32, State)> = Vec::new();
+        let mut calm = 0;
+        for now in 0..20_000 {
+            // The attacker sees the state, and trips a limit as soon as it is nominal.
+            let is_attacked = machine.state() == State::Nominal;
+            calm = if is_attacked { 0 } else { calm + 1 };
+            let before = machine.state();
+            let state = machine.step(&rejected(now, if is_attacked { 10 } else { 0 })).state;
+            assert!(!is_attacked || state == State::Safe, "safe is immediate");
+            if state != before {
+                assert!(state == State::Safe || calm > limits.dwell_steps());
+                changes.push((now, state));
+            }
+        }
+        changes.len()
+    };
+    assert!(changes(limits(1, true)) > 15_000, "without a dwell");
+    assert!((350..=400).contains(&changes(limits(1, true).dwell(100))));
+    let by_default = Limits::new(AGE, SPEED).unwrap().rejections(REJECTIONS).automatic();
+    assert!((35..=40).contains(&changes(by_default)));
+    // An acknowledgement must wait, too.
+    let mut machine = FailSafe::new(limits(1, false).dwell(2));
+    for now in 0..3 {
+        let steps = if now == 0 { 3 } else { 3 - now };
+        let early = machine.acknowledge();
+        assert_eq!(early.map_err(|error| error.steps), Err(steps));
+        assert_eq!(machine.step(&seen(now, now, 0)).waits_for_acknowledgement, now == 2);
+    }
+    machine.acknowledge().unwrap();
+    assert_eq!(machine.step(&seen(3, 3, 0)).state, State::Nominal);
+}
+
 #[test]
 fn safe_comes_exactly_one_tick_after_the_limit_whatever_the_clock_shows() {
     for start in [0, 1, u32::MAX - 300, u32::MAX - 200, u32::MAX, i32::MAX as u32 - 100] {
-        let mut machine = FailSafe::new(Limits::new(AGE, SPEED).unwrap().automatic());
+        let mut machine = FailSafe::new(Limits::new(AGE, SPEED).unwrap().dwell(0).automatic());
         let mut states = Vec::new();
         for tick in 0..400_u32 {
             let now = start.wrapping_add(tick);
@@ -223,7 +264,7 @@ fn safe_comes_exactly_one_tick_after_the_limit_whatever_the_clock_shows() {
 
 #[test]
 fn the_margin_is_age_times_speed_in_every_state_that_acts() {
-    let mut machine = FailSafe::new(Limits::new(AGE, SPEED).unwrap().automatic());
+    let mut machine = FailSafe::new(Limits::new(AGE, SPEED).unwrap().dwell(0).automatic());
     let mut before = -1.0;
     for age in 0..=AGE.safe().0 {
         let verdict = machine.step(&seen(1000 + age, 1, age));
@@ -241,7 +282,7 @@ fn the_margin_is_age_times_speed_in_every_state_that_acts() {
 
 #[test]
 fn a_slow_second_core_is_not_an_old_surface() {
-    let mut machine = FailSafe::new(Limits::new(AGE, SPEED).unwrap().automatic());
+    let mut machine = FailSafe::new(Limits::new(AGE, SPEED).unwrap().dwell(0).automatic());
     // The receiver's clock is ahead by one.
     let age = Ageing::default().at(Millis(1000), Millis(1001)).oldest;
     let verdict = machine.step(&seen(1000, 1, age.0));
@@ -259,6 +300,11 @@ fn limits_that_no_machine_can_have_are_named() {
     }
     assert!(matches!(Limits::new(AGE, f32::NAN), Err(LimitError::Speed { .. })));
     assert_eq!(limits(1, false).recovery(0), Err(LimitError::Recovery { frames: 0 }));
+    let most = Link::MOST_FORGERIES;
+    let untrippable = Err(LimitError::Untrippable { safe: most });
+    assert_eq!(limits(1, false).forgeries(count(0, most)), untrippable);
+    assert!(limits(1, false).forgeries(count(0, most - 1)).is_ok());
+    assert!(limits(1, false).forgeries(Watch::OFF).is_ok());
 }
 
 /// One step of a random run.
@@ -342,10 +388,12 @@ proptest! {
     fn a_random_run_keeps_the_rules(
         steps in steps(),
         frames in 1_u16..4,
+        dwell in 0_u32..6,
         automatic in any::<bool>(),
         start in any::<u32>(),
     ) {
-        let (seen, verdicts, acknowledged) = run(&steps, limits(frames, automatic), start);
+        let (seen, verdicts, acknowledged) =
+            run(&steps, limits(frames, automatic).dwell(dwell), start);
         for (at, verdict) in verdicts.iter().enumerate() {
             // An observation beyond a limit always has the state that the limit requires.
             prop_assert!(!is_beyond(&seen[at], true) || verdict.state == State::Safe);
@@ -364,6 +412,7 @@ proptest! {
             let is_new = |i: usize| i == 0 || epoch(i) != epoch(i - 1);
             let new = clear.iter().filter(|&&i| is_new(i)).count();
             prop_assert!(new >= usize::from(frames));
+            prop_assert!(clear.len() > dwell as usize);
             if before == State::Safe && !automatic {
                 prop_assert!(clear.iter().any(|&i| i < at && acknowledged[i]));
             }
@@ -375,7 +424,7 @@ proptest! {
                 let clear: Vec<usize> =
                     (0..=at).rev().take_while(|&i| !is_beyond(&seen[i], false)).collect();
                 let new = clear.iter().filter(|&&i| epoch(i) != epoch(i - 1)).count();
-                prop_assert!(new < usize::from(frames));
+                prop_assert!(new < usize::from(frames) || clear.len() <= dwell as usize);
             }
         }
     }

@@ -150,7 +150,7 @@ fn packets<M: Mac, const MTU: usize>(
     built: &BuiltTree,
     positions: &[Vec3],
     session: u32,
-    keyed_mac: impl Fn(u32) -> M + Send + 'static,
+    keyed_mac: impl Fn(u64) -> M + Send + 'static,
 ) -> Result<Vec<Vec<u8>>> {
     let order = SurfaceOrder::of(&built.tree::<u16>()?);
     let settings =

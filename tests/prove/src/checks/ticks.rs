@@ -233,7 +233,7 @@ impl Script {
         let (mut packet, mut line) = ([0; MTU], [0; framed_bytes(MTU)]);
         let mut lines = Vec::new();
         let mut beat = [0; 64];
-        let beat = encode_heartbeat(&id, id.epoch, &NoMac, &mut beat);
+        let beat = encode_heartbeat(&id, id.epoch, None, &NoMac, &mut beat);
         lines.push(enframe(beat, &mut line).context("no room")?.to_vec());
         let freshness = Freshness { age_ms: 0, echo: Some(begins) };
         let encoder = FrameEncoder::<_, MTU>::new(id, Encoding::Float, &frame.rows[..])?;

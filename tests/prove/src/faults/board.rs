@@ -38,7 +38,8 @@ impl Board {
     pub fn boot<M: Mac>(program: &Path, mac: &M) -> Result<Self> {
         let folder = tempfile::tempdir()?;
         let blob = TREE.blob();
-        let head = [u32::from(M::TAGGED), mac.challenge(), LIMIT.to_bits(), blob.len() as u32];
+        let challenge = u32::try_from(mac.challenge())?;
+        let head = [u32::from(M::TAGGED), challenge, LIMIT.to_bits(), blob.len() as u32];
         let script = [head.map(u32::to_le_bytes).as_flattened(), blob].concat();
         fs::write(folder.path().join("script.bin"), script)?;
         let socket = UnixListener::bind(folder.path().join("bus"))?;

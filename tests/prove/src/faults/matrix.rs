@@ -103,7 +103,7 @@ fn life(fault: Fault, count: u64, chunk: u64, seed: u64, place: Place<'_>) -> Ro
 struct Life<'p, M> {
     place: Place<'p>,
     source: Source<M>,
-    keyed_mac: fn(u32) -> M,
+    keyed_mac: fn(u64) -> M,
     log: Log,
     injector: Injector,
     rng: Rng,
@@ -120,7 +120,7 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
         count: u64,
         case: Case,
         seed: u64,
-        keyed_mac: fn(u32) -> M,
+        keyed_mac: fn(u64) -> M,
         place: Place<'p>,
     ) -> Row {
         let mut rng = Rng::with_seed(seed);
@@ -161,7 +161,7 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
 
     /// The challenge that a receiver draws when it starts.
     fn any_mac(&mut self) -> M {
-        (self.keyed_mac)(if M::TAGGED { self.rng.u32(..) } else { 0 })
+        (self.keyed_mac)(if M::TAGGED { u64::from(self.rng.u32(..)) } else { 0 })
     }
 
     /// The next frame's packets.

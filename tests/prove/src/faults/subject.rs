@@ -105,7 +105,7 @@ pub type Source<M> = Sender<Mailbox, MTU, M>;
 pub fn source<M: Mac>(
     case: Case,
     session: u32,
-    keyed_mac: impl Fn(u32) -> M + Send + 'static,
+    keyed_mac: impl Fn(u64) -> M + Send + 'static,
 ) -> Source<M> {
     let tree = TREE.tree::<u16>().expect("16-bit indices");
     let settings = Settings {
@@ -266,7 +266,7 @@ impl<M: Mac> Receiver for Controller<'_, M> {
 }
 
 /// The MAC under a challenge.
-pub fn mac_under(challenge: u32) -> AesCmac {
+pub fn mac_under(challenge: u64) -> AesCmac {
     AesCmac::new(&KEY, RECEIVER, challenge)
 }
 

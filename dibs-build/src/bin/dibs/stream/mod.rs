@@ -57,7 +57,7 @@ pub struct Args {
     key: Option<PathBuf>,
     /// The receiver's challenge, where it has no way to report one: 0, if it was made with none
     #[arg(long, value_name = "NUMBER", requires = "key")]
-    challenge: Option<u32>,
+    challenge: Option<u64>,
     /// The receiver's id under the tags: a key may be shared by several receivers, each with its own
     #[arg(long, value_name = "NUMBER", default_value_t = 0, requires = "key")]
     receiver: u32,

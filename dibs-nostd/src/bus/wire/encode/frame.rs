@@ -6,6 +6,7 @@ use crate::bus::wire::{
     Begin, Content, EncodeError, Encoding, FrameId, Freshness, HEADER_BYTES, MAX_CONTENT_PACKETS,
     MAX_ROWS, Mac, NoMac, kind,
 };
+use crate::tree::SurfaceFacts;
 
 /// Cuts one frame into packets of at most `MTU` bytes: begin, vertices, commit.
 ///
@@ -78,7 +79,8 @@ impl<'a, T: VertexTable + ?Sized, const MTU: usize> FrameEncoder<'a, T, MTU> {
             }
         }
         let (session, freshness) = (id.session, Freshness::default());
-        let begin = Begin { session, content: Content::Whole, encoding, rows, freshness };
+        let (content, surface) = (Content::Whole, SurfaceFacts::default());
+        let begin = Begin { session, content, encoding, rows, surface, freshness };
         let next = Next::Begin;
         let frame =
             Self { id, begin, positions, held: None, mac: NoMac, next, sequence: 0, digest: 0 };
@@ -91,7 +93,7 @@ impl<'a, T: VertexTable + ?Sized, const MTU: usize> FrameEncoder<'a, T, MTU> {
     /// `held` must be the positions that the receiver decoded, not those before quantising.
     ///
     /// # Errors
-    /// As [`new`](Self::new), and [`EncodeError::Base`].
+    /// As [`new`](Self::new), and [`EncodeError::Base`] or [`EncodeError::BaseEpoch`].
     pub fn partial(
         id: FrameId,
         encoding: Encoding,
@@ -101,6 +103,9 @@ impl<'a, T: VertexTable + ?Sized, const MTU: usize> FrameEncoder<'a, T, MTU> {
     ) -> Result<Self, EncodeError> {
         if held.len() != positions.len() {
             return Err(EncodeError::Base { rows: held.len() });
+        }
+        if !(1..=u32::from(u16::MAX)).contains(&id.epoch.wrapping_sub(base_epoch)) {
+            return Err(EncodeError::BaseEpoch { epoch: base_epoch });
         }
         let mut frame = Self::new(id, encoding, positions)?;
         frame.begin.content = Content::Partial { base_epoch };
@@ -112,6 +117,13 @@ impl<'a, T: VertexTable + ?Sized, const MTU: usize> FrameEncoder<'a, T, MTU> {
     #[must_use]
     pub fn with_freshness(mut self, freshness: Freshness) -> Self {
         self.begin.freshness = freshness;
+        self
+    }
+
+    /// The same frame, of a surface with this unit and number of triangles.
+    #[must_use]
+    pub fn with_surface(mut self, surface: SurfaceFacts) -> Self {
+        self.begin.surface = surface;
         self
     }
 

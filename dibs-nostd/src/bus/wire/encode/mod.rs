@@ -10,47 +10,49 @@ use core::fmt;
 
 use super::checksum::{checksum, scrambled};
 use super::fields::Bytes;
-use super::packet::HAS_ECHO;
+use super::packet::{HAS_ECHO, STATUS_BYTES};
 use super::{
-    Begin, CHECKSUM_BYTES, Content, Counters, Direction, Encoding, FrameId, HEADER_BYTES,
-    MAX_CONTENT_PACKETS, MAX_ROWS, MAX_WEIGHTS, MIN_MTU, Mac, NoMac, Status, TAG_BYTES, VERSION,
-    kind, padded,
+    Answer, Begin, CHECKSUM_BYTES, Content, Counters, Direction, Encoding, FrameId, HEADER_BYTES,
+    MAX_CONTENT_PACKETS, MAX_ROWS, MAX_WEIGHTS, MIN_MTU, Mac, Status, TAG_BYTES, VERSION, kind,
+    padded,
 };
+use crate::tree::{SurfaceFacts, Unit};
 
 /// Writes a heartbeat to the buffer. `id` has the newest epoch that the sender has begun, or one less than the first
-/// frame's before that. `beat` counts up by one.
+/// frame's before that. `beat` counts up by one. `echo` is the clock of the newest status that the sender has taken.
 pub fn encode_heartbeat<'b, M: Mac>(
     id: &FrameId,
     beat: u32,
+    echo: Option<u32>,
     mac: &M,
     buffer: &'b mut [u8; MIN_MTU],
 ) -> &'b [u8] {
-    words(kind::HEARTBEAT, id, beat, mac, buffer)
-}
-
-/// Writes a hello to the buffer: `id` as in a heartbeat, and a nonce that is not 0. Never tagged.
-pub fn encode_hello<'b>(id: &FrameId, nonce: u32, buffer: &'b mut [u8; MIN_MTU]) -> &'b [u8] {
-    words(kind::HELLO, id, nonce, &NoMac, buffer)
-}
-
-/// A packet of session and one number.
-fn words<'b, M: Mac>(
-    kind: u8,
-    id: &FrameId,
-    number: u32,
-    mac: &M,
-    buffer: &'b mut [u8; MIN_MTU],
-) -> &'b [u8] {
-    let mut packet = PacketWriter::<M>::new(buffer, kind, id, 0, 0, 0);
+    let mut packet = PacketWriter::<M>::with_clock(buffer, kind::HEARTBEAT, id, 0, echo);
     let [_, _, high @ ..] = id.session.to_le_bytes();
     packet.put(&high);
-    packet.put(&[0; 2]);
-    packet.put(&number.to_le_bytes());
+    packet.put(&[if echo.is_some() { HAS_ECHO } else { 0 }, 0]);
+    packet.put(&beat.to_le_bytes());
     packet.finish(mac, id.session).0
 }
 
-/// Writes a status to the buffer, with as many counters as fit. The status' number selects them, so that a few statuses
-/// carry all.
+/// Writes a hello to the buffer: `id` as in a heartbeat, and a nonce that was never used before. Its tag does not depend
+/// on the challenge of `mac`.
+pub fn encode_hello<'b, M: Mac>(
+    id: &FrameId,
+    nonce: u64,
+    mac: &M,
+    buffer: &'b mut [u8; MIN_MTU],
+) -> &'b [u8] {
+    let mut packet = PacketWriter::<M>::new(buffer, kind::HELLO, id, 0, 0, 0);
+    let [_, _, high @ ..] = id.session.to_le_bytes();
+    packet.put(&high);
+    packet.put(&[0; 2]);
+    packet.put(&nonce.to_le_bytes());
+    packet.finish(mac, id.session).0
+}
+
+/// Writes a status to the buffer: the answer to a hello, or else as many counters as fit. The status' number selects
+/// them, so that a few statuses carry all.
 pub fn encode_status<'b, M: Mac, const MTU: usize>(
     mesh_id: u32,
     status: &Status,
@@ -58,7 +60,7 @@ pub fn encode_status<'b, M: Mac, const MTU: usize>(
     mac: &M,
     buffer: &'b mut [u8; MTU],
 ) -> &'b [u8] {
-    let room = const { capacity::<M>(MTU, 28 + HEADER_BYTES, 4) };
+    let room = const { capacity::<M>(MTU, STATUS_BYTES + HEADER_BYTES, 4) };
     let all = counters.from(0).len();
     let pages = all.div_ceil(room as usize);
     let first = (status.number as usize).checked_rem(pages).unwrap_or(0) * room as usize;
@@ -70,18 +72,27 @@ pub fn encode_status<'b, M: Mac, const MTU: usize>(
         None => (0, 0, 0, 0.0),
     };
     let id = FrameId { mesh_id, session, epoch };
-    let count = page.len() as u8;
-    let mut packet = PacketWriter::<M>::new(buffer, kind::STATUS, &id, 0, count, first as u32);
+    let mut packet = match status.answer {
+        Some(_) => PacketWriter::with_clock(buffer, kind::ANSWER, &id, 0, Some(status.clock)),
+        None => {
+            PacketWriter::<M>::new(buffer, kind::STATUS, &id, 0, page.len() as u8, first as u32)
+        }
+    };
     let [_, _, high @ ..] = session.to_le_bytes();
     packet.put(&high);
     let flags = u8::from(status.published.is_some()) | u8::from(status.wants_whole) << 1;
     packet.put(&[flags, status.safety]);
     packet.put(&status.number.to_le_bytes());
     packet.put(&age_ms.to_le_bytes());
-    packet.put(&stretch.to_le_bytes());
-    for word in [status.challenge, status.clock, status.answer] {
-        packet.put(&word.to_le_bytes());
+    if let Some(Answer { nonce, challenge, surface }) = &status.answer {
+        packet.put(&nonce.to_le_bytes());
+        packet.put(&challenge.to_le_bytes());
+        packet.surface(surface);
+        packet.put(&[0]);
+        return packet.finish(mac, session).0;
     }
+    packet.put(&stretch.to_le_bytes());
+    packet.put(&status.clock.to_le_bytes());
     for counter in page {
         packet.put(&counter.to_le_bytes());
     }
@@ -94,11 +105,11 @@ fn begin_packet<'b, M: Mac>(
     id: &FrameId,
     begin: &Begin,
 ) -> PacketWriter<'b, M> {
-    // The echo takes the place of count and first row.
-    let [count, first @ ..] = begin.freshness.echo.unwrap_or(0).to_le_bytes();
-    let [f0, f1, f2] = first;
-    let first = u32::from_le_bytes([f0, f1, f2, 0]);
-    let mut packet = PacketWriter::new(buffer, kind::BEGIN, id, 0, count, first);
+    let back = match begin.content {
+        Content::Partial { base_epoch } => id.epoch.wrapping_sub(base_epoch) as u16,
+        _ => 0,
+    };
+    let mut packet = PacketWriter::with_clock(buffer, kind::BEGIN, id, back, begin.freshness.echo);
     packet.begin(begin);
     packet
 }
@@ -135,31 +146,62 @@ impl<'b, M: Mac> PacketWriter<'b, M> {
         bytes.put(&sequence.to_le_bytes());
         let [f0, f1, f2, _] = first.to_le_bytes();
         bytes.put(&[count, f0, f1, f2]);
-        let direction =
-            if kind == kind::STATUS { Direction::ToSender } else { Direction::ToReceiver };
+        let direction = match kind {
+            kind::STATUS | kind::ANSWER => Direction::ToSender,
+            kind::HELLO => Direction::Greeting,
+            _ => Direction::ToReceiver,
+        };
         Self { bytes, direction, mac: core::marker::PhantomData }
+    }
+
+    /// A packet with a time of the receiver's clock in place of count and first row.
+    fn with_clock(
+        buffer: &'b mut [u8],
+        kind: u8,
+        id: &FrameId,
+        sequence: u16,
+        clock: Option<u32>,
+    ) -> Self {
+        let [count, f0, f1, f2] = clock.unwrap_or(0).to_le_bytes();
+        Self::new(buffer, kind, id, sequence, count, u32::from_le_bytes([f0, f1, f2, 0]))
     }
 
     fn put(&mut self, bytes: &[u8]) {
         self.bytes.put(bytes);
     }
 
+    /// A number of 24 bits; 0, which is unknown, for a larger one.
+    fn put_u24(&mut self, number: u32) {
+        let [n0, n1, n2, high] = number.to_le_bytes();
+        self.put(&if high == 0 { [n0, n1, n2] } else { [0; 3] });
+    }
+
+    fn surface(&mut self, surface: &SurfaceFacts) {
+        self.put(&[surface.unit.map_or(0, Unit::code)]);
+        self.put_u24(surface.vertices);
+        self.put_u24(surface.triangles);
+    }
+
     /// The body of a begin packet.
     fn begin(&mut self, begin: &Begin) {
         let [_, _, high @ ..] = begin.session.to_le_bytes();
         self.put(&high);
-        let (content, base_epoch) = match begin.content {
-            Content::Whole => (0, 0),
-            Content::Partial { base_epoch } => (1, base_epoch),
-            Content::Modal => (2, 0),
+        let content = match begin.content {
+            Content::Whole => 0,
+            Content::Partial { .. } => 1,
+            Content::Modal => 2,
         };
         let encoding = u8::from(begin.encoding != Encoding::Float);
         let has_echo = if begin.freshness.echo.is_some() { HAS_ECHO } else { 0 };
         self.put(&begin.freshness.age_ms.to_le_bytes());
         self.put(&[content | encoding << 3 | has_echo]);
-        let [r0, r1, r2, _] = begin.rows.to_le_bytes();
-        self.put(&[r0, r1, r2]);
-        self.put(&base_epoch.to_le_bytes());
+        if begin.content == Content::Modal {
+            self.surface(&begin.surface);
+            self.put_u24(begin.rows);
+            self.put(&[0; 21]);
+            return;
+        }
+        self.surface(&SurfaceFacts { vertices: begin.rows, ..begin.surface });
         match begin.encoding {
             Encoding::Float => self.put(&[0; 24]),
             Encoding::Quantised(grid) => {
@@ -208,6 +250,11 @@ pub enum EncodeError {
         /// Vertices of the base.
         rows: usize,
     },
+    /// The base of a partial frame is not one of the 65,535 epochs before it.
+    BaseEpoch {
+        /// Epoch of the base.
+        epoch: u32,
+    },
     /// A position or weight is not finite.
     NotFinite {
         /// The first such row.
@@ -228,6 +275,9 @@ impl fmt::Display for EncodeError {
                 write!(f, "a frame of {packets} packets cannot be sent: the packets are too small")
             }
             Self::Base { rows } => write!(f, "the base of the partial frame has {rows} rows"),
+            Self::BaseEpoch { epoch } => {
+                write!(f, "frame {epoch} is too long ago to be the base of a partial frame")
+            }
             Self::NotFinite { row } => write!(f, "row {row} is not finite"),
             Self::OutOfBox { row } => write!(f, "row {row} is outside the quantisation box"),
         }

@@ -5,6 +5,7 @@ use crate::bus::wire::{
     Begin, Content, EncodeError, Encoding, FrameId, Freshness, HEADER_BYTES, MAX_WEIGHTS, Mac,
     NoMac, kind,
 };
+use crate::tree::SurfaceFacts;
 
 /// Cuts the weights of one modal frame into packets of at most `MTU` bytes: begin, weights, commit.
 ///
@@ -25,6 +26,7 @@ pub struct WeightsEncoder<'a, const MTU: usize, M = NoMac> {
     id: FrameId,
     weights: &'a [f32],
     freshness: Freshness,
+    surface: SurfaceFacts,
     mac: M,
     /// Weights sent; `None` before the begin.
     sent: Option<u32>,
@@ -48,6 +50,7 @@ impl<'a, const MTU: usize> WeightsEncoder<'a, MTU> {
                 id,
                 weights,
                 freshness: Freshness::default(),
+                surface: SurfaceFacts::default(),
                 mac: NoMac,
                 sent: None,
                 is_done: false,
@@ -60,8 +63,8 @@ impl<'a, const MTU: usize> WeightsEncoder<'a, MTU> {
     /// The same frame, with a tag on every packet.
     #[must_use]
     pub fn with_mac<M: Mac>(self, mac: M) -> WeightsEncoder<'a, MTU, M> {
-        let Self { id, weights, freshness, sent, is_done, sequence, digest, .. } = self;
-        WeightsEncoder { id, weights, freshness, mac, sent, is_done, sequence, digest }
+        let Self { id, weights, freshness, surface, sent, is_done, sequence, digest, .. } = self;
+        WeightsEncoder { id, weights, freshness, surface, mac, sent, is_done, sequence, digest }
     }
 }
 
@@ -72,6 +75,12 @@ impl<M: Mac, const MTU: usize> WeightsEncoder<'_, MTU, M> {
     #[must_use]
     pub fn with_freshness(self, freshness: Freshness) -> Self {
         Self { freshness, ..self }
+    }
+
+    /// The same frame, of this surface.
+    #[must_use]
+    pub fn with_surface(self, surface: SurfaceFacts) -> Self {
+        Self { surface, ..self }
     }
 
     /// Writes the next packet to the buffer; `None` after the commit.
@@ -85,6 +94,7 @@ impl<M: Mac, const MTU: usize> WeightsEncoder<'_, MTU, M> {
                 content: Content::Modal,
                 encoding: Encoding::Float,
                 rows: self.weights.len() as u32,
+                surface: self.surface,
                 freshness: self.freshness,
             };
             let packet = begin_packet::<M>(buffer, &self.id, &begin);

@@ -49,8 +49,8 @@ fn run(bytes: &mut [u8]) -> Option<()> {
     if is_tagged == 0 {
         Receiver::new(&tree, writer, reader, limit, NoMac)?.receive()
     } else {
-        Receiver::new(&tree, writer, reader, limit, AesCmac::new(&KEY, RECEIVER, challenge))?
-            .receive()
+        let mac = AesCmac::new(&KEY, RECEIVER, u64::from(challenge));
+        Receiver::new(&tree, writer, reader, limit, mac)?.receive()
     }
 }
 

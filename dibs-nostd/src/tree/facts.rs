@@ -1,0 +1,52 @@
+//! The facts by which both ends of a bus see that they mean the same surface.
+
+use core::fmt;
+
+use super::Unit;
+
+/// A surface's unit and size, as one end of a bus states them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct SurfaceFacts {
+    /// Unit of the mesh's file; `None` where it is not known.
+    pub unit: Option<Unit>,
+    /// Vertices; 0 where it is not known.
+    pub vertices: u32,
+    /// Triangles; 0 where it is not known.
+    pub triangles: u32,
+}
+
+impl SurfaceFacts {
+    /// Whether nothing that both state differs.
+    ///
+    /// ```
+    /// use dibs_nostd::{SurfaceFacts, format::Unit};
+    /// let here = SurfaceFacts { unit: Some(Unit::Millimetre), vertices: 4, triangles: 4 };
+    /// assert!(here.agrees_with(&SurfaceFacts { unit: None, ..here }));
+    /// assert!(!here.agrees_with(&SurfaceFacts { unit: Some(Unit::Metre), ..here }));
+    /// ```
+    #[must_use]
+    pub fn agrees_with(&self, other: &Self) -> bool {
+        let agree = |here: u32, there: u32| here == 0 || there == 0 || here == there;
+        let units =
+            [self.unit, other.unit].map(|unit| unit.map_or(0, |unit| u32::from(unit.code())));
+        let [here, there] = units;
+        agree(here, there)
+            && agree(self.vertices, other.vertices)
+            && agree(self.triangles, other.triangles)
+    }
+}
+
+impl fmt::Display for SurfaceFacts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { unit, vertices, triangles } = self;
+        match vertices {
+            0 => write!(f, "an unknown number of vertices")?,
+            _ => write!(f, "{vertices} vertices")?,
+        }
+        if *triangles != 0 {
+            write!(f, ", {triangles} triangles")?;
+        }
+        unit.map_or(Ok(()), |unit| write!(f, ", from a file in {unit}"))
+    }
+}
