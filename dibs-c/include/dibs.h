@@ -344,6 +344,10 @@ enum dibs_code
    */
   DIBS_CODE_UNAVAILABLE = 314,
   /**
+   * The tool's side is not known, so it may be inside.
+   */
+  DIBS_CODE_NO_SIDE = 315,
+  /**
    * The packet's checksum does not match, or it is too short for one.
    */
   DIBS_CODE_PACKET_DAMAGED = 400,
@@ -668,34 +672,6 @@ typedef struct dibs_tracker dibs_tracker;
 typedef struct dibs_tree dibs_tree;
 
 /**
- * A wall: a margin around the surface, with a spring and a damper.
- *
- * A sampled wall is passive only if the device's own damping is above `stiffness * tick / 2 + damping`.
- */
-typedef struct {
-  /**
-   * In N/mm, above 0.
-   */
-  float stiffness;
-  /**
-   * In N s/mm, at least 0.
-   */
-  float damping;
-  /**
-   * Damping (N s/mm, at least 0) where there is no answer to act on; 0 lets go of the tool.
-   */
-  float hold_damping;
-  /**
-   * In N, above 0.
-   */
-  float max_force;
-  /**
-   * Reach of the wall from the surface (mm, above 0).
-   */
-  float margin;
-} dibs_wall;
-
-/**
  * A point, a direction, a force or a velocity.
  */
 typedef struct {
@@ -714,9 +690,9 @@ typedef struct {
 } dibs_vec3;
 
 /**
- * The closest pair, with an interval that holds its separation: `lower - accuracy` to `separation + accuracy`.
+ * The closest pair. `dibs_proximity_interval` gives the interval that holds its separation.
  *
- * Where the side is none of the first three, the tool is taken to be outside.
+ * Where the side is none of the first three, the numbers are those of a tool outside.
  */
 typedef struct {
   /**
@@ -735,6 +711,10 @@ typedef struct {
    * A `dibs_side`.
    */
   uint32_t side;
+  /**
+   * A `dibs_coverage`: whether the stretch that the answer rests on was checked.
+   */
+  uint32_t coverage;
   /**
    * Distance (mm) from the tool's axis to the surface: 0 where it crosses.
    */
@@ -776,6 +756,48 @@ typedef struct {
    */
   uint32_t triangle_tests;
 } dibs_proximity;
+
+/**
+ * The last answer whose side was certain, widened by the motion since. All zeros are no past. Keep one for each tool.
+ */
+typedef struct {
+  /**
+   * The answer.
+   */
+  dibs_proximity proximity;
+  /**
+   * 1 where there is one; else 0.
+   */
+  uint32_t has_past;
+} dibs_last_side;
+
+/**
+ * A wall: a margin around the surface, with a spring and a damper.
+ *
+ * A sampled wall is passive only if the device's own damping is above `stiffness * tick / 2 + damping`.
+ */
+typedef struct {
+  /**
+   * In N/mm, above 0.
+   */
+  float stiffness;
+  /**
+   * In N s/mm, at least 0.
+   */
+  float damping;
+  /**
+   * Damping (N s/mm, at least 0) where there is no answer to act on; 0 lets go of the tool.
+   */
+  float hold_damping;
+  /**
+   * In N, above 0.
+   */
+  float max_force;
+  /**
+   * Reach of the wall from the surface (mm, above 0).
+   */
+  float margin;
+} dibs_wall;
 
 /**
  * A force and a torque on the tool.
@@ -1118,6 +1140,20 @@ typedef struct {
 } dibs_frame_facts;
 
 /**
+ * An interval of separations (mm).
+ */
+typedef struct {
+  /**
+   * No true separation is less.
+   */
+  float lower;
+  /**
+   * No true separation is more.
+   */
+  float upper;
+} dibs_interval;
+
+/**
  * Limits of a surface besides the tree's stretch limit. A limit that is not a number refuses every frame.
  */
 typedef struct {
@@ -1279,6 +1315,24 @@ extern "C" {
 const char *dibs_code_text(uint32_t code);
 
 /**
+ * Gives a wall an answer to act on where a tick's own has no side: the last one with a side and its force, by the motion
+ * since. Call it at every tick, before `dibs_wall_force`; a wall on its own has no past, and damps without a side.
+ *
+ * @param last       The tool's past, which goes on.
+ * @param outcome    As for `dibs_wall_force`.
+ * @param proximity  The closest pair, in place of which the pair to act on is written; not read, and may be null, where the
+ *                   outcome is an error.
+ * @param moved      The most (mm) that tool and surface together have moved since the last call, as of
+ *                   `dibs_tracker_closest`; negative where it is not known, which ends the past.
+ * @return `DIBS_CODE_OK`, also for an outcome that is an error; `DIBS_CODE_ARGUMENT` for a side or coverage that is none; or
+ *         a misuse.
+ */
+dibs_code dibs_last_side_settle(dibs_last_side *last,
+                                uint32_t outcome,
+                                dibs_proximity *proximity,
+                                float moved);
+
+/**
  * The force of a wall on the tool, from its closest pair.
  *
  * Call it at every tick, with the code of whatever the pair came from: with an error the force is the hold, pure damping.
@@ -1347,6 +1401,16 @@ dibs_code dibs_query_contacts(dibs_query *query,
                               const dibs_options *options,
                               dibs_contacts *contacts,
                               dibs_proximity *proximity);
+
+/**
+ * Gives a list whose tool may be inside, because the closest pair has no side, that of `closest`: a pair whose side is
+ * certain from the tool's past, of `dibs_last_side_settle`. That pair is a contact then, and the only one unless the tool is
+ * outside. Other lists stay as they are.
+ *
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a side or coverage that is none, or a misuse.
+ */
+dibs_code dibs_contacts_settle(dibs_contacts *contacts,
+                               const dibs_proximity *closest);
 
 /**
  * Facts that hold for the list.
@@ -1485,9 +1549,15 @@ dibs_code dibs_frame_get_facts(dibs_frame *frame, dibs_frame_facts *facts);
 dibs_code dibs_frame_release(dibs_frame *frame);
 
 /**
- * A panic path put in on purpose.
+ * The certified interval of a pair's separation: both ends include the accuracy, rounded outwards. Act on its lower end.
+ *
+ * Without a side the tool may be inside at any depth: the lower end is negative infinity. With `DIBS_SIDE_NOT_ASKED` and
+ * `DIBS_SIDE_NO_ADJACENCY` it is that of a tool outside.
+ *
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a side or coverage that is none, or a misuse.
  */
-uint8_t dibs_planted_panic(size_t at);
+dibs_code dibs_proximity_interval(const dibs_proximity *proximity,
+                                  dibs_interval *interval);
 
 /**
  * Makes a query on a tree.
@@ -1763,13 +1833,16 @@ dibs_code dibs_tracker_set_frame(dibs_tracker *tracker,
  * @param options    Options, or null.
  * @param proximity  Receives the answer; its counts of tests are this tick's.
  * @param fallback   Receives the reason for a whole query; or null.
+ * @param moved      Receives the most (mm) that tool and surface together have moved since the tracker's last search;
+ *                   -1 where it is not known; or null.
  * @return As `dibs_query_closest`.
  */
 dibs_code dibs_tracker_closest(dibs_tracker *tracker,
                                const dibs_tool *tool,
                                const dibs_options *options,
                                dibs_proximity *proximity,
-                               dibs_fallback *fallback);
+                               dibs_fallback *fallback,
+                               float *moved);
 
 /**
  * The closest pair of the tool and the frame that a reader holds: the answer of `dibs_tracker_closest`, without a copy of the
@@ -1784,6 +1857,8 @@ dibs_code dibs_tracker_closest(dibs_tracker *tracker,
  * @param options    Options, or null.
  * @param proximity  Receives the answer; its counts of tests are this tick's.
  * @param fallback   Receives the reason for a whole query; or null.
+ * @param moved      Receives the most (mm) that tool and surface together have moved since the tracker's last search;
+ *                   -1 where it is not known; or null.
  * @return As `dibs_query_closest`; `DIBS_CODE_ARGUMENT` of a frame of the caller's vertices.
  */
 dibs_code dibs_tracker_closest_on(dibs_tracker *tracker,
@@ -1791,7 +1866,8 @@ dibs_code dibs_tracker_closest_on(dibs_tracker *tracker,
                                   const dibs_tool *tool,
                                   const dibs_options *options,
                                   dibs_proximity *proximity,
-                                  dibs_fallback *fallback);
+                                  dibs_fallback *fallback,
+                                  float *moved);
 
 /**
  * Fills the list with all locally closest pairs whose separation is at most `margin`, deepest first: that of
@@ -1807,6 +1883,7 @@ dibs_code dibs_tracker_closest_on(dibs_tracker *tracker,
  * @param contacts   The list; empty after an error.
  * @param proximity  Receives the closest pair, or null.
  * @param fallback   Receives the reason for a whole query; or null.
+ * @param moved      As of `dibs_tracker_closest`.
  * @return As `dibs_query_contacts`.
  */
 dibs_code dibs_tracker_contacts(dibs_tracker *tracker,
@@ -1815,7 +1892,8 @@ dibs_code dibs_tracker_contacts(dibs_tracker *tracker,
                                 const dibs_options *options,
                                 dibs_contacts *contacts,
                                 dibs_proximity *proximity,
-                                dibs_fallback *fallback);
+                                dibs_fallback *fallback,
+                                float *moved);
 
 /**
  * The closest pair of several, each a tracker, on its surface, with a tool: of a chain of tools, of several surfaces, or of

@@ -73,10 +73,10 @@ struct Scene : dibs_scene {
 template <uint32_t Vertices> struct Tracker : Object<dibs_tracker, DIBS_TRACKER_SIZE(Vertices), dibs_tracker_init> {
     Code set(dibs_frame *frame) { return dibs_tracker_set_frame(*this, frame); }
     Code closest(const dibs_tool &tool, dibs_proximity &found, Options options = {}) {
-        return dibs_tracker_closest(*this, &tool, options, &found, nullptr);
+        return dibs_tracker_closest(*this, &tool, options, &found, nullptr, nullptr);
     }
     Code contacts(const dibs_tool &tool, float margin, dibs_contacts *list, Options options = {}) {
-        return dibs_tracker_contacts(*this, &tool, margin, options, list, nullptr, nullptr);
+        return dibs_tracker_contacts(*this, &tool, margin, options, list, nullptr, nullptr, nullptr);
     }
 };
 /** The closest pair of several trackers, each with a tool. */

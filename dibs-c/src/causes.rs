@@ -67,6 +67,7 @@ impl From<Unavailable> for dibs_code {
             Unavailable::SourceStale { .. } => Self::SourceStale,
             Unavailable::Forgeries { .. } => Self::Forgeries,
             Unavailable::NoDirection => Self::NoDirection,
+            Unavailable::NoSide => Self::NoSide,
             Unavailable::CutShort => Self::CutShort,
             Unavailable::NotFinite => Self::NotFinite,
             _ => Self::Unavailable,

@@ -98,6 +98,8 @@ pub enum dibs_code {
     TooFast = 313,
     /// There is no surface for another cause.
     Unavailable = 314,
+    /// The tool's side is not known, so it may be inside.
+    NoSide = 315,
     /// The packet's checksum does not match, or it is too short for one.
     PacketDamaged = 400,
     /// The packet is of another protocol version.
@@ -207,6 +209,7 @@ impl dibs_code {
         Self::Shrunk,
         Self::TooFast,
         Self::Unavailable,
+        Self::NoSide,
         Self::PacketDamaged,
         Self::PacketVersion,
         Self::PacketForm,
@@ -287,6 +290,7 @@ impl dibs_code {
             Self::Shrunk => c"a region of the surface has shrunk below its limit",
             Self::TooFast => c"a vertex moved faster than its limit",
             Self::Unavailable => c"the surface is not available",
+            Self::NoSide => c"the tool's side is not known",
             Self::PacketDamaged => c"the packet is damaged",
             Self::PacketVersion => c"the packet is of another protocol version",
             Self::PacketForm => c"the packet is malformed",

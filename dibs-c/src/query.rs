@@ -4,7 +4,9 @@ use core::ffi::c_void;
 
 use bytemuck::AnyBitPattern;
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Budget, Cost, NoSide, Options, Proximity, Query, Side, TriangleRow};
+use dibs_nostd::{
+    Budget, Cost, Coverage, Interval, NoSide, Options, Proximity, Query, Side, TriangleRow,
+};
 
 use crate::border::{Handle, Input, Kind, Output, Storage};
 use crate::code::dibs_code;
@@ -121,12 +123,31 @@ const SIDES: [(dibs_side, Side); 9] = [
     (dibs_side::CutShort, Side::Undefined(NoSide::CutShort)),
 ];
 
+/// How it is known that the tree's spheres cover the surface, so that no part of it is nearer than an answer says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum dibs_coverage {
+    /// The stretch was measured on these positions.
+    Measured = 0,
+    /// A bound on the stretch follows from measured frames.
+    Proven = 1,
+    /// Nothing was measured: the tree's stretch limit is taken to hold. If it does not, a nearer part of the surface can be
+    /// missed.
+    Assumed = 2,
+}
+
+const COVERAGES: [(dibs_coverage, Coverage); 3] = [
+    (dibs_coverage::Measured, Coverage::Measured),
+    (dibs_coverage::Proven, Coverage::Proven),
+    (dibs_coverage::Assumed, Coverage::Assumed),
+];
+
 /// In place of a triangle's row: none.
 pub const DIBS_NO_TRIANGLE: u32 = u32::MAX;
 
-/// The closest pair, with an interval that holds its separation: `lower - accuracy` to `separation + accuracy`.
+/// The closest pair. `dibs_proximity_interval` gives the interval that holds its separation.
 ///
-/// Where the side is none of the first three, the tool is taken to be outside.
+/// Where the side is none of the first three, the numbers are those of a tool outside.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_proximity {
@@ -138,6 +159,8 @@ pub struct dibs_proximity {
     pub accuracy: f32,
     /// A `dibs_side`.
     pub side: u32,
+    /// A `dibs_coverage`: whether the stretch that the answer rests on was checked.
+    pub coverage: u32,
     /// Distance (mm) from the tool's axis to the surface: 0 where it crosses.
     pub axis_distance: f32,
     /// The surface's point of the pair (mm).
@@ -163,11 +186,13 @@ pub struct dibs_proximity {
 impl From<Proximity> for dibs_proximity {
     fn from(found: Proximity) -> Self {
         let side = SIDES.iter().find(|(_, side)| *side == found.side);
+        let coverage = COVERAGES.iter().find(|(_, coverage)| *coverage == found.coverage);
         Self {
             separation: found.separation,
             lower: found.lower,
             accuracy: found.accuracy,
             side: side.map_or(dibs_side::NotAsked, |(number, _)| *number) as u32,
+            coverage: coverage.map_or(dibs_coverage::Assumed, |(number, _)| *number) as u32,
             axis_distance: found.axis_distance,
             point_on_surface: found.point_on_surface.into(),
             point_on_tool: found.point_on_tool.into(),
@@ -192,6 +217,8 @@ impl TryFrom<dibs_proximity> for Proximity {
         found.lower = given.lower;
         found.accuracy = given.accuracy;
         found.side = side.ok_or(dibs_code::Argument)?.1;
+        let coverage = COVERAGES.iter().find(|(number, _)| *number as u32 == given.coverage);
+        found.coverage = coverage.ok_or(dibs_code::Argument)?.1;
         found.axis_distance = given.axis_distance;
         found.point_on_surface = given.point_on_surface.into();
         found.point_on_tool = given.point_on_tool.into();
@@ -205,6 +232,35 @@ impl TryFrom<dibs_proximity> for Proximity {
         found.triangle_tests = given.triangle_tests;
         Ok(found)
     }
+}
+
+/// An interval of separations (mm).
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct dibs_interval {
+    /// No true separation is less.
+    pub lower: f32,
+    /// No true separation is more.
+    pub upper: f32,
+}
+
+/// The certified interval of a pair's separation: both ends include the accuracy, rounded outwards. Act on its lower end.
+///
+/// Without a side the tool may be inside at any depth: the lower end is negative infinity. With `DIBS_SIDE_NOT_ASKED` and
+/// `DIBS_SIDE_NO_ADJACENCY` it is that of a tool outside.
+///
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a side or coverage that is none, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_proximity_interval(
+    proximity: *const dibs_proximity,
+    interval: *mut dibs_interval,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (place, proximity) = (interval.check()?, Proximity::try_from(proximity.get()?)?);
+        let Interval { lower, upper } = proximity.interval();
+        place.set(dibs_interval { lower, upper });
+        Ok(())
+    })
 }
 
 /// Makes a query on a tree.

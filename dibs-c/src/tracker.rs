@@ -225,6 +225,8 @@ pub struct dibs_tracked {
 /// @param options    Options, or null.
 /// @param proximity  Receives the answer; its counts of tests are this tick's.
 /// @param fallback   Receives the reason for a whole query; or null.
+/// @param moved      Receives the most (mm) that tool and surface together have moved since the tracker's last search;
+///                   -1 where it is not known; or null.
 /// @return As `dibs_query_closest`.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tracker_closest(
@@ -233,9 +235,11 @@ pub extern "C" fn dibs_tracker_closest(
     options: *const dibs_options,
     proximity: *mut dibs_proximity,
     fallback: *mut dibs_fallback,
+    moved: *mut f32,
 ) -> dibs_code {
     dibs_code::of(|| {
         let (proximity, fallback) = (proximity.check()?, fallback.check_if_any()?);
+        let moved = moved.check_if_any()?;
         let (shape, mut tracker) = (Shape::try_from(tool.get()?)?, tracker.open()?);
         let options = dibs_options::of(options)?;
         let dibs_tracker { tracker, surface, .. } = &mut *tracker;
@@ -247,6 +251,9 @@ pub extern "C" fn dibs_tracker_closest(
         proximity.set(found.closest.into());
         if let Some(fallback) = fallback {
             fallback.set(found.fallback.into());
+        }
+        if let Some(moved) = moved {
+            moved.set(found.moved.unwrap_or(-1.0));
         }
         Ok(())
     })
@@ -264,6 +271,8 @@ pub extern "C" fn dibs_tracker_closest(
 /// @param options    Options, or null.
 /// @param proximity  Receives the answer; its counts of tests are this tick's.
 /// @param fallback   Receives the reason for a whole query; or null.
+/// @param moved      Receives the most (mm) that tool and surface together have moved since the tracker's last search;
+///                   -1 where it is not known; or null.
 /// @return As `dibs_query_closest`; `DIBS_CODE_ARGUMENT` of a frame of the caller's vertices.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tracker_closest_on(
@@ -273,9 +282,11 @@ pub extern "C" fn dibs_tracker_closest_on(
     options: *const dibs_options,
     proximity: *mut dibs_proximity,
     fallback: *mut dibs_fallback,
+    moved: *mut f32,
 ) -> dibs_code {
     dibs_code::of(|| {
         let (proximity, fallback) = (proximity.check()?, fallback.check_if_any()?);
+        let moved = moved.check_if_any()?;
         let (shape, mut tracker) = (Shape::try_from(tool.get()?)?, tracker.open()?);
         let (frame, options) = (frame.open()?, dibs_options::of(options)?);
         let surface = match &frame.table {
@@ -291,6 +302,9 @@ pub extern "C" fn dibs_tracker_closest_on(
         proximity.set(found.closest.into());
         if let Some(fallback) = fallback {
             fallback.set(found.fallback.into());
+        }
+        if let Some(moved) = moved {
+            moved.set(found.moved.unwrap_or(-1.0));
         }
         Ok(())
     })
@@ -309,6 +323,7 @@ pub extern "C" fn dibs_tracker_closest_on(
 /// @param contacts   The list; empty after an error.
 /// @param proximity  Receives the closest pair, or null.
 /// @param fallback   Receives the reason for a whole query; or null.
+/// @param moved      As of `dibs_tracker_closest`.
 /// @return As `dibs_query_contacts`.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tracker_contacts(
@@ -319,9 +334,11 @@ pub extern "C" fn dibs_tracker_contacts(
     contacts: *mut dibs_contacts,
     proximity: *mut dibs_proximity,
     fallback: *mut dibs_fallback,
+    moved: *mut f32,
 ) -> dibs_code {
     dibs_code::of(|| {
         let (proximity, fallback) = (proximity.check_if_any()?, fallback.check_if_any()?);
+        let moved = moved.check_if_any()?;
         let found: Tracked = contacts.open()?.fill(|list| {
             let (shape, mut tracker) = (Shape::try_from(tool.get()?)?, tracker.open()?);
             let options = dibs_options::of(options)?;
@@ -341,6 +358,9 @@ pub extern "C" fn dibs_tracker_contacts(
         }
         if let Some(fallback) = fallback {
             fallback.set(found.fallback.into());
+        }
+        if let Some(moved) = moved {
+            moved.set(found.moved.unwrap_or(-1.0));
         }
         Ok(())
     })

@@ -12,6 +12,7 @@ fn the_header_is_that_of_the_source() {
     bindings.write(&mut header);
     let header = String::from_utf8(header).expect("text");
     assert!(header.contains("dibs_query_closest("), "no functions:\n{header}");
+    assert!(!header.contains("planted"), "a function of the tests alone");
     let path = root.join("include/dibs.h");
     if env::var_os("DIBS_WRITE").is_some() {
         fs::write(path, header).expect("writable");

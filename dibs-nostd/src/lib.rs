@@ -78,17 +78,17 @@ pub use bus::{Advance, Assembler, BusHealth, LastHeartbeat, Progress, ReceiveErr
 pub use control::{constraint, failsafe};
 pub use error::Error;
 pub use query::{
-    Budget, Closest, Contact, Contacts, Cost, Fallback, NoSide, Options, Proximity, Query, Side,
-    Sweep, Swept, Tracked, Tracker,
+    Budget, Closest, Contact, Contacts, Cost, Fallback, Interval, NoSide, Options, Proximity,
+    Query, Side, Sweep, Swept, Tracked, Tracker,
 };
 pub use stretch::{
     Arriving, Changed, Gate, StretchError, StretchMonitor, SurfaceLimits, Unchecked, Verdict,
     measure_stretch,
 };
 pub use surface::{
-    Between, FrameAge, FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames, Latest,
-    MeasuredStretch, Millis, Moved, MovingSurface, Odometer, OutOfTableError, PublishError,
-    QuantisedVertices, REGIONS, SplitError, Step, Ticks, Travel, VertexTable,
+    Between, Coverage, FrameAge, FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter,
+    Frames, Latest, MeasuredStretch, Millis, Moved, MovingSurface, Odometer, OutOfTableError,
+    PublishError, QuantisedVertices, REGIONS, SplitError, Step, Ticks, Travel, VertexTable,
 };
 /// Surfaces of a size that no type has, for the C interface. They may change with any version.
 #[doc(hidden)]

@@ -3,7 +3,7 @@
 use core::fmt;
 
 use bytemuck::Zeroable;
-use dibs_nostd::constraint::{ForbiddenRegion, GainError, SpringDamper};
+use dibs_nostd::constraint::{ForbiddenRegion, GainError, LastSide, SpringDamper};
 use dibs_nostd::failsafe::{FailSafe, LimitError, Observation};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
@@ -56,6 +56,8 @@ pub struct Control {
     search: Search,
     surface: surface::continuous::Reader,
     wall: ForbiddenRegion,
+    /// For ticks whose answer has no side.
+    last_side: LastSide,
     failsafe: FailSafe,
     bus: &'static BusStatus,
     tick: Ticks,
@@ -79,6 +81,7 @@ impl Control {
             search: Search::new(tree).map_err(SetupError::Query)?,
             surface,
             wall: ForbiddenRegion::new(spring, MARGIN).map_err(SetupError::Gain)?,
+            last_side: LastSide::new(),
             failsafe: FailSafe::new(trust.limits().map_err(SetupError::Limit)?),
             bus,
             tick: Ticks(0),
@@ -110,10 +113,10 @@ impl Control {
         let tool = instrument(tick).ok();
         let before = self.before;
         self.before = tool;
-        let (frame, answer) = match &tool {
+        let Asked { age: frame, answer, moved } = match &tool {
             Some(tool) => self.ask(tool, now, clock, &mut record),
             // The pose is not finite, so no query is possible.
-            None => (None, Err(Unavailable::NotFinite)),
+            None => Asked { age: None, answer: Err(Unavailable::NotFinite), moved: None },
         };
         let link = self.bus.link.read(now);
         let mut verdict = self.failsafe.step(&Observation {
@@ -134,6 +137,7 @@ impl Control {
         }
         self.bus.set_state(verdict.state);
         let admitted = answer.and_then(|closest| verdict.admit(closest));
+        let settled = self.last_side.settle(admitted, moved);
         let along = answer.map_or(0.5, |closest| closest.axis_parameter);
         let velocity = match (before, tool) {
             (Some(before), Some(now)) => velocity(&before, &now, along),
@@ -141,7 +145,7 @@ impl Control {
             // Without a pose there is no velocity to damp.
             (_, None) => Vec3::NAN,
         };
-        let force = self.wall.force(&admitted, velocity);
+        let force = self.wall.force(&settled, velocity);
 
         record.state = verdict.state as u32;
         record.cause = verdict.cause.map_or(0, |cause| cause_code(&cause));
@@ -160,7 +164,7 @@ impl Control {
         now: Millis,
         clock: impl Fn() -> u32,
         record: &mut Tick,
-    ) -> (Option<FrameAge>, Result<Proximity, Unavailable>) {
+    ) -> Asked {
         record.tool_start = tool.start().to_array();
         record.tool_end = tool.end().to_array();
         record.tool_radius = tool.radius();
@@ -169,7 +173,7 @@ impl Control {
         // The fail-safe machine decides how old a surface may be.
         let frame = match latest.of_any_age() {
             Ok(frame) => frame,
-            Err(unavailable) => return (age, Err(unavailable)),
+            Err(unavailable) => return Asked { age, answer: Err(unavailable), moved: None },
         };
         let label = frame.label();
         record.epoch = label.epoch;
@@ -186,20 +190,30 @@ impl Control {
         let answer = self.search.closest(&surface, tool, &options).map(|tracked| {
             record.front = tracked.opened;
             record.fallback = fallback_code(tracked.fallback);
-            tracked.closest
+            (tracked.closest, tracked.moved)
         });
         #[cfg(feature = "wide")]
-        let answer = self.search.closest_wide(&surface, tool, &options);
+        let answer = self.search.closest_wide(&surface, tool, &options).map(|found| (found, None));
         record.query_counts = clock().wrapping_sub(start);
         drop(frame);
 
-        let closest = match answer {
-            Ok(closest) => closest,
-            Err(error) => return (age, Err(Unavailable::Query(error))),
-        };
-        write(&closest, record);
-        (age, Ok(closest))
+        match answer {
+            Ok((closest, moved)) => {
+                write(&closest, record);
+                Asked { age, answer: Ok(closest), moved }
+            }
+            Err(error) => Asked { age, answer: Err(Unavailable::Query(error)), moved: None },
+        }
     }
+}
+
+/// What a tick asked for.
+struct Asked {
+    /// Of the frame published last.
+    age: Option<FrameAge>,
+    answer: Result<Proximity, Unavailable>,
+    /// Most (mm) that tool and surface have moved since the tick before, where it is known.
+    moved: Option<f32>,
 }
 
 /// Velocity of the point at `along` (0 to 1) of the instrument's axis, in mm/s.

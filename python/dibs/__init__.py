@@ -15,7 +15,7 @@ from ._mesh import Mesh, MeshWarning, build, generate, read
 from ._motion import Motion, MotionStretch, read_motion
 from ._stream import Sender, Sent, Totals
 from ._tools import capsules, spheres
-from ._tree import ANSWER, CONTACT, SIDE_REASONS, Budget, Contacts, Scene, Side, Surface, Tree
+from ._tree import ANSWER, CONTACT, SIDE_REASONS, Budget, Contacts, Coverage, Scene, Side, Surface, Tree
 
 __all__ = [
     "ANSWER",
@@ -23,6 +23,7 @@ __all__ = [
     "SIDE_REASONS",
     "Budget",
     "Contacts",
+    "Coverage",
     "Mesh",
     "MeshWarning",
     "Motion",

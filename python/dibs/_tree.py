@@ -21,7 +21,8 @@ def _dtype(fields: list[tuple[str, str, int]]) -> np.dtype[Any]:
 
 
 ANSWER = _dtype(_dibs.ANSWER)
-"""The record of an answer. Field names are those of `dibs query --json`."""
+"""The record of an answer. Field names are those of `dibs query --json`. Act on the first of `interval`, which holds the
+true separation: it is negative infinity where the tool may be inside at any depth."""
 CONTACT = _dtype(_dibs.CONTACT)
 """The record of a contact; `pose` is the tool's row."""
 SIDE_REASONS: tuple[str, ...] = tuple(_dibs.REASONS)
@@ -35,6 +36,17 @@ class Side(IntEnum):
     INSIDE = 1
     CROSSING = 2
     UNDEFINED = 3
+
+
+class Coverage(IntEnum):
+    """Values of the field `coverage`: how it is known that no part of the surface is nearer than an answer says."""
+
+    MEASURED = 0
+    """The stretch was measured on these positions."""
+    PROVEN = 1
+    """A bound on the stretch follows from measured surfaces."""
+    ASSUMED = 2
+    """The tree cannot measure it: its stretch limit is taken to hold."""
 
 
 class Contacts(NamedTuple):

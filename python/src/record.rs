@@ -1,7 +1,7 @@
 //! Answers as the records of a structured array.
 
 use dibs_build::glam::{DVec3, Vec3};
-use dibs_nostd::{Contact, NoSide, Proximity, Side};
+use dibs_nostd::{Contact, Coverage, Interval, NoSide, Proximity, Side};
 
 use crate::tree::Owned;
 
@@ -27,6 +27,8 @@ pub const ANSWER: &Fields = &[
     ("label", "<i2", 1),
     ("side", "u1", 1),
     ("side_reason", "u1", 1),
+    ("interval", "<f4", 2),
+    ("coverage", "u1", 1),
 ];
 
 /// A contact. [`push_contact`] writes it.
@@ -88,6 +90,13 @@ pub fn push_answer(out: &mut Vec<u8>, found: &Proximity, tree: &Owned, pair: [us
     numbers(out, pair);
     label(out, found.triangle.and_then(|row| tree.label(row)));
     out.extend([side, reason]);
+    let Interval { lower, upper } = found.interval();
+    floats(out, &[lower, upper]);
+    out.push(match found.coverage {
+        Coverage::Measured => 0,
+        Coverage::Proven => 1,
+        _ => 2,
+    });
 }
 
 /// Appends a contact of a pose.

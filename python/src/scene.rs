@@ -153,6 +153,7 @@ impl Closest {
         let mut closer = if two.separation < one.separation { other } else { self };
         closer.found.lower = one.lower.min(two.lower);
         closer.found.accuracy = one.accuracy.max(two.accuracy);
+        closer.found.coverage = one.coverage.or_weaker(two.coverage);
         closer.found.node_tests = one.node_tests.saturating_add(two.node_tests);
         closer.found.triangle_tests = one.triangle_tests.saturating_add(two.triangle_tests);
         // Where a budget left the side of one pair open, that pair may be the deepest.

@@ -57,6 +57,7 @@ impl Line {
             ConstraintState::Saturated => [2, 0],
             ConstraintState::Safe(Unavailable::CutShort) => [3, 309],
             ConstraintState::Safe(Unavailable::NoDirection) => [3, 308],
+            ConstraintState::Safe(Unavailable::NoSide) => [3, 315],
             other => panic!("{other:?}"),
         };
         self.numbers(&state);

@@ -7,7 +7,7 @@ use super::passed::{self, Passed};
 use super::search::{Search, WITHIN};
 use super::{Contacts, NoSide, Options, Proximity, Query, Side};
 use crate::unavailable::QueryError;
-use crate::{Index, Tool, TriangleRow, VertexTable};
+use crate::{Coverage, Index, Tool, TriangleRow, VertexTable};
 
 /// The closest pair of a chain of tools and the surfaces of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -305,6 +305,7 @@ struct Scene {
     best: Option<Closest>,
     lower: f32,
     accuracy: f32,
+    coverage: Coverage,
     node_tests: u32,
     triangle_tests: u32,
     /// With the rest of the budget.
@@ -327,6 +328,7 @@ impl Scene {
             best: None,
             lower: f32::INFINITY,
             accuracy: 0.0,
+            coverage: Coverage::Measured,
             node_tests: 0,
             triangle_tests: 0,
             options: *options,
@@ -373,6 +375,7 @@ impl Scene {
         if found.accuracy > self.accuracy {
             self.accuracy = found.accuracy;
         }
+        self.coverage = self.coverage.or_weaker(found.coverage);
         if own.is_none_or(|own| found.separation < own.separation) {
             *own = Some(found);
         }
@@ -382,12 +385,13 @@ impl Scene {
     }
 
     fn finish(self) -> Option<Closest> {
-        let Self { lower, accuracy, node_tests, triangle_tests, .. } = self;
+        let Self { lower, accuracy, coverage, node_tests, triangle_tests, .. } = self;
         let Closest { surface, tool, mut proximity } = self.best?;
         if self.is_cut_short {
             proximity.side = Side::Undefined(NoSide::CutShort);
         }
-        let proximity = Proximity { lower, accuracy, node_tests, triangle_tests, ..proximity };
+        let proximity =
+            Proximity { lower, accuracy, coverage, node_tests, triangle_tests, ..proximity };
         Some(Closest { surface, tool, proximity })
     }
 }

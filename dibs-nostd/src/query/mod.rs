@@ -25,7 +25,7 @@ pub use chain::Closest;
 pub use contacts::{Contact, Contacts};
 pub use cost::Cost;
 pub use options::{Budget, Options};
-pub use proximity::Proximity;
+pub use proximity::{Interval, Proximity};
 pub use side::{NoSide, Side};
 pub use swept::{Sweep, Swept};
 pub use tracker::{Fallback, Tracked, Tracker};

@@ -1,6 +1,6 @@
 //! A query's options: prior knowledge and a budget.
 
-use crate::{MeasuredStretch, TriangleRow};
+use crate::{Coverage, MeasuredStretch, TriangleRow, VertexTable};
 
 /// The most work of one query. It bounds the query's time; an answer that was cut short is still valid, with a wider
 /// interval.
@@ -105,6 +105,12 @@ impl Options {
             First::Cold => None,
             First::Triangle(triangle) => Some(triangle),
         }
+    }
+
+    /// How the stretch of a search with these options is known.
+    pub(super) fn coverage<V: VertexTable + ?Sized>(&self, vertices: &V) -> Coverage {
+        let measured = self.stretch.or_else(|| vertices.stretch());
+        measured.map_or(Coverage::Assumed, |measured| measured.coverage())
     }
 
     /// Leaves the side out: the separation is that of a tool outside, and costs no more than the distance.

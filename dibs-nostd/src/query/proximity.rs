@@ -3,16 +3,17 @@
 use glam::Vec3;
 
 use super::{NoSide, Side};
-use crate::TriangleRow;
+use crate::math::round::{sum_down, sum_up};
+use crate::{Coverage, TriangleRow};
 
 /// The closest pair between a tool and a surface, with a certified interval for its separation.
 ///
-/// Lengths are in the mesh's own unit (mm in the examples). The true separation lies in
-/// `[lower - accuracy, separation + accuracy]`; the two ends are equal when the query was not cut
-/// short by its budget.
+/// Lengths are in the mesh's own unit (mm in the examples). [`interval`](Self::interval) holds the true separation; its
+/// ends are twice the accuracy apart when the query was not cut short by its budget. It rests on the surface's stretch:
+/// see [`coverage`](Self::coverage).
 ///
-/// If [`side`](Self::side) is undefined, the tool is taken to be outside: the interval is that of the unsigned distance
-/// less the radius, and too high for a tool that is inside.
+/// If [`side`](Self::side) is undefined, `separation` and `lower` are those of a tool outside: the unsigned distance less
+/// the radius, too high for a tool that is inside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -31,6 +32,8 @@ pub struct Proximity {
     pub accuracy: f32,
     /// On which side of the surface the axis is.
     pub side: Side,
+    /// Whether the stretch that the answer rests on was checked.
+    pub coverage: Coverage,
     /// Distance from the tool's axis (a sphere's centre, a capsule's segment) to the surface: 0 where it crosses.
     pub axis_distance: f32,
     /// The surface's point of the closest pair; where the axis crosses or is inside, the closest to its deepest point.
@@ -67,6 +70,7 @@ impl Proximity {
         lower: f32::NAN,
         accuracy: f32::NAN,
         side: Side::Undefined(NoSide::NotAsked),
+        coverage: Coverage::Assumed,
         axis_distance: f32::NAN,
         point_on_surface: Vec3::NAN,
         point_on_tool: Vec3::NAN,
@@ -79,6 +83,34 @@ impl Proximity {
         triangle_tests: 0,
     };
 
+    /// The certified interval of the separation: both ends include the accuracy, rounded outwards. Act on its lower end.
+    ///
+    /// Where the side is undefined, the tool may be inside at any depth: the lower end is negative infinity. It is that of
+    /// a tool outside if no side was asked for, or the tree has none.
+    ///
+    /// Cost: some ten f32 operations.
+    #[must_use]
+    pub fn interval(&self) -> Interval {
+        let lower = match self.side {
+            Side::Undefined(NoSide::NotAsked | NoSide::NoAdjacency) => self.lower,
+            Side::Undefined(_) => f32::NEG_INFINITY,
+            _ => self.lower,
+        };
+        Interval {
+            lower: sum_down(lower, -self.accuracy),
+            upper: sum_up(self.separation, self.accuracy),
+        }
+    }
+
+    /// Whether the axis is at the surface, as far as the accuracy tells: the separation of either side is then the same to
+    /// within that, and the direction is the surface's own.
+    pub(crate) fn is_at_surface(&self) -> bool {
+        /// Rounding of a coordinate, relative to its size.
+        const COORDINATES: f32 = 4.0 / 16_777_216.0;
+        let error = self.accuracy + COORDINATES * self.point_on_surface.abs().max_element();
+        self.side == Side::Undefined(NoSide::BelowAccuracy) && self.axis_distance <= 2.0 * error
+    }
+
     /// Whether the budget ran out before the closest point was certain.
     pub(super) fn is_cut_short(&self) -> bool {
         self.triangle.is_none() || self.lower < self.separation
@@ -89,7 +121,17 @@ impl Proximity {
     /// as its points move.
     #[must_use]
     pub fn widened(mut self, error: f32) -> Self {
-        self.accuracy += error;
+        self.accuracy = sum_up(self.accuracy, error);
         self
     }
+}
+
+/// An interval of separations (mm).
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Interval {
+    /// No true separation is less.
+    pub lower: f32,
+    /// No true separation is more.
+    pub upper: f32,
 }

@@ -46,6 +46,7 @@ pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     } else {
         asked.signed(stack, found, memory, RootSet::ALL)?
     };
+    found.coverage = options.coverage(vertices);
     found.accuracy += vertices.position_error();
     Ok(found)
 }

@@ -6,6 +6,32 @@ use crate::tree::TriangleRow;
 /// are patches of the surface because rows stand leaf by leaf.
 pub const REGIONS: usize = 32;
 
+/// How it is known that the tree's spheres cover the surface, so that no part of it is nearer than an answer says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Coverage {
+    /// The stretch was measured on these positions.
+    Measured,
+    /// A bound on the stretch follows from measured frames: between two of them, or from a modal surface's weights.
+    Proven,
+    /// Nothing was measured: the tree's stretch limit is taken to hold. If it does not, a nearer part of the surface can be
+    /// missed. [`measure_stretch`](crate::measure_stretch) checks a frame.
+    Assumed,
+}
+
+impl Coverage {
+    /// That of an answer from two surfaces: the weaker.
+    #[must_use]
+    pub const fn or_weaker(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Assumed, _) | (_, Self::Assumed) => Self::Assumed,
+            (Self::Proven, _) | (_, Self::Proven) => Self::Proven,
+            (Self::Measured, Self::Measured) => Self::Measured,
+        }
+    }
+}
+
 /// The largest stretch `sigma` of one frame, over all triangles, and that of each region.
 ///
 /// Only a measurement makes one, so a query cannot be given a stretch below the true one by mistake. A query refuses a
@@ -22,6 +48,7 @@ pub struct MeasuredStretch {
     epoch: Option<u32>,
     /// Each region's share of `sigma`, less one, in parts of 256.
     regions: [u8; REGIONS],
+    is_proven: bool,
 }
 
 impl MeasuredStretch {
@@ -33,13 +60,14 @@ impl MeasuredStretch {
         epoch: Option<u32>,
         regions: [u8; REGIONS],
     ) -> Self {
-        Self { sigma, tree, triangle, epoch, regions }
+        Self { sigma, tree, triangle, epoch, regions, is_proven: false }
     }
 
     /// One bound for the whole surface, not from a measurement of every triangle.
     #[cfg(feature = "modes")]
     pub(crate) const fn everywhere(sigma: f32, tree: u32, triangle: u32) -> Self {
-        Self { sigma, tree, triangle, epoch: None, regions: [u8::MAX; REGIONS] }
+        let regions = [u8::MAX; REGIONS];
+        Self { sigma, tree, triangle, epoch: None, regions, is_proven: true }
     }
 
     /// A bound for two frames of one surface and all between them: gradients are linear in the positions, and
@@ -54,7 +82,8 @@ impl MeasuredStretch {
     pub(crate) fn of_both(self, other: Self, sigma: f32) -> Option<Self> {
         let larger = if other.sigma > self.sigma { other } else { self };
         let regions = [u8::MAX; REGIONS];
-        (self.tree == other.tree).then_some(Self { sigma, epoch: None, regions, ..larger })
+        let both = Self { sigma, epoch: None, regions, is_proven: true, ..larger };
+        (self.tree == other.tree).then_some(both)
     }
 
     /// The largest stretch, rounded up: at least 1 where anything kept its length, and never below a
@@ -89,9 +118,16 @@ impl MeasuredStretch {
         self.epoch
     }
 
+    /// Whether it was measured on the frame itself, or follows from other frames.
+    #[must_use]
+    pub const fn coverage(&self) -> Coverage {
+        if self.is_proven { Coverage::Proven } else { Coverage::Measured }
+    }
+
     /// The measurement as words, without its epoch and its regions, for the frame's label.
     pub(crate) const fn to_words(self) -> [u32; MeasuredStretch::WORDS] {
-        [self.sigma.to_bits(), self.tree, self.triangle]
+        let proven = if self.is_proven { PROVEN } else { 0 };
+        [self.sigma.to_bits(), self.tree, self.triangle & !PROVEN | proven]
     }
 
     /// The inverse of [`to_words`](Self::to_words).
@@ -99,12 +135,18 @@ impl MeasuredStretch {
         [sigma, tree, triangle]: [u32; MeasuredStretch::WORDS],
         epoch: u32,
     ) -> Self {
-        Self::new(f32::from_bits(sigma), tree, triangle, Some(epoch), [u8::MAX; REGIONS])
+        let regions = [u8::MAX; REGIONS];
+        let measured =
+            Self::new(f32::from_bits(sigma), tree, triangle & !PROVEN, Some(epoch), regions);
+        Self { is_proven: triangle & PROVEN != 0, ..measured }
     }
 
     /// Words that a measurement takes.
     pub(crate) const WORDS: usize = 3;
 }
+
+/// Bit of a label's triangle: no tree has so many.
+const PROVEN: u32 = 1 << 31;
 
 /// Stretch that a region's code stands for.
 pub(crate) fn share(sigma: f32, code: u8) -> f32 {

@@ -22,7 +22,7 @@ pub use error::{OutOfTableError, PublishError, SplitError};
 pub use frames::{BorrowedFrames, Buffers, FrameWriter, Frames};
 pub use latest::{FrameAge, Latest};
 pub(crate) use measured::share;
-pub use measured::{MeasuredStretch, REGIONS};
+pub use measured::{Coverage, MeasuredStretch, REGIONS};
 pub use motion::{Moved, MovingSurface, Odometer, Travel, TravelUnit};
 pub use moving::{Between, Step};
 #[cfg(feature = "modes")]

@@ -56,6 +56,8 @@ pub enum Unavailable {
     },
     /// The tool's axis touches the surface: no direction leads out.
     NoDirection,
+    /// The tool's side is not known, so it may be inside; [`Proximity::side`](crate::Proximity::side) has the reason.
+    NoSide,
     /// The budget ended before the tool's side or its contacts were known.
     CutShort,
     /// A number is not finite, or the direction is not a unit vector.
@@ -80,6 +82,7 @@ impl fmt::Display for Unavailable {
             Self::SourceStale { age } => write!(f, "the surface was {age} old when it was sent"),
             Self::Forgeries { count } => write!(f, "{count} packets were forged"),
             Self::NoDirection => write!(f, "the tool's axis touches the surface"),
+            Self::NoSide => write!(f, "the tool's side is not known"),
             Self::CutShort => {
                 write!(f, "the budget ended before the side or the contacts were known")
             }

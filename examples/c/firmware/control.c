@@ -50,6 +50,8 @@ static dibs_failsafe *failsafe;
 static uint32_t tick;
 /* The last tick's instrument, for its velocity. */
 static dibs_tool before;
+/* For ticks whose answer has no side. */
+static dibs_last_side last_side;
 
 void control_init(void) {
     must(dibs_tracker_init(tracker_memory, sizeof tracker_memory, surface_tree(), &tracker));
@@ -59,7 +61,8 @@ void control_init(void) {
     before = instrument(0);
 }
 
-static void write(const dibs_proximity *found, tick_record *record) {
+static void write(const dibs_proximity *found, float *moved,
+                     tick_record *record) {
     record->answered = 1;
     record->separation = found->separation;
     record->lower = found->lower;
@@ -87,7 +90,7 @@ static dibs_code ask(const dibs_tool *tool, dibs_observation *seen, dibs_proximi
     record->position_error = facts.position_error;
 
     const uint32_t start = clock_now();
-    seen->query = dibs_tracker_closest_on(tracker, frame, tool, &options, found, &record->fallback);
+    seen->query = dibs_tracker_closest_on(tracker, frame, tool, &options, found, &record->fallback, moved);
     record->query_counts = clock_now() - start;
     /* Until then no frame is published. */
     must(dibs_frame_release(frame));
@@ -129,7 +132,8 @@ void control_tick(tick_record *record) {
 
     dibs_observation seen = {.query = DIBS_CODE_OK};
     dibs_proximity found;
-    dibs_code code = ask(&tool, &seen, &found, record);
+    float moved = -1.0f;
+    dibs_code code = ask(&tool, &seen, &found, &moved, record);
     const float share = code == DIBS_CODE_OK ? found.axis_parameter : 0.5f;
 
     must(dibs_reader_link(reader, tick, &seen.link));
@@ -141,6 +145,7 @@ void control_tick(tick_record *record) {
     if (code == DIBS_CODE_OK) {
         code = dibs_verdict_admit(&verdict, &found);
     }
+    must(dibs_last_side_settle(&last_side, code, &found, moved));
     dibs_force force;
     must(dibs_wall_force(&wall, code, &found, velocity(&tool, share), &force));
 

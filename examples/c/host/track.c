@@ -33,7 +33,7 @@ static void touch(dibs_tool tool, uint32_t number) {
     if (number / 8 % 2 == 1) {
         tool.end = tool.start;
     }
-    must(dibs_tracker_contacts(trackers[TOUCH], &tool, MARGIN, NULL, contacts, &found, &fallback));
+    must(dibs_tracker_contacts(trackers[TOUCH], &tool, MARGIN, NULL, contacts, &found, &fallback, NULL));
     printf("touch %u", fallback);
     print_proximity(&found);
     print_contacts(contacts);
@@ -61,7 +61,7 @@ void track(dibs_frame *frame, const dibs_age *age, const dibs_tool *tool) {
         }
         tracked = age->epoch;
     }
-    must(dibs_tracker_closest(trackers[CLOSEST], tool, NULL, &found, &fallback));
+    must(dibs_tracker_closest(trackers[CLOSEST], tool, NULL, &found, &fallback, NULL));
     printf("track %u", fallback);
     print_proximity(&found);
     printf("\n");

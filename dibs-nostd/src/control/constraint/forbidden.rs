@@ -8,14 +8,14 @@ use crate::unavailable::Unavailable;
 
 /// Pushes the tool away from the surface within a margin; never pulls.
 ///
-/// Force along the closest pair's direction, with `d = lower - accuracy`:
+/// Force along the closest pair's direction, with `d`, the lower end of its [interval](Proximity::interval):
 ///
 /// `F = min(max_force, max(0, K (margin - d) - B v))` for `d < margin`, else 0,
 ///
 /// where `v` is the tool's speed out of the surface, negative on approach. Inside, `d` is below zero, and the spring
-/// grows with the depth up to saturation. If the budget ended before the side was known, the output is the hold. For a
-/// query without sides ([`Options::unsigned`](crate::Options::unsigned)), `lower` is the least possible separation, and
-/// the direction is that of the best pair found.
+/// grows with the depth up to saturation. Without a side the output is the hold; [`LastSide`](super::LastSide) keeps the
+/// last one. For a query that asked for none ([`Options::unsigned`](crate::Options::unsigned)), the direction is that of
+/// the best pair found.
 ///
 /// ```
 /// use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};

@@ -8,7 +8,8 @@ use crate::unavailable::Unavailable;
 
 /// Draws the tool to a stand-off from the surface, with a dead band in which it is free.
 ///
-/// Force along the closest pair's direction, with `d = lower - accuracy` and `e = d - stand_off`:
+/// Force along the closest pair's direction, with `d`, the lower end of its
+/// [interval](Proximity::interval), and `e = d - stand_off`:
 ///
 /// `F = -K (e -/+ dead_band) - B v` for `e` above / below the dead band, else 0, saturated at
 /// `max_force` both ways.

@@ -9,14 +9,17 @@
 //! # Promises
 //!
 //! - For any input a force is finite and never larger than `max_force` (up to the direction's rounding).
-//! - It is computed from the conservative end of the certified interval, `lower - accuracy`.
+//! - It is computed from the lower end of the [certified interval](crate::Proximity::interval).
 //! - Where the surface has sides (a tree with adjacency, see [`Side`](crate::Side)), it leads outwards from first
 //!   contact to any depth, and its size is continuous through contact and through the surface. Where it has none, or
 //!   the query was [`unsigned`](crate::Options::unsigned), the tool is taken to be outside, and a query that its budget
 //!   cut short never weakens the force.
-//! - If the proximity is unknown, the surface stale, a number not finite, or the budget ended before the side was
-//!   known, the output is the *hold*: pure damping against the tool's velocity, saturated the same way, and the state
-//!   gives the reason. For a velocity that is not finite it is zero.
+//! - Where the side is undefined, [`LastSide`] keeps the last certain one and its force, by the motion since. Without a
+//!   past the output is the hold, never [`Inactive`](ConstraintState::Inactive): the tool may be inside. Within the
+//!   accuracy of the surface both sides give the same force, and it acts.
+//! - If the proximity is unknown, the surface stale, or a number not finite, the output is the *hold*: pure damping
+//!   against the tool's velocity, saturated the same way, and the state gives the reason. For a velocity that is not
+//!   finite it is zero.
 //!
 //! # No promise: passivity
 //!
@@ -47,6 +50,7 @@ macro_rules! tri {
 
 mod forbidden;
 mod guidance;
+mod last_side;
 mod proxy;
 mod rows;
 #[cfg(test)]
@@ -57,12 +61,14 @@ use core::fmt;
 
 use glam::Vec3;
 
+use crate::math::round::sum_down;
 use crate::math::sqrt::sqrt;
 use crate::query::{NoSide, Proximity, Side};
 use crate::unavailable::Unavailable;
 
 pub use forbidden::ForbiddenRegion;
 pub use guidance::Guidance;
+pub use last_side::LastSide;
 pub use proxy::{Proxy, Wrench};
 pub use rows::VelocityRow;
 
@@ -236,19 +242,21 @@ impl Approach {
     ) -> Result<Self, Unavailable> {
         let proximity = proximity.as_ref().map_err(|unavailable| *unavailable)?;
         let direction = proximity.direction;
-        match proximity.side {
+        let separation = match proximity.side {
+            Side::Undefined(NoSide::NotAsked | NoSide::NoAdjacency) => proximity.interval().lower,
+            Side::Undefined(_) if proximity.is_at_surface() => {
+                let inside = sum_down(proximity.lower, -2.0 * proximity.axis_distance);
+                sum_down(inside, -proximity.accuracy)
+            }
             // If the tool is inside, the direction leads in.
             Side::Undefined(NoSide::CutShort) => return Err(Unavailable::CutShort),
-            Side::Undefined(NoSide::Degenerate) => return Err(Unavailable::NoDirection),
-            _ if direction == Vec3::ZERO => return Err(Unavailable::NoDirection),
-            _ => (),
-        }
-        let approach = Self {
-            direction,
-            separation: proximity.lower - proximity.accuracy,
-            speed: velocity.dot(direction),
-            velocity,
+            Side::Undefined(_) => return Err(Unavailable::NoSide),
+            _ => proximity.interval().lower,
         };
+        if direction == Vec3::ZERO {
+            return Err(Unavailable::NoDirection);
+        }
+        let approach = Self { direction, separation, speed: velocity.dot(direction), velocity };
         let is_unit = (direction.length_squared() - 1.0).abs() < 1.0e-3;
         let is_finite = proximity.separation.is_finite()
             && proximity.point_on_surface.is_finite()

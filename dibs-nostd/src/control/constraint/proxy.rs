@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::walls::{COMPLIANCE, MOST, Wall, displacement};
 use super::{ConstraintState, GainError, SpringDamper, positive};
+use crate::math::round::sum_down;
 use crate::math::sqrt::sqrt;
 use crate::query::Contact;
 use crate::unavailable::Unavailable;
@@ -109,7 +110,7 @@ impl Proxy {
         let mut is_in = false;
         let mut free = held.iter_mut();
         for contact in contacts {
-            let depth = self.margin - (contact.separation - accuracy);
+            let depth = self.margin - sum_down(contact.separation, -accuracy);
             is_in |= !(depth <= 0.0);
             let Some(place) = free.next() else { break };
             let lever = contact.point_on_tool - origin;

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use crate::math::round::sum_down;
 use crate::query::Contact;
 
 /// One inequality on the tool's velocity: `linear . v + angular . w >= least`, with `v`, the velocity of a point of
@@ -67,7 +68,7 @@ impl VelocityRow {
             angular: lever.cross(normal).to_array(),
             least: surface,
             surface,
-            separation: contact.separation - accuracy,
+            separation: sum_down(contact.separation, -accuracy),
             stand_off: 0.0,
             gain: 0.0,
         }

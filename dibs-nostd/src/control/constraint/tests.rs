@@ -5,9 +5,10 @@ extern crate std;
 use proptest::prelude::*;
 
 use super::*;
+use crate::query::Contact;
 use crate::surface::Millis;
 use crate::unavailable::QueryError;
-use crate::{NoSide, Side, TriangleRow};
+use crate::{Coverage, NoSide, Side, TriangleRow};
 
 const QUERY: QueryError = QueryError::Corrupt { row: 7 };
 
@@ -21,6 +22,7 @@ fn pair(gap: f32, direction: Vec3) -> Proximity {
         separation: gap,
         lower: gap,
         side: Side::Outside,
+        coverage: Coverage::Measured,
         accuracy: 0.0,
         axis_distance: gap + RADIUS,
         point_on_surface,
@@ -127,24 +129,148 @@ fn the_hold_damps_and_says_why() {
     assert_eq!(touching.state, ConstraintState::Safe(Unavailable::NoDirection));
 }
 
-/// If the budget ended before the side was known, the direction may lead in.
+const NO_SIDES: [(NoSide, Option<Unavailable>); 6] = [
+    (NoSide::CutShort, Some(Unavailable::CutShort)),
+    (NoSide::Degenerate, Some(Unavailable::NoSide)),
+    (NoSide::OpenBoundary, Some(Unavailable::NoSide)),
+    (NoSide::BelowAccuracy, Some(Unavailable::NoSide)),
+    (NoSide::NotAsked, None),
+    (NoSide::NoAdjacency, None),
+];
+
+/// A pair without a side at this distance.
+fn without_side(reason: NoSide, gap: f32) -> Proximity {
+    Proximity { side: Side::Undefined(reason), accuracy: 1e-4, ..pair(gap, Vec3::X) }
+}
+
+/// Near or far, the tool may be inside, and the direction may lead in.
 #[test]
-fn a_side_that_is_not_known_is_held() {
-    for (reason, held) in [
-        (NoSide::CutShort, Some(Unavailable::CutShort)),
-        (NoSide::Degenerate, Some(Unavailable::NoDirection)),
-        (NoSide::NotAsked, None),
-        (NoSide::NoAdjacency, None),
-        (NoSide::OpenBoundary, None),
-        (NoSide::BelowAccuracy, None),
-    ] {
-        let mut pair = pair(1.0, Vec3::X);
-        pair.side = Side::Undefined(reason);
-        for force in [wall().force(&Ok(pair), Vec3::Y), guide().force(&Ok(pair), Vec3::Y)] {
-            assert_eq!(held.map(ConstraintState::Safe).unwrap_or(force.state), force.state);
-            assert_eq!(held.is_some(), close(force.force, Vec3::Y * -0.01), "{reason:?}");
+fn a_tool_without_a_side_is_held_at_any_distance() {
+    for (reason, held) in NO_SIDES {
+        for gap in [-2.0, 1.0, 8.0, 500.0] {
+            let pair = without_side(reason, gap);
+            for force in [wall().force(&Ok(pair), Vec3::Y), guide().force(&Ok(pair), Vec3::Y)] {
+                assert_eq!(held.map(ConstraintState::Safe).unwrap_or(force.state), force.state);
+                assert_eq!(held.is_some(), close(force.force, Vec3::Y * -0.01), "{reason:?}");
+            }
+            assert_eq!(held.is_some(), pair.interval().lower == f32::NEG_INFINITY, "{reason:?}");
         }
     }
+}
+
+/// On either side of the surface, a tool whose axis is at it gets the same force.
+#[test]
+fn a_tool_at_the_surface_is_pushed_out() {
+    let soft = SpringDamper::stiffness(0.5).max_force(5.0);
+    let wall = ForbiddenRegion::new(soft, 3.0).unwrap();
+    let at_surface = without_side(NoSide::BelowAccuracy, -RADIUS + 1e-4);
+    let force = wall.force(&Ok(at_surface), Vec3::ZERO).force;
+    assert!((force - Vec3::X * 2.75).length() < 5e-4, "{force}");
+    let mut beyond = at_surface;
+    beyond.axis_distance = 1e-2;
+    assert_eq!(
+        wall.force(&Ok(beyond), Vec3::ZERO).state,
+        ConstraintState::Safe(Unavailable::NoSide)
+    );
+}
+
+/// The tool deep inside moves on where no side is known: the force stays, and grows by the motion.
+#[test]
+fn the_last_side_holds_as_long_as_it_is_not_known() {
+    let soft = SpringDamper::stiffness(0.1).max_force(5.0);
+    let wall = ForbiddenRegion::new(soft, 3.0).unwrap();
+    let inside = Proximity { side: Side::Inside, accuracy: 1e-4, ..pair(-10.0 - RADIUS, Vec3::Y) };
+    for (reason, held) in NO_SIDES {
+        let mut last_side = LastSide::new();
+        let now = without_side(reason, 10.0 - RADIUS);
+        // Without a past it comes back as it is.
+        assert_eq!(last_side.settle(Ok(now), Some(0.0)), Ok(now));
+        assert_eq!(last_side.settle(Ok(inside), None), Ok(inside));
+        for tick in 1..100_u16 {
+            let kept = last_side.settle(Ok(now), Some(0.05)).unwrap();
+            let Some(_) = held else {
+                assert_eq!(kept, now);
+                continue;
+            };
+            let deeper = 0.05 * f32::from(tick);
+            let force = wall.force(&Ok(kept), Vec3::ZERO).force;
+            assert!((force - Vec3::Y * 0.1 * (15.5 + deeper)).length() < 1e-3, "{tick}: {force}");
+            let interval = kept.interval();
+            assert!(interval.lower <= -12.5 - deeper && interval.upper >= -12.5 + deeper);
+        }
+        // Once the motion is not known there is no past.
+        for moved in [None, Some(f32::NAN), Some(-1.0)] {
+            let mut last_side = last_side;
+            assert_eq!(last_side.settle(Ok(now), moved), Ok(now));
+            assert_eq!(last_side.settle(Ok(now), Some(0.0)), Ok(now));
+        }
+        // An answer that is missing ends nothing.
+        let gone = last_side.settle(Err(Unavailable::NoSurface), Some(1.0));
+        assert_eq!(gone, Err(Unavailable::NoSurface));
+        let kept = last_side.settle(Ok(now), Some(0.0)).unwrap();
+        assert_eq!(held.is_some(), kept.side == Side::Inside);
+    }
+}
+
+/// From outside, a motion too short to lead inside keeps the tool outside; a longer one is not trusted.
+#[test]
+fn the_last_side_is_outside_while_the_motion_cannot_have_led_in() {
+    let far = Proximity { accuracy: 1e-4, ..pair(20.0, Vec3::Y) };
+    let now = without_side(NoSide::OpenBoundary, 18.0);
+    let settle = |moved| {
+        let mut last_side = LastSide::new();
+        last_side.settle(Ok(far), None).unwrap();
+        last_side.settle(Ok(now), Some(moved)).unwrap()
+    };
+    // Seen from the pair at hand.
+    let outside = settle(2.5);
+    assert_eq!((outside.side, outside.separation), (Side::Outside, 18.0));
+    assert!(close(outside.direction, Vec3::X), "{outside:?}");
+    assert_eq!(wall().force(&Ok(outside), Vec3::ZERO), ConstraintForce::NONE);
+    // 42.9 mm of motion could lead to 20.5 mm inside.
+    assert_eq!(settle(42.9).side, Side::Outside);
+    let doubtful = settle(43.1);
+    assert!(wall().force(&Ok(doubtful), Vec3::ZERO).force.y > 4.9, "{doubtful:?}");
+    // Neither side is that near: what was said of the motion is wrong.
+    let wrong = settle(1.0);
+    assert_eq!(wrong, now);
+    assert!(matches!(wall().force(&Ok(wrong), Vec3::ZERO).state, ConstraintState::Safe(_)));
+}
+
+/// A contact `gap` from a tool.
+fn contact(gap: f32) -> Contact {
+    Contact { separation: gap, normal: Vec3::X, ..Contact::NONE }
+}
+
+#[test]
+fn proxy_and_rows_count_from_the_lower_end() {
+    let soft = SpringDamper::stiffness(0.5).max_force(5.0);
+    let proxy = Proxy::new(soft, 3.0).unwrap();
+    let force = |gap, accuracy| {
+        let contacts = [contact(gap)];
+        proxy.wrench(Ok(contacts.iter()), accuracy, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO)
+    };
+    assert!((force(2.0, 0.5).force - Vec3::X * 0.75).length() < 1e-4);
+    // Within the margin by its accuracy alone.
+    assert_eq!(force(3.2, 0.1), Wrench::NONE);
+    assert!((force(3.2, 0.4).force - Vec3::X * 0.1).length() < 1e-4);
+
+    let row =
+        |accuracy| VelocityRow::new(&contact(2.0), accuracy, Vec3::ZERO).stand_off(1.0).gain(20.0);
+    assert!((row(0.0).least + 20.0).abs() < 1e-4 && (row(0.25).least + 15.0).abs() < 1e-4);
+    assert!(row(0.25).allows(Vec3::X * -14.9, Vec3::ZERO));
+    assert!(!row(0.25).allows(Vec3::X * -15.1, Vec3::ZERO));
+}
+
+#[test]
+fn an_interval_is_rounded_outwards() {
+    let mut pair = pair(1.0, Vec3::X);
+    pair.accuracy = 1e-9;
+    let interval = pair.interval();
+    assert_eq!((interval.lower, interval.upper), (1.0_f32.next_down(), 1.0_f32.next_up()));
+    pair.accuracy = 0.25;
+    pair.lower = -0.5;
+    assert_eq!((pair.interval().lower, pair.interval().upper), (-0.75, 1.25));
 }
 
 #[test]

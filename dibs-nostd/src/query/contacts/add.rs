@@ -10,7 +10,7 @@ use crate::query::search::RangeFront;
 use crate::query::side::{self, Side};
 use crate::query::{NoSide, Options, Proximity};
 use crate::unavailable::QueryError;
-use crate::{Budget, Index, Tool, Tree, TriangleRow, VertexTable};
+use crate::{Budget, Coverage, Index, Tool, Tree, TriangleRow, VertexTable};
 
 /// Ridges of this part of the margin do not part two contacts.
 const RIDGE: f32 = 1.0 / 64.0;
@@ -82,6 +82,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         // The search below takes the positions as exact; the answer's accuracy has their error already.
         let accuracy = closest.accuracy - vertices.position_error();
         let has_side = closest.side != Side::Undefined(NoSide::CutShort);
+        found.has_no_side |= may_be_inside(closest);
         if closest.side == Side::Inside || (closest.lower > margin && has_side) {
             if let Some(contact) = pair.contact(closest).filter(|at| at.separation <= margin) {
                 found.insert(contact);
@@ -150,24 +151,37 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
 }
 
 impl<I, V: ?Sized, T> Pair<'_, I, V, T> {
-    /// The contact at two points, if a direction leads out.
     fn contact(&self, at: &Proximity) -> Option<Contact> {
-        let is_unit = (at.direction.length_squared() - 1.0).abs() < 1e-3;
-        let triangle = at.triangle.filter(|_| is_unit)?;
-        Some(Contact {
-            separation: at.lower,
-            normal: at.direction,
-            point_on_surface: at.point_on_surface,
-            point_on_tool: at.point_on_tool,
-            axis_parameter: at.axis_parameter,
-            surface: self.surface,
-            tool: self.number,
-            triangle,
-            corners: at.corners,
-            barycentric: at.barycentric,
-            velocity: Vec3::ZERO,
-        })
+        let contact = contact(at)?;
+        Some(Contact { surface: self.surface, tool: self.number, ..contact })
     }
+}
+
+/// The contact at two points, if a direction leads out.
+pub(super) fn contact(at: &Proximity) -> Option<Contact> {
+    let is_unit = (at.direction.length_squared() - 1.0).abs() < 1e-3;
+    let triangle = at.triangle.filter(|_| is_unit)?;
+    Some(Contact {
+        separation: at.lower,
+        normal: at.direction,
+        point_on_surface: at.point_on_surface,
+        point_on_tool: at.point_on_tool,
+        axis_parameter: at.axis_parameter,
+        triangle,
+        corners: at.corners,
+        barycentric: at.barycentric,
+        ..Contact::NONE
+    })
+}
+
+/// Whether a pair has no side, though one was asked for. The list's bound says so itself where the budget ended.
+fn may_be_inside(closest: &Proximity) -> bool {
+    let has_none = match closest.side {
+        Side::Undefined(NoSide::NotAsked | NoSide::NoAdjacency | NoSide::CutShort) => false,
+        Side::Undefined(_) => true,
+        _ => false,
+    };
+    has_none && !closest.is_at_surface()
 }
 
 /// The pair of a tool and the lowest triangle of a valley.
@@ -192,6 +206,7 @@ fn pair_at<I: Index, V: VertexTable + ?Sized, T: Tool>(
         lower: separation,
         accuracy,
         side: Side::Undefined(NoSide::NotAsked),
+        coverage: Coverage::Assumed,
         axis_distance,
         point_on_surface: found.on_surface,
         point_on_tool: found.on_axis,

@@ -13,6 +13,8 @@ pub(super) struct List<const N: usize> {
     /// The margin that was asked for.
     pub margin: f32,
     pub is_cut_short: bool,
+    /// The tool may be inside a surface whose closest pair has no side.
+    pub has_no_side: bool,
 }
 
 impl<const N: usize> List<N> {
@@ -25,6 +27,7 @@ impl<const N: usize> List<N> {
             is_full: false,
             margin: f32::NEG_INFINITY,
             is_cut_short: true,
+            has_no_side: false,
         }
     }
 
@@ -36,6 +39,7 @@ impl<const N: usize> List<N> {
         self.is_full = false;
         self.margin = f32::NEG_INFINITY;
         self.is_cut_short = true;
+        self.has_no_side = false;
     }
 
     /// Empties the list for the contacts within `margin`.

@@ -8,7 +8,7 @@ mod low;
 use glam::Vec3;
 
 use super::search::RangeFront;
-use super::{Options, Proximity, Query};
+use super::{Options, Proximity, Query, Side};
 use crate::unavailable::{QueryError, Unavailable};
 use crate::{Index, Tool, TriangleRow, VertexTable};
 pub(super) use add::Pair;
@@ -49,7 +49,7 @@ pub struct Contact {
 }
 
 impl Contact {
-    const NONE: Self = Self {
+    pub(crate) const NONE: Self = Self {
         separation: f32::INFINITY,
         normal: Vec3::ZERO,
         point_on_surface: Vec3::ZERO,
@@ -132,19 +132,44 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     ///
     /// # Errors
     /// [`Unavailable::CutShort`] if the budget ended before all contacts within the margin were known, or no query
-    /// filled the list; [`QueryError::Margin`] if the query's margin was less.
+    /// filled the list; [`Unavailable::NoSide`] if the tool may be inside and no contact is within the margin;
+    /// [`QueryError::Margin`] if the query's margin was less.
     pub fn within(
         &self,
         margin: f32,
     ) -> Result<impl Iterator<Item = &Contact> + Clone, Unavailable> {
-        let List { bound, is_cut_short, .. } = self.found;
+        let List { bound, is_cut_short, has_no_side, accuracy, .. } = self.found;
         if is_cut_short && !(bound >= margin) {
             return Err(Unavailable::CutShort);
         }
         if !(margin <= self.found.margin) {
             return Err(QueryError::Margin { bits: margin.to_bits() }.into());
         }
+        let acts = |first: &Contact| first.separation - accuracy < margin;
+        if has_no_side && !self.iter().next().is_some_and(acts) {
+            return Err(Unavailable::NoSide);
+        }
         Ok(self.iter())
+    }
+
+    /// Gives a list whose tool may be inside, because the closest pair has no side, that of `closest`: a pair whose side
+    /// is certain from the tool's past, as [`LastSide`](crate::constraint::LastSide) makes it. That pair is a contact
+    /// then, and the only one unless the tool is outside. Other lists stay as they are.
+    pub fn settle(&mut self, closest: &Proximity) {
+        if !self.found.has_no_side || matches!(closest.side, Side::Undefined(_)) {
+            return;
+        }
+        self.found.has_no_side = false;
+        if closest.side != Side::Outside {
+            self.found.count = 0;
+        }
+        if closest.accuracy > self.found.accuracy {
+            self.found.accuracy = closest.accuracy;
+        }
+        if let Some(contact) = add::contact(closest).filter(|at| at.separation <= self.found.margin)
+        {
+            self.found.insert(contact);
+        }
     }
 
     /// Every contact whose separation is below this (mm) is in the list. It is the margin, unless the list or `NEAR`

@@ -6,7 +6,7 @@ use super::slack::{ACCURACY, FLOOR};
 use super::{NearestPin, Search};
 use crate::math::sqrt::sqrt;
 use crate::query::{NoSide, Proximity, Side};
-use crate::{Index, QueryError, Tool, TriangleRow, VertexTable};
+use crate::{Coverage, Index, QueryError, Tool, TriangleRow, VertexTable};
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// The answer, where `lower` bounds the unexplored subtrees.
@@ -42,6 +42,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             lower: if left < separation { left } else { separation },
             accuracy: ACCURACY * self.scale + FLOOR + self.tree.position_error(),
             side: Side::Undefined(NoSide::NotAsked),
+            coverage: Coverage::Assumed,
             axis_distance,
             point_on_surface: pair.on_surface,
             point_on_tool: pair.on_axis - direction * radius,

@@ -101,6 +101,9 @@ pub struct Tracked {
     pub closest: Proximity,
     /// The reason, if this tick was a whole query.
     pub fallback: Option<Fallback>,
+    /// Most (mm) that tool and surface together have moved since the last tick; `None` where it is not known, and of
+    /// several pairs.
+    pub moved: Option<f32>,
     /// Places of the tracker's `OPENED` used since the front last started.
     pub opened: u32,
     /// Of [`Tracker::closest_of`], the closest pair's index; else 0.
@@ -194,6 +197,9 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         let travel = surface.travel();
         let moved = self.moved(tool, travel);
         self.last = None;
+        // Rounded to nearest from whole units.
+        let length = |units: u32| self.unit.length(units as i32) * (1.0 + 4.0 * f32::EPSILON);
+        let moved_by = moved.ok().map(length);
         let (moved, mut fallback) = match moved {
             Ok(moved) => (moved, self.front.borrow().is_empty().then_some(Fallback::Start)),
             Err(fallback) => {
@@ -232,7 +238,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         let is_closed = self.tree.is_closed();
         self.last = travel.map(|travel| Last::new(tool, travel, &closest, is_closed));
         let opened = self.front.borrow().used() as u32;
-        Ok(Tracked { closest, fallback, opened, pair: 0, searched: 1 })
+        Ok(Tracked { closest, fallback, moved: moved_by, opened, pair: 0, searched: 1 })
     }
 
     /// The closest pair, and all contacts within `margin` (mm): those of [`Query::contacts`](crate::Query::contacts).

@@ -89,7 +89,8 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
             let tracked = tracker.closest(*surface, *tool, &rest)?;
             let own = &tracked.closest;
             rest = rest.budget(rest.budget.less(own.node_tests, own.triangle_tests));
-            let own = Tracked { pair: at, ..tracked };
+            let moved = if pairs.len() > 1 { None } else { tracked.moved };
+            let own = Tracked { pair: at, moved, ..tracked };
             found = Some(found.map_or(own, |found| found.and(own)));
         }
         if let (Some(found), Some(at)) = (&mut found, ahead)
@@ -187,6 +188,7 @@ impl Tracked {
             accuracy: if two.accuracy > one.accuracy { two.accuracy } else { one.accuracy },
             node_tests: one.node_tests.saturating_add(two.node_tests),
             triangle_tests: one.triangle_tests.saturating_add(two.triangle_tests),
+            coverage: one.coverage.or_weaker(two.coverage),
             side: if is_open { cut_short } else { closer.closest.side },
             ..closer.closest
         };

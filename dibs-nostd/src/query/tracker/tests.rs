@@ -13,7 +13,9 @@ use super::Tracker;
 use super::front::{NOWHERE, UNUSED};
 use crate::query::distances::{distance, least};
 use crate::tree::format::Link;
-use crate::{Budget, Capsule, Odometer, Options, Sphere, Tree, measure_stretch};
+use crate::{
+    Budget, Capsule, Coverage, Odometer, Options, Sphere, Tree, VertexTable, measure_stretch,
+};
 
 /// A bound in the front.
 struct Bound {
@@ -103,6 +105,81 @@ fn no_bound_exceeds_the_distance() {
     }
     std::println!("{checked} bounds, {above_zero} of them above zero");
     assert!(above_zero > 150 * frames());
+}
+
+/// Positions that are each off by up to a millimetre.
+struct Rough<'a>(&'a [Vec3]);
+
+impl VertexTable for Rough<'_> {
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.0.position(vertex)
+    }
+
+    fn position_error(&self) -> f32 {
+        1.0
+    }
+}
+
+/// The error of the positions counts twice: when the pair was searched, and now.
+#[test]
+fn a_pair_rests_only_if_it_is_farther_than_the_errors_of_both_searches() {
+    let built = Builder::new().stretch(1.5).build(&band(160)).expect("builds");
+    let tree = Tree::<u16>::from_bytes(built.blob()).expect("valid");
+    let rest: Vec<Vec3> =
+        (0..tree.vertex_count()).map(|row| tree.rest_position(row).expect("a row")).collect();
+    for (height, searched) in [(1.5, 2), (1.9, 2), (2.1, 1)] {
+        let rough = Rough(rest.as_slice());
+        let surface = Odometer::new(&tree).start(&rough);
+        let tool = |x: f32, height: f32| {
+            Sphere::new(Vec3::new(x, 0.05, 5.0 + height), 0.5).expect("valid")
+        };
+        let tools = [tool(40.0, 0.0), tool(120.0, height)];
+        let [mut near, mut far] =
+            [(); 2].map(|()| Tracker::<_, 128, 128>::new(&tree).expect("enough"));
+        let mut ask = || {
+            let mut pairs = [(&mut near, &surface, &tools[0]), (&mut far, &surface, &tools[1])];
+            let options = Options::cold().unsigned();
+            Tracker::closest_of(&mut pairs, &options).expect("an answer").expect("two pairs")
+        };
+        assert_eq!(ask().searched, 2);
+        assert_eq!(ask().searched, searched, "{height}");
+    }
+}
+
+/// Rows as they came, larger than the limit allows: the answer says that it rests on the tree's limit.
+#[test]
+fn an_answer_says_whether_the_stretch_was_checked() {
+    let built = Builder::new().stretch(1.5).build(&band(160)).expect("builds");
+    let tree = Tree::<u16>::from_bytes(built.blob()).expect("valid");
+    let rest: Vec<Vec3> =
+        (0..tree.vertex_count()).map(|row| tree.rest_position(row).expect("a row")).collect();
+    let large: Vec<Vec3> = rest.iter().map(|&row| row * 1.6).collect();
+    let tool = Sphere::new(Vec3::new(40.0, 0.05, 5.0), 0.5).expect("valid");
+    let mut tracker = Tracker::<_, 128, 128>::new(&tree).expect("enough");
+    let mut odometer = Odometer::new(&tree);
+    let measured = measure_stretch(&tree, rest.as_slice()).expect("at rest");
+    assert!(measure_stretch(&tree, large.as_slice()).is_err());
+    let both = measured.or_larger(measured).expect("one tree");
+    for (rows, options, coverage) in [
+        (&large, Options::cold(), Coverage::Assumed),
+        (&rest, Options::cold(), Coverage::Assumed),
+        (&rest, Options::cold().stretch(measured), Coverage::Measured),
+        (&rest, Options::cold().stretch(both), Coverage::Proven),
+    ] {
+        let surface = odometer.start(rows.as_slice());
+        let tracked = tracker.closest(&surface, &tool, &options).expect("an answer");
+        assert_eq!((tracked.closest.coverage, tracked.moved), (coverage, None));
+        let again = tracker.closest(&surface, &tool, &options).expect("an answer");
+        assert_eq!(again.moved, Some(0.0));
+        let tools = [tool; 2];
+        let mut query = crate::Query::<_, 128>::new(&tree).expect("enough");
+        let of = query.closest_of(rows.as_slice(), &tools, &options).expect("an answer");
+        assert_eq!(of.map(|found| found.proximity.coverage), Some(coverage));
+    }
 }
 
 /// A straight band of squares, a tenth as wide as they are long.

@@ -1,7 +1,7 @@
 //! An answer, as JSON or for a reader.
 
 use dibs_build::glam::{DVec3, Vec3};
-use dibs_nostd::{Contact, MeasuredStretch, Proximity, Side};
+use dibs_nostd::{Contact, Coverage, MeasuredStretch, Proximity, Side};
 use serde::Serialize;
 
 /// The closest pair of a tool and a surface.
@@ -45,6 +45,15 @@ pub fn side_name(side: Side) -> (&'static str, Option<String>) {
     }
 }
 
+/// How it is known that no part of the surface is nearer.
+fn coverage_name(coverage: Coverage) -> &'static str {
+    match coverage {
+        Coverage::Measured => "measured",
+        Coverage::Proven => "proven",
+        _ => "assumed",
+    }
+}
+
 /// An answer in JSON. Numbers are f64, which holds every f32: a reader that computes in f64 gets the same bits.
 #[derive(Serialize)]
 pub struct Record<'a> {
@@ -54,6 +63,10 @@ pub struct Record<'a> {
     separation: f64,
     lower: f64,
     accuracy: f64,
+    /// Certified: the ends include the accuracy. The first is null where the tool may be inside at any depth.
+    interval: [f64; 2],
+    /// Whether the stretch that the answer rests on was checked.
+    coverage: &'static str,
     side: &'static str,
     side_reason: Option<String>,
     axis_distance: f64,
@@ -113,11 +126,14 @@ impl<'a> Answer<'a> {
         let p = &self.proximity;
         let (side, side_reason) = side_name(p.side);
         let contacts = self.contacts.as_ref();
+        let interval = p.interval();
         Record {
             line,
             separation: p.separation.into(),
             lower: p.lower.into(),
             accuracy: p.accuracy.into(),
+            interval: [interval.lower.into(), interval.upper.into()],
+            coverage: coverage_name(p.coverage),
             side,
             side_reason,
             axis_distance: p.axis_distance.into(),
@@ -159,6 +175,9 @@ impl<'a> Answer<'a> {
         }
         if let Some(measured) = self.stretch {
             println!("stretch           {}", measured.sigma());
+        }
+        if p.coverage == Coverage::Assumed {
+            println!("coverage          assumed: the tree cannot measure the stretch");
         }
         println!("tests             {} nodes, {} triangles", p.node_tests, p.triangle_tests);
         for touch in self.contacts.iter().flatten() {

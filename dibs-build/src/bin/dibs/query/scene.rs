@@ -8,8 +8,8 @@ use anyhow::{Result, anyhow, bail};
 use dibs_build::glam::{DVec3, Vec3};
 use dibs_build::{Import, ReadOptions};
 use dibs_nostd::{
-    Contact, Contacts, Index, MeasuredStretch, Options, Proximity, Query, StretchError, Tool, Tree,
-    measure_stretch,
+    Contact, Contacts, Coverage, Index, MeasuredStretch, Options, Proximity, Query, StretchError,
+    Tool, Tree, measure_stretch,
 };
 use std::path::{Path, PathBuf};
 
@@ -78,6 +78,10 @@ impl<'a> Surface<'a> {
             LocalTool::Sphere(sphere) => self.closest(tree, &sphere, margin, room)?,
             LocalTool::Capsule(capsule) => self.closest(tree, &capsule, margin, room)?,
         };
+        // It is within the limit, or the surface would have been refused.
+        if self.stretch.is_some() {
+            found.proximity.coverage = Coverage::Measured;
+        }
         let vertex = |row| tree.vertex_number(row).map_or(row, |vertex| vertex.0);
         found.triangle = found.proximity.corners.map(vertex);
         found.triangles =
@@ -152,7 +156,8 @@ pub fn ask<'a>(
 ) -> Result<Answer<'a>> {
     let mut best: Option<Answer<'a>> = None;
     let (mut touches, mut bound) = (Vec::new(), f32::INFINITY);
-    // Interval, accuracy and tests are those of all pairs.
+    // Interval, accuracy, coverage and tests are those of all pairs.
+    let mut coverage = Coverage::Measured;
     let (mut lower, mut accuracy, mut node_tests, mut triangle_tests) =
         (f32::INFINITY, 0_f32, 0, 0);
     for surface in surfaces {
@@ -171,6 +176,7 @@ pub fn ask<'a>(
             let Proximity { separation, .. } = found.proximity;
             lower = lower.min(found.proximity.lower);
             accuracy = accuracy.max(found.proximity.accuracy);
+            coverage = coverage.or_weaker(found.proximity.coverage);
             node_tests += found.proximity.node_tests;
             triangle_tests += found.proximity.triangle_tests;
             if best.as_ref().is_none_or(|best| separation < best.proximity.separation) {
@@ -191,7 +197,7 @@ pub fn ask<'a>(
     }
     let mut answer = best.ok_or_else(|| anyhow!("no tool"))?;
     let closest = &mut answer.proximity;
-    (closest.lower, closest.accuracy) = (lower, accuracy);
+    (closest.lower, closest.accuracy, closest.coverage) = (lower, accuracy, coverage);
     (closest.node_tests, closest.triangle_tests) = (node_tests, triangle_tests);
     if margin.is_some() {
         touches.sort_by(|a, b| a.contact.separation.total_cmp(&b.contact.separation));
