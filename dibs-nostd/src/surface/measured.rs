@@ -44,11 +44,11 @@ impl Coverage {
 pub struct MeasuredStretch {
     sigma: f32,
     tree: u32,
+    /// The triangle that is stretched most, and [`PROVEN`].
     triangle: u32,
     epoch: Option<u32>,
     /// Each region's share of `sigma`, less one, in parts of 256.
     regions: [u8; REGIONS],
-    is_proven: bool,
 }
 
 impl MeasuredStretch {
@@ -60,14 +60,14 @@ impl MeasuredStretch {
         epoch: Option<u32>,
         regions: [u8; REGIONS],
     ) -> Self {
-        Self { sigma, tree, triangle, epoch, regions, is_proven: false }
+        Self { sigma, tree, triangle, epoch, regions }
     }
 
     /// One bound for the whole surface, not from a measurement of every triangle.
     #[cfg(feature = "modes")]
     pub(crate) const fn everywhere(sigma: f32, tree: u32, triangle: u32) -> Self {
         let regions = [u8::MAX; REGIONS];
-        Self { sigma, tree, triangle, epoch: None, regions, is_proven: true }
+        Self { sigma, tree, triangle: triangle | PROVEN, epoch: None, regions }
     }
 
     /// A bound for two frames of one surface and all between them: gradients are linear in the positions, and
@@ -82,7 +82,8 @@ impl MeasuredStretch {
     pub(crate) fn of_both(self, other: Self, sigma: f32) -> Option<Self> {
         let larger = if other.sigma > self.sigma { other } else { self };
         let regions = [u8::MAX; REGIONS];
-        let both = Self { sigma, epoch: None, regions, is_proven: true, ..larger };
+        let triangle = larger.triangle | PROVEN;
+        let both = Self { sigma, triangle, epoch: None, regions, ..larger };
         (self.tree == other.tree).then_some(both)
     }
 
@@ -103,7 +104,7 @@ impl MeasuredStretch {
     /// The triangle that is stretched most.
     #[must_use]
     pub const fn triangle(&self) -> TriangleRow {
-        TriangleRow(self.triangle)
+        TriangleRow(self.triangle & !PROVEN)
     }
 
     /// Checksum of the tree that it was measured with.
@@ -121,13 +122,12 @@ impl MeasuredStretch {
     /// Whether it was measured on the frame itself, or follows from other frames.
     #[must_use]
     pub const fn coverage(&self) -> Coverage {
-        if self.is_proven { Coverage::Proven } else { Coverage::Measured }
+        if self.triangle & PROVEN != 0 { Coverage::Proven } else { Coverage::Measured }
     }
 
     /// The measurement as words, without its epoch and its regions, for the frame's label.
     pub(crate) const fn to_words(self) -> [u32; MeasuredStretch::WORDS] {
-        let proven = if self.is_proven { PROVEN } else { 0 };
-        [self.sigma.to_bits(), self.tree, self.triangle & !PROVEN | proven]
+        [self.sigma.to_bits(), self.tree, self.triangle]
     }
 
     /// The inverse of [`to_words`](Self::to_words).
@@ -135,17 +135,14 @@ impl MeasuredStretch {
         [sigma, tree, triangle]: [u32; MeasuredStretch::WORDS],
         epoch: u32,
     ) -> Self {
-        let regions = [u8::MAX; REGIONS];
-        let measured =
-            Self::new(f32::from_bits(sigma), tree, triangle & !PROVEN, Some(epoch), regions);
-        Self { is_proven: triangle & PROVEN != 0, ..measured }
+        Self::new(f32::from_bits(sigma), tree, triangle, Some(epoch), [u8::MAX; REGIONS])
     }
 
     /// Words that a measurement takes.
     pub(crate) const WORDS: usize = 3;
 }
 
-/// Bit of a label's triangle: no tree has so many.
+/// Bit of the triangle of a bound that was not measured on the frame itself: no tree has so many triangles.
 const PROVEN: u32 = 1 << 31;
 
 /// Stretch that a region's code stands for.
