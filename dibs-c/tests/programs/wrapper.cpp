@@ -86,11 +86,34 @@ int main(int argc, char **argv) {
         dibs_fallback fallback = DIBS_FALLBACK_NONE;
         MUST(tracker.init(tree));
         EXPECT(DIBS_CODE_VERTEX_COUNT, tracker.set(frame));
-        MUST(dibs_tracker_closest_on(tracker, frame, &tool, nullptr, &tracked, &fallback));
+        float moved = 1.0f;
+        MUST(dibs_tracker_closest_on(tracker, frame, &tool, nullptr, &tracked, &fallback, &moved));
+        EXPECT(true, moved == -1.0f);
         EXPECT(true, fallback == DIBS_FALLBACK_START && tracked.separation == on_bus.separation);
-        MUST(dibs_tracker_closest_on(tracker, frame, &tool, nullptr, &tracked, &fallback));
+        MUST(dibs_tracker_closest_on(tracker, frame, &tool, nullptr, &tracked, &fallback, &moved));
+        EXPECT(true, moved == 0.0f);
         EXPECT(true, fallback == DIBS_FALLBACK_NONE && tracked.separation == on_bus.separation);
         EXPECT(true, tracked.node_tests < on_bus.node_tests);
+        EXPECT(true, tracked.coverage == DIBS_COVERAGE_MEASURED);
+
+        /* An answer without a side: the last one's stays, by the motion since. */
+        dibs_last_side last = {};
+        dibs_proximity settled = tracked;
+        MUST(dibs_last_side_settle(&last, DIBS_CODE_OK, &settled, -1.0f));
+        EXPECT(true, last.has_past == 1 && settled.separation == tracked.separation);
+        settled.side = DIBS_SIDE_DEGENERATE;
+        dibs_interval interval;
+        MUST(dibs_proximity_interval(&settled, &interval));
+        EXPECT(true, interval.lower < -1e30f && interval.upper >= tracked.separation);
+        MUST(dibs_last_side_settle(&last, DIBS_CODE_OK, &settled, 0.5f));
+        EXPECT(true, settled.side == tracked.side);
+        MUST(dibs_last_side_settle(&last, DIBS_CODE_STALE, nullptr, 0.0f));
+        EXPECT(true, last.has_past == 1);
+        MUST(dibs_proximity_interval(&settled, &interval));
+        EXPECT(true, interval.lower < tracked.lower && interval.upper > tracked.separation);
+        MUST(dibs_contacts_settle(contacts, &settled));
+        settled.coverage = 9;
+        EXPECT(DIBS_CODE_ARGUMENT, dibs_proximity_interval(&settled, &interval));
     }
     dibs::Frame frame;
     MUST(frame.init());
