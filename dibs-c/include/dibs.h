@@ -300,7 +300,7 @@ enum dibs_code
    */
   DIBS_CODE_HEARTBEAT_LOST = 303,
   /**
-   * More frames were refused or damaged than allowed.
+   * More frames were refused or abandoned than allowed.
    */
   DIBS_CODE_REJECTIONS = 304,
   /**
@@ -443,6 +443,10 @@ enum dibs_code
    * The acknowledgement came before the machine waited for it.
    */
   DIBS_CODE_ACKNOWLEDGE = 505,
+  /**
+   * A limit is so high that its input never exceeds it.
+   */
+  DIBS_CODE_LIMIT_UNTRIPPABLE = 506,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -996,7 +1000,7 @@ typedef struct {
    */
   dibs_watch heartbeat;
   /**
-   * Frames refused or damaged since the last one was published.
+   * Frames refused or abandoned since the last one was published.
    */
   dibs_watch rejections;
   /**
@@ -1008,7 +1012,7 @@ typedef struct {
    */
   dibs_watch source_age;
   /**
-   * Forged packets since the last frame was published.
+   * Forged packets, of which 10 are forgotten each second; the limits are below 1,000.
    */
   dibs_watch forgeries;
   /**
@@ -1019,6 +1023,10 @@ typedef struct {
    * Frames in a row that recover: 1 to 65,535.
    */
   uint32_t recovery_frames;
+  /**
+   * Steps in a row with every input within its first limit, before the one that recovers.
+   */
+  uint32_t dwell;
   /**
    * 0 to leave the safe state by an acknowledgement alone; otherwise without one.
    */
@@ -1060,11 +1068,11 @@ typedef struct {
    */
   uint32_t heartbeat;
   /**
-   * Frames refused or damaged since the last one was published.
+   * Frames refused or abandoned since the last one was published.
    */
   uint32_t rejections;
   /**
-   * Packets without a genuine tag since then.
+   * Packets without a genuine tag, less 10 for each second.
    */
   uint32_t forgeries;
   /**
@@ -1465,9 +1473,12 @@ dibs_code dibs_contacts_rows(dibs_contacts *contacts,
  * @param size      Bytes of the storage.
  * @param limits    Its limits.
  * @param failsafe  Receives the machine's address.
- * @return `DIBS_CODE_OK`, `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`, or a misuse.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`, `DIBS_CODE_LIMIT_UNTRIPPABLE`, or a misuse.
  */
-dibs_code dibs_failsafe_init(void *storage, size_t size, const dibs_limits *limits, dibs_failsafe **failsafe);
+dibs_code dibs_failsafe_init(void *storage,
+                             size_t size,
+                             const dibs_limits *limits,
+                             dibs_failsafe **failsafe);
 
 /**
  * One control tick of the machine.
@@ -1701,7 +1712,7 @@ dibs_code dibs_receiver_advance(dibs_receiver *receiver,
                                 dibs_advance *advance);
 
 /**
- * Writes the receiver's status for the sender: every 100 ms or so, and when a hello asks for it.
+ * Writes the receiver's status for the sender: every 100 ms or so, and as soon as a hello asks for it.
  *
  * @param receiver  The receiver.
  * @param now       The receiver's clock, in ms.
@@ -1737,8 +1748,16 @@ dibs_code dibs_receiver_position(dibs_receiver *receiver,
                                  dibs_vec3 *position);
 
 /**
- * The count of each event since the start, in the order of docs/wire.md: published, abandoned, duplicate,
- * heartbeat, and from the fifth on rejections by their cause.
+ * Name of an event, in English: published, abandoned, duplicate, heartbeat, and from the fifth on rejections by their
+ * cause.
+ *
+ * @param event  Its place among the counters.
+ * @return A static text; never null, also for a number that is no event.
+ */
+const char *dibs_event_name(uint32_t event);
+
+/**
+ * The count of each event since the start, in the order of `dibs_event_name`.
  *
  * @param receiver  The receiver.
  * @param counters  Room for `DIBS_EVENTS` numbers.

@@ -94,11 +94,11 @@ pub use surface::{
 #[doc(hidden)]
 pub use surface::{BorrowedFrames, Buffer, Position};
 pub use tool::{ACCURACY, AxisPair, Capsule, MAX_COORDINATE, Sphere, Tool, ToolError};
+pub use tree::{
+    CorruptTreeError, FormatError, Index, PathKind, Scrub, Tree, TreeBytes, TriangleRow,
+    VertexNumber,
+};
 /// The layout of a tree's bytes, for `dibs-build`. It may change with any version.
 #[doc(hidden)]
-pub use tree::format;
-pub use tree::{
-    CorruptTreeError, FormatError, Index, PathKind, Scrub, SurfaceFacts, Tree, TreeBytes,
-    TriangleRow, VertexNumber,
-};
+pub use tree::{SurfaceFacts, format};
 pub use unavailable::{QueryError, Unavailable};

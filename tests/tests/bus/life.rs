@@ -87,6 +87,16 @@ fn heartbeats_are_as_old_as_the_status_that_they_echo() {
         }
     }
     assert!((90..=200).contains(&most), "{most}");
+    // After a silence of any length a heartbeat counts.
+    for silence in [1_u32 << 31, u32::MAX - 1_000] {
+        let later = 10_000_u32.wrapping_add(silence);
+        let beat = encode_heartbeat(&id(1), 1, Some(later), &NoMac, &mut [0; 64]).to_vec();
+        let (mut open, _reader) = guarded(NoMac);
+        let first = encode_heartbeat(&id(1), 0, Some(9_990), &NoMac, &mut [0; 64]).to_vec();
+        open.accept(&first, Millis(10_000)).unwrap();
+        open.accept(&beat, Millis(later)).unwrap();
+        assert_eq!(open.health().heartbeat, Some(Millis(later)));
+    }
     // An echo ahead of the clock is of another run of the receiver: no sign of life in this one.
     let (mut anew, _reader) = guarded(NoMac);
     for (n, echo) in [(1, 40), (2, 1 << 30), (3, i32::MAX as u32 - 10)] {

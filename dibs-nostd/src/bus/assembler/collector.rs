@@ -367,7 +367,8 @@ impl Collector {
         // One that is ahead by no more than two clocks' readings may be counts as now.
         let age = elapsed(self.now, at);
         let at = if age == Millis(0) { self.now } else { at };
-        let is_later = self.heartbeat_at.is_none_or(|last| is_newer(at.0, last.0));
+        // By their ages, so that the longest silence ends with a heartbeat.
+        let is_later = self.heartbeat_at.is_none_or(|last| age <= self.now.since(last));
         if age.0 <= i32::MAX as u32 && is_later {
             self.heartbeat_at = Some(at);
         }

@@ -48,9 +48,9 @@ pub use mac::{Code, Direction, Mac, NoMac};
 #[doc(hidden)]
 pub use packet::Packet;
 pub use quantised::{BoxError, QuantisedBox};
+pub use status::Status;
 #[doc(hidden)]
-pub use status::PublishedStatus;
-pub use status::{Answer, Status, StatusReport};
+pub use status::{Answer, PublishedStatus, StatusReport};
 pub use stream::{Deframer, StreamError, enframe, framed_bytes};
 
 /// The protocol's version: the first byte of every packet.
