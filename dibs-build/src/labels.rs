@@ -1,12 +1,13 @@
-//! The file of labels that `dibs build --labels` reads: one for each triangle of a mesh.
+//! The file of labels that `dibs build --labels` reads: one for each face of a mesh's file, or each triangle of the mesh.
 //!
-//! Text: lines that start with `#` and empty ones are skipped; then one number from 0 to 255 a line, in the mesh's order.
+//! Text: lines that start with `#` and empty ones are skipped; then one number from 0 to 255 a line, in the file's order.
 
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use crate::Mesh;
+use crate::RestSurface;
+use crate::read::file;
 
 /// A file of labels that cannot be used.
 #[derive(Debug, Error)]
@@ -26,13 +27,21 @@ pub enum LabelsErrorKind {
     #[error("cannot be read ({0})")]
     Io(#[from] std::io::Error),
     /// The number of labels differs from that of triangles.
-    #[error(
-        "has {found} labels for {expected} triangles: give one for each triangle of the mesh as read, without those that \
-         were dropped"
-    )]
+    #[error("has {found} labels for {expected} triangles{}: give one for each", of_faces(*.faces))]
     Count {
         /// Triangles of the mesh.
         expected: usize,
+        /// Faces of the mesh's file, if they are not these triangles.
+        faces: Option<usize>,
+        /// Labels in the file.
+        found: usize,
+    },
+    /// The file of the mesh has as many faces as the mesh has triangles, but not the same.
+    #[error(
+        "has {found} labels, and the mesh's file has as many faces as triangles are left of others: mend the mesh, \
+         so that none is dropped (--strict names them)"
+    )]
+    Ambiguous {
         /// Labels in the file.
         found: usize,
     },
@@ -46,26 +55,54 @@ pub enum LabelsErrorKind {
     },
 }
 
-/// Reads the labels of a mesh's triangles: text, one number from 0 to 255 a line, `#` before a comment.
+fn of_faces(faces: Option<usize>) -> String {
+    faces.map(|faces| format!(" of a file with {faces} faces")).unwrap_or_default()
+}
+
+/// Reads the labels of a surface's triangles: text, one number from 0 to 255 a line, `#` before a comment. There is one
+/// for each face of the surface's file, of which those of dropped faces are passed over; or one for each triangle.
 ///
 /// # Errors
 /// [`LabelsError`] names the file and its defect.
-pub fn read_labels(path: impl AsRef<Path>, mesh: &Mesh) -> Result<Vec<u8>, LabelsError> {
+pub fn read_labels(
+    path: impl AsRef<Path>,
+    surface: &(impl RestSurface + ?Sized),
+) -> Result<Vec<u8>, LabelsError> {
     let path = path.as_ref();
-    let text = std::fs::read_to_string(path).map_err(LabelsErrorKind::from);
-    text.and_then(|text| parse(&text, mesh.triangles.len()))
+    let text = file::text(path).map_err(LabelsErrorKind::from);
+    text.and_then(|text| for_triangles(parse(&text)?, surface))
         .map_err(|kind| LabelsError { path: path.to_path_buf(), kind })
 }
 
-fn parse(text: &str, expected: usize) -> Result<Vec<u8>, LabelsErrorKind> {
+fn for_triangles(
+    labels: Vec<u8>,
+    surface: &(impl RestSurface + ?Sized),
+) -> Result<Vec<u8>, LabelsErrorKind> {
+    let (expected, found) = (surface.mesh().triangles.len(), labels.len());
+    let is_other = |(faces, count): &(&[u32], usize)| {
+        *count != expected || faces.iter().zip(0..).any(|(&face, triangle)| face != triangle)
+    };
+    let Some((of_triangle, faces)) = surface.file_faces().filter(is_other) else {
+        let fits = found == expected;
+        return fits.then_some(labels).ok_or(LabelsErrorKind::Count {
+            expected,
+            faces: None,
+            found,
+        });
+    };
+    match (found == faces, found == expected) {
+        (true, true) => Err(LabelsErrorKind::Ambiguous { found }),
+        (true, false) => Ok(of_triangle.iter().map(|&face| labels[face as usize]).collect()),
+        (false, true) => Ok(labels),
+        (false, false) => Err(LabelsErrorKind::Count { expected, faces: Some(faces), found }),
+    }
+}
+
+fn parse(text: &str) -> Result<Vec<u8>, LabelsErrorKind> {
     let lines = (1..).zip(text.lines().map(str::trim));
     let labels = lines.filter(|(_, text)| !text.starts_with('#') && !text.is_empty());
     let label = |(line, text): (usize, &str)| {
         text.parse::<u8>().map_err(|_| LabelsErrorKind::Line { line, text: text.to_owned() })
     };
-    let labels = labels.map(label).collect::<Result<Vec<u8>, _>>()?;
-    if labels.len() != expected {
-        return Err(LabelsErrorKind::Count { expected, found: labels.len() });
-    }
-    Ok(labels)
+    labels.map(label).collect()
 }

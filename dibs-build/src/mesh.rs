@@ -49,6 +49,12 @@ pub trait RestSurface {
     fn file_triangles(&self) -> usize {
         self.mesh().triangles.len()
     }
+
+    /// The face of its file, counted from 0, that each triangle comes from, and the number of these faces; `None` where it
+    /// has no file.
+    fn file_faces(&self) -> Option<(&[u32], usize)> {
+        None
+    }
 }
 
 impl RestSurface for Mesh {
@@ -77,6 +83,10 @@ impl<S: RestSurface> RestSurface for &S {
     fn file_triangles(&self) -> usize {
         (**self).file_triangles()
     }
+
+    fn file_faces(&self) -> Option<(&[u32], usize)> {
+        (**self).file_faces()
+    }
 }
 
 /// A recorded or generated deformation of a mesh: every frame holds one position a vertex.
@@ -84,7 +94,7 @@ impl<S: RestSurface> RestSurface for &S {
 pub struct Motion {
     /// The frames, in order of time. Positions count from the origin.
     pub frames: Vec<Vec<Vec3>>,
-    /// Frames a second; 0 if the file does not state it.
+    /// Frames a second; 0 if the file does not say it.
     pub rate: f32,
     /// The [origin](Mesh::origin) of the mesh.
     pub origin: DVec3,

@@ -175,7 +175,7 @@ impl TreeScript {
             None => builder,
         };
         let builder = match &self.labels {
-            Some(path) => builder.labels(read_labels(path, surface.mesh())?),
+            Some(path) => builder.labels(read_labels(path, &*surface)?),
             None => builder,
         };
         let built = builder.build(&*surface).map_err(|error| format!("{label}: {error}"))?;

@@ -1,6 +1,6 @@
 from typing import Optional
 
-_Reading = tuple[str, Optional[float], bool, bool, Optional[list[float]], bool, bool]
+_Reading = tuple[Optional[str], Optional[float], bool, bool, Optional[list[float]], bool, bool]
 _Tools = tuple[bytes, int, int]
 _Frames = tuple[bytearray, int, float]
 
@@ -61,5 +61,5 @@ def query(surfaces: list[Surface], tools: _Tools, budget: tuple[int, int]) -> by
 def contacts(
     surfaces: list[Surface], tools: _Tools, margin: float, budget: tuple[int, int]
 ) -> list[bytearray]: ...
-def read_motion(path: str, in_unit: str, origin: list[float]) -> _Frames: ...
+def read_motion(path: str, in_unit: Optional[str], origin: list[float]) -> _Frames: ...
 def generate(kind: str, triangles: int) -> tuple[Mesh, Optional[_Frames]]: ...

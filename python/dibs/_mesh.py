@@ -46,7 +46,7 @@ class Mesh:
         vertices: npt.ArrayLike,
         triangles: npt.ArrayLike,
         *,
-        unit: str = "mm",
+        unit: Optional[str] = None,
         weld: Optional[float] = None,
         strict: bool = False,
         largest_component: bool = False,
@@ -86,14 +86,14 @@ class Mesh:
 
 
 def _reading(
-    unit: str,
+    unit: Optional[str],
     weld: Optional[float],
     strict: bool,
     largest_component: bool,
     origin: Optional[npt.ArrayLike],
     orient: bool,
     groups: bool,
-) -> tuple[str, Optional[float], bool, bool, Optional[list[float]], bool, bool]:
+) -> tuple[Optional[str], Optional[float], bool, bool, Optional[list[float]], bool, bool]:
     place: Optional[list[float]] = None
     if origin is not None:
         place = _arrays.points("origin", _arrays.numbers("origin", origin)[np.newaxis])[0].tolist()
@@ -105,7 +105,7 @@ def _reading(
 def read(
     path: Path,
     *,
-    unit: str = "mm",
+    unit: Optional[str] = None,
     weld: Optional[float] = None,
     strict: bool = False,
     largest_component: bool = False,
@@ -113,8 +113,10 @@ def read(
     orient: bool = False,
     groups: bool = False,
 ) -> Mesh:
-    """Reads a mesh file: OBJ, STL, PLY, OFF, VTK (.vtk, .vtp), glTF, Gmsh or 3MF, told apart by content.
+    """Reads a mesh file: OBJ, STL, PLY, OFF, VTK (.vtk, .vtp, .vtu), glTF, Gmsh or 3MF, told apart by content.
 
+    `unit` ("mm", "cm", "m", "in", "um") is the unit of its lengths, which become millimetres; without it the one that the file
+    states (glTF: metres; 3MF), else millimetres. Another unit than the stated one is refused.
     `weld` joins vertices that are at most so far apart; without it only triangle soup is welded. `strict` refuses
     degenerate and duplicate triangles instead of dropping them. `orient` turns triangles until the surface faces
     outwards. `groups` makes labels of the file's groups: OBJ's g and usemtl, Gmsh's physical groups, VTK's cell data label,

@@ -30,7 +30,7 @@ def frames_of(native: tuple[bytearray, int, float]) -> Motion:
     return Motion(np.frombuffer(positions, "<f8").reshape(count, -1, 3), rate)
 
 
-def read_motion(path: Union[str, os.PathLike[str]], mesh: Union[Mesh, Tree], *, unit: str = "mm") -> Motion:
+def read_motion(path: Union[str, os.PathLike[str]], mesh: Union[Mesh, Tree], *, unit: Optional[str] = None) -> Motion:
     """Reads a motion of a mesh: PC2, .npy, or a series of meshes, heart_%03d.vtp."""
     return frames_of(_dibs.read_motion(os.fspath(path), unit, mesh.origin.tolist()))
 

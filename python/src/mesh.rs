@@ -18,7 +18,7 @@ pub struct Mesh {
 }
 
 /// `unit`, `weld`, `strict`, `largest_component`, `origin`, `orient`, `groups`.
-type Reading = (String, Option<f32>, bool, bool, Option<[f64; 3]>, bool, bool);
+type Reading = (Option<String>, Option<f32>, bool, bool, Option<[f64; 3]>, bool, bool);
 
 #[pymethods]
 impl Mesh {
@@ -108,7 +108,7 @@ impl Mesh {
 /// How to read, and whether to turn the mesh outwards.
 fn options(reading: Reading) -> PyResult<(ReadOptions, bool)> {
     let (unit, weld_tolerance, strict, largest_component, origin, is_to_turn, groups) = reading;
-    let unit = self::unit(&unit)?;
+    let unit = unit.as_deref().map(self::unit).transpose()?;
     let origin = origin.map(DVec3::from_array);
     let options = ReadOptions { weld_tolerance, strict, largest_component, unit, origin, groups };
     Ok((options, is_to_turn))

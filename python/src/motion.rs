@@ -54,10 +54,10 @@ type Frames<'py> = (Bound<'py, PyByteArray>, usize, f32);
 pub fn read_motion<'py>(
     py: Python<'py>,
     path: PathBuf,
-    in_unit: &str,
+    in_unit: Option<&str>,
     origin: [f64; 3],
 ) -> PyResult<Frames<'py>> {
-    let (in_unit, origin) = (unit(in_unit)?, DVec3::from_array(origin));
+    let (in_unit, origin) = (in_unit.map(unit).transpose()?, DVec3::from_array(origin));
     let read = py.detach(|| Motion::read_around(path, in_unit, origin));
     let motion = read.map_err(|error| error::read(&error))?;
     Ok(frames(py, &motion.frames, origin, motion.rate))

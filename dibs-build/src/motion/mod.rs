@@ -6,48 +6,62 @@ mod series;
 
 pub use pc2::MotionMismatchError;
 
-use crate::read::{Place, ReadError, ReadErrorKind};
+use crate::read::{Place, ReadError, ReadErrorKind, file};
 use crate::{Motion, Unit};
 use glam::{DVec3, Vec3};
 use std::path::Path;
 
 impl Motion {
     /// Reads a motion: a PC2 file, a NumPy array (.npy) of frames x vertices x 3, or a numbered series of mesh files,
-    /// named as `heart_%03d.vtp`. The mesh's [origin](crate::Mesh::origin) is zero: [`read_around`](Self::read_around)
-    /// serves others. PC2 alone says how many frames a second were recorded.
+    /// named as `heart_%03d.vtp` (`%d` takes numbers with or without zeros before them). The mesh's
+    /// [origin](crate::Mesh::origin) is zero: [`read_around`](Self::read_around) serves others. How many frames a second
+    /// were recorded no format says but the PC2 files of [`write_pc2`](Self::write_pc2): else [`rate`](Self::rate) is 0.
     ///
     /// # Errors
     /// [`ReadError`], one sentence that names the file, the offending element and the remedy; of a series also where
     /// a number is missing, or a frame has other triangles than the first.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, ReadError> {
-        Self::read_around(path, Unit::Millimetre, DVec3::ZERO)
+        Self::read_around(path, None, DVec3::ZERO)
     }
 
     /// As [`read`](Self::read), a motion whose lengths are in `unit`, of a mesh with this [origin](crate::Mesh::origin):
-    /// positions become millimetres, from the origin, and are rounded to f32 only then.
+    /// positions become millimetres, from the origin, and are rounded to f32 only then. `None` means millimetres, or the
+    /// unit that the files of a series state.
     ///
     /// # Errors
     /// As [`read`](Self::read); also for a frame so far from the origin that f32 does not hold its shape.
     pub fn read_around(
         path: impl AsRef<Path>,
-        unit: Unit,
+        unit: impl Into<Option<Unit>>,
         origin: DVec3,
     ) -> Result<Self, ReadError> {
-        let path = path.as_ref();
-        let place = Place { scale: unit.millimetres(), origin };
+        let (path, unit) = (path.as_ref(), unit.into());
         if let Some(series) = series::Series::named(path) {
-            return series.read(&place);
+            return series.read(unit, origin);
         }
+        let place = Place { unit: unit.unwrap_or_default(), origin };
         let parse = |bytes: Vec<u8>| match &bytes[..] {
             [] => Err(ReadErrorKind::Empty),
             bytes if bytes.starts_with(pc2::MAGIC) => pc2::parse(bytes, &place),
             bytes if bytes.starts_with(npy::MAGIC) => npy::parse(bytes, &place),
-            _ => Err(ReadErrorKind::UnknownMotion),
+            bytes => Err(unknown(path, bytes)),
         };
-        std::fs::read(path)
+        file::whole(path)
             .map_err(ReadErrorKind::from)
             .and_then(parse)
             .map_err(|kind| ReadError { path: path.to_path_buf(), kind })
+    }
+}
+
+/// The error of a file that begins as no motion: where its extension is known, that of its reader.
+fn unknown(path: &Path, bytes: &[u8]) -> ReadErrorKind {
+    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    match extension.to_ascii_lowercase().as_str() {
+        "pc2" => ReadErrorKind::NotPc2,
+        "npy" => ReadErrorKind::NumPy { what: "it does not begin as a NumPy array".to_owned() },
+        "npz" => ReadErrorKind::NumPyArchive,
+        _ if bytes.starts_with(b"PK") => ReadErrorKind::NumPyArchive,
+        _ => ReadErrorKind::UnknownMotion,
     }
 }
 

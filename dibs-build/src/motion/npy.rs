@@ -64,12 +64,18 @@ fn kind(value: &str) -> Result<(Scalar, Endian), ReadErrorKind> {
     let descr = value.trim_start_matches('\'').split('\'').next().unwrap_or_default();
     let order = if descr.starts_with('>') { Endian::Big } else { Endian::Little };
     let scalar = match descr.trim_start_matches(['<', '>', '|', '=']) {
+        "f2" => Scalar::F16,
         "f4" => Scalar::F32,
         "f8" => Scalar::F64,
+        "i1" => Scalar::I8,
         "i2" => Scalar::I16,
         "i4" => Scalar::I32,
         "i8" => Scalar::I64,
-        _ => return Err(wrong(format!("numbers of the type '{}'", excerpt(descr)))),
+        "u1" => Scalar::U8,
+        "u2" => Scalar::U16,
+        "u4" => Scalar::U32,
+        "u8" => Scalar::U64,
+        _ => return Err(ReadErrorKind::NumPyType { descr: excerpt(descr) }),
     };
     Ok((scalar, order))
 }

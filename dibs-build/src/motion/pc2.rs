@@ -1,12 +1,12 @@
 //! PC2 point cache files, as animation tools write them.
 //!
-//! Layout, little-endian: `POINTCACHE2\0`, i32 version 1, i32 points, f32 start frame, f32 sample
-//! rate (frames per sample; used here as samples a second, as the field's files do), i32 samples,
-//! then samples x points x 3 f32.
+//! Layout, little-endian: `POINTCACHE2\0`, i32 version 1, i32 points, f32 start frame, f32 frames per sample, i32
+//! samples, then samples x points x 3 f32. Nothing in it says how many frames a second has. So this crate's own files
+//! say it after the last sample, where other readers do not look: `DIBSRATE`, f32 frames a second.
 
-use crate::read::{Place, ReadError, ReadErrorKind};
+use crate::read::{Place, ReadError, ReadErrorKind, file};
 use crate::write::{WriteErrorKind, write_atomically};
-use crate::{Mesh, Motion, WriteError};
+use crate::{Mesh, Motion, Unit, WriteError};
 use glam::{DVec3, Vec3};
 use std::path::Path;
 use thiserror::Error;
@@ -14,6 +14,9 @@ use thiserror::Error;
 pub(super) const MAGIC: &[u8; 12] = b"POINTCACHE2\0";
 const HEADER: usize = 32;
 const POINT: usize = 12;
+const RATE: &[u8; 8] = b"DIBSRATE";
+/// Frames per sample: each is one.
+const SAMPLING: f32 = 1.0;
 
 /// A motion that does not fit a mesh.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -50,9 +53,9 @@ impl Motion {
     /// [`ReadError`] for a file that is not PC2, is shorter than it claims, or has a coordinate that is not finite.
     pub fn read_pc2(path: impl AsRef<Path>) -> Result<Self, ReadError> {
         let path = path.as_ref();
-        std::fs::read(path)
+        file::whole(path)
             .map_err(ReadErrorKind::from)
-            .and_then(|bytes| parse(&bytes, &Place { scale: 1.0, origin: DVec3::ZERO }))
+            .and_then(|bytes| parse(&bytes, &Place { unit: Unit::Millimetre, origin: DVec3::ZERO }))
             .map_err(|kind| ReadError { path: path.to_path_buf(), kind })
     }
 
@@ -82,10 +85,14 @@ impl Motion {
             out.write_all(&1_i32.to_le_bytes())?;
             out.write_all(&points.to_le_bytes())?;
             out.write_all(&0_f32.to_le_bytes())?;
-            out.write_all(&self.rate.to_le_bytes())?;
+            out.write_all(&SAMPLING.to_le_bytes())?;
             out.write_all(&samples.to_le_bytes())?;
             for coordinate in self.frames.iter().flatten().flat_map(Vec3::to_array) {
                 out.write_all(&coordinate.to_le_bytes())?;
+            }
+            if self.rate > 0.0 {
+                out.write_all(RATE)?;
+                out.write_all(&self.rate.to_le_bytes())?;
             }
             Ok(())
         })
@@ -127,8 +134,12 @@ pub(super) fn parse(bytes: &[u8], place: &Place) -> Result<Motion, ReadErrorKind
     if version != 1 || points == 0 || samples == 0 {
         return Err(ReadErrorKind::NotPc2);
     }
-    // The product of the counts is compared with the file's size before it is used.
-    if frame_bytes.saturating_mul(samples) != data.len() as u64 {
+    // The product of the counts is compared with the file's size before it is used. A few bytes after the last frame are
+    // no other one.
+    let length = frame_bytes.saturating_mul(samples);
+    let rate = usize::try_from(length).ok().and_then(|length| rate(data.get(length..)?));
+    let after = (data.len() as u64).checked_sub(length);
+    if rate.is_none() && after.is_none_or(|after| after >= frame_bytes) {
         return Err(ReadErrorKind::Count {
             element: format!("frames of {points} vertices"),
             claimed: samples,
@@ -137,14 +148,20 @@ pub(super) fn parse(bytes: &[u8], place: &Place) -> Result<Motion, ReadErrorKind
         });
     }
     let mut frames = Vec::with_capacity(samples as usize);
-    for (number, frame) in data.chunks_exact(frame_bytes as usize).enumerate() {
+    let frames_alone = data.chunks_exact(frame_bytes as usize).take(samples as usize);
+    for (number, frame) in frames_alone.enumerate() {
         let (coordinates, _) = frame.as_chunks::<4>();
         let (points, _) = coordinates.as_chunks::<3>();
         let points: Vec<[f64; 3]> =
             points.iter().map(|p| p.map(|x| f32::from_le_bytes(x).into())).collect();
         frames.push(super::frame(&points, number, place)?);
     }
-    let rate = f32::from_le_bytes(word(3));
-    let rate = if rate.is_finite() && rate > 0.0 { rate } else { 0.0 };
-    Ok(Motion { frames, rate, origin: place.origin })
+    Ok(Motion { frames, rate: rate.unwrap_or(0.0), origin: place.origin })
+}
+
+/// The frames a second that stand after the last sample.
+fn rate(after: &[u8]) -> Option<f32> {
+    let rate = after.strip_prefix(RATE)?;
+    let rate = f32::from_le_bytes(*rate.as_array()?);
+    (rate > 0.0 && rate.is_finite()).then_some(rate)
 }

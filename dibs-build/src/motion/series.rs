@@ -1,8 +1,8 @@
 //! A numbered series of mesh files, each a frame: `heart_%03d.vtp`.
 
-use crate::Motion;
-use crate::read::{Format, Place, ReadError, ReadErrorKind, elements};
-use glam::Vec3;
+use crate::read::{Format, Place, ReadError, ReadErrorKind, elements, file, unit_of};
+use crate::{Motion, Unit};
+use glam::{DVec3, Vec3};
 use std::path::{Path, PathBuf};
 
 /// Files of one name but for a number.
@@ -10,8 +10,8 @@ pub(super) struct Series<'a> {
     path: &'a Path,
     before: &'a str,
     after: &'a str,
-    /// Digits of a number that zeros fill up.
-    width: usize,
+    /// Digits of a number that zeros fill up; any where it is not said.
+    width: Option<usize>,
 }
 
 impl<'a> Series<'a> {
@@ -21,48 +21,61 @@ impl<'a> Series<'a> {
         let (before, rest) = name.split_once('%')?;
         let (width, after) = rest.split_once('d')?;
         let is_number = width.is_empty() || width.starts_with('0');
-        let width = if width.is_empty() { 0 } else { width.parse().ok()? };
+        let width = if width.is_empty() { None } else { Some(width.parse().ok()?) };
         (is_number && !path.exists()).then_some(Self { path, before, after, width })
     }
 
-    fn file(&self, number: u64) -> PathBuf {
-        let Self { before, after, width, .. } = self;
+    /// The name of a number that no file has.
+    fn file(&self, number: u64, width: usize) -> PathBuf {
+        let Self { before, after, .. } = self;
         self.path.with_file_name(format!("{before}{number:0width$}{after}"))
     }
 
-    /// The numbers that there are, in their order.
-    fn numbers(&self) -> Result<Vec<u64>, std::io::Error> {
+    /// The numbers that there are and their files, in their order.
+    fn files(&self) -> Result<Vec<(u64, PathBuf)>, std::io::Error> {
         let folder = self.path.parent().filter(|folder| *folder != Path::new(""));
-        let mut numbers = Vec::new();
+        let mut files = Vec::new();
         for entry in std::fs::read_dir(folder.unwrap_or(Path::new(".")))? {
             let name = entry?.file_name();
             let digits = name.to_str().and_then(|name| name.strip_prefix(self.before));
             let digits = digits.and_then(|digits| digits.strip_suffix(self.after));
-            let number = digits.and_then(|digits| digits.parse().ok());
-            let is_named_so = |number: &u64| self.file(*number).file_name() == Some(&name);
-            numbers.extend(number.filter(is_named_so));
+            let digits = digits.filter(|digits| digits.bytes().all(|digit| digit.is_ascii_digit()));
+            let Some(digits) = digits else { continue };
+            // Zeros fill up the width that is asked for, or any.
+            let is_filled = digits.len() > 1 && digits.starts_with('0');
+            let fits = self
+                .width
+                .is_none_or(|width| digits.len() == width || digits.len() > width && !is_filled);
+            if let (true, Ok(number)) = (fits, digits.parse()) {
+                files.push((number, self.path.with_file_name(&name)));
+            }
         }
-        numbers.sort_unstable();
-        Ok(numbers)
+        files.sort_unstable();
+        Ok(files)
     }
 
-    pub fn read(&self, place: &Place) -> Result<Motion, ReadError> {
+    pub fn read(&self, unit: Option<Unit>, origin: DVec3) -> Result<Motion, ReadError> {
         let fail = |path: &Path, kind| ReadError { path: path.to_path_buf(), kind };
-        let numbers = self.numbers().map_err(|error| fail(self.path, error.into()))?;
-        let Some(&first) = numbers.first() else {
+        let files = self.files().map_err(|error| fail(self.path, error.into()))?;
+        let Some((first, path)) = files.first() else {
             return Err(fail(self.path, ReadErrorKind::NoSeries));
         };
+        let others = self.before.len() + self.after.len();
+        let width = path.file_name().map_or(0, |name| name.len() - others);
         let mut triangles = None;
-        let mut frames = Vec::with_capacity(numbers.len());
-        for (number, found) in (first..).zip(&numbers) {
-            let path = self.file(number);
-            if number != *found {
-                return Err(fail(&path, ReadErrorKind::Gap { next: *found }));
+        let mut frames = Vec::with_capacity(files.len());
+        for (number, (found, path)) in (*first..).zip(&files) {
+            if *found < number {
+                return Err(fail(path, ReadErrorKind::Twice));
             }
-            let frame = frame(&path, number - first, &mut triangles, place);
-            frames.push(frame.map_err(|kind| fail(&path, kind))?);
+            if *found > number {
+                let missing = self.file(number, width);
+                return Err(fail(&missing, ReadErrorKind::Gap { next: *found }));
+            }
+            let frame = frame(path, number - first, &mut triangles, unit, origin);
+            frames.push(frame.map_err(|kind| fail(path, kind))?);
         }
-        Ok(Motion { frames, rate: 0.0, origin: place.origin })
+        Ok(Motion { frames, rate: 0.0, origin })
     }
 }
 
@@ -71,9 +84,10 @@ fn frame(
     path: &Path,
     number: u64,
     polygons: &mut Option<(Vec<u32>, Vec<usize>)>,
-    place: &Place,
+    unit: Option<Unit>,
+    origin: DVec3,
 ) -> Result<Vec<Vec3>, ReadErrorKind> {
-    let (format, raw) = elements(std::fs::read(path)?, path, false)?;
+    let (format, raw) = elements(file::whole(path)?, path, false)?;
     if matches!(format, Format::StlAscii | Format::StlBinary) {
         return Err(ReadErrorKind::UnnumberedFrame);
     }
@@ -81,5 +95,7 @@ fn frame(
     if *of_first != (raw.corners, raw.ends) {
         return Err(ReadErrorKind::OtherTriangles);
     }
-    super::frame(&raw.positions, number as usize, place)
+    let unit = unit_of(format, raw.unit, unit)?;
+    let place = Place { unit, origin };
+    super::frame(&raw.positions, number as usize, &place)
 }

@@ -34,10 +34,11 @@ pub(crate) fn import(
     let is_stl = matches!(format, Format::StlAscii | Format::StlBinary);
     let mut report = Report {
         format,
-        unit: options.unit,
+        unit: place.unit,
         extension_disagrees: false,
         vertices: 0,
         unreferenced_vertices: 0,
+        faces: raw.ends.len(),
         triangles: 0,
         file_triangles: 0,
         polygons_triangulated: 0,
@@ -54,6 +55,7 @@ pub(crate) fn import(
         origin: place.origin.to_array(),
         recentred: options.origin.is_none() && place.origin != DVec3::ZERO,
         position_error: position_error(raw, place.origin),
+        remarks: raw.remarks.clone(),
     };
     let (faces, short) = triangles(raw, &mut report)?;
     report.file_triangles = faces.len();
@@ -65,20 +67,23 @@ pub(crate) fn import(
     surface.drop_degenerate(options.strict, &mut report)?;
     surface.drop_duplicates(options.strict, &mut report)?;
     if surface.faces.is_empty() {
-        return Err(ReadErrorKind::NoTriangles { degenerate: report.dropped_degenerate });
+        let Report { dropped_degenerate: degenerate, remarks, .. } = report;
+        return Err(ReadErrorKind::NoTriangles { degenerate, remarks });
     }
     surface.keep_components(options.largest_component, &mut report)?;
     surface.count_edges(&mut report);
     surface.count_vertices(&mut report);
     report.triangles = surface.faces.len();
-    let faces = surface.faces.iter().map(|triangle| triangle.face);
+    let faces = || surface.faces.iter().map(|triangle| triangle.face);
     let groups = raw.groups.as_ref();
-    let groups = groups.map(|groups| groups.labels(faces, format == Format::Obj)).transpose()?;
+    let groups = groups.map(|groups| groups.labels(faces(), format == Format::Obj)).transpose()?;
+    let faces = faces().map(|face| face as u32 - 1).collect();
     let triangles = surface.faces.into_iter().map(|face| face.corners).collect();
     Ok(Import {
         mesh: Mesh { origin: place.origin, positions: surface.positions, triangles },
         report,
         groups,
+        faces,
     })
 }
 

@@ -39,7 +39,10 @@ impl<'a> Cursor<'a> {
 
     /// The next word, `None` at the end.
     pub fn word(&mut self) -> Option<&'a str> {
-        self.at += self.rest().iter().take_while(|byte| byte.is_ascii_whitespace()).count();
+        let is_text = self.binary.is_none();
+        // Some programs write a zero after the end.
+        let is_space = |byte: &&u8| byte.is_ascii_whitespace() || (is_text && **byte == 0);
+        self.at += self.rest().iter().take_while(is_space).count();
         let length = self.rest().iter().take_while(|byte| !byte.is_ascii_whitespace()).count();
         let word = &self.rest()[..length];
         self.at += length;
@@ -50,6 +53,18 @@ impl<'a> Cursor<'a> {
     /// The next word, which must be there.
     pub fn needed(&mut self, what: &str) -> Result<&'a str> {
         self.word().ok_or_else(|| self.truncated(format!("no {what}")))
+    }
+
+    /// The next word in capitals, `None` at the end.
+    pub fn keyword(&mut self) -> Option<String> {
+        self.word().map(str::to_ascii_uppercase)
+    }
+
+    /// Passes so many bytes.
+    pub fn skip(&mut self, bytes: usize) -> Result<&'a [u8]> {
+        let skipped = self.rest().get(..bytes);
+        self.at = (self.at + bytes).min(self.bytes.len());
+        skipped.ok_or_else(|| self.truncated("bytes are missing".to_owned()))
     }
 
     /// Leaves the line, and returns the rest of it.
@@ -120,5 +135,26 @@ impl<'a> Cursor<'a> {
         let bytes = if self.binary.is_some() { scalar.bytes() } else { 2 };
         let count = self.check_room(count, bytes, element)?;
         (0..count).map(|_| self.number(scalar)).collect()
+    }
+
+    /// The next numbers if they are wanted; otherwise they are passed, whatever a text has in their places.
+    pub fn numbers_or_words(
+        &mut self,
+        count: u64,
+        scalar: Scalar,
+        is_wanted: bool,
+    ) -> Result<Option<Vec<f64>>> {
+        if is_wanted {
+            return self.numbers(count, scalar, "values").map(Some);
+        }
+        if self.binary.is_some() {
+            let count = self.check_room(count, scalar.bytes(), "values")?;
+            self.skip(count * scalar.bytes())?;
+        } else {
+            for _ in 0..self.check_room(count, 2, "values")? {
+                self.needed("value where one must be")?;
+            }
+        }
+        Ok(None)
     }
 }

@@ -1,6 +1,7 @@
 //! Errors of reading a file: one sentence that names the file, the element and the remedy.
 
 use super::Format;
+use crate::Unit;
 use dibs_nostd::format::MAX_ROOTS;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -55,12 +56,30 @@ pub enum ReadErrorKind {
         "neither PC2 nor a NumPy array (.npy), nor a series of meshes (heart_%03d.ply); export the motion as one of them"
     )]
     UnknownMotion,
+    /// A NumPy archive.
+    #[error(
+        "an archive (.npz) and not one array; save the frames alone by `numpy.save(name, frames)`"
+    )]
+    NumPyArchive,
     /// A NumPy array that is no motion.
     #[error("no motion: {what}; save it by `numpy.save(name, frames)`, of frames x vertices x 3")]
     NumPy {
         /// What is wrong with it.
         what: String,
     },
+    /// A NumPy array of other things than real numbers.
+    #[error(
+        "no motion: numbers of the type '{descr}'; save it by `numpy.save(name, frames.astype('float32'))`"
+    )]
+    NumPyType {
+        /// NumPy's name of the type.
+        descr: String,
+    },
+    /// Two files of a series have one number.
+    #[error(
+        "has the number of another file of its series; name the series with its digits, as heart_%03d.ply, or remove one"
+    )]
+    Twice,
     /// A series without a file.
     #[error(
         "no file has this name with a number in the place of %d; give the series as heart_%03d.ply"
@@ -120,10 +139,12 @@ pub enum ReadErrorKind {
         at_most: bool,
     },
     /// It has no surface.
-    #[error("no triangles{}; export the mesh with its faces", dropped(*.degenerate))]
+    #[error("no triangles{}{}; export the mesh with its faces", dropped(*.degenerate), others(.remarks))]
     NoTriangles {
         /// Degenerate triangles in it.
         degenerate: usize,
+        /// What is in it and was left out.
+        remarks: Vec<String>,
     },
     /// A face refers to a vertex that does not exist.
     #[error(
@@ -217,6 +238,19 @@ pub enum ReadErrorKind {
         /// The surface's largest extent along an axis.
         extent: f64,
     },
+    /// The given unit is not the one that the file states.
+    #[error(
+        "its lengths are in {}, as {format} files say, and not in {}: leave the unit out (--unit), or export the mesh as PLY, which states none",
+        name(*.stated), name(*.given)
+    )]
+    OtherUnit {
+        /// The format.
+        format: Format,
+        /// The file's unit.
+        stated: Unit,
+        /// The given one.
+        given: Unit,
+    },
     /// The origin that was given is not a point.
     #[error("the origin is {origin}; give three finite numbers")]
     Origin {
@@ -286,6 +320,10 @@ pub enum ReadErrorKind {
     },
 }
 
+fn name(unit: Unit) -> String {
+    format!("{unit:?}s").to_lowercase().replace("inchs", "inches")
+}
+
 fn group(value: f64) -> String {
     if value.is_nan() { "no group".to_owned() } else { format!("the group {value}") }
 }
@@ -296,6 +334,10 @@ fn at(line: Option<usize>) -> String {
 
 fn dropped(degenerate: usize) -> String {
     if degenerate == 0 { String::new() } else { format!(" but {degenerate} degenerate ones") }
+}
+
+fn others(remarks: &[String]) -> String {
+    if remarks.is_empty() { String::new() } else { format!(" ({})", remarks.join("; ")) }
 }
 
 /// The largest few sizes, and the number of others.

@@ -13,6 +13,7 @@ enum Remedy {
     Unpack,
     Segment,
     Motion,
+    Fetch,
 }
 
 /// Where in a file its mark stands, the mark, the file's kind, and the remedy.
@@ -43,6 +44,9 @@ const MARKS: &[(usize, &[u8], &str, Remedy)] = &[
     (344, b"n+1\0", "a volume image (NIfTI)", Remedy::Segment),
     (0, b"POINTCACHE2\0", "a motion (PC2)", Remedy::Motion),
     (0, b"\x93NUMPY", "a motion (NumPy)", Remedy::Motion),
+    (0, b"version https://git-lfs", "a pointer of Git LFS in a mesh's place", Remedy::Fetch),
+    (0, b"<!DOCTYPE html", "a web page", Remedy::Fetch),
+    (0, b"<html", "a web page", Remedy::Fetch),
     (0, b"\x1f\x8b", "a compressed file (gzip)", Remedy::Unpack),
     (0, b"PK\x03\x04", "a compressed file (ZIP)", Remedy::Unpack),
 ];
@@ -97,6 +101,7 @@ impl Remedy {
                 "it has no surface yet: segment it, in 3D Slicer for example, and export that as PLY"
                     .to_owned()
             }
+            Self::Fetch => "fetch the mesh itself (`git lfs pull`, or another link)".to_owned(),
             Self::Motion => "give the mesh here, and this file where a motion is asked for".to_owned(),
         }
     }

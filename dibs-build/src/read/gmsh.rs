@@ -1,4 +1,4 @@
-//! Gmsh's meshes, versions 2 and 4.1, text or binary: their triangles and quads.
+//! Gmsh's meshes, versions 1, 2 and 4.1, text or binary: their triangles and quads, or the skin of their volumes.
 //!
 //! Our own reader, although `mshio` exists: that is of 2020, knows version 4.1 alone, and panics on numbers of other
 //! widths than it expects.
@@ -7,18 +7,77 @@ use super::cursor::Cursor;
 use super::groups::FaceGroups;
 use super::raw::{Raw, excerpt};
 use super::scalar::{Endian, Scalar};
+use super::volume::{Shape, Volumes};
 use super::{Format, ReadErrorKind};
 use std::collections::HashMap;
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
+/// How a file of a version writes its sections.
+#[derive(Clone, Copy, PartialEq)]
+enum Version {
+    /// `$NOD` and `$ELM`, without a header.
+    One,
+    Two,
+    Four,
+}
+
 pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
     let mut file = Cursor::new(bytes, Format::Gmsh);
+    let version = header(&mut file)?;
+    let mut mesh = Mesh::default();
+    mesh.raw.groups = groups.then(FaceGroups::default);
+    let (mut has_nodes, mut has_elements) = (false, false);
+    while let Some(section) = file.word() {
+        let Some(name) = section.strip_prefix('$') else {
+            return Err(file.malformed(format!("'{}' is no section", excerpt(section))));
+        };
+        match (name, version) {
+            ("PhysicalNames", _) if groups => mesh.names(&mut file)?,
+            ("Entities", Version::Four) if groups => mesh.entities(&mut file)?,
+            ("NOD", Version::One) | ("Nodes" | "ParametricNodes", Version::Two) => {
+                mesh.old_nodes(&mut file, name == "ParametricNodes")?;
+            }
+            ("Nodes", Version::Four) => mesh.nodes(&mut file)?,
+            ("ELM", Version::One) => mesh.oldest_elements(&mut file)?,
+            ("Elements", Version::Two) => mesh.old_elements(&mut file)?,
+            ("Elements", Version::Four) => mesh.elements(&mut file)?,
+            _ => {}
+        }
+        has_nodes |= matches!(name, "Nodes" | "ParametricNodes" | "NOD");
+        has_elements |= matches!(name, "Elements" | "ELM");
+        let end = if version == Version::One { "$END" } else { "$End" };
+        file.skip_to(&format!("{end}{name}"))?;
+    }
+    if !(has_nodes && has_elements) {
+        return Err(file.truncated("no '$Nodes' or no '$Elements'".to_owned()));
+    }
+    let Mesh { mut raw, volumes, volume_names, .. } = mesh;
+    if let (Some(groups), true) = (&mut raw.groups, raw.ends.is_empty()) {
+        groups.names = volume_names;
+    }
+    volumes.finish(&mut raw, groups, FLATTEN)?;
+    // Without physical groups all numbers are 0.
+    raw.groups = raw.groups.filter(|groups| groups.of_face.iter().any(|&n| n != 0.0));
+    Ok(raw)
+}
+
+/// Reads the header, and leaves the file behind it: numbers may be binary from there on.
+fn header(file: &mut Cursor<'_>) -> Result<Version> {
+    let start = file.clone();
+    match file.word() {
+        Some("$NOD") => {
+            *file = start;
+            return Ok(Version::One);
+        }
+        Some(word) if word.starts_with('$') => *file = start,
+        _ => return Err(file.malformed("no '$MeshFormat' at its beginning".to_owned())),
+    }
     file.skip_to("$MeshFormat")?;
     let version = file.needed("version")?;
     let is_binary = file.text_index()? == 1;
     let size = file.text_index()?;
-    let is_known = matches!(version, "2" | "2.1" | "2.2" | "4.1");
+    let is_known = matches!(version, "2" | "2.0" | "2.1" | "2.2" | "4.1");
     if !is_known || size != 8 {
         return Err(ReadErrorKind::Foreign {
             what: format!("a Gmsh mesh of version {}", excerpt(version)),
@@ -26,7 +85,6 @@ pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
                 .to_owned(),
         });
     }
-    let is_old = version.starts_with('2');
     if is_binary {
         file.line();
         // The number 1, in the order of the bytes.
@@ -36,40 +94,21 @@ pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
         }
     }
     file.skip_to("$EndMeshFormat")?;
-    let mut mesh = Mesh { raw: Raw::new(0), row: HashMap::new(), physical: HashMap::new() };
-    mesh.raw.groups = groups.then(FaceGroups::default);
-    let (mut has_nodes, mut has_elements) = (false, false);
-    while let Some(section) = file.word() {
-        let Some(name) = section.strip_prefix('$') else {
-            return Err(file.malformed(format!("'{}' is no section", excerpt(section))));
-        };
-        match (name, is_old) {
-            ("PhysicalNames", _) if groups => mesh.names(&mut file)?,
-            ("Entities", false) if groups => mesh.entities(&mut file)?,
-            ("Nodes", true) => mesh.old_nodes(&mut file)?,
-            ("Nodes", false) => mesh.nodes(&mut file)?,
-            ("Elements", true) => mesh.old_elements(&mut file)?,
-            ("Elements", false) => mesh.elements(&mut file)?,
-            _ => {}
-        }
-        has_nodes |= name == "Nodes";
-        has_elements |= name == "Elements";
-        file.skip_to(&format!("$End{name}"))?;
-    }
-    if !(has_nodes && has_elements) {
-        return Err(file.truncated("no '$Nodes' or no '$Elements'".to_owned()));
-    }
-    // Without physical groups all numbers are 0.
-    mesh.raw.groups = mesh.raw.groups.filter(|groups| groups.of_face.iter().any(|&n| n != 0.0));
-    Ok(mesh.raw)
+    Ok(if version.starts_with('2') { Version::Two } else { Version::Four })
 }
 
+const FLATTEN: &str = "mesh it again with flat elements: `gmsh MODEL.geo -2 -order 1 -o NEW.msh`";
+
+#[derive(Default)]
 struct Mesh {
     raw: Raw,
     /// The row of each node's number.
     row: HashMap<u64, u32>,
-    /// The physical group of each surface that has one.
-    physical: HashMap<i64, f64>,
+    /// The physical group of each surface and volume that has one, by its dimension and number.
+    physical: HashMap<(u64, i64), f64>,
+    volumes: Volumes,
+    /// Names of physical groups of volumes.
+    volume_names: Vec<(f64, String)>,
 }
 
 impl Mesh {
@@ -78,8 +117,11 @@ impl Mesh {
         for _ in 0..file.text_index()? {
             let (dimension, number) = (file.text_index()?, file.text_number()?);
             let name = file.line().trim_matches('"').to_owned();
-            if let Some(groups) = self.raw.groups.as_mut().filter(|_| dimension == 2) {
-                groups.names.push((number, name));
+            let Some(groups) = &mut self.raw.groups else { continue };
+            match dimension {
+                2 => groups.names.push((number, name)),
+                3 => self.volume_names.push((number, name)),
+                _ => {}
             }
         }
         Ok(())
@@ -89,7 +131,7 @@ impl Mesh {
     fn entities(&mut self, file: &mut Cursor<'_>) -> Result<()> {
         skip_line(file);
         let counts = file.numbers(4, Scalar::U64, "numbers of entities")?;
-        for (dimension, &count) in counts[..3].iter().enumerate() {
+        for (dimension, &count) in (0..).zip(&counts) {
             for _ in 0..file.whole(count)? {
                 let entity = file.number(Scalar::I32)?;
                 // A point's place, or the corners of a box.
@@ -105,12 +147,14 @@ impl Mesh {
                     continue;
                 }
                 if !others.is_empty() {
+                    let entity =
+                        format!("{} {entity}", if dimension == 2 { "surface" } else { "volume" });
                     return Err(file.malformed(format!(
-                        "surface {entity} is in several physical groups, and a triangle has one label"
+                        "{entity} is in several physical groups, and a triangle has one label"
                     )));
                 }
                 // Its sign turns the surface, which the elements show.
-                self.physical.insert(entity as i64, number.abs());
+                self.physical.insert((dimension, entity as i64), number.abs());
             }
         }
         Ok(())
@@ -138,12 +182,20 @@ impl Mesh {
         Ok(())
     }
 
-    fn old_nodes(&mut self, file: &mut Cursor<'_>) -> Result<()> {
+    fn old_nodes(&mut self, file: &mut Cursor<'_>, is_parametric: bool) -> Result<()> {
         let count = file.text_index()?;
         skip_line(file);
         for _ in 0..count {
             let tag = file.index(Scalar::I32)?;
             self.node(file, tag)?;
+            if file.binary.is_none() {
+                // Its place on a curve or surface may follow.
+                file.line();
+            } else if is_parametric {
+                let (dimension, _) = (file.index(Scalar::I32)?, file.number(Scalar::I32)?);
+                let more = if dimension < 3 { dimension } else { 0 };
+                file.numbers(more, Scalar::F64, "parameters")?;
+            }
         }
         Ok(())
     }
@@ -166,10 +218,10 @@ impl Mesh {
         file.numbers(3, Scalar::U64, "numbers")?;
         for _ in 0..blocks {
             let (dimension, entity) = (file.number(Scalar::I32)?, file.number(Scalar::I32)?);
-            let group = self.physical.get(&(entity as i64)).filter(|_| dimension == 2.0);
+            let group = self.physical.get(&(dimension as u64, entity as i64));
             let group = group.copied().unwrap_or(0.0);
             let kind = file.index(Scalar::I32)?;
-            let nodes = nodes_of(kind, file)?;
+            let nodes = nodes_of(kind)?;
             for _ in 0..file.index(Scalar::U64)? {
                 let tag = file.index(Scalar::U64)?;
                 let nodes = file.numbers(nodes, Scalar::U64, "nodes")?;
@@ -194,7 +246,7 @@ impl Mesh {
                 kind = file.index(Scalar::I32)?;
                 (block, tags) = (1, file.index(Scalar::I32)?);
             }
-            let nodes = nodes_of(kind, file)?;
+            let nodes = nodes_of(kind)?;
             for _ in 0..block {
                 let tag = tag.map_or_else(|| file.index(Scalar::I32), Ok)?;
                 // The first is the physical group, 0 for none.
@@ -208,7 +260,23 @@ impl Mesh {
         Ok(())
     }
 
-    /// Triangles and quads are kept.
+    fn oldest_elements(&mut self, file: &mut Cursor<'_>) -> Result<()> {
+        for _ in 0..file.text_index()? {
+            let (tag, kind) = (file.text_index()?, file.text_index()?);
+            // The physical group, and the entity.
+            let (group, _) = (file.text_number()?, file.text_number()?);
+            let count = file.text_index()?;
+            if nodes_of(kind)? != count {
+                let what = format!("element {tag} of the type {kind} has {count} nodes");
+                return Err(file.malformed(what));
+            }
+            let nodes = file.numbers(count, Scalar::I32, "nodes")?;
+            self.element(file, kind, tag, &nodes, group.abs())?;
+        }
+        Ok(())
+    }
+
+    /// Triangles and quads are kept, and volumes for their skin; points and curves are passed over.
     fn element(
         &mut self,
         file: &Cursor<'_>,
@@ -217,15 +285,30 @@ impl Mesh {
         nodes: &[f64],
         group: f64,
     ) -> Result<()> {
-        if !matches!(kind, 2 | 3) {
+        let shape = match kind {
+            2 | 3 => None,
+            4 => Some(Shape::Tetrahedron),
+            5 => Some(Shape::Hexahedron),
+            6 => Some(Shape::Wedge),
+            7 => Some(Shape::Pyramid),
+            11..=14 | 17..=19 | 29..=31 => {
+                self.volumes.curved += 1;
+                return Ok(());
+            }
+            _ => return Ok(()),
+        };
+        let row = |&node: &f64| {
+            let row = self.row.get(&file.whole(node)?).copied();
+            row.ok_or_else(|| {
+                file.malformed(format!("element {tag} has node {node}, which is not there"))
+            })
+        };
+        let rows = nodes.iter().map(row).collect::<Result<Vec<u32>>>()?;
+        if let Some(shape) = shape {
+            self.volumes.push(shape, &rows, group);
             return Ok(());
         }
-        for &node in nodes {
-            let row = self.row.get(&file.whole(node)?).copied();
-            let missing =
-                || file.malformed(format!("element {tag} has node {node}, which is not there"));
-            self.raw.corners.push(row.ok_or_else(missing)?);
-        }
+        self.raw.corners.extend(rows);
         self.raw.end_face();
         if let Some(groups) = &mut self.raw.groups {
             groups.of_face.push(group);
@@ -242,33 +325,35 @@ fn skip_line(file: &mut Cursor<'_>) {
 }
 
 /// The nodes of an element of this type.
-fn nodes_of(kind: u64, file: &Cursor<'_>) -> Result<u64> {
-    // Points, lines and volumes, also of higher orders, are passed over.
-    Ok(match kind {
-        15 => 1,
-        1 => 2,
-        2 | 8 => 3,
-        3 | 4 | 26 => 4,
-        7 | 27 => 5,
-        6 | 28 => 6,
-        5 => 8,
-        11 => 10,
-        14 => 14,
-        13 => 18,
-        12 => 27,
-        17 => 20,
-        18 => 15,
-        19 => 13,
-        29 => 20,
-        30 => 35,
-        31 => 56,
-        9 | 10 | 16 | 20..=25 => {
+fn nodes_of(kind: u64) -> Result<u64> {
+    let curved = match kind {
+        15 => return Ok(1),
+        1 => return Ok(2),
+        2 | 8 => return Ok(3),
+        3 | 4 | 26 => return Ok(4),
+        7 | 27 => return Ok(5),
+        6 | 28 => return Ok(6),
+        5 => return Ok(8),
+        11 => return Ok(10),
+        14 => return Ok(14),
+        13 => return Ok(18),
+        12 => return Ok(27),
+        17 | 29 => return Ok(20),
+        18 => return Ok(15),
+        19 => return Ok(13),
+        30 => return Ok(35),
+        31 => return Ok(56),
+        9 | 20..=25 | 42..=46 | 52..=56 => "curved triangles",
+        10 | 16 | 36..=41 | 47..=51 | 57..=61 => "curved quads",
+        _ => {
             return Err(ReadErrorKind::Foreign {
-                what: "a Gmsh mesh of curved triangles".to_owned(),
-                remedy: "mesh it again with flat ones: `gmsh MODEL.geo -2 -order 1 -o NEW.msh`"
-                    .to_owned(),
+                what: format!("a Gmsh mesh with elements of the type {kind}, which is not read"),
+                remedy: FLATTEN.to_owned(),
             });
         }
-        _ => return Err(file.malformed(format!("an element of the unknown type {kind}"))),
+    };
+    Err(ReadErrorKind::Foreign {
+        what: format!("a Gmsh mesh of {curved}"),
+        remedy: FLATTEN.to_owned(),
     })
 }

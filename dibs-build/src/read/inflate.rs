@@ -5,12 +5,21 @@ use std::io::{self, Read};
 /// Coordinates and numbers shrink to a third or a tenth; what grows more than this was made to fill the memory.
 const MOST_GROWTH: u64 = 200;
 
+/// Bytes that so many compressed ones can honestly become.
+pub(super) fn most(compressed: usize) -> u64 {
+    (compressed as u64).saturating_mul(MOST_GROWTH).saturating_add(1 << 16)
+}
+
 /// Reads to the end, at most so much as `compressed` bytes can honestly hold.
 pub(super) fn read(data: impl Read, compressed: usize) -> io::Result<Vec<u8>> {
-    let most = (compressed as u64).saturating_mul(MOST_GROWTH).saturating_add(1 << 16);
+    read_some(data, compressed, most(compressed))
+}
+
+/// Reads to the end, at most `room` bytes of those that `compressed` ones can honestly hold.
+pub(super) fn read_some(data: impl Read, compressed: usize, room: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    if data.take(most + 1).read_to_end(&mut bytes)? as u64 > most {
-        let what = format!("{compressed} compressed bytes become more than {most}");
+    if data.take(room.saturating_add(1)).read_to_end(&mut bytes)? as u64 > room {
+        let what = format!("{compressed} compressed bytes become more than {}", most(compressed));
         return Err(io::Error::other(what));
     }
     Ok(bytes)

@@ -5,6 +5,7 @@ mod base64;
 mod check;
 mod cursor;
 mod error;
+pub(crate) mod file;
 mod foreign;
 #[cfg(feature = "formats")]
 mod gltf;
@@ -22,9 +23,12 @@ mod report;
 mod scalar;
 mod sniff;
 mod stl;
+mod text;
 #[cfg(feature = "formats")]
 mod three_mf;
+mod volume;
 mod vtk;
+mod vtk_cells;
 mod vtk_data;
 #[cfg(feature = "formats")]
 mod vtp;
@@ -53,6 +57,8 @@ pub struct Import {
     pub report: Report,
     /// The labels that the file's groups give its triangles, where [`ReadOptions::groups`] asks for them.
     pub groups: Option<Groups>,
+    /// The face of the file, counted from 0, that each triangle of the mesh comes from.
+    pub faces: Vec<u32>,
 }
 
 /// How to read a mesh file. [`read`] uses the defaults.
@@ -69,8 +75,9 @@ pub struct ReadOptions {
     pub strict: bool,
     /// Keep only the connected component with the most triangles.
     pub largest_component: bool,
-    /// What the file's lengths are: they become millimetres.
-    pub unit: Unit,
+    /// The unit of the file's lengths, which become millimetres. `None` takes the unit that the file states, as glTF
+    /// (always metres) and 3MF do, and millimetres of a file that states none. A unit other than the stated one is refused.
+    pub unit: Option<Unit>,
     /// The point of the file, in millimetres, that the mesh's positions count from: [`Mesh::origin`].
     ///
     /// `None` decides by the file: zero, or where f32 would round the mesh by more than 2^-20 of its extent the centre
@@ -99,6 +106,10 @@ impl RestSurface for Import {
     fn file_triangles(&self) -> usize {
         self.report.file_triangles
     }
+
+    fn file_faces(&self) -> Option<(&[u32], usize)> {
+        Some((&self.faces, self.report.faces))
+    }
 }
 
 impl Import {
@@ -117,7 +128,7 @@ impl ReadOptions {
     pub fn read(&self, path: impl AsRef<Path>) -> Result<Import, ReadError> {
         let path = path.as_ref();
         let fail = |kind| ReadError { path: path.to_path_buf(), kind };
-        let bytes = std::fs::read(path).map_err(|error| fail(error.into()))?;
+        let bytes = file::whole(path).map_err(|error| fail(error.into()))?;
         self.read_bytes(bytes, path).map_err(fail)
     }
 
@@ -176,12 +187,29 @@ impl ReadOptions {
         if self.groups && raw.groups.is_none() {
             return Err(ReadErrorKind::NoGroups { format });
         }
-        let scale = self.unit.millimetres();
-        let place = Place::of_mesh(&raw, scale, self.origin)?;
+        let unit = unit_of(format, raw.unit, self.unit)?;
+        let place = Place::of_mesh(&raw, unit, self.origin)?;
         for position in &mut raw.positions {
             *position = place.of(*position).to_array();
         }
         check::import(&raw, format, self, place)
+    }
+}
+
+/// The unit of a file's lengths: the one that it states, or else the given one, or millimetres.
+///
+/// # Errors
+/// [`ReadErrorKind::OtherUnit`] where both are there and differ: lengths are converted once.
+pub(crate) fn unit_of(
+    format: Format,
+    stated: Option<Unit>,
+    given: Option<Unit>,
+) -> Result<Unit, ReadErrorKind> {
+    match (stated, given) {
+        (Some(stated), Some(given)) if stated != given => {
+            Err(ReadErrorKind::OtherUnit { format, stated, given })
+        }
+        (stated, given) => Ok(stated.or(given).unwrap_or_default()),
     }
 }
 
@@ -191,6 +219,8 @@ pub(crate) fn elements(
     path: &Path,
     groups: bool,
 ) -> Result<(Format, Raw), ReadErrorKind> {
+    // A binary STL may begin with any bytes.
+    let bytes = if stl::size_fits_count(&bytes) { bytes } else { text::normal(bytes) };
     let format = sniff::format(&bytes, path)?;
     let raw = match format {
         Format::Obj => obj::read(&bytes, groups),
@@ -223,7 +253,8 @@ pub(crate) fn elements(
 /// [`Mesh::positions`], so a recorded [`Motion`](crate::Motion) still fits. STL has no vertex numbers: distinct
 /// positions are numbered in order of first appearance.
 ///
-/// The whole file is held in memory. Memory is bounded by the file's size, not by a count that the file claims.
+/// The whole file is held in memory. Memory is bounded by the size of the file, and of regular files that it names, not by a
+/// count that they claim. Pipes and devices are refused. Elements that are left out are [`Report::remarks`].
 ///
 /// # Errors
 /// [`ReadError`], one sentence that names the file, the offending element and the remedy.

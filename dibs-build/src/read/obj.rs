@@ -11,6 +11,7 @@ use super::{Format, ReadErrorKind};
 pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw, ReadErrorKind> {
     let mut raw = Raw::new(1);
     let mut names = groups.then(Names::default);
+    let mut others = Others::default();
     let mut continued = String::new();
     for (number, line) in lines(bytes) {
         let line = line.trim();
@@ -24,10 +25,10 @@ pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw, ReadErrorKind> {
             continue;
         }
         if continued.is_empty() {
-            statement(line, number, &mut raw, &mut names)?;
+            statement(line, number, &mut raw, &mut names, &mut others)?;
         } else {
             let line = std::mem::take(&mut continued) + line;
-            statement(&line, number, &mut raw, &mut names)?;
+            statement(&line, number, &mut raw, &mut names, &mut others)?;
         }
     }
     if !continued.is_empty() {
@@ -37,6 +38,21 @@ pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw, ReadErrorKind> {
         });
     }
     raw.groups = names.filter(|names| names.were_given).map(|names| names.groups);
+    raw.remark(
+        others.lines,
+        "element was left out: points and lines are no surface",
+        "elements were left out: points and lines are no surface",
+    );
+    raw.remark(
+        others.curved,
+        "free-form surface was left out: export the mesh as polygons",
+        "free-form surfaces were left out: export the mesh as polygons",
+    );
+    raw.remark(
+        others.files,
+        "other file that it names by `call` was left out",
+        "other files that it names by `call` were left out",
+    );
     Ok(raw)
 }
 
@@ -72,11 +88,20 @@ impl Names {
     }
 }
 
+/// Statements that are left out.
+#[derive(Default)]
+struct Others {
+    lines: usize,
+    curved: usize,
+    files: usize,
+}
+
 fn statement(
     line: &str,
     number: usize,
     raw: &mut Raw,
     names: &mut Option<Names>,
+    others: &mut Others,
 ) -> Result<(), ReadErrorKind> {
     let malformed =
         |what| ReadErrorKind::Malformed { format: Format::Obj, line: Some(number), what };
@@ -121,6 +146,9 @@ fn statement(
                 names.set(keyword, words.collect::<Vec<_>>().join(" "));
             }
         }
+        Some("p" | "l") => others.lines += 1,
+        Some("surf" | "bzp" | "bsp") => others.curved += 1,
+        Some("call") => others.files += 1,
         _ => {}
     }
     Ok(())

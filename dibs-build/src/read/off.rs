@@ -21,8 +21,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
     if rest.to_ascii_lowercase().contains("binary") {
         return Err(malformed(number, "binary OFF is not supported".to_owned()));
     }
-    if !keyword.to_ascii_uppercase().ends_with("OFF") {
-        return Err(malformed(number, "no OFF header".to_owned()));
+    if !is_header(keyword) {
+        let what = format!("'{}' is no header of an OFF in three dimensions", excerpt(keyword));
+        return Err(malformed(number, what));
     }
     // The counts may be on the header's line. Normals, colours and texture, which prefixes of OFF announce, follow the
     // position on a vertex's line.
@@ -59,6 +60,16 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
         raw.end_face();
     }
     Ok(raw)
+}
+
+/// Whether a word begins a file of points in three dimensions: OFF after letters for texture, colours and normals. A small n
+/// or a 4 before OFF announce other dimensions.
+pub(super) fn is_header(word: &str) -> bool {
+    let letters = word.strip_suffix("OFF").map_or("STCNstcn", |_| "STCN");
+    let prefix = word.len().checked_sub(3).and_then(|end| word.split_at_checked(end));
+    prefix.is_some_and(|(prefix, off)| {
+        off.eq_ignore_ascii_case("off") && prefix.chars().all(|letter| letters.contains(letter))
+    })
 }
 
 fn truncated(missing: &str) -> ReadErrorKind {

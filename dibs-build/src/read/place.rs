@@ -2,6 +2,7 @@
 
 use super::ReadErrorKind;
 use super::raw::Raw;
+use crate::Unit;
 use glam::{DVec3, Vec3};
 
 /// Rounding by this part of a mesh's extent is about the accuracy of a query there; a mesh is recentred where f32 would
@@ -19,8 +20,8 @@ type Result<T> = std::result::Result<T, ReadErrorKind>;
 /// The place of a file's coordinates among a mesh's.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
-    /// Millimetres of the file's unit.
-    pub scale: f64,
+    /// The unit of the file's lengths.
+    pub unit: Unit,
     /// The mesh's origin, in millimetres from the file's.
     pub origin: DVec3,
 }
@@ -28,7 +29,7 @@ pub(crate) struct Place {
 impl Place {
     /// A position of the file, not yet rounded.
     pub fn of(&self, position: [f64; 3]) -> DVec3 {
-        DVec3::from(position) * self.scale - self.origin
+        DVec3::from(position) * self.unit.millimetres() - self.origin
     }
 
     /// The place of a mesh. Its origin is the given one; otherwise the file's own, or where f32 would spoil the mesh the
@@ -39,8 +40,8 @@ impl Place {
     ///
     /// # Errors
     /// [`ReadErrorKind::TooFar`] where the file's numbers do not hold the shape.
-    pub fn of_mesh(raw: &Raw, scale: f64, origin: Option<DVec3>) -> Result<Self> {
-        let unmoved = Self { scale, origin: DVec3::ZERO };
+    pub fn of_mesh(raw: &Raw, unit: Unit, origin: Option<DVec3>) -> Result<Self> {
+        let unmoved = Self { unit, origin: DVec3::ZERO };
         let positions = || raw.corner_positions();
         let bounds = Bounds::of(positions().map(|position| unmoved.of(position)));
         let extent = bounds.extent();
@@ -51,7 +52,7 @@ impl Place {
             check_digits(&bounds, positions)?;
         }
         if let Some(origin) = origin {
-            return Ok(Self { scale, origin });
+            return Ok(Self { unit, origin });
         }
         if !is_surface {
             return Ok(unmoved);

@@ -1,11 +1,11 @@
 //! PLY through `ply-rs-bw`: ASCII, little- and big-endian, any scalar types.
 
-use super::raw::Raw;
+use super::raw::{Raw, excerpt};
 use super::{Format, ReadErrorKind};
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
-    BeginList, ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType,
-    ScalarType,
+    BeginList, ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyDef,
+    PropertyType, ScalarType,
 };
 use std::io::{BufRead, ErrorKind};
 
@@ -30,8 +30,21 @@ pub(super) fn read(mut bytes: Vec<u8>) -> Result<Raw, ReadErrorKind> {
                     .map_err(|error| malformed(&error))?;
                 raw.positions = vertices.into_iter().map(|vertex| vertex.position).collect();
             }
-            "face" => read_faces(&mut reader, element, &header, &mut raw)?,
-            _ => {
+            "face" => {
+                for face in corners(&mut reader, element, &header, &mut raw)? {
+                    face.add_to(&mut raw)?;
+                }
+            }
+            // Several strips stand in one list, each ended by -1.
+            name if name.contains("strip") => {
+                for strips in corners(&mut reader, element, &header, &mut raw)? {
+                    strips.add_strips_to(&mut raw)?;
+                }
+            }
+            name => {
+                let several = format!("elements '{}' were left out", excerpt(name));
+                let one = format!("element '{}' was left out", excerpt(name));
+                raw.remark(element.count, &one, &several);
                 Parser::<Other>::new()
                     .read_payload_for_element(&mut reader, element, &header)
                     .map_err(|error| malformed(&error))?;
@@ -41,24 +54,53 @@ pub(super) fn read(mut bytes: Vec<u8>) -> Result<Raw, ReadErrorKind> {
     Ok(raw)
 }
 
-fn read_faces<T: BufRead>(
+/// The lists of vertex numbers of an element, under whatever name.
+fn corners<T: BufRead>(
     reader: &mut Reader<T>,
     element: &ElementDef,
     header: &ply_rs_bw::ply::Header,
     raw: &mut Raw,
-) -> Result<(), ReadErrorKind> {
-    let faces = Parser::<Face>::new()
-        .read_payload_for_element(reader, element, header)
-        .map_err(|error| malformed(&error))?;
-    for face in faces {
-        for &index in &face.signed {
-            raw.corners.push(u32::try_from(index).map_err(|_| raw.bad_index(i64::from(index)))?);
+) -> Result<Vec<Face>, ReadErrorKind> {
+    let is_list = |property: &&PropertyDef| {
+        let PropertyType::List(_, scalar) = &property.data_type else { return false };
+        !matches!(scalar, ScalarType::Float | ScalarType::Double)
+    };
+    let lists: Vec<&PropertyDef> = element.properties.values().filter(is_list).collect();
+    let known = lists.iter().find(|list| NAMES.contains(&list.name.as_str()));
+    let list = match (known, &lists[..]) {
+        (Some(list), _) | (None, [list]) => list.name.as_str(),
+        _ if element.count == 0 => NAMES[0],
+        _ => {
+            let names: Vec<String> =
+                lists.iter().map(|list| format!("'{}'", excerpt(&list.name))).collect();
+            return Err(unusable(format!(
+                "its element '{}' has no list of the name 'vertex_indices' or 'vertex_index', but {}",
+                excerpt(&element.name),
+                if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+            )));
         }
-        raw.corners.extend(face.unsigned);
-        raw.end_face();
+    };
+    if !NAMES.contains(&list) {
+        raw.remarks.push(format!("vertex numbers were taken from the list '{}'", excerpt(list)));
     }
-    Ok(())
+    let mut renamed = ElementDef { properties: Default::default(), ..element.clone() };
+    for property in element.properties.values() {
+        let mut property = property.clone();
+        // Another list may have that name, and be of other numbers.
+        if property.name == list {
+            NAMES[0].clone_into(&mut property.name);
+        } else if property.name == NAMES[0] {
+            property.name += " of other numbers";
+        }
+        renamed.properties.insert(property.name.clone(), property);
+    }
+    Parser::<Face>::new()
+        .read_payload_for_element(reader, &renamed, header)
+        .map_err(|error| malformed(&error))
 }
+
+/// The usual names of a face's list of vertex numbers.
+const NAMES: [&str; 2] = ["vertex_indices", "vertex_index"];
 
 /// Comments come in any encoding, but the parser requires UTF-8.
 fn make_header_ascii(bytes: &mut [u8]) {
@@ -182,8 +224,38 @@ struct Face {
     unsigned: Vec<u32>,
 }
 
+impl Face {
+    fn numbers(&self) -> impl Iterator<Item = i64> {
+        let signed = self.signed.iter().map(|&number| i64::from(number));
+        signed.chain(self.unsigned.iter().map(|&number| i64::from(number)))
+    }
+
+    fn add_to(&self, raw: &mut Raw) -> Result<(), ReadErrorKind> {
+        for number in self.numbers() {
+            raw.corners.push(u32::try_from(number).map_err(|_| raw.bad_index(number))?);
+        }
+        raw.end_face();
+        Ok(())
+    }
+
+    fn add_strips_to(&self, raw: &mut Raw) -> Result<(), ReadErrorKind> {
+        let numbers: Vec<i64> = self.numbers().collect();
+        for strip in numbers.split(|&number| number == -1 || number == i64::from(u32::MAX)) {
+            for (number, triangle) in strip.windows(3).enumerate() {
+                let [a, b, c] = [triangle[0], triangle[1], triangle[2]];
+                // Every second one is wound the other way.
+                for corner in if number % 2 == 0 { [a, b, c] } else { [b, a, c] } {
+                    raw.corners.push(u32::try_from(corner).map_err(|_| raw.bad_index(corner))?);
+                }
+                raw.end_face();
+            }
+        }
+        Ok(())
+    }
+}
+
 fn is_corners(name: &str) -> bool {
-    matches!(name, "vertex_indices" | "vertex_index")
+    name == NAMES[0]
 }
 
 impl PropertyAccess for Face {

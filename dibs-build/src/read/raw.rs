@@ -2,6 +2,7 @@
 
 use super::groups::FaceGroups;
 use super::{Format, ReadErrorKind};
+use crate::Unit;
 use std::borrow::Cow;
 
 /// The contents of a file, before the checks that need all of it.
@@ -17,16 +18,23 @@ pub(crate) struct Raw {
     pub first_vertex: u32,
     /// The group of each polygon, where groups are asked for and the file has them.
     pub groups: Option<FaceGroups>,
+    /// The unit of its lengths, where the file states it.
+    pub unit: Option<Unit>,
+    /// What was left out or interpreted: warnings.
+    pub remarks: Vec<String>,
 }
 
 impl Raw {
     pub fn new(first_vertex: u32) -> Self {
-        Self {
-            positions: Vec::new(),
-            corners: Vec::new(),
-            ends: Vec::new(),
-            first_vertex,
-            groups: None,
+        Self { first_vertex, ..Self::default() }
+    }
+
+    /// A warning where there are such things in the file.
+    pub fn remark(&mut self, count: usize, one: &str, several: &str) {
+        match count {
+            0 => (),
+            1 => self.remarks.push(format!("1 {one}")),
+            count => self.remarks.push(format!("{count} {several}")),
         }
     }
 
@@ -62,7 +70,7 @@ impl Raw {
 /// The lines of a text, counted from 1. Old exporters write names in any encoding, so bytes that
 /// are not UTF-8 are replaced instead of rejected.
 pub(crate) fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let bytes = super::text::trimmed(bytes);
     let separator = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
     bytes
         .split(move |&byte| byte == separator)

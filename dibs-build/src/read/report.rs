@@ -19,13 +19,13 @@ pub enum Format {
     Ply,
     /// Object File Format, as text.
     Off,
-    /// VTK's legacy format: PolyData, or flat cells of an unstructured grid.
+    /// VTK's legacy format: PolyData, or an unstructured grid.
     Vtk,
-    /// VTK's XML PolyData.
+    /// VTK's XML: PolyData (`.vtp`), or an unstructured grid (`.vtu`).
     Vtp,
     /// glTF 2.0, as JSON or as GLB.
     Gltf,
-    /// Gmsh's mesh, version 2.2 or 4.1.
+    /// Gmsh's mesh, version 1, 2 or 4.1.
     Gmsh,
     /// 3D Manufacturing Format.
     ThreeMf,
@@ -36,8 +36,12 @@ pub enum Format {
 impl Format {
     /// Whether an extension, in any case, is one of the format's.
     pub(super) fn has_extension(self, extension: &str) -> bool {
-        let other = matches!(self, Self::Gltf) && extension.eq_ignore_ascii_case("glb");
-        other || extension.eq_ignore_ascii_case(self.extension())
+        let other = match self {
+            Self::Gltf => "glb",
+            Self::Vtp => "vtu",
+            _ => self.extension(),
+        };
+        extension.eq_ignore_ascii_case(other) || extension.eq_ignore_ascii_case(self.extension())
     }
 
     /// The usual file name extension, in lower case; none in memory.
@@ -90,6 +94,8 @@ pub struct Report {
     pub vertices: usize,
     /// Rows that no triangle uses, in the file or after repairs.
     pub unreferenced_vertices: usize,
+    /// Faces of the file.
+    pub faces: usize,
     /// Triangles of the mesh.
     pub triangles: usize,
     /// Triangles of the file, those too that were dropped; polygons count as the triangles that they were cut into.
@@ -123,6 +129,8 @@ pub struct Report {
     /// Largest distance of a vertex from its position in the file, by rounding to f32; in the mesh's unit, 0 for files
     /// that hold f32. The tree adds it to the accuracy of every answer.
     pub position_error: f64,
+    /// Elements of the file that were left out or interpreted, a sentence each; they are warnings, too.
+    pub remarks: Vec<String>,
 }
 
 fn symbol<S: Serializer>(unit: &Unit, serializer: S) -> Result<S::Ok, S::Error> {
@@ -132,7 +140,7 @@ fn symbol<S: Serializer>(unit: &Unit, serializer: S) -> Result<S::Ok, S::Error> 
 impl Report {
     /// Warnings for a user, one sentence for each change and each oddity.
     pub fn warnings(&self) -> impl Iterator<Item = String> + use<> {
-        let mut warnings = Vec::new();
+        let mut warnings = self.remarks.clone();
         let mut warn = |count: usize, one: &str, several: &str| match count {
             0 => (),
             1 => warnings.push(format!("1 {one}")),

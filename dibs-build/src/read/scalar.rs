@@ -11,6 +11,7 @@ pub(crate) enum Scalar {
     U32,
     I64,
     U64,
+    F16,
     F32,
     F64,
 }
@@ -26,7 +27,7 @@ impl Scalar {
     pub fn bytes(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
+            Self::I16 | Self::U16 | Self::F16 => 2,
             Self::I32 | Self::U32 | Self::F32 => 4,
             Self::I64 | Self::U64 | Self::F64 => 8,
         }
@@ -51,6 +52,7 @@ impl Scalar {
             Self::U32 => f64::from(word as u32),
             Self::I64 => word as i64 as f64,
             Self::U64 => word as f64,
+            Self::F16 => half(word as u16),
             Self::F32 => f64::from(f32::from_bits(word as u32)),
             Self::F64 => f64::from_bits(word),
         }
@@ -62,7 +64,41 @@ impl Scalar {
     }
 }
 
+/// A number of 16 bits: sign, five bits of exponent, ten of fraction.
+fn half(bits: u16) -> f64 {
+    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023) / 1024.0);
+    let size = match exponent {
+        0 => fraction * 2_f64.powi(-14),
+        31 if fraction > 0.0 => f64::NAN,
+        31 => f64::INFINITY,
+        _ => (1.0 + fraction) * 2_f64.powi(exponent - 15),
+    };
+    if bits >> 15 == 1 { -size } else { size }
+}
+
 /// A number that counts or numbers something.
 pub(crate) fn index(number: f64) -> Option<u64> {
     (number >= 0.0 && number < 2_f64.powi(53) && number.trunc() == number).then_some(number as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::half;
+
+    #[test]
+    fn half_precision_is_exact() {
+        for (bits, number) in [
+            (0x0000, 0.0),
+            (0x3c00, 1.0),
+            (0xc000, -2.0),
+            (0x3555, 0.333_251_953_125),
+            (0x7bff, 65_504.0),
+            (0x0400, 2_f64.powi(-14)),
+            (0x8001, -(2_f64.powi(-24))),
+            (0xfc00, f64::NEG_INFINITY),
+        ] {
+            assert_eq!(half(bits), number, "{bits:04x}");
+        }
+        assert!(half(0x7e00).is_nan());
+    }
 }

@@ -1,7 +1,8 @@
 //! Finds a file's format by its content, and by its extension only if the content does not decide.
 
 use super::raw::{coordinate, lines};
-use super::{Format, ReadErrorKind, foreign, stl};
+use super::text::trimmed;
+use super::{Format, ReadErrorKind, foreign, off, stl};
 use std::path::Path;
 
 pub(super) fn format(bytes: &[u8], path: &Path) -> Result<Format, ReadErrorKind> {
@@ -12,48 +13,67 @@ pub(super) fn format(bytes: &[u8], path: &Path) -> Result<Format, ReadErrorKind>
         return Ok(format);
     }
     let first_line = lines(bytes)
-        .map(|(_, line)| line.trim().to_ascii_lowercase())
+        .map(|(_, line)| line.trim().to_owned())
         .find(|line| !line.is_empty() && !line.starts_with('#'))
         .unwrap_or_default();
     let first_word = first_line.split_whitespace().next().unwrap_or_default();
-    if first_line == "ply" {
+    if first_line.eq_ignore_ascii_case("ply") {
         return Ok(Format::Ply);
     }
-    if matches!(first_word, "off" | "coff" | "noff" | "cnoff" | "stoff") {
+    if off::is_header(first_word) {
         return Ok(Format::Off);
     }
     // Checked before "solid", because many binary files begin with that word.
     if stl::size_fits_count(bytes) {
         return Ok(Format::StlBinary);
     }
-    let is_text = !bytes.contains(&0);
-    if first_word == "solid" && is_text {
+    let is_text = !trimmed(bytes).contains(&0);
+    if first_word.eq_ignore_ascii_case("solid") && is_text {
         return Ok(Format::StlAscii);
     }
     if is_text && lines(bytes).any(|(_, line)| is_obj_line(&line)) {
         return Ok(Format::Obj);
     }
+    let named = path.extension().and_then(|extension| extension.to_str()).and_then(named);
+    // A damaged package is no other archive.
+    if named == Some(Format::ThreeMf) {
+        return Ok(Format::ThreeMf);
+    }
     if let Some(foreign) = foreign::named(bytes, path) {
         return Err(foreign);
     }
-    let extension = path.extension().and_then(|extension| extension.to_str());
-    match extension.map(str::to_ascii_lowercase).as_deref() {
-        Some("obj") if is_text => Ok(Format::Obj),
-        Some("stl") => Ok(Format::StlBinary),
-        _ => Err(ReadErrorKind::UnknownFormat),
+    match named {
+        // Its reader tells text from bytes no better than this.
+        Some(Format::StlAscii) if !is_text => Ok(Format::StlBinary),
+        // So that the error is that of its reader.
+        Some(format) => Ok(format),
+        None => Err(ReadErrorKind::UnknownFormat),
     }
+}
+
+/// The format of an extension.
+fn named(extension: &str) -> Option<Format> {
+    use Format::{Gltf, Gmsh, Obj, Off, Ply, StlAscii, ThreeMf, Vtk, Vtp};
+    let all = [Obj, StlAscii, Ply, Off, Vtk, Vtp, Gltf, Gmsh, ThreeMf];
+    all.into_iter().find(|format| format.has_extension(extension))
 }
 
 /// A format that begins with a mark of its own.
 fn marked(bytes: &[u8]) -> Option<Format> {
     let beginning = &bytes[..bytes.len().min(1024)];
-    let has = |bytes: &[u8], mark: &[u8]| bytes.windows(mark.len()).any(|window| window == mark);
+    let has = |bytes: &[u8], mark: &[u8]| {
+        bytes.windows(mark.len()).any(|window| window.eq_ignore_ascii_case(mark))
+    };
     match beginning.trim_ascii_start() {
-        [b'#', ..] if bytes.starts_with(b"# vtk DataFile") => Some(Format::Vtk),
+        [b'#', ..] if has(&beginning[..beginning.len().min(16)], b"# vtk DataFile") => {
+            Some(Format::Vtk)
+        }
         [b'<', ..] if has(beginning, b"<VTKFile") => Some(Format::Vtp),
         [b'g', b'l', b'T', b'F', ..] => Some(Format::Gltf),
         [b'{', ..] if has(bytes, b"\"asset\"") => Some(Format::Gltf),
-        [b'$', ..] if has(beginning, b"$MeshFormat") => Some(Format::Gmsh),
+        [b'$', ..] if has(beginning, b"$MeshFormat") || has(beginning, b"$NOD") => {
+            Some(Format::Gmsh)
+        }
         // Names of files stand in a package as they are.
         [b'P', b'K', 3, 4, ..] if has(bytes, b"3D/") && has(bytes, b".model") => {
             Some(Format::ThreeMf)

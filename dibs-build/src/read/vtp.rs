@@ -1,11 +1,11 @@
-//! VTK's XML PolyData: text, inline binary and appended data, compressed by zlib or not.
+//! VTK's XML, PolyData and unstructured grids: text, inline binary and appended data, compressed by zlib or not.
 //!
 //! Our own reader of what `quick-xml` finds; `vtk.rs` says why not `vtkio`.
 
 use super::groups::is_name;
 use super::raw::{Raw, coordinate, excerpt};
 use super::scalar::{Endian, Scalar, index};
-use super::vtk::{Labelled, not_a_surface, split};
+use super::vtk_cells::{Labelled, not_a_surface, split};
 use super::{Format, ReadErrorKind, base64, inflate};
 use flate2::read::ZlibDecoder;
 use quick_xml::Reader;
@@ -25,24 +25,26 @@ pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
     let mut xml = Reader::from_str(&head);
     // Only the end of the whole is cut off.
     xml.config_mut().check_end_names = false;
-    let mut raw = Raw::new(0);
     loop {
         match xml.read_event().map_err(|error| malformed(error.to_string()))? {
-            Event::Start(tag) => file.enter(&tag, &raw)?,
+            Event::Start(tag) => file.enter(&tag)?,
             Event::Empty(tag) => {
-                file.enter(&tag, &raw)?;
-                file.leave(tag.name().0, &mut raw)?;
+                file.enter(&tag)?;
+                file.leave(tag.name().0)?;
             }
             Event::Text(text) => file.text(&text.xml10_content()),
-            Event::End(tag) => file.leave(tag.name().0, &mut raw)?,
+            Event::End(tag) => file.leave(tag.name().0)?,
             Event::Eof => break,
             _ => {}
         }
     }
-    if !file.is_complete {
-        return Err(truncated("no </PolyData>"));
+    if file.order.is_none() {
+        return Err(malformed("no <VTKFile> in it".to_owned()));
     }
-    Ok(raw)
+    if !file.is_complete {
+        return Err(truncated(&format!("no </{}>", file.kind)));
+    }
+    file.surface.end()
 }
 
 fn malformed(what: String) -> ReadErrorKind {
@@ -73,23 +75,28 @@ struct File<'a> {
     appended: &'a [u8],
     /// Whether labels of cells are wanted.
     has_groups: bool,
-    /// Points, Polys, Strips, `CellData`, or others.
+    /// `PolyData` or `UnstructuredGrid`.
+    kind: String,
+    /// Points, Polys, Strips, Cells, `CellData`, or others.
     section: String,
     array: Option<Array>,
     connectivity: Vec<u64>,
     offsets: Vec<u64>,
+    types: Vec<u64>,
     /// Vertices of the pieces before.
     first: u32,
     /// The cells of a piece, the number of those that are no surface, and their labels.
     polygons: Vec<Vec<u32>>,
     strips: Vec<Vec<u32>>,
+    grid: Vec<(u64, Vec<u32>)>,
     others: usize,
     labels: Option<Vec<f64>>,
+    surface: Labelled,
     is_complete: bool,
 }
 
 impl File<'_> {
-    fn enter(&mut self, tag: &BytesStart<'_>, raw: &Raw) -> Result<()> {
+    fn enter(&mut self, tag: &BytesStart<'_>) -> Result<()> {
         let attribute = |name: &str| match tag.try_get_attribute(name) {
             Ok(found) => Ok(found.map(|attribute| attribute.value.into_owned())),
             Err(error) => Err(malformed(error.to_string())),
@@ -101,9 +108,10 @@ impl File<'_> {
         match tag.name().0 {
             "VTKFile" => {
                 let kind = attribute("type")?.unwrap_or_default();
-                if kind != "PolyData" {
+                if !matches!(kind.as_str(), "PolyData" | "UnstructuredGrid") {
                     return Err(not_a_surface(&kind));
                 }
+                self.kind = kind;
                 let is_big = attribute("byte_order")?.is_some_and(|order| order == "BigEndian");
                 self.order = Some(if is_big { Endian::Big } else { Endian::Little });
                 self.has_long_headers = attribute("header_type")?.is_some_and(|t| t == "UInt64");
@@ -119,15 +127,19 @@ impl File<'_> {
                 };
             }
             "Piece" => {
-                self.first = raw.positions.len() as u32;
+                self.first = self.surface.raw.positions.len() as u32;
                 self.others = 0;
                 for name in ["NumberOfVerts", "NumberOfLines"] {
                     let count = attribute(name)?.and_then(|count| count.trim().parse().ok());
-                    self.others += count.unwrap_or(0);
+                    self.others = self.others.saturating_add(count.unwrap_or(0));
                 }
             }
             "DataArray" if self.is_read(&attribute("Name")?.unwrap_or_default()) => {
                 let kind = attribute("type")?.unwrap_or_default();
+                // Labels that are no numbers are none.
+                if self.section == "CellData" && scalar(&kind).is_err() {
+                    return Ok(());
+                }
                 let offset = attribute("offset")?.and_then(|offset| offset.trim().parse().ok());
                 self.array = Some(Array {
                     name: attribute("Name")?.unwrap_or_default(),
@@ -138,8 +150,10 @@ impl File<'_> {
                     depth: 0,
                 });
             }
-            "DataArray" => {}
-            name => name.clone_into(&mut self.section),
+            "Points" | "Verts" | "Lines" | "Polys" | "Strips" | "Cells" | "PointData"
+            | "CellData" | "FieldData" => tag.name().0.clone_into(&mut self.section),
+            // Arrays of texts, and what is known about an array.
+            _ => {}
         }
         Ok(())
     }
@@ -147,14 +161,17 @@ impl File<'_> {
     /// Whether an array of this name is needed.
     fn is_read(&self, name: &str) -> bool {
         match self.section.as_str() {
-            "Points" | "Polys" | "Strips" => true,
+            "Points" => true,
+            "Polys" | "Strips" | "Cells" => {
+                matches!(name, "connectivity" | "offsets" | "types")
+            }
             "CellData" => self.has_groups && is_name(name),
             _ => false,
         }
     }
 
     /// Adds the cells of a piece.
-    fn end_piece(&mut self, raw: &mut Raw) -> Result<()> {
+    fn end_piece(&mut self) -> Result<()> {
         let (polygons, bands) = (take(&mut self.polygons), take(&mut self.strips));
         let labels = self.labels.take();
         if labels.is_some() && !polygons.is_empty() && !bands.is_empty() {
@@ -163,11 +180,22 @@ impl File<'_> {
                 remedy: "save it as triangles: in ParaView, the filter Triangulate".to_owned(),
             });
         }
-        let mut labelled = Labelled { raw: take(raw), labels, cell: self.others };
-        labelled.faces(&polygons);
-        labelled.strips(&bands);
-        *raw = labelled.end().map_err(malformed)?;
-        Ok(())
+        // Pieces repeat the points between them, so the cells there would seem to lie outside.
+        if self.surface.has_volumes() {
+            return Err(ReadErrorKind::Foreign {
+                what: "a VTK grid of volume cells in several pieces".to_owned(),
+                remedy: "save its skin: in ParaView, the filters Merge Blocks and Extract Surface"
+                    .to_owned(),
+            });
+        }
+        self.surface.begin(labels);
+        self.surface.skip(self.others);
+        self.surface.faces(&polygons);
+        self.surface.strips(&bands);
+        for (kind, cell) in take(&mut self.grid) {
+            self.surface.grid_cell(kind, cell, malformed)?;
+        }
+        self.surface.end_piece().map_err(malformed)
     }
 
     fn text(&mut self, text: &str) {
@@ -176,7 +204,7 @@ impl File<'_> {
         }
     }
 
-    fn leave(&mut self, tag: &str, raw: &mut Raw) -> Result<()> {
+    fn leave(&mut self, tag: &str) -> Result<()> {
         if let Some(mut array) = self.array.take() {
             if array.depth > 0 {
                 array.depth -= 1;
@@ -194,30 +222,38 @@ impl File<'_> {
                     if !rest.is_empty() {
                         return Err(malformed("points that have not three coordinates".to_owned()));
                     }
-                    raw.positions.extend(points);
+                    self.surface.raw.positions.extend(points);
                 }
                 _ if self.section == "CellData" => self.labels = Some(numbers),
                 "connectivity" => self.connectivity = indices()?,
                 "offsets" => self.offsets = indices()?,
+                "types" => self.types = indices()?,
                 _ => {}
             }
             return Ok(());
         }
         match tag {
-            "Polys" | "Strips" => {
+            "Polys" | "Strips" | "Cells" => {
                 let points = take(&mut self.connectivity);
                 let mut cells = split(&take(&mut self.offsets), &points).map_err(malformed)?;
                 for point in cells.iter_mut().flatten() {
                     *point = point.saturating_add(self.first);
                 }
-                if tag == "Polys" {
-                    self.polygons = cells;
-                } else {
-                    self.strips = cells;
+                match tag {
+                    "Polys" => self.polygons = cells,
+                    "Strips" => self.strips = cells,
+                    _ => {
+                        let types = take(&mut self.types);
+                        if types.len() != cells.len() {
+                            let (cells, types) = (cells.len(), types.len());
+                            return Err(malformed(format!("{cells} cells and {types} cell types")));
+                        }
+                        self.grid = types.into_iter().zip(cells).collect();
+                    }
                 }
             }
-            "Piece" => self.end_piece(raw)?,
-            "PolyData" => self.is_complete = true,
+            "Piece" => self.end_piece()?,
+            "PolyData" | "UnstructuredGrid" => self.is_complete = true,
             _ => {}
         }
         Ok(())

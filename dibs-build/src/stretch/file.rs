@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use dibs_nostd::format::CRC;
 use thiserror::Error;
 
+use crate::read::file;
 use crate::{Mesh, WriteError, write_atomically};
 
 /// A file of limits that cannot be used.
@@ -89,7 +90,7 @@ pub fn write_limits(
 /// [`LimitsError`] names the file and its defect, such as limits of another mesh.
 pub fn read_limits(path: impl AsRef<Path>, mesh: &Mesh) -> Result<Vec<f32>, LimitsError> {
     let path = path.as_ref();
-    let text = std::fs::read_to_string(path).map_err(LimitsErrorKind::from);
+    let text = file::text(path).map_err(LimitsErrorKind::from);
     text.and_then(|text| parse(&text, mesh))
         .map_err(|kind| LimitsError { path: path.to_path_buf(), kind })
 }

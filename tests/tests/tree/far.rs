@@ -174,7 +174,7 @@ fn a_far_motion_keeps_its_digits() {
     npy.extend((header.len() as u16).to_le_bytes());
     npy.extend(header.bytes().chain(numbers.flat_map(f64::to_le_bytes)));
     std::fs::write(folder.path().join("f.npy"), npy).unwrap();
-    let options = ReadOptions { unit: Unit::Metre, ..Import::options() };
+    let options = ReadOptions { unit: Some(Unit::Metre), ..Import::options() };
     let import = read(&folder, &obj(&exact, &mesh), &options).unwrap();
     let origin = import.mesh.origin;
     assert!(origin.x > 3.9e6);

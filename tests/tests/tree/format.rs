@@ -393,7 +393,7 @@ fn the_files_unit_and_counts_are_stored() {
     };
     assert_eq!(facts(Builder::new().build(&plain).expect("valid")), (None, 3, 1));
     for unit in Unit::ALL {
-        let import = ReadOptions { unit, ..ReadOptions::default() };
+        let import = ReadOptions { unit: Some(unit), ..ReadOptions::default() };
         let import = import.check(&corners, &triangles).expect("a mesh");
         let built = Builder::new().build(&import).expect("valid");
         assert_eq!(word(built.blob(), 56), u32::from(unit.code()));

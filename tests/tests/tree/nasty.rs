@@ -84,14 +84,20 @@ const OUTCOMES: &[(&str, Want)] = &[
         Error(|k| matches!(k, K::Malformed { line: Some(23), .. }), "a face without vertices"),
     ),
     ("assimp_multiple_spaces.obj", Mesh(4, 1, &[unreferenced(1), border(3)])),
-    ("assimp_point_cloud.obj", Error(|k| matches!(k, K::NoTriangles { degenerate: 0 }), "faces")),
+    (
+        "assimp_point_cloud.obj",
+        Error(|k| matches!(k, K::NoTriangles { degenerate: 0, .. }), "faces"),
+    ),
     // A quad, and both of its halves again.
     ("assimp_regr_3429812.obj", Mesh(4, 2, &[polygons(1), duplicates(2), border(4)])),
     (
         "assimp_spider.obj",
         Components(19, 762, 98, &[coincident(40), unreferenced(711), degenerate(56)]),
     ),
-    ("assimp_testpoints.obj", Error(|k| matches!(k, K::NoTriangles { degenerate: 0 }), "faces")),
+    (
+        "assimp_testpoints.obj",
+        Error(|k| matches!(k, K::NoTriangles { degenerate: 0, .. }), "faces"),
+    ),
     ("assimp_triangle_with_empty_solid.stl", Mesh(3, 1, &[border(3)])),
     ("synthetic_ascii.stl", Mesh(162, 320, &[welded(798)])),
     (
@@ -100,7 +106,10 @@ const OUTCOMES: &[(&str, Want)] = &[
     ),
     ("synthetic_ascii_truncated.stl", Error(|k| matches!(k, K::Truncated { .. }), "endsolid")),
     ("synthetic_ascii_upper_crlf.stl", Mesh(162, 320, &[welded(798)])),
-    ("synthetic_collinear.obj", Error(|k| matches!(k, K::NoTriangles { degenerate: 320 }), "320")),
+    (
+        "synthetic_collinear.obj",
+        Error(|k| matches!(k, K::NoTriangles { degenerate: 320, .. }), "320"),
+    ),
     (
         "synthetic_count_too_large.stl",
         Error(|k| matches!(k, K::Count { claimed: 1_000_000_000, found: 320, .. }), "triangles"),
@@ -136,8 +145,8 @@ const OUTCOMES: &[(&str, Want)] = &[
     ("synthetic_two_components.obj", Components(2, 324, 320, &[unreferenced(162)])),
     ("synthetic_unwelded_soup.obj", Mesh(960, 320, &[welded(798), unreferenced(798)])),
     ("trimesh_LICENSE.md", Error(|k| matches!(k, K::UnknownFormat), "convert")),
-    ("trimesh_empty.obj", Error(|k| matches!(k, K::NoTriangles { degenerate: 0 }), "faces")),
-    ("trimesh_empty.stl", Error(|k| matches!(k, K::NoTriangles { degenerate: 0 }), "faces")),
+    ("trimesh_empty.obj", Error(|k| matches!(k, K::NoTriangles { degenerate: 0, .. }), "faces")),
+    ("trimesh_empty.stl", Error(|k| matches!(k, K::NoTriangles { degenerate: 0, .. }), "faces")),
     // Its faces name normals that are absent; a group's name contains an f.
     ("trimesh_face_in_group_name_mid_file.obj", Mesh(5, 2, &[border(6)])),
     // Two tetrahedra, each of which has the triangle between them.
@@ -150,18 +159,21 @@ const OUTCOMES: &[(&str, Want)] = &[
     ("trimesh_negative_indices.obj", Mesh(8, 12, &[polygons(6)])),
     // A face of two corners has no area.
     ("trimesh_notenoughindices.obj", Mesh(3, 1, &[degenerate(1), border(3)])),
-    ("trimesh_obj_points.obj", Error(|k| matches!(k, K::NoTriangles { degenerate: 0 }), "faces")),
+    (
+        "trimesh_obj_points.obj",
+        Error(|k| matches!(k, K::NoTriangles { degenerate: 0, .. }), "faces"),
+    ),
     ("trimesh_obj_with_no_face_in_chunk.obj", Mesh(3, 1, &[border(3)])),
     (
         "trimesh_ply_empty_header.ply",
-        Error(|k| matches!(k, K::NoTriangles { degenerate: 0 }), "faces"),
+        Error(|k| matches!(k, K::NoTriangles { degenerate: 0, .. }), "faces"),
     ),
     // A polygon of five corners in no plane: seen along its normal, one side runs back over another.
     ("trimesh_polygonfaces.obj", Mesh(5, 3, &[polygons(1), ("polygons_not_simple", 1), border(5)])),
     ("trimesh_soup.stl", Components(100, 300, 1, &[unreferenced(297), border(3)])),
     (
         "trimesh_stl_empty_bin.stl",
-        Error(|k| matches!(k, K::NoTriangles { degenerate: 0 }), "faces"),
+        Error(|k| matches!(k, K::NoTriangles { degenerate: 0, .. }), "faces"),
     ),
     ("trimesh_two_objects.obj", Components(2, 12, 12, &[coincident(4), unreferenced(4)])),
     ("trimesh_wallhole.obj", Mesh(92, 66, &[polygons(13), welded(57), unreferenced(57)])),

@@ -22,7 +22,7 @@ Examples:
   dibs build organs.msh -o organs.dibs --labels-from-groups
   dibs build heart.ply -o heart.dibs --motion heart.pc2 --modes 16")]
 pub struct Args {
-    /// The rest shape: OBJ, STL, PLY, OFF, VTK (.vtk, .vtp), glTF (.gltf, .glb), Gmsh (.msh) or 3MF, told apart by content
+    /// The rest shape: OBJ, STL, PLY, OFF, VTK (.vtk, .vtp, .vtu), glTF (.gltf, .glb), Gmsh (.msh) or 3MF, told apart by content
     mesh: PathBuf,
     /// What to write: NAME.dibs, a blob, or NAME.rs, a Rust module that includes NAME.dibs beside it
     #[arg(short, long)]
@@ -33,7 +33,8 @@ pub struct Args {
     /// A limit for each triangle instead, as `dibs stretch` writes them
     #[arg(long, value_name = "FILE", conflicts_with = "stretch")]
     limits: Option<PathBuf>,
-    /// A label for each triangle, say of its tissue: text, one number from 0 to 255 a line, in the mesh's order
+    /// A label for each face of the file or triangle of the mesh, say of its tissue: text, one number from 0 to 255 a
+    /// line, in the file's order
     #[arg(long, value_name = "FILE")]
     labels: Option<PathBuf>,
     /// Labels from the file's own groups: OBJ's g and usemtl, numbered from 0; Gmsh's physical groups by their numbers; VTK's
@@ -95,12 +96,12 @@ pub fn run(args: &Args) -> Result<()> {
     } else {
         None
     };
-    let Import { mesh, report, groups } = &import;
+    let Import { mesh, report, groups, .. } = &import;
     let winding = check_winding(mesh).err().map(|error| error.to_string());
     let crossing = crossing_parts(mesh);
     let limits = args.limits.as_ref().map(|path| read_limits(path, mesh)).transpose()?;
     let labels = match (&args.labels, groups) {
-        (Some(path), _) => Some(read_labels(path, mesh)?),
+        (Some(path), _) => Some(read_labels(path, &import)?),
         (None, Some(groups)) => Some(groups.labels.clone()),
         (None, None) => None,
     };

@@ -30,9 +30,10 @@ pub struct MeshArgs {
 /// The unit of files.
 #[derive(clap::Args)]
 pub struct Lengths {
-    /// Unit of the lengths in files of meshes and motions; they become millimetres
-    #[arg(long, value_enum, default_value = "mm")]
-    unit: UnitName,
+    /// Unit of the lengths in files of meshes and motions, which become millimetres; by default the one that the file
+    /// states (glTF: metres; 3MF), else mm
+    #[arg(long, value_enum)]
+    unit: Option<UnitName>,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -45,14 +46,15 @@ enum UnitName {
 }
 
 impl Lengths {
-    pub fn unit(&self) -> Unit {
-        match self.unit {
+    /// The unit that is given.
+    pub fn unit(&self) -> Option<Unit> {
+        self.unit.map(|unit| match unit {
             UnitName::Mm => Unit::Millimetre,
             UnitName::Cm => Unit::Centimetre,
             UnitName::M => Unit::Metre,
             UnitName::In => Unit::Inch,
             UnitName::Um => Unit::Micrometre,
-        }
+        })
     }
 
     /// Reads a motion in this unit, of a mesh with this origin.

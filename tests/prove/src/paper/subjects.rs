@@ -48,6 +48,8 @@ pub fn hearts(triangles: u32) -> Result<Vec<Heart>> {
         if mesh.is_file() && motion.is_file() {
             let (mesh, motion) = (dibs_build::read(mesh)?.mesh, Motion::read_pc2(motion)?);
             motion.check_fits(&mesh)?;
+            // Its file states no rate; the recorded figures are of a frame a second.
+            let motion = Motion { rate: 1.0, ..motion };
             hearts.push(Heart { name: "human heart".to_owned(), mesh, motion, stretch: None });
         }
     }

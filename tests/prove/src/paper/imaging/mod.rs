@@ -39,7 +39,7 @@ pub const RUN: &str = "imaging-run";
 pub const RATES: [u32; 2] = [30, 60];
 /// Ticks of the control loop a second.
 const TICK_RATE: u32 = 1_000;
-/// Seconds of a heartbeat. The recorded motion's own rate, a frame a second, is no living heart's.
+/// Seconds of a heartbeat. A recorded motion's frame a second is no living heart's.
 const BEAT: f32 = 1.0;
 /// Imaging periods that train the hybrid's split level.
 const TRAINING: u32 = 4;

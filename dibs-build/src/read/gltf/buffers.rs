@@ -1,0 +1,142 @@
+//! The bytes of a document's buffers: each is read when it is first asked for, and only once.
+
+use super::document::Buffer;
+use super::{Result, get, malformed};
+use crate::read::raw::excerpt;
+use crate::read::{base64, file};
+use std::borrow::Cow;
+use std::collections::{HashMap, HashSet};
+use std::path::{Component, Path, PathBuf};
+
+pub struct Buffers<'a> {
+    folder: &'a Path,
+    /// The binary part of a GLB file.
+    binary: &'a [u8],
+    buffers: &'a [Buffer],
+    /// By their numbers, and the files by their paths.
+    data: HashMap<usize, Vec<u8>>,
+    files: HashMap<PathBuf, Vec<u8>>,
+}
+
+impl<'a> Buffers<'a> {
+    pub fn new(folder: &'a Path, binary: &'a [u8], buffers: &'a [Buffer]) -> Self {
+        Self { folder, binary, buffers, data: HashMap::new(), files: HashMap::new() }
+    }
+
+    /// Bytes in the files that the document names.
+    pub fn room(&self) -> usize {
+        let uris = self.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
+        let names: HashSet<_> = uris.filter(|uri| !uri.starts_with("data:")).map(decoded).collect();
+        let length = |name: &Cow<'_, str>| {
+            let path = file_beside(name).map(|path| self.folder.join(path)).unwrap_or_default();
+            let metadata = std::fs::metadata(path);
+            metadata.map_or(0, |metadata| usize::try_from(metadata.len()).unwrap_or(usize::MAX))
+        };
+        names.iter().map(length).fold(0, usize::saturating_add)
+    }
+
+    /// The bytes of a buffer, as many as the document says: the binary part, data inside the document, or a file beside
+    /// it.
+    pub fn bytes(&mut self, number: usize) -> Result<&[u8]> {
+        let buffer = get(self.buffers, number, "buffer")?;
+        let bytes = match &buffer.uri {
+            None => self.binary,
+            Some(uri) => match uri.strip_prefix("data:") {
+                Some(data) => self.inside(number, data)?,
+                None => self.beside(uri)?,
+            },
+        };
+        let cut_off = || {
+            let (stated, found) = (buffer.byte_length, bytes.len());
+            malformed(format!("buffer {number} has {found} bytes, and {stated} are stated"))
+        };
+        bytes.get(..buffer.byte_length).ok_or_else(cut_off)
+    }
+
+    fn inside(&mut self, number: usize, data: &str) -> Result<&[u8]> {
+        if !self.data.contains_key(&number) {
+            let encoded = data.split_once(";base64,").map(|(_, encoded)| encoded);
+            let bytes = encoded.and_then(|encoded| base64::decode(encoded.as_bytes()));
+            let bytes = bytes.ok_or_else(|| malformed("a buffer that is no base64"))?;
+            self.data.insert(number, bytes);
+        }
+        Ok(self.data.get(&number).map_or(&[], Vec::as_slice))
+    }
+
+    /// A file is read as far as the longest of its buffers says.
+    fn beside(&mut self, uri: &str) -> Result<&[u8]> {
+        let name = decoded(uri);
+        let no_file = || malformed(format!("the buffer '{}' is no file beside it", excerpt(uri)));
+        let path = file_beside(&name).ok_or_else(no_file)?;
+        if !self.files.contains_key(path) {
+            let is_same =
+                |buffer: &&Buffer| buffer.uri.as_deref().map(decoded).as_ref() == Some(&name);
+            let same = self.buffers.iter().filter(is_same);
+            let most = same.map(|buffer| buffer.byte_length as u64).max().unwrap_or(0);
+            // Some programs write the name as it is.
+            let spellings = [self.folder.join(path), self.folder.join(uri)];
+            let there = spellings.iter().find(|path| path.exists()).unwrap_or(&spellings[0]);
+            let bytes = file::first(there, most).map_err(|error| {
+                let uri = excerpt(uri);
+                malformed(format!(
+                    "its buffer '{uri}' cannot be read ({error}); keep both together"
+                ))
+            })?;
+            self.files.insert(path.to_path_buf(), bytes);
+        }
+        Ok(self.files.get(path).map_or(&[], Vec::as_slice))
+    }
+}
+
+/// A document names files beside it, not those of the computer.
+fn file_beside(name: &str) -> Option<&Path> {
+    let path = Path::new(name);
+    let is_beside = path.components().all(|part| matches!(part, Component::Normal(_)));
+    (is_beside && !name.is_empty()).then_some(path)
+}
+
+/// A URI's name of a file: `%20` is a space.
+fn decoded(uri: &str) -> Cow<'_, str> {
+    if !uri.contains('%') {
+        return uri.into();
+    }
+    let mut bytes = Vec::with_capacity(uri.len());
+    let mut rest = uri.as_bytes();
+    while let Some((&byte, after)) = rest.split_first() {
+        let code = after.get(..2).filter(|_| byte == b'%');
+        let code = code.and_then(|code| std::str::from_utf8(code).ok());
+        let code = code.filter(|code| code.bytes().all(|digit| digit.is_ascii_hexdigit()));
+        match code.and_then(|code| u8::from_str_radix(code, 16).ok()) {
+            Some(code) => {
+                bytes.push(code);
+                rest = &after[2..];
+            }
+            None => {
+                bytes.push(byte);
+                rest = after;
+            }
+        }
+    }
+    // Names that are no UTF-8 stay as they are.
+    String::from_utf8(bytes).map_or(uri.into(), Into::into)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::decoded;
+
+    #[test]
+    fn percent_signs_are_decoded_where_they_encode() {
+        for (uri, name) in [
+            ("left%20lung.bin", "left lung.bin"),
+            ("%C3%a4.bin", "ä.bin"),
+            ("100%.bin", "100%.bin"),
+            ("50%of.bin", "50%of.bin"),
+            ("%ff", "%ff"),
+            ("%+1.bin", "%+1.bin"),
+            ("a%2Fb", "a/b"),
+        ] {
+            assert_eq!(decoded(uri), name);
+        }
+    }
+}

@@ -1,0 +1,292 @@
+//! 3MF: the objects that its build names, from all models of the package.
+//!
+//! Our own reader of what `zip` and `quick-xml` find, although `threemf` exists: that leaves out where an object's
+//! parts are placed, and takes all the memory that a compressed file asks for.
+
+mod package;
+
+use super::raw::{Raw, coordinate, excerpt};
+use super::{Format, ReadErrorKind, inflate};
+use crate::Unit;
+use glam::{DMat4, DVec3};
+use package::{Package, tags};
+use quick_xml::events::BytesStart;
+use std::collections::{HashMap, HashSet};
+
+type Result<T> = std::result::Result<T, ReadErrorKind>;
+
+/// More copies of its vertices than this are no organ.
+const MOST_COPIES: usize = 16;
+
+/// Parts of the namespaces of extensions that are read, or change no position.
+const KNOWN: [&str; 3] = ["/production/", "/material/", "/trianglesets/"];
+
+/// The beginning of the namespaces of most extensions.
+const NAMESPACES: &str = "http://schemas.microsoft.com/3dmanufacturing/";
+
+/// Elements that are geometry of another kind.
+const OTHERS: [&str; 5] =
+    ["beamlattice", "booleanshape", "displacementmesh", "levelset", "slicestack"];
+
+pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
+    let mut package = Package::new(bytes)?;
+    let root = package.root()?;
+    let mut model = Model::default();
+    let mut seen = HashSet::from([root.clone()]);
+    let mut waiting = vec![root];
+    while let Some(path) = waiting.pop() {
+        let text = package.text(&path)?;
+        (model.path, model.current) = (path, None);
+        tags(&text, |tag| model.enter(tag))?;
+        // The production extension keeps objects in models of their own.
+        for other in std::mem::take(&mut model.others) {
+            if seen.insert(other.clone()) {
+                waiting.push(other);
+            }
+        }
+    }
+    model.assemble()
+}
+
+fn malformed(what: impl Into<String>) -> ReadErrorKind {
+    ReadErrorKind::Malformed { format: Format::ThreeMf, line: None, what: what.into() }
+}
+
+#[derive(Default)]
+struct Object {
+    /// Not `model`, but `support` or another kind that is no part of the surface.
+    is_support: bool,
+    positions: Vec<[f64; 3]>,
+    triangles: Vec<[u32; 3]>,
+    /// Other objects, and where they are placed.
+    parts: Vec<(Key, DMat4)>,
+}
+
+/// The path of a model and the number of an object in it.
+type Key = (String, String);
+
+#[derive(Default)]
+struct Model {
+    /// The unit of the package's first model.
+    unit: Option<Unit>,
+    /// Such units that one of the present model is.
+    scale: f64,
+    /// The present model, and the others that it names.
+    path: String,
+    others: Vec<String>,
+    objects: Vec<Object>,
+    /// The present object.
+    current: Option<usize>,
+    /// The place in `objects` of each number in a model.
+    numbers: HashMap<Key, usize>,
+    items: Vec<(Key, DMat4)>,
+    /// Elements that are left out.
+    unread: usize,
+}
+
+impl Model {
+    fn enter(&mut self, tag: &BytesStart<'_>) -> Result<()> {
+        let name = tag.local_name();
+        let attribute = |name: &str| match tag.try_get_attribute(name) {
+            Ok(found) => Ok(found.map(|attribute| attribute.value.into_owned())),
+            Err(error) => Err(malformed(error.to_string())),
+        };
+        let needed = |of: &str| {
+            attribute(of)?
+                .ok_or_else(|| malformed(format!("<{}> has no {of}", excerpt(name.as_ref()))))
+        };
+        let number = |of: &str| {
+            let text = needed(of)?;
+            coordinate(text.trim())
+                .ok_or_else(|| malformed(format!("'{}' is not a number", excerpt(&text))))
+        };
+        let row = |of: &str| {
+            let text = needed(of)?;
+            let row = text.trim().parse();
+            row.map_err(|_| malformed(format!("'{}' is no number of a vertex", excerpt(&text))))
+        };
+        match name.as_ref() {
+            "model" => {
+                check_required(tag)?;
+                let (unit, factor) = unit(attribute("unit")?.as_deref())?;
+                let first = *self.unit.get_or_insert(unit);
+                self.scale = factor * unit.millimetres() / first.millimetres();
+            }
+            "object" => {
+                self.numbers.insert((self.path.clone(), needed("id")?), self.objects.len());
+                self.current = Some(self.objects.len());
+                let kind = attribute("type")?;
+                let is_support =
+                    matches!(kind.as_deref(), Some("support" | "solidsupport" | "other"));
+                self.objects.push(Object { is_support, ..Object::default() });
+            }
+            "vertex" => {
+                let position = [number("x")?, number("y")?, number("z")?];
+                let scale = self.scale;
+                self.object()?.positions.push(position.map(|x| scale * x));
+            }
+            "triangle" => {
+                let triangle = [row("v1")?, row("v2")?, row("v3")?];
+                self.object()?.triangles.push(triangle);
+            }
+            "component" | "item" => {
+                let path = match with_prefix(tag, "path") {
+                    Some(path) => {
+                        let path = path.trim_start_matches('/').to_owned();
+                        self.others.push(path.clone());
+                        path
+                    }
+                    None => self.path.clone(),
+                };
+                let place = transform(attribute("transform")?.as_deref(), self.scale)?;
+                let part = ((path, needed("objectid")?), place);
+                if name.as_ref() == "item" {
+                    self.items.push(part);
+                } else {
+                    self.object()?.parts.push(part);
+                }
+            }
+            other if OTHERS.contains(&other) => self.unread += 1,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn object(&mut self) -> Result<&mut Object> {
+        let object = self.current.and_then(|current| self.objects.get_mut(current));
+        object.ok_or_else(|| malformed("a mesh outside of an object"))
+    }
+
+    fn find(&self, key: &Key) -> Result<usize> {
+        let unknown = || malformed(format!("object {} is not there", excerpt(&key.1)));
+        self.numbers.get(key).copied().ok_or_else(unknown)
+    }
+
+    /// Places every item, and the parts of which it is made.
+    fn assemble(self) -> Result<Raw> {
+        if self.items.is_empty() {
+            return Err(malformed("its build names no object"));
+        }
+        let vertices: usize = self.objects.iter().map(|object| object.positions.len()).sum();
+        let mut raw = Raw::new(0);
+        let items = self.items.iter().rev().map(|(key, place)| Ok((self.find(key)?, *place)));
+        let mut waiting = items.collect::<Result<Vec<_>>>()?;
+        let mut is_placed = vec![false; self.objects.len()];
+        let (mut placed, mut supports) = (0, 0);
+        while let Some((number, place)) = waiting.pop() {
+            let object = &self.objects[number];
+            is_placed[number] = true;
+            placed += 1;
+            if raw.positions.len() + object.positions.len() > MOST_COPIES * vertices
+                || placed > MOST_COPIES * self.objects.len()
+            {
+                let what =
+                    format!("more than {MOST_COPIES} copies of its objects, or one in itself");
+                return Err(malformed(what));
+            }
+            if object.is_support {
+                supports += 1;
+                continue;
+            }
+            object.add_to(&mut raw, &place);
+            for (key, inner) in object.parts.iter().rev() {
+                waiting.push((self.find(key)?, place * *inner));
+            }
+        }
+        raw.unit = self.unit;
+        let is_elsewhere =
+            |(object, placed): &(&Object, &bool)| !**placed && !object.triangles.is_empty();
+        let elsewhere = self.objects.iter().zip(&is_placed).filter(is_elsewhere).count();
+        raw.remark(
+            elsewhere,
+            "object was left out: it is not in the build",
+            "objects were left out: they are not in the build",
+        );
+        raw.remark(
+            supports,
+            "object was left out: it is of a type for supports",
+            "objects were left out: they are of a type for supports",
+        );
+        raw.remark(
+            self.unread,
+            "element of an extension was left out: a lattice, a boolean or the like",
+            "elements of extensions were left out: lattices, booleans or the like",
+        );
+        Ok(raw)
+    }
+}
+
+impl Object {
+    fn add_to(&self, raw: &mut Raw, place: &DMat4) {
+        let first = raw.positions.len() as u32;
+        let positions = self.positions.iter();
+        raw.positions.extend(positions.map(|&p| place.transform_point3(DVec3::from(p)).to_array()));
+        // A mirror turns triangles over: the other way round their outer side stays outside.
+        let is_mirrored = place.determinant() < 0.0;
+        for &[a, b, c] in &self.triangles {
+            let triangle = if is_mirrored { [a, c, b] } else { [a, b, c] };
+            raw.corners.extend(triangle.map(|row| match self.positions.get(row as usize) {
+                Some(_) => first + row,
+                // Of no vertex of any object.
+                None => u32::MAX,
+            }));
+            raw.end_face();
+        }
+    }
+}
+
+/// A reader that does not know an extension that a model requires must refuse it.
+fn check_required(model: &BytesStart<'_>) -> Result<()> {
+    let required = model.try_get_attribute("requiredextensions");
+    let required = required.map_err(|error| malformed(error.to_string()))?;
+    let Some(required) = required else { return Ok(()) };
+    for prefix in required.value.split_whitespace() {
+        let namespace = model.try_get_attribute(format!("xmlns:{prefix}").as_str()).ok().flatten();
+        let namespace = namespace.map_or(prefix.to_owned(), |found| found.value.into_owned());
+        if !KNOWN.iter().any(|known| namespace.contains(known)) {
+            return Err(ReadErrorKind::Foreign {
+                what: format!(
+                    "3MF that requires the extension {}, which is not read",
+                    excerpt(namespace.trim_start_matches(NAMESPACES))
+                ),
+                remedy: "export it without this extension, or as PLY".to_owned(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// An attribute of an extension, whose prefix any letters may be.
+fn with_prefix(tag: &BytesStart<'_>, name: &str) -> Option<String> {
+    let attributes = tag.attributes().filter_map(std::result::Result::ok);
+    let mut named = attributes.filter(|attribute| attribute.key.local_name().as_ref() == name);
+    named.next().map(|attribute| attribute.value.into_owned())
+}
+
+/// The unit that a model states, and how many of it are one of the file's.
+fn unit(name: Option<&str>) -> Result<(Unit, f64)> {
+    Ok(match name {
+        None | Some("millimeter") => (Unit::Millimetre, 1.0),
+        Some("micron") => (Unit::Micrometre, 1.0),
+        Some("centimeter") => (Unit::Centimetre, 1.0),
+        Some("inch") => (Unit::Inch, 1.0),
+        Some("foot") => (Unit::Inch, 12.0),
+        Some("meter") => (Unit::Metre, 1.0),
+        Some(other) => return Err(malformed(format!("the unit '{}'", excerpt(other)))),
+    })
+}
+
+/// Twelve numbers: the images of the axes, and then of the origin, a length.
+fn transform(text: Option<&str>, scale: f64) -> Result<DMat4> {
+    let Some(text) = text else { return Ok(DMat4::IDENTITY) };
+    let numbers: Option<Vec<f64>> = text.split_whitespace().map(coordinate).collect();
+    match numbers.as_ref().map(|numbers| numbers.as_chunks::<3>().0) {
+        Some(&[x, y, z, origin]) => Ok(DMat4::from_cols(
+            DVec3::from(x).extend(0.0),
+            DVec3::from(y).extend(0.0),
+            DVec3::from(z).extend(0.0),
+            (scale * DVec3::from(origin)).extend(1.0),
+        )),
+        _ => Err(malformed(format!("'{}' is no transform", excerpt(text)))),
+    }
+}
