@@ -71,7 +71,8 @@ pub fn print(summary: &Summary) {
         println!("labels   {} different", s.labels);
     }
     let unit = s.unit.map_or_else(String::new, |unit| format!(" in {unit}"));
-    println!("file     {} vertices, {} triangles{unit}", s.file_vertices, s.file_triangles);
+    let plural = if s.file_triangles == 1 { "" } else { "s" };
+    println!("file     {} vertices, {} triangle{plural}{unit}", s.file_vertices, s.file_triangles);
     println!("mesh id  {:08x}", s.mesh_id);
     println!(
         "flash    {} bytes; of these a query reads {} ({:.1} a triangle)",
