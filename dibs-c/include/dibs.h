@@ -336,7 +336,7 @@ enum dibs_code
    */
   DIBS_CODE_SHRUNK = 312,
   /**
-   * A vertex moved faster than its limit.
+   * A vertex moved farther than the limits on speed and recovery allow.
    */
   DIBS_CODE_TOO_FAST = 313,
   /**
@@ -347,6 +347,10 @@ enum dibs_code
    * The tool's side is not known, so it may be inside.
    */
   DIBS_CODE_NO_SIDE = 315,
+  /**
+   * A closed surface is mirrored or inside out.
+   */
+  DIBS_CODE_INSIDE_OUT = 316,
   /**
    * The packet's checksum does not match, or it is too short for one.
    */
@@ -419,6 +423,14 @@ enum dibs_code
    * The packet was refused for another cause.
    */
   DIBS_CODE_PACKET_REFUSED = 417,
+  /**
+   * The surface was captured before the published one.
+   */
+  DIBS_CODE_PACKET_EARLIER = 418,
+  /**
+   * The surface was 65,535 ms old or older when it was sent.
+   */
+  DIBS_CODE_PACKET_TOO_OLD = 419,
   /**
    * A stiffness, damping, largest force or margin is out of range.
    */
@@ -1004,11 +1016,11 @@ typedef struct {
    */
   dibs_watch rejections;
   /**
-   * Time that the published frame was on its way.
+   * Time that the published frame was on its way. With `DIBS_UNLIMITED` it has no limit, and is in the margin.
    */
   dibs_watch transit;
   /**
-   * Age of the published frame when it was sent.
+   * Age of the published frame when it was sent; a safe limit is below 65,534.
    */
   dibs_watch source_age;
   /**
@@ -1027,6 +1039,10 @@ typedef struct {
    * Steps in a row with every input within its first limit, before the one that recovers.
    */
   uint32_t dwell;
+  /**
+   * Other than 0 to leave the time on the way out of the margin and the limits: a delay is then not detected.
+   */
+  uint32_t without_transit;
   /**
    * 0 to leave the safe state by an acknowledgement alone; otherwise without one.
    */
@@ -1120,7 +1136,7 @@ typedef struct {
    */
   uint32_t cause;
   /**
-   * Largest way (mm) of the tissue since the surface was received.
+   * Largest way (mm) of the tissue in the surface's age and the time that it was on its way.
    */
   float margin;
   /**
@@ -1170,13 +1186,18 @@ typedef struct {
    */
   float reach;
   /**
-   * Largest speed of a vertex, in mm per unit of the receiver's clock; `INFINITY` for no limit.
+   * Largest speed of a vertex, in mm per ms (m/s); `INFINITY` for no limit.
    */
   float speed;
   /**
    * Least size of a region as a part of its size at rest, 0.25 for example; 0 for no limit.
    */
   float shrinkage;
+  /**
+   * Farthest (mm) that a vertex may be from its place in the published frame, however long ago that was; 0 for a
+   * tenth of the reach, `INFINITY` for no limit.
+   */
+  float recovery;
 } dibs_surface_limits;
 
 /**
@@ -1662,6 +1683,14 @@ dibs_code dibs_receiver_init(void *storage,
                              dibs_tree *tree,
                              const dibs_surface_limits *limits,
                              dibs_receiver **receiver);
+
+/**
+ * Registers the surface anew: the next whole frame is compared with none before it. For an operator who knows that the
+ * tissue was moved farther than `dibs_surface_limits.recovery`; until then no frame that far away is published.
+ *
+ * @return `DIBS_CODE_OK`, or a misuse.
+ */
+dibs_code dibs_receiver_register(dibs_receiver *receiver);
 
 /**
  * Takes one packet, whole: a datagram, or the data of a CAN-FD message.

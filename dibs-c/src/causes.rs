@@ -82,6 +82,7 @@ impl From<StretchError> for dibs_code {
             StretchError::VertexCount { .. } => Self::VertexCount,
             StretchError::Shrunk { .. } => Self::Shrunk,
             StretchError::TooFast { .. } => Self::TooFast,
+            StretchError::InsideOut { .. } => Self::InsideOut,
             StretchError::Corrupt { .. } => Self::TreeCorrupt,
             _ => Self::StretchExceeded,
         }
@@ -99,6 +100,8 @@ impl From<ReceiveError> for dibs_code {
             ReceiveError::WrongMesh { .. } | ReceiveError::OtherSurface { .. } => Self::PacketMesh,
             ReceiveError::Forged { .. } => Self::PacketForged,
             ReceiveError::Stale { .. } => Self::PacketStale,
+            ReceiveError::Earlier { .. } => Self::PacketEarlier,
+            ReceiveError::TooOld => Self::PacketTooOld,
             ReceiveError::Refused { cause, .. }
             | ReceiveError::Unverifiable { cause: Some(cause), .. } => cause.into(),
             ReceiveError::Unexpected { .. } | ReceiveError::Unverifiable { .. } => {

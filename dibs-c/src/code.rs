@@ -94,12 +94,14 @@ pub enum dibs_code {
     StretchExceeded = 311,
     /// A region of the surface has shrunk below its limit.
     Shrunk = 312,
-    /// A vertex moved faster than its limit.
+    /// A vertex moved farther than the limits on speed and recovery allow.
     TooFast = 313,
     /// There is no surface for another cause.
     Unavailable = 314,
     /// The tool's side is not known, so it may be inside.
     NoSide = 315,
+    /// A closed surface is mirrored or inside out.
+    InsideOut = 316,
     /// The packet's checksum does not match, or it is too short for one.
     PacketDamaged = 400,
     /// The packet is of another protocol version.
@@ -136,6 +138,10 @@ pub enum dibs_code {
     Framing = 416,
     /// The packet was refused for another cause.
     PacketRefused = 417,
+    /// The surface was captured before the published one.
+    PacketEarlier = 418,
+    /// The surface was 65,535 ms old or older when it was sent.
+    PacketTooOld = 419,
     /// A stiffness, damping, largest force or margin is out of range.
     Gain = 500,
     /// A safe limit is below the degraded one.
@@ -210,6 +216,7 @@ impl dibs_code {
         Self::TooFast,
         Self::Unavailable,
         Self::NoSide,
+        Self::InsideOut,
         Self::PacketDamaged,
         Self::PacketVersion,
         Self::PacketForm,
@@ -228,6 +235,8 @@ impl dibs_code {
         Self::PacketDigest,
         Self::Framing,
         Self::PacketRefused,
+        Self::PacketEarlier,
+        Self::PacketTooOld,
         Self::Gain,
         Self::LimitOrder,
         Self::LimitTooLong,
@@ -288,9 +297,10 @@ impl dibs_code {
             Self::NotFinite => c"a number is not finite",
             Self::StretchExceeded => c"a triangle is stretched beyond its limit",
             Self::Shrunk => c"a region of the surface has shrunk below its limit",
-            Self::TooFast => c"a vertex moved faster than its limit",
+            Self::TooFast => c"a vertex moved farther than its limit",
             Self::Unavailable => c"the surface is not available",
             Self::NoSide => c"the tool's side is not known",
+            Self::InsideOut => c"the surface is mirrored or inside out",
             Self::PacketDamaged => c"the packet is damaged",
             Self::PacketVersion => c"the packet is of another protocol version",
             Self::PacketForm => c"the packet is malformed",
@@ -309,6 +319,8 @@ impl dibs_code {
             Self::PacketDigest => c"the packets are not all of one frame",
             Self::Framing => c"bytes of the stream are no packet",
             Self::PacketRefused => c"the packet was refused",
+            Self::PacketEarlier => c"the surface was captured before the published one",
+            Self::PacketTooOld => c"the surface was too old when it was sent to say how old",
             Self::Gain => c"a gain of the constraint is out of range",
             Self::LimitOrder => c"a safe limit is below the degraded one",
             Self::LimitTooLong => c"a limit is 2^31 or more",

@@ -77,9 +77,9 @@ pub struct dibs_limits {
     pub heartbeat: dibs_watch,
     /// Frames refused or abandoned since the last one was published.
     pub rejections: dibs_watch,
-    /// Time that the published frame was on its way.
+    /// Time that the published frame was on its way. With `DIBS_UNLIMITED` it has no limit, and is in the margin.
     pub transit: dibs_watch,
-    /// Age of the published frame when it was sent.
+    /// Age of the published frame when it was sent; a safe limit is below 65,534.
     pub source_age: dibs_watch,
     /// Forged packets, of which 10 are forgotten each second; the limits are below 1,000.
     pub forgeries: dibs_watch,
@@ -89,6 +89,8 @@ pub struct dibs_limits {
     pub recovery_frames: u32,
     /// Steps in a row with every input within its first limit, before the one that recovers.
     pub dwell: u32,
+    /// Other than 0 to leave the time on the way out of the margin and the limits: a delay is then not detected.
+    pub without_transit: u32,
     /// 0 to leave the safe state by an acknowledgement alone; otherwise without one.
     pub automatic: u32,
 }
@@ -105,9 +107,10 @@ impl TryFrom<dibs_limits> for Limits {
             .heartbeat(given.heartbeat.try_into()?)
             .rejections(given.rejections.try_into()?)
             .transit(given.transit.try_into()?)
-            .source_age(given.source_age.try_into()?)
+            .source_age(given.source_age.try_into()?)?
             .forgeries(given.forgeries.try_into()?)?
             .dwell(given.dwell);
+        let limits = if given.without_transit == 0 { limits } else { limits.without_transit() };
         Ok(if given.automatic == 0 { limits } else { limits.automatic() })
     }
 }
@@ -168,7 +171,7 @@ pub struct dibs_verdict {
     pub state: u32,
     /// Cause of a state that is not nominal: a `dibs_code`.
     pub cause: u32,
-    /// Largest way (mm) of the tissue since the surface was received.
+    /// Largest way (mm) of the tissue in the surface's age and the time that it was on its way.
     pub margin: f32,
     /// 1 where only an acknowledgement is missing to leave the safe state; else 0.
     pub waits_for_acknowledgement: u32,
@@ -194,6 +197,7 @@ pub extern "C" fn dibs_failsafe_step(
         }
         let found = failsafe.machine.step(&Observation {
             frame: seen.age.into(),
+            lag: None,
             link: seen.link.into(),
             // The machine needs only the fact; the code is kept here.
             query_error: (query != dibs_code::Ok).then_some(QueryError::NoAdjacency),

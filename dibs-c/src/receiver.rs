@@ -59,10 +59,13 @@ impl dibs_receiver {
 pub struct dibs_surface_limits {
     /// No coordinate is beyond this (mm) on any axis. The smaller, the more damage it tells from a surface.
     pub reach: f32,
-    /// Largest speed of a vertex, in mm per unit of the receiver's clock; `INFINITY` for no limit.
+    /// Largest speed of a vertex, in mm per ms (m/s); `INFINITY` for no limit.
     pub speed: f32,
     /// Least size of a region as a part of its size at rest, 0.25 for example; 0 for no limit.
     pub shrinkage: f32,
+    /// Farthest (mm) that a vertex may be from its place in the published frame, however long ago that was; 0 for a
+    /// tenth of the reach, `INFINITY` for no limit.
+    pub recovery: f32,
 }
 
 /// Makes the receiver of a surface, once.
@@ -92,6 +95,8 @@ pub extern "C" fn dibs_receiver_init(
             }
             let limits = SurfaceLimits::reach_mm(given.reach);
             let limits = limits.speed(given.speed).shrinkage(given.shrinkage);
+            let limits =
+                if given.recovery == 0.0 { limits } else { limits.recovery_mm(given.recovery) };
             let monitor = StretchMonitor::new(tree)?.limits(limits);
             let (writer, mesh_id) = (surface.take_writer()?, tree.mesh_id());
             let assembler = Assembler::new(writer, monitor, mesh_id, given.reach);
@@ -132,6 +137,18 @@ impl From<Progress> for dibs_progress {
             _ => Self::Stored,
         }
     }
+}
+
+/// Registers the surface anew: the next whole frame is compared with none before it. For an operator who knows that the
+/// tissue was moved farther than `dibs_surface_limits.recovery`; until then no frame that far away is published.
+///
+/// @return `DIBS_CODE_OK`, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_receiver_register(receiver: *mut dibs_receiver) -> dibs_code {
+    dibs_code::of(|| {
+        receiver.open()?.assembler.register();
+        Ok(())
+    })
 }
 
 /// Takes one packet, whole: a datagram, or the data of a CAN-FD message.

@@ -113,14 +113,17 @@ impl Control {
         let tool = instrument(tick).ok();
         let before = self.before;
         self.before = tool;
-        let Asked { age: frame, answer, moved } = match &tool {
+        let Asked { age: frame, lag, answer, moved } = match &tool {
             Some(tool) => self.ask(tool, now, clock, &mut record),
             // The pose is not finite, so no query is possible.
-            None => Asked { age: None, answer: Err(Unavailable::NotFinite), moved: None },
+            None => {
+                Asked { age: None, lag: None, answer: Err(Unavailable::NotFinite), moved: None }
+            }
         };
         let link = self.bus.link.read(now);
-        let mut verdict = self.failsafe.step(&Observation {
+        let verdict = self.failsafe.step(&Observation {
             frame,
+            lag,
             link,
             query_error: match answer {
                 Err(Unavailable::Query(error)) => Some(error),
@@ -129,12 +132,6 @@ impl Control {
             is_tree_corrupt: self.bus.is_tree_corrupt()
                 || self.search.tree().check(TREE.bytes()).is_err(),
         });
-        // A surface that moves on is off by the change of the tissue's motion, not by its way since the last frame: as the
-        // last frames showed, and growing as if the velocity changed steadily.
-        if record.shown_error >= 0.0 {
-            let beyond = record.share - 1.0;
-            verdict.margin = record.shown_error * beyond * (beyond + 1.0) / 2.0;
-        }
         self.bus.set_state(verdict.state);
         let admitted = answer.and_then(|closest| verdict.admit(closest));
         let settled = self.last_side.settle(admitted, moved);
@@ -173,7 +170,9 @@ impl Control {
         // The fail-safe machine decides how old a surface may be.
         let frame = match latest.of_any_age() {
             Ok(frame) => frame,
-            Err(unavailable) => return Asked { age, answer: Err(unavailable), moved: None },
+            Err(unavailable) => {
+                return Asked { age, lag: None, answer: Err(unavailable), moved: None };
+            }
         };
         let label = frame.label();
         record.epoch = label.epoch;
@@ -183,6 +182,7 @@ impl Control {
         record.share = surface.share();
         record.shown_error = surface.shown_error().unwrap_or(-1.0);
         record.position_error = surface.position_error();
+        let lag = surface.lag();
 
         let options = Options::new().budget(BUDGET).depth_tolerance(DEPTH_TOLERANCE);
         let start = clock();
@@ -200,9 +200,9 @@ impl Control {
         match answer {
             Ok((closest, moved)) => {
                 write(&closest, record);
-                Asked { age, answer: Ok(closest), moved }
+                Asked { age, lag, answer: Ok(closest), moved }
             }
-            Err(error) => Asked { age, answer: Err(Unavailable::Query(error)), moved: None },
+            Err(error) => Asked { age, lag, answer: Err(Unavailable::Query(error)), moved: None },
         }
     }
 }
@@ -211,6 +211,8 @@ impl Control {
 struct Asked {
     /// Of the frame published last.
     age: Option<FrameAge>,
+    /// The part of the age that the answer's accuracy does not cover.
+    lag: Option<Millis>,
     answer: Result<Proximity, Unavailable>,
     /// Most (mm) that tool and surface have moved since the tick before, where it is known.
     moved: Option<f32>,

@@ -33,8 +33,8 @@ pub struct Tick {
     pub cause: u32,
     /// 1 if there was an answer, else 0.
     pub answered: u32,
-    /// How far the tissue may be off, in mm: by its speed since the frame was received, or by the error that extrapolations
-    /// showed if that is known. The constraint's answer has it added to its accuracy.
+    /// How far the tissue may have moved, in mm: by its speed in the time by which the surface lags, and in that which
+    /// its frame was on its way. The constraint's answer has it added to its accuracy.
     pub margin: f32,
     /// The frame that was searched, if there was an answer.
     pub epoch: u32,

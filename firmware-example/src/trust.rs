@@ -80,7 +80,8 @@ impl Trust {
         let limits = limits
             .heartbeat(watch!(self.heartbeat))
             .rejections(tri!(Watch::count(REJECTIONS.0, REJECTIONS.1)));
-        let limits = limits.transit(watch!(self.transit)).source_age(watch!(self.source_age));
+        let limits = limits.transit(watch!(self.transit));
+        let limits = tri!(limits.source_age(watch!(self.source_age)));
         let forgeries = tri!(Watch::count(FORGERIES.0, FORGERIES.1));
         Ok(tri!(limits.forgeries(forgeries)).dwell(DWELL).automatic())
     }

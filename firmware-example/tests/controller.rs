@@ -138,9 +138,7 @@ fn every_answer_is_that_of_whole_frames() {
                     checked += 1;
                 }
                 (last_epoch, answers) = (tick.epoch, answers + 1);
-                moving += u32::from(
-                    tick.share > 1.0 && tick.share < 3.0 && tick.margin < tick.shown_error * 3.0,
-                );
+                moving += u32::from(tick.share > 1.0 && tick.share < 3.0 && tick.margin < 0.1);
                 if force(&tick) > 0.0 { acting += 1 } else { free += 1 }
             }
         }

@@ -27,7 +27,7 @@ MEMORY(scrub_memory, DIBS_SCRUB_SIZE);
 MEMORY(unmade, 64);
 
 static const dibs_wall wall = {1.0f, 0.002f, 0.002f, 5.0f, 5.0f};
-static const dibs_surface_limits surface_limits = {300.0f, 1e9f, 0.25f};
+static const dibs_surface_limits surface_limits = {300.0f, 1e9f, 0.25f, 0.0f};
 
 static dibs_tree *tree;
 static dibs_frame *frame;
@@ -221,7 +221,7 @@ static void failsafe(void) {
     dibs_proximity found = {0};
     dibs_observation seen = {.query = 12345};
     const dibs_watch off = {DIBS_UNLIMITED, DIBS_UNLIMITED};
-    dibs_limits limits = {off, off, off, off, off, off, off, 0.1f, 1, 0, 0};
+    dibs_limits limits = {off, off, off, off, off, off, off, 0.1f, 1, 0, 0, 0};
     EXPECT(LIMIT_TOO_LONG, dibs_failsafe_init(failsafe_memory, sizeof failsafe_memory, &limits, &machine));
     limits.age = (dibs_watch){60, 20};
     EXPECT(LIMIT_ORDER, dibs_failsafe_init(failsafe_memory, sizeof failsafe_memory, &limits, &machine));

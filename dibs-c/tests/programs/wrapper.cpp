@@ -52,7 +52,7 @@ int main(int argc, char **argv) {
     static dibs::Query other_query;
     static dibs::Tracker<502> trackers[2];
     static dibs::FailSafe failsafe;
-    const dibs_surface_limits surface_limits = {300.0f, std::numeric_limits<float>::infinity(), 0.25f};
+    const dibs_surface_limits surface_limits = {300.0f, std::numeric_limits<float>::infinity(), 0.25f, 0.0f};
     dibs_proximity on_bus, at_rest;
 
     EXPECT(DIBS_CODE_NULL, query.init(tree));

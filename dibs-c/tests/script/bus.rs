@@ -98,7 +98,7 @@ pub fn answers(built: &BuiltTree, events: &[Event]) -> Vec<String> {
         .expect("limits")
         .silence(watch(30, 100))
         .rejections(Watch::count(1, 10).expect("limits"));
-    let mut machine = FailSafe::new(limits.dwell(3).automatic());
+    let mut machine = FailSafe::new(limits.without_transit().dwell(3).automatic());
     let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
     let wall = ForbiddenRegion::new(spring, 5.0).expect("a margin");
 
@@ -130,7 +130,8 @@ pub fn answers(built: &BuiltTree, events: &[Event]) -> Vec<String> {
                 Ok(found)
             });
             let link = link.read(Millis(*now));
-            let seen = Observation { frame, link, query_error: None, is_tree_corrupt: false };
+            let seen =
+                Observation { frame, lag: None, link, query_error: None, is_tree_corrupt: false };
             let verdict = machine.step(&seen);
             let admitted = found.and_then(|found| verdict.admit(found));
             let force = wall.force(&admitted, Vec3::new(10.0, -20.0, 5.0));

@@ -11,7 +11,7 @@ use super::{ModalSurface, Modes};
 use crate::surface::motion::sealed::Sealed;
 use crate::surface::{
     Ahead, Course, FARTHEST, FrameLabel, MeasuredStretch, Millis, MovingSurface, Travel,
-    VertexTable, clamped,
+    VertexTable, clamped, grown,
 };
 
 /// The weights of a surface, and a bound on its stretch.
@@ -94,7 +94,10 @@ impl<const K: usize> Step<K> {
         if let Some(last) = last {
             let share = last.ahead(interval);
             let expected = before.towards(&last.end, share, modes);
-            shown = [last.shown[1], reach.between(&expected.surface(modes), &surface)];
+            // Of a velocity that changes steadily, after as long a time again as this step took.
+            let longer = 2.0 * interval.0 as f32 / (interval.0 as f32 + last.interval.0 as f32);
+            let longer = if longer > 1.0 { longer } else { 1.0 };
+            shown = [last.shown[1], reach.between(&expected.surface(modes), &surface) * longer];
             // Weights and shares are rounded by a few parts in 2^24.
             let rounding = (units(&rest) + step + last.units_ahead) / (1 << 20);
             // At the end, where the error has grown threefold, the surface is off its course by all that was cut.
@@ -130,6 +133,9 @@ pub struct ModalFrame<'a, const K: usize> {
     age: Millis,
     is_frame: bool,
     shown: f32,
+    /// The part of `shown` that is in its error by now.
+    own_error: f32,
+    lag: Millis,
 }
 
 impl<'a, const K: usize> ModalFrame<'a, K> {
@@ -143,8 +149,9 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         age: Millis,
     ) -> Self {
         let surface = weights.surface(modes);
-        let (is_frame, shown) = (true, f32::NAN);
-        Self { surface, label, weights: *weights, travel, step, age, is_frame, shown }
+        let (is_frame, shown, own_error) = (true, f32::NAN, 0.0);
+        let (weights, lag) = (*weights, age);
+        Self { surface, label, weights, travel, step, age, is_frame, shown, own_error, lag }
     }
 
     /// The facts about this frame; of a surface between frames, those of the later. Its position error is that of the
@@ -164,19 +171,25 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         let share = clamped(self.age.0 as f32 / step.interval.0 as f32, 1.0);
         let weights = step.before.towards(&self.weights, share, self.surface.modes());
         let travel = step.from.along((share * step.units as f32) as u64);
-        self.moved(weights, Some(travel), f32::NAN)
+        let lag = if step.interval > self.age { step.interval } else { self.age };
+        self.moved(weights, Some(travel), (f32::NAN, 0.0), lag)
     }
 
     /// The surface now, if every weight has kept its velocity since the last frame: on time, and wrong by the change of
-    /// the motion. O(modes).
+    /// the motion, as the last frames showed it: that error is in its [`position_error`](VertexTable::position_error).
+    /// O(modes).
     ///
     /// It goes on for twice the time between the last two frames, and is held then. No weight leaves its range. It is
-    /// held at once where the surface, moved on for so long, might be stretched beyond the tree's limit.
+    /// held at once before the third frame, and where the surface, moved on for so long, might be stretched beyond the
+    /// tree's limit.
     #[must_use]
     pub fn extrapolated(&self) -> Self {
         let (Some(step), Some(travel)) = (&self.step, self.travel) else { return *self };
         let modes = self.surface.modes();
-        if !step.end.stretch.is_some_and(|end| end.sigma() <= modes.stretch_limit()) {
+        let is_within = |end: MeasuredStretch| end.sigma() <= modes.stretch_limit();
+        // False for NaN: the error is not known before the third frame.
+        let is_known = step.shown[1] >= 0.0;
+        if !is_known || !step.end.stretch.is_some_and(is_within) {
             return *self;
         }
         let share = step.ahead(self.age);
@@ -187,22 +200,36 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         // The change of the motion may have been none by chance. False for NaN.
         let [before, now] = step.shown;
         let shown = if before > now { before } else { now };
-        let shown = if share < 1.0 { shown } else { f32::NAN };
-        self.moved(weights, travel, shown)
+        let end = Millis((step.interval.0 as f32 * FARTHEST) as u32);
+        let lag = Millis(self.age.0.saturating_sub(end.0));
+        self.moved(weights, travel, (shown, grown(shown, share * FARTHEST)), lag)
     }
 
     /// A bound (mm) on the distance of the last frame's vertices from its extrapolation by the two frames before, the
-    /// larger of the last two frames': an estimate of this surface's own error by the time of the next frame, not a
-    /// bound. `None` for a surface between its frames, where it is not known, and once the extrapolation has come to its
-    /// end.
+    /// larger of the last two frames': an estimate of this surface's own error by the time of the next frame.
+    /// [`position_error`](VertexTable::position_error) includes it as far as it has grown. `None` for a surface that is
+    /// not extrapolated.
     #[must_use]
     pub fn shown_error(&self) -> Option<f32> {
         (self.shown >= 0.0).then_some(self.shown)
     }
 
-    fn moved(&self, weights: Weights<K>, travel: Option<Travel>, shown: f32) -> Self {
+    /// The time by which this surface is behind the present: see [`Between::lag`](crate::Between::lag).
+    #[must_use]
+    pub const fn lag(&self) -> Option<Millis> {
+        Some(self.lag)
+    }
+
+    fn moved(
+        &self,
+        weights: Weights<K>,
+        travel: Option<Travel>,
+        (shown, own_error): (f32, f32),
+        lag: Millis,
+    ) -> Self {
         let surface = weights.surface(self.surface.modes());
-        Self { surface, weights, travel, step: None, shown, is_frame: false, ..*self }
+        let (step, is_frame) = (None, false);
+        Self { surface, weights, travel, step, shown, own_error, lag, is_frame, ..*self }
     }
 }
 
@@ -225,7 +252,7 @@ impl<const K: usize> VertexTable for ModalFrame<'_, K> {
     }
 
     fn position_error(&self) -> f32 {
-        self.label.position_error
+        self.label.position_error + self.own_error
     }
 }
 

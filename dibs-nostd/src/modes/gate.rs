@@ -2,8 +2,8 @@
 
 use super::reach::Reach;
 use super::{ModalSurface, Modes, WeightsError};
-use crate::stretch::{Arriving, Changed, Gate, StretchError, Verdict, farthest};
-use crate::surface::VertexTable;
+use crate::stretch::{Arriving, Changed, Gate, StretchError, Verdict};
+use crate::surface::{Millis, VertexTable};
 use crate::tree::SurfaceFacts;
 
 /// Admits weights within their ranges whose surface keeps to the stretch limit, and to a speed limit: the
@@ -14,8 +14,8 @@ use crate::tree::SurfaceFacts;
 /// [`StretchMonitor`](crate::StretchMonitor). So no frame within the limits is refused, and no frame stretched or moved
 /// beyond them is admitted.
 ///
-/// The limit on speed is `G`'s: [`StretchMonitor::limits`](crate::StretchMonitor::limits). Its limit on size holds only
-/// for frames that it measures.
+/// The limits on speed and recovery are `G`'s: [`StretchMonitor::limits`](crate::StretchMonitor::limits). Its limits on
+/// size and on the sign of the volume hold only for frames that it measures.
 #[derive(Clone, Debug)]
 pub struct ModalGate<'a, G, const K: usize> {
     modes: Modes<'a>,
@@ -73,8 +73,8 @@ impl<G: Gate, const K: usize> Gate for ModalGate<'_, G, K> {
         self.exact.surface_facts()
     }
 
-    fn speed_limit(&self) -> f32 {
-        self.exact.speed_limit()
+    fn farthest(&self, elapsed: Millis) -> f32 {
+        self.exact.farthest(elapsed)
     }
 
     fn position_error(&self) -> f32 {
@@ -102,9 +102,8 @@ impl<G: Gate, const K: usize> Gate for ModalGate<'_, G, K> {
             None => {
                 let weights = Self::weights(rows)?;
                 let surface = ModalSurface::new(&self.modes, weights.into_iter());
-                let speed = self.exact.speed_limit();
                 let is_slow = before.as_ref().is_none_or(|(before, elapsed)| {
-                    self.reach.between(before, &surface) <= farthest(speed, *elapsed)
+                    self.reach.between(before, &surface) <= self.exact.farthest(*elapsed)
                 });
                 let bound = self.modes.bound(&weights);
                 if is_slow && bound.sigma() <= self.modes.stretch_limit() {

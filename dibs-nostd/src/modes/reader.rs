@@ -3,9 +3,7 @@
 use super::frame::{Step, Weights};
 use super::reach::Reach;
 use super::{ModalFrame, Modes, WeightsError};
-use crate::surface::{
-    FrameGuard, FrameLabel, FrameReader, Latest, Millis, Travel, VertexTable, elapsed,
-};
+use crate::surface::{FrameGuard, FrameLabel, FrameReader, Latest, Millis, Travel, VertexTable};
 
 /// Reads published weights as surfaces. The double buffer is [`Frames`](crate::Frames) of `K` rows, with one weight in
 /// each.
@@ -110,11 +108,11 @@ impl<const K: usize> Last<K> {
             now.travel = Some(Travel::start(modes.travel.tree));
             return now;
         };
-        let interval = elapsed(received, before.received);
+        let interval = received.since(before.received);
         let weights = [&before.weights, &weights];
         let step = Step::new(modes, reach, weights, (from, interval), before.step.as_ref());
         now.travel = Some(from.along(step.units));
-        now.step = (interval > Millis(0)).then_some(step);
+        now.step = (interval > Millis(0) && interval < Millis(1 << 31)).then_some(step);
         now
     }
 }

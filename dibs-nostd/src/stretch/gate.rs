@@ -33,7 +33,8 @@ pub struct Arriving<'a, V: ?Sized> {
     pub surface: &'a V,
     /// Number of final rows. It only grows within a frame, and is the number of all rows once the frame is complete.
     pub ready: u32,
-    /// The published surface, and the time from its capture to this one's; `None` before the first.
+    /// The published surface, and the time from its capture to this one's; `None` before the first, and for a
+    /// [registration](crate::Assembler::register).
     pub before: Option<(&'a V, Millis)>,
 }
 
@@ -81,9 +82,11 @@ pub trait Gate {
         None
     }
 
-    /// The largest speed of any vertex that the gate admits, in mm per millisecond: see
-    /// [`SurfaceLimits::speed`](crate::SurfaceLimits::speed). Infinite for a gate that compares no frames.
-    fn speed_limit(&self) -> f32 {
+    /// The farthest (mm) that any vertex may be from its place in a surface captured so long before: see
+    /// [`SurfaceLimits::speed`](crate::SurfaceLimits::speed) and
+    /// [`recovery_mm`](crate::SurfaceLimits::recovery_mm). Infinite for a gate that compares no frames.
+    fn farthest(&self, elapsed: Millis) -> f32 {
+        let _ = elapsed;
         f32::INFINITY
     }
 
@@ -95,7 +98,7 @@ pub trait Gate {
 
     /// The stretch at the end of the frame's extrapolation, once it is admitted. `None` where the gate measures none, or it is beyond the limit.
     #[doc(hidden)]
-    fn ahead(&self) -> Option<MeasuredStretch> {
+    fn ahead(&self) -> Option<f32> {
         None
     }
 

@@ -2,9 +2,10 @@
 
 /// Limits for a surface to be published, besides the tree's stretch limit.
 ///
-/// They refuse surfaces in impossible places or shapes. They do not detect a first frame that is turned, mirrored or
-/// moved as a whole (the next correct frame would be too fast), or a part of a region that shrinks while the rest
-/// grows.
+/// They refuse surfaces in impossible places or shapes. A closed surface must enclose a volume of the sign that its
+/// rest shape encloses: a mirrored one is refused, and one turned inside out, however slowly. They do not detect a
+/// first frame that is turned or moved as a whole (the next correct frame would be too far away), a part of a closed
+/// surface that is inside out while the rest encloses more, or a part of a region that shrinks while the rest grows.
 ///
 /// A limit of NaN refuses every frame.
 ///
@@ -19,27 +20,41 @@
 pub struct SurfaceLimits {
     pub(crate) reach: f32,
     pub(super) speed: f32,
+    pub(super) recovery: f32,
     pub(super) shrinkage: f32,
 }
 
 impl SurfaceLimits {
     /// Limits each coordinate of a vertex to `reach` (mm). A smaller reach detects more damage, and improves the
-    /// accuracy of every query. There is no limit on speed, and regions that shrink below a quarter of their size are
-    /// refused.
+    /// accuracy of every query. There is no limit on speed, frames farther than a tenth of the reach from the published
+    /// one are refused, and so are regions that shrink below a quarter of their size.
     #[must_use]
     pub const fn reach_mm(reach: f32) -> Self {
-        Self { reach, speed: f32::INFINITY, shrinkage: 0.25 }
+        Self { reach, speed: f32::INFINITY, recovery: reach * 0.1, shrinkage: 0.25 }
     }
 
     /// The largest speed of any vertex, in mm per millisecond (m/s): from one published frame to the next a
     /// vertex may move by the speed times the time between their captures plus one millisecond.
     ///
     /// After a refused frame the published one ages, which a [`FailSafe`](crate::failsafe::FailSafe) watches, and later
-    /// frames may be farther from it. Frames that were delayed and come in a burst seem faster than they are: allow for
-    /// that.
+    /// frames may be farther from it, up to the limit on [recovery](Self::recovery_mm). A frame captured before a
+    /// published one is not given any time. Frames that were delayed and come in a burst seem faster than they are:
+    /// allow for that.
     #[must_use]
     pub const fn speed(mut self, speed: f32) -> Self {
         self.speed = speed;
+        self
+    }
+
+    /// The farthest (mm) that a vertex may be from its place in the published frame, however long ago that was: after a
+    /// silence, a surface that is mirrored, turned or moved as a whole is not the one that was trusted. A tenth of the
+    /// reach by default; infinite for no limit.
+    ///
+    /// A surface that was really moved farther, say with the patient, is refused until somebody registers it anew:
+    /// [`Assembler::register`](crate::Assembler::register).
+    #[must_use]
+    pub const fn recovery_mm(mut self, distance: f32) -> Self {
+        self.recovery = distance;
         self
     }
 

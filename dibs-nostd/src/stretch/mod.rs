@@ -8,6 +8,7 @@ mod motion;
 mod pass;
 mod regions;
 mod rows;
+mod volume;
 
 use core::fmt;
 
@@ -18,9 +19,6 @@ pub use gate::{Arriving, Changed, Gate, Unchecked, Verdict};
 use kernel::Worst;
 pub use limits::SurfaceLimits;
 pub use monitor::StretchMonitor;
-#[cfg(feature = "modes")]
-pub(crate) use motion::farthest;
-#[cfg(feature = "bus")]
 #[cfg(feature = "bus")]
 pub(crate) use motion::{largest_change, largest_step};
 use regions::{of_regions, region_rows};
@@ -55,13 +53,20 @@ pub enum StretchError {
         /// The least size allowed.
         limit: f32,
     },
-    /// A vertex moved farther since the published frame than the speed limit allows.
+    /// A closed surface encloses a volume of the other sign: it is mirrored, or inside out.
+    InsideOut {
+        /// Its volume (mm³): positive where triangles wind counterclockwise as seen from outside.
+        volume: f32,
+        /// The volume of the rest shape, or of the first frame where the tree has none.
+        reference: f32,
+    },
+    /// A vertex moved farther since the published frame than the limits on speed and recovery allow.
     TooFast {
         /// Row of the vertex.
         vertex: u32,
         /// The distance moved (mm).
         step: f32,
-        /// The distance allowed in the time between the two frames (mm).
+        /// The distance allowed (mm).
         limit: f32,
     },
     /// A row outside its table: the tree's bytes changed after they were validated.
@@ -83,6 +88,9 @@ impl fmt::Display for StretchError {
             }
             Self::Shrunk { triangle, limit } => {
                 write!(f, "the region of triangle {triangle} shrank below {limit} of its size")
+            }
+            Self::InsideOut { volume, reference } => {
+                write!(f, "the surface encloses {volume} where it should {reference}: inside out")
             }
             Self::TooFast { vertex, step, limit } => {
                 write!(

@@ -5,8 +5,9 @@ use core::ops::Range;
 use super::motion::{farthest, largest_step, too_fast};
 use super::pass::{ALL, Pass};
 use super::regions::region_rows;
+use super::volume::Volume;
 use super::{Arriving, Changed, Gate, StretchError, SurfaceLimits, Verdict, check_tables};
-use crate::surface::{Between, MeasuredStretch, REGIONS, TravelUnit, VertexTable};
+use crate::surface::{Between, Millis, REGIONS, TravelUnit, VertexTable};
 use crate::tree::{Index, SurfaceFacts, Tree, TriangleRow};
 
 /// Blocks of vertex rows, at most: they mark the rows that a partial frame moved.
@@ -22,15 +23,16 @@ const BLOCKS: usize = 32;
 /// [`measure_stretch`](super::measure_stretch) on the whole surface, but for a few parts in a million of rounding,
 /// which depend on the triangle that a region began with. The same frames always give the same bits.
 ///
-/// The rows that a frame brings are compared with the published ones; [`SurfaceLimits`] lists the refusals.
+/// The rows that a frame brings are compared with the published ones, and the volume that a closed surface encloses
+/// with that of the rest shape; [`SurfaceLimits`] lists the refusals.
 ///
 /// With `SURFACES` = 2 ([`continuous`](StretchMonitor::continuous)) it measures the end of the frame's extrapolation, too:
 /// `now + 2 (now - before)`, with the published frame before. By convexity the two bound the stretch of all surfaces on
 /// the way.
 ///
 /// Cost: [`advance`](Gate::advance) checks at most `work` rows and triangles, plus O([`REGIONS`]). RAM: 600 bytes
-/// at most, whatever the surface, and 300 bytes more with the extrapolation. [`new`](Self::new) makes one pass over the
-/// triangles.
+/// at most, whatever the surface, and 300 bytes more with the extrapolation. [`new`](Self::new) makes two passes over
+/// the triangles.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -69,14 +71,16 @@ pub struct StretchMonitor<'t, I, const SURFACES: usize = 1> {
     changed: Changed,
     /// The measurement of the frame, and that of its extrapolation.
     passes: [Pass; SURFACES],
-    /// The extrapolation of the frame in work, once measured and within the limit.
-    ahead: Option<MeasuredStretch>,
+    /// The stretch of the extrapolation of the frame in work; NaN unless measured, and within the limit.
+    ahead: f32,
     /// The extrapolation is beyond the limit.
     is_beyond: bool,
     speed: f32,
+    recovery: f32,
     shrinkage: f32,
     /// The square of each region's size at rest.
     rest: [f32; REGIONS],
+    volume: Volume,
     /// Blocks of rows still to be compared with the published ones, and the next row of the first of them.
     blocks_left: u32,
     next_row: u32,
@@ -134,21 +138,24 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
             block_shift: block_shift as u8,
             changed: Changed::Whole,
             passes: [const { Pass::new() }; SURFACES],
-            ahead: None,
+            ahead: f32::NAN,
             is_beyond: false,
             speed: limits.speed,
+            recovery: limits.recovery,
             shrinkage: limits.shrinkage,
             rest,
+            volume: Volume::of(tree),
             blocks_left: ALL,
             next_row: 0,
         })
     }
 
-    /// The same with these limits on speed and size. The assembler limits the reach:
+    /// The same with these limits on speed, recovery and size. The assembler limits the reach:
     /// [`Assembler::for_tree`](crate::Assembler::for_tree).
     #[must_use]
     pub const fn limits(mut self, limits: SurfaceLimits) -> Self {
         self.speed = limits.speed;
+        self.recovery = limits.recovery;
         self.shrinkage = limits.shrinkage;
         self
     }
@@ -176,7 +183,7 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
             self.blocks_left = 0;
             return Ok((work, true));
         };
-        let limit = farthest(self.speed, elapsed);
+        let limit = farthest(self.speed, self.recovery, elapsed);
         if limit == f32::INFINITY {
             self.blocks_left = 0;
         }
@@ -223,10 +230,10 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
         }
         let surface = Between::ahead(before, surface);
         // Beyond the limit, or not finite: no extrapolation.
-        let measured = ahead.advance(self.tree, &surface, ready, (0.0, &self.rest), work);
+        let measured = ahead.advance(self.tree, &surface, ready, (0.0, &self.rest), work, |_| ());
         self.is_beyond = measured.is_err();
         let is_done = measured.is_ok_and(|(_, is_done)| is_done);
-        self.ahead = is_done.then(|| ahead.measured(self.tree, None));
+        self.ahead = if is_done { ahead.measured(self.tree, None).sigma() } else { f32::NAN };
         is_done || self.is_beyond
     }
 }
@@ -236,7 +243,8 @@ impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
         self.changed = changed;
         self.next_row = 0;
         self.blocks_left = if changed == Changed::Whole { ALL } else { 0 };
-        (self.ahead, self.is_beyond) = (None, false);
+        (self.ahead, self.is_beyond) = (f32::NAN, false);
+        self.volume.begin(changed == Changed::Whole);
         for (number, pass) in self.passes.iter_mut().enumerate() {
             // What a partial frame leaves as it was has moved before, so its extrapolation is another one.
             pass.begin(changed == Changed::Whole || number > 0);
@@ -276,18 +284,23 @@ impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
         let ahead = if SURFACES > 1 { work / 2 } else { 0 };
         let (tree, size) = (self.tree, (self.shrinkage, &self.rest));
         let Some(own) = self.passes.first_mut() else { return Ok(Verdict::Pending) };
-        let (left, is_measured) = own.advance(tree, surface, ready, size, work - ahead)?;
+        // What a partial frame moved replaces what was there.
+        let replaced = if self.changed == Changed::Partial { before } else { None };
+        let volume = &mut self.volume;
+        let sum = |rows| volume.add(tree, surface, replaced, rows);
+        let (left, is_measured) = own.advance(tree, surface, ready, size, work - ahead, sum)?;
         let is_ahead =
             SURFACES == 1 || self.look_ahead(before, surface, ready, ahead.saturating_add(left));
         if !is_complete || !is_compared || !is_measured || !is_ahead {
             return Ok(Verdict::Pending);
         }
+        self.volume.check()?;
         let Some(own) = self.passes.first() else { return Ok(Verdict::Pending) };
         Ok(Verdict::Admitted(Some(own.measured(tree, surface.epoch()))))
     }
 
-    fn ahead(&self) -> Option<MeasuredStretch> {
-        self.ahead
+    fn ahead(&self) -> Option<f32> {
+        (self.ahead >= 0.0).then_some(self.ahead)
     }
 
     fn travel_unit(&self) -> Option<TravelUnit> {
@@ -298,11 +311,12 @@ impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
         self.tree.surface_facts()
     }
 
-    fn speed_limit(&self) -> f32 {
-        self.speed
+    fn farthest(&self, elapsed: Millis) -> f32 {
+        farthest(self.speed, self.recovery, elapsed)
     }
 
     fn published(&mut self) {
+        self.volume.published();
         for pass in &mut self.passes {
             pass.published();
         }

@@ -9,10 +9,13 @@ use super::StretchError;
 use crate::math::sqrt::sqrt;
 use crate::surface::{Millis, VertexTable};
 
-/// Most that a vertex may move in this time (mm); infinite without a limit.
-pub(crate) const fn farthest(speed: f32, elapsed: Millis) -> f32 {
+/// Most that a vertex may move in this time (mm), at this speed and never farther than `recovery`; infinite without
+/// either.
+pub(super) const fn farthest(speed: f32, recovery: f32, elapsed: Millis) -> f32 {
     // One millisecond more than the time, because the clock counts whole ones.
-    speed * (elapsed.0 as f32 + 1.0)
+    let way = speed * (elapsed.0 as f32 + 1.0);
+    // A speed or distance of NaN refuses every frame.
+    if way <= recovery || way.is_nan() { way } else { recovery }
 }
 
 /// The largest squared distance of these rows from their previous positions, or `largest` if that is larger. NaN where

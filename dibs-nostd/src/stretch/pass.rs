@@ -59,6 +59,7 @@ impl Pass {
 
     /// Measures at most `work` triangles whose corners are below row `ready`. Returns the work left, and whether all
     /// regions are done. A region must not shrink below `shrinkage` of its size, whose square at rest is in `rest`.
+    /// `measured` is given the rows, each once.
     pub fn advance<I: Index, V: VertexTable + ?Sized>(
         &mut self,
         tree: &Tree<'_, I>,
@@ -66,6 +67,7 @@ impl Pass {
         ready: u32,
         (shrinkage, rest): (f32, &[f32; REGIONS]),
         mut work: u32,
+        mut measured: impl FnMut(Range<u32>),
     ) -> Result<(u32, bool), StretchError> {
         while self.left != 0 {
             let region = self.left.trailing_zeros();
@@ -92,6 +94,7 @@ impl Pass {
             let stop = if rows.end - next < work { rows.end } else { next + work };
             let mut size = self.size;
             let at = rows::scan(tree, surface, next..stop, ready, slot, &mut size)?;
+            measured(next..at);
             self.size = size;
             work -= at - next;
             if at < rows.end {

@@ -25,15 +25,19 @@ impl Course {
 
     /// The course of a surface extrapolated by a `share` of the step, `units` long, to a frame whose label has `ahead`.
     pub fn new(units: u64, ahead: &Ahead, share: f32) -> Self {
-        if units > u64::from(u32::MAX) || ahead.off == Ahead::UNKNOWN.off {
+        if ahead.off == Ahead::UNKNOWN.off {
             return Self::NONE;
         }
-        let part = |units: u32| (share * units as f32) as u32;
-        let passed = ahead.passed.saturating_add(part(ahead.passed));
+        // `1 + share` times as much. No sum overflows: `share` is at most 2.
+        let grown = |units: u32| u64::from(units) + (share * units as f32) as u64;
+        let (passed, off) = (grown(ahead.passed), grown(ahead.off));
         // `share` and products are rounded by a few parts in 2^24.
-        let rounding = passed / (1 << 20) + 2;
-        let off = ahead.off.saturating_add(part(ahead.off)).saturating_add(rounding);
-        Self { units: units as u32, passed, off }
+        let off = off + (passed + off) / (1 << 20) + 2;
+        // Where a number is too large to be kept, nothing is known: a smaller one would understate the motion.
+        match (units.try_into(), passed.try_into(), off.try_into()) {
+            (Ok(units), Ok(passed), Ok(off)) => Self { units, passed, off },
+            _ => Self::NONE,
+        }
     }
 
     /// The farthest that a vertex can be from its place `aside` units beyond the frame before, on the course of that;

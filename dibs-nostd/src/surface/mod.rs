@@ -26,12 +26,12 @@ pub use measured::{Coverage, MeasuredStretch, REGIONS};
 pub use motion::{Moved, MovingSurface, Odometer, Travel, TravelUnit};
 pub use moving::{Between, Step};
 #[cfg(feature = "modes")]
-pub(crate) use moving::{FARTHEST, clamped};
+pub(crate) use moving::{FARTHEST, clamped, grown};
 #[cfg(feature = "bus")]
 pub(crate) use reader::LastStep;
 pub use reader::{FrameGuard, FrameReader, FrameView};
 pub(crate) use time::Ageing;
-#[cfg(any(feature = "bus", feature = "modes"))]
-pub(crate) use time::elapsed;
+#[cfg(feature = "bus")]
+pub(crate) use time::{AHEAD, elapsed};
 pub use time::{Millis, Ticks};
 pub use vertices::{QuantisedVertices, VertexTable};

@@ -121,9 +121,12 @@ impl Travel {
         (self.tree == unit.tree).then(|| self.along(units))
     }
 
-    /// A frame's reading, so many units farther on the path.
+    /// A frame's reading, so many units farther on the path; a start where they are too many to count.
     pub(crate) fn along(self, units: u64) -> Self {
-        Self { reading: self.reading.saturating_add(units), ..self }
+        match self.reading.checked_add(units) {
+            Some(reading) => Self { reading, ..self },
+            None => Self::start(self.tree),
+        }
     }
 
     /// That of a surface so many units off the path; `None` if they are too many to count.

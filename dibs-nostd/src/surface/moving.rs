@@ -9,7 +9,7 @@ use glam::Vec3;
 use super::buffer::Ahead;
 use super::course::Course;
 use super::motion::{Moved, MovingSurface, Travel};
-use crate::{MeasuredStretch, VertexTable};
+use crate::{MeasuredStretch, Millis, VertexTable};
 
 /// Two frames that follow one another, as [`Odometer::step`](crate::Odometer::step) measured them.
 ///
@@ -78,6 +78,12 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
 /// that time is twice as old when the next one comes.
 pub(crate) const FARTHEST: f32 = 2.0;
 
+/// The error of an extrapolation by a part `beyond` of the time between frames, if it was `shown` after one whole: that
+/// of a velocity that changes steadily.
+pub(crate) fn grown(shown: f32, beyond: f32) -> f32 {
+    shown * beyond * (beyond + 1.0) * 0.5
+}
+
 /// A number within 0 and `most`: 0 for NaN.
 pub(crate) fn clamped(share: f32, most: f32) -> f32 {
     let share = if share > 0.0 { share } else { 0.0 };
@@ -95,6 +101,8 @@ pub struct Between<'v, W: ?Sized, V: ?Sized> {
     share: f32,
     travel: Option<Travel>,
     ahead: Ahead,
+    /// The time by which it is behind the present, as far as its error does not cover it; `None` without a clock.
+    lag: Option<Millis>,
 }
 
 impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
@@ -110,7 +118,7 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
         // Off by less than a few units, within a tracker's slack.
         let along = (share * units as f32) as u64;
         let travel = Some(from.along(along));
-        Self { before, after, share, travel, ahead: Ahead::UNKNOWN }
+        Self { before, after, share, travel, ahead: Ahead::UNKNOWN, lag: None }
     }
 
     /// The surface after the later frame.
@@ -123,7 +131,7 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
     ) -> Self {
         let share = clamped(share, FARTHEST);
         let travel = last.beside((share * units as f32) as u64);
-        Self { before, after, share: 1.0 + share, travel, ahead: Ahead::UNKNOWN }
+        Self { before, after, share: 1.0 + share, travel, ahead: Ahead::UNKNOWN, lag: None }
     }
 
     /// The same on a course.
@@ -138,6 +146,23 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
         self
     }
 
+    /// The same, so far behind the present.
+    pub(super) const fn lagging(mut self, lag: Millis) -> Self {
+        self.lag = Some(lag);
+        self
+    }
+
+    /// The time by which this surface is behind the present: the tissue may have moved on for so long, and for the time
+    /// that the frame was on its way. For [`Observation::lag`](crate::failsafe::Observation::lag).
+    ///
+    /// 0 for one that is extrapolated, whose error is in its [`position_error`](VertexTable::position_error); the time
+    /// since the end for one that has come to the end of its extrapolation. The time between the frames for one between
+    /// them. The age for one that is held. `None` for a surface of a [`Step`], which has no clock.
+    #[must_use]
+    pub const fn lag(&self) -> Option<Millis> {
+        self.lag
+    }
+
     /// The surface's place in time: 0 is the earlier frame, 1 the later, 2 as long after it, and 3 the end.
     #[must_use]
     pub const fn share(&self) -> f32 {
@@ -150,26 +175,27 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
         self.before
     }
 
-    /// The largest distance (mm) of a vertex of a frame from its extrapolation by the two frames before, the larger of the
-    /// last two frames': an estimate of this surface's own error by the time of the next frame, not a bound. A surface
-    /// whose velocity changes steadily is three times as far off at the end. `None` for a surface between its frames, where it was not measured,
-    /// and once the extrapolation has come to its end.
+    /// The largest distance (mm) of a vertex of a frame from its extrapolation by the two frames before, the larger of
+    /// the last two frames': an estimate of this surface's own error by the time of the next frame. Where the time
+    /// between frames grew, it is that of a velocity that changes steadily, after as long a time again.
+    /// [`position_error`](VertexTable::position_error) includes it as far as it has grown. `None` for a surface that is
+    /// not extrapolated.
     #[must_use]
     pub fn shown_error(&self) -> Option<f32> {
-        let is_known = self.ahead.shown >= 0.0 && self.share < 1.0 + FARTHEST;
-        is_known.then_some(self.ahead.shown)
+        (self.ahead.shown >= 0.0).then_some(self.ahead.shown)
     }
 }
 
 impl<'v, V: VertexTable + ?Sized> Between<'v, V, V> {
     /// A frame, held.
     pub(super) const fn held(frame: &'v V, travel: Option<Travel>) -> Self {
-        Self { before: frame, after: frame, share: 1.0, travel, ahead: Ahead::UNKNOWN }
+        Self { before: frame, after: frame, share: 1.0, travel, ahead: Ahead::UNKNOWN, lag: None }
     }
 
     /// The end of the extrapolation, whose motion is not measured.
     pub(crate) const fn ahead(before: &'v V, after: &'v V) -> Self {
-        Self { before, after, share: 1.0 + FARTHEST, travel: None, ahead: Ahead::UNKNOWN }
+        let share = 1.0 + FARTHEST;
+        Self { before, after, share, travel: None, ahead: Ahead::UNKNOWN, lag: None }
     }
 }
 
@@ -204,9 +230,16 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> VertexTable for Between<'
         before.of_both(after, sigma * (1.0 + 2.0 * f32::EPSILON))
     }
 
+    /// The frames' errors, by their part in each position, and of an extrapolated surface the change of the motion: the
+    /// [error that the last frames showed](Between::shown_error), growing as if the velocity changed steadily, three
+    /// times as much at the end. That is an estimate: no measurement of the past bounds it.
     fn position_error(&self) -> f32 {
         let (before, after) = (self.before.position_error(), self.after.position_error());
-        (1.0 - self.share).abs() * before + self.share * after
+        let frames = (1.0 - self.share).abs() * before + self.share * after;
+        match self.shown_error() {
+            Some(shown) => frames + grown(shown, self.share - 1.0),
+            None => frames,
+        }
     }
 }
 
@@ -215,3 +248,6 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> MovingSurface for Between
         self.travel
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -96,28 +96,35 @@ impl<'f, const N: usize> FrameGuard<'f, N, Frames<N, 3>> {
     #[must_use]
     pub fn interpolated(&self) -> Between<'_, ContinuousView<'f, N>, ContinuousView<'f, N>> {
         match self.last_step() {
-            Some(step) => step.inside([&self.before, &self.view], self.age),
-            None => Between::held(&self.view, self.view.travel()),
+            Some(step) => {
+                let lag = if step.interval > self.age { step.interval } else { self.age };
+                step.inside([&self.before, &self.view], self.age).lagging(lag)
+            }
+            None => self.held(),
         }
     }
 
     /// The surface now, if every vertex has kept its velocity since the last frame: on time, and wrong by the change of
-    /// the motion. [`Between::shown_error`] is the error that the last frames showed.
+    /// the motion. It carries that error, as the last frames showed it, in its
+    /// [`position_error`](VertexTable::position_error), and so into each answer's accuracy.
     ///
     /// It goes on for twice the time between the last two frames, and is held then: long enough for frames at a steady
-    /// rate whose way to here takes as long as the time between them. It is held at once where the surface, moved on for
-    /// so long, would be stretched beyond the tree's limit.
+    /// rate whose way to here takes as long as the time between them. It is held at once before the third frame, which
+    /// shows the error, and where the surface, moved on for so long, would be stretched beyond the tree's limit. The
+    /// time for which it is held is its [`lag`](Between::lag).
     #[must_use]
     pub fn extrapolated(&self) -> Between<'_, ContinuousView<'f, N>, ContinuousView<'f, N>> {
         let (ahead, before) = (self.view.buffer.ahead(), self.before.buffer.ahead());
         match self.last_step() {
-            Some(step) if ahead.sigma >= 0.0 => {
+            Some(step) if ahead.sigma >= 0.0 && ahead.shown >= 0.0 => {
                 // The change of the motion may have been none by chance. False for NaN.
                 let is_worse = before.shown > ahead.shown;
                 let shown = if is_worse { before.shown } else { ahead.shown };
-                step.outside([&self.before, &self.view], self.age, Ahead { shown, ..ahead })
+                let lag = Millis(self.age.0.saturating_sub(step.end().0));
+                let ahead = Ahead { shown, ..ahead };
+                step.outside([&self.before, &self.view], self.age, ahead).lagging(lag)
             }
-            _ => Between::held(&self.view, self.view.travel()),
+            _ => self.held(),
         }
     }
 
@@ -126,6 +133,10 @@ impl<'f, const N: usize> FrameGuard<'f, N, Frames<N, 3>> {
     #[must_use]
     pub fn before(&self) -> &ContinuousView<'f, N> {
         &self.before
+    }
+
+    fn held(&self) -> Between<'_, ContinuousView<'f, N>, ContinuousView<'f, N>> {
+        Between::held(&self.view, self.view.travel()).lagging(self.age)
     }
 
     fn last_step(&self) -> Option<LastStep> {
@@ -191,8 +202,14 @@ impl LastStep {
     ) -> Option<Self> {
         let (from, travel) = (before.travel()?, after.travel()?);
         let units = travel.after(&from)?;
-        let interval = before.time_to(after.label().received);
-        (interval > Millis(0)).then_some(Self { from, travel, units, interval })
+        // Of two captures in the wrong order, or of one time, no velocity follows.
+        let interval = after.label().received.since(before.label().received);
+        (interval > Millis(0) && interval < Millis(1 << 31)).then_some(Self {
+            from,
+            travel,
+            units,
+            interval,
+        })
     }
 
     /// The surface between the two, `age` after the later, less the time between them.
@@ -227,6 +244,11 @@ impl LastStep {
     #[cfg(feature = "bus")]
     pub const fn units(&self) -> u64 {
         self.units
+    }
+
+    /// The age at which the extrapolation ends, rounded down.
+    const fn end(&self) -> Millis {
+        Millis((self.interval.0 as f32 * FARTHEST) as u32)
     }
 
     fn share(&self, age: Millis) -> f32 {
@@ -267,6 +289,7 @@ impl<'f, const N: usize, F: Buffers> FrameView<'f, N, F> {
     }
 
     /// Time from this frame to one with the stamp `received`.
+    #[cfg(feature = "bus")]
     pub(crate) fn time_to(&self, received: Millis) -> Millis {
         elapsed(received, Millis(self.buffer.received.load(Ordering::Relaxed)))
     }

@@ -83,8 +83,9 @@ impl<T: VertexTable + ?Sized> VertexTable for &T {
 
 /// A table of 16-bit positions, 6 bytes a vertex: `position = origin + step * row`.
 ///
-/// Against the position that was quantised, each axis is off by at most `step / 2` plus the f32 rounding of the result;
-/// a separation's accuracy grows by as much (in length: `step.length() / 2`).
+/// Against the position that was quantised, each axis is off by at most `step / 2` plus the f32 rounding of the result.
+/// The table carries that as its [`position_error`](VertexTable::position_error), so every answer's accuracy includes
+/// it.
 ///
 /// ```
 /// use dibs_nostd::{QuantisedVertices, VertexTable, glam::Vec3};
@@ -92,6 +93,7 @@ impl<T: VertexTable + ?Sized> VertexTable for &T {
 /// let table = QuantisedVertices::new(&rows, Vec3::new(-10.0, 0.0, 0.0), Vec3::splat(0.01));
 /// assert_eq!(table.position(1), Some(Vec3::new(-9.0, 2.0, 655.35)));
 /// assert_eq!(table.position(2), None);
+/// assert!(table.position_error() > 0.0086 && table.position_error() < 0.009); // half of the cells' diagonal
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct QuantisedVertices<'a> {
@@ -118,5 +120,13 @@ impl VertexTable for QuantisedVertices<'_> {
     fn position(&self, vertex: u32) -> Option<Vec3> {
         let &[x, y, z] = self.rows.get(vertex as usize)?;
         Some(self.origin + self.step * Vec3::new(f32::from(x), f32::from(y), f32::from(z)))
+    }
+
+    /// Half of a step on each axis, and the rounding of a product and a sum.
+    fn position_error(&self) -> f32 {
+        let (origin, step) = (self.origin.abs(), self.step.abs());
+        let rounding = (origin + step * (2.0 * 65_535.0)) * (0.5 * f32::EPSILON);
+        // The sum and the length round, too.
+        (step * 0.5 + rounding).length() * (1.0 + 4.0 * f32::EPSILON)
     }
 }

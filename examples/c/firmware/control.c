@@ -17,7 +17,7 @@
 static const dibs_options options = {.budget = {.node_tests = 1800, .triangle_tests = 150},
                                      .depth_tolerance = 0.25f};
 
-/* Limits in ticks, the first degraded and the second safe. The emulated line takes one to three seconds for a frame; those
+/* Limits in ms, the first degraded and the second safe. The emulated line takes one to three seconds for a frame; those
    of a real bus, which brings tens of frames a second, are some tens of milliseconds. */
 static const dibs_limits limits = {
     .age = {4 * TICK_RATE, 6 * TICK_RATE},

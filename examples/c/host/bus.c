@@ -38,6 +38,8 @@ void bus_init(dibs_tree *tree, uint32_t vertices) {
         .tissue_speed = 0.1f,
         .recovery_frames = 2,
         .dwell = 3,
+        /* The frames of the script echo nothing. */
+        .without_transit = 1,
         .automatic = 1};
     must(dibs_surface_init(surface_memory, sizeof surface_memory, vertices, &surface));
     must(dibs_receiver_init(receiver_memory, sizeof receiver_memory, surface, tree, &surface_limits, &receiver));

@@ -14,6 +14,7 @@ mod partial;
 mod properties;
 mod specification;
 mod strangers;
+mod time;
 mod travel;
 mod weights;
 mod weights_between;

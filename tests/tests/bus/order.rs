@@ -116,8 +116,11 @@ fn a_newer_frame_supersedes_an_unfinished_one() {
 fn a_stray_begin_does_not_block_the_line() {
     for (session, epoch) in [(1, 0x3000_0000), (0x4000_0000, 7)] {
         let mut bus = bus();
-        assert_eq!(send(&mut bus, 1, 1), Ok(Some(1)));
         let start = u32::MAX - 150;
+        for packet in frame_of(1, 1) {
+            give_at(&mut bus.0, &packet, start).unwrap();
+        }
+        assert_eq!(bus.0.published().map(|id| id.epoch), Some(1));
         give_at(&mut bus.0, &frame_of(session, epoch)[0], start).unwrap();
         let send_at = |bus: &mut Bus, epoch: u32, after: u32| {
             let mut last = Ok(None);

@@ -143,7 +143,8 @@ fn publications_do_not_hide_forgeries() {
     let other = AesCmac::new(b"another key.....", 7, 77);
     let watch = Watch::count(50, 500).unwrap();
     let age = Watch::new(Millis(60), Millis(120)).unwrap();
-    let limits = Limits::new(age, 0.0).unwrap().forgeries(watch).unwrap().automatic();
+    let limits = Limits::new(age, 0.0).unwrap().without_transit();
+    let limits = limits.forgeries(watch).unwrap().automatic();
     let drain = BusHealth::FORGERIES_A_SECOND;
     for (a_second, worst) in [
         (1, State::Nominal),
@@ -170,7 +171,8 @@ fn publications_do_not_hide_forgeries() {
             link.set(&assembler.health());
             let frame = reader.latest(Millis(now)).frame();
             let link = link.read(Millis(now));
-            let seen = Observation { frame, link, query_error: None, is_tree_corrupt: false };
+            let seen =
+                Observation { frame, lag: None, link, query_error: None, is_tree_corrupt: false };
             let before = machine.state();
             states.push(machine.step(&seen).state);
             changes += u32::from(machine.state() != before);
@@ -195,7 +197,8 @@ fn publications_do_not_hide_forgeries() {
 fn strangers_change_no_state() {
     let age = Watch::new(Millis(60), Millis(120)).unwrap();
     let rejections = Watch::count(10, 30).unwrap();
-    let limits = Limits::new(age, 0.0).unwrap().rejections(rejections).automatic();
+    let limits = Limits::new(age, 0.0).unwrap().without_transit();
+    let limits = limits.rejections(rejections).automatic();
     for strays_a_frame in [1_u32, 11, 31] {
         let (mut assembler, mut reader) = line(mac());
         let (link, mut machine) = (LinkStatus::new(), FailSafe::new(limits));
@@ -216,7 +219,8 @@ fn strangers_change_no_state() {
             }
             link.set(&assembler.health());
             let (frame, link) = (reader.latest(Millis(now)).frame(), link.read(Millis(now)));
-            let seen = Observation { frame, link, query_error: None, is_tree_corrupt: false };
+            let seen =
+                Observation { frame, lag: None, link, query_error: None, is_tree_corrupt: false };
             let before = machine.state();
             if machine.step(&seen).state != before {
                 changes.push((now, machine.state()));

@@ -127,7 +127,9 @@ fn the_surface_between_frames_of_weights_is_where_they_put_it() {
                     let predicted = exact(&modes, &blend(b, &end, share.min(2.0) / 2.0));
                     let frame =
                         exact(&modes, &weights.iter().map(|w| f64::from(*w)).collect::<Vec<_>>());
-                    predicted.iter().zip(&frame).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max)
+                    let growth = (2.0 * share / (1.0 + share)).max(1.0);
+                    let off = predicted.iter().zip(&frame).map(|(a, b)| a.distance(*b));
+                    off.fold(0.0, f64::max) * growth
                 }
                 _ => f64::NAN,
             };
@@ -281,15 +283,18 @@ fn without_a_time_between_frames_nothing_moves() {
     let same = |frame: &ModalFrame<'_, MODES>, moved: ModalFrame<'_, MODES>| {
         positions(frame) == positions(&moved) && moved.shown_error().is_none()
     };
-    for (epoch, (now, is_held)) in (1..).zip([(20, true), (40, false), (40, true), (60, false)]) {
+    // Extrapolated once a third frame has shown the error.
+    let frames = [(20, [true; 2]), (40, [false, true]), (40, [true; 2]), (60, [false, true])];
+    let frames = frames.into_iter().chain([(80, [false; 2])]);
+    for (epoch, (now, is_held)) in (1..).zip(frames) {
         let weights: Vec<f32> =
             anywhere(&modes, &mut rng).iter().map(|weight| weight * 0.02).collect();
         assert!(send(&mut bus, tree.mesh_id(), epoch, &weights, now));
         let frame = reader.latest(Millis(now + 5)).of_any_age().expect("published");
-        assert_eq!(same(&frame, frame.interpolated()), is_held, "{epoch}");
-        assert_eq!(same(&frame, frame.extrapolated()), is_held, "{epoch}");
+        let found = [frame.interpolated(), frame.extrapolated()].map(|moved| same(&frame, moved));
+        assert_eq!(found, is_held, "{epoch}");
         let frame = reader.read().expect("published");
-        assert!(same(&frame, frame.extrapolated()) || epoch == 4, "{epoch}");
+        assert!(same(&frame, frame.extrapolated()) || epoch == 5, "{epoch}");
     }
 }
 
@@ -309,8 +314,10 @@ fn an_extrapolation_ends_at_the_ends_of_the_ranges() {
         };
         assert!(send(&mut bus, tree.mesh_id(), 1, &at(0.2), 20));
         assert!(reader.read().is_some());
-        assert!(send(&mut bus, tree.mesh_id(), 2, &at(0.7), 40));
-        let frame = reader.latest(Millis(80)).of_any_age().expect("published");
+        assert!(send(&mut bus, tree.mesh_id(), 2, &at(0.45), 40));
+        assert!(reader.read().is_some());
+        assert!(send(&mut bus, tree.mesh_id(), 3, &at(0.7), 60));
+        let frame = reader.latest(Millis(100)).of_any_age().expect("published");
         let moved = frame.extrapolated();
         if moved.epoch().is_none() {
             let last = at(1.0).map(f64::from);

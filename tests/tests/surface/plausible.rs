@@ -5,7 +5,7 @@ use std::path::Path;
 
 use dibs_build::{Builder, BuiltTree, Motion, generate};
 use dibs_nostd::glam::{Quat, Vec3};
-use dibs_nostd::wire::{Encoding, Event, FrameId};
+use dibs_nostd::wire::{Encoding, Event, FrameEncoder, FrameId};
 use dibs_nostd::{
     Advance, Arriving, Assembler, Changed, FrameReader, Frames, Gate, Millis, ReceiveError,
     StretchError, StretchMonitor, SurfaceLimits, Tree, Verdict, VertexTable,
@@ -36,10 +36,28 @@ impl Bus {
 
     /// Sends a frame whose first packet arrives at `now`, with `work` done after every packet.
     fn send(&mut self, rows: &[Vec3], now: u32, work: u32) -> Result<(), ReceiveError> {
+        self.send_on(None, rows, now, work)
+    }
+
+    /// The same; of a surface whose rows were `base` as the part that changed.
+    fn send_on(
+        &mut self,
+        base: Option<&[Vec3]>,
+        rows: &[Vec3],
+        now: u32,
+        work: u32,
+    ) -> Result<(), ReceiveError> {
+        let published = self.epoch;
         self.epoch += 1;
         let id = FrameId { mesh_id: self.tree.mesh_id(), session: 1, epoch: self.epoch };
-        let encoder =
-            dibs_nostd::wire::FrameEncoder::<_, 256>::new(id, Encoding::Float, rows).unwrap();
+        let encoder = match base {
+            Some(base) => {
+                while self.assembler.advance(1_000)? != Advance::Idle {}
+                FrameEncoder::<_, 256>::partial(id, Encoding::Float, rows, published, base)
+            }
+            None => FrameEncoder::<_, 256>::new(id, Encoding::Float, rows),
+        };
+        let encoder = encoder.unwrap();
         for packet in collect(encoder) {
             self.assembler.accept(&packet, Millis(now))?;
             self.assembler.advance(work)?;
@@ -131,15 +149,99 @@ fn a_surface_that_is_mirrored_turned_or_jumped_is_too_fast() {
             );
             assert_eq!(bus.assembler.counters().rejected(), 1, "{name}: nothing else");
         }
-        // As first frames these pass: without an earlier frame there is no speed.
-        for (name, rows) in &wrong[..3] {
+        // As first frames these pass, but for the mirrored one: without an earlier frame there is no speed.
+        for (name, rows) in &wrong[1..3] {
             assert_eq!(Bus::new(built, limits).send(rows, 0, work), Ok(()), "{name}");
         }
-        // After enough time the jump passes: 200 mm in two seconds are 0.1 mm a tick.
-        let mut bus = Bus::new(built, limits);
+        let mirrored = Bus::new(built, limits).send(&wrong[0].1, 0, work);
+        assert!(is_inside_out(&mirrored), "{mirrored:?}");
+        // After enough time the jump passes, without a limit on recovery: 200 mm in two seconds are 0.1 mm a tick.
+        let mut bus = Bus::new(built, limits.recovery_mm(f32::INFINITY));
         bus.send(&rest, 0, work).unwrap();
         assert!(bus.send(&wrong[2].1, 1_990, work).is_err());
         assert_eq!(bus.send(&wrong[2].1, 2_000, work), Ok(()));
+    }
+}
+
+const fn is_inside_out(outcome: &Result<(), ReceiveError>) -> bool {
+    matches!(outcome, Err(ReceiveError::Stretch(StretchError::InsideOut { .. })))
+}
+
+/// After any silence a surface comes back near its last trusted pose, or somebody registers it anew.
+#[test]
+fn a_silence_admits_no_other_surface() {
+    let (built, motion) = heart();
+    let rest = built.to_rows(&motion.frames[0]);
+    let centre = rest.iter().copied().sum::<Vec3>() / N as f32;
+    let of = |f: &dyn Fn(Vec3) -> Vec3| rest.iter().map(|&p| f(p)).collect::<Vec<_>>();
+    let turned = |axis, angle| of(&|p| centre + Quat::from_axis_angle(axis, angle) * (p - centre));
+    let moved = of(&|p| p + Vec3::X * 56.0);
+    let wrong = [
+        ("mirrored", of(&|p| (p - centre) * Vec3::new(-1.0, 1.0, 1.0) + centre)),
+        ("inside out", of(&|p| centre * 2.0 - p)),
+        ("half a turn", turned(Vec3::X, std::f32::consts::PI)),
+        ("a quarter turn", turned(Vec3::Y, std::f32::consts::FRAC_PI_2)),
+        ("moved", moved.clone()),
+    ];
+    // With the default, a tenth of the reach; with one of its own; and without a limit on speed.
+    let reach = SurfaceLimits::reach_mm(250.0);
+    let all = [reach.speed(SPEED), reach.speed(SPEED).recovery_mm(40.0), reach];
+    for (limits, most) in all.into_iter().zip([25.0, 40.0, 25.0]) {
+        for silence in [2_000, 600_000, 1 << 31, u32::MAX - 200_000] {
+            for (name, rows) in &wrong {
+                let mut bus = Bus::new(built, limits);
+                bus.send(&rest, 1_000, 64).unwrap();
+                let later = 1_000_u32.wrapping_add(silence);
+                let refused = bus.send(rows, later, 64);
+                let is_far = matches!(
+                    refused,
+                    Err(ReceiveError::Stretch(StretchError::TooFast { limit, .. }))
+                        if limit == most
+                );
+                assert!(is_far, "{name} after {silence}: {refused:?}");
+                // The surface as it was, and as far as the limit allows, passes.
+                let near = of(&|p| p + Vec3::X * (most - 1.0));
+                assert_eq!(bus.send(&near, later, 64), Ok(()), "{silence}");
+            }
+        }
+    }
+    // A registration admits one surface elsewhere, but not an inside-out one; from there on the limits hold again.
+    let mut bus = Bus::new(built, reach);
+    bus.send(&rest, 0, 64).unwrap();
+    bus.assembler.register();
+    assert!(is_inside_out(&bus.send(&wrong[0].1, 20, 64)));
+    assert_eq!(bus.send(&moved, 40, 64), Ok(()));
+    assert!(bus.send(&rest, 60, 64).is_err());
+    assert_eq!(bus.send(&moved, 80, 64), Ok(()));
+}
+
+/// A closed surface is turned inside out through a plane, by small steps within all other limits: by whole frames, and
+/// by partial ones. It is refused once its volume has the other sign.
+#[test]
+fn a_surface_is_not_turned_inside_out_however_slowly() {
+    let (built, motion) = heart();
+    let rest = built.to_rows(&motion.frames[0]);
+    let centre = rest.iter().copied().sum::<Vec3>() / N as f32;
+    for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+        for is_partial in [false, true] {
+            let mut bus = Bus::new(built, SurfaceLimits::reach_mm(1e3).shrinkage(0.0));
+            bus.send(&rest, 0, 64).unwrap();
+            let (mut held, mut scale, mut refused) = (rest.clone(), 1.0_f32, None);
+            for number in 1..400 {
+                scale -= 0.005;
+                let at = |p: &Vec3| centre + (*p - centre) * (Vec3::ONE - axis * (1.0 - scale));
+                let rows: Vec<Vec3> = rest.iter().map(at).collect();
+                let base = is_partial.then_some(held.as_slice());
+                if let Err(error) = bus.send_on(base, &rows, 20 * number, 64) {
+                    refused = Some((scale, error));
+                    break;
+                }
+                held = rows;
+            }
+            let (scale, error) = refused.expect("refused");
+            assert!(is_inside_out(&Err(error)), "{error}");
+            assert!(scale < 0.0 && scale > -0.03, "{axis}, {is_partial}: at {scale}");
+        }
     }
 }
 

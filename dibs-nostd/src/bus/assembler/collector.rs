@@ -9,7 +9,7 @@ use crate::bus::wire::{
     Answer, Begin, Commit, Content, Counters, Event, FrameId, Heartbeat, Hello, Mac, Packet,
     PublishedStatus, Status, is_newer,
 };
-use crate::surface::{Millis, elapsed};
+use crate::surface::{AHEAD, Millis, elapsed};
 use crate::tree::SurfaceFacts;
 
 /// The frame in work.
@@ -37,7 +37,11 @@ pub(super) struct Frame {
 struct Published {
     id: FrameId,
     captured: Millis,
-    source_age: Millis,
+    /// The age that was stated: below 65,535.
+    source_age: u16,
+    /// By how long this capture is before the latest of any published frame: a surface may go back by a clock's jitter,
+    /// its time does not.
+    back: u16,
     transit: Millis,
     /// The greatest age that was reported: a wrap of the clock does not make it young again.
     oldest: Millis,
@@ -65,6 +69,8 @@ pub(super) struct Collector {
     pub frame: Option<Frame>,
     heartbeat: Option<LastHeartbeat>,
     wants_whole: bool,
+    /// The next whole frame is a new registration.
+    pub is_registration: bool,
     /// Statuses made so far.
     statuses: u32,
     /// The nonce of the last hello, until a status answers it.
@@ -87,6 +93,10 @@ const STRAGGLERS: u32 = 16;
 /// Time without a packet after which an earlier frame may replace the one in work.
 const PATIENCE: Millis = Millis(100);
 
+/// The longest time by which a capture can be earlier than a published one: more than any age that a packet states. A
+/// longer time back is one forward, on a clock that wraps.
+const EARLIEST: Millis = Millis(1 << 17);
+
 impl Collector {
     pub const fn new(mesh_id: u32) -> Self {
         Self {
@@ -95,6 +105,7 @@ impl Collector {
             frame: None,
             heartbeat: None,
             wants_whole: false,
+            is_registration: false,
             statuses: 0,
             hello: None,
             straggler: None,
@@ -150,7 +161,7 @@ impl Collector {
     /// The numbers that a fail-safe machine watches.
     pub fn health(&self) -> BusHealth {
         let (transit, source_age) = match &self.published {
-            Some(published) => (published.transit, published.source_age),
+            Some(published) => (published.transit, Millis(published.source_age.into())),
             None => (Millis::MAX, Millis::MAX),
         };
         let (rejections, forgeries) = self.trouble.counts(self.now);
@@ -185,6 +196,16 @@ impl Collector {
             return Err(ReceiveError::Stale { epoch });
         }
         is_acceptable(&begin)?;
+        let age_ms = begin.freshness.age_ms;
+        if age_ms == u16::MAX {
+            return Err(ReceiveError::TooOld);
+        }
+        let captured = self.now.before(Millis(age_ms.into()));
+        if let Some(Err(by)) = self.since_newest(captured)
+            && by > AHEAD
+        {
+            return Err(ReceiveError::Earlier { by });
+        }
         if let Content::Partial { base_epoch } = begin.content {
             let base = FrameId { epoch: base_epoch, ..id };
             if self.published.is_none_or(|published| published.id != base) {
@@ -315,8 +336,7 @@ impl Collector {
             self.frame = None;
             return Err(ReceiveError::Digest { stated, computed });
         }
-        let is_partial = matches!(frame.begin.content, Content::Partial { .. });
-        if !is_partial && rows != frame.begin.rows {
+        if !frame.is_partial() && rows != frame.begin.rows {
             self.frame = None;
             return Err(ReceiveError::RowCount { rows });
         }
@@ -378,6 +398,12 @@ impl Collector {
     pub fn published(&mut self, frame: &Frame) {
         self.frame = None;
         self.wants_whole = false;
+        self.is_registration &= frame.is_partial();
+        let back = match self.since_newest(frame.captured()) {
+            // At most a clock's jitter, or the frame had been refused.
+            Some(Err(Millis(by))) => by as u16,
+            _ => 0,
+        };
         let freshness = frame.begin.freshness;
         // An echo from the future comes from another run of this receiver.
         let transit = freshness.echo.map(|echo| elapsed(frame.received, Millis(echo)));
@@ -386,13 +412,34 @@ impl Collector {
         self.published = Some(Published {
             id: frame.id,
             captured: frame.captured(),
-            source_age: Millis(freshness.age_ms.into()),
+            back,
+            source_age: freshness.age_ms,
             transit: transit.unwrap_or(Millis::MAX),
             oldest: Millis(0),
         });
         // The published session is the sender's: a heartbeat of another one was stray.
         self.heartbeat = self.heartbeat.filter(|last| last.session == frame.id.session);
         self.counters.count(Event::Published);
+    }
+
+    /// The time from the latest published capture to this one, or by how long this one is earlier.
+    fn since_newest(&self, captured: Millis) -> Option<Result<Millis, Millis>> {
+        let Published { captured: last, back, .. } = self.published?;
+        let newest = last.after(Millis(back.into()));
+        let by = newest.since(captured);
+        let is_earlier = by > Millis(0) && by <= EARLIEST;
+        Some(if is_earlier { Err(by) } else { Ok(captured.since(newest)) })
+    }
+
+    /// The time in which the published surface became that of the frame in work: 0 for one captured earlier.
+    pub fn time_to(&self, frame: &Frame) -> Option<Millis> {
+        let time = self.since_newest(frame.captured())?;
+        Some(time.unwrap_or(Millis(0)))
+    }
+
+    /// The next whole frame is a new registration.
+    pub const fn register(&mut self) {
+        self.is_registration = true;
     }
 
     pub fn want_whole(&mut self) {
@@ -444,6 +491,10 @@ impl Misplaced {
 }
 
 impl Frame {
+    pub const fn is_partial(&self) -> bool {
+        matches!(self.begin.content, Content::Partial { .. })
+    }
+
     /// The receiver's clock at the surface's capture, if the begin took no time on its way.
     pub fn captured(&self) -> Millis {
         self.received.before(Millis(self.begin.freshness.age_ms.into()))

@@ -4,6 +4,7 @@ use core::fmt;
 
 use crate::StretchError;
 use crate::bus::wire::{Event, PacketError};
+use crate::surface::Millis;
 use crate::tree::SurfaceFacts;
 
 /// Why a packet, or the frame that it would have finished, was rejected. The frame published last
@@ -37,6 +38,13 @@ pub enum ReceiveError {
         /// The packet's epoch.
         epoch: u32,
     },
+    /// The surface was captured before the published one, by more than the jitter of a clock.
+    Earlier {
+        /// By so long.
+        by: Millis,
+    },
+    /// The surface was 65,535 ms old or older when it was sent: how old, the packet cannot say.
+    TooOld,
     /// Rows or a commit of a frame whose begin never came, or that was abandoned.
     Unexpected {
         /// The packet's epoch.
@@ -135,7 +143,7 @@ impl ReceiveError {
             Self::Packet(_) => Event::Malformed,
             Self::WrongMesh { .. } | Self::OtherSurface { .. } => Event::WrongMesh,
             Self::Forged { .. } => Event::Forged,
-            Self::Stale { .. } => Event::Stale,
+            Self::Stale { .. } | Self::Earlier { .. } | Self::TooOld => Event::Stale,
             Self::Unexpected { .. }
             | Self::Refused { .. }
             | Self::Unverifiable { .. }
@@ -174,6 +182,10 @@ impl fmt::Display for ReceiveError {
             }
             Self::Forged { epoch } => write!(f, "a packet of frame {epoch} has no genuine tag"),
             Self::Stale { epoch } => write!(f, "frame {epoch} is not later than what is here"),
+            Self::Earlier { by } => {
+                write!(f, "the surface was captured {by} before the published one")
+            }
+            Self::TooOld => write!(f, "the surface was 65,535 ms old or older when it was sent"),
             Self::Unexpected { epoch } => write!(f, "frame {epoch} is not being received"),
             Self::Refused { epoch, cause } => {
                 write!(f, "frame {epoch} was refused before: {cause}")

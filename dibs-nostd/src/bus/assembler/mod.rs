@@ -324,6 +324,13 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
         self.writer.front()
     }
 
+    /// Registers the surface anew: the next whole frame is compared with no frame before it, as the first one is. For
+    /// an operator who knows that the tissue was moved, say with the patient, beyond the limit on
+    /// [recovery](SurfaceLimits::recovery_mm). Until then no frame that far away is published.
+    pub const fn register(&mut self) {
+        self.collector.register();
+    }
+
     /// The gate.
     #[must_use]
     pub const fn gate(&self) -> &G {
@@ -370,7 +377,14 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
                 return Ok(Advance::Pending);
             }
         }
-        let before = front.as_ref().map(|front| (front, front.time_to(frame.captured())));
+        // A registration is compared with nothing. A partial frame is none: the rest of it is the published one's.
+        let is_registration = self.collector.is_registration && !frame.is_partial();
+        let before = front.as_ref().filter(|_| !is_registration);
+        let time = |front: &FrameView<'_, N, F>| {
+            let time = self.collector.time_to(frame);
+            time.unwrap_or_else(|| front.time_to(frame.captured()))
+        };
+        let before = before.map(|front| (front, time(front)));
         let verdict = self.gate.advance(Arriving { surface: &back, ready, before }, work);
         match verdict {
             Err(error) => {
@@ -391,7 +405,7 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
                 };
                 let before = front.and_then(|front| front.travel());
                 let travel = unit.map(|unit| self.step.travel(&unit, before));
-                let sigma = self.gate.ahead().map_or(f32::NAN, |ahead| ahead.sigma());
+                let sigma = self.gate.ahead().unwrap_or(f32::NAN);
                 let ahead = Ahead { sigma, ..self.step.ahead(unit.as_ref()) };
                 self.writer.set_label(label, travel, ahead);
                 self.is_admitted = true;

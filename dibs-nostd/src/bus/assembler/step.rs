@@ -75,7 +75,11 @@ impl Step {
             _ => None,
         };
         let (passed, off) = known.unwrap_or((0, Ahead::UNKNOWN.off));
-        Ahead { shown: sqrt(self.off), passed, off, ..Ahead::UNKNOWN }
+        // Of a velocity that changes steadily, after as long a time again as the last step took: more than was seen, if
+        // the step took longer than the one before.
+        let growth = 2.0 * self.share / (1.0 + self.share);
+        let growth = if growth > 1.0 { growth } else { 1.0 };
+        Ahead { shown: sqrt(self.off) * growth, passed, off, ..Ahead::UNKNOWN }
     }
 
     /// The odometer's reading after the step from a frame with the reading `before`; a start where that is unknown, or

@@ -1,48 +1,91 @@
 //! Limits on faults that the age alone does not show: delay on the way, a source that stands still, forgeries.
 
 use super::{LimitError, Limits, Link, State, Watch};
+use crate::surface::Millis;
 use crate::unavailable::Unavailable;
 
-/// The limits, off by default.
+/// The limits. By default the way is watched, with the limits on age, and the rest is not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Freshness {
-    transit: Watch,
+    transit: Transit,
     source_age: Watch,
     forgeries: Watch<u32>,
 }
 
 impl Freshness {
     pub const OFF: Self =
-        Self { transit: Watch::OFF, source_age: Watch::OFF, forgeries: Watch::OFF };
+        Self { transit: Transit::AsAge, source_age: Watch::OFF, forgeries: Watch::OFF };
+
+    /// The time that a frame may have been on its way, as far as it counts.
+    pub const fn transit(&self, link: &Link) -> Millis {
+        match self.transit {
+            Transit::LeftOut => Millis(0),
+            Transit::AsAge | Transit::Watched(_) => link.transit,
+        }
+    }
 
     /// The level that each input requires, and its cause.
-    pub fn levels(&self, link: &Link) -> [(State, Unavailable); 3] {
-        let Link { transit, source_age, forgeries, .. } = *link;
+    pub fn levels(&self, link: &Link, age: Watch) -> [(State, Unavailable); 3] {
+        let Link { source_age, forgeries, .. } = *link;
+        let transit = self.transit(link);
+        let watch = match self.transit {
+            Transit::Watched(watch) => watch,
+            Transit::AsAge | Transit::LeftOut => age,
+        };
         [
-            (self.transit.level(transit), Unavailable::Delayed { transit }),
+            (watch.level(transit), Unavailable::Delayed { transit }),
             (self.source_age.level(source_age), Unavailable::SourceStale { age: source_age }),
             (self.forgeries.level(forgeries), Unavailable::Forgeries { count: forgeries }),
         ]
     }
 }
 
+/// What becomes of the time that a frame was on its way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+enum Transit {
+    /// In the margin, with the limits on age.
+    AsAge,
+    /// In the margin, with limits of its own.
+    Watched(Watch),
+    /// Left out of margin and limits.
+    LeftOut,
+}
+
+/// A frame that was older when it was sent is not published, because its packets cannot say how old.
+const OLDEST: Millis = Millis(u16::MAX as u32 - 1);
+
 impl Limits {
     /// Limits on the time that the published frame was on its way, measured from the status that it echoes: no clock of
     /// the sender is needed. Normally it is the time between two statuses plus the way there and back. A frame without
-    /// an echo is beyond every limit.
+    /// an echo is beyond every limit. By default these are the limits on age. The margin includes this time.
     #[must_use]
     pub const fn transit(mut self, watch: Watch) -> Self {
-        self.freshness.transit = watch;
+        self.freshness.transit = Transit::Watched(watch);
+        self
+    }
+
+    /// Leaves the time that frames are on their way out of the margin and out of the limits: for a bus whose delay is
+    /// short for reasons that this machine does not see. A delay is then not detected, and no margin covers it.
+    #[must_use]
+    pub const fn without_transit(mut self) -> Self {
+        self.freshness.transit = Transit::LeftOut;
         self
     }
 
     /// Limits on the age of the published frame when it was sent: a source that stands still while its
     /// sender lives.
-    #[must_use]
-    pub const fn source_age(mut self, watch: Watch) -> Self {
+    ///
+    /// # Errors
+    /// [`LimitError::Untrippable`] if the safe limit is 65,534 ms or more: no frame older than that is published.
+    pub const fn source_age(mut self, watch: Watch) -> Result<Self, LimitError> {
+        let safe = watch.safe();
+        if safe.0 >= OLDEST.0 && safe.0 != Millis::MAX.0 {
+            return Err(LimitError::Untrippable { safe: safe.0 });
+        }
         self.freshness.source_age = watch;
-        self
+        Ok(self)
     }
 
     /// Limits on forged packets, of which [`BusHealth::FORGERIES_A_SECOND`](crate::BusHealth::FORGERIES_A_SECOND) are

@@ -106,8 +106,9 @@ const fn check(degraded: u32, safe: u32) -> Result<(), LimitError> {
 
 /// The machine's limits, and its conditions for recovery.
 ///
-/// Only the age must be watched; every other input is off by default. By default one good frame, 1,000 clear
-/// steps and an acknowledgement recover.
+/// Only the age must be watched. The time that frames are on their way has the same limits, unless they are given or
+/// [left out](Self::without_transit); every other input is off by default. By default one good
+/// frame, 1,000 clear steps and an acknowledgement recover.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Limits {
@@ -126,7 +127,8 @@ pub struct Limits {
 const DWELL: u32 = 1_000;
 
 impl Limits {
-    /// Limits on the surface's age, and the largest speed of any of its points, in mm per millisecond (m/s). 0 adds no margin for age.
+    /// Limits on the surface's age, and the largest speed of any of its points, in mm per millisecond (m/s). 0 adds no
+    /// margin for age and transit.
     ///
     /// # Errors
     /// [`LimitError`] if the age is not watched, or the speed is negative or not finite.
@@ -216,11 +218,11 @@ impl Limits {
         self.age
     }
 
-    /// Distance that tissue may move within an age, in mm, rounded up.
+    /// Distance that tissue may move within a time, in mm, rounded up.
     #[must_use]
-    pub fn margin(&self, age: Millis) -> f32 {
+    pub fn margin(&self, time: Millis) -> f32 {
         // Conversion and product each round by at most half an epsilon.
-        age.0 as f32 * self.tissue_speed * (1.0 + 2.0 * f32::EPSILON)
+        time.0 as f32 * self.tissue_speed * (1.0 + 2.0 * f32::EPSILON)
     }
 }
 

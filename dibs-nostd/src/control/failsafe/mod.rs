@@ -7,12 +7,13 @@
 //!
 //! | state | the constraint's input | meaning |
 //! |---|---|---|
-//! | [`State::Nominal`] | the answer, widened by age x tissue speed | every input is within its limits |
+//! | [`State::Nominal`] | the answer, widened by (age + transit) x tissue speed | every input is within its limits |
 //! | [`State::Degraded`] | the same, and the margin grows with the age | an input is beyond its first limit, or was: tell the operator |
 //! | [`State::Safe`] | [`Unavailable`]: the constraint's hold | an input is beyond its second limit, or was: the surface is not acted on |
 //!
 //! The answer is widened in the nominal state too, so that the force does not jump where the state
-//! changes: the margin is one continuous function of the age.
+//! changes: the margin is one continuous function of the age. It covers the time that the frame was on its way, too,
+//! which only [`Limits::without_transit`] leaves out.
 //!
 //! # Transitions
 //!
@@ -67,6 +68,9 @@ pub use status::LinkStatus;
 pub struct Observation {
     /// The published frame and its age: [`Latest::frame`](crate::Latest::frame); `None` before the first.
     pub frame: Option<FrameAge>,
+    /// The time by which the surface that was searched is behind the present, as far as its own error does not cover
+    /// it: [`Between::lag`](crate::Between::lag). `None` for the frame as it was published, whose lag is its age.
+    pub lag: Option<Millis>,
     /// The bus's health.
     pub link: Link,
     /// The error of the query on that frame, if it returned one.
@@ -97,7 +101,8 @@ pub struct Verdict {
     /// Why it is not nominal: the first input that requires the state, in the order missing surface, query, tree, age,
     /// link. If none requires it any more, the last cause remains.
     pub cause: Option<Unavailable>,
-    /// Most that the tissue may have moved since the surface was received, in mm: age times speed.
+    /// Most that the tissue may have moved from the surface that was searched, in mm: its lag and its way, times the
+    /// speed.
     pub margin: f32,
     /// Whether only an acknowledgement is missing to leave the safe state.
     pub waits_for_acknowledgement: bool,
@@ -130,7 +135,7 @@ impl Verdict {
 /// let mut state = |now: u32, epoch, received: u32| {
 ///     let (age, received) = (Millis(now - received), Millis(received));
 ///     let frame = Some(FrameAge { epoch, received, age }); // from `Latest::frame`
-///     let seen = Observation { frame, link, query_error: None, is_tree_corrupt: false };
+///     let seen = Observation { frame, lag: None, link, query_error: None, is_tree_corrupt: false };
 ///     machine.step(&seen).state
 /// };
 /// assert_eq!(state(1000, 1, 1000), State::Safe); // it starts safe
@@ -225,7 +230,13 @@ impl FailSafe {
         Verdict {
             state: self.state,
             cause: self.cause,
-            margin: if seen.frame.is_some() { self.limits.margin(age) } else { 0.0 },
+            margin: match seen.frame {
+                Some(frame) => {
+                    let lag = seen.lag.unwrap_or(frame.age);
+                    self.limits.margin(lag.plus(self.limits.freshness.transit(&seen.link)))
+                }
+                None => 0.0,
+            },
             waits_for_acknowledgement: self.state == State::Safe && has_recovered,
         }
     }
@@ -271,7 +282,7 @@ impl FailSafe {
             (limits.heartbeat.level(link.heartbeat), heartbeat),
             (limits.rejections.level(link.rejections), rejections),
         ];
-        for (level, cause) in inputs.into_iter().chain(limits.freshness.levels(&link)) {
+        for (level, cause) in inputs.into_iter().chain(limits.freshness.levels(&link, limits.age)) {
             if level > worst.0 {
                 worst = (level, Some(cause));
             }

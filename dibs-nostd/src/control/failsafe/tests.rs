@@ -44,6 +44,7 @@ fn limits(frames: u16, automatic: bool) -> Limits {
         .rejections(REJECTIONS)
         .transit(TRANSIT)
         .source_age(SOURCE_AGE)
+        .unwrap()
         .forgeries(FORGERIES)
         .unwrap()
         .dwell(0)
@@ -59,6 +60,7 @@ fn seen(now: u32, epoch: u32, age: u32) -> Observation {
     let (now, age) = (Millis(now), Millis(age));
     Observation {
         frame: Some(FrameAge { epoch, received: now.before(age), age }),
+        lag: None,
         link: GOOD,
         query_error: None,
         is_tree_corrupt: false,
@@ -280,6 +282,41 @@ fn the_margin_is_age_times_speed_in_every_state_that_acts() {
     }
 }
 
+/// The margin covers the time on the way as it covers the age, and an unknown way is beyond every limit. Only a written
+/// choice leaves it out.
+#[test]
+fn the_margin_covers_the_way_unless_that_is_left_out() {
+    let limits = Limits::new(AGE, SPEED).unwrap().dwell(0).automatic();
+    let with = |transit, lag| Observation {
+        lag,
+        link: Link { transit: Millis(transit), ..GOOD },
+        ..seen(1000, 1, 30)
+    };
+    let step = |limits, seen| {
+        let verdict = FailSafe::new(limits).step(&seen);
+        (verdict.state, verdict.margin)
+    };
+    let margin = |millis| limits.margin(Millis(millis));
+    assert_eq!(step(limits, with(20, None)), (State::Nominal, margin(50)));
+    // An extrapolated surface covers its age itself, but not the way.
+    assert_eq!(step(limits, with(20, Some(Millis(0)))), (State::Nominal, margin(20)));
+    assert_eq!(step(limits, with(20, Some(Millis(7)))), (State::Nominal, margin(27)));
+    // By default the limits are those on age.
+    for transit in [AGE.safe().0 + 1, 1 << 30, u32::MAX] {
+        assert_eq!(step(limits, with(transit, None)).0, State::Safe, "{transit}");
+        assert_eq!(
+            step(limits.without_transit(), with(transit, None)),
+            (State::Nominal, margin(30))
+        );
+    }
+    let verdict = FailSafe::new(limits).step(&with(AGE.safe().0 + 1, None));
+    let transit = Millis(AGE.safe().0 + 1);
+    assert_eq!(verdict.cause, Some(Unavailable::Delayed { transit }));
+    let own = limits.transit(watch(5, 10));
+    assert_eq!(step(own, with(10, None)).1, margin(40));
+    assert_eq!(step(own, with(11, None)).0, State::Safe);
+}
+
 #[test]
 fn a_slow_second_core_is_not_an_old_surface() {
     let mut machine = FailSafe::new(Limits::new(AGE, SPEED).unwrap().dwell(0).automatic());
@@ -295,6 +332,14 @@ fn limits_that_no_machine_can_have_are_named() {
     let long = 1 << 31;
     assert_eq!(Watch::new(Millis(5), Millis(long)), Err(LimitError::TooLong { safe: long }));
     assert_eq!(Limits::new(Watch::OFF, 0.0), Err(LimitError::TooLong { safe: u32::MAX }));
+    // No frame is published whose source was older.
+    for safe in [65_534, 65_535, 120_000].map(Millis) {
+        let never = Watch::new(Millis(100), safe).unwrap();
+        let refused = limits(1, false).source_age(never);
+        assert_eq!(refused, Err(LimitError::Untrippable { safe: safe.0 }));
+    }
+    assert!(limits(1, false).source_age(watch(100, 65_533)).is_ok());
+    assert!(limits(1, false).source_age(Watch::OFF).is_ok());
     for tissue_speed in [-1.0, f32::INFINITY] {
         assert_eq!(Limits::new(AGE, tissue_speed), Err(LimitError::Speed { tissue_speed }));
     }
@@ -362,7 +407,7 @@ fn run(steps: &[Step], limits: Limits, start: u32) -> (Vec<Observation>, Vec<Ver
         });
         let Step { link, query_failed, is_tree_corrupt, .. } = *step;
         let query_error = query_failed.then_some(QUERY);
-        let seen = Observation { frame, link, query_error, is_tree_corrupt };
+        let seen = Observation { frame, lag: None, link, query_error, is_tree_corrupt };
         verdicts.push(machine.step(&seen));
         acknowledged.push(step.acknowledge && machine.acknowledge().is_ok());
         observations.push(seen);

@@ -9,6 +9,7 @@ use dibs_build::{Builder, generate};
 use fastrand::Rng;
 use glam::Vec3;
 
+use super::{Ahead, Course};
 use crate::surface::motion::{Travel, Unit};
 use crate::wire::{Encoding, FrameEncoder, FrameId, NoMac};
 use crate::{
@@ -168,4 +169,45 @@ fn the_order_of_two_readings_does_not_matter() {
             assert!(moved <= stated + 1e-4, "{moved} {stated}");
         }
     }
+}
+
+/// Of any numbers, however large, a course says nothing or no less than the motion.
+#[test]
+fn a_course_is_not_cut_to_the_numbers_that_fit() {
+    let mut rng = Rng::with_seed(8);
+    let mut any = |most: u32| rng.u32(..most) >> rng.u32(..32);
+    let (mut known, mut unknown) = (0, 0);
+    for _ in 0..100_000 {
+        let (passed, off, units) = (any(u32::MAX), any(u32::MAX), any(u32::MAX).max(1));
+        let share = any(2_000) as f32 / 999.5;
+        let ahead = Ahead { passed, off, ..Ahead::UNKNOWN };
+        let course = Course::new(units.into(), &ahead, share);
+        if course == Course::NONE {
+            let most = f64::from(passed.max(off)) * f64::from(1.0 + share);
+            assert!(most > f64::from(u32::MAX) / 2.0, "{passed} {off} {share}");
+            unknown += 1;
+            continue;
+        }
+        let place = any(u32::MAX);
+        let stated = course.since(units.into(), place).unwrap();
+        let grown = f64::from(1.0 + share);
+        let farthest =
+            (f64::from(passed) * grown - f64::from(place)).abs() + f64::from(off) * grown;
+        assert!(
+            stated as f64 >= farthest - 2.0,
+            "{passed} {off} {units} {share}: {stated} {farthest}"
+        );
+        known += 1;
+    }
+    assert!(known > 10_000 && unknown > 1_000, "{known} {unknown}");
+}
+
+/// An odometer that cannot count on starts anew.
+#[test]
+fn a_reading_that_does_not_fit_is_a_start() {
+    let start = Travel::start(7);
+    let far = start.along(u64::MAX - 5);
+    assert_eq!(far.since(&start), Some(u64::MAX - 5));
+    assert_eq!(far.along(5).since(&far), Some(5));
+    assert_eq!(far.along(6).since(&far), None);
 }

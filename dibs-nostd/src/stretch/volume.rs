@@ -1,0 +1,131 @@
+//! The volume that a closed surface encloses, whose sign tells a surface from its inside-out image.
+//!
+//! A surface can be turned inside out through a plane, slowly and within every limit on stretch, size and speed: only
+//! the sign of its volume shows it. The volume is the sum, over the triangles, of the signed volume of the tetrahedron
+//! that each spans with one point. A whole frame sums up all triangles; a partial one replaces those of the regions
+//! that it moved.
+
+use core::ops::Range;
+
+use glam::Vec3;
+
+use super::StretchError;
+use crate::math::sqrt::sqrt;
+use crate::surface::VertexTable;
+use crate::tree::{Index, Tree};
+
+/// Part of the reference's volume by which the sign may be the other one: a flat surface has no volume but the rounding
+/// of its vertices.
+const FLAT: f32 = 1.0 / 64.0;
+
+/// The least volume that has a sign, as a part of the cube around the surface: a surface that is flat at rest has none
+/// but its rounding.
+const LEAST: f32 = 1.0 / (1 << 20) as f32;
+
+/// The volume of the frame in work, in mm³, and of the published one.
+#[derive(Clone, Debug)]
+pub(super) struct Volume {
+    /// Square of the largest distance of a triangle's first corner from there.
+    far: f32,
+    work: f32,
+    published: f32,
+    /// The volume at rest, or that of the first frame where the tree has no rest shape. 0 if not known, and as long as
+    /// it has no sign.
+    reference: f32,
+}
+
+impl Volume {
+    /// The watch on a surface of this tree.
+    ///
+    /// Cost: a pass over the triangles, if the surface is closed and the tree has its rest shape.
+    pub fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
+        let (work, published, reference, far) = (0.0, 0.0, 0.0, 0.0);
+        let mut volume = Self { far, work, published, reference };
+        let rest = Rest(tree);
+        if tree.is_closed() && rest.position(0).is_some() {
+            volume.add(tree, &rest, None::<&Rest<'_, '_, I>>, 0..tree.triangle_count());
+            volume.reference = volume.significant();
+        }
+        volume
+    }
+
+    /// A frame begins.
+    pub const fn begin(&mut self, is_whole: bool) {
+        self.work = if is_whole { 0.0 } else { self.published };
+    }
+
+    /// Adds triangles, in place of those of the surface `before` if there is one.
+    pub fn add<I: Index, V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
+        &mut self,
+        tree: &Tree<'_, I>,
+        surface: &V,
+        before: Option<&W>,
+        rows: Range<u32>,
+    ) {
+        if !tree.is_closed() {
+            return;
+        }
+        // Near the surface, so that the sum rounds little.
+        let origin = tree.rest_position(0).unwrap_or_default();
+        let mut sum = 0.0;
+        for corners in rows.filter_map(|row| tree.triangle(row)) {
+            let Some(now) = at(surface, corners) else { continue };
+            let [first, ..] = now;
+            sum += six_volumes(now, origin);
+            let squared = first.distance_squared(origin);
+            if squared > self.far {
+                self.far = squared;
+            }
+            if let Some(then) = before.and_then(|before| at(before, corners)) {
+                sum -= six_volumes(then, origin);
+            }
+        }
+        self.work += sum / 6.0;
+    }
+
+    /// Whether the frame in work is not inside out.
+    pub fn check(&self) -> Result<(), StretchError> {
+        let Self { work: volume, reference, .. } = *self;
+        let kept = if reference < 0.0 { -volume } else { volume };
+        if kept < -FLAT * reference.abs() {
+            return Err(StretchError::InsideOut { volume, reference });
+        }
+        Ok(())
+    }
+
+    /// The frame in work is the published one.
+    pub fn published(&mut self) {
+        self.published = self.work;
+        if self.reference == 0.0 {
+            self.reference = self.significant();
+        }
+    }
+
+    /// The volume of the frame in work; 0 if it is too small to have a sign.
+    fn significant(&self) -> f32 {
+        let cube = self.far * sqrt(self.far);
+        if self.work.abs() > LEAST * cube { self.work } else { 0.0 }
+    }
+}
+
+/// The rest shape of a tree.
+struct Rest<'r, 't, I>(&'r Tree<'t, I>);
+
+impl<I: Index> VertexTable for Rest<'_, '_, I> {
+    fn len(&self) -> usize {
+        self.0.vertex_count() as usize
+    }
+
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.0.rest_position(vertex)
+    }
+}
+
+fn at<V: VertexTable + ?Sized>(surface: &V, [a, b, c]: [u32; 3]) -> Option<[Vec3; 3]> {
+    Some([surface.position(a)?, surface.position(b)?, surface.position(c)?])
+}
+
+/// Six times the signed volume of a tetrahedron.
+fn six_volumes([a, b, c]: [Vec3; 3], origin: Vec3) -> f32 {
+    (a - origin).dot((b - origin).cross(c - origin))
+}
