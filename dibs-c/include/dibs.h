@@ -34,7 +34,7 @@
 /**
  * Bytes of a list's storage.
  */
-#define DIBS_CONTACTS_SIZE 16384
+#define DIBS_CONTACTS_SIZE 18432
 
 /**
  * Contacts that a list holds: of more, the deepest.
@@ -75,6 +75,11 @@
  * A flag of options: no side is asked for, at the cost of the distance alone. The separation is that of a tool outside.
  */
 #define DIBS_UNSIGNED 2
+
+/**
+ * List only contacts of the triangles with the options' label, as if the others were not there.
+ */
+#define DIBS_CONTACTS_OF 4
 
 /**
  * In place of a triangle's row: none.
@@ -884,9 +889,13 @@ typedef struct {
    */
   float depth_tolerance;
   /**
-   * `DIBS_COLD`, `DIBS_UNSIGNED`, both or 0.
+   * The sum of any of `DIBS_COLD`, `DIBS_UNSIGNED` and `DIBS_CONTACTS_OF`.
    */
   uint32_t flags;
+  /**
+   * A triangle's label, for `DIBS_CONTACTS_OF`: at most 255.
+   */
+  uint32_t label;
 } dibs_options;
 
 /**

@@ -51,6 +51,9 @@ pub const DIBS_COLD: u32 = 1;
 /// A flag of options: no side is asked for, at the cost of the distance alone. The separation is that of a tool outside.
 pub const DIBS_UNSIGNED: u32 = 2;
 
+/// List only contacts of the triangles with the options' label, as if the others were not there.
+pub const DIBS_CONTACTS_OF: u32 = 4;
+
 /// Options of a query. Null for none: no budget, a warm start, signed.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
@@ -60,15 +63,18 @@ pub struct dibs_options {
     /// Largest length (mm) of the interval of a depth where the tool's axis crosses the surface; 0 for a 512th of the
     /// axis' length.
     pub depth_tolerance: f32,
-    /// `DIBS_COLD`, `DIBS_UNSIGNED`, both or 0.
+    /// The sum of any of `DIBS_COLD`, `DIBS_UNSIGNED` and `DIBS_CONTACTS_OF`.
     pub flags: u32,
+    /// A triangle's label, for `DIBS_CONTACTS_OF`: at most 255.
+    pub label: u32,
 }
 
 impl dibs_options {
     /// The core's options.
     pub(crate) fn of(options: *const Self) -> Result<Options, dibs_code> {
         let Some(given) = options.get_if_any()? else { return Ok(Options::new()) };
-        if given.flags & !(DIBS_COLD | DIBS_UNSIGNED) != 0 || !(given.depth_tolerance >= 0.0) {
+        let known = DIBS_COLD | DIBS_UNSIGNED | DIBS_CONTACTS_OF;
+        if given.flags & !known != 0 || !(given.depth_tolerance >= 0.0) {
             return Err(dibs_code::Argument);
         }
         let dibs_budget { node_tests, triangle_tests } = given.budget;
@@ -78,6 +84,10 @@ impl dibs_options {
         }
         if given.flags & DIBS_UNSIGNED != 0 {
             options = options.unsigned();
+        }
+        if given.flags & DIBS_CONTACTS_OF != 0 {
+            let label = u8::try_from(given.label).map_err(|_| dibs_code::Argument)?;
+            options = options.contacts_of(label);
         }
         if given.depth_tolerance > 0.0 {
             options = options.depth_tolerance(given.depth_tolerance);

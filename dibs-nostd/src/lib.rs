@@ -79,7 +79,7 @@ pub use control::{constraint, failsafe};
 pub use error::Error;
 pub use query::{
     Budget, Closest, Contact, Contacts, Cost, Fallback, Interval, NoSide, Options, Proximity,
-    Query, Side, Sweep, Swept, Tracked, Tracker,
+    Query, Side, Sweep, Swept, Tracked, Tracker, Within,
 };
 pub use stretch::{
     Arriving, Changed, Gate, StretchError, StretchMonitor, SurfaceLimits, Unchecked, Verdict,

@@ -100,10 +100,14 @@ class Scene:
         answers = np.frombuffer(_dibs.query(self._natives, poses.native, _tests(budget)), ANSWER)
         return answers[0] if poses.is_single else answers
 
-    def contacts(self, tools: npt.ArrayLike, margin: float, *, budget: tuple[int, int] = Budget()) -> Contacts:
+    def contacts(
+        self, tools: npt.ArrayLike, margin: float, *, budget: tuple[int, int] = Budget(), label: Optional[int] = None
+    ) -> Contacts:
         """All locally closest pairs of each pose and the scene: as `Tree.contacts`."""
         margin = _arrays.number("margin", margin)
-        native = _dibs.contacts(self._natives, _tools.poses(tools).native, margin, _tests(budget))
+        if label is not None and not (isinstance(label, (int, np.integer)) and 0 <= label <= 255):
+            raise ValueError(f"label: {label!r} is no whole number from 0 to 255")
+        native = _dibs.contacts(self._natives, _tools.poses(tools).native, margin, _tests(budget), label)
         found, bound = native
         return Contacts(np.frombuffer(found, CONTACT), np.frombuffer(bound, "<f4"))
 
@@ -130,9 +134,11 @@ class Surface:
         """The closest pair of each pose and the surface: as `Tree.query`."""
         return Scene([self]).query(tools, budget=budget)
 
-    def contacts(self, tools: npt.ArrayLike, margin: float, *, budget: tuple[int, int] = Budget()) -> Contacts:
+    def contacts(
+        self, tools: npt.ArrayLike, margin: float, *, budget: tuple[int, int] = Budget(), label: Optional[int] = None
+    ) -> Contacts:
         """All locally closest pairs of each pose and the surface: as `Tree.contacts`."""
-        return Scene([self]).contacts(tools, margin, budget=budget)
+        return Scene([self]).contacts(tools, margin, budget=budget, label=label)
 
 
 def _of_vertices(tree: Tree, name: str, value: Optional[npt.ArrayLike]) -> Optional[bytes]:
@@ -237,10 +243,12 @@ class Tree:
         surface: Union[Surface, npt.ArrayLike, None] = None,
         *,
         budget: tuple[int, int] = Budget(),
+        label: Optional[int] = None,
     ) -> Contacts:
         """All locally closest pairs of each pose and a surface whose separation is at most `margin`: up to 64 of each
-        tool. The arguments are those of `query`."""
-        return self._surface(surface).contacts(tools, margin, budget=budget)
+        tool. The arguments are those of `query`. With a `label`, those of its triangles alone, as if the others were not
+        there, so that its margin holds beside a part that is nearer."""
+        return self._surface(surface).contacts(tools, margin, budget=budget, label=label)
 
     def _surface(self, surface: Union[Surface, npt.ArrayLike, None]) -> Surface:
         if not isinstance(surface, Surface):

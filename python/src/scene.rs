@@ -45,9 +45,10 @@ pub fn contacts<'py>(
     tools: Tools<'_>,
     margin: f32,
     budget: Tests,
+    label: Option<u8>,
 ) -> PyResult<[Bound<'py, PyByteArray>; 2]> {
     let scene = Scene::new(surfaces, budget);
-    let found = in_blocks(py, tools, |chunk| scene.touch(chunk, margin))?;
+    let found = in_blocks(py, tools, |chunk| scene.touch(chunk, (margin, label)))?;
     let (records, bounds): (Vec<_>, Vec<_>) = found.into_iter().unzip();
     Ok([records, bounds].map(|bytes| PyByteArray::new(py, &bytes.concat())))
 }
@@ -112,10 +113,14 @@ impl Scene {
     }
 
     /// The records of each pose's contacts, deepest first, and its bound.
-    fn touch(&self, chunk: Chunk<'_>, margin: f32) -> Result<(Vec<u8>, Vec<u8>), String> {
+    fn touch(
+        &self,
+        chunk: Chunk<'_>,
+        (margin, label): (f32, Option<u8>),
+    ) -> Result<(Vec<u8>, Vec<u8>), String> {
         let mut all: Vec<(Vec<Contact>, f32)> = vec![(Vec::new(), margin); chunk.len()];
         for (number, surface) in self.surfaces() {
-            surface.contacts(chunk, self.budget, margin, |pose, tool, found, bound| {
+            surface.contacts(chunk, self.budget, (margin, label), |pose, tool, found, bound| {
                 let (contacts, least) = &mut all[pose];
                 for contact in found {
                     let mut contact = *contact;

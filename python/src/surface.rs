@@ -65,16 +65,19 @@ impl Surface {
         Ok(())
     }
 
-    /// Finds the contacts of each tool. `found` takes them with the tool's pose and number, and the bound below which
+    /// Finds the contacts of each tool, or only those of a label. `found` takes them with the tool's pose and number, and the bound below which
     /// all are listed.
     pub fn contacts(
         &self,
         chunk: Chunk<'_>,
         budget: Budget,
-        margin: f32,
+        (margin, label): (f32, Option<u8>),
         mut found: impl FnMut(usize, usize, &mut dyn Iterator<Item = &Contact>, f32),
     ) -> Result<(), String> {
-        let (rows, options) = (self.rows.as_slice(), self.options(budget));
+        let (rows, mut options) = (self.rows.as_slice(), self.options(budget));
+        if let Some(label) = label {
+            options = options.contacts_of(label);
+        }
         let mut contacts = Box::new(Contacts::<MOST_CONTACTS, 16_384>::new());
         of_any_width!(self.tree.view(), tree => {
             let mut query = query_of(tree)?;

@@ -22,7 +22,7 @@ mod swept;
 mod tracker;
 
 pub use chain::Closest;
-pub use contacts::{Contact, Contacts};
+pub use contacts::{Contact, Contacts, Within};
 pub use cost::Cost;
 pub use options::{Budget, Options};
 pub use proximity::{Interval, Proximity};

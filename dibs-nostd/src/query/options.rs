@@ -31,6 +31,12 @@ impl Budget {
             triangle_tests: self.triangle_tests.saturating_sub(triangle_tests),
         }
     }
+
+    /// The same with no more than `most` node tests.
+    pub(super) const fn nodes_at_most(self, most: u32) -> Self {
+        let node_tests = if self.node_tests < most { self.node_tests } else { most };
+        Self { node_tests, ..self }
+    }
 }
 
 /// Prior knowledge for a query, and its budget. Prior knowledge changes an answer's cost, not the answer, except
@@ -42,6 +48,7 @@ pub struct Options {
     pub(super) stretch: Option<MeasuredStretch>,
     pub(super) is_signed: bool,
     pub(super) depth_tolerance: Option<f32>,
+    pub(super) part: Option<u8>,
 }
 
 /// The triangle that a query tests first.
@@ -71,6 +78,7 @@ impl Options {
             stretch: None,
             is_signed: true,
             depth_tolerance: None,
+            part: None,
         }
     }
 
@@ -126,6 +134,16 @@ impl Options {
     #[must_use]
     pub const fn depth_tolerance(mut self, tolerance: f32) -> Self {
         self.depth_tolerance = Some(tolerance);
+        self
+    }
+
+    /// Lists only contacts of the triangles with this [label](crate::Tree::label), as if the others were not there: the
+    /// locally closest pairs of their part of the surface. So a label's margin holds beside a part that is nearer. The
+    /// closest pair and the side are those of the whole surface. Where the tool is inside or crossing, its deepest pair is
+    /// in the list of its own triangle's label.
+    #[must_use]
+    pub const fn contacts_of(mut self, label: u8) -> Self {
+        self.part = Some(label);
         self
     }
 

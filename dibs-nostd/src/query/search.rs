@@ -172,17 +172,10 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         if !(coordinates < 1e18) {
             return Err(QueryError::Position { vertex: root.pin });
         }
-        // A sound tree tests each node's sphere once, each leaf's plane twice and each triangle once. If corrupt bytes
-        // form a loop, this budget ends the search.
+        // The closest pair in a sound tree takes one test of each node's sphere, two of each leaf's plane and one of each
+        // triangle. If corrupt bytes form a loop, this bound ends the search. Other kinds have bounds of their own.
         let most = header.nodes.saturating_mul(3).saturating_add(header.triangles);
-        let budget = Budget {
-            node_tests: if options.budget.node_tests < most {
-                options.budget.node_tests
-            } else {
-                most
-            },
-            triangle_tests: options.budget.triangle_tests,
-        };
+        let budget = options.budget.nodes_at_most(most);
         let is_asked = options.is_signed && tree.is_closed() && tool.axis_length() > 0.0;
         if let Some(touched) = &mut touched {
             touched.reset(is_asked);

@@ -103,28 +103,34 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
         };
         let at_end = look(1.0, options)?;
         let mut swept = Swept { clear_until: 0.0, contact: None, at_end: at_end.found, looks: 1 };
+        // A distance clears a part of the way; any does, where nothing moves.
+        let part = |spare: f32| match most {
+            _ if !(spare > 0.0) => 0.0,
+            0.0 => ALWAYS,
+            most => spare / most * ROUND_DOWN,
+        };
         // The pair at the end clears the way from here on.
-        let end = 1.0 - at_end.spare / most * ROUND_DOWN;
+        let end = 1.0 - part(at_end.spare);
         if at_end.touches {
             swept.contact = Some(1.0);
         }
         let unsigned = options.unsigned();
         let mut time = 0.0;
-        while swept.looks < looks && !(time > end) {
+        while swept.looks < looks && !(time > end) && time <= 1.0 {
             let now = look(time, &unsigned)?;
             swept.looks += 1;
             if now.touches {
                 swept.contact = Some(time);
                 break;
             }
-            let next = time + now.spare / most * ROUND_DOWN;
+            let next = time + part(now.spare);
             // The step rounds to nothing.
             if !(next > time) {
                 break;
             }
             time = next;
         }
-        swept.clear_until = if time > end { ALWAYS } else { time };
+        swept.clear_until = if time > end || time > 1.0 { ALWAYS } else { time };
         Ok(swept)
     }
 }
@@ -159,3 +165,22 @@ const ALWAYS: f32 = 2.0;
 const ROUND_DOWN: f32 = 1.0 - 8.0 / 16_777_216.0;
 /// Rounding of tool, surface and time at an instant, relative to [`Sweep::size`].
 const ROUNDING: f32 = 48.0 / 16_777_216.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_errors_are_no_part_of_the_spare_distance() {
+        let found = Proximity {
+            axis_distance: 3.0,
+            separation: 2.0,
+            lower: 2.0,
+            accuracy: 0.25,
+            side: Side::Outside,
+            ..Proximity::NOWHERE
+        };
+        let spare = |margin| Look::new(found, margin, 0.125, 1.0).spare;
+        assert_eq!([spare(1.0), spare(1.625), spare(1.75), spare(2.0)], [0.625, 0.0, 0.0, 0.0]);
+    }
+}

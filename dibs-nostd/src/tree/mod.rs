@@ -280,8 +280,9 @@ impl<'a, I: Index> Tree<'a, I> {
         }
     }
 
-    /// Label of a triangle's tissue, by which a controller tells contacts apart: a margin and a stiffness for each
-    /// label, or none. `None` outside the table or where the tree was built without labels.
+    /// Label of a triangle's tissue: a margin and a stiffness for each, or none. Ask for the contacts of each label with
+    /// [`Options::contacts_of`](crate::Options::contacts_of): of the whole surface's contacts, none need be on a part that
+    /// is within its margin beside a nearer one. `None` outside the table or where the tree was built without labels.
     ///
     /// ```
     /// use dibs_build::{Builder, generate};
@@ -303,13 +304,13 @@ impl<'a, I: Index> Tree<'a, I> {
     /// let mut query = Query::<_, 32>::new(&tree)?;
     /// let mut contacts = Contacts::<8>::new();
     /// let tool = Sphere::new(Vec3::new(65.0, 0.0, 20.0), 2.5)?;
-    /// query.contacts(rows.as_slice(), &tool, 5.0, &Options::new(), &mut contacts)?;
-    /// let force = [(MUSCLE, soft), (ARTERY, hard)].map(|(label, wall)| {
-    ///     let of_label = contacts.within(5.0).map(|all| {
-    ///         all.filter(|contact| tree.label(contact.triangle) == Some(label))
-    ///     });
-    ///     wall.wrench(of_label, contacts.accuracy(), tool.centre(), Vec3::ZERO, Vec3::ZERO).force
-    /// });
+    /// let mut force = Vec3::ZERO;
+    /// for (label, margin, wall) in [(MUSCLE, 1.0, soft), (ARTERY, 5.0, hard)] {
+    ///     let options = Options::new().contacts_of(label);
+    ///     query.contacts(rows.as_slice(), &tool, margin, &options, &mut contacts)?;
+    ///     let (found, accuracy) = (contacts.within(margin), contacts.accuracy());
+    ///     force += wall.wrench(found, accuracy, tool.centre(), Vec3::ZERO, Vec3::ZERO).force;
+    /// }
     /// # let _ = force;
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```

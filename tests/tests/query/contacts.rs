@@ -130,13 +130,20 @@ fn no_contact_is_missing_and_none_is_doubled() {
             crossing += usize::from(is_crossing);
             let (truth, label) = valleys(&rows, &triangles, [from, to]);
             assert!(contacts.bound() >= MARGIN && !contacts.is_full());
-            let mut found = vec![0; truth.len()];
+            let mut found = vec![Vec::new(); truth.len()];
             // The first contact of an axis that crosses is its deepest point, and stands for where it crosses.
             let accuracy = f64::from(contacts.accuracy());
             for contact in contacts.iter().skip(usize::from(is_crossing)) {
                 let valley = label[contact.triangle.0 as usize];
-                found[valley] += 1;
-                let off = f64::from(contact.separation + radius) - truth[valley].distance;
+                // Walls in other directions are contacts of their own, and part those beside them where it is rough.
+                let is_like =
+                    |other: &Vec3| name != "rough" && contact.normal.distance(*other) < 0.11;
+                assert!(!found[valley].iter().any(is_like), "{name}: twice {:?}", truth[valley]);
+                found[valley].push(contact.normal);
+                let corners =
+                    triangles[contact.triangle.0 as usize].map(|v| rows[v as usize].as_dvec3());
+                let pair = closest_pair(from.as_dvec3(), to.as_dvec3(), corners);
+                let off = f64::from(contact.separation + radius) - pair.distance;
                 let off = off.abs() - f64::from(contacts.accuracy());
                 assert!(off <= 0.0, "{name}: {contact:?} {:?}", truth[valley]);
                 let apart = contact.point_on_tool - contact.point_on_surface;
@@ -146,13 +153,12 @@ fn no_contact_is_missing_and_none_is_doubled() {
                 );
             }
             let slack = 0.01;
-            for (count, valley) in found.iter().zip(&truth) {
+            for (normals, valley) in found.iter().zip(&truth) {
                 let reach = f64::from(MARGIN + radius);
                 let is_apart = !is_crossing || valley.distance > accuracy;
                 let is_clear = is_apart && valley.distance < reach - slack && valley.up > 0.05;
                 let is_parted = valley.ridge > RIDGE + slack;
-                assert!(!is_clear || !is_parted || *count == 1, "{name}: {count} of {valley:?}");
-                assert!(*count <= 1, "{name}: {count} of {valley:?}");
+                assert!(!is_clear || !is_parted || !normals.is_empty(), "{name}: no {valley:?}");
             }
             several += usize::from(contacts.len() > 1);
         }
@@ -179,7 +185,7 @@ fn a_fine_surface_needs_little_room() {
         contacts.len()
     };
     let (coarse, fine) = (found(40), found(126));
-    assert!(coarse > 3 && fine == coarse, "{coarse} and {fine}");
+    assert!(fine > 3 && fine <= coarse, "{coarse} and {fine}");
 }
 
 #[test]

@@ -21,4 +21,5 @@ mod tracked_chain;
 mod tracked_contacts;
 mod tracked_depth;
 mod tracker;
+mod walls;
 mod wide;

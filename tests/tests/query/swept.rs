@@ -250,3 +250,28 @@ fn hostile_ways_are_refused_or_never_cleared() {
     };
     assert!(is_unclear, "{found:?}");
 }
+
+/// Nothing moves, so any distance clears the whole way; a budget that shows none is no error.
+#[test]
+fn a_sweep_at_rest_needs_no_budget() {
+    let mesh = dibs_build::generate::heart(1_000).expect("a valid size").mesh;
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut odometer = Odometer::new(&tree);
+    let step = odometer.step(rows.as_slice(), rows.as_slice());
+    let mut rng = Rng::with_seed(11);
+    let (mut cleared, mut open) = (0, 0);
+    for _ in 0..2_000 {
+        let mut tracker = Follower::new(&tree).expect("deep enough");
+        let tool = Sphere::new(unit(&mut rng) * 120.0, 0.0).expect("valid");
+        let budget = Budget { node_tests: rng.u32(..60), triangle_tests: rng.u32(..10) };
+        let way = Sweep { step: &step, shares: [0.0, 0.0], tools: [tool, tool] };
+        let swept = tracker.sweep(&way, 1.0, 10, &Options::new().budget(budget));
+        let swept = swept.expect("a short budget is no error");
+        assert!(swept.clear_until.is_finite() && swept.looks <= 10, "{swept:?}");
+        cleared += usize::from(swept.clear_until >= 1.0);
+        open += usize::from(swept.clear_until < 1.0);
+    }
+    assert!(cleared > 100 && open > 100, "{cleared} {open}");
+}

@@ -42,9 +42,14 @@ impl defmt::Format for Wrench {
 /// count as one, up to 6 %. The force of each contact acts at its point of the tool, which gives the torque.
 ///
 /// The displacement `t` has the least `|t|^2` under `n . t >= margin - d` for each of the eight deepest contacts, each
-/// of which yields by a 16th. An active set finds it exactly but for rounding. So it is continuous in depths and
-/// normals, and a contact that appears at the margin's edge begins with zero force. If no two contacts face each other,
-/// `t` clears each contact by at least its depth.
+/// of which yields by a 16th. An active set finds it exactly but for rounding. If no two contacts face each other, `t`
+/// clears each contact by at least its depth.
+///
+/// `t` is continuous in depths and normals. So the force is continuous while the contacts stay, also where two walls tie,
+/// and a contact that appears at the margin's edge begins with zero force. It changes at once where a contact begins or
+/// ends within the margin: where the closest point on a wall reaches the wall's edge beside a nearer wall, or where walls
+/// within 7 degrees become one contact. From a list that is not [complete](crate::Within::is_complete) the force is at
+/// least that of the closest pair.
 ///
 /// The damper acts against the tool's speed into the surface, relative to the surface's velocity.
 ///
@@ -92,7 +97,8 @@ impl Proxy {
     ///
     /// `contacts` are those of [`Contacts::within`](crate::Contacts::within) this margin or more, deepest first, each
     /// within `accuracy` (mm); `velocity` (mm/s) is the tool's at `origin`, `angular` (1/s) its angular velocity. An
-    /// error instead of contacts gives the hold.
+    /// error instead of contacts gives the hold. For a label, ask for its contacts
+    /// ([`Options::contacts_of`](crate::Options::contacts_of)).
     #[must_use]
     pub fn wrench<'c>(
         &self,

@@ -2,18 +2,22 @@
 
 use glam::Vec3;
 
-use super::basins::{Basins, Near};
+use super::basins::{Basins, Near, Place};
 use super::low::Found;
 use super::{Contact, Contacts};
 use crate::math::sqrt::sqrt;
 use crate::query::search::RangeFront;
 use crate::query::side::{self, Side};
 use crate::query::{NoSide, Options, Proximity};
+use crate::tool::AxisPair;
 use crate::unavailable::QueryError;
 use crate::{Budget, Coverage, Index, Tool, Tree, TriangleRow, VertexTable};
 
 /// Ridges of this part of the margin do not part two contacts.
 const RIDGE: f32 = 1.0 / 64.0;
+
+/// Accuracies within which two points are too close to give a direction.
+const NO_DIRECTION: f32 = 16.0;
 
 /// A tool and a surface, with their numbers in a scene.
 pub(in crate::query) struct Pair<'a, I, V: ?Sized, T> {
@@ -83,8 +87,10 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         let accuracy = closest.accuracy - vertices.position_error();
         let has_side = closest.side != Side::Undefined(NoSide::CutShort);
         found.has_no_side |= may_be_inside(closest);
+        let is_of = |row| options.part.is_none() || tree.label(row) == options.part;
+        let own = pair.contact(closest).filter(|at| at.separation <= margin && is_of(at.triangle));
         if closest.side == Side::Inside || (closest.lower > margin && has_side) {
-            if let Some(contact) = pair.contact(closest).filter(|at| at.separation <= margin) {
+            if let Some(contact) = own {
                 found.insert(contact);
             }
             return Ok(Budget { node_tests: 0, triangle_tests: 0 });
@@ -93,58 +99,76 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         let limit = tool.radius() + margin + ridge;
         let Found { complete, beyond, tests: mut made } = find(basins, front, limit, ridge)?;
         let is_crossing = closest.side == Side::Crossing;
-        if is_crossing && let Some(contact) = pair.contact(closest) {
+        let has_crossing = is_crossing && own.is_some();
+        if let Some(contact) = own.filter(|_| is_crossing) {
             found.insert(contact);
         }
-        let mut is_cut_short = !has_side || beyond < limit;
-        let height = |row| {
+        let look = |row| {
             if made.triangle_tests >= options.budget.triangle_tests {
-                is_cut_short = true;
                 return Ok(None);
             }
             made.triangle_tests += 1;
-            pair.square(row, limit + ridge).map(Some)
+            pair.near(row, limit + ridge, accuracy).map(Some)
         };
-        let missing = basins.each_valley(tree, ridge, height, |near| {
+        let mut least = f32::INFINITY;
+        let (ridges, is_left_out) = ((ridge, 2.0 * accuracy), |row| !is_of(TriangleRow(row)));
+        let missing = basins.each_valley(tree, ridges, is_left_out, look, |near| {
             let is_on = sqrt(near.square) <= accuracy;
             // The crossing pair, inserted above, stands for these triangles.
-            if is_crossing && is_on {
+            if has_crossing && is_on {
                 return Ok(());
             }
-            let other = pair_at(tree, vertices, tool, near, accuracy)?;
+            let mut other = pair_at(tree, vertices, tool, near, accuracy)?;
+            // Of a part, what counts is the distance: at its border the surface goes on.
+            if options.part.is_none() || closest.side != Side::Outside {
+                other.add_side(tree, vertices, tool)?;
+            }
             if other.side != Side::Inside
                 && other.separation <= margin
                 && let Some(contact) = pair.contact(&other)
             {
+                if contact.separation < least {
+                    least = contact.separation;
+                }
                 found.insert(contact);
             }
             Ok(())
         })?;
-        let mut least = if beyond < complete { beyond } else { complete };
-        if let Some(from) = missing.map(sqrt).filter(|&from| from < least) {
-            least = from;
+        let is_known = has_side && (is_crossing || !closest.is_cut_short());
+        // The closest pair is certain then, whatever became of the search.
+        if is_known
+            && !is_crossing
+            && let Some(contact) = own
+            && !(least <= contact.separation + 2.0 * closest.accuracy)
+        {
+            found.insert(contact);
         }
-        found.is_cut_short |= is_cut_short;
+        // Of a part that the closest pair is not on, the search has seen the deepest contact if it came to its end.
+        found.is_open |= !is_known || !(is_crossing || own.is_some() || beyond >= limit);
+        let mut from = if beyond < complete { beyond } else { complete };
+        if let Some(missing) = missing.map(sqrt).filter(|&missing| missing < from) {
+            from = missing;
+        }
         // Without a side the tool may be inside, deeper than every pair seen.
         if !has_side {
             found.lower_bound(f32::NEG_INFINITY);
-        } else if least < limit {
+        } else if from < limit {
             // A valley's lowest triangle is less than a ridge below the low one that was visited.
-            found.lower_bound(least - ridge - tool.radius());
+            found.lower_bound(from - ridge - tool.radius());
         }
         Ok(made)
     }
 }
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
-    /// The square of a triangle's distance from the axis; infinite if beyond the limit.
-    fn square(&self, row: u32, limit: f32) -> Result<f32, QueryError> {
+    /// A triangle, and the square of its distance from the axis; infinite if beyond the limit.
+    fn near(&self, row: u32, limit: f32, accuracy: f32) -> Result<Near, QueryError> {
         let (rows, corners) = corners(self.tree, self.vertices, row)?;
         match self.tool.closest_on_triangle(&corners, limit * limit) {
-            Some(found) => Ok(found.distance_squared),
+            Some(found) => Ok(near(row, &found, accuracy)),
             None => match rows.into_iter().zip(corners).find(|(_, corner)| !corner.is_finite()) {
                 Some((vertex, _)) => Err(QueryError::Position { vertex }),
-                None => Ok(f32::INFINITY),
+                None => Ok(Near { square: f32::INFINITY, row, place: Place::NONE }),
             },
         }
     }
@@ -184,6 +208,12 @@ fn may_be_inside(closest: &Proximity) -> bool {
     has_none && !closest.is_at_surface()
 }
 
+/// A triangle at this pair. Within some accuracies its direction is none.
+pub(super) fn near(row: u32, pair: &AxisPair, accuracy: f32) -> Near {
+    let place = Place::of(pair, NO_DIRECTION * accuracy);
+    Near { square: pair.distance_squared, row, place }
+}
+
 /// The pair of a tool and the lowest triangle of a valley.
 fn pair_at<I: Index, V: VertexTable + ?Sized, T: Tool>(
     tree: &Tree<'_, I>,
@@ -201,7 +231,7 @@ fn pair_at<I: Index, V: VertexTable + ?Sized, T: Tool>(
     let length = sqrt(towards.length_squared());
     let direction = if length > 0.0 { towards / length } else { Vec3::ZERO };
     let separation = axis_distance - tool.radius();
-    let mut pair = Proximity {
+    Ok(Proximity {
         separation,
         lower: separation,
         accuracy,
@@ -209,7 +239,7 @@ fn pair_at<I: Index, V: VertexTable + ?Sized, T: Tool>(
         coverage: Coverage::Assumed,
         axis_distance,
         point_on_surface: found.on_surface,
-        point_on_tool: found.on_axis,
+        point_on_tool: found.on_axis - direction * tool.radius(),
         direction,
         axis_parameter: found.axis_parameter,
         triangle: Some(TriangleRow(row)),
@@ -217,14 +247,26 @@ fn pair_at<I: Index, V: VertexTable + ?Sized, T: Tool>(
         barycentric: found.barycentric,
         node_tests: 0,
         triangle_tests: 0,
-    };
-    let at = side::of_point(tree, vertices, &pair, found.on_axis)?;
-    pair.side = at.side;
-    if at.outward != Vec3::ZERO {
-        pair.direction = at.outward;
+    })
+}
+
+impl Proximity {
+    /// Adds the side of the axis' point, and the direction that leads out of the surface there.
+    fn add_side<I: Index, V: VertexTable + ?Sized, T: Tool>(
+        &mut self,
+        tree: &Tree<'_, I>,
+        vertices: &V,
+        tool: &T,
+    ) -> Result<(), QueryError> {
+        let on_axis = tool.axis_point(self.axis_parameter);
+        let at = side::of_point(tree, vertices, self, on_axis)?;
+        self.side = at.side;
+        if at.outward != Vec3::ZERO {
+            self.direction = at.outward;
+        }
+        self.point_on_tool = on_axis - self.direction * tool.radius();
+        Ok(())
     }
-    pair.point_on_tool = found.on_axis - pair.direction * tool.radius();
-    Ok(pair)
 }
 
 /// A triangle's corners: their rows, and their positions.

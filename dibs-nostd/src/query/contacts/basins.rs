@@ -1,39 +1,96 @@
 //! Selects the triangles near a tool that are closer than their surroundings.
 //!
 //! The distance from the tool is a height over the surface, and each valley of it is a contact. A flood from each low
-//! triangle, the lowest first, rises by the height of a ridge. If it runs into the flood of a lower one, both are one
-//! valley: a flat wall along a capsule is one, however many triangles are equally far.
+//! triangle, the lowest first, goes down to a place with nothing lower next to it. Then it rises by the height of a ridge,
+//! over triangles in much the same direction. If it runs into the flood of a lower one, both are one valley: a flat wall
+//! along a capsule is one, however many triangles are equally far, and two walls are two, however low the ridge between.
+//!
+//! Over a triangle the height is convex. So the way from its lowest point to a neighbour leads over no ridge exactly if
+//! that point is on the edge between.
+//!
+//! Without room or budget a flood does not rise. Then one valley may be two, but none is lost, unless it cannot be seen
+//! whether anything lower is next to a place.
+
+use glam::Vec3;
 
 use crate::math::sqrt::sqrt;
+use crate::tool::AxisPair;
 use crate::unavailable::QueryError;
 use crate::{Index, Tree};
 
-/// A triangle, and the square of its distance.
+/// A triangle, the square of its distance, and its closest point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Near {
     pub square: f32,
     pub row: u32,
+    pub place: Place,
 }
 
-/// The same as a number that sorts by the distance, then by the row: bits of floats above zero sort as integers.
+/// The closest point of a triangle: the direction to the tool, in 9 bits an axis, and the edges that it is on, a bit each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Key(u64);
+pub(super) struct Place(u32);
+
+impl Place {
+    /// No direction, and no edge.
+    pub const NONE: Self = Self(0);
+    /// Bits of the directions.
+    const DIRECTION: u32 = (1 << 27) - 1;
+    /// Largest distance of two unit vectors in much the same direction: 7 degrees.
+    const ALIKE: f32 = 0.125;
+    const SCALE: f32 = 255.0;
+    /// Weight of the corner beyond an edge, for a point on the edge.
+    const ON_EDGE: f32 = 1e-4;
+
+    /// The place of a pair. It has no direction if the points are no farther apart than `least`.
+    #[inline(always)]
+    pub fn of(pair: &AxisPair, least: f32) -> Self {
+        let [a, b, c] = pair.barycentric.map(|weight| u32::from(!(weight > Self::ON_EDGE)));
+        let edges = (b << 2 | a << 1 | c) << 27;
+        let vector = pair.on_axis - pair.on_surface;
+        let length = sqrt(vector.length_squared());
+        if !(length > least) {
+            return Self(edges);
+        }
+        let bits = |axis: f32| (axis / length * Self::SCALE) as i32 as u32 & 0x1FF;
+        Self(edges | bits(vector.x) | bits(vector.y) << 9 | bits(vector.z) << 18)
+    }
+
+    const fn is_on(self, edge: u32) -> bool {
+        self.0 >> (27 + edge) & 1 == 1
+    }
+
+    /// Whether both directions are much the same, or one is none.
+    fn is_like(self, other: Self) -> bool {
+        let axis = |bits: u32, at: u32| ((bits << (23 - at)) as i32 >> 23) as f32;
+        let vector = |Self(bits)| Vec3::new(axis(bits, 0), axis(bits, 9), axis(bits, 18));
+        let has_direction = |Self(bits)| bits & Self::DIRECTION != 0;
+        let most = Self::ALIKE * Self::SCALE;
+        let apart = (vector(self) - vector(other)).length_squared();
+        !has_direction(self) || !has_direction(other) || apart <= most * most
+    }
+}
+
+/// The same as numbers that sort by the distance, then by the row: bits of floats above zero sort as integers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Key {
+    square: u32,
+    row: u32,
+    place: Place,
+}
 
 impl Key {
+    const NONE: Self = Self { square: 0, row: 0, place: Place::NONE };
+
     fn of(near: Near) -> Self {
-        Self(u64::from(near.square.to_bits()) << 32 | u64::from(near.row))
+        Self { square: near.square.to_bits(), row: near.row, place: near.place }
     }
 
     fn square(self) -> f32 {
-        f32::from_bits((self.0 >> 32) as u32)
-    }
-
-    fn row(self) -> u32 {
-        self.0 as u32
+        f32::from_bits(self.square)
     }
 
     fn near(self) -> Near {
-        Near { square: self.square(), row: self.row() }
+        Near { square: self.square(), row: self.row, place: self.place }
     }
 }
 
@@ -60,16 +117,16 @@ pub(super) struct Basins<const N: usize> {
 enum Flood {
     /// It has reached all that is below its level; the lowest.
     Ended(Near),
-    /// It has met the flood of a lower triangle.
+    /// It has met the flood of a lower triangle in much the same direction.
     Joined,
-    /// No room for another triangle, or no budget.
+    /// Without room or budget, something lower may be next to it.
     CutShort,
 }
 
 impl<const N: usize> Basins<N> {
     pub const fn new() -> Self {
         Self {
-            near: [Key(0); N],
+            near: [Key::NONE; N],
             is_heap: false,
             heads: [NONE; N],
             next: [NONE; N],
@@ -102,15 +159,17 @@ impl<const N: usize> Basins<N> {
         low.first().map(|farthest| farthest.square())
     }
 
-    /// Finds the valleys: ridges of at most `ridge` above the higher valley do not count. Calls back with the lowest
-    /// triangle of each, nearest first. `height` is the square of a triangle's distance, or `None` without budget.
+    /// Finds the valleys: between those in much the same direction, ridges of at most `ridge` above the higher one do not
+    /// count. Calls back with the lowest triangle of each, nearest first. `look` finds a triangle's closest point, or `None`
+    /// without budget; points that differ by `error` may be equally far. Triangles that `is_left_out` are not looked at.
     ///
     /// Returns the square of the distance from which on valleys may be missing, if any.
     pub fn each_valley<I: Index>(
         &mut self,
         tree: &Tree<'_, I>,
-        ridge: f32,
-        mut height: impl FnMut(u32) -> Result<Option<f32>, QueryError>,
+        ridges: (f32, f32),
+        is_left_out: impl Fn(u32) -> bool,
+        mut look: impl FnMut(u32) -> Result<Option<Near>, QueryError>,
         mut visit: impl FnMut(Near) -> Result<(), QueryError>,
     ) -> Result<Option<f32>, QueryError> {
         sort(self.near.get_mut(..self.count).unwrap_or_default(), self.is_heap);
@@ -120,50 +179,65 @@ impl<const N: usize> Basins<N> {
         for entry in 0..low {
             self.enter(entry);
         }
+        let mut missing = None;
         for entry in 0..low {
-            match self.flood(tree, entry as u16, ridge, &mut height)? {
+            match self.flood(tree, entry as u16, ridges, &is_left_out, &mut look)? {
                 Flood::Ended(lowest) => visit(lowest)?,
                 Flood::Joined => (),
-                Flood::CutShort => return Ok(self.near.get(entry).map(|key| key.square())),
+                Flood::CutShort => {
+                    missing = missing.or(self.near.get(entry).map(|key| key.square()));
+                }
             }
         }
-        Ok(None)
+        Ok(missing)
     }
 
-    /// Floods the surroundings of a low triangle up to the height of a ridge above it.
+    /// Floods the surroundings of a low triangle up to the height of a ridge above the lowest place.
     fn flood<I: Index>(
         &mut self,
         tree: &Tree<'_, I>,
         low: u16,
-        ridge: f32,
-        height: &mut impl FnMut(u32) -> Result<Option<f32>, QueryError>,
+        (ridge, error): (f32, f32),
+        is_left_out: &impl Fn(u32) -> bool,
+        look: &mut impl FnMut(u32) -> Result<Option<Near>, QueryError>,
     ) -> Result<Flood, QueryError> {
         let Some(&(mut lowest)) = self.near.get(usize::from(low)) else {
             return Ok(Flood::Joined);
         };
-        let level = sqrt(lowest.square()) + ridge;
+        let mut height = sqrt(lowest.square());
         let mut count = 0;
         if !self.reach(low, low, &mut count) {
             return Ok(Flood::Joined);
         }
         for at in 0..N {
             let Some(&entry) = self.reached.get(at).filter(|_| at < count) else { break };
-            let Some(row) = self.near.get(usize::from(entry)).map(|key| key.row()) else { break };
-            for across in (0..3).filter_map(|edge| tree.row_across(row, edge)) {
-                let Some(next) = self.entry(across, height)? else { return Ok(Flood::CutShort) };
+            let Some(&from) = self.near.get(usize::from(entry)) else { break };
+            for edge in 0..3 {
+                let Some(across) = tree.row_across(from.row, edge) else { continue };
+                if is_left_out(across) {
+                    continue;
+                }
+                let is_level = from.place.is_on(edge) && sqrt(from.square()) <= height + error;
+                let Some(next) = self.entry(across, look)? else {
+                    if is_level {
+                        return Ok(Flood::CutShort);
+                    }
+                    continue;
+                };
                 let at = usize::from(next);
                 let (Some(&key), Some(&by)) = (self.near.get(at), self.reached_by.get(at)) else {
-                    return Ok(Flood::CutShort);
+                    continue;
                 };
-                if by == low || key.square() > level * level {
+                let is_within = sqrt(key.square()) <= height + ridge;
+                if by == low || !is_within || !(is_level || key.place.is_like(lowest.place)) {
                     continue;
                 }
                 if !self.reach(next, low, &mut count) {
                     return Ok(Flood::Joined);
                 }
-                // By rounding only: lower valleys were flooded before.
                 if key < lowest {
                     lowest = key;
+                    height = sqrt(lowest.square());
                 }
             }
         }
@@ -186,15 +260,15 @@ impl<const N: usize> Basins<N> {
     fn entry(
         &mut self,
         row: u32,
-        height: &mut impl FnMut(u32) -> Result<Option<f32>, QueryError>,
+        look: &mut impl FnMut(u32) -> Result<Option<Near>, QueryError>,
     ) -> Result<Option<u16>, QueryError> {
         let known = self.find(row);
         if known.is_some() {
             return Ok(known);
         }
         let Some(place) = self.near.get_mut(self.count) else { return Ok(None) };
-        let Some(square) = height(row)? else { return Ok(None) };
-        *place = Key::of(Near { square, row });
+        let Some(near) = look(row)? else { return Ok(None) };
+        *place = Key::of(near);
         self.enter(self.count);
         self.count += 1;
         Ok(Some((self.count - 1) as u16))
@@ -202,7 +276,7 @@ impl<const N: usize> Basins<N> {
 
     /// Enters an entry into the hash table.
     fn enter(&mut self, entry: usize) {
-        let Some(row) = self.near.get(entry).map(|key| key.row()) else { return };
+        let Some(row) = self.near.get(entry).map(|key| key.row) else { return };
         let bucket = (row as usize).checked_rem(N).unwrap_or_default();
         if let (Some(head), Some(next), Some(by)) =
             (self.heads.get_mut(bucket), self.next.get_mut(entry), self.reached_by.get_mut(entry))
@@ -217,7 +291,7 @@ impl<const N: usize> Basins<N> {
         let mut entry = *self.heads.get(bucket)?;
         for _ in 0..N {
             let near = self.near.get(usize::from(entry))?;
-            if near.row() == row {
+            if near.row == row {
                 return Some(entry);
             }
             entry = *self.next.get(usize::from(entry))?;

@@ -12,7 +12,8 @@ pub(super) struct List<const N: usize> {
     pub is_full: bool,
     /// The margin that was asked for.
     pub margin: f32,
-    pub is_cut_short: bool,
+    /// The deepest contact is not known.
+    pub is_open: bool,
     /// The tool may be inside a surface whose closest pair has no side.
     pub has_no_side: bool,
 }
@@ -26,7 +27,7 @@ impl<const N: usize> List<N> {
             accuracy: 0.0,
             is_full: false,
             margin: f32::NEG_INFINITY,
-            is_cut_short: true,
+            is_open: true,
             has_no_side: false,
         }
     }
@@ -38,14 +39,14 @@ impl<const N: usize> List<N> {
         self.accuracy = 0.0;
         self.is_full = false;
         self.margin = f32::NEG_INFINITY;
-        self.is_cut_short = true;
+        self.is_open = true;
         self.has_no_side = false;
     }
 
     /// Empties the list for the contacts within `margin`.
     pub fn begin(&mut self, margin: f32) {
         self.clear();
-        (self.bound, self.margin, self.is_cut_short) = (margin, margin, false);
+        (self.bound, self.margin, self.is_open) = (margin, margin, false);
     }
 
     /// Contacts beyond `bound` may be missing.

@@ -1,12 +1,13 @@
 //! The low triangles of a pair: found anew, or from the front of the last search on.
 
 use super::Contacts;
-use super::add::Pair;
-use super::basins::{Basins, Near};
+use super::add::{Pair, near};
+use super::basins::Basins;
 use crate::math::sqrt::sqrt;
 use crate::query::Options;
 use crate::query::search::{Search, Waiting};
 use crate::surface::motion::Unit;
+use crate::tool::AxisPair;
 use crate::unavailable::QueryError;
 use crate::{Budget, Index, Tool, Travel, VertexTable};
 
@@ -28,11 +29,12 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         options: &Options,
     ) -> Result<Budget, QueryError> {
         self.add_from(pair, options, |basins, _, limit, ridge| {
-            let mut low = Low::new(basins, limit);
+            let mut low = Low::new(basins, limit, pair);
             let &Pair { tree, vertices, tool, .. } = pair;
             let search = Search::start(tree, stack, vertices, tool, options, None, None)?;
-            let visit = |row, square| low.add(row, square);
-            let (beyond, tests) = search.each_low(limit, ridge, visit)?;
+            let search = search.over_range(options);
+            let visit = |row, at: &AxisPair| low.add(row, at);
+            let (beyond, tests) = search.each_low(limit, (ridge, options.part), visit)?;
             Ok(Found { complete: low.complete, beyond, tests })
         })
     }
@@ -47,12 +49,14 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         unit: Unit,
     ) -> Result<Budget, QueryError> {
         self.add_from(pair, options, |basins, front, limit, ridge| {
-            let mut front = front.moved_to(pair.tool, travel, unit);
-            let mut low = Low::new(basins, limit);
+            let mut front = front.moved_to(pair.tool, travel, unit, options.part);
+            let mut low = Low::new(basins, limit, pair);
             let &Pair { tree, vertices, tool, .. } = pair;
             let search = Search::start(tree, stack, vertices, tool, options, None, None)?;
-            let visit = |row, square| low.add(row, square);
-            let (beyond, tests) = search.each_low_from(&mut front, limit, ridge, visit)?;
+            let search = search.over_range(options);
+            let visit = |row, at: &AxisPair| low.add(row, at);
+            let (beyond, tests) =
+                search.each_low_from(&mut front, limit, (ridge, options.part), visit)?;
             if beyond == f32::INFINITY {
                 front.keep(pair.tool, travel);
             }
@@ -66,18 +70,23 @@ struct Low<'b, const NEAR: usize> {
     basins: &'b mut Basins<NEAR>,
     /// All that are closer are entered.
     complete: f32,
+    accuracy: f32,
 }
 
 impl<'b, const NEAR: usize> Low<'b, NEAR> {
-    fn new(basins: &'b mut Basins<NEAR>, limit: f32) -> Self {
+    fn new<I, V: ?Sized, T>(
+        basins: &'b mut Basins<NEAR>,
+        limit: f32,
+        pair: &Pair<'_, I, V, T>,
+    ) -> Self {
         basins.clear();
-        Self { basins, complete: limit }
+        Self { basins, complete: limit, accuracy: pair.closest.accuracy }
     }
 
     /// Enters a triangle. Returns the distance from which on others would have no room.
     #[inline(always)]
-    fn add(&mut self, row: u32, square: f32) -> f32 {
-        if let Some(farthest) = self.basins.push(Near { square, row }) {
+    fn add(&mut self, row: u32, at: &AxisPair) -> f32 {
+        if let Some(farthest) = self.basins.push(near(row, at, self.accuracy)) {
             self.complete = sqrt(farthest);
         }
         self.complete

@@ -65,10 +65,10 @@ impl Contact {
 }
 
 /// Up to `N` contacts, deepest first, and a bound on the others. A query compares up to `NEAR` triangles: those near a
-/// contact, and some with no lower vertex next to theirs. A tracker remembers up to `NEAR` opened nodes of the tree in
+/// contact, and some with no lower vertex next to theirs, at most half of `NEAR`. A tracker remembers up to `NEAR` opened nodes of the tree in
 /// the list, some hundred as a rule.
 ///
-/// RAM on a 32-bit processor: 88 bytes for each of the `N`, 28 for each of the `NEAR`, and 144.
+/// RAM on a 32-bit processor: 88 bytes for each of the `N`, 32 for each of the `NEAR`, and 144.
 ///
 /// Make it once, in a `static` or at start-up, and use it at every tick.
 ///
@@ -95,6 +95,41 @@ pub struct Contacts<const N: usize, const NEAR: usize = 512> {
     basins: Basins<NEAR>,
     /// Of a tracker's last search.
     front: RangeFront<NEAR>,
+}
+
+/// The contacts of a list that a constraint acts on, deepest first: see [`Contacts::within`].
+#[derive(Clone, Debug)]
+pub struct Within<'c> {
+    contacts: core::slice::Iter<'c, Contact>,
+    bound: f32,
+    is_complete: bool,
+}
+
+impl Within<'_> {
+    /// Whether all contacts within the margin are among them. If not, the list or its places were too few, or the budget
+    /// ended: walls may be missing beyond [`bound`](Self::bound).
+    #[must_use]
+    pub const fn is_complete(&self) -> bool {
+        self.is_complete
+    }
+
+    /// Every contact whose separation is below this (mm) is among them: [`Contacts::bound`].
+    #[must_use]
+    pub const fn bound(&self) -> f32 {
+        self.bound
+    }
+}
+
+impl<'c> Iterator for Within<'c> {
+    type Item = &'c Contact;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.contacts.next()
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        self.contacts.size_hint()
+    }
 }
 
 impl<const N: usize, const NEAR: usize> Default for Contacts<N, NEAR> {
@@ -127,19 +162,17 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         self.found.count == 0
     }
 
-    /// The contacts, deepest first, for a constraint that acts within `margin` (mm). A full list is no error: it has the
-    /// deepest.
+    /// The contacts, deepest first, for a constraint that acts within `margin` (mm). The deepest is among them for
+    /// certain; others may be missing where [`Within::is_complete`] says so.
     ///
     /// # Errors
-    /// [`Unavailable::CutShort`] if the budget ended before all contacts within the margin were known, or no query
-    /// filled the list; [`Unavailable::NoSide`] if the tool may be inside and no contact is within the margin;
-    /// [`QueryError::Margin`] if the query's margin was less.
-    pub fn within(
-        &self,
-        margin: f32,
-    ) -> Result<impl Iterator<Item = &Contact> + Clone, Unavailable> {
-        let List { bound, is_cut_short, has_no_side, accuracy, .. } = self.found;
-        if is_cut_short && !(bound >= margin) {
+    /// [`Unavailable::CutShort`] if the budget ended before the deepest contact was known, or no query filled the list;
+    /// [`Unavailable::NoSide`] if the tool may be inside and no contact is within the margin; [`QueryError::Margin`] if the
+    /// query's margin was less.
+    pub fn within(&self, margin: f32) -> Result<Within<'_>, Unavailable> {
+        let List { bound, is_open, has_no_side, accuracy, .. } = self.found;
+        let is_complete = bound >= margin;
+        if is_open && !is_complete {
             return Err(Unavailable::CutShort);
         }
         if !(margin <= self.found.margin) {
@@ -149,7 +182,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         if has_no_side && !self.iter().next().is_some_and(acts) {
             return Err(Unavailable::NoSide);
         }
-        Ok(self.iter())
+        let contacts = self.found.list.get(..self.found.count).unwrap_or_default().iter();
+        Ok(Within { contacts, bound, is_complete })
     }
 
     /// Gives a list whose tool may be inside, because the closest pair has no side, that of `closest`: a pair whose side
@@ -222,10 +256,14 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// `margin` (mm). For a tool that is inside the only contact is its deepest pair; for one that crosses the surface
     /// that pair is the first.
     ///
-    /// Two valleys of the distance are one contact unless a ridge of more than a 64th of the margin parts them, so a
-    /// flat wall along a capsule is one. Pairs with the inner side of a sheet, say the far side of an organ, are not
+    /// Two valleys of the distance in much the same direction, within 7 degrees, are one contact unless a ridge of more than
+    /// a 64th of the margin parts them, so a flat wall along a capsule is one. Walls in other directions are contacts of
+    /// their own. Pairs with the inner side of a sheet, say the far side of an organ, are not
     /// contacts. Where the side is undefined the tool is taken to be outside. If that is because the budget ended,
     /// contacts may be missing at any distance: see [`Contacts::within`].
+    ///
+    /// Where the list has too few places, or the budget ends, the closest pair is in it all the same, and its
+    /// [bound](Contacts::bound) says how far it is complete. One wall may then be several contacts.
     ///
     /// Cost: that of [`closest`](Self::closest), a range search that compares the corners of each triangle within the
     /// margin, and exact tests of about an eighth of these and of those around a contact.

@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use super::Search;
 use crate::unavailable::QueryError;
-use crate::{Index, Tool, VertexTable};
+use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
 
 /// Places of the table. Neighbouring vertices have rows close together, and the last bits of a row are its place.
 const PLACES: usize = 128;
@@ -86,6 +86,8 @@ impl Place {
 
 /// The vertices seen last.
 pub(super) struct Heights {
+    /// Triangles with another label are left out.
+    part: Option<u8>,
     places: [Vertex; PLACES],
     /// Those that have lost their place while a triangle stood for them: at most one for each corner of a triangle.
     lost: [Vertex; 3],
@@ -93,8 +95,20 @@ pub(super) struct Heights {
 }
 
 impl Heights {
-    pub const fn new() -> Self {
-        Self { places: [Vertex::UNSEEN; PLACES], lost: [Vertex::UNSEEN; 3], losses: 0 }
+    pub const fn new(part: Option<u8>) -> Self {
+        Self { part, places: [Vertex::UNSEEN; PLACES], lost: [Vertex::UNSEEN; 3], losses: 0 }
+    }
+
+    /// Whether triangles are left out.
+    #[inline(always)]
+    pub const fn is_of_part(&self) -> bool {
+        self.part.is_some()
+    }
+
+    /// Whether a triangle is left out.
+    #[inline(always)]
+    pub fn leaves_out<I: Index>(&self, tree: &Tree<'_, I>, triangle: u32) -> bool {
+        self.part.is_some() && tree.label(TriangleRow(triangle)) != self.part
     }
 
     #[inline(always)]

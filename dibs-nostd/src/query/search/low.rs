@@ -13,12 +13,12 @@ use glam::Vec3;
 
 use super::Search;
 use super::heights::{Heights, Place, Vertex};
-use crate::tool::{SLIVER, Tool};
+use crate::tool::{AxisPair, SLIVER, Tool};
 use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
 
 /// Most triangles that are turned through around a vertex.
-const MAX_RING: u32 = 256;
+pub(super) const MAX_RING: u32 = 256;
 
 /// A triangle, seen from the axis.
 struct Seen {
@@ -52,12 +52,15 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         count: u32,
         ridge: f32,
         heights: &mut Heights,
-        visit: &mut impl FnMut(u32, f32) -> f32,
+        visit: &mut impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<Option<f32>, QueryError> {
         let corrupt = QueryError::Corrupt { row: first };
         let tree = self.tree;
         let mut least = f32::INFINITY;
         for (triangle, rows) in (first..).zip(tree.triangles(first, count).ok_or(corrupt)?) {
+            if heights.leaves_out(tree, triangle) {
+                continue;
+            }
             let seen = self.see(rows, ridge, heights)?;
             if seen.low < least {
                 least = seen.low;
@@ -71,7 +74,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                         Some(false)
                     }
                     Dip::Edge(edge) => self.dips(triangle, edge, seen.low, heights)?,
-                    Dip::Anywhere => self.is_outside(triangle)?,
+                    Dip::Anywhere => self.is_outside(triangle, heights)?,
                 }
             };
             let Some(is_low) = is_low else { return Ok(None) };
@@ -94,7 +97,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         &mut self,
         vertex: &Vertex,
         heights: &Heights,
-        visit: &mut impl FnMut(u32, f32) -> f32,
+        visit: &mut impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<bool, QueryError> {
         let Some(triangle) = vertex.standing() else { return Ok(true) };
         match self.is_lowest(triangle, vertex, heights)? {
@@ -109,13 +112,13 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     fn visit_triangle(
         &mut self,
         triangle: u32,
-        visit: &mut impl FnMut(u32, f32) -> f32,
+        visit: &mut impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<bool, QueryError> {
         let Some(left) = self.left.triangle_tests.checked_sub(1) else { return Ok(false) };
         self.left.triangle_tests = left;
         let corners = self.corners(triangle)?;
         if let Some(pair) = self.tool.closest_on_triangle(&corners, self.cutoff_squared) {
-            let limit = visit(triangle, pair.distance_squared);
+            let limit = visit(triangle, &pair);
             self.set_limit(limit);
         }
         Ok(true)
@@ -162,8 +165,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
 
     /// Whether a triangle of a closed surface is seen from outside, as far as known. `None` without budget.
     #[inline(always)]
-    fn is_outside(&mut self, triangle: u32) -> Result<Option<bool>, QueryError> {
-        if !self.tree.is_closed() {
+    fn is_outside(&mut self, triangle: u32, heights: &Heights) -> Result<Option<bool>, QueryError> {
+        // At the border of a part, the edge's other triangle is left out.
+        if !self.tree.is_closed() || heights.is_of_part() {
             return Ok(Some(true));
         }
         let Some(left) = self.left.node_tests.checked_sub(1) else { return Ok(None) };
@@ -226,6 +230,10 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             let Some(left) = self.left.node_tests.checked_sub(1) else { return Ok(None) };
             self.left.node_tests = left;
             (row, corner) = (next, if is_back { other } else { after(other) });
+            // Its corners may be seen again with a triangle that is not left out; if not, one more triangle is low.
+            if heights.leaves_out(tree, row) {
+                continue;
+            }
             let new = if is_back { before(corner) } else { after(corner) };
             let (new, square) = self.corner(row, new, heights)?;
             if square < vertex.square || square == vertex.square && new < vertex.row {
@@ -243,7 +251,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         low: f32,
         heights: &Heights,
     ) -> Result<Option<bool>, QueryError> {
-        if let Some((row, other)) = self.tree.across(triangle, edge) {
+        if let Some((row, other)) = self.tree.across(triangle, edge)
+            && !heights.leaves_out(self.tree, row)
+        {
             let Some(left) = self.left.node_tests.checked_sub(1) else { return Ok(None) };
             self.left.node_tests = left;
             let (_, beyond) = self.corner(row, before(other), heights)?;
@@ -251,7 +261,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 return Ok(Some(false));
             }
         }
-        self.is_outside(triangle)
+        self.is_outside(triangle, heights)
     }
 
     /// The row and the height of a triangle's corner.

@@ -1,26 +1,39 @@
 //! All low triangles within a distance, instead of the closest.
 
 use super::heights::{Heights, Place};
+use super::low::MAX_RING;
 use super::{Search, Waiting};
-use crate::Budget;
 use crate::math::sqrt::sqrt;
-use crate::tool::Tool;
+use crate::tool::{AxisPair, Tool};
 use crate::tree::format::Link;
 use crate::unavailable::QueryError;
-use crate::{Index, VertexTable};
+use crate::{Budget, Index, Options, VertexTable};
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
+    /// A search over a range, with the budget of `options`.
+    ///
+    /// In a sound tree it tests each node's sphere once. It looks at each triangle once, at the vertex beyond one edge of
+    /// it, and at its side. Each triangle stands for one vertex at most, and has it turned round once, past [`MAX_RING`]
+    /// triangles at most. So this bound is never met; if corrupt bytes form a loop, it ends the search.
+    pub fn over_range(mut self, options: &Options) -> Self {
+        let header = self.tree.header();
+        let most = header.triangles.saturating_mul(3 + MAX_RING).saturating_add(header.nodes);
+        self.budget = options.budget.nodes_at_most(most);
+        self.left = self.budget;
+        self
+    }
+
     /// Visits every triangle within `limit` of the axis that may be the lowest of its surroundings, but for ridges of
-    /// `ridge`, with the square of its distance. A visit returns the next limit. Unvisited ones are at least as far as
-    /// the distance returned; the budget is the tests made.
+    /// `ridge`, with its pair. A visit returns the next limit. Unvisited ones are at least as far as
+    /// the distance returned; the budget is the tests made. With a label, only that `part` of the surface is visited.
     pub fn each_low(
         mut self,
         limit: f32,
-        ridge: f32,
-        mut visit: impl FnMut(u32, f32) -> f32,
+        (ridge, part): (f32, Option<u8>),
+        mut visit: impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<(f32, Budget), QueryError> {
         self.set_limit(limit);
-        let mut heights = Heights::new();
+        let mut heights = Heights::new(part);
         let least = match self.visit_waiting(ridge, &mut heights, &mut visit)? {
             Some(waiting) => {
                 let standing = least_standing(&heights, ridge);
@@ -39,7 +52,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         &mut self,
         ridge: f32,
         heights: &mut Heights,
-        visit: &mut impl FnMut(u32, f32) -> f32,
+        visit: &mut impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<Option<f32>, QueryError> {
         while let Some(top) = self.waiting.checked_sub(1) {
             self.waiting = top;
@@ -74,7 +87,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     pub(super) fn visit_rest(
         &mut self,
         heights: &Heights,
-        visit: &mut impl FnMut(u32, f32) -> f32,
+        visit: &mut impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<bool, QueryError> {
         for place in Place::all() {
             let vertex = heights.at(place);

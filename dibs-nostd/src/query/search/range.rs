@@ -15,7 +15,7 @@ use crate::math::sqrt::sqrt;
 use crate::query::axis::Axis;
 use crate::query::tracker::front::is_before;
 use crate::surface::motion::{FAR, Unit};
-use crate::tool::Tool;
+use crate::tool::{AxisPair, Tool};
 use crate::tree::format::{Link, MAX_CHILDREN};
 use crate::unavailable::QueryError;
 use crate::{Budget, Index, Travel, VertexTable};
@@ -50,6 +50,8 @@ struct State {
     now: u32,
     /// Axis and surface at the last search; none if it did not come to its end.
     last: Option<(Axis, Travel)>,
+    /// The label whose leaves are near.
+    part: Option<u8>,
 }
 
 /// The front without its size.
@@ -62,7 +64,7 @@ pub(in crate::query) struct RangeFrontMut<'f> {
 impl<const M: usize> RangeFront<M> {
     pub const fn new() -> Self {
         let none = Opened { link: 0, key: 0, opened: 0, near: 0 };
-        Self { nodes: [none; M], state: State { count: 0, now: 0, last: None } }
+        Self { nodes: [none; M], state: State { count: 0, now: 0, last: None, part: None } }
     }
 
     /// Number of opened nodes.
@@ -71,9 +73,16 @@ impl<const M: usize> RangeFront<M> {
     }
 
     /// The front after the motion since its last search.
-    pub fn moved_to(&mut self, tool: &impl Tool, travel: Travel, unit: Unit) -> RangeFrontMut<'_> {
+    pub fn moved_to(
+        &mut self,
+        tool: &impl Tool,
+        travel: Travel,
+        unit: Unit,
+        part: Option<u8>,
+    ) -> RangeFrontMut<'_> {
         let Self { nodes, state } = self;
-        let moved = state.last.and_then(|(axis, before)| {
+        let last = state.last.filter(|_| state.part == part);
+        let moved = last.and_then(|(axis, before)| {
             let surface = travel.since(&before)?;
             Some(surface.saturating_add(u64::from(axis.step(tool, unit))))
         });
@@ -83,7 +92,7 @@ impl<const M: usize> RangeFront<M> {
             }
             _ => state.count = 0,
         }
-        state.last = None;
+        (state.last, state.part) = (None, part);
         RangeFrontMut { nodes, state, unit }
     }
 }
@@ -129,15 +138,15 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         mut self,
         front: &mut RangeFrontMut<'_>,
         limit: f32,
-        ridge: f32,
-        mut visit: impl FnMut(u32, f32) -> f32,
+        (ridge, part): (f32, Option<u8>),
+        mut visit: impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<(f32, Budget), QueryError> {
         self.set_limit(limit);
         if front.state.count == 0 && front.start(self.tree.roots()).is_none() {
-            return self.each_low(limit, ridge, visit);
+            return self.each_low(limit, (ridge, part), visit);
         }
         self.waiting = 0;
-        let mut heights = Heights::new();
+        let mut heights = Heights::new(part);
         let mut threshold = front.threshold(self.cutoff + self.coordinate_slack);
         let mut at = 0;
         while let Some(node) = front.node(at) {
@@ -238,7 +247,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         at: usize,
         ridge: f32,
         heights: &mut Heights,
-        visit: &mut impl FnMut(u32, f32) -> f32,
+        visit: &mut impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<bool, QueryError> {
         let (now, unit, tree) = (front.state.now, front.unit, self.tree);
         let margin = self.slack + self.coordinate_slack;

@@ -91,11 +91,11 @@ fn no_bound_of_a_range_exceeds_the_distance() {
             let travel = surface.travel().expect("measured");
             let mut search = |options: &Options| {
                 let search = Search::start(&tree, &mut stack, &surface, &tool, options, None, None);
-                let mut moved = front.moved_to(&tool, travel, Unit::of(&tree));
+                let mut moved = front.moved_to(&tool, travel, Unit::of(&tree), None);
                 kept += usize::from(moved.state.count > 0);
-                let visit = |_, _| LIMIT;
+                let visit = |_, _: &_| LIMIT;
                 let search = search.expect("valid");
-                let (beyond, _) = search.each_low_from(&mut moved, LIMIT, RIDGE, visit)?;
+                let (beyond, _) = search.each_low_from(&mut moved, LIMIT, (RIDGE, None), visit)?;
                 let is_whole = beyond == f32::INFINITY;
                 if is_whole {
                     moved.keep(&tool, travel);
