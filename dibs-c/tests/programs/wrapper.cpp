@@ -176,7 +176,7 @@ int main(int argc, char **argv) {
     EXPECT(DIBS_CODE_ARGUMENT, dibs::closest_of(both, std::span(chain, 1), of_chain));
 
     const dibs_watch off = {DIBS_UNLIMITED, DIBS_UNLIMITED};
-    const dibs_limits limits = {{20, 60}, off, off, off, off, off, off, 0.1f, 1, 0};
+    const dibs_limits limits = {{20, 60}, off, off, off, off, off, off, 0.1f, 1, 0, 0, 0};
     dibs_verdict verdict;
     MUST(failsafe.init(&limits));
     MUST(failsafe.step({}, verdict));
