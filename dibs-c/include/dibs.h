@@ -622,6 +622,89 @@ typedef uint32_t dibs_fallback;
 #endif // __cplusplus
 
 /**
+ * On which side of the surface a tool's axis is.
+ */
+enum dibs_side
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * Outside: where the triangles' corners are seen counter-clockwise.
+   */
+  DIBS_SIDE_OUTSIDE = 0,
+  /**
+   * The whole axis is inside.
+   */
+  DIBS_SIDE_INSIDE = 1,
+  /**
+   * The axis crosses the surface.
+   */
+  DIBS_SIDE_CROSSING = 2,
+  /**
+   * No side: none was asked for.
+   */
+  DIBS_SIDE_NOT_ASKED = 3,
+  /**
+   * No side: the tree has no adjacency.
+   */
+  DIBS_SIDE_NO_ADJACENCY = 4,
+  /**
+   * No side: the closest point is on an open boundary of the surface.
+   */
+  DIBS_SIDE_OPEN_BOUNDARY = 5,
+  /**
+   * No side: the sides are closer than the accuracy.
+   */
+  DIBS_SIDE_BELOW_ACCURACY = 6,
+  /**
+   * No side: the triangles at the closest point have no clear normal.
+   */
+  DIBS_SIDE_DEGENERATE = 7,
+  /**
+   * No side: the budget ran out.
+   */
+  DIBS_SIDE_CUT_SHORT = 8,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_side dibs_side;
+#else
+typedef uint32_t dibs_side;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * How it is known that the tree's spheres cover the surface, so that no part of it is nearer than an answer says.
+ */
+enum dibs_coverage
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * The stretch was measured on these positions.
+   */
+  DIBS_COVERAGE_MEASURED = 0,
+  /**
+   * A bound on the stretch follows from measured frames.
+   */
+  DIBS_COVERAGE_PROVEN = 1,
+  /**
+   * Nothing was measured: the tree's stretch limit is taken to hold. If it does not, a nearer part of the surface can be
+   * missed.
+   */
+  DIBS_COVERAGE_ASSUMED = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_coverage dibs_coverage;
+#else
+typedef uint32_t dibs_coverage;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * A list of contacts.
  *
  * One context at a time.
