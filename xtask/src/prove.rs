@@ -15,7 +15,7 @@ pub struct Passed {
 /// `cargo run` of the program, without its arguments. It runs in the user's folder, because arguments may be paths.
 pub fn command(features: &[&str]) -> Command {
     let mut cargo = Command::new("cargo");
-    cargo.args(["run", "--quiet", "--release", "--package", "dibs-prove", "--manifest-path"]);
+    cargo.args(["run", "--release", "--package", "dibs-prove", "--manifest-path"]);
     cargo.arg(workspace::root().join("Cargo.toml")).args(features).arg("--");
     cargo
 }

@@ -1,15 +1,47 @@
 //! Folders of the workspace.
 
 use std::env;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// The repository's top folder.
+/// The repository's top folder: of the package that cargo runs, of this program, or the current folder's. It is looked for
+/// at each start, so that a copy of the checkout, target folder included, works on itself.
 pub fn root() -> PathBuf {
-    let own = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
-    own.parent().map(PathBuf::from).unwrap_or(own)
+    let starts = [
+        env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from),
+        env::current_exe().ok(),
+        env::current_dir().ok(),
+    ];
+    let root = starts.iter().flatten().find_map(|start| root_above(start));
+    root.map_or_else(|| PathBuf::from("."), Path::to_path_buf)
+}
+
+/// The top folder of the repository that a path is in.
+fn root_above(start: &Path) -> Option<&Path> {
+    let holds = |folder: &Path, package: &str| folder.join(package).join("Cargo.toml").is_file();
+    start.ancestors().find(|folder| holds(folder, "xtask") && holds(folder, "dibs-nostd"))
 }
 
 /// Cargo's target folder.
 pub fn target() -> PathBuf {
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |dir| root().join(dir))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::root_above;
+    use std::fs;
+
+    #[test]
+    fn a_copy_is_a_root_of_its_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let copy = folder.path().join("copy");
+        for package in ["xtask", "dibs-nostd", "tests/prove"] {
+            fs::create_dir_all(copy.join(package)).unwrap();
+            fs::write(copy.join(package).join("Cargo.toml"), "").unwrap();
+        }
+        for start in ["xtask", "tests/prove", "target/release/xtask", ""] {
+            assert_eq!(root_above(&copy.join(start)), Some(copy.as_path()), "{start}");
+        }
+        assert_eq!(root_above(folder.path()), None);
+    }
 }

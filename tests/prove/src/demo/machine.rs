@@ -94,7 +94,7 @@ impl Machine {
             workspace::target().join("host-controller")
         };
         let mut cargo = Command::new("cargo");
-        cargo.args(["build", "--quiet", "--release", "--package", "dibs-prove"]);
+        cargo.args(["build", "--release", "--package", "dibs-prove"]);
         cargo.args(["--package", "firmware-example", "--bin", "host", "--target-dir"]).arg(&folder);
         cargo.current_dir(workspace::root());
         scene.surface.describe_to(&mut cargo);

@@ -80,6 +80,7 @@ pub struct Options {
 pub fn run(options: &Options) -> Result<()> {
     let scene = Scene::load(options)?;
     println!("surface: {}", scene.describe());
+    eprintln!("building the controller ...");
     let machine = Machine::prepare(options, &scene)?;
     println!("controller: {}", machine.describe());
 
