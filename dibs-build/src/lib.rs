@@ -21,6 +21,7 @@ mod error;
 mod export;
 #[cfg(feature = "stream")]
 pub mod faults;
+mod frames;
 pub mod generate;
 mod geodesic;
 mod labels;
@@ -46,6 +47,7 @@ pub use builder::{Builder, IndexWidth};
 pub use construct::Construction;
 pub use crossing::{CrossingParts, crossing_parts};
 pub use error::BuildError;
+pub use frames::{FrameCheck, FrameError};
 pub use labels::{LabelsError, LabelsErrorKind, read_labels};
 pub use mesh::{Mesh, Motion, RestSurface};
 pub use motion::MotionMismatchError;
@@ -56,7 +58,8 @@ pub use read::{
 pub use rest::Paths;
 pub use script::{MeshSource, TreeScript, tree};
 pub use stretch::{
-    Beyond, LimitsError, LimitsErrorKind, MotionStretch, Needed, read_limits, write_limits,
+    Beyond, LimitsError, LimitsErrorKind, MotionStretch, Needed, largest_stretch, read_limits,
+    write_limits,
 };
 pub use write::{WriteError, WriteErrorKind, write_atomically};
 

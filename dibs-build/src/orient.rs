@@ -48,6 +48,17 @@ pub enum WindingError {
         /// The other one.
         other: usize,
     },
+    /// So many closed parts that the test which lies in which would take too long.
+    #[error(
+        "the surface has {parts} closed parts, and whether they lie in each other is tested for at most {most}: build a \
+         tree for each few of them"
+    )]
+    Parts {
+        /// Closed parts.
+        parts: usize,
+        /// Most that are tested.
+        most: usize,
+    },
     /// A closed part of the surface, in no other closed part, has normals that point inwards.
     #[error(
         "the closed surface with triangle {triangle} faces inwards, so what it encloses counts as outside: turn it with \
@@ -78,6 +89,7 @@ pub fn check_winding(mesh: &Mesh) -> Result<(), WindingError> {
         });
     }
     let closed = edges.closed_parts();
+    check_parts(closed.len())?;
     let is_inside = |row: usize| {
         let vertex = mesh.triangles[closed[row][0]][0];
         let point = mesh.positions[vertex as usize].as_dvec3();
@@ -142,6 +154,7 @@ pub fn orient(mesh: &mut Mesh) -> Result<usize, WindingError> {
     }
     let is_closed = |part: &[usize]| part.iter().all(|&triangle| edges.neighbours[triangle] == 3);
     let closed: Vec<bool> = parts.iter().map(|part| is_closed(part)).collect();
+    check_parts(closed.iter().filter(|&&is_closed| is_closed).count())?;
     let against: Vec<bool> = (0..parts.len())
         .map(|row| {
             let part = &parts[row];
@@ -166,6 +179,14 @@ pub fn orient(mesh: &mut Mesh) -> Result<usize, WindingError> {
     let changed = mesh.triangles.iter().zip(&oriented.triangles).filter(|(a, b)| a != b).count();
     *mesh = oriented;
     Ok(changed)
+}
+
+/// Most closed parts that are tested, each against all triangles. A tree has 64 roots; parts that only share vertices or
+/// edges are one root's.
+const MOST_PARTS: usize = 256;
+
+fn check_parts(parts: usize) -> Result<(), WindingError> {
+    if parts > MOST_PARTS { Err(WindingError::Parts { parts, most: MOST_PARTS }) } else { Ok(()) }
 }
 
 /// Two triangles with a common edge.

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use dibs_build::glam::Vec3;
+use dibs_build::largest_stretch;
 use dibs_nostd::{
     Budget, Contact, Contacts, Index, MeasuredStretch, Options, Proximity, Query, QueryError, Tree,
 };
@@ -29,8 +30,10 @@ pub struct Surface {
 
 #[pymethods]
 impl Surface {
-    fn stretch(&self) -> Option<f32> {
-        self.stretch.map(|measured| measured.sigma())
+    fn stretch(&self) -> Option<f64> {
+        let measured = self.stretch?;
+        let largest = of_any_width!(self.tree.view(), tree => largest_stretch(tree, &self.rows));
+        Some(largest.unwrap_or(measured.sigma().into()))
     }
 }
 

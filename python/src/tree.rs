@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dibs_build::glam::{DVec3, Vec3};
-use dibs_build::summarise;
+use dibs_build::{FrameCheck, summarise};
 use dibs_nostd::{FormatError, Index, StretchError, TriangleRow, measure_stretch};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -50,15 +50,9 @@ impl Owned {
         self.validated.borrow_dependent()
     }
 
-    /// Vertices that a mesh of this tree has at least.
+    /// Vertices of the tree's mesh.
     pub fn vertices(&self) -> usize {
-        self.order.iter().max().map_or(0, |&last| last as usize + 1)
-    }
-
-    /// Positions of the mesh's vertices in the order of the rows, from the origin; `None` where some are missing.
-    pub fn rows(&self, of_mesh: &[DVec3]) -> Option<Vec<Vec3>> {
-        let row = |&vertex: &u32| Some((of_mesh.get(vertex as usize)? - self.origin).as_vec3());
-        self.order.iter().map(row).collect()
+        of_any_width!(self.view(), tree => tree.file_vertex_count() as usize)
     }
 
     pub fn label(&self, triangle: TriangleRow) -> Option<u8> {
@@ -112,13 +106,13 @@ impl Tree {
         py.detach(|| {
             let velocities = velocities.map(|each| self.velocities(each)).transpose()?;
             let rows = match positions {
-                Some(positions) => self.0.rows(&bytes::points(positions)).ok_or_else(|| {
-                    let (needed, found) = (self.0.vertices(), positions.len() / 24);
-                    invalid(format!(
-                        "{found} positions and the tree uses {needed} vertices; give those of the mesh that the tree \
-                         was built from"
-                    ))
-                })?,
+                Some(positions) => {
+                    let origin = self.0.origin;
+                    let at = |position: DVec3| (position - origin).as_vec3();
+                    let positions: Vec<Vec3> = bytes::points(positions).into_iter().map(at).collect();
+                    let check = of_any_width!(self.0.view(), tree => FrameCheck::of(tree));
+                    check.to_rows(&positions).map_err(|error| invalid(format!("surface: {error}")))?
+                }
                 None => of_any_width!(self.0.view(), tree => at_rest(tree)?),
             };
             let measured = of_any_width!(self.0.view(), tree => measure_stretch(tree, rows.as_slice()));

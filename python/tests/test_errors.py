@@ -58,7 +58,7 @@ CASES = [
     # Surfaces.
     (ValueError, "surface: the shape is (3,)", lambda: TREE.query(TOOL, surface=[0, 0, 0])),
     (ValueError, "surface: 501 positions, and the mesh has 502 vertices", lambda: TREE.query(TOOL, surface=VERTICES[1:])),
-    (ValueError, "501 positions and the tree uses 502 vertices", lambda: dibs.Tree(TREE.blob).query(TOOL, surface=VERTICES[1:])),
+    (ValueError, "has 501 vertices and the tree's mesh has 502", lambda: dibs.Tree(TREE.blob).query(TOOL, surface=VERTICES[1:])),
     (ValueError, "surface: nan at [3, 1]", lambda: TREE.query(TOOL, surface=NAN)),
     (ValueError, "build the tree with a larger stretch", lambda: TREE.surface(VERTICES * [2, 1, 1])),
     (ValueError, "surface: is of another tree", lambda: dibs.Tree(TREE.blob).query(TOOL, surface=TREE.rest)),

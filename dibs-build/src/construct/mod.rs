@@ -4,6 +4,8 @@ mod paper;
 mod pin;
 mod section;
 mod split;
+#[cfg(test)]
+mod tests;
 mod widen;
 
 use std::sync::Mutex;
@@ -105,25 +107,29 @@ impl<'a> Constructor<'a> {
         components.into_iter().map(tree).collect()
     }
 
-    /// The tree of a section, which is part of the section `around` it.
+    /// The tree of a section, which is part of the section `around` it: that one's sphere, and whether its parts meet nearby.
     fn cluster(
         &self,
         section: &Section,
-        around: Option<(&Section, Pin)>,
+        around: Option<(&Section, Pin, bool)>,
         start: u32,
         depth: u32,
     ) -> Result<Cluster, BuildError> {
         let mut searches = self.take_searches();
-        searches.enter(section, around.map(|(around, _)| around));
+        searches.enter(section, around.map(|(around, ..)| around));
+        if let Some((.., false)) = around {
+            searches.stay();
+        }
         let mut pin = self.pin(section, &mut searches, start);
-        if let Some((_, whole)) = around
-            && !pin.radius.is_finite()
+        let is_connected = pin.radius.is_finite();
+        if let Some((_, whole, _)) = around
+            && !is_connected
         {
             pin = whole;
         }
         if section.triangles.len() <= self.leaf_triangles {
             self.give_back(searches);
-            return self.leaves(section, pin, depth);
+            return self.leaves(section, pin, is_connected, depth);
         }
         let sides = self.split(section, &mut searches, depth);
         let [left, right] = sides.map(|triangles| Section::new(self.surface.mesh, triangles));
@@ -137,8 +143,10 @@ impl<'a> Constructor<'a> {
         });
         self.give_back(searches);
         let big = section.triangles.len() > PARALLEL_ABOVE;
-        let build_left = || self.cluster(&left, Some((section, pin)), borders[0], depth + 1);
-        let build_right = || self.cluster(&right, Some((section, pin)), borders[1], depth + 1);
+        let build_left =
+            || self.cluster(&left, Some((section, pin, is_connected)), borders[0], depth + 1);
+        let build_right =
+            || self.cluster(&right, Some((section, pin, is_connected)), borders[1], depth + 1);
         let (left, right) =
             if big { rayon::join(build_left, build_right) } else { (build_left(), build_right()) };
         let content = Content::Inner(vec![left?, right?]);
@@ -147,7 +155,13 @@ impl<'a> Constructor<'a> {
 
     /// One leaf; or one for each part that edges connect, and one for each triangle whose stretch measurement would be
     /// ill-conditioned in a common leaf.
-    fn leaves(&self, section: &Section, pin: Pin, depth: u32) -> Result<Cluster, BuildError> {
+    fn leaves(
+        &self,
+        section: &Section,
+        pin: Pin,
+        is_connected: bool,
+        depth: u32,
+    ) -> Result<Cluster, BuildError> {
         let mesh = self.surface.mesh;
         let mut parts = leaf::connected_by_edges(&mesh.triangles, &section.triangles);
         if let [whole] = &mut parts[..] {
@@ -165,7 +179,7 @@ impl<'a> Constructor<'a> {
         } else {
             let leaves = parts.into_iter().map(|part| {
                 let part = Section::new(mesh, part);
-                self.cluster(&part, Some((section, pin)), part.vertices[0], depth + 1)
+                self.cluster(&part, Some((section, pin, is_connected)), part.vertices[0], depth + 1)
             });
             Content::Inner(leaves.collect::<Result<_, _>>()?)
         };

@@ -27,6 +27,9 @@ pub(crate) fn geodesic_centre(
     start: u32,
 ) -> Pin {
     let first = searches.search_other(surface, section, start);
+    if first.reached < section.vertices.len() {
+        searches.stay();
+    }
     let second = searches.search_seed(0, surface, section, first.vertex);
     searches.search_seed(1, surface, section, second.vertex);
     let first = first.vertex;

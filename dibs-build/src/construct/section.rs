@@ -32,8 +32,8 @@ pub(crate) struct Surface<'a> {
 /// Most arcs, for each vertex of a section, that a search may look at for paths outside the section around it. A section
 /// whose parts only meet farther off keeps the sphere of the section around: where triangles are connected at random most
 /// sections are of that kind, and each would search the whole mesh.
-const ROUNDABOUT: usize = 1024;
-const ROUNDABOUT_LEAST: usize = 16_384;
+const ROUNDABOUT: usize = 256;
+const ROUNDABOUT_LEAST: usize = 4096;
 
 /// Memory of one thread's searches.
 #[derive(Debug)]
@@ -55,6 +55,8 @@ struct Members {
     around: u32,
     /// The vertices of the section and of the section around it, in ascending order.
     lists: [Vec<u32>; 2],
+    /// Whether a search may leave the section around.
+    may_leave: bool,
 }
 
 impl Searches {
@@ -65,16 +67,24 @@ impl Searches {
                 section: 0,
                 around: 0,
                 lists: Default::default(),
+                may_leave: true,
             },
             seeds: [Distances::new(vertices), Distances::new(vertices)],
             other: Distances::new(vertices),
         }
     }
 
+    /// Arcs that all searches with this memory looked at.
+    #[cfg(test)]
+    pub fn arcs_seen(&self) -> usize {
+        self.seeds.iter().chain([&self.other]).map(Distances::arcs_seen).sum()
+    }
+
     /// Makes `section` the target of searches. Paths stay in the section `around` it if that is connected: paths
     /// outside are hardly ever shorter, and take more than half of a search's time.
     pub fn enter(&mut self, section: &Section, around: Option<&Section>) {
         let members = &mut self.members;
+        members.may_leave = true;
         members.section += 2;
         members.around = if around.is_some() { members.section - 1 } else { 0 };
         let [inside, outside] = &mut members.lists;
@@ -87,6 +97,11 @@ impl Searches {
         for &v in &section.vertices {
             members.latest[v as usize] = members.section;
         }
+    }
+
+    /// Keeps the searches of the entered section in the section around it.
+    pub fn stay(&mut self) {
+        self.members.may_leave = false;
     }
 
     /// Writes the distances from `source` to every vertex of the entered section to one of `seeds`.
@@ -133,7 +148,7 @@ impl Members {
             return search(0, None, usize::MAX);
         }
         let farthest = search(self.around, Some(&self.lists[1]), usize::MAX);
-        if farthest.reached == wanted {
+        if farthest.reached == wanted || !self.may_leave {
             return farthest;
         }
         search(0, None, ROUNDABOUT * wanted + ROUNDABOUT_LEAST)

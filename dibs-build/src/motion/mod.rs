@@ -66,7 +66,11 @@ fn unknown(path: &Path, bytes: &[u8]) -> ReadErrorKind {
 }
 
 /// The positions of frame `number` in their place; an error where one is not finite, or f32 does not hold the shape.
-fn frame(positions: &[[f64; 3]], number: usize, place: &Place) -> Result<Vec<Vec3>, ReadErrorKind> {
+pub(crate) fn frame(
+    positions: &[[f64; 3]],
+    number: usize,
+    place: &Place,
+) -> Result<Vec<Vec3>, ReadErrorKind> {
     let is_finite = |value: &f64| (*value as f32).is_finite();
     if let Some(vertex) = positions.iter().position(|position| !position.iter().all(is_finite)) {
         let value = positions[vertex].into_iter().find(|value| !is_finite(value));

@@ -4,9 +4,10 @@
 //! samples, then samples x points x 3 f32. Nothing in it says how many frames a second has. So this crate's own files
 //! say it after the last sample, where other readers do not look: `DIBSRATE`, f32 frames a second.
 
+use crate::frames::check_mesh_size;
 use crate::read::{Place, ReadError, ReadErrorKind, file};
 use crate::write::{WriteErrorKind, write_atomically};
-use crate::{Mesh, Motion, Unit, WriteError};
+use crate::{FrameError, Mesh, Motion, Unit, WriteError};
 use glam::{DVec3, Vec3};
 use std::path::Path;
 use thiserror::Error;
@@ -33,6 +34,14 @@ pub enum MotionMismatchError {
         expected: usize,
         /// Vertices of the frame.
         found: usize,
+    },
+    /// A frame is far smaller than the mesh.
+    #[error("frame {frame} of the motion: {error}")]
+    Frame {
+        /// The first such frame, counted from 0.
+        frame: usize,
+        /// What is wrong with it.
+        error: FrameError,
     },
     /// The motion counts from another origin.
     #[error(
@@ -108,12 +117,14 @@ impl Motion {
             return Err(MotionMismatchError::Origin { expected, found });
         }
         let expected = mesh.positions.len();
-        match self.frames.iter().position(|frame| frame.len() != expected) {
+        if let Some(frame) = self.frames.iter().position(|frame| frame.len() != expected) {
+            let found = self.frames[frame].len();
+            return Err(MotionMismatchError::Vertices { frame, expected, found });
+        }
+        let sizes = self.frames.iter().map(|positions| check_mesh_size(mesh, positions).err());
+        match (0..).zip(sizes).find_map(|(frame, error)| Some((frame, error?))) {
+            Some((frame, error)) => Err(MotionMismatchError::Frame { frame, error }),
             None => Ok(()),
-            Some(frame) => {
-                let found = self.frames[frame].len();
-                Err(MotionMismatchError::Vertices { frame, expected, found })
-            }
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::Mesh;
 use crate::components::connected_by_vertices;
 use dibs_nostd::format::MAX_ROOTS;
 use glam::{DVec3, Vec3};
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 /// The exact tests multiply two squared lengths. Across a mesh of this size, with edges down to a
 /// thousandth of it, the product of two squared edges is still a normal f32.
@@ -20,6 +20,10 @@ const MOST_COORDINATE: f64 = dibs_nostd::MAX_COORDINATE as f64;
 
 /// Ear clipping takes quadratic time at worst: up to a second for a face below this size.
 const MOST_CORNERS: usize = 10_000;
+
+/// So faces of more corners than this may only be few: their squares sum up to at most three of the largest.
+const FEW_CORNERS: usize = 100;
+const MOST_WORK: usize = 3 * MOST_CORNERS * MOST_CORNERS;
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
@@ -155,7 +159,7 @@ fn triangles(raw: &Raw, report: &mut Report) -> Result<(Vec<Triangle>, Vec<usize
     let mut triangulator = Triangulator::new();
     let mut cut = Vec::new();
     let mut triangles = Vec::with_capacity(raw.ends.len());
-    let mut short = Vec::new();
+    let (mut short, mut work) = (Vec::new(), 0_usize);
     for (face, corners) in (1..).zip(raw.faces()) {
         if let Some(&corner) = corners.iter().find(|&&c| c as usize >= raw.positions.len()) {
             return Err(ReadErrorKind::IndexOutOfRange {
@@ -168,6 +172,14 @@ fn triangles(raw: &Raw, report: &mut Report) -> Result<(Vec<Triangle>, Vec<usize
         if corners.len() > MOST_CORNERS {
             let corners = corners.len();
             return Err(ReadErrorKind::LargePolygon { face, corners, most: MOST_CORNERS });
+        }
+        work = work.saturating_add(corners.len() * corners.len());
+        if corners.len() > FEW_CORNERS && work > MOST_WORK {
+            return Err(ReadErrorKind::LargePolygon {
+                face,
+                corners: corners.len(),
+                most: FEW_CORNERS,
+            });
         }
         if corners.len() < 3 {
             short.push(face);
@@ -206,6 +218,11 @@ impl Surface {
             return;
         }
         report.welded = coincident;
+        let moved = (0..).zip(&first).map(|(vertex, &first): (usize, _)| {
+            let [from, to] = [vertex, first as usize].map(|v| self.positions[v].as_dvec3());
+            if referenced[vertex] { from.distance(to) } else { 0.0 }
+        });
+        report.position_error += moved.fold(0.0, f64::max);
         for corner in self.faces.iter_mut().flat_map(|face| &mut face.corners) {
             *corner = first[*corner as usize];
         }
@@ -247,7 +264,10 @@ impl Surface {
         let first_thin = self.faces.iter().find(|triangle| bad(triangle)).map(|t| t.face);
         let first = self.short.iter().copied().chain(first_thin).min();
         let before = self.faces.len();
+        let thin = self.faces.iter().filter(|triangle| bad(triangle)).map(|t| t.corners);
+        let thin: Vec<[u32; 3]> = thin.collect();
         self.faces.retain(|triangle| !bad(triangle));
+        report.position_error += lost(&thin, self.faces.iter().map(|t| t.corners), &self.positions);
         let count = self.short.len() + before - self.faces.len();
         if let (true, Some(face)) = (strict, first) {
             return Err(ReadErrorKind::Degenerate { count, face });
@@ -329,6 +349,62 @@ impl Surface {
         referenced
     }
 }
+
+/// The farthest that a point of dropped triangles may be from those that are kept. A point of a triangle is no farther from
+/// its longest edge than the triangle is high, nor from the two others together.
+fn lost(dropped: &[[u32; 3]], kept: impl Iterator<Item = [u32; 3]>, positions: &[Vec3]) -> f64 {
+    let edge = |a: u32, b: u32| (a.min(b), a.max(b));
+    let edges = |[a, b, c]: [u32; 3]| [edge(a, b), edge(b, c), edge(c, a)];
+    let length = |(a, b): (u32, u32)| {
+        let [a, b] = [a, b].map(|corner| positions[corner as usize].as_dvec3());
+        a.distance(b)
+    };
+    let mut thin = Vec::with_capacity(dropped.len());
+    // The distance of each edge of a dropped triangle from those that are kept.
+    let mut from_kept = HashMap::new();
+    for &corners in dropped {
+        let [a, b, c] = corners.map(|corner| positions[corner as usize].as_dvec3());
+        let mut edges = edges(corners);
+        edges.sort_by(|&a, &b| length(b).total_cmp(&length(a)).then(a.cmp(&b)));
+        let doubled_area = (b - a).cross(c - a).length();
+        // One without area is no surface.
+        if doubled_area > 0.0 {
+            from_kept.extend(edges.map(|edge| (edge, f64::INFINITY)));
+            thin.push((edges, doubled_area / length(edges[0]), f64::INFINITY));
+        }
+    }
+    if thin.is_empty() {
+        return 0.0;
+    }
+    for edge in kept.flat_map(edges) {
+        from_kept.entry(edge).and_modify(|distance| *distance = 0.0);
+    }
+    for _ in 0..MOST_ROUNDS {
+        let mut is_done = true;
+        for (edges, height, distance) in &mut thin {
+            let [long, one, other] = edges.map(|edge| from_kept[&edge]);
+            let found = *height + long.min(one.max(other));
+            if found < *distance {
+                *distance = found;
+                is_done = false;
+                for edge in *edges {
+                    from_kept.entry(edge).and_modify(|known| *known = known.min(found));
+                }
+            }
+        }
+        if is_done {
+            break;
+        }
+    }
+    // A triangle that no kept one is near was a line by itself.
+    let of = |&(_, height, distance): &(_, f64, f64)| {
+        if distance.is_finite() { distance } else { height }
+    };
+    thin.iter().map(of).fold(0.0, f64::max)
+}
+
+/// Most dropped triangles in a row whose heights are added up.
+const MOST_ROUNDS: usize = 64;
 
 /// Whether a triangle repeats a vertex, or could be a line segment rounded to f32: its height over its longest side is
 /// less than the distance between neighbouring f32 numbers of its coordinates' size.

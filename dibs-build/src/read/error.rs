@@ -21,6 +21,9 @@ pub struct ReadError {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ReadErrorKind {
+    /// The file is no frame of the tree.
+    #[error(transparent)]
+    Frame(#[from] crate::FrameError),
     /// The operating system could not read it.
     #[error("cannot be read ({0}); check the path and its permissions")]
     Io(#[from] std::io::Error),

@@ -41,7 +41,7 @@ pub use report::{Format, Report};
 use crate::mesh::{Mesh, RestSurface};
 use crate::rounding::round_up;
 use dibs_nostd::format::Unit;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 pub(crate) use place::Place;
 use raw::Raw;
 pub(crate) use raw::excerpt;
@@ -211,6 +211,24 @@ pub(crate) fn unit_of(
         }
         (stated, given) => Ok(stated.or(given).unwrap_or_default()),
     }
+}
+
+/// The positions of a mesh file that is a frame (mm, from `origin`), and its faces.
+///
+/// # Errors
+/// [`ReadErrorKind::UnnumberedFrame`] for STL, whose vertices may be others than the tree's.
+pub(crate) fn frame(
+    path: &Path,
+    unit: Option<Unit>,
+    origin: DVec3,
+) -> Result<(Vec<Vec3>, Vec<Vec<u32>>), ReadErrorKind> {
+    let (format, raw) = elements(file::whole(path)?, path, false)?;
+    if matches!(format, Format::StlAscii | Format::StlBinary) {
+        return Err(ReadErrorKind::UnnumberedFrame);
+    }
+    let place = Place { unit: unit_of(format, raw.unit, unit)?, origin };
+    let positions = crate::motion::frame(&raw.positions, 0, &place)?;
+    Ok((positions, raw.faces().map(<[u32]>::to_vec).collect()))
 }
 
 /// The format of a file, and its vertices and polygons, with their groups if asked for.

@@ -126,8 +126,8 @@ pub struct Report {
     pub origin: [f64; 3],
     /// Whether the reader chose that point, because f32 would lose the shape so far from the file's own origin.
     pub recentred: bool,
-    /// Largest distance of a vertex from its position in the file, by rounding to f32; in the mesh's unit, 0 for files
-    /// that hold f32. The tree adds it to the accuracy of every answer.
+    /// Largest distance of the file's surface from the mesh (mm): by rounding vertices to f32 (0 for files that hold f32),
+    /// by welding, and by dropping triangles too low for f32. The tree adds it to the accuracy of every answer.
     pub position_error: f64,
     /// Elements of the file that were left out or interpreted, a sentence each; they are warnings, too.
     pub remarks: Vec<String>,

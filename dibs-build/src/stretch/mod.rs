@@ -2,6 +2,8 @@
 
 mod file;
 
+use dibs_nostd::format::PathKind;
+use dibs_nostd::{Index, Tree, TriangleRow};
 use glam::{DMat2, DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -150,6 +152,25 @@ impl MotionStretch {
         // NaN counts as beyond.
         if worst.share() <= 1.0 { None } else { Some(worst) }
     }
+}
+
+/// The largest stretch of any triangle of a surface whose vertices stand in the order of the tree's rows, in f64; `None`
+/// where the tree has no rest shape, or a position is missing. [`MeasuredStretch`](dibs_nostd::MeasuredStretch) is a factor
+/// for the tree's radii instead: where triangles have their own limits, a triangle's stretch is divided by its limit there,
+/// and multiplied by the tree's.
+#[must_use]
+pub fn largest_stretch<I: Index>(tree: &Tree<'_, I>, rows: &[Vec3]) -> Option<f64> {
+    let kind = tree.paths();
+    let paths = if kind == PathKind::EdgePath { Paths::Edges } else { Paths::default() };
+    let mut largest = 0.0;
+    for row in 0..tree.triangle_count() {
+        let [a, b, c] = tree.corners(TriangleRow(row))?;
+        let rest = [tree.rest_position(a)?, tree.rest_position(b)?, tree.rest_position(c)?];
+        let now = [a, b, c].map(|vertex| rows.get(vertex as usize).map(|at| at.as_dvec3()));
+        let [Some(a), Some(b), Some(c)] = now else { return None };
+        largest = f64::max(largest, stretch(RestShape::new(rest, kind).corners, [a, b, c], paths));
+    }
+    Some(largest)
 }
 
 /// The stretch of a triangle against its rest shape.

@@ -107,7 +107,7 @@ fn bad_input_is_one_sentence_and_no_output() {
     write("few.off", "OFF 2 0 0\n0 0 0\n1 0 0\n");
     for (line, part) in [
         ("--vertices far.obj", "stretched by 2"),
-        ("--vertices few.off", "no triangles"),
+        ("--vertices few.off", "has 2 vertices and the tree's mesh has 3"),
         ("--vertices ok.obj --frame 0", ".pc2"),
         ("--vertices ok.obj --stretch 0.9", "more than the 0.9"),
         ("--vertices absent.pc2 --frame 0", "absent.pc2"),

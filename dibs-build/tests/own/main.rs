@@ -1,5 +1,6 @@
 //! The tests of the `dibs` program and of its parts, as one program, so that the library is linked once.
 
+mod another_mesh;
 mod bulk;
 mod cli;
 mod cli_motion;

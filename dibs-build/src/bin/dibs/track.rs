@@ -106,8 +106,10 @@ fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
             motion.rate
         );
     }
-    let frames: Vec<Vec<Vec3>> =
-        motion.frames.iter().map(|frame| rows(tree, &args.motion, frame)).collect::<Result<_>>()?;
+    let frames: Vec<Vec<Vec3>> = (0..)
+        .zip(&motion.frames)
+        .map(|(number, frame)| rows(tree, &args.motion, number, frame))
+        .collect::<Result<_>>()?;
     let stretches: Vec<MeasuredStretch> = (0..)
         .zip(&frames)
         .map(|(number, frame)| {

@@ -19,6 +19,9 @@ pub enum SendError {
         /// Vertices of the frame.
         found: usize,
     },
+    /// The positions are no frame of the tree's surface.
+    #[error("the frame {0}")]
+    Positions(#[from] crate::FrameError),
     /// The positions cannot be put into packets.
     #[error("the frame cannot be sent: {0}")]
     Frame(EncodeError),

@@ -4,14 +4,17 @@ use dibs_nostd::glam::Vec3;
 use dibs_nostd::{Index, SurfaceFacts, Tree};
 
 use super::SendError;
+use crate::FrameCheck;
 
 /// A mesh, and the order in which its vertices are sent.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceOrder {
     pub(super) mesh_id: u32,
     pub(super) facts: SurfaceFacts,
     /// The mesh's vertex of each row.
     order: Vec<u32>,
+    /// Of the tree that it was made of.
+    check: Option<FrameCheck>,
 }
 
 impl SurfaceOrder {
@@ -20,14 +23,16 @@ impl SurfaceOrder {
     pub fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
         let number = |row| tree.vertex_number(row).map_or(row, |number| number.0);
         let order = (0..tree.vertex_count()).map(number);
-        Self { mesh_id: tree.mesh_id(), facts: tree.surface_facts(), order: order.collect() }
+        let (mesh_id, facts) = (tree.mesh_id(), tree.surface_facts());
+        Self { mesh_id, facts, order: order.collect(), check: Some(FrameCheck::of(tree)) }
     }
 
     /// An order from the mesh's vertex of each row of the vertex table. Unit and triangles are not known.
     #[must_use]
     pub fn new(mesh_id: u32, order: Vec<u32>) -> Self {
         let vertices = u32::try_from(order.len()).unwrap_or(0);
-        Self { mesh_id, facts: SurfaceFacts { vertices, ..SurfaceFacts::default() }, order }
+        let facts = SurfaceFacts { vertices, ..SurfaceFacts::default() };
+        Self { mesh_id, facts, order, check: None }
     }
 
     /// Identity of the mesh.
@@ -45,7 +50,8 @@ impl SurfaceOrder {
     /// Puts positions in the mesh's order into that of the tree's rows.
     ///
     /// # Errors
-    /// [`SendError::Vertices`] if a vertex of the tree has no position.
+    /// [`SendError::Vertices`] if a vertex of the tree has no position, and where the order is that of a tree
+    /// [`SendError::Positions`] if they are no frame of its surface.
     pub fn to_rows(&self, positions: &[Vec3]) -> Result<Vec<Vec3>, SendError> {
         let row = |&vertex: &u32| {
             positions
@@ -53,6 +59,10 @@ impl SurfaceOrder {
                 .copied()
                 .ok_or(SendError::Vertices { vertex, found: positions.len() })
         };
-        self.order.iter().map(row).collect()
+        let rows: Result<Vec<Vec3>, SendError> = self.order.iter().map(row).collect();
+        match &self.check {
+            Some(check) if rows.is_ok() => Ok(check.to_rows(positions)?),
+            _ => rows,
+        }
     }
 }

@@ -31,7 +31,14 @@ impl Checked {
 /// The accuracy of an answer on the vertices as they were decoded, which both sides use here: the stated one without
 /// the bus's quantisation.
 pub fn accuracy_of(tick: &Tick) -> f64 {
-    f64::from(tick.accuracy) - f64::from(tick.position_error)
+    without(tick.accuracy, tick.position_error)
+}
+
+/// What was added to a position error, at most: the sum was rounded to f32. On a surface as small as a bus's step the
+/// difference alone is zero.
+fn without(accuracy: f32, position_error: f32) -> f64 {
+    let rounding = f64::from(accuracy) * f64::from(f32::EPSILON) / 2.0;
+    f64::from(accuracy) - f64::from(position_error) + rounding
 }
 
 /// Checks one answer: its separation, its interval, and its point. The error is the largest of the
@@ -88,5 +95,20 @@ fn corners(scene: &Scene, triangle: u32) -> Option<[u32; 3]> {
     match scene.tree.index_bits() {
         16 => of::<u16>(scene, triangle),
         _ => of::<u32>(scene, triangle),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_accuracy_below_the_position_errors_last_digit_is_not_lost() {
+        for error in [0.0_f32, 1e-6, 1e-3, 0.7] {
+            for own in [1e-12_f32, 3e-8, 1e-5] {
+                let found = without(own + error, error);
+                assert!(found >= f64::from(own) && found.is_finite(), "{own} of {error}: {found}");
+            }
+        }
     }
 }

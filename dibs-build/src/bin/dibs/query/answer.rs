@@ -1,7 +1,7 @@
 //! An answer, as JSON or for a reader.
 
 use dibs_build::glam::{DVec3, Vec3};
-use dibs_nostd::{Contact, Coverage, MeasuredStretch, Proximity, Side};
+use dibs_nostd::{Contact, Coverage, Proximity, Side};
 use serde::Serialize;
 
 /// The closest pair of a tool and a surface.
@@ -17,7 +17,7 @@ pub struct Answer<'a> {
     /// The tool's number in its chain, from 0.
     pub tool: usize,
     /// `None` where the tree has no rest metric to measure with.
-    pub stretch: Option<MeasuredStretch>,
+    pub stretch: Option<f64>,
     /// All contacts, nearest first, where they were asked for.
     pub contacts: Option<Vec<Touch<'a>>>,
     /// Every contact whose separation is below is listed.
@@ -146,7 +146,7 @@ impl<'a> Answer<'a> {
             triangle: self.triangle,
             label: self.label,
             barycentric: p.barycentric.map(f64::from),
-            stretch: self.stretch.map(|measured| measured.sigma().into()),
+            stretch: self.stretch,
             node_tests: p.node_tests,
             triangle_tests: p.triangle_tests,
             contacts: contacts.map(|contacts| contacts.iter().map(Touch::record).collect()),
@@ -173,8 +173,8 @@ impl<'a> Answer<'a> {
         if let Some(label) = self.label {
             println!("label             {label}");
         }
-        if let Some(measured) = self.stretch {
-            println!("stretch           {}", measured.sigma());
+        if let Some(stretch) = self.stretch {
+            println!("stretch           {}", stretch as f32);
         }
         if p.coverage == Coverage::Assumed {
             println!("coverage          assumed: the tree cannot measure the stretch");

@@ -5,8 +5,8 @@ use super::{LocalTool, ToolSpec};
 use crate::mesh_file::Lengths;
 use crate::tree_file::{self, AnyTree};
 use anyhow::{Result, anyhow, bail};
-use dibs_build::glam::{DVec3, Vec3};
-use dibs_build::{Import, ReadOptions};
+use dibs_build::glam::Vec3;
+use dibs_build::{FrameCheck, largest_stretch};
 use dibs_nostd::{
     Contact, Contacts, Coverage, Index, MeasuredStretch, Options, Proximity, Query, StretchError,
     Tool, Tree, measure_stretch,
@@ -23,7 +23,7 @@ pub struct Surface<'a> {
     /// In the order of the tree's rows.
     positions: Vec<Vec3>,
     /// `None` where the tree has no rest metric to measure with.
-    stretch: Option<MeasuredStretch>,
+    stretch: Option<f64>,
     options: Options,
 }
 
@@ -38,17 +38,24 @@ impl<'a> Surface<'a> {
         limit: Option<f32>,
     ) -> Result<Self> {
         let tree = tree_file::validate(bytes, path)?;
-        let (positions, stretch) = match &tree {
+        let (positions, measured) = match &tree {
             AnyTree::Narrow(tree) => measured(tree, path, vertices, frame, lengths)?,
             AnyTree::Wide(tree) => measured(tree, path, vertices, frame, lengths)?,
         };
+        let largest = match &tree {
+            AnyTree::Narrow(tree) => largest_stretch(tree, &positions),
+            AnyTree::Wide(tree) => largest_stretch(tree, &positions),
+        };
+        // Without a rest shape only the factor for radii is known, which is no smaller.
+        let stretch = measured.map(|measured| largest.unwrap_or(measured.sigma().into()));
         let name = path.display();
         let mut options = Options::cold();
         if let Some(limit) = limit {
-            let measured = stretch
-                .ok_or_else(|| anyhow!("{name}: no rest metric to measure a stretch with"))?;
-            let sigma = measured.sigma();
-            if sigma > limit || limit.is_nan() {
+            let (Some(measured), Some(sigma)) = (measured, stretch) else {
+                bail!("{name}: no rest metric to measure a stretch with");
+            };
+            // Up to the measure's own rounding.
+            if sigma > f64::from(limit) * (1.0 + 1e-5) || limit.is_nan() {
                 bail!(
                     "{name}: the surface is stretched by {sigma}, more than the {limit} of --stretch"
                 );
@@ -220,7 +227,7 @@ fn measured<I: Index>(
             .map(|row| tree.rest_position(row))
             .collect::<Option<Vec<Vec3>>>()
             .ok_or_else(|| anyhow!("{name}: the tree has no rest shape, give --vertices"))?,
-        Some(path) => rows(tree, path, &current(path, frame, lengths, tree.origin().into())?)?,
+        Some(path) => current(tree, path, frame, lengths)?,
     };
     // A distance on a surface that is stretched beyond the limit could be wrong: none is given.
     match measure_stretch(tree, positions.as_slice()) {
@@ -232,14 +239,15 @@ fn measured<I: Index>(
     }
 }
 
-/// Positions in the order of the mesh file, from the tree's origin.
-fn current(
+/// Positions in the order of the tree's rows, from its origin.
+fn current<I: Index>(
+    tree: &Tree<'_, I>,
     path: &Path,
     frame: Option<usize>,
     lengths: &Lengths,
-    origin: DVec3,
 ) -> Result<Vec<Vec3>> {
     let name = path.display();
+    let origin = tree.origin().into();
     let is_motion = name.to_string().contains('%')
         || path
             .extension()
@@ -251,35 +259,22 @@ fn current(
             if frame >= frames.len() {
                 bail!("{name}: no frame {frame}, the motion has {}", frames.len());
             }
-            Ok(frames.swap_remove(frame))
+            rows(tree, path, frame, &frames.swap_remove(frame))
         }
         (false, Some(_)) => {
             bail!("{name}: --frame needs a motion: .pc2, .npy or a series heart_%03d.ply")
         }
-        // Only the vertices count: the tree may be of the largest of many components.
-        (false, None) => {
-            let unit = lengths.unit();
-            let origin = Some(origin);
-            let options =
-                ReadOptions { largest_component: true, unit, origin, ..Import::options() };
-            Ok(options.read(path)?.mesh.positions)
-        }
+        (false, None) => Ok(FrameCheck::of(tree).read(path, lengths.unit(), origin)?),
     }
 }
 
-/// Puts positions into the order of the tree's rows.
-pub fn rows<I: Index>(tree: &Tree<'_, I>, path: &Path, of_mesh: &[Vec3]) -> Result<Vec<Vec3>> {
-    (0..tree.vertex_count())
-        .map(|row| {
-            let vertex = tree.vertex_number(row).map_or(row, |number| number.0);
-            of_mesh.get(vertex as usize).copied().ok_or_else(|| {
-                anyhow!(
-                    "{}: has {} vertices and the tree uses vertex {vertex}; give the positions of \
-                     the mesh that the tree was built from",
-                    path.display(),
-                    of_mesh.len()
-                )
-            })
-        })
-        .collect()
+/// Puts the positions of a motion's frame into the order of the tree's rows.
+pub fn rows<I: Index>(
+    tree: &Tree<'_, I>,
+    path: &Path,
+    frame: usize,
+    of_mesh: &[Vec3],
+) -> Result<Vec<Vec3>> {
+    let rows = FrameCheck::of(tree).to_rows(of_mesh);
+    rows.map_err(|error| anyhow!("{}, frame {frame}: {error}", path.display()))
 }

@@ -91,6 +91,9 @@ pub fn run(args: &Args) -> Result<()> {
     if motion.frames.is_empty() {
         bail!("{name}: the motion has no frame");
     }
+    for (number, frame) in motion.frames.iter().enumerate() {
+        order.to_rows(frame).map_err(|error| anyhow!("{name}, frame {number}: {error}"))?;
+    }
     let rate = match (args.rate, motion.rate) {
         (Some(rate), _) => rate,
         (None, recorded) if recorded > 0.0 => f64::from(recorded),

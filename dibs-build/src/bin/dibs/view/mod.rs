@@ -130,7 +130,7 @@ fn motion<I: Index>(args: &Args, tree: &Tree<'_, I>, path: &Path) -> Result<(Vec
     }
     let mut frames = Vec::with_capacity(motion.frames.len());
     for (number, frame) in motion.frames.iter().enumerate() {
-        let frame = rows(tree, path, frame)?;
+        let frame = rows(tree, path, number, frame)?;
         if let Err(error) = measure_stretch(tree, frame.as_slice()) {
             bail!(
                 "{name}, frame {number}: {error}; build the tree with a larger --stretch, or with --limits that \

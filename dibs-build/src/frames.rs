@@ -1,0 +1,193 @@
+//! The one check of frames against a tree, wherever they come from: a file, an array, a live source.
+
+use dibs_nostd::format::Unit;
+use dibs_nostd::{Index, Tree, TriangleRow};
+use glam::{DVec3, Vec3};
+use std::path::Path;
+
+use crate::{Mesh, ReadError, ReadErrorKind};
+
+/// Why positions are no frame of a tree's surface.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FrameError {
+    /// Too few or too many positions.
+    #[error(
+        "has {found} vertices and the tree's mesh has {expected}: give the positions of the mesh that the tree was built \
+         from, one for each vertex of its file"
+    )]
+    Vertices {
+        /// Vertices of the mesh's file.
+        expected: usize,
+        /// Positions of the frame.
+        found: usize,
+    },
+    /// Its triangles are not the tree's.
+    #[error(
+        "has no face with the vertices {0}, {1} and {2} (counted from 0), which are a triangle of the tree: it is of another \
+         mesh, or numbers its vertices otherwise, as STL does, which has no numbers", corners[0], corners[1], corners[2]
+    )]
+    Triangle {
+        /// The corners of a triangle of the tree, by the mesh's numbers.
+        corners: [u32; 3],
+    },
+    /// It is far smaller or larger than the rest shape.
+    #[error(
+        "has edges {ratio:.3e} times as long as at rest: it is in another unit{}, or of another mesh",
+        of_unit(*unit)
+    )]
+    Size {
+        /// Length of its edges (root mean square) as a part of that at rest.
+        ratio: f64,
+        /// The unit of the mesh's file, where it is known.
+        unit: Option<Unit>,
+    },
+}
+
+fn of_unit(unit: Option<Unit>) -> String {
+    unit.map_or_else(String::new, |unit| {
+        format!(" (lengths in the mesh's file are in {unit}: read frames with --unit {unit})")
+    })
+}
+
+/// Edges of a frame are at least so long, as a part of those at rest: as a receiver's limit on shrinkage is by default.
+const LEAST: f64 = 0.25;
+
+/// And at most so many times as long, or twice the stretch limit.
+const MOST: f64 = 4.0;
+
+/// Checks frames against a tree, and puts their positions into the order of its rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameCheck {
+    /// The mesh's vertex of each row.
+    order: Vec<u32>,
+    /// Corners of the tree's triangles, by the mesh's numbers.
+    triangles: Vec<[u32; 3]>,
+    /// Vertices of the mesh's file.
+    vertices: usize,
+    unit: Option<Unit>,
+    /// The sum of the squares of all edges at rest, where the tree has its rest shape.
+    rest: Option<f64>,
+    most: f64,
+}
+
+impl FrameCheck {
+    /// The check for frames of this tree.
+    #[must_use]
+    pub fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
+        let number = |row| tree.vertex_number(row).map_or(row, |number| number.0);
+        // Without the mesh's numbers, positions come in the order of the rows.
+        let has_order = tree.vertex_number(0).is_some();
+        let order: Vec<u32> = (0..tree.vertex_count()).map(number).collect();
+        let rows = (0..tree.triangle_count()).filter_map(|row| tree.corners(TriangleRow(row)));
+        let rows: Vec<[u32; 3]> = rows.collect();
+        let at_rest = |row| tree.rest_position(row);
+        Self {
+            triangles: rows.iter().map(|corners| corners.map(number)).collect(),
+            order,
+            vertices: if has_order { tree.file_vertex_count() } else { tree.vertex_count() }
+                as usize,
+            unit: tree.unit(),
+            rest: squares(&rows, at_rest),
+            most: (2.0 * f64::from(tree.stretch())).max(MOST),
+        }
+    }
+
+    /// Positions in the mesh's order (mm), in the order of the tree's rows.
+    ///
+    /// # Errors
+    /// [`FrameError`] for another number of vertices, and for another size.
+    pub fn to_rows(&self, positions: &[Vec3]) -> Result<Vec<Vec3>, FrameError> {
+        if positions.len() != self.vertices {
+            let (expected, found) = (self.vertices, positions.len());
+            return Err(FrameError::Vertices { expected, found });
+        }
+        let at = |vertex: u32| positions.get(vertex as usize).copied();
+        if let (Some(rest), Some(now)) = (self.rest, squares(&self.triangles, at)) {
+            check_size(rest, now, self.most, self.unit)?;
+        }
+        let missing = FrameError::Vertices { expected: self.vertices, found: positions.len() };
+        self.order.iter().map(|&vertex| at(vertex)).collect::<Option<_>>().ok_or(missing)
+    }
+
+    /// Reads a mesh file that is a frame: positions in the order of the tree's rows.
+    ///
+    /// # Errors
+    /// [`ReadError`], and for a file of other vertices, triangles or size.
+    pub fn read(
+        &self,
+        path: impl AsRef<Path>,
+        unit: Option<Unit>,
+        origin: DVec3,
+    ) -> Result<Vec<Vec3>, ReadError> {
+        let path = path.as_ref();
+        let read = || {
+            let (positions, faces) = crate::read::frame(path, unit, origin)?;
+            let rows = self.to_rows(&positions)?;
+            if !faces.is_empty() {
+                self.check_faces(faces.iter().map(|face| &face[..]))?;
+            }
+            Ok(rows)
+        };
+        read().map_err(|kind: ReadErrorKind| ReadError { path: path.to_path_buf(), kind })
+    }
+
+    /// Checks that each triangle of the tree is one of these faces, or a part of one.
+    ///
+    /// # Errors
+    /// [`FrameError::Triangle`] names the first that is not.
+    pub fn check_faces<'f>(
+        &self,
+        faces: impl IntoIterator<Item = &'f [u32]>,
+    ) -> Result<(), FrameError> {
+        let faces: Vec<&[u32]> = faces.into_iter().collect();
+        let mut at: Vec<Vec<u32>> = vec![Vec::new(); self.vertices];
+        for (number, face) in (0..).zip(&faces) {
+            for &corner in *face {
+                if let Some(at) = at.get_mut(corner as usize) {
+                    at.push(number);
+                }
+            }
+        }
+        let has = |corners: &[u32; 3]| {
+            // At a hub of many faces another corner has few.
+            let few = corners.iter().filter_map(|&corner| at.get(corner as usize));
+            let few = few.min_by_key(|at| at.len());
+            let holds =
+                |&face: &u32| corners.iter().all(|corner| faces[face as usize].contains(corner));
+            few.is_some_and(|few| few.iter().any(holds))
+        };
+        match self.triangles.iter().find(|corners| !has(corners)) {
+            Some(&corners) => Err(FrameError::Triangle { corners }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Checks the size of a frame against the mesh that it is of.
+pub(crate) fn check_mesh_size(mesh: &Mesh, frame: &[Vec3]) -> Result<(), FrameError> {
+    let of = |positions: &[Vec3]| squares(&mesh.triangles, |v| positions.get(v as usize).copied());
+    match (of(&mesh.positions), of(frame)) {
+        (Some(rest), Some(now)) => check_size(rest, now, f64::INFINITY, None),
+        _ => Ok(()),
+    }
+}
+
+fn check_size(rest: f64, now: f64, most: f64, unit: Option<Unit>) -> Result<(), FrameError> {
+    let ratio = (now / rest).sqrt();
+    // What is not finite has an error of its own.
+    if ratio < LEAST || ratio > most && ratio.is_finite() {
+        return Err(FrameError::Size { ratio, unit });
+    }
+    Ok(())
+}
+
+/// The sum of the squares of all triangles' edges; `None` where a position is missing.
+fn squares(triangles: &[[u32; 3]], at: impl Fn(u32) -> Option<Vec3>) -> Option<f64> {
+    let mut sum = 0.0;
+    for &[a, b, c] in triangles {
+        let [a, b, c] = [at(a)?, at(b)?, at(c)?].map(Vec3::as_dvec3);
+        sum += a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a);
+    }
+    Some(sum)
+}
