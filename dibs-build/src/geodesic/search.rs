@@ -60,6 +60,7 @@ impl Distances {
     /// no time.
     ///
     /// Returns the farthest of the wanted vertices, and its distance.
+    #[allow(clippy::too_many_arguments)]
     pub fn search(
         &mut self,
         graph: &Graph,

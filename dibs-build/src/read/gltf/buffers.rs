@@ -5,7 +5,8 @@ use super::{Result, get, malformed};
 use crate::read::raw::excerpt;
 use crate::read::{base64, file};
 use std::borrow::Cow;
-use std::collections::{HashMap, HashSet};
+use std::collections::hash_map::{Entry, HashMap};
+use std::collections::HashSet;
 use std::path::{Component, Path, PathBuf};
 
 pub struct Buffers<'a> {
@@ -54,13 +55,14 @@ impl<'a> Buffers<'a> {
     }
 
     fn inside(&mut self, number: usize, data: &str) -> Result<&[u8]> {
-        if !self.data.contains_key(&number) {
-            let encoded = data.split_once(";base64,").map(|(_, encoded)| encoded);
-            let bytes = encoded.and_then(|encoded| base64::decode(encoded.as_bytes()));
-            let bytes = bytes.ok_or_else(|| malformed("a buffer that is no base64"))?;
-            self.data.insert(number, bytes);
+        match self.data.entry(number) {
+            Entry::Occupied(read) => Ok(read.into_mut()),
+            Entry::Vacant(place) => {
+                let encoded = data.split_once(";base64,").map(|(_, encoded)| encoded);
+                let bytes = encoded.and_then(|encoded| base64::decode(encoded.as_bytes()));
+                Ok(place.insert(bytes.ok_or_else(|| malformed("a buffer that is no base64"))?))
+            }
         }
-        Ok(self.data.get(&number).map_or(&[], Vec::as_slice))
     }
 
     /// A file is read as far as the longest of its buffers says.
