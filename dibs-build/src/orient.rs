@@ -24,10 +24,10 @@ pub enum WindingError {
         /// Number of other such pairs.
         others: usize,
     },
-    /// More than two triangles share an edge.
+    /// More than two triangles share an edge, and they do not face each other in pairs.
     #[error(
-        "{triangles} triangles share the edge from vertex {from} to vertex {to}, so the surface has no outer side and \
-         distances to it no sign: cut it open there in a mesh editor"
+        "{triangles} triangles share the edge from vertex {from} to vertex {to} and do not face each other in pairs, so \
+         distances to that edge have no sign: remove walls inside the solid, or cut it open there, in a mesh editor"
     )]
     NonManifold {
         /// Number of triangles at the edge.
@@ -78,7 +78,7 @@ pub enum WindingError {
 /// # Errors
 /// [`WindingError`] names the first conflicting triangles.
 pub fn check_winding(mesh: &Mesh) -> Result<(), WindingError> {
-    let edges = Edges::of(mesh)?;
+    let edges = Edges::of(mesh);
     let against = edges.pairs.iter().filter(|pair| !pair.agrees);
     if let Some(first) = against.clone().next() {
         let others = against.count() - 1;
@@ -98,11 +98,11 @@ pub fn check_winding(mesh: &Mesh) -> Result<(), WindingError> {
     let faces_inwards = |row: usize| volume(mesh, closed[row].iter().copied()) < 0.0;
     match (0..closed.len()).find(|&row| faces_inwards(row) && !is_inside(row)) {
         Some(row) => Err(WindingError::Inward { triangle: closed[row][0] }),
-        None => Ok(()),
+        None => edges.crowded.map_or(Ok(()), Err),
     }
 }
 
-/// Turns triangles until the surface has an outer side. Open parts turn as few triangles as possible; closed parts face
+/// Turns triangles until the surface has an outer side. Parts end at edges of more than two triangles. Open parts turn as few triangles as possible; closed parts face
 /// outwards, or inwards for a cavity in another part. Returns the number of turned triangles.
 ///
 /// Cost: linear in the triangles, times the closed parts of the surface.
@@ -110,7 +110,7 @@ pub fn check_winding(mesh: &Mesh) -> Result<(), WindingError> {
 /// # Errors
 /// [`WindingError`] if no turning helps; the mesh is then unchanged.
 pub fn orient(mesh: &mut Mesh) -> Result<usize, WindingError> {
-    let edges = Edges::of(mesh)?;
+    let edges = Edges::of(mesh);
     let count = mesh.triangles.len();
     let mut around = vec![Vec::new(); count];
     for pair in &edges.pairs {
@@ -199,12 +199,14 @@ struct Pair {
 
 struct Edges {
     pairs: Vec<Pair>,
-    /// Triangles across the edges of each triangle.
+    /// Edges of each triangle that are no border.
     neighbours: Vec<u8>,
+    /// The first edge of more than two triangles that are not as many in one direction as in the other.
+    crowded: Option<WindingError>,
 }
 
 impl Edges {
-    fn of(mesh: &Mesh) -> Result<Self, WindingError> {
+    fn of(mesh: &Mesh) -> Self {
         // The triangles of each edge, and whether they run along it from the lower number to the higher.
         let mut users: HashMap<(u32, u32), Vec<(usize, bool)>> = HashMap::new();
         for (triangle, &[a, b, c]) in mesh.triangles.iter().enumerate() {
@@ -213,7 +215,8 @@ impl Edges {
                 users.entry(edge).or_default().push((triangle, from < to));
             }
         }
-        let mut edges = Self { pairs: Vec::new(), neighbours: vec![0; mesh.triangles.len()] };
+        let mut edges =
+            Self { pairs: Vec::new(), neighbours: vec![0; mesh.triangles.len()], crowded: None };
         let mut crowded: Option<((u32, u32), usize)> = None;
         for (&edge, of) in &users {
             match of[..] {
@@ -223,18 +226,25 @@ impl Edges {
                     edges.neighbours[other] += 1;
                     edges.pairs.push(Pair { triangle, other, agrees: forward != other_forward });
                 }
-                _ if crowded.is_none_or(|(least, _)| edge < least) => {
-                    crowded = Some((edge, of.len()));
+                _ => {
+                    if of.len().is_multiple_of(2) {
+                        of.iter().for_each(|&(triangle, _)| edges.neighbours[triangle] += 1);
+                    }
+                    let forward = of.iter().filter(|(_, is_forward)| *is_forward).count();
+                    if 2 * forward != of.len() && crowded.is_none_or(|(least, _)| edge < least) {
+                        crowded = Some((edge, of.len()));
+                    }
                 }
-                _ => (),
             }
         }
-        if let Some(((from, to), triangles)) = crowded {
-            return Err(WindingError::NonManifold { triangles, from, to });
-        }
+        edges.crowded = crowded.map(|((from, to), triangles)| WindingError::NonManifold {
+            triangles,
+            from,
+            to,
+        });
         // The map's order is not deterministic.
         edges.pairs.sort_unstable_by_key(|pair| (pair.triangle, pair.other));
-        Ok(edges)
+        edges
     }
 
     /// The sets of triangles that edges connect and that have no border, in order of their first triangle.

@@ -59,7 +59,7 @@
 /**
  * Bytes of a query's storage.
  */
-#define DIBS_QUERY_SIZE 4672
+#define DIBS_QUERY_SIZE 4864
 
 /**
  * As much as it takes, for either number of a budget.
@@ -134,7 +134,7 @@
 /**
  * Bytes of a tracker's storage besides its vertices.
  */
-#define DIBS_TRACKER_BASE 16960
+#define DIBS_TRACKER_BASE 17152
 
 /**
  * Bytes of a tracker's storage for each vertex: the surface as it is, and as it was.

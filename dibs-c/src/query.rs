@@ -15,7 +15,7 @@ use crate::tool::{Shape, dibs_tool, dibs_vec3};
 use crate::tree::dibs_tree;
 
 /// Bytes of a query's storage.
-pub const DIBS_QUERY_SIZE: usize = 4_672;
+pub const DIBS_QUERY_SIZE: usize = 4_864;
 
 /// Entries of the stack: as many as the format allows, so that any tree can be searched.
 pub(crate) const STACK: usize = 512;
@@ -118,10 +118,12 @@ pub enum dibs_side {
     Degenerate = 7,
     /// No side: the budget ran out.
     CutShort = 8,
+    /// No side: the closest point is on an edge of more than two triangles that are no pairs.
+    NonManifold = 9,
 }
 
 /// Each side with its number.
-const SIDES: [(dibs_side, Side); 9] = [
+const SIDES: [(dibs_side, Side); 10] = [
     (dibs_side::Outside, Side::Outside),
     (dibs_side::Inside, Side::Inside),
     (dibs_side::Crossing, Side::Crossing),
@@ -131,6 +133,7 @@ const SIDES: [(dibs_side, Side); 9] = [
     (dibs_side::BelowAccuracy, Side::Undefined(NoSide::BelowAccuracy)),
     (dibs_side::Degenerate, Side::Undefined(NoSide::Degenerate)),
     (dibs_side::CutShort, Side::Undefined(NoSide::CutShort)),
+    (dibs_side::NonManifold, Side::Undefined(NoSide::NonManifold)),
 ];
 
 /// How it is known that the tree's spheres cover the surface, so that no part of it is nearer than an answer says.

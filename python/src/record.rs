@@ -51,13 +51,14 @@ pub const CONTACT: &Fields = &[
 const NO_LABEL: i16 = -1;
 
 /// Reasons for an undefined side; field `side_reason` counts them from 1.
-const REASONS: [NoSide; 6] = [
+const REASONS: [NoSide; 7] = [
     NoSide::NotAsked,
     NoSide::NoAdjacency,
     NoSide::OpenBoundary,
     NoSide::BelowAccuracy,
     NoSide::Degenerate,
     NoSide::CutShort,
+    NoSide::NonManifold,
 ];
 
 /// A sentence for each value of `side_reason`: none for 0.

@@ -146,7 +146,7 @@ pub(crate) fn flatten<I: Index>(
         sections.push((section::LIMITS, codes.flat_map(u16::to_le_bytes).collect()));
     }
     if facts.with_adjacency
-        && let Some(neighbours) = adjacency::<I>(&flat.triangles)
+        && let Some(neighbours) = adjacency::<I>(mesh, &flat.triangles)
     {
         let counts = roots.iter().map(Cluster::triangles);
         let solids =

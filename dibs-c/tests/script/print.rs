@@ -93,6 +93,7 @@ fn side(side: Side) -> u32 {
         Side::Undefined(NoSide::BelowAccuracy) => 6,
         Side::Undefined(NoSide::Degenerate) => 7,
         Side::Undefined(NoSide::CutShort) => 8,
+        Side::Undefined(NoSide::NonManifold) => 9,
         other => panic!("{other:?}"),
     }
 }

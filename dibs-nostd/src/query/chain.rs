@@ -56,9 +56,9 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         let first =
             first.filter(|(_, corner)| !(tool.axis_distance_squared(*corner) > limit * limit));
         let first = first.map(|(first, _)| first);
-        let touched = Some(&mut self.touched);
+        let ties = Some(&mut self.ties);
         let mut search =
-            Search::start(&self.tree, &mut self.stack, vertices, tool, options, first, touched)?;
+            Search::start(&self.tree, &mut self.stack, vertices, tool, options, first, ties)?;
         let limit = search.limit_to(separation);
         let found = search.run::<WITHIN>(limit)?;
         // A search that its budget ended has a lower bound below the limit.

@@ -9,6 +9,7 @@ mod cost_x86_64;
 mod depth;
 #[cfg(test)]
 mod distances;
+mod exact;
 mod normal;
 mod options;
 mod passed;
@@ -32,7 +33,7 @@ pub use tracker::{Fallback, Tracked, Tracker};
 
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
-use search::{Search, Touched, WHOLE, Waiting, WideSearch};
+use search::{Search, Ties, WHOLE, Waiting, WideSearch};
 use separation::signed;
 
 /// A query on one tree, with the fixed stack that its traversal needs: 8 bytes an entry.
@@ -45,7 +46,7 @@ pub struct Query<'t, I, const STACK: usize> {
     stack: [Waiting; STACK],
     /// The last answer's triangle.
     triangle: Option<TriangleRow>,
-    touched: Touched,
+    ties: Ties,
 }
 
 impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
@@ -58,7 +59,7 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
             return Err(QueryError::Stack { needed: tree.stack(), available: STACK as u32 });
         }
         let stack = [Waiting { lower: 0.0, link: 0 }; STACK];
-        Ok(Self { tree: *tree, stack, triangle: None, touched: Touched::new() })
+        Ok(Self { tree: *tree, stack, triangle: None, ties: Ties::new() })
     }
 
     /// The tree that is searched.
@@ -92,9 +93,9 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         options: &Options,
     ) -> Result<Proximity, QueryError> {
         let first = options.first(self.triangle);
-        let touched = Some(&mut self.touched);
+        let ties = Some(&mut self.ties);
         let search =
-            Search::start(&self.tree, &mut self.stack, vertices, tool, options, first, touched)?;
+            Search::start(&self.tree, &mut self.stack, vertices, tool, options, first, ties)?;
         let found = search.run::<WHOLE>(f32::INFINITY)?;
         self.sided(vertices, tool, options, found)
     }
@@ -115,9 +116,9 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         options: &Options,
     ) -> Result<Proximity, QueryError> {
         let first = options.first(self.triangle);
-        let touched = Some(&mut self.touched);
+        let ties = Some(&mut self.ties);
         let search =
-            Search::start(&self.tree, &mut self.stack, vertices, tool, options, first, touched)?;
+            Search::start(&self.tree, &mut self.stack, vertices, tool, options, first, ties)?;
         let found = WideSearch::new(search).run()?;
         self.sided(vertices, tool, options, found)
     }
@@ -134,6 +135,6 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         found: Proximity,
     ) -> Result<Proximity, QueryError> {
         self.triangle = found.triangle.or(self.triangle);
-        signed(&self.tree, &mut self.stack, vertices, tool, options, found, (&self.touched, None))
+        signed(&self.tree, &mut self.stack, vertices, tool, options, found, (&mut self.ties, None))
     }
 }

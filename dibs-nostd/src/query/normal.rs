@@ -12,7 +12,7 @@ use crate::math::sqrt::sqrt;
 use crate::{Index, Tree, VertexTable};
 
 /// Most triangles around a vertex.
-const MAX_RING: u32 = 256;
+pub(super) const MAX_RING: u32 = 256;
 
 /// Square of the sine below which two edges span no plane in f32.
 const FLAT: f32 = 1.0 / 1_048_576.0;
@@ -22,6 +22,9 @@ const FLAT_DOUBLE: f64 = 1e-18;
 
 /// Squares of lengths below this lose their digits.
 const TINY: f32 = 1e-30;
+
+/// Rounding of a pseudonormal, relative to the sum of its weights.
+pub(super) const NORMAL: f32 = 1e-5;
 
 /// The feature of a triangle that a point is on. Edge `e` leads from corner `e` to the next one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,42 +40,6 @@ pub(super) struct Pseudonormal {
     pub vector: Vec3,
     /// Sum of the weights of the unit normals; rounding is relative to it.
     pub weight: f32,
-    /// Of a vertex: the point is above a triangle that may be as close as the vertex.
-    pub is_above: bool,
-    /// Of a vertex: the point is below such a triangle.
-    pub is_below: bool,
-}
-
-/// A point, and the error of its distance from the surface.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Off {
-    pub point: Vec3,
-    pub error: f32,
-}
-
-impl Pseudonormal {
-    fn new(vector: Vec3, weight: f32) -> Self {
-        Self { vector, weight, is_above: false, is_below: false }
-    }
-
-    /// Adds a triangle around a vertex, the first of its corners, with its unit normal.
-    fn add(&mut self, [centre, from, to]: [Vec3; 3], unit: Vec3, area: f32, off: Off) {
-        let weight = angle(area, (from - centre).dot(to - centre));
-        self.vector += weight * unit;
-        self.weight += weight;
-        let towards = off.point - centre;
-        // If the point is over the triangle, it leans over one of its edges at least.
-        let leans = |end: Vec3| {
-            let edge = end - centre;
-            let over = towards.dot(edge);
-            !(over < 0.0 && over * over > off.error * off.error * edge.length_squared())
-        };
-        if leans(from) || leans(to) {
-            let height = towards.dot(unit);
-            self.is_above |= height > 0.0;
-            self.is_below |= height < 0.0;
-        }
-    }
 }
 
 /// Why there is no pseudonormal.
@@ -110,74 +77,29 @@ impl Feature {
         feature
     }
 
-    /// Whether a point is above all triangles that meet in a feature, or below all, by the sine `least` against its
-    /// direction `towards` from the closest point. Then it is so for any pseudonormal of the feature, which costs twice
-    /// as much. `None` where that is not clear.
-    pub fn clear_side<I: Index, V: VertexTable + ?Sized>(
+    /// Visits the triangles that meet in a feature of a triangle, but for this one, as far as [`MAX_RING`] or a border.
+    pub fn each_other<I: Index>(
         self,
         tree: &Tree<'_, I>,
-        vertices: &V,
         triangle: u32,
-        corners: &[Vec3; 3],
-        towards: Vec3,
-        least: f32,
-    ) -> Option<bool> {
-        let square = least * least * towards.length_squared();
-        let is_above = |[centre, from, to]: [Vec3; 3]| {
-            let (one, other) = (from - centre, to - centre);
-            let across = one.cross(other);
-            let squared = across.length_squared();
-            let is_flat = !(squared > FLAT * one.length_squared() * other.length_squared());
-            let height = towards.dot(across);
-            let is_clear = squared > TINY && !is_flat && height * height > square * squared;
-            is_clear.then_some(height > 0.0)
+        mut visit: impl FnMut(u32),
+    ) {
+        let (mut corner, most) = match self {
+            Self::Face => return,
+            Self::Edge(edge) => (edge, 1),
+            Self::Vertex(corner) => (corner, MAX_RING),
         };
-        let first = self.corner();
-        let [centre, mut from, mut to] = turned(*corners, first);
-        let (mut row, mut corner, mut side) = (triangle, first, None);
-        for rest in (0..=self.most()).rev() {
-            let this = is_above([centre, from, to])?;
-            if *side.get_or_insert(this) != this {
-                return None;
+        let mut row = triangle;
+        for _ in 0..most {
+            match tree.across(row, corner) {
+                Some((next, back)) if next != triangle => (row, corner) = (next, after(back)),
+                _ => return,
             }
-            if rest == 0 {
-                break;
-            }
-            // The next triangle has this one's edge from `centre` to `from`.
-            let (next, back) = tree.across(row, corner)?;
-            if next == triangle {
-                return side;
-            }
-            (row, corner, to) = (next, after(back), from);
-            let [a, b, c] = tree.triangle(row)?;
-            from = vertices.position(match corner {
-                0 => b,
-                1 => c,
-                _ => a,
-            })?;
-        }
-        if matches!(self, Self::Vertex(_)) { None } else { side }
-    }
-
-    /// The corner around which the feature's triangles lie, and which its edge leaves.
-    const fn corner(self) -> u32 {
-        match self {
-            Self::Face => 0,
-            Self::Edge(edge) => edge,
-            Self::Vertex(corner) => corner,
+            visit(row);
         }
     }
 
-    /// The most triangles that meet in it besides the first.
-    const fn most(self) -> u32 {
-        match self {
-            Self::Face => 0,
-            Self::Edge(_) => 1,
-            Self::Vertex(_) => MAX_RING,
-        }
-    }
-
-    /// The pseudonormal of a feature of a triangle, for a point to whose distance the feature's comes near.
+    /// The pseudonormal of a feature of a triangle.
     ///
     /// Cost: one normal of a face, two of an edge, at most [`MAX_RING`] of a vertex.
     pub fn pseudonormal<I: Index, V: VertexTable + ?Sized>(
@@ -185,23 +107,24 @@ impl Feature {
         tree: &Tree<'_, I>,
         vertices: &V,
         triangle: u32,
-        off: Off,
     ) -> Result<Pseudonormal, NoNormal> {
         let at = |row| corners(tree, vertices, row);
         match self {
-            Self::Face => Ok(Pseudonormal::new(normal(&at(triangle)?)?.0, 1.0)),
+            Self::Face => Ok(Pseudonormal { vector: normal(&at(triangle)?)?.0, weight: 1.0 }),
             Self::Edge(edge) => {
                 let (other, _) = tree.across(triangle, edge).ok_or(NoNormal::Open)?;
                 let vector = normal(&at(triangle)?)?.0 + normal(&at(other)?)?.0;
-                Ok(Pseudonormal::new(vector, 2.0))
+                Ok(Pseudonormal { vector, weight: 2.0 })
             }
             Self::Vertex(corner) => {
-                let mut sum = Pseudonormal::new(Vec3::ZERO, 0.0);
+                let mut sum = Pseudonormal { vector: Vec3::ZERO, weight: 0.0 };
                 let (mut row, mut corner) = (triangle, corner);
                 for _ in 0..MAX_RING {
-                    let fan = turned(at(row)?, corner);
-                    let (unit, area) = normal(&fan)?;
-                    sum.add(fan, unit, area, off);
+                    let [centre, from, to] = turned(at(row)?, corner);
+                    let (unit, area) = normal(&[centre, from, to])?;
+                    let weight = angle(area, (from - centre).dot(to - centre));
+                    sum.vector += weight * unit;
+                    sum.weight += weight;
                     let (next, back) = tree.across(row, corner).ok_or(NoNormal::Open)?;
                     if next == triangle {
                         return Ok(sum);
@@ -226,12 +149,12 @@ pub(super) fn corners<I: Index, V: VertexTable + ?Sized>(
 }
 
 /// The corner after one.
-const fn after(corner: u32) -> u32 {
+pub(super) const fn after(corner: u32) -> u32 {
     if corner == 2 { 0 } else { corner + 1 }
 }
 
 /// The corners in their order, from one of them on.
-fn turned([a, b, c]: [Vec3; 3], first: u32) -> [Vec3; 3] {
+pub(super) fn turned<T>([a, b, c]: [T; 3], first: u32) -> [T; 3] {
     match first {
         0 => [a, b, c],
         1 => [b, c, a],
@@ -325,55 +248,6 @@ mod tests {
             let found = angle((3.0 * truth.sin()) as f32, (3.0 * truth.cos()) as f32);
             assert!((f64::from(found) - truth).abs() < 1e-6, "{found} for {truth}");
         }
-    }
-
-    /// A clear side is the pseudonormal's side. The surface is crumpled, and some triangles have no area.
-    #[test]
-    fn a_clear_side_is_that_of_the_pseudonormal() {
-        const WEIGHTS: f32 = 1e-5;
-        let mesh = dibs_build::generate::heart(320).unwrap().mesh;
-        let built = dibs_build::Builder::new().build(&mesh).unwrap();
-        let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
-        let mut rng = fastrand::Rng::with_seed(1);
-        let unit = |rng: &mut fastrand::Rng| {
-            let mut axis = || rng.f32() - 0.5;
-            Vec3::new(axis(), axis(), axis()).normalize_or(Vec3::X)
-        };
-        let mut clear = [0; 2];
-        for round in 0..40 {
-            let mut rows = built.to_rows(&mesh.positions);
-            for row in &mut rows {
-                *row += unit(&mut rng) * (rng.f32() * 0.3 * round as f32);
-            }
-            for _ in 0..round {
-                let [a, b, _] = tree.triangle(rng.u32(..320)).unwrap();
-                rows[b as usize] = rows[a as usize];
-            }
-            let rows = rows.as_slice();
-            for _ in 0..2_000 {
-                let triangle = rng.u32(..320);
-                let at @ [a, b, c] = corners(&tree, rows, triangle).unwrap();
-                let (feature, from) = match rng.u32(..3) {
-                    0 => (Feature::Face, (a + b + c) / 3.0),
-                    1 => (Feature::Edge(1), b.midpoint(c)),
-                    _ => (Feature::Vertex(2), c),
-                };
-                let towards = unit(&mut rng) * 10.0_f32.powf(rng.f32() * 5.0 - 4.0);
-                let (point, error, distance) = (from + towards, 1e-5, towards.length());
-                let least = (4.0 * error / distance).sqrt() + WEIGHTS;
-                let found = feature.clear_side(&tree, rows, triangle, &at, towards, least);
-                let Some(is_above) = found else { continue };
-                clear[usize::from(is_above)] += 1;
-                let normal =
-                    feature.pseudonormal(&tree, rows, triangle, Off { point, error }).unwrap();
-                let height = towards.dot(normal.vector) * if is_above { 1.0 } else { -1.0 };
-                let doubt = (2.0 * error * distance).sqrt() * normal.vector.length()
-                    + WEIGHTS * distance * normal.weight;
-                assert!(height > doubt, "{feature:?} {height} {doubt}");
-                assert!(!(if is_above { normal.is_below } else { normal.is_above }));
-            }
-        }
-        assert!(clear[0] > 1_000 && clear[1] > 1_000, "{clear:?}");
     }
 
     #[test]

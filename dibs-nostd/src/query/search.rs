@@ -9,7 +9,7 @@ mod range;
 mod roots;
 mod slack;
 mod tick;
-mod touched;
+mod ties;
 mod wide;
 
 use glam::Vec3;
@@ -17,11 +17,11 @@ use glam::Vec3;
 pub(super) use around::Around;
 pub(super) use range::RangeFront;
 pub(super) use tick::{Outcome, Tick};
-pub(super) use touched::Touched;
+pub(super) use ties::Ties;
 pub(super) use wide::WideSearch;
 
 use roots::Roots;
-use slack::{ACCURACY, COORDINATES, FLOOR, SLACK, TILT};
+use slack::{COORDINATES, FLOOR, SLACK, TILT};
 
 use super::plane::Plane;
 use super::{Budget, Options};
@@ -93,15 +93,15 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     best_triangle: u32,
     /// The rest of the budget.
     left: Budget,
-    /// A triangle no farther from the axis may meet it. Negative if nobody asks.
-    touching_squared: f32,
-    /// The triangles that the axis may meet, once the search has ended.
-    touched: Option<&'s mut Touched>,
+    /// A triangle no farther from the axis is collected. Not a number if nobody asks.
+    tie_squared: f32,
+    /// The triangles that may be the closest, once the search has ended.
+    ties: Option<&'s mut Ties>,
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T> {
-    /// A search that tests the triangle `first` before anything else. If the side is asked for, `touched` will have
-    /// the triangles that the axis may meet, once the search has ended.
+    /// A search that tests the triangle `first` before anything else. If the side is asked for, `ties` will have
+    /// the triangles that may be the closest, once the search has ended.
     #[inline(always)]
     pub fn start(
         tree: &'s Tree<'t, I>,
@@ -110,9 +110,9 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         tool: &'s T,
         options: &Options,
         first: Option<TriangleRow>,
-        touched: Option<&'s mut Touched>,
+        ties: Option<&'s mut Ties>,
     ) -> Result<Self, QueryError> {
-        Self::start_in(RootSet::ALL, tree, stack, vertices, tool, options, first, touched)
+        Self::start_in(RootSet::ALL, tree, stack, vertices, tool, options, first, ties)
     }
 
     /// A search below some roots; the triangle `first` must be below one of them.
@@ -126,7 +126,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         tool: &'s T,
         options: &Options,
         first: Option<TriangleRow>,
-        mut touched: Option<&'s mut Touched>,
+        mut ties: Option<&'s mut Ties>,
     ) -> Result<Self, QueryError> {
         let header = tree.header();
         if vertices.len() != header.vertices as usize {
@@ -176,11 +176,10 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         // triangle. If corrupt bytes form a loop, this bound ends the search. Other kinds have bounds of their own.
         let most = header.nodes.saturating_mul(3).saturating_add(header.triangles);
         let budget = options.budget.nodes_at_most(most);
-        let is_asked = options.is_signed && tree.is_closed() && tool.axis_length() > 0.0;
-        if let Some(touched) = &mut touched {
-            touched.reset(is_asked);
+        ties = ties.filter(|_| options.is_signed && tree.has_adjacency());
+        if let Some(ties) = &mut ties {
+            ties.reset(scale, tree.is_closed() && tool.axis_length() > 0.0);
         }
-        let accuracy = ACCURACY * scale + FLOOR;
         let mut search = Self {
             tree,
             vertices,
@@ -200,8 +199,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             best: None,
             best_squared: f32::INFINITY,
             best_triangle: u32::MAX,
-            touching_squared: if is_asked { accuracy * accuracy } else { -1.0 },
-            touched,
+            tie_squared: f32::NAN,
+            ties,
         };
         search.lower_cutoff_to_pin(all.nearest.row, all.nearest.distance);
         if let Some(TriangleRow(triangle)) = first
@@ -430,28 +429,38 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     fn test_triangle(&mut self, triangle: u32, corners: &[Vec3; 3]) {
         if let Some(pair) = self.tool.closest_on_triangle(corners, self.cutoff_squared) {
             if pair.distance_squared < self.best_squared {
-                self.best_squared = pair.distance_squared;
-                self.best_triangle = triangle;
-                self.best = Some(pair);
-                self.lower_cutoff(sqrt(pair.distance_squared));
+                self.improve(triangle, pair, sqrt(pair.distance_squared));
             }
-            if pair.distance_squared <= self.touching_squared {
-                self.add_touched(triangle);
-            }
+            self.add_tie(triangle, pair.distance_squared);
         }
     }
 
+    /// A triangle is the closest so far.
     #[inline(always)]
-    fn add_touched(&mut self, triangle: u32) {
-        if let Some(touched) = &mut self.touched {
-            touched.push(triangle);
+    fn improve(&mut self, triangle: u32, pair: AxisPair, distance: f32) {
+        self.best_squared = pair.distance_squared;
+        self.best_triangle = triangle;
+        self.best = Some(pair);
+        self.lower_cutoff(distance);
+        if self.ties.is_some() {
+            self.tie_squared = ties::limit_of(distance, self.scale);
         }
     }
 
-    /// The axis may meet the surface where it was not searched.
+    /// Collects a triangle if it may be the closest; `square` bounds the square of its distance.
+    #[inline(always)]
+    fn add_tie(&mut self, triangle: u32, square: f32) {
+        if square <= self.tie_squared
+            && let Some(ties) = &mut self.ties
+        {
+            ties.push(triangle, square, self.tie_squared);
+        }
+    }
+
+    /// Where it was not searched, the surface may be as close as the closest triangle.
     fn leave_unfinished(&mut self) {
-        if let Some(touched) = &mut self.touched {
-            touched.reset(false);
+        if let Some(ties) = &mut self.ties {
+            ties.lose();
         }
     }
 

@@ -6,8 +6,8 @@
 use glam::Vec3;
 
 use super::depth::{Depth, Known};
-use super::search::{Touched, Waiting};
-use super::side::{self, NoSide, Side};
+use super::search::{Ties, Waiting};
+use super::side::{self, NoSide, OnAxis, Side};
 use super::{Options, Proximity, solids};
 use crate::tree::RootSet;
 use crate::unavailable::QueryError;
@@ -22,8 +22,8 @@ pub(super) struct Asked<'a, 't, I, V: ?Sized, T> {
 }
 
 /// Adds the side, and the signed separation that follows from it. Both take the table's positions as exact; their
-/// position error is added to the accuracy last. `touched` are the triangles that the
-/// axis may meet, `known` a tracker's memory of the last tick's depth.
+/// position error is added to the accuracy last. `ties` are the triangles that may be
+/// the closest, `known` a tracker's memory of the last tick's depth.
 #[inline(never)]
 pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     tree: &Tree<'_, I>,
@@ -32,7 +32,7 @@ pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     tool: &T,
     options: &Options,
     mut found: Proximity,
-    memory: (&Touched, Option<&mut Known>),
+    memory: (&mut Ties, Option<&mut Known>),
 ) -> Result<Proximity, QueryError> {
     let asked = Asked { tree, vertices, tool, options };
     let mut found = if !options.is_signed {
@@ -58,7 +58,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
         &self,
         stack: &mut [Waiting],
         mut found: Proximity,
-        (touched, known): (&Touched, Option<&mut Known>),
+        (ties, known): (&mut Ties, Option<&mut Known>),
         roots: RootSet,
     ) -> Result<Proximity, QueryError> {
         let &Self { tree, vertices, tool, options } = self;
@@ -68,10 +68,20 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
             found.side = Side::Undefined(NoSide::CutShort);
             return Ok(found);
         }
+        if roots != RootSet::ALL {
+            ties.keep(|row| roots.contains(tree.root_of(row)));
+        }
         let has_length = tool.axis_length() > 0.0;
         if !(is_touching && has_length) {
             let on_axis = tool.axis_point(found.axis_parameter);
-            let at = side::of_point(tree, vertices, &found, on_axis)?;
+            let is_many = ties.are_lost() && !is_touching;
+            let many = is_many
+                .then(|| side::of_many(roots, tree, stack, vertices, &mut found, on_axis, options))
+                .transpose()?;
+            let point = OnAxis::new(tool, found.axis_parameter);
+            let left = options.budget.node_tests.saturating_sub(found.node_tests);
+            let at = side::of_point(tree, vertices, &found, &point, ties, many, left)?;
+            found.node_tests = found.node_tests.saturating_add(at.work);
             found.side = at.side;
             if at.outward != Vec3::ZERO {
                 found.direction = at.outward;
@@ -89,7 +99,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
             }
         }
         let (known, around) = known.map(|known| known.now(roots)).unzip();
-        let mut depth = Depth::new(tree, stack, vertices, tool, options, &found, around, roots);
-        depth.run(touched, known)
+        let mut depth =
+            Depth::new(tree, stack, vertices, tool, options, &found, around, roots, ties);
+        depth.run(known)
     }
 }

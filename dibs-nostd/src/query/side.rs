@@ -2,13 +2,17 @@
 
 use core::fmt;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
-use super::Proximity;
-use super::normal::{Feature, NoNormal, Off, corners};
+use super::exact::{Above, Exact};
+use super::normal::{Feature, NORMAL, NoNormal, corners};
+use super::search::{Search, Ties, Waiting};
+use super::{Budget, Options, Proximity};
 use crate::math::sqrt::sqrt;
+use crate::tool::AxisPoint;
+use crate::tree::RootSet;
 use crate::unavailable::QueryError;
-use crate::{Index, Tree, TriangleRow, VertexTable};
+use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
 
 /// On which side of the surface a tool's axis is. The outer side is where the triangles' corners are seen counter-
 /// clockwise.
@@ -39,6 +43,9 @@ pub enum NoSide {
     OpenBoundary,
     /// The axis is closer to the surface, or to a tie between its features, than the accuracy tells apart.
     BelowAccuracy,
+    /// The closest point is on an edge of more than two triangles that are not pairs around a solid; the tree was cut
+    /// there.
+    NonManifold,
     /// A triangle at the closest point has no area, or more than 256 meet there.
     Degenerate,
     /// The budget ran out before the closest point was certain, or no point is as close as asked for
@@ -50,8 +57,13 @@ impl fmt::Display for NoSide {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::NotAsked => "no side was asked for",
-            Self::NoAdjacency => "the tree has no adjacency",
+            Self::NoAdjacency => {
+                "the tree has no adjacency: it was built without, or triangles are wound against each other"
+            }
             Self::OpenBoundary => "the closest point is on an open boundary",
+            Self::NonManifold => {
+                "the closest point is on an edge of more than two triangles: cut the mesh open there"
+            }
             Self::BelowAccuracy => "the sides are closer than the accuracy",
             Self::Degenerate => "the triangles at the closest point have no clear normal",
             Self::CutShort => "the budget ran out",
@@ -62,99 +74,276 @@ impl fmt::Display for NoSide {
 /// Rounding of a coordinate and of a few operations on it, relative to its size.
 const COORDINATES: f32 = 4.0 / 16_777_216.0;
 
-/// Rounding of a pseudonormal, relative to the sum of its weights.
-const NORMAL: f32 = 1e-5;
+/// A corner's weight above which a point of a triangle is not on the edge across from it.
+const AWAY: f32 = 1e-3;
 
 /// Within this many accuracies the difference of two points gives a poor direction, so the pseudonormal is used.
 const NEAR: f32 = 8.0;
+
+/// Rounding of a height above a plane: 12 `u` of the product of three lengths, which their sums of coordinates bound.
+const HEIGHT: f32 = 16.0 / 16_777_216.0;
+
+/// Rounding of the vector between two points, relative to the sizes of its terms.
+const VECTOR: f32 = 4.0 / 16_777_216.0;
 
 /// A point's side, and the unit vector that leads out; zero where no normal is known.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PointSide {
     pub side: Side,
     pub outward: Vec3,
+    /// Node tests that take as long as its work in f64.
+    pub work: u32,
 }
 
-/// The side of an axis' point whose closest point of the surface is known.
+/// A point of an axis. Its parts are kept apart, so that far from the origin their sum is not rounded.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OnAxis {
+    start: Vec3,
+    span: Vec3,
+    parameter: f32,
+    point: Vec3,
+}
+
+impl OnAxis {
+    pub fn new(tool: &impl Tool, parameter: f32) -> Self {
+        let (start, span) = (tool.axis_start(), tool.axis_span());
+        Self { start, span, parameter, point: tool.axis_point(parameter) }
+    }
+
+    /// Whether the point is above a triangle's plane, if f32 can tell.
+    #[inline(always)]
+    fn is_above(&self, &[a, b, c]: &[Vec3; 3]) -> Option<bool> {
+        let (ab, ac) = (b - a, c - a);
+        let normal = ab.cross(ac);
+        let (from_a, along) = (self.start - a, self.span * self.parameter);
+        let towards = from_a + along;
+        let height = normal.dot(towards);
+        let size = |v: Vec3| v.x.abs() + v.y.abs() + v.z.abs();
+        let doubt = HEIGHT * (size(ab) * size(ac) * size(towards))
+            + VECTOR * (size(from_a) + size(along)) * size(normal);
+        // Written so that NaN is not clear.
+        if height > doubt {
+            Some(true)
+        } else if height < -doubt {
+            Some(false)
+        } else {
+            None
+        }
+    }
+}
+
+/// The side of an axis' point whose closest point of the surface is known, with no more node tests than `left`.
 ///
-/// # Why a near tie is no wrong side
-/// Let the distance `d` be within `e` of the truth. A ball of radius `d - e` around the point holds no point of the
-/// surface, so along any straight line of the surface from the closest point found, the direction to the point is
-/// within an angle of `sqrt(2 e / d)` of being perpendicular.
-///
-/// On a face or an edge it is then within that angle of the normal cone, and a pseudonormal has no negative product with
-/// any direction of its feature's normal cone: a product farther from zero than that angle's has the right sign.
-///
-/// A vertex may have no normal cone (a saddle). It is then never the closest point, only nearly. If a triangle at the
-/// vertex is closer, the point leans over one of that triangle's edges. If the closest point is inside the triangle, the
-/// triangle's normal has the right sign; if it is on the edge, the normal of one of the edge's two triangles has. So the
-/// pseudonormal's sign counts only if no triangle that the point leans over has the other one.
-///
-/// Any other product leaves the side undefined.
-///
-/// A point that is clearly above all triangles of its feature is above their pseudonormal, whatever their weights: then
-/// none is needed.
+/// # Why no side is wrong
+/// `ties` holds every triangle that may be the closest, so all triangles that meet in the true closest point are among
+/// them. A point above the planes of all of these is above any pseudonormal there, and outside; below all of them, inside.
+/// So if the point is above all of `ties`, or below all, whichever is the closest does not matter. Elsewhere
+/// [`Exact`] puts them in order. If there are too many, `many` is the answer of [`of_many`].
 #[inline(never)] // So that a tick's code fits the tightly coupled memory of small controllers.
 pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     vertices: &V,
     pair: &Proximity,
-    on_axis: Vec3,
+    at: &OnAxis,
+    ties: &Ties,
+    many: Option<Above>,
+    left: u32,
 ) -> Result<PointSide, QueryError> {
-    let undefined = |reason, outward| Ok(PointSide { side: Side::Undefined(reason), outward });
-    let Some(TriangleRow(triangle)) = pair.triangle else {
-        return undefined(NoSide::CutShort, Vec3::ZERO);
+    if pair.triangle.is_none() {
+        let side = Side::Undefined(NoSide::CutShort);
+        return Ok(PointSide { side, outward: Vec3::ZERO, work: 0 });
+    }
+    let distance = pair.axis_distance;
+    let error = pair.accuracy + COORDINATES * pair.point_on_surface.abs().max_element();
+    let mut normal = None;
+    if !(distance > NEAR * error) {
+        normal = match outward(tree, vertices, pair)? {
+            Ok(unit) => Some(unit).filter(|&unit| unit != Vec3::ZERO),
+            Err(reason) if !(distance > 2.0 * pair.accuracy) => {
+                let is_cut = reason == NoSide::OpenBoundary && is_crowded(tree, ties);
+                let side = Side::Undefined(if is_cut { NoSide::NonManifold } else { reason });
+                return Ok(PointSide { side, outward: Vec3::ZERO, work: 0 });
+            }
+            Err(_) => None,
+        };
+    }
+    let undefined = |reason, work| {
+        let outward = normal.unwrap_or_default();
+        Ok(PointSide { side: Side::Undefined(reason), outward, work })
     };
-    let point = pair.point_on_surface;
-    let error = pair.accuracy + COORDINATES * point.abs().max_element();
-    let (distance, towards) = (pair.axis_distance, on_axis - point);
-    let corners = corners(tree, vertices, triangle);
-    let feature = corners.map(|corners| Feature::of(&corners, point, error));
-    if let (Ok(corners), Ok(feature)) = (&corners, &feature)
-        && distance > NEAR * error
-    {
-        let least = sqrt(4.0 * error / distance) + NORMAL;
-        if let Some(is_above) =
-            feature.clear_side(tree, vertices, triangle, corners, towards, least)
+    if !(distance > 2.0 * pair.accuracy) {
+        return undefined(NoSide::BelowAccuracy, 0);
+    }
+    let mut work = 0;
+    let is_above = match clearly_above(tree, vertices, pair, at, ties)? {
+        Some(is_above) => is_above,
+        None => {
+            let along = at.span.as_dvec3() * f64::from(at.parameter);
+            let mut exact = Exact::new(tree, vertices, at.start, along, left);
+            let above = match ties.deciding() {
+                Some(rows) => exact.of(rows)?,
+                None => many.unwrap_or(Err(NoSide::BelowAccuracy)),
+            };
+            work = exact.work;
+            match above {
+                Ok(is_above) => is_above,
+                Err(NoSide::OpenBoundary) if is_crowded(tree, ties) => {
+                    return undefined(NoSide::NonManifold, work);
+                }
+                Err(reason) => return undefined(reason, work),
+            }
+        }
+    };
+    let towards = at.point - pair.point_on_surface;
+    let apart = sqrt(towards.length_squared());
+    let outward = match normal {
+        Some(unit) => unit,
+        None if !(apart > 0.0) => Vec3::ZERO,
+        None if is_above => towards / apart,
+        None => -towards / apart,
+    };
+    Ok(PointSide { side: if is_above { Side::Outside } else { Side::Inside }, outward, work })
+}
+
+/// The side of a point with too many ties to remember: searches them again, from the closest pair on.
+#[cold]
+#[inline(never)]
+pub(super) fn of_many<I: Index, V: VertexTable + ?Sized>(
+    roots: RootSet,
+    tree: &Tree<'_, I>,
+    stack: &mut [Waiting],
+    vertices: &V,
+    pair: &mut Proximity,
+    point: Vec3,
+    options: &Options,
+) -> Result<Above, QueryError> {
+    let (tool, first) = (AxisPoint(point), pair.triangle);
+    let at = OnAxis::new(&tool, 0.0);
+    let rest = |pair: &Proximity| {
+        options.budget(options.budget.less(pair.node_tests, pair.triangle_tests))
+    };
+    let add = |pair: &mut Proximity, made: Budget| {
+        pair.node_tests = pair.node_tests.saturating_add(made.node_tests);
+        pair.triangle_tests = pair.triangle_tests.saturating_add(made.triangle_tests);
+    };
+    if tree.is_closed() {
+        let search =
+            Search::start_in(roots, tree, stack, vertices, &tool, &rest(pair), first, None)?;
+        let mut side = None;
+        let (is_clear, made) = search.each_tie(|row| {
+            let this = match corners(tree, vertices, row) {
+                Err(NoNormal::Corrupt(row)) => return Err(QueryError::Corrupt { row }),
+                corners => corners.ok().and_then(|corners| at.is_above(&corners)),
+            };
+            Ok(this.is_some() && *side.get_or_insert(this) == this)
+        })?;
+        add(pair, made);
+        if let Some(Some(is_above)) = side
+            && is_clear
         {
-            let outward = towards / sqrt(towards.length_squared());
-            return Ok(if is_above {
-                PointSide { side: Side::Outside, outward }
-            } else {
-                PointSide { side: Side::Inside, outward: -outward }
-            });
+            return Ok(Ok(is_above));
         }
     }
-    let off = Off { point: on_axis, error };
-    let found = feature.and_then(|feature| feature.pseudonormal(tree, vertices, triangle, off));
-    let normal = match found {
-        Ok(normal) => normal,
-        Err(NoNormal::Open) => return undefined(NoSide::OpenBoundary, Vec3::ZERO),
-        Err(NoNormal::Unclear) => return undefined(NoSide::Degenerate, Vec3::ZERO),
-        Err(NoNormal::Corrupt(row)) => return Err(QueryError::Corrupt { row }),
-    };
-    let length = sqrt(normal.vector.length_squared());
-    let unit = normal.vector / length;
-    let is_known = length > NORMAL * normal.weight;
-    let unit = if is_known { unit } else { Vec3::ZERO };
-    if !(distance > 2.0 * error) {
-        return undefined(NoSide::BelowAccuracy, unit);
+    let options = rest(pair);
+    let left = options.budget.node_tests / 2;
+    let mut exact = Exact::new(tree, vertices, point, DVec3::ZERO, left);
+    let options = options.budget(options.budget.less(left, 0));
+    let search = Search::start_in(roots, tree, stack, vertices, &tool, &options, first, None)?;
+    let (is_complete, made) = search.each_tie(|row| exact.add(row))?;
+    add(pair, made);
+    pair.node_tests = pair.node_tests.saturating_add(exact.work);
+    Ok(if is_complete { exact.answer() } else { Err(NoSide::CutShort) })
+}
+
+/// Whether a point is above all triangles of a tie, or below all, as far as f32 can tell. A triangle at an open boundary
+/// counts only if the closest point is not there.
+fn clearly_above<I: Index, V: VertexTable + ?Sized>(
+    tree: &Tree<'_, I>,
+    vertices: &V,
+    pair: &Proximity,
+    at: &OnAxis,
+    ties: &Ties,
+) -> Result<Option<bool>, QueryError> {
+    let Some(rows) = ties.rows() else { return Ok(None) };
+    let mut side = None;
+    for row in rows {
+        let corners = match corners(tree, vertices, row) {
+            Err(NoNormal::Corrupt(row)) => return Err(QueryError::Corrupt { row }),
+            corners => corners.ok(),
+        };
+        let this = corners.and_then(|corners| at.is_above(&corners));
+        if this.is_none() || *side.get_or_insert(this) != this {
+            return Ok(None);
+        }
+        if !tree.is_closed() {
+            for (edge, opposite) in [(0, 2), (1, 0), (2, 1)] {
+                let is_away = pair.triangle == Some(TriangleRow(row))
+                    && pair.barycentric.get(opposite).is_some_and(|&weight| weight > AWAY);
+                if !is_away && tree.across(row, edge).is_none() {
+                    return Ok(None);
+                }
+            }
+        }
     }
-    let height = towards.dot(normal.vector);
-    let doubt = sqrt(2.0 * error * distance) * length + NORMAL * distance * normal.weight;
-    let side = if height > doubt && !normal.is_below {
-        Side::Outside
-    } else if height < -doubt && !normal.is_above {
-        Side::Inside
-    } else {
-        return undefined(NoSide::BelowAccuracy, unit);
-    };
-    let is_near = distance <= NEAR * error && is_known;
-    let apart = sqrt(towards.length_squared());
-    let outward = match side {
-        _ if is_near || !(apart > 0.0) => unit,
-        Side::Inside => -towards / apart,
-        _ => towards / apart,
-    };
-    Ok(PointSide { side, outward })
+    Ok(side.flatten())
+}
+
+/// Whether triangles of a tie meet in an edge that has no neighbours.
+#[cold]
+fn is_crowded<I: Index>(tree: &Tree<'_, I>, ties: &Ties) -> bool {
+    ties.deciding().into_iter().flatten().any(|row| {
+        let [a, b, c] = tree.triangle(row).unwrap_or_default();
+        [(0, a, b), (1, b, c), (2, c, a)].into_iter().any(|(edge, from, to)| {
+            let shares = |other: u32| {
+                let corners = tree.triangle(other).unwrap_or_default();
+                other != row && corners.contains(&from) && corners.contains(&to)
+            };
+            tree.across(row, edge).is_none() && ties.deciding().into_iter().flatten().any(shares)
+        })
+    })
+}
+
+/// The triangles that meet where a pair's point of the surface is, for a side as seen from there alone.
+pub(super) fn star<I: Index, V: VertexTable + ?Sized>(
+    tree: &Tree<'_, I>,
+    vertices: &V,
+    pair: &Proximity,
+) -> Result<Ties, QueryError> {
+    let mut star = Ties::star();
+    let Some(TriangleRow(triangle)) = pair.triangle else { return Ok(star) };
+    star.add(triangle);
+    match corners(tree, vertices, triangle) {
+        Ok(corners) => {
+            let error = pair.accuracy + COORDINATES * pair.point_on_surface.abs().max_element();
+            let feature = Feature::of(&corners, pair.point_on_surface, error);
+            feature.each_other(tree, triangle, |row| star.add(row));
+            Ok(star)
+        }
+        Err(NoNormal::Corrupt(row)) => Err(QueryError::Corrupt { row }),
+        Err(_) => Ok(star),
+    }
+}
+
+/// The pseudonormal at a pair's point of the surface, of length 1; zero if rounding hides it.
+pub(super) fn outward<I: Index, V: VertexTable + ?Sized>(
+    tree: &Tree<'_, I>,
+    vertices: &V,
+    pair: &Proximity,
+) -> Result<Result<Vec3, NoSide>, QueryError> {
+    let Some(TriangleRow(triangle)) = pair.triangle else { return Ok(Err(NoSide::CutShort)) };
+    let point = pair.point_on_surface;
+    let error = pair.accuracy + COORDINATES * point.abs().max_element();
+    let found = corners(tree, vertices, triangle).and_then(|corners| {
+        Feature::of(&corners, point, error).pseudonormal(tree, vertices, triangle)
+    });
+    match found {
+        Ok(normal) => {
+            let length = sqrt(normal.vector.length_squared());
+            let is_known = length > NORMAL * normal.weight;
+            Ok(Ok(if is_known { normal.vector / length } else { Vec3::ZERO }))
+        }
+        Err(NoNormal::Open) => Ok(Err(NoSide::OpenBoundary)),
+        Err(NoNormal::Unclear) => Ok(Err(NoSide::Degenerate)),
+        Err(NoNormal::Corrupt(row)) => Err(QueryError::Corrupt { row }),
+    }
 }

@@ -4,7 +4,7 @@
 //! sheet of all decides nothing. The least of their separations changes by no more than tool and surface move, as each
 //! of them does.
 
-use super::search::{Search, Touched, WHOLE, Waiting};
+use super::search::{Search, Ties, WHOLE, Waiting};
 use super::separation::Asked;
 use super::side::{NoSide, Side};
 use super::{Proximity, depth};
@@ -20,7 +20,7 @@ pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     asked: &Asked<'_, '_, I, V, T>,
     stack: &mut [Waiting],
     closest: &Proximity,
-    memory: (&Touched, Option<&mut depth::Known>),
+    memory: (&mut Ties, Option<&mut depth::Known>),
 ) -> Result<Proximity, QueryError> {
     let &Asked { tree, vertices, tool, options } = asked;
     let root = closest.triangle.map_or(0, |row| tree.root_of(row.0));
@@ -61,11 +61,11 @@ fn of_solid<I: Index, V: VertexTable + ?Sized, T: Tool>(
     let &Asked { tree, vertices, tool, options } = asked;
     let rest = options.budget(options.budget.less(answer.node_tests, answer.triangle_tests));
     let asked = Asked { options: &rest, ..*asked };
-    let mut touched = Touched::new();
-    let memory = Some(&mut touched);
+    let mut ties = Ties::new();
+    let memory = Some(&mut ties);
     let search = Search::start_in(roots, tree, stack, vertices, tool, &rest, None, memory)?;
     let found = search.run::<WHOLE>(f32::INFINITY)?;
-    asked.signed(stack, found, (&touched, None), roots)
+    asked.signed(stack, found, (&mut ties, None), roots)
 }
 
 /// The nearer of the answers of two solids, with the interval and the tests of both. The tool is inside if it is inside one

@@ -336,6 +336,7 @@ fn side(side: Side) -> u32 {
             NoSide::BelowAccuracy => 6,
             NoSide::Degenerate => 7,
             NoSide::CutShort => 8,
+            NoSide::NonManifold => 9,
             _ => u32::MAX,
         },
         _ => u32::MAX,

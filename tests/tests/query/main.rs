@@ -17,6 +17,7 @@ mod side;
 mod slack;
 mod solids;
 mod swept;
+mod ties;
 mod tracked_chain;
 mod tracked_contacts;
 mod tracked_depth;

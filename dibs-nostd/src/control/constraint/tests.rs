@@ -129,10 +129,11 @@ fn the_hold_damps_and_says_why() {
     assert_eq!(touching.state, ConstraintState::Safe(Unavailable::NoDirection));
 }
 
-const NO_SIDES: [(NoSide, Option<Unavailable>); 6] = [
+const NO_SIDES: [(NoSide, Option<Unavailable>); 7] = [
     (NoSide::CutShort, Some(Unavailable::CutShort)),
     (NoSide::Degenerate, Some(Unavailable::NoSide)),
     (NoSide::OpenBoundary, Some(Unavailable::NoSide)),
+    (NoSide::NonManifold, Some(Unavailable::NoSide)),
     (NoSide::BelowAccuracy, Some(Unavailable::NoSide)),
     (NoSide::NotAsked, None),
     (NoSide::NoAdjacency, None),

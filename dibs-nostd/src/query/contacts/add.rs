@@ -7,7 +7,7 @@ use super::low::Found;
 use super::{Contact, Contacts};
 use crate::math::sqrt::sqrt;
 use crate::query::search::RangeFront;
-use crate::query::side::{self, Side};
+use crate::query::side::{self, OnAxis, Side};
 use crate::query::{NoSide, Options, Proximity};
 use crate::tool::AxisPair;
 use crate::unavailable::QueryError;
@@ -259,7 +259,9 @@ impl Proximity {
         tool: &T,
     ) -> Result<(), QueryError> {
         let on_axis = tool.axis_point(self.axis_parameter);
-        let at = side::of_point(tree, vertices, self, on_axis)?;
+        let (at, star) =
+            (OnAxis::new(tool, self.axis_parameter), side::star(tree, vertices, self)?);
+        let at = side::of_point(tree, vertices, self, &at, &star, None, u32::MAX)?;
         self.side = at.side;
         if at.outward != Vec3::ZERO {
             self.direction = at.outward;

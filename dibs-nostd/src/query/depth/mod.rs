@@ -22,8 +22,8 @@ mod walk;
 
 use glam::Vec3;
 
-use super::search::{Around, Search, Touched, UNTIL, Waiting};
-use super::side::{self, NoSide, Side};
+use super::search::{Around, Search, Ties, UNTIL, Waiting};
+use super::side::{self, NoSide, OnAxis, Side};
 use super::{Budget, Options, Proximity};
 use crate::tool::{AxisPoint, Tool};
 use crate::tree::RootSet;
@@ -80,6 +80,8 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
     around: Option<&'s mut Around>,
     /// Roots of the shells that decide.
     roots: RootSet,
+    /// The triangles that the axis may meet; then those that may be the closest to the point searched last.
+    ties: &'s mut Ties,
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> {
@@ -95,6 +97,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         closest: &'s Proximity,
         around: Option<&'s mut Around>,
         roots: RootSet,
+        ties: &'s mut Ties,
     ) -> Self {
         let mut options = *options;
         options.stretch = options.stretch.or_else(|| vertices.stretch());
@@ -123,16 +126,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             looks: 0,
             around,
             roots,
+            ties,
         }
     }
 
     /// The answer with side, signed separation, and the deepest point's pair. `known` is the last tick's search, and
     /// then this one.
-    pub fn run(
-        &mut self,
-        touched: &Touched,
-        known: Option<&mut Points>,
-    ) -> Result<Proximity, QueryError> {
+    pub fn run(&mut self, known: Option<&mut Points>) -> Result<Proximity, QueryError> {
         let least = LEAST_TOLERANCE * self.closest.accuracy;
         let default = larger(self.tool.axis_length() * TOLERANCE, least);
         let tolerance = self.options.depth_tolerance.unwrap_or(default);
@@ -143,7 +143,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             }
             return self.finish(reach);
         }
-        self.find_touches(touched)?;
+        self.find_touches()?;
         let mut parts = Parts::new();
         let last = match known.as_deref().and_then(|known| known.below(reach)) {
             Some((points, deepest)) => {
@@ -285,17 +285,24 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             &point,
             &options,
             first,
-            None,
+            Some(&mut *self.ties),
         )?;
         // A bound that is just low enough would not be so at the next tick.
         let enough = if self.around.is_some() { EXACT } else { enough };
         let length = self.tool.axis_length();
         let around = self.around.as_deref_mut();
-        let found = match around.map(|around| (around.way_to(parameter, length), around)) {
+        let mut found = match around.map(|around| (around.way_to(parameter, length), around)) {
             Some((way, around)) if search.is_among(around, way) => search.among(around, way)?,
             Some((way, around)) if way <= 0.0 => search.gather(around)?,
             _ => search.run::<UNTIL>(enough)?,
         };
+        let (tree, vertices, roots) = (self.tree, self.vertices, self.roots);
+        let is_many = self.ties.are_lost() && !found.is_cut_short();
+        let many = is_many
+            .then(|| {
+                side::of_many(roots, tree, self.stack, vertices, &mut found, on_axis, &options)
+            })
+            .transpose()?;
         self.options.budget = Budget {
             node_tests: node_tests.saturating_sub(found.node_tests.saturating_sub(1)),
             triangle_tests: triangle_tests.saturating_sub(found.triangle_tests),
@@ -307,8 +314,11 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         let at = if found.is_cut_short() {
             None
         } else {
-            Some(side::of_point(self.tree, self.vertices, &found, on_axis)?)
+            let (at, left) = (OnAxis::new(&point, 0.0), self.options.budget.node_tests);
+            Some(side::of_point(tree, vertices, &found, &at, self.ties, many, left)?)
         };
+        self.spend(at.map_or(0, |at| at.work));
+        let answer = &mut self.answer;
         let depth = match at {
             Some(at) if at.side == Side::Outside => {
                 self.touches.add_outside(parameter * self.tool.axis_length());
@@ -370,9 +380,9 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         if !is_inside {
             if self.deepest <= 0.0 {
                 let on_axis = self.tool.axis_point(closest.axis_parameter);
-                let at = side::of_point(self.tree, self.vertices, closest, on_axis)?;
-                answer.direction = at.outward;
-                answer.point_on_tool = on_axis - at.outward * self.tool.radius();
+                let outward = side::outward(self.tree, self.vertices, closest)?.unwrap_or_default();
+                answer.direction = outward;
+                answer.point_on_tool = on_axis - outward * self.tool.radius();
             }
             let crosses = closest.axis_distance <= 0.0 || self.deepest > answer.accuracy;
             answer.side =

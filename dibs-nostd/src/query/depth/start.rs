@@ -5,27 +5,23 @@ use super::part::{Part, Parts, Sample};
 use super::touches::Touches;
 use super::{DISTANCE_COST, Depth};
 use crate::query::Proximity;
-use crate::query::search::Touched;
 use crate::tool::Tool;
-use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, TriangleRow, VertexTable};
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
     /// Finds the places where the axis meets the triangles that a search found to touch it.
-    pub(super) fn find_touches(&mut self, touched: &Touched) -> Result<(), QueryError> {
+    pub(super) fn find_touches(&mut self) -> Result<(), QueryError> {
         if self.is_inside {
             self.touches = Touches::NONE;
             return Ok(());
         }
-        let Some(rows) = touched.rows() else { return Ok(()) };
+        let ties = *self.ties;
+        let Some(mut rows) = ties.touched().map(Iterator::peekable) else { return Ok(()) };
         // A tracker's accuracy is larger than a search's, for which the closest triangle may be no touched one.
-        let closest = self.closest.triangle.filter(|_| rows.is_empty());
+        let closest = self.closest.triangle.filter(|_| rows.peek().is_none());
         self.touches = Touches::NONE;
-        for row in rows.iter().copied().chain(closest.map(|TriangleRow(row)| row)) {
-            if self.roots != RootSet::ALL && !self.roots.contains(self.tree.root_of(row)) {
-                continue;
-            }
+        for row in rows.chain(closest.map(|TriangleRow(row)| row)) {
             if self.is_spent() {
                 self.touches = Touches::ANYWHERE;
                 break;

@@ -258,11 +258,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         };
         let distance = sqrt(pair.distance_squared);
         if pair.distance_squared < self.best_squared {
-            self.best_squared = pair.distance_squared;
-            self.best_triangle = triangle;
-            self.best = Some(pair);
-            self.lower_cutoff(distance);
+            self.improve(triangle, pair, distance);
         }
+        self.add_tie(triangle, pair.distance_squared);
         Ok(Some(distance))
     }
 }

@@ -108,7 +108,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         self.cutoff_squared = self.cutoff * self.cutoff;
     }
 
-    fn wait_for_children(&mut self, parent: f32, first: u32, count: u32) -> Result<(), QueryError> {
+    pub(super) fn wait_for_children(
+        &mut self,
+        parent: f32,
+        first: u32,
+        count: u32,
+    ) -> Result<(), QueryError> {
         let corrupt = QueryError::Corrupt { row: first };
         let tree = self.tree;
         let base = self.waiting;

@@ -22,9 +22,18 @@ pub(super) const SLACK: f32 = 48.0 * U;
 /// that of the pair's last operations, a root, a difference and the tool's radius.
 pub(super) const ACCURACY: f32 = 24.0 * U;
 
+/// How much farther than the closest distance found a triangle may seem to be that is as close as the closest one to the
+/// axis' point found, in units of `S`.
+///
+/// The pair found is real, so that its distance is at most 4 `u` more than computed, and 3 `u` more from the axis' point
+/// with its rounded parameter: 7 `u`. No triangle that is closest to that point is farther from the axis, nor seems so by
+/// more than [`KERNEL`]. A tracker's lower bound has an error of at most 12 `u`.
+pub(super) const TIE: f32 = 40.0 * U;
+
 const _: () = {
     // A subtree's bound, or a plane, against a triangle's distance.
     assert!(SLACK >= BOUND + KERNEL && SLACK >= PLANE + KERNEL);
+    assert!(TIE >= 7.0 * U + KERNEL && SLACK >= TIE && SLACK >= BOUND + 7.0 * U + KERNEL);
     assert!(ACCURACY >= KERNEL + 4.0 * U && ACCURACY >= BOUND);
 };
 

@@ -299,6 +299,10 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             let corners = search.corners(triangle)?;
             let facing = self.facing.lowest(&corners);
             let bound = if facing > self.facing.within {
+                // A large flat part lies along the plane, but few of its triangles are near.
+                if facing * facing <= search.tie_squared && !(search.excess(&corners).0 > 0.0) {
+                    search.add_tie(triangle, facing * facing);
+                }
                 facing
             } else {
                 match self.test_closely(triangle, &corners, place, triangles_left)? {
@@ -322,15 +326,10 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         left: u32,
     ) -> Result<Option<f32>, QueryError> {
         let search = &self.search;
-        let &[a, b, c] = corners;
-        let middle = (a + b + c) * THIRD;
-        let normal = search.tool.axis_to(middle);
-        let distance = sqrt(normal.dot(normal));
-        let plane = search.plane_across(normal, middle, distance);
-        if plane.limit.is_nan() {
+        let (excess, distance) = search.excess(corners);
+        if excess.is_nan() {
             return Err(QueryError::Position { vertex: search.not_finite(triangle) });
         }
-        let excess = least([a, b, c].map(|corner| plane.normal.dot(corner))) - plane.limit;
         if excess > 0.0 {
             return Ok(Some(search.cutoff + excess / distance));
         }
@@ -352,16 +351,12 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             return Err(QueryError::Position { vertex: search.not_finite(triangle) });
         };
         let distance = sqrt(pair.distance_squared);
-        if pair.distance_squared <= search.touching_squared {
-            search.add_touched(triangle);
-        }
         if !(pair.distance_squared < search.best_squared) {
+            search.add_tie(triangle, pair.distance_squared);
             return Ok(Some(distance));
         }
-        search.best_squared = pair.distance_squared;
-        search.best_triangle = triangle;
-        search.best = Some(pair);
-        search.lower_cutoff(distance);
+        search.improve(triangle, pair, distance);
+        search.add_tie(triangle, pair.distance_squared);
         self.facing = Facing::new(&self.search);
         let corrupt = QueryError::Corrupt { row: triangle };
         if let Some(place) = self.front.best.replace(place) {
@@ -395,6 +390,19 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             }
         }
         Ok(())
+    }
+}
+
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
+    /// A triangle's excess over the plane of its own that bounds those beyond the cutoff, and the length of the plane's
+    /// normal. Not a number where a corner is none.
+    #[inline(always)]
+    fn excess(&self, &[a, b, c]: &[Vec3; 3]) -> (f32, f32) {
+        let middle = (a + b + c) * THIRD;
+        let normal = self.tool.axis_to(middle);
+        let length = sqrt(normal.dot(normal));
+        let plane = self.plane_across(normal, middle, length);
+        (least([a, b, c].map(|corner| plane.normal.dot(corner))) - plane.limit, length)
     }
 }
 

@@ -8,7 +8,7 @@ mod tests;
 use super::axis::Axis;
 use super::contacts::Pair;
 use super::depth::Known;
-use super::search::{Outcome, Search, Tick, Touched, WHOLE, Waiting};
+use super::search::{Outcome, Search, Tick, Ties, WHOLE, Waiting};
 use super::{Budget, Contacts, NoSide, Options, Proximity, Side, signed};
 use crate::surface::motion::Unit;
 use crate::unavailable::QueryError;
@@ -40,7 +40,7 @@ const FARTHEST: u32 = 1 << 29;
 /// Where the axis crosses the surface, it remembers which parts of the axis cannot be deepest, and searches those points
 /// that may have become so.
 ///
-/// RAM: 8 bytes for each entry of the stack, 44 for each opened node, and 1,152.
+/// RAM: 8 bytes for each entry of the stack, 44 for each opened node, and 1,296.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -75,7 +75,7 @@ pub struct Tracker<'t, I, const STACK: usize, const OPENED: usize> {
     /// Units since every bound due was tested.
     behind: u32,
     known: Known,
-    touched: Touched,
+    ties: Ties,
     triangle: Option<TriangleRow>,
 }
 
@@ -146,7 +146,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
             now: 0,
             behind: 0,
             known: Known::new(Unit::of(tree)),
-            touched: Touched::new(),
+            ties: Ties::new(),
             triangle: None,
         })
     }
@@ -212,9 +212,9 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         self.now = self.now.wrapping_add(moved);
         self.known.add_motion(moved);
         let first = self.triangle.or(options.first(None));
-        let touched = Some(&mut self.touched);
+        let ties = Some(&mut self.ties);
         let search =
-            Search::start(&self.tree, &mut self.stack, surface, tool, options, first, touched)?;
+            Search::start(&self.tree, &mut self.stack, surface, tool, options, first, ties)?;
         let front = self.front.borrow();
         let mut tick = Tick::new(search, front, self.unit, self.now, options.budget, separation);
         let outcome = tick.run(moved)?;
@@ -232,7 +232,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
                 (self.whole(surface, tool, options, best, tests)?, true)
             }
         };
-        let memory = (&self.touched, Some(&mut self.known));
+        let memory = (&mut self.ties, Some(&mut self.known));
         let closest = signed(&self.tree, &mut self.stack, surface, tool, options, closest, memory)?;
         self.behind = if is_complete { 0 } else { self.behind.saturating_add(moved) };
         let is_closed = self.tree.is_closed();
@@ -300,9 +300,9 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         tests: Budget,
     ) -> Result<Proximity, QueryError> {
         let options = options.budget(options.budget.less(tests.node_tests, tests.triangle_tests));
-        let touched = Some(&mut self.touched);
+        let ties = Some(&mut self.ties);
         let search =
-            Search::start(&self.tree, &mut self.stack, surface, tool, &options, first, touched)?;
+            Search::start(&self.tree, &mut self.stack, surface, tool, &options, first, ties)?;
         let mut closest = search.run::<WHOLE>(f32::INFINITY)?;
         closest.node_tests = closest.node_tests.saturating_add(tests.node_tests);
         closest.triangle_tests = closest.triangle_tests.saturating_add(tests.triangle_tests);

@@ -1,0 +1,247 @@
+//! The triangles that may be the closest one, or share its closest point.
+//!
+//! A search finds one closest triangle, with an error. The true one, and all others that share its closest point, are as
+//! close within [`TIE`], and no bound rejects them: the slack of the cutoff is larger. So a search collects every
+//! triangle that it tests within that window, and a tracker those that it passes over, too. They decide the side.
+
+use super::slack::{ACCURACY, FLOOR, TIE};
+use super::{Search, Waiting};
+use crate::math::sqrt::sqrt;
+use crate::tool::Tool;
+use crate::tree::format::Link;
+use crate::unavailable::QueryError;
+use crate::{Budget, Index, VertexTable};
+
+/// Most of them. Six or so share a vertex.
+const MOST: usize = 32;
+
+/// Triangles about as close as the closest.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::query) struct Ties {
+    rows: [u32; MOST],
+    /// Squares of their distances, or of lower bounds.
+    squares: [f32; MOST],
+    count: usize,
+    /// Square of the distance up to which a triangle counts.
+    limit: f32,
+    /// Square of the distance up to which the axis may meet it; negative if nobody asks.
+    touching: f32,
+    /// There were too many, or the search did not look for all.
+    are_lost: bool,
+    /// They are the triangles that meet in one feature.
+    are_star: bool,
+}
+
+impl Ties {
+    pub const fn new() -> Self {
+        let (rows, squares) = ([0; MOST], [0.0; MOST]);
+        Self {
+            rows,
+            squares,
+            count: 0,
+            limit: -1.0,
+            touching: -1.0,
+            are_lost: true,
+            are_star: false,
+        }
+    }
+
+    /// The triangles that meet in a feature, to which they are added.
+    pub const fn star() -> Self {
+        Self { are_lost: false, are_star: true, ..Self::new() }
+    }
+
+    /// Adds a triangle of a star.
+    pub fn add(&mut self, row: u32) {
+        self.push(row, 0.0, 0.0);
+    }
+
+    /// Forgets all. `is_crossable` if the axis can meet the surface, which is closed.
+    #[inline(always)]
+    pub(super) fn reset(&mut self, scale: f32, is_crossable: bool) {
+        let accuracy = ACCURACY * scale + FLOOR;
+        self.touching = if is_crossable { accuracy * accuracy } else { -1.0 };
+        (self.count, self.limit) = (0, -1.0);
+        (self.are_lost, self.are_star) = (false, false);
+    }
+
+    /// Keeps those that are asked for.
+    pub fn keep(&mut self, is_kept: impl Fn(u32) -> bool) {
+        for (row, square) in self.rows.iter().zip(&mut self.squares) {
+            if !is_kept(*row) {
+                *square = f32::INFINITY;
+            }
+        }
+    }
+
+    /// Whether there are too many.
+    pub const fn are_lost(&self) -> bool {
+        self.are_lost
+    }
+
+    /// Some may be missing.
+    #[inline(always)]
+    pub(super) const fn lose(&mut self) {
+        self.are_lost = true;
+    }
+
+    /// Adds a triangle, where those within `limit` count.
+    #[inline(always)]
+    pub(super) fn push(&mut self, row: u32, square: f32, limit: f32) {
+        self.limit = limit;
+        if self.count == MOST {
+            self.drop_farther();
+        }
+        let place = self.rows.get_mut(self.count).zip(self.squares.get_mut(self.count));
+        let Some(place) = place else {
+            self.are_lost = true;
+            return;
+        };
+        (*place.0, *place.1) = (row, square);
+        self.count += 1;
+    }
+
+    /// Makes room.
+    #[cold]
+    #[inline(never)]
+    fn drop_farther(&mut self) {
+        let mut kept = 0;
+        for at in 0..self.count {
+            let (Some(&row), Some(&square)) = (self.rows.get(at), self.squares.get(at)) else {
+                break;
+            };
+            if square <= self.limit
+                && let (Some(to), Some(its)) = (self.rows.get_mut(kept), self.squares.get_mut(kept))
+            {
+                (*to, *its) = (row, square);
+                kept += 1;
+            }
+        }
+        self.count = kept;
+    }
+
+    fn within(&self, limit: f32) -> impl Iterator<Item = u32> {
+        let pairs = self.rows.iter().zip(&self.squares).take(self.count);
+        pairs.filter(move |&(_, &square)| square <= limit).map(|(&row, _)| row)
+    }
+
+    /// All triangles that may be the closest, or share its closest point. `None` if they are not known.
+    pub fn rows(&self) -> Option<impl Iterator<Item = u32>> {
+        (!self.are_lost).then(|| self.within(self.limit))
+    }
+
+    /// Those that decide the side in f64: all. If too many meet in one feature, the first, since each stands for the feature.
+    pub fn deciding(&self) -> Option<impl Iterator<Item = u32>> {
+        let most = if self.are_lost { usize::from(self.are_star) } else { MOST };
+        (most > 0).then(|| self.within(self.limit).take(most))
+    }
+
+    /// All triangles that the axis may meet, if they are known.
+    pub fn touched(&self) -> Option<impl Iterator<Item = u32>> {
+        let is_known = !self.are_lost && self.touching >= 0.0;
+        is_known.then(|| self.within(self.touching))
+    }
+}
+
+/// The square of the distance up to which a triangle counts, where the closest is at `distance`.
+#[inline(always)]
+pub(super) fn limit_of(distance: f32, scale: f32) -> f32 {
+    let limit = distance + (TIE * scale + FLOOR);
+    limit * limit
+}
+
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
+    /// Visits every triangle that may be the closest, or share its closest point, for a search that began with the
+    /// closest one. A visit returns whether it goes on. Returns whether all were visited, and the tests made.
+    #[cold]
+    #[inline(never)]
+    pub fn each_tie(
+        mut self,
+        mut visit: impl FnMut(u32) -> Result<bool, QueryError>,
+    ) -> Result<(bool, Budget), QueryError> {
+        let limit = limit_of(sqrt(self.best_squared), self.scale);
+        while let Some(top) = self.waiting.checked_sub(1) {
+            self.waiting = top;
+            let &Waiting { lower, link } =
+                self.stack.get(top).ok_or(QueryError::Corrupt { row: top as u32 })?;
+            if lower > self.cutoff {
+                continue;
+            }
+            let (first, count, is_leaf) = match Link::decode(link) {
+                Link::Children { first, count } => (first, count, false),
+                Link::Leaf { first, count } => (first, count, true),
+            };
+            let Some(left) = self.left.node_tests.checked_sub(count) else {
+                return Ok((false, self.made()));
+            };
+            self.left.node_tests = left;
+            if !is_leaf {
+                self.wait_for_children(lower, first, count)?;
+                continue;
+            }
+            for triangle in first..first.saturating_add(count) {
+                let Some(left) = self.left.triangle_tests.checked_sub(1) else {
+                    return Ok((false, self.made()));
+                };
+                self.left.triangle_tests = left;
+                let corners = self.corners(triangle)?;
+                let pair = self.tool.closest_on_triangle(&corners, self.cutoff_squared);
+                if pair.is_some_and(|pair| pair.distance_squared <= limit) && !visit(triangle)? {
+                    return Ok((false, self.made()));
+                }
+            }
+        }
+        Ok((true, self.made()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
+    use super::{MOST, Ties};
+
+    fn rows(ties: &Ties) -> Option<Vec<u32>> {
+        ties.rows().map(Iterator::collect)
+    }
+
+    #[test]
+    fn rows_are_known_unless_too_many_are_as_close() {
+        let mut ties = Ties::new();
+        assert!(rows(&ties).is_none() && ties.touched().is_none());
+        ties.reset(1.0, true);
+        for row in 0..MOST as u32 {
+            ties.push(row, 0.0, 1.0);
+        }
+        let all: Vec<_> = (0..MOST as u32).collect();
+        assert_eq!(rows(&ties), Some(all.clone()));
+        assert_eq!(ties.touched().map(Iterator::collect), Some(all));
+        ties.push(99, 1.0, 1.0);
+        assert!(rows(&ties).is_none() && ties.touched().is_none());
+        ties.reset(1.0, false);
+        assert_eq!(rows(&ties), Some(Vec::new()));
+        assert!(ties.touched().is_none());
+        ties.lose();
+        assert_eq!(rows(&ties), None);
+    }
+
+    #[test]
+    fn farther_ones_make_room() {
+        let mut ties = Ties::new();
+        ties.reset(1.0, true);
+        for row in 0..MOST as u32 {
+            ties.push(row, 1.0 + f32::from(u8::from(row % 2 == 0)), 2.0);
+        }
+        for row in 100..100 + MOST as u32 / 2 {
+            ties.push(row, 1.0, 1.0);
+        }
+        let odd = (0..MOST as u32).filter(|row| row % 2 == 1);
+        let all: Vec<_> = odd.chain(100..100 + MOST as u32 / 2).collect();
+        assert_eq!(rows(&ties), Some(all));
+        ties.push(7, 0.5, 0.5);
+        assert_eq!(rows(&ties), Some(std::vec![7]));
+        assert_eq!(ties.touched().map(|touched| touched.count()), Some(0));
+    }
+}
