@@ -274,7 +274,7 @@ fn a_frame_counts_once() {
     }
     assert_eq!(rejections(&assembler), 3, "frame 4 was abandoned");
     for packet in &frame(5, true)[3..] {
-        give(&mut assembler, &packet).unwrap();
+        give(&mut assembler, packet).unwrap();
     }
     assert_eq!(rejections(&assembler), 0);
     // Recordings of past frames, before any other fault.

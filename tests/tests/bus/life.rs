@@ -36,7 +36,7 @@ fn silence_after_death<M: Mac + 'static>(mac: fn(u64) -> M) -> u32 {
         for packet in source.pipe.sent() {
             let is_beat = matches!(Packet::decode(&packet).unwrap().body, Body::Heartbeat(_));
             if is_beat {
-                bank.push_back(packet)
+                bank.push_back(packet);
             } else {
                 let _ = assembler.accept(&packet, Millis(now));
             }
@@ -264,9 +264,7 @@ fn both_ends_say_that_their_surfaces_differ() {
             let packet =
                 encode_status(tree.mesh_id(), &status, counters, mac, &mut [0; 256]).to_vec();
             source.pipe.answer(&packet);
-            if told.is_err() {
-                return told;
-            }
+            told?;
         }
         source.sender.poll()
     };

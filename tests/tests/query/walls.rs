@@ -261,7 +261,7 @@ fn the_force_between_two_walls_is_continuous() {
     let spring = SpringDamper::stiffness(1.0).max_force(1e9);
     let proxy = Proxy::new(spring, MARGIN).expect("a valid margin");
     let mut steepest = 0.0_f32;
-    for angle in [0.1, 0.25, 0.5, 0.785_398_2, 1.2] {
+    for angle in [0.1, 0.25, 0.5, core::f32::consts::FRAC_PI_4, 1.2] {
         let built = Builder::new().build(&groove(angle)).expect("a valid mesh");
         let tree = built.tree::<u16>().expect("valid");
         let rows = built.to_rows(&groove(angle).positions);
