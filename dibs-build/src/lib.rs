@@ -31,6 +31,7 @@ mod mesh;
 pub mod modes;
 mod motion;
 mod orient;
+mod parts;
 mod read;
 mod rest;
 mod rounding;
@@ -52,6 +53,7 @@ pub use labels::{LabelsError, LabelsErrorKind, read_labels};
 pub use mesh::{Mesh, Motion, RestSurface};
 pub use motion::MotionMismatchError;
 pub use orient::{WindingError, check_winding, orient};
+pub use parts::files_of;
 pub use read::{
     Format, Group, Groups, Import, ReadError, ReadErrorKind, ReadOptions, Report, read,
 };

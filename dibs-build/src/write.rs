@@ -55,9 +55,10 @@ pub enum WriteErrorKind {
     },
 }
 
-/// Writes a file through `contents` into a temporary file beside it, which is renamed once it is complete and synced.
-/// So a failure of the program leaves no half-written output, and a power failure none under the file's name, if disk
-/// and file system honour `fsync`. A path that is not a regular file (`/dev/stdout`) is written directly.
+/// Writes a file through `contents` into a temporary file in its folder, which takes the name once it is complete and
+/// synced. So a failure of the program leaves no half-written output, and a power failure none under the file's name, if
+/// disk and file system honour `fsync`. On Linux the temporary file has no name where the file system can do that, so a
+/// killed program leaves none behind. A path that is not a regular file (`/dev/stdout`) is written directly.
 ///
 /// # Errors
 /// [`WriteErrorKind::Io`], also for an error of `contents`.
@@ -79,6 +80,26 @@ fn write(path: &Path, contents: impl FnOnce(&mut dyn Write) -> io::Result<()>) -
         Some(folder) if folder != Path::new("") => folder,
         _ => Path::new("."),
     };
+    match nameless::file(folder) {
+        Some(file) => {
+            fill(&file, contents)?;
+            file.sync_all()?;
+            nameless::persist(&file, folder, &target)?;
+        }
+        None => {
+            let temporary = builder().tempfile_in(folder)?;
+            fill(temporary.as_file(), contents)?;
+            temporary.as_file().sync_all()?;
+            temporary.persist(&target)?;
+        }
+    }
+    // The folder holds the name: without this sync the old file may come back. Not every system can open a folder.
+    #[cfg(unix)]
+    File::open(folder)?.sync_all()?;
+    Ok(())
+}
+
+fn builder() -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
     #[cfg(unix)]
     {
@@ -86,14 +107,62 @@ fn write(path: &Path, contents: impl FnOnce(&mut dyn Write) -> io::Result<()>) -
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let temporary = builder.prefix(".dibs-").tempfile_in(folder)?;
-    fill(temporary.as_file(), contents)?;
-    temporary.as_file().sync_all()?;
-    temporary.persist(&target)?;
-    // The folder holds the name: without this sync the old file may come back. Not every system can open a folder.
-    #[cfg(unix)]
-    File::open(folder)?.sync_all()?;
-    Ok(())
+    builder.prefix(".dibs-");
+    builder
+}
+
+/// A temporary file without a name, of which nothing is left once its program has ended, however it ends.
+#[cfg(target_os = "linux")]
+mod nameless {
+    use rustix::fs::{AtFlags, CWD, Mode, OFlags};
+    use std::fs::File;
+    use std::io::{self, ErrorKind};
+    use std::os::fd::AsRawFd;
+    use std::path::{Path, PathBuf};
+
+    /// `None` where the file system has no such files, or where they cannot be given a name.
+    pub fn file(folder: &Path) -> Option<File> {
+        let flags = OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC;
+        let file = File::from(rustix::fs::open(folder, flags, Mode::from(0o666)).ok()?);
+        name(&file).exists().then_some(file)
+    }
+
+    /// Gives the file the name `target`, in place of an older file's.
+    pub fn persist(file: &File, folder: &Path, target: &Path) -> io::Result<()> {
+        match link(file, target) {
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                // A link replaces nothing, so the file has another name for a moment.
+                super::builder().make_in(folder, |path| link(file, path))?.persist(target)?;
+                Ok(())
+            }
+            linked => linked,
+        }
+    }
+
+    fn link(file: &File, path: &Path) -> io::Result<()> {
+        Ok(rustix::fs::linkat(CWD, name(file), CWD, path, AtFlags::SYMLINK_FOLLOW)?)
+    }
+
+    /// The kernel's name for an open file.
+    fn name(file: &File) -> PathBuf {
+        PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()))
+    }
+}
+
+/// No such files elsewhere.
+#[cfg(not(target_os = "linux"))]
+mod nameless {
+    use std::fs::File;
+    use std::io;
+    use std::path::Path;
+
+    pub fn file(_folder: &Path) -> Option<File> {
+        None
+    }
+
+    pub fn persist(_file: &File, _folder: &Path, _target: &Path) -> io::Result<()> {
+        Err(io::ErrorKind::Unsupported.into())
+    }
 }
 
 fn fill(file: &File, contents: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
@@ -122,6 +191,34 @@ mod tests {
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
         write_atomically(&path, |out| out.write_all(b"new")).unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"new");
+    }
+
+    /// While a file is written its folder shows no other, so a killed program leaves none.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn nothing_is_seen_of_a_file_until_it_is_complete() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        if nameless::file(folder.path()).is_none() {
+            println!("skipped: the file system has no files without a name");
+            return;
+        }
+        let path = folder.path().join("out.ply");
+        let names = || std::fs::read_dir(folder.path()).unwrap().count();
+        for (before, text) in [(0, b"one".as_slice()), (1, b"two")] {
+            write_atomically(&path, |out| {
+                out.write_all(text)?;
+                out.flush()?;
+                assert_eq!(names(), before);
+                Ok(())
+            })
+            .unwrap();
+            assert_eq!((std::fs::read(&path).unwrap().as_slice(), names()), (text, 1));
+        }
+        let other = folder.path().join("other");
+        std::fs::write(&other, "").unwrap();
+        let mode = |path: &Path| std::fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&path), mode(&other));
     }
 
     #[test]

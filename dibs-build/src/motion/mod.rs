@@ -9,7 +9,13 @@ pub use pc2::MotionMismatchError;
 use crate::read::{Place, ReadError, ReadErrorKind, file};
 use crate::{Motion, Unit};
 use glam::{DVec3, Vec3};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// The files of a series that are there; `None` of a path that names none.
+pub(crate) fn series_files(path: &Path) -> Option<Vec<PathBuf>> {
+    let files = series::Series::named(path)?.files().unwrap_or_default();
+    Some(files.into_iter().map(|(_, file)| file).collect())
+}
 
 impl Motion {
     /// Reads a motion: a PC2 file, a NumPy array (.npy) of frames x vertices x 3, or a numbered series of mesh files,

@@ -32,7 +32,7 @@ impl<'a> Series<'a> {
     }
 
     /// The numbers that there are and their files, in their order.
-    fn files(&self) -> Result<Vec<(u64, PathBuf)>, std::io::Error> {
+    pub fn files(&self) -> Result<Vec<(u64, PathBuf)>, std::io::Error> {
         let folder = self.path.parent().filter(|folder| *folder != Path::new(""));
         let mut files = Vec::new();
         for entry in std::fs::read_dir(folder.unwrap_or(Path::new(".")))? {

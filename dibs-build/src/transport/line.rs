@@ -3,11 +3,11 @@
 use std::fmt;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpStream, UdpSocket};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 #[cfg(unix)]
 use std::os::unix::net::UnixStream;
@@ -20,7 +20,7 @@ use super::Transport;
 /// A line that takes no byte for this long is stuck: on a slow line a packet takes about a second.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Time after which the reading thread checks whether its owner still exists.
+/// Time after which a blocked write checks whether it is to stop, and the reading thread whether its owner still exists.
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// A serial line or a socket. A separate thread reads, so that neither direction waits for the other.
@@ -30,7 +30,43 @@ pub struct Line {
     framed: Vec<u8>,
     received: Receiver<io::Result<Vec<u8>>>,
     over: Arc<AtomicBool>,
-    hang_up: Box<dyn Fn() + Send>,
+    stop: Arc<AtomicBool>,
+    refusals: Shared,
+    /// Takes whether what was written need not arrive.
+    hang_up: Box<dyn Fn(bool) + Send>,
+}
+
+/// Datagrams that came back: the network says that nothing listens at the address.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Refusals {
+    /// Their number, as far as the network tells.
+    pub count: u64,
+    /// When the last one came back.
+    pub last: Option<Instant>,
+}
+
+/// Counted by both threads.
+#[derive(Clone, Debug, Default)]
+struct Shared(Arc<Mutex<Refusals>>);
+
+impl Shared {
+    fn get(&self) -> Refusals {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Counts the answer to an earlier datagram; other errors come back.
+    fn count(&self, error: io::Error) -> io::Result<()> {
+        match error.kind() {
+            ErrorKind::ConnectionRefused
+            | ErrorKind::HostUnreachable
+            | ErrorKind::NetworkUnreachable => {
+                let mut refusals = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+                *refusals = Refusals { count: refusals.count + 1, last: Some(Instant::now()) };
+                Ok(())
+            }
+            _ => Err(error),
+        }
+    }
 }
 
 impl fmt::Debug for Line {
@@ -48,9 +84,15 @@ impl Line {
     /// If the port cannot be shared with the reading thread.
     pub fn serial(mut port: SerialPort) -> io::Result<Self> {
         port.set_read_timeout(PATIENCE)?;
-        port.set_write_timeout(WRITE_TIMEOUT)?;
-        let reader = port.try_clone()?;
-        Ok(Self::stream(Port(port), reader, || ()))
+        port.set_write_timeout(PATIENCE)?;
+        let (reader, handle) = (port.try_clone()?, port.try_clone()?);
+        // A close waits for the bytes that the line has not taken.
+        let discard = move |is_stopped| {
+            if is_stopped {
+                drop(handle.discard_output_buffer());
+            }
+        };
+        Ok(Self::bytes(Port(port), reader, discard))
     }
 
     /// A TCP connection.
@@ -60,7 +102,7 @@ impl Line {
     pub fn tcp(socket: TcpStream) -> io::Result<Self> {
         socket.set_nodelay(true)?;
         socket.set_read_timeout(Some(PATIENCE))?;
-        socket.set_write_timeout(Some(WRITE_TIMEOUT))?;
+        socket.set_write_timeout(Some(PATIENCE))?;
         let (reader, handle) = (socket.try_clone()?, socket.try_clone()?);
         Ok(Self::stream(socket, reader, move || drop(handle.shutdown(Shutdown::Both))))
     }
@@ -72,12 +114,13 @@ impl Line {
     #[cfg(unix)]
     pub fn unix(socket: UnixStream) -> io::Result<Self> {
         socket.set_read_timeout(Some(PATIENCE))?;
-        socket.set_write_timeout(Some(WRITE_TIMEOUT))?;
+        socket.set_write_timeout(Some(PATIENCE))?;
         let (reader, handle) = (socket.try_clone()?, socket.try_clone()?);
         Ok(Self::stream(socket, reader, move || drop(handle.shutdown(Shutdown::Both))))
     }
 
-    /// A UDP socket that is connected to its peer: one packet a datagram.
+    /// A UDP socket that is connected to its peer: one packet a datagram. Datagrams that nobody takes are lost, since a
+    /// receiver may start later; [`refusals`](Self::refusals) counts those that came back.
     ///
     /// # Errors
     /// When the socket cannot be shared with the reading thread.
@@ -95,12 +138,14 @@ impl Line {
         writer: impl FnOnce(Datagrams) -> W,
     ) -> io::Result<Self> {
         socket.set_read_timeout(Some(PATIENCE))?;
-        let reader = socket.try_clone()?;
-        Ok(Self::datagrams(writer(Datagrams(socket)), move |buffer| match reader.recv(buffer) {
+        let (reader, refusals) = (socket.try_clone()?, Shared::default());
+        let (here, there) = (refusals.clone(), refusals.clone());
+        let mut line = Self::datagrams(writer(Datagrams(socket, here)), move |buffer| {
             // There is no receiver yet: the sender continues, as after any lost datagram.
-            Err(error) if error.kind() == ErrorKind::ConnectionRefused => Ok(0),
-            received => received,
-        }))
+            reader.recv(buffer).or_else(|error| there.count(error).map(|()| 0))
+        });
+        line.refusals = refusals;
+        Ok(line)
     }
 
     /// Any line that keeps packets apart: a write is a packet, and `read` fills in the next one that came, 0 bytes if
@@ -113,7 +158,7 @@ impl Line {
         Self::new(
             writer,
             false,
-            || (),
+            |_| (),
             move |packets| {
                 let bytes = read(&mut buffer)?;
                 packets.extend((bytes > 0).then(|| buffer[..bytes].to_vec()));
@@ -126,8 +171,16 @@ impl Line {
     /// `hang_up` is called: the reading thread lives until it returns.
     pub fn stream(
         writer: impl Write + Send + 'static,
-        mut reader: impl Read + Send + 'static,
+        reader: impl Read + Send + 'static,
         hang_up: impl Fn() + Send + 'static,
+    ) -> Self {
+        Self::bytes(writer, reader, move |_| hang_up())
+    }
+
+    fn bytes(
+        writer: impl Write + Send + 'static,
+        mut reader: impl Read + Send + 'static,
+        hang_up: impl Fn(bool) + Send + 'static,
     ) -> Self {
         let mut deframer = Deframer::<MAX_PACKET>::new();
         let mut buffer = [0; 4096];
@@ -148,7 +201,7 @@ impl Line {
     fn new(
         writer: impl Write + Send + 'static,
         is_stream: bool,
-        hang_up: impl Fn() + Send + 'static,
+        hang_up: impl Fn(bool) + Send + 'static,
         mut read: impl FnMut(&mut Vec<Vec<u8>>) -> io::Result<()> + Send + 'static,
     ) -> Self {
         let (to_owner, received) = channel();
@@ -179,6 +232,8 @@ impl Line {
             framed: vec![0; framed_bytes(MAX_PACKET)],
             received,
             over,
+            stop: Arc::default(),
+            refusals: Shared::default(),
             hang_up: Box::new(hang_up),
         }
     }
@@ -189,12 +244,26 @@ impl Line {
         self.is_stream
     }
 
+    /// The same line, whose writes end with an error within a twentieth of a second once `stop` is set and the line takes
+    /// nothing. Bytes that a serial port has not sent are then dropped. A writer of your own has to time out for it.
+    #[must_use]
+    pub fn until(mut self, stop: Arc<AtomicBool>) -> Self {
+        self.stop = stop;
+        self
+    }
+
+    /// Datagrams that came back.
+    #[must_use]
+    pub fn refusals(&self) -> Refusals {
+        self.refusals.get()
+    }
+
     /// Sends bytes as they are, damaged packets too. For fault injection.
     ///
     /// # Errors
     /// The operating system's error.
     pub fn send_raw(&mut self, bytes: &[u8]) -> io::Result<()> {
-        write(&mut self.writer, bytes)
+        write(&mut self.writer, bytes, &self.stop)
     }
 }
 
@@ -206,7 +275,7 @@ impl Transport for Line {
         } else {
             packet
         };
-        write(&mut self.writer, bytes)
+        write(&mut self.writer, bytes, &self.stop)
     }
 
     fn receive(&mut self) -> io::Result<Option<Vec<u8>>> {
@@ -222,20 +291,37 @@ impl Transport for Line {
 impl Drop for Line {
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
-        (self.hang_up)();
+        (self.hang_up)(self.stop.load(Ordering::Relaxed));
     }
 }
 
-/// Writes all bytes; an error if the line is stuck.
-fn write(writer: &mut (impl Write + ?Sized), bytes: &[u8]) -> io::Result<()> {
-    writer.write_all(bytes).and_then(|()| writer.flush()).map_err(|error| {
-        if !matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) {
-            return error;
+/// Writes all bytes; an error if the line is stuck, or takes nothing when it is to stop.
+fn write(
+    writer: &mut (impl Write + ?Sized),
+    mut bytes: &[u8],
+    stop: &AtomicBool,
+) -> io::Result<()> {
+    let mut taken = Instant::now();
+    while !bytes.is_empty() {
+        match writer.write(bytes) {
+            Ok(0) => return Err(ErrorKind::WriteZero.into()),
+            Ok(written) => {
+                bytes = bytes.get(written..).unwrap_or_default();
+                taken = Instant::now();
+            }
+            Err(error) if !is_patience(&error) => return Err(error),
+            Err(_) if stop.load(Ordering::Relaxed) => {
+                return Err(io::Error::other("stopped while the receiver took nothing"));
+            }
+            Err(_) if taken.elapsed() >= WRITE_TIMEOUT => {
+                let seconds = WRITE_TIMEOUT.as_secs();
+                let text = format!("the receiver has taken nothing for {seconds} s");
+                return Err(io::Error::new(ErrorKind::TimedOut, text));
+            }
+            Err(_) => (),
         }
-        let seconds = WRITE_TIMEOUT.as_secs();
-        let text = format!("the receiver has taken nothing for {seconds} s");
-        io::Error::new(ErrorKind::TimedOut, text)
-    })
+    }
+    writer.flush()
 }
 
 /// Whether the read timed out.
@@ -258,15 +344,13 @@ impl Write for Port {
 
 /// A UDP socket to write to: a write is a datagram.
 #[derive(Debug)]
-pub struct Datagrams(UdpSocket);
+pub struct Datagrams(UdpSocket, Shared);
 
 impl Write for Datagrams {
     fn write(&mut self, packet: &[u8]) -> io::Result<usize> {
-        match self.0.send(packet) {
-            // The answer to an earlier datagram: no receiver yet.
-            Err(error) if error.kind() == ErrorKind::ConnectionRefused => Ok(packet.len()),
-            sent => sent,
-        }
+        // An error can be the answer to an earlier datagram: no receiver yet.
+        let lost = |error| self.1.count(error).map(|()| packet.len());
+        self.0.send(packet).or_else(lost)
     }
 
     fn flush(&mut self) -> io::Result<()> {

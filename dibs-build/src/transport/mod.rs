@@ -5,7 +5,7 @@ mod target;
 
 use std::io;
 
-pub use line::{Datagrams, Line};
+pub use line::{Datagrams, Line, Refusals};
 pub use target::{Target, TargetError};
 
 /// The transport of a [`Sender`](crate::stream::Sender).

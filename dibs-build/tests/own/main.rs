@@ -11,6 +11,7 @@ mod formats;
 mod groups;
 mod labels;
 mod manners;
+mod overwrite;
 mod pace;
 mod placement;
 mod program;

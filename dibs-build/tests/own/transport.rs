@@ -146,6 +146,33 @@ fn a_line_that_nobody_reads_is_an_error_in_bounded_time() {
     }
 }
 
+/// A stuck write ends once it is told to stop.
+#[cfg(unix)]
+#[test]
+fn a_stuck_line_stops_when_told() {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let over_tcp = open(&format!("tcp:{}", listener.local_addr().unwrap()));
+    let (mine, _unix) = std::os::unix::net::UnixStream::pair().unwrap();
+    let (port, _pty) = serial2::SerialPort::pair().unwrap();
+    let stop = Arc::new(AtomicBool::new(false));
+    let (done, outcomes) = std::sync::mpsc::channel();
+    for line in [over_tcp, Line::unix(mine).unwrap(), Line::serial(port).unwrap()] {
+        let (done, mut line) = (done.clone(), line.until(Arc::clone(&stop)));
+        std::thread::spawn(move || {
+            let failed = (0..1_000_000).find_map(|_| line.send(&[0x55; 1024]).err());
+            done.send(failed.expect("a line has no room for a gigabyte"))
+        });
+    }
+    std::thread::sleep(Duration::from_secs(1));
+    stop.store(true, Ordering::Relaxed);
+    for _ in 0..3 {
+        let error = outcomes.recv_timeout(Duration::from_secs(3)).expect("a write goes on");
+        assert_eq!(error.to_string(), "stopped while the receiver took nothing");
+    }
+}
+
 #[test]
 fn targets_are_read_and_bad_ones_named() {
     for text in ["serial:/dev/ttyUSB0@115200", "tcp:[::1]:80", "udp:host:5000", "unix:/tmp/x"] {

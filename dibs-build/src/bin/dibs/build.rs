@@ -1,7 +1,7 @@
 //! `dibs build`: a mesh file becomes a blob or Rust source.
 
 use crate::mesh_file::{self, MeshArgs};
-use crate::{modes, stretch, tree_file};
+use crate::{modes, overwrite, stretch, tree_file};
 use anyhow::{Result, anyhow, bail};
 use clap::ValueEnum;
 use dibs_build::{
@@ -89,6 +89,11 @@ pub fn run(args: &Args) -> Result<()> {
         Some("dibs") => false,
         _ => bail!("{}: the output's name must end in .dibs or .rs", args.output.display()),
     };
+    // A Rust module has its blob beside it.
+    let blob = is_source.then(|| args.output.with_extension("dibs"));
+    let inputs =
+        [Some(&args.mesh), args.limits.as_ref(), args.labels.as_ref(), args.motion.as_ref()];
+    overwrite::check(inputs.into_iter().flatten(), [&args.output].into_iter().chain(&blob))?;
     let mut import = mesh_file::read(&args.mesh, &args.reading, args.labels_from_groups)?;
     let name = args.mesh.display();
     let turned = if args.orient {

@@ -1,6 +1,7 @@
 //! `dibs generate`: procedural surfaces.
 
 use crate::mesh_file::spinner;
+use crate::overwrite;
 use anyhow::Result;
 use clap::Subcommand;
 use dibs_build::{Format, generate};
@@ -49,6 +50,11 @@ pub fn run(args: &Args) -> Result<()> {
     let (Surface::Heart { output, .. } | Surface::Brain { output, .. }) = &args.surface;
     // Checked before the work, not after it.
     let format = Format::from_name(output)?;
+    let motion = match &args.surface {
+        Surface::Heart { motion, .. } => motion.as_ref(),
+        Surface::Brain { .. } => None,
+    };
+    overwrite::check([], [output].into_iter().chain(motion))?;
     let mut moved = None;
     let mesh = match &args.surface {
         Surface::Heart { triangles, motion, .. } => {

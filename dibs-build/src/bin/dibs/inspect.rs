@@ -1,5 +1,6 @@
 //! `dibs inspect`: a tree file's sizes and facts, and whether it is intact.
 
+use crate::overwrite;
 use crate::tree_file::{self, AnyTree};
 use anyhow::Result;
 use dibs_build::summarise;
@@ -19,6 +20,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<()> {
+    overwrite::check([&args.tree], [])?;
     let bytes = tree_file::load(&args.tree)?;
     let summary = match tree_file::validate(&bytes, &args.tree)? {
         AnyTree::Narrow(tree) => summarise(&tree, bytes.len()),

@@ -9,6 +9,7 @@ mod inspect;
 mod manual;
 mod mesh_file;
 mod modes;
+mod overwrite;
 mod query;
 mod stream;
 mod stretch;

@@ -1,6 +1,7 @@
 //! `dibs stretch`: the stretch limits that a recorded motion needs.
 
 use crate::mesh_file::{self, MeshArgs};
+use crate::overwrite;
 use anyhow::{Context, Result, anyhow, bail};
 use dibs_build::{Mesh, Motion, MotionStretch, Needed, Paths, write_atomically, write_limits};
 use plotters::prelude::*;
@@ -53,6 +54,7 @@ pub fn run(args: &Args) -> Result<()> {
             args.margin
         );
     }
+    overwrite::check([&args.mesh, &args.motion], args.limits.iter().chain(&args.picture))?;
     let import = mesh_file::read(&args.mesh, &args.reading, false)?;
     let mesh = &import.mesh;
     let motion = args.reading.lengths.motion(&args.motion, mesh.origin)?;

@@ -1,9 +1,9 @@
 //! `dibs track`: a tool on its path about a moving surface, tick by tick.
 
 use crate::mesh_file::Lengths;
-use crate::output;
 use crate::query::{LocalTool, STACK, ToolSpec, parse_tool, rows, side_name};
 use crate::tree_file::{self, AnyTree};
+use crate::{output, overwrite};
 use anyhow::{Context, Result, anyhow, bail};
 use dibs_build::glam::Vec3;
 use dibs_nostd::{
@@ -64,6 +64,7 @@ enum Surface {
 }
 
 pub fn run(args: &Args) -> Result<()> {
+    overwrite::check([&args.tree, &args.motion, &args.path], [])?;
     let bytes = tree_file::load(&args.tree)?;
     match tree_file::validate(&bytes, &args.tree)? {
         AnyTree::Narrow(tree) => track(args, &tree),

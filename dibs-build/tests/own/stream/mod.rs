@@ -320,6 +320,59 @@ fn a_receiver_that_reads_nothing_is_named() {
     assert!(totals["frames"].as_u64().unwrap() > 0, "{totals}");
 }
 
+/// An interrupt ends a stream to a receiver that reads nothing while it is stuck, not once it gives up.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_a_stuck_stream_at_once() {
+    let folder = heart();
+    let tcp = TcpListener::bind("127.0.0.1:0").unwrap();
+    let unix = std::os::unix::net::UnixListener::bind(folder.path().join("bus")).unwrap();
+    let targets = [format!("tcp:{}", tcp.local_addr().unwrap()), "unix:bus".to_owned()];
+    let children =
+        targets.map(|to| stream(folder.path(), &format!("--to {to} --rate 100000 --loop")));
+    let _unread = (tcp.accept().unwrap(), unix.accept().unwrap());
+    std::thread::sleep(Duration::from_secs(2));
+    for mut child in children {
+        let start = Instant::now();
+        let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        assert!(kill.success());
+        while child.try_wait().unwrap().is_none() {
+            assert!(start.elapsed() < Duration::from_secs(3), "the program does not end");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let totals = totals(&child.wait_with_output().unwrap());
+        assert_eq!(totals["interrupted"], true);
+    }
+}
+
+/// Datagrams to a port that nobody listens at come back: the program says so, and ends with an error.
+#[test]
+fn datagrams_that_come_back_are_an_error_at_the_end() {
+    let folder = heart();
+    let closed = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    for frames in [1, 20] {
+        let line = format!("--to udp:{closed} --rate 100 --frames {frames}");
+        let output = stream(folder.path(), &line).wait_with_output().unwrap();
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{error}");
+        assert!(error.contains("nothing listens there"), "{error}");
+        let totals: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert!(totals["refused"].as_u64().unwrap() > 0, "{totals}");
+        assert_eq!(totals["frames"], frames);
+    }
+    // A receiver that started late, and one that only listens.
+    let late = std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_secs(1));
+        let socket = UdpSocket::bind(closed).unwrap();
+        std::thread::sleep(Duration::from_secs(4));
+        drop(socket);
+    });
+    let line = format!("--to udp:{closed} --rate 100 --frames 350");
+    let output = stream(folder.path(), &line).wait_with_output().unwrap();
+    assert!(totals(&output)["refused"].as_u64().unwrap() > 0);
+    late.join().unwrap();
+}
+
 /// A receiver that reports and publishes nothing: the program says so, and goes on.
 #[test]
 fn a_receiver_that_acknowledges_nothing_is_named() {

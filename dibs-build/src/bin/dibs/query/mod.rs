@@ -11,7 +11,7 @@ pub use scene::{STACK, rows};
 pub use tool::{LocalTool, ToolSpec, parse_tool};
 
 use crate::mesh_file::Lengths;
-use crate::tree_file;
+use crate::{overwrite, tree_file};
 use anyhow::{Result, bail};
 use scene::{Room, Surface};
 use std::path::PathBuf;
@@ -78,6 +78,8 @@ pub fn run(args: &Args) -> Result<()> {
             "--vertices is given {vertices} times for {trees} trees: give it once for each, or never"
         );
     }
+    let inputs = args.trees.iter().chain(&args.vertices).chain(&args.poses);
+    overwrite::check(inputs, [&args.output])?;
     let files = args.trees.iter().map(|path| tree_file::load(path));
     let files = files.collect::<Result<Vec<_>>>()?;
     let surfaces: Vec<Surface> = args

@@ -3,6 +3,9 @@
 use anyhow::{Context, Result};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
+use std::time::Duration;
 
 /// Whether the user or the system has asked the program to end.
 pub struct Interrupt(Arc<AtomicBool>);
@@ -24,5 +27,27 @@ impl Interrupt {
 
     pub fn is_raised(&self) -> bool {
         self.0.load(Ordering::Relaxed)
+    }
+
+    /// The flag, for a line that must not block afterwards.
+    pub fn flag(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.0)
+    }
+
+    /// The result of work that may block; `None` if it was not there before the interrupt.
+    pub fn unless_raised<T: Send + 'static>(
+        &self,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Option<T> {
+        let (done, result) = channel();
+        // Without an owner the result is dropped.
+        thread::spawn(move || drop(done.send(work())));
+        loop {
+            match result.recv_timeout(Duration::from_millis(20)) {
+                Ok(result) => return Some(result),
+                Err(RecvTimeoutError::Timeout) if !self.is_raised() => (),
+                Err(_) => return None,
+            }
+        }
     }
 }

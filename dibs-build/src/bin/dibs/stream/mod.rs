@@ -6,8 +6,8 @@ mod player;
 mod report;
 
 use crate::mesh_file::Lengths;
-use crate::modes;
 use crate::tree_file::{self, AnyTree};
+use crate::{modes, overwrite};
 use anyhow::{Context, Result, anyhow, bail};
 use dibs_build::glam::{DVec3, Vec3};
 use dibs_build::stream::{Sender, Settings, SurfaceOrder};
@@ -84,6 +84,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<()> {
+    overwrite::check([&args.surface, &args.motion].into_iter().chain(&args.key), [])?;
     let key = args.key.as_deref().map(key::read).transpose()?;
     let (order, origin) = order(&args.surface, &args.lengths)?;
     let motion = args.lengths.motion(&args.motion, origin)?;
@@ -135,7 +136,11 @@ fn connect<const MTU: usize>(
     let settings =
         Settings { quantised: args.quantise, partial: args.partial, ..Settings::default() };
     let interrupt = Interrupt::new()?;
-    let line = args.to.open()?;
+    let to = args.to.clone();
+    let Some(line) = interrupt.unless_raised(move || to.open()) else {
+        bail!("{}: stopped before it was open", args.to);
+    };
+    let line = line?.until(interrupt.flag());
     let Some(key) = key else {
         let sender = Sender::<_, MTU>::new(line, order, settings);
         return Player::new(args, recording, sender, interrupt).run();

@@ -12,6 +12,12 @@ use std::time::{Duration, Instant};
 /// A receiver without a status for this long does not report.
 const SILENT: Duration = Duration::from_secs(2);
 
+/// A datagram that nobody takes comes back within this time.
+const REFUSAL: Duration = Duration::from_millis(100);
+
+/// Datagrams that came back so long before the end were sent before the receiver started: not every one comes back.
+const RECENT: Duration = Duration::from_millis(1500);
+
 /// Between two attempts to connect.
 const ATTEMPT: Duration = Duration::from_millis(200);
 
@@ -55,15 +61,38 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
     pub fn run(mut self) -> Result<()> {
         self.await_challenge()?;
         let played = self.play();
+        let refused = self.refused();
         self.display.finish();
         report::print(&self.sender, &self.outcome, self.args.json);
-        played
+        played.and(refused)
+    }
+
+    /// An error if nothing listens at the end.
+    fn refused(&mut self) -> Result<()> {
+        let is_heard = self.sender.totals().statuses > 0 && self.sender.in_flight() == 0;
+        if !matches!(self.args.to, Target::Udp { .. }) || is_heard {
+            return Ok(());
+        }
+        let end = Instant::now();
+        if !self.outcome.is_interrupted {
+            std::thread::sleep(REFUSAL);
+        }
+        let refusals = self.sender.transport().refusals();
+        self.outcome.refused = refusals.count;
+        if refusals.last.is_some_and(|last| last + RECENT > end) {
+            bail!(
+                "{}: nothing listens there ({} datagrams came back); is the receiver running, and the address right?",
+                self.args.to,
+                refusals.count
+            );
+        }
+        Ok(())
     }
 
     /// Waits for the receiver's challenge, if tags need it.
     fn await_challenge(&mut self) -> Result<()> {
         let (start, to) = (Instant::now(), &self.args.to);
-        while !self.sender.is_ready() {
+        while !self.sender.is_ready() && !self.interrupt.is_raised() {
             if start.elapsed() > SILENT {
                 bail!(
                     "{to}: no genuine status came within {} s: is the receiver on, and has it the same \
@@ -71,7 +100,10 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
                     SILENT.as_secs()
                 );
             }
-            self.sender.poll()?;
+            match self.sender.poll() {
+                Err(_) if self.interrupt.is_raised() => (),
+                polled => polled?,
+            }
             std::thread::sleep(GLANCE);
         }
         Ok(())
@@ -103,6 +135,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         while self.sender.in_flight() > 0
             && self.sender.status().is_some()
             && end.elapsed() < SILENT
+            && !self.interrupt.is_raised()
         {
             self.poll()?;
             std::thread::sleep(GLANCE);
@@ -123,7 +156,16 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
             sender.transmit_paced(prepared, || pace.wait())
         });
         match sent {
-            Ok(sent) => self.display.show(&self.sender, &sent),
+            Ok(sent) => {
+                let refused = self.sender.transport().refusals().count;
+                if refused > 0 && self.outcome.refused == 0 {
+                    let text =
+                        format!("{}: nothing listens there yet: datagrams come back", self.args.to);
+                    self.display.note(&text);
+                }
+                self.outcome.refused = refused;
+                self.display.show(&self.sender, &sent);
+            }
             Err(SendError::Line(error)) => self.reconnect(&error)?,
             Err(error) => return Err(anyhow!("{}: {error}", self.args.motion.display())),
         }
@@ -139,19 +181,23 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
 
     /// Connects again, within the time that the user allows.
     fn reconnect(&mut self, error: &std::io::Error) -> Result<()> {
+        // An interrupt prints the totals and is no error.
+        if self.interrupt.is_raised() {
+            return Ok(());
+        }
         let (start, to) = (Instant::now(), &self.args.to);
         let patience = Duration::from_secs(self.args.retry);
         eprintln!("{to}: the connection broke ({error})");
         while start.elapsed() < patience && !self.interrupt.is_raised() {
-            if let Ok(line) = to.open() {
-                drop(self.sender.reconnect(line));
+            let target = to.clone();
+            if let Some(Ok(line)) = self.interrupt.unless_raised(move || target.open()) {
+                drop(self.sender.reconnect(line.until(self.interrupt.flag())));
                 self.outcome.reconnections += 1;
                 eprintln!("{to}: connected again");
                 return Ok(());
             }
             std::thread::sleep(ATTEMPT);
         }
-        // An interrupt while waiting prints the totals and is no error.
         if self.interrupt.is_raised() {
             return Ok(());
         }

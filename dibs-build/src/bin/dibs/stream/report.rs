@@ -21,6 +21,8 @@ pub struct Outcome {
     pub late: u64,
     /// Times that the connection was made again.
     pub reconnections: u64,
+    /// Datagrams that came back.
+    pub refused: u64,
     /// Whether the user ended it.
     pub is_interrupted: bool,
 }
@@ -60,6 +62,11 @@ impl Display {
         if !causes.is_empty() {
             let _ = write!(text, "; it rejected {}", causes.join(", "));
         }
+        self.bar.suspend(|| eprintln!("{text}"));
+    }
+
+    /// Shows a line above the progress.
+    pub fn note(&self, text: &str) {
         self.bar.suspend(|| eprintln!("{text}"));
     }
 
@@ -117,7 +124,7 @@ pub fn print<M: Mac, const MTU: usize>(
     outcome: &Outcome,
     json: bool,
 ) {
-    let Outcome { late, reconnections, is_interrupted } = *outcome;
+    let Outcome { late, reconnections, refused, is_interrupted } = *outcome;
     let totals = sender.totals();
     let per_frame = totals.bytes as f64 / totals.frames.max(1) as f64;
     let (published, rejected) =
@@ -138,6 +145,7 @@ pub fn print<M: Mac, const MTU: usize>(
                 "bytes_per_frame": per_frame,
                 "late": late,
                 "reconnections": reconnections,
+                "refused": refused,
                 "interrupted": is_interrupted,
                 "statuses": totals.statuses,
                 "acknowledged": sender.acknowledged(),
@@ -156,6 +164,9 @@ pub fn print<M: Mac, const MTU: usize>(
     }
     if reconnections > 0 {
         println!("line      broke and came back {reconnections} times");
+    }
+    if refused > 0 {
+        println!("refused   {refused} datagrams came back");
     }
     if is_interrupted {
         println!("stopped   by a signal");

@@ -4,8 +4,8 @@ mod pack;
 
 use crate::mesh_file::Lengths;
 use crate::query::rows;
-use crate::track;
 use crate::tree_file::{self, AnyTree};
+use crate::{overwrite, track};
 use anyhow::{Context, Result, bail, ensure};
 use dibs_build::glam::Vec3;
 use dibs_build::write_atomically;
@@ -51,7 +51,10 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    let page = page(args.page.as_deref())?;
+    let inputs = [&args.tree].into_iter().chain(&args.motion).chain(&args.path);
+    let page = page_path(args.page.as_deref())?;
+    overwrite::check(inputs.chain([&page]), [&args.output])?;
+    let page = read_page(&page)?;
     let bytes = tree_file::load(&args.tree)?;
     let data = match tree_file::validate(&bytes, &args.tree)? {
         AnyTree::Narrow(tree) => data(args, &tree, &bytes)?,
@@ -68,15 +71,18 @@ pub fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// The page without data.
-fn page(given: Option<&Path>) -> Result<String> {
+/// The file of the page without data.
+fn page_path(given: Option<&Path>) -> Result<PathBuf> {
     let beside = || std::env::current_exe().ok()?.parent().map(|folder| folder.join(PAGE));
-    let path = match given {
-        Some(path) => path.to_path_buf(),
-        None => beside().context("this program's folder is unknown; give the page with --page")?,
-    };
+    match given {
+        Some(path) => Ok(path.to_path_buf()),
+        None => beside().context("this program's folder is unknown; give the page with --page"),
+    }
+}
+
+fn read_page(path: &Path) -> Result<String> {
     let name = path.display();
-    let page = std::fs::read_to_string(&path).with_context(|| {
+    let page = std::fs::read_to_string(path).with_context(|| {
         format!("{name}: cannot be read; `cargo xtask viewer` in the repository writes it, and --page names another")
     });
     // One sentence, with the system's reason at its end.

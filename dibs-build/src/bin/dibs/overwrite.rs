@@ -1,0 +1,88 @@
+//! No output replaces an input, or another output.
+
+use anyhow::{Result, bail};
+use dibs_build::files_of;
+use std::fs::Metadata;
+use std::path::{Path, PathBuf};
+
+/// The file behind a path, whatever the path's spelling, links and hard links.
+#[derive(PartialEq, Eq)]
+enum Identity {
+    #[cfg(unix)]
+    File { device: u64, inode: u64 },
+    #[cfg(not(unix))]
+    File(PathBuf),
+    /// One that is not there yet: its folder, and its name.
+    New(PathBuf, std::ffi::OsString),
+}
+
+impl Identity {
+    /// `None` where there is nothing to lose: a device, or a path that cannot be written.
+    fn of(path: &Path) -> Option<Self> {
+        match path.metadata() {
+            Ok(metadata) => metadata.is_file().then(|| Self::of_file(path, &metadata)).flatten(),
+            Err(_) => {
+                let folder = match path.parent() {
+                    Some(folder) if folder != Path::new("") => folder,
+                    _ => Path::new("."),
+                };
+                Some(Self::New(folder.canonicalize().ok()?, path.file_name()?.to_owned()))
+            }
+        }
+    }
+
+    #[cfg(unix)]
+    fn of_file(_path: &Path, metadata: &Metadata) -> Option<Self> {
+        use std::os::unix::fs::MetadataExt;
+        Some(Self::File { device: metadata.dev(), inode: metadata.ino() })
+    }
+
+    #[cfg(not(unix))]
+    fn of_file(path: &Path, _metadata: &Metadata) -> Option<Self> {
+        path.canonicalize().ok().map(Self::File)
+    }
+}
+
+/// An error if an output is an input, also as a part of one, or another output. `-` is standard input and output, and
+/// results may be redirected to a file, too.
+pub fn check<'a>(
+    inputs: impl IntoIterator<Item = &'a PathBuf>,
+    outputs: impl IntoIterator<Item = &'a PathBuf>,
+) -> Result<()> {
+    let is_stream = |path: &Path| path == Path::new("-");
+    let inputs: Vec<PathBuf> =
+        inputs
+            .into_iter()
+            .flat_map(|path| {
+                if is_stream(path) { vec![PathBuf::from("/dev/stdin")] } else { files_of(path) }
+            })
+            .collect();
+    // An input that is not there is the reader's error.
+    let inputs = inputs.iter().filter(|path| path.exists());
+    let inputs: Vec<_> = inputs.map(|path| (path, Identity::of(path))).collect();
+    let printed = PathBuf::from("/dev/stdout");
+    let outputs = outputs.into_iter().filter(|path| !is_stream(path));
+    let mut before: Vec<(&Path, Identity)> = Vec::new();
+    for output in [printed.as_path()].into_iter().chain(outputs.map(|path| path.as_path())) {
+        let Some(identity) = Identity::of(output) else { continue };
+        let name = output.display();
+        if let Some((input, _)) = inputs.iter().find(|(_, other)| other.as_ref() == Some(&identity))
+        {
+            bail!(
+                "{name}: this output is the same file as the input {}; give the output another name",
+                input.display()
+            );
+        }
+        if let Some((other, _)) = before.iter().find(|(_, other)| *other == identity) {
+            bail!(
+                "{name}: this output is the same file as the output {}; give each its own name",
+                other.display()
+            );
+        }
+        // Lines of results beside an output are no loss: it replaces its file.
+        if output != printed {
+            before.push((output, identity));
+        }
+    }
+    Ok(())
+}
