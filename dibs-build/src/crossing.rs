@@ -82,7 +82,8 @@ fn first_crossing(
             }
             *left = left.checked_sub(1)?;
             let corners = [triangle, beside].map(|&row| mesh.corners(mesh.triangles[row]));
-            if other.meets(bounds) && meet(corners.map(|corners| corners.map(glam::Vec3::as_dvec3))) {
+            if other.meets(bounds) && meet(corners.map(|corners| corners.map(glam::Vec3::as_dvec3)))
+            {
                 return Some(CrossingParts { triangle: *triangle, other: *beside });
             }
         }

@@ -29,7 +29,7 @@ mod tests {
         for _ in 0..100_000 {
             let mut next = || {
                 seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                f32::from_bits((seed >> 1 & 0x07FF_FFFF) + (118 << 23) ^ seed >> 2 << 31)
+                f32::from_bits(((seed >> 1 & 0x07FF_FFFF) + (118 << 23)) ^ (seed >> 2 << 31))
             };
             let (a, b) = (next(), next());
             let sum = f64::from(a) + f64::from(b);

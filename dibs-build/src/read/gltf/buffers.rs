@@ -5,8 +5,8 @@ use super::{Result, get, malformed};
 use crate::read::raw::excerpt;
 use crate::read::{base64, file};
 use std::borrow::Cow;
-use std::collections::hash_map::{Entry, HashMap};
 use std::collections::HashSet;
+use std::collections::hash_map::{Entry, HashMap};
 use std::path::{Component, Path, PathBuf};
 
 pub struct Buffers<'a> {

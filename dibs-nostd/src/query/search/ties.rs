@@ -242,6 +242,6 @@ mod tests {
         assert_eq!(rows(&ties), Some(all));
         ties.push(7, 0.5, 0.5);
         assert_eq!(rows(&ties), Some(std::vec![7]));
-        assert_eq!(ties.touched().map(|touched| touched.count()), Some(0));
+        assert_eq!(ties.touched().map(Iterator::count), Some(0));
     }
 }
