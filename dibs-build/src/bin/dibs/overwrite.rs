@@ -63,7 +63,7 @@ pub fn check<'a>(
     let printed = PathBuf::from("/dev/stdout");
     let outputs = outputs.into_iter().filter(|path| !is_stream(path));
     let mut before: Vec<(&Path, Identity)> = Vec::new();
-    for output in [printed.as_path()].into_iter().chain(outputs.map(|path| path.as_path())) {
+    for output in [printed.as_path()].into_iter().chain(outputs.map(std::path::PathBuf::as_path)) {
         let Some(identity) = Identity::of(output) else { continue };
         let name = output.display();
         if let Some((input, _)) = inputs.iter().find(|(_, other)| other.as_ref() == Some(&identity))
