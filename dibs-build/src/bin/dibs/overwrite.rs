@@ -62,8 +62,9 @@ pub fn check<'a>(
     let inputs: Vec<_> = inputs.map(|path| (path, Identity::of(path))).collect();
     let printed = PathBuf::from("/dev/stdout");
     let outputs = outputs.into_iter().filter(|path| !is_stream(path));
+    let outputs: Vec<&Path> = outputs.map(AsRef::as_ref).collect();
     let mut before: Vec<(&Path, Identity)> = Vec::new();
-    for output in [printed.as_path()].into_iter().chain(outputs.map(std::path::PathBuf::as_path)) {
+    for output in [printed.as_path()].into_iter().chain(outputs) {
         let Some(identity) = Identity::of(output) else { continue };
         let name = output.display();
         if let Some((input, _)) = inputs.iter().find(|(_, other)| other.as_ref() == Some(&identity))
