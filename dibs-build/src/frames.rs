@@ -2,10 +2,9 @@
 
 use dibs_nostd::format::Unit;
 use dibs_nostd::{Index, Tree, TriangleRow};
-use glam::{DVec3, Vec3};
-use std::path::Path;
+use glam::Vec3;
 
-use crate::{Mesh, ReadError, ReadErrorKind};
+use crate::Mesh;
 
 /// Why positions are no frame of a tree's surface.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -108,28 +107,6 @@ impl FrameCheck {
         }
         let missing = FrameError::Vertices { expected: self.vertices, found: positions.len() };
         self.order.iter().map(|&vertex| at(vertex)).collect::<Option<_>>().ok_or(missing)
-    }
-
-    /// Reads a mesh file that is a frame: positions in the order of the tree's rows.
-    ///
-    /// # Errors
-    /// [`ReadError`], and for a file of other vertices, triangles or size.
-    pub fn read(
-        &self,
-        path: impl AsRef<Path>,
-        unit: Option<Unit>,
-        origin: DVec3,
-    ) -> Result<Vec<Vec3>, ReadError> {
-        let path = path.as_ref();
-        let read = || {
-            let (positions, faces) = crate::read::frame(path, unit, origin)?;
-            let rows = self.to_rows(&positions)?;
-            if !faces.is_empty() {
-                self.check_faces(faces.iter().map(|face| &face[..]))?;
-            }
-            Ok(rows)
-        };
-        read().map_err(|kind: ReadErrorKind| ReadError { path: path.to_path_buf(), kind })
     }
 
     /// Checks that each triangle of the tree is one of these faces, or a part of one.

@@ -21,6 +21,7 @@ mod error;
 mod export;
 #[cfg(feature = "stream")]
 pub mod faults;
+mod frame_file;
 mod frames;
 pub mod generate;
 mod geodesic;

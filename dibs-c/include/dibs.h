@@ -665,6 +665,10 @@ enum dibs_side
    * No side: the budget ran out.
    */
   DIBS_SIDE_CUT_SHORT = 8,
+  /**
+   * No side: the closest point is on an edge of more than two triangles that are no pairs.
+   */
+  DIBS_SIDE_NON_MANIFOLD = 9,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

@@ -66,6 +66,7 @@ pub mod modes;
 mod query;
 mod stretch;
 mod surface;
+mod time;
 mod tool;
 mod tree;
 mod unavailable;

@@ -103,7 +103,8 @@ pub struct Tally {
     pub undefined_away: usize,
     /// Poses whose axis is that far from the surface.
     pub away: usize,
-    /// Poses where the surface is shown to cut itself: the side is that of the nearest sheet.
+    /// Poses where the surface is shown to cut itself: the side is that of the nearest sheet, and the depth jumps along
+    /// an axis inside.
     pub self_cut: usize,
     /// Poses whose side or separation is wrong.
     pub wrong: usize,
@@ -123,6 +124,9 @@ impl AddAssign for Tally {
 
 /// Poses judged together on one shape of a surface.
 pub const POSES_OF_A_FRAME: usize = 100;
+
+/// Parts of an axis whose depth is sampled.
+const POINTS: u32 = 16;
 
 /// Judges poses on one shape of a surface; prints the wrong ones.
 ///
@@ -192,7 +196,16 @@ pub fn judge(surface: &Closed, seed: u64) -> Tally {
         }
         tally.inside += usize::from(inside);
         let off = off(&rows, &triangles, &tool, &pair, inside, &found);
-        if inside != says || off > f64::from(found.accuracy) {
+        let is_off = off > f64::from(found.accuracy);
+        if inside == says
+            && inside
+            && is_off
+            && sides::is_cut_along(&rows, &triangles, &tool, POINTS)
+        {
+            tally.self_cut += 1;
+            continue;
+        }
+        if inside != says || is_off {
             tally.wrong += 1;
             println!("{}: {tool:?} inside: {inside}, off {off}, {found:?}", surface.name);
         }
@@ -209,7 +222,6 @@ fn off(
     inside: bool,
     found: &Proximity,
 ) -> f64 {
-    const POINTS: u32 = 16;
     let signed = if inside { -pair.axis_distance } else { pair.axis_distance };
     let high = signed - f64::from(tool.radius);
     // An axis inside counts by its deepest point. Where the surface cuts itself, a point of the axis may have no depth.

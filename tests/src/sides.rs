@@ -100,6 +100,22 @@ pub fn is_cut(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -> 
         .any(|place| touching.iter().any(|triangle| proves(triangle, place)))
 }
 
+/// Whether a surface is shown to cut itself next to one of `points + 1` points of an axis, so that the depth along it
+/// jumps.
+#[must_use]
+pub fn is_cut_along(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    tool: &Instrument,
+    points: u32,
+) -> bool {
+    (0..=points).any(|step| {
+        let at = tool.start.lerp(tool.end, step as f32 / points as f32);
+        let nearest = exhaustive(positions, triangles, &Instrument::sphere(at, 0.0));
+        nearest.is_some_and(|nearest| is_cut(positions, triangles, &nearest))
+    })
+}
+
 /// Parameter of the point on the segment from `a` (0) to `b` (1) nearest to a point.
 fn along(a: DVec3, b: DVec3, point: DVec3) -> f64 {
     ((point - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0)

@@ -3,8 +3,8 @@
 use dibs_nostd::format::PathKind;
 use glam::{DVec3, Vec3};
 
-use crate::leaf::openness;
 use crate::rest::RestShape;
+use crate::rest::openness;
 use crate::rounding::round_down;
 
 /// Rounding of the controller's check in f32, in units of 2^-24: derived in `dibs_nostd`'s

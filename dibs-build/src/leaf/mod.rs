@@ -3,5 +3,5 @@
 mod order;
 mod patch;
 
-pub(crate) use order::{StoredTriangle, ill_conditioned, openness, order};
+pub(crate) use order::{StoredTriangle, ill_conditioned, order};
 pub(crate) use patch::connected_by_edges;

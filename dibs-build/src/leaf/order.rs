@@ -8,10 +8,9 @@
 //! these to reject the leaf.
 
 use dibs_nostd::format::{Join, MAX_LEAF_TRIANGLES, PathKind};
-use glam::DVec3;
 
 use crate::Mesh;
-use crate::rest::RestShape;
+use crate::rest::{RestShape, openness};
 
 /// A triangle of the mesh, and its corners in stored order: rotated, which keeps the orientation.
 #[derive(Clone, Copy, Debug)]
@@ -255,13 +254,3 @@ const OPEN: f64 = 0.05;
 
 /// Openness of a corner of 3 degrees.
 const POINTED: f64 = 0.0014;
-
-/// `1 - |cos|` of the angle between two edges, computed without cancellation. The check's rounding grows with its
-/// inverse.
-pub(crate) fn openness(e1: DVec3, e2: DVec3) -> f64 {
-    let lengths = e1.length() * e2.length();
-    let sine = e1.cross(e2).length() / lengths;
-    let openness = sine * sine / (1.0 + (e1.dot(e2) / lengths).abs());
-    // An edge without length has no angle.
-    if openness.is_nan() { 0.0 } else { openness }
-}

@@ -8,7 +8,7 @@ pub use pc2::MotionMismatchError;
 
 use crate::read::{Place, ReadError, ReadErrorKind, file};
 use crate::{Motion, Unit};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use std::path::{Path, PathBuf};
 
 /// The files of a series that are there; `None` of a path that names none.
@@ -69,21 +69,4 @@ fn unknown(path: &Path, bytes: &[u8]) -> ReadErrorKind {
         _ if bytes.starts_with(b"PK") => ReadErrorKind::NumPyArchive,
         _ => ReadErrorKind::UnknownMotion,
     }
-}
-
-/// The positions of frame `number` in their place; an error where one is not finite, or f32 does not hold the shape.
-pub(crate) fn frame(
-    positions: &[[f64; 3]],
-    number: usize,
-    place: &Place,
-) -> Result<Vec<Vec3>, ReadErrorKind> {
-    let is_finite = |value: &f64| (*value as f32).is_finite();
-    if let Some(vertex) = positions.iter().position(|position| !position.iter().all(is_finite)) {
-        let value = positions[vertex].into_iter().find(|value| !is_finite(value));
-        return Err(ReadErrorKind::NonFinite {
-            vertex: format!("vertex {vertex} (counted from 0) in frame {number}"),
-            value: value.map_or(f64::NAN, |value| (value as f32).into()),
-        });
-    }
-    place.frame(positions, || format!("frame {number}"))
 }

@@ -46,7 +46,7 @@ pub(super) fn parse(bytes: &[u8], place: &Place) -> Result<Motion, ReadErrorKind
     let point = |frame, vertex| [0, 1, 2].map(|axis| numbers[index(frame, vertex, axis)]);
     let frame = |frame| {
         let points: Vec<[f64; 3]> = (0..vertices).map(|vertex| point(frame, vertex)).collect();
-        super::frame(&points, frame, place)
+        place.frame_of(&points, frame)
     };
     let frames = (0..frames).map(frame).collect::<Result<_, _>>()?;
     Ok(Motion { frames, rate: 0.0, origin: place.origin })

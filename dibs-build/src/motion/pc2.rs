@@ -165,7 +165,7 @@ pub(super) fn parse(bytes: &[u8], place: &Place) -> Result<Motion, ReadErrorKind
         let (points, _) = coordinates.as_chunks::<3>();
         let points: Vec<[f64; 3]> =
             points.iter().map(|p| p.map(|x| f32::from_le_bytes(x).into())).collect();
-        frames.push(super::frame(&points, number, place)?);
+        frames.push(place.frame_of(&points, number)?);
     }
     Ok(Motion { frames, rate: rate.unwrap_or(0.0), origin: place.origin })
 }

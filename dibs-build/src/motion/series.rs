@@ -97,5 +97,5 @@ fn frame(
     }
     let unit = unit_of(format, raw.unit, unit)?;
     let place = Place { unit, origin };
-    super::frame(&raw.positions, number as usize, &place)
+    place.frame_of(&raw.positions, number as usize)
 }

@@ -227,7 +227,7 @@ pub(crate) fn frame(
         return Err(ReadErrorKind::UnnumberedFrame);
     }
     let place = Place { unit: unit_of(format, raw.unit, unit)?, origin };
-    let positions = crate::motion::frame(&raw.positions, 0, &place)?;
+    let positions = place.frame_of(&raw.positions, 0)?;
     Ok((positions, raw.faces().map(<[u32]>::to_vec).collect()))
 }
 

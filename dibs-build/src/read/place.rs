@@ -80,6 +80,23 @@ impl Place {
         check_nearness(positions.iter().map(|&position| self.of(position)), name)?;
         Ok(positions.iter().map(|&position| self.of(position).as_vec3()).collect())
     }
+
+    /// The positions of frame `number` of a motion in their place.
+    ///
+    /// # Errors
+    /// [`ReadErrorKind::NonFinite`], and those of [`frame`](Self::frame).
+    pub fn frame_of(&self, positions: &[[f64; 3]], number: usize) -> Result<Vec<Vec3>> {
+        let is_finite = |value: &f64| (*value as f32).is_finite();
+        if let Some(vertex) = positions.iter().position(|position| !position.iter().all(is_finite))
+        {
+            let value = positions[vertex].into_iter().find(|value| !is_finite(value));
+            return Err(ReadErrorKind::NonFinite {
+                vertex: format!("vertex {vertex} (counted from 0) in frame {number}"),
+                value: value.map_or(f64::NAN, |value| (value as f32).into()),
+            });
+        }
+        self.frame(positions, || format!("frame {number}"))
+    }
 }
 
 /// The distance of a position from the nearest f32 numbers.

@@ -4,11 +4,10 @@
 //! limit of exactly 1 would refuse the rest shape itself, and limits learned from a motion would refuse its frames.
 
 use dibs_nostd::format::PathKind;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::RestShape;
 use crate::Mesh;
-use crate::leaf::openness;
 
 /// Rounding of the check, at most: 21 units when the metric is stored, 21 when it is compared (`dibs_nostd`'s
 /// `stretch/kernel.rs`), 2 for its marks, less a half for the root, and those of the limit's own rounding.
@@ -32,4 +31,14 @@ fn rounding(corners: [Vec3; 3], paths: PathKind) -> f64 {
 /// The least limit of each triangle.
 pub(crate) fn least_limits(mesh: &Mesh, paths: PathKind) -> impl Iterator<Item = f64> {
     mesh.triangles.iter().map(move |&triangle| rounding(mesh.corners(triangle), paths))
+}
+
+/// `1 - |cos|` of the angle between two edges, computed without cancellation. The check's rounding grows with its
+/// inverse.
+pub(crate) fn openness(e1: DVec3, e2: DVec3) -> f64 {
+    let lengths = e1.length() * e2.length();
+    let sine = e1.cross(e2).length() / lengths;
+    let openness = sine * sine / (1.0 + (e1.dot(e2) / lengths).abs());
+    // An edge without length has no angle.
+    if openness.is_nan() { 0.0 } else { openness }
 }

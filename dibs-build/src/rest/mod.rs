@@ -6,7 +6,7 @@ mod paths;
 mod shape;
 mod shares;
 
-pub(crate) use floor::{SHARED, least_limits};
+pub(crate) use floor::{SHARED, least_limits, openness};
 pub use paths::Paths;
 pub(crate) use shape::{RestShape, has_area};
 pub(crate) use shares::Shares;

@@ -127,7 +127,7 @@ impl MotionStretch {
 
     /// Limits for the builder: each triangle's largest stretch, at least 1, plus `margin` (0.1: a tenth), plus the rounding
     /// of the controller's measurement: 0.0006, and up to 0.016 for a triangle with a sharp corner. A tree with them
-    /// admits every frame of the motion, even with a margin of 0.
+    /// admits every frame of the motion that does not turn a closed surface inside out, even with a margin of 0.
     #[must_use]
     pub fn limits(&self, margin: f32) -> Vec<f32> {
         let limit = |(needed, rounding): (&Needed, &f64)| {

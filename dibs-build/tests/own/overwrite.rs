@@ -21,12 +21,12 @@ fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 fn inputs() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    succeeds(at, "generate heart --triangles 200 -o heart.ply --motion heart.pc2");
+    succeeds(at, "generate heart --triangles 320 -o heart.ply --motion heart.pc2");
     succeeds(at, "stretch heart.ply heart.pc2 --limits heart.limits");
     succeeds(at, "build heart.ply -o tree.dibs --limits heart.limits");
     // A mesh is told by its content, not by its name.
     fs::copy(at.join("heart.ply"), at.join("mesh.dibs")).unwrap();
-    fs::write(at.join("labels.dibs"), "1\n".repeat(200)).unwrap();
+    fs::write(at.join("labels.dibs"), "1\n".repeat(320)).unwrap();
     fs::copy(at.join("heart.limits"), at.join("limits.dibs")).unwrap();
     fs::copy(at.join("heart.pc2"), at.join("motion.dibs")).unwrap();
     fs::write(at.join("poses.csv"), "0,0,150,5\n").unwrap();
@@ -94,8 +94,8 @@ fn no_output_replaces_another() {
     let at = folder.path();
     let before = contents(at);
     for line in [
-        "generate heart --triangles 200 -o new.ply --motion new.ply",
-        "generate heart --triangles 200 -o new.ply --motion ./new.ply",
+        "generate heart --triangles 320 -o new.ply --motion new.ply",
+        "generate heart --triangles 320 -o new.ply --motion ./new.ply",
         "stretch heart.ply heart.pc2 --limits new --picture new",
         "stretch heart.ply heart.pc2 --limits poses.csv --picture ./poses.csv",
     ] {
@@ -124,7 +124,7 @@ fn links_and_redirections_are_seen_through() {
         "build hard.dibs -o soft.dibs",
         "build mesh.dibs -o folder/mesh.dibs",
         "build folder/mesh.dibs -o hard.rs",
-        "generate heart --triangles 200 -o new.ply --motion folder/new.ply",
+        "generate heart --triangles 320 -o new.ply --motion folder/new.ply",
     ] {
         let error = fails(at, line);
         assert!(error.contains("same file as the"), "{line}: {error}");

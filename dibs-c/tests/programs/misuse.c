@@ -99,7 +99,8 @@ static void values(const float *positions, uint32_t vertices) {
     dibs_frame_facts facts;
     size_t count;
     const dibs_vec3 zero = {0.0f, 0.0f, 0.0f};
-    const dibs_options options = {{DIBS_UNLIMITED, DIBS_UNLIMITED}, 0.0f, 4, 0};
+    const dibs_options options = {{DIBS_UNLIMITED, DIBS_UNLIMITED}, 0.0f, 8, 0};
+    const dibs_options label = {{DIBS_UNLIMITED, DIBS_UNLIMITED}, 0.0f, DIBS_CONTACTS_OF, 256};
     const dibs_options tolerance = {{DIBS_UNLIMITED, DIBS_UNLIMITED}, -1.0f, 0, 0};
     const dibs_tool no_radius = {tool.start, tool.end, -1.0f};
     const dibs_tool far_away = {{1e30f, 0.0f, 0.0f}, tool.end, 1.0f};
@@ -124,6 +125,7 @@ static void values(const float *positions, uint32_t vertices) {
     EXPECT(NULL, dibs_query_closest(query, frame, NULL, NULL, &found));
     EXPECT(NULL, dibs_query_closest(query, frame, &tool, NULL, NULL));
     EXPECT(ARGUMENT, dibs_query_closest(query, frame, &tool, &options, &found));
+    EXPECT(ARGUMENT, dibs_query_closest(query, frame, &tool, &label, &found));
     EXPECT(ARGUMENT, dibs_query_closest(query, frame, &tool, &tolerance, &found));
     EXPECT(TOOL_RADIUS, dibs_query_closest(query, frame, &no_radius, NULL, &found));
     EXPECT(TOOL_COORDINATE, dibs_query_closest(query, frame, &far_away, NULL, &found));

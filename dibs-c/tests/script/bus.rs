@@ -33,7 +33,8 @@ pub fn events(built: &BuiltTree, motion: &[Vec<Vec3>], lines: &mut String) -> Ve
     for epoch in 1..=12_u32 {
         let mut rows = motion[epoch as usize % motion.len()].clone();
         if epoch == 7 {
-            rows[100] += Vec3::new(0.0, 0.0, 80.0);
+            // Too far for the edges, not for the speed or the recovery.
+            rows[100] += Vec3::new(0.0, 0.0, 25.0);
         }
         let packed = QuantisedBox::covering(&rows).expect("a box");
         let encoding = if epoch % 2 == 0 { Encoding::Float } else { Encoding::Quantised(packed) };

@@ -9,6 +9,7 @@ use super::depth::{Depth, Known};
 use super::search::{Ties, Waiting};
 use super::side::{self, NoSide, OnAxis, Side};
 use super::{Options, Proximity, solids};
+use crate::math::round::sum_up;
 use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
@@ -47,7 +48,7 @@ pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
         asked.signed(stack, found, memory, RootSet::ALL)?
     };
     found.coverage = options.coverage(vertices);
-    found.accuracy += vertices.position_error();
+    found.accuracy = sum_up(found.accuracy, vertices.position_error());
     Ok(found)
 }
 

@@ -10,9 +10,12 @@ mod measured;
 pub(crate) mod motion;
 mod moving;
 mod reader;
-mod time;
 mod vertices;
 
+pub(crate) use crate::time::Ageing;
+#[cfg(feature = "bus")]
+pub(crate) use crate::time::{AHEAD, elapsed};
+pub use crate::time::{Millis, Ticks};
 #[cfg(any(feature = "bus", feature = "modes"))]
 pub(crate) use buffer::Ahead;
 pub use buffer::{Buffer, FrameLabel, Position};
@@ -30,8 +33,4 @@ pub(crate) use moving::{FARTHEST, clamped, grown};
 #[cfg(feature = "bus")]
 pub(crate) use reader::LastStep;
 pub use reader::{FrameGuard, FrameReader, FrameView};
-pub(crate) use time::Ageing;
-#[cfg(feature = "bus")]
-pub(crate) use time::{AHEAD, elapsed};
-pub use time::{Millis, Ticks};
 pub use vertices::{QuantisedVertices, VertexTable};

@@ -10,8 +10,8 @@ use super::frames::{Buffers, Frames, READING, published};
 use super::motion::{MovingSurface, Travel};
 use super::moving::Between;
 use super::moving::{FARTHEST, clamped};
-use super::time::elapsed;
 use super::{Ageing, FrameAge, Latest, MeasuredStretch, Millis, VertexTable};
+use crate::time::elapsed;
 
 /// The end that reads: owned by the control tick.
 #[derive(Debug)]

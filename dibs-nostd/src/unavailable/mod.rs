@@ -6,7 +6,7 @@ use core::fmt;
 
 pub use query::QueryError;
 
-use crate::surface::Millis;
+use crate::time::Millis;
 
 /// Why there is no proximity to act on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -49,6 +49,7 @@ fn depths_are_those_of_dense_sampling() {
     let surfaces = closed();
     let count = poses() / 60;
     let (mut crossing, mut inside, mut wide, mut cut, mut searches) = (0, 0, 0, 0, 0_u64);
+    let mut slow = 0;
     for (seed, surface) in (1..).zip(surfaces.iter().filter(|s| s.mesh.triangles.len() < 1_000)) {
         let mut rng = Rng::with_seed(seed);
         let tree = surface.built.tree::<u16>().expect("valid");
@@ -72,7 +73,7 @@ fn depths_are_those_of_dense_sampling() {
             let accuracy = f64::from(found.accuracy);
             let (lower, upper) = (f64::from(found.lower), f64::from(found.separation));
             let holds = lower <= high + accuracy && upper >= low - accuracy;
-            if !holds && is_cut_along(&rows, &triangles, &capsule, POINTS) {
+            if !holds && sides::is_cut_along(&rows, &triangles, &tool, POINTS) {
                 cut += 1;
                 continue;
             }
@@ -91,10 +92,10 @@ fn depths_are_those_of_dense_sampling() {
                 );
             let touches = Side::Undefined(NoSide::BelowAccuracy);
             assert!(side.side == found.side || side.side == touches, "{side:?}");
-            assert_eq!(
-                (side.node_tests, side.triangle_tests),
-                (plain.node_tests, plain.triangle_tests)
-            );
+            // Ties that f32 cannot tell apart take node tests for their work in f64.
+            assert!(side.node_tests >= plain.node_tests, "{side:?} {plain:?}");
+            assert_eq!(side.triangle_tests, plain.triangle_tests, "{side:?} {plain:?}");
+            slow += u64::from(side.node_tests > plain.node_tests);
             let (lower, upper) = (f64::from(side.lower), f64::from(side.separation));
             assert!(lower <= low + accuracy && upper >= low - accuracy, "{side:?} {low} {high}");
             searches += u64::from(found.node_tests);
@@ -113,20 +114,12 @@ fn depths_are_those_of_dense_sampling() {
     }
     println!(
         "{crossing} axes cross, {inside} are inside, {wide} depths wider than the tolerance, {cut} along a surface that cuts itself, \
-         {} node tests in the mean",
+         {slow} sides by f64, {} node tests in the mean",
         searches / (crossing + inside).max(1)
     );
     assert!(inside as usize > count / 6);
+    assert!(slow * 10 < crossing + inside, "{slow} of {crossing} and {inside}");
     assert!(crossing as usize > count / 10 && wide * 50 < crossing as usize);
-}
-
-/// Whether a surface is shown to cut itself next to an axis, so that the depth along it jumps.
-fn is_cut_along(rows: &[Vec3], triangles: &[[u32; 3]], tool: &Capsule, points: u32) -> bool {
-    (0..=points).any(|step| {
-        let at = tool.axis_point(step as f32 / points as f32);
-        let nearest = exhaustive(rows, triangles, &Instrument::sphere(at, 0.0));
-        sides::is_cut(rows, triangles, &nearest.expect("has triangles"))
-    })
 }
 
 /// From far outside a ball to near its middle, the separation falls steadily, and the direction points out.

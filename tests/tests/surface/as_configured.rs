@@ -98,12 +98,20 @@ fn a_limit_of_exactly_one_admits_the_rest_shape() {
     assert!(Modes::of(&tree).expect("has modes").anchor_count() > 0);
 }
 
-/// Limits learned from a motion admit its frames with a margin of 0, on meshes pressed flat too.
+/// Volume that a closed surface encloses.
+fn volume(mesh: &Mesh, positions: &[Vec3]) -> f64 {
+    let at = |v: u32| positions[v as usize].as_dvec3() - positions[0].as_dvec3();
+    mesh.triangles.iter().map(|&[a, b, c]| at(a).dot(at(b).cross(at(c))) / 6.0).sum()
+}
+
+/// Limits learned from a motion admit its frames with a margin of 0, on meshes pressed flat too. Only a frame that turned
+/// the surface inside out is refused, which on the flattest ones a frame can by less than it stretches them.
 #[test]
 fn every_frame_that_limits_were_learned_from_is_admitted() {
     let mut rng = Rng::with_seed(191);
     let mut random = |size: f32| Vec3::from_array([0; 3].map(|_| (rng.f32() * 2.0 - 1.0) * size));
     let heart = generate::heart(600).expect("a valid size").mesh;
+    let (mut frames_seen, mut refused) = (0, 0);
     for round in 0..24 {
         let mesh = squashed(&heart, [1.0, 0.1, 1e-2, 1e-3][round % 4], round as f32);
         let stirred = |part: f32, bend: Vec3| {
@@ -129,9 +137,19 @@ fn every_frame_that_limits_were_learned_from_is_admitted() {
                 let built = builder.paths(paths).build(&mesh).expect("a valid mesh");
                 for frame in &motion.frames {
                     let found = admitted(&built, &built.to_rows(frame), 0.0);
-                    assert_eq!(found, Ok(()), "round {round}");
+                    let kept = volume(&mesh, frame) / volume(&mesh, &mesh.positions);
+                    frames_seen += 1;
+                    match found {
+                        Err(StretchError::InsideOut { .. }) if kept < -1.0 / 65.0 => refused += 1,
+                        found => {
+                            assert_eq!(found, Ok(()), "round {round}, {kept} of the volume");
+                            assert!(kept > -1.0 / 63.0, "round {round}, {kept} of the volume");
+                        }
+                    }
                 }
             }
         }
     }
+    println!("{refused} of {frames_seen} frames are inside out");
+    assert!(refused < frames_seen / 8, "{refused} of {frames_seen}");
 }

@@ -189,7 +189,9 @@ fn counts(import: &Import) -> BTreeMap<String, usize> {
     let report = report.as_object().unwrap();
     report
         .iter()
-        .filter(|(name, _)| !matches!(name.as_str(), "vertices" | "triangles" | "file_triangles"))
+        .filter(|(name, _)| {
+            !matches!(name.as_str(), "vertices" | "faces" | "triangles" | "file_triangles")
+        })
         .filter_map(|(name, value)| Some((name.clone(), value.as_u64()? as usize)))
         .filter(|&(_, count)| count != 0)
         .collect()

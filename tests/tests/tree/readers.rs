@@ -305,7 +305,15 @@ fn motions_round_trip_and_bad_ones_are_errors() {
     let read = |bytes: &[u8]| Motion::read_pc2(folder.put("b.pc2", bytes)).map_err(|e| e.kind);
     assert!(matches!(read(&[]), Err(ReadErrorKind::Empty)));
     assert!(matches!(read(&bytes[..20]), Err(ReadErrorKind::NotPc2)));
-    assert!(matches!(read(&bytes[..bytes.len() - 1]), Err(ReadErrorKind::Count { .. })));
+    // The rate stands after the last frame: a file cut within it has all frames, as one without a rate has.
+    let frames = bytes.len() - 12;
+    for end in frames..bytes.len() {
+        let unrated = read(&bytes[..end]).unwrap();
+        assert_eq!((&unrated.frames, unrated.rate), (&motion.frames, 0.0), "{end} bytes");
+    }
+    for end in [32, frames / 2, frames - 1] {
+        assert!(matches!(read(&bytes[..end]), Err(ReadErrorKind::Count { .. })), "{end} bytes");
+    }
     let changed = |at: usize, value: [u8; 4]| {
         let mut bytes = bytes.clone();
         bytes[at..at + 4].copy_from_slice(&value);

@@ -238,10 +238,11 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.held = Some((id.epoch, held));
         if content == Content::Whole {
             self.since_whole = 0;
-            self.whole_wanted = false;
         } else {
             self.since_whole += 1;
         }
+        // A receiver refuses a frame of an age that cannot be stated: none can build on it.
+        self.whole_wanted = freshness.age_ms == u16::MAX;
         Ok(Prepared::new(id.epoch, content, rows_sent, encoding.error(), packets))
     }
 

@@ -118,7 +118,14 @@ pub fn receive<M: Mac>(
             let now = start.elapsed().as_millis() as u32;
             match assembler.accept(&packet, Millis(now)) {
                 Ok(Progress::Begun { .. }) => seen.last_begun = Some(Instant::now()),
-                Ok(_) | Err(ReceiveError::Forged { .. } | ReceiveError::Unexpected { .. }) => (),
+                // A forged begin, and what follows it.
+                Ok(_)
+                | Err(
+                    ReceiveError::Forged { .. }
+                    | ReceiveError::Unexpected { .. }
+                    | ReceiveError::Refused { cause: Event::Forged, .. }
+                    | ReceiveError::Unverifiable { cause: None | Some(Event::Forged), .. },
+                ) => (),
                 Err(rejection) => panic!("{rejection}"),
             }
             loop {

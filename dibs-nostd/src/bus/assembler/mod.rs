@@ -41,7 +41,7 @@ use step::{Earlier, Step};
 ///
 /// RAM: less than half a kilobyte besides [`Frames`](crate::Frames) and gate, for any `N`. A surface's buffers with
 /// both ends, the assembler and the [`StretchMonitor`](crate::StretchMonitor) together take 24 bytes a vertex and at
-/// most 1,100 bytes.
+/// most 1,300 bytes.
 ///
 /// ```
 /// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};

@@ -20,7 +20,7 @@ use super::{Code, Direction, Mac};
 ///
 /// ```
 /// use dibs_nostd::wire::{AesCmac, Encoding, FrameEncoder, FrameId};
-/// use dibs_nostd::{Assembler, Frames, ReceiveError, Unchecked, glam::Vec3};
+/// use dibs_nostd::{Assembler, Frames, Millis, ReceiveError, Unchecked, glam::Vec3};
 ///
 /// let key = *b"a secret of ours";
 /// let receiver = 7; // this controller's number
@@ -38,7 +38,7 @@ use super::{Code, Direction, Mac};
 ///         .unwrap();
 ///     let mut buffer = [0; 64];
 ///     while let Some(packet) = frame.next_packet(&mut buffer) {
-///         assembler.accept(packet, 0)?;
+///         assembler.accept(packet, Millis(0))?;
 ///     }
 ///     assembler.advance(100)
 /// };

@@ -19,12 +19,12 @@ use crate::unavailable::Unavailable;
 ///
 /// ```
 /// use dibs_nostd::constraint::{ConstraintState, Guidance, SpringDamper};
-/// use dibs_nostd::{Unavailable, glam::Vec3};
+/// use dibs_nostd::{Millis, Unavailable, glam::Vec3};
 ///
 /// let spring = SpringDamper::stiffness(0.5).damping(0.002).max_force(2.0);
 /// let guide = Guidance::new(spring, 10.0)?.dead_band(1.0)?; // 9 to 11 mm from the surface is free
-/// let safe = guide.force(&Err(Unavailable::Stale { age: 250 }), Vec3::ZERO);
-/// assert_eq!(safe.state, ConstraintState::Safe(Unavailable::Stale { age: 250 }));
+/// let safe = guide.force(&Err(Unavailable::Stale { age: Millis(250) }), Vec3::ZERO);
+/// assert_eq!(safe.state, ConstraintState::Safe(Unavailable::Stale { age: Millis(250) }));
 /// # Ok::<(), dibs_nostd::constraint::GainError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,33 @@
+//! A mesh file as a frame of a tree.
+
+use std::path::Path;
+
+use dibs_nostd::format::Unit;
+use glam::{DVec3, Vec3};
+
+use crate::frames::FrameCheck;
+use crate::read::{self, ReadError, ReadErrorKind};
+
+impl FrameCheck {
+    /// Reads a mesh file that is a frame: positions in the order of the tree's rows.
+    ///
+    /// # Errors
+    /// [`ReadError`], and for a file of other vertices, triangles or size.
+    pub fn read(
+        &self,
+        path: impl AsRef<Path>,
+        unit: Option<Unit>,
+        origin: DVec3,
+    ) -> Result<Vec<Vec3>, ReadError> {
+        let path = path.as_ref();
+        let frame = || {
+            let (positions, faces) = read::frame(path, unit, origin)?;
+            let rows = self.to_rows(&positions)?;
+            if !faces.is_empty() {
+                self.check_faces(faces.iter().map(|face| &face[..]))?;
+            }
+            Ok(rows)
+        };
+        frame().map_err(|kind: ReadErrorKind| ReadError { path: path.to_path_buf(), kind })
+    }
+}
