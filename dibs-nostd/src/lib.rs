@@ -86,15 +86,19 @@ pub use stretch::{
     Arriving, Changed, Gate, StretchError, StretchMonitor, SurfaceLimits, Unchecked, Verdict,
     measure_stretch,
 };
+#[doc(hidden)]
+pub use surface::REGIONS;
 pub use surface::{
     Between, Coverage, FrameAge, FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter,
     Frames, Latest, MeasuredStretch, Millis, Moved, MovingSurface, Odometer, OutOfTableError,
-    PublishError, QuantisedVertices, REGIONS, SplitError, Step, Ticks, Travel, VertexTable,
+    PublishError, QuantisedVertices, SplitError, Step, Ticks, Travel, VertexTable,
 };
 /// Surfaces of a size that no type has, for the C interface. They may change with any version.
 #[doc(hidden)]
 pub use surface::{BorrowedFrames, Buffer, Position};
-pub use tool::{ACCURACY, AxisPair, Capsule, MAX_COORDINATE, Sphere, Tool, ToolError};
+#[doc(hidden)]
+pub use tool::{ACCURACY, MAX_COORDINATE};
+pub use tool::{AxisPair, Capsule, Sphere, Tool, ToolError};
 pub use tree::{
     CorruptTreeError, FormatError, Index, PathKind, Scrub, Tree, TreeBytes, TriangleRow,
     VertexNumber,

@@ -70,7 +70,7 @@ static void scenes(const float *positions, uint32_t vertices) {
     EXPECT_THAT(facts.count > 0);
     EXPECT(MARGIN, dibs_scene_contacts(&scene, -1.0f, NULL, contacts, NULL));
     EXPECT(OK, dibs_scene_contacts(&scene, 60.0f, NULL, contacts, &closest));
-    EXPECT(ARGUMENT, dibs_scene_contacts(&scene, 60.0f, &(dibs_options){.flags = 4}, contacts, NULL));
+    EXPECT(ARGUMENT, dibs_scene_contacts(&scene, 60.0f, &(dibs_options){.flags = 8}, contacts, NULL));
     /* No contacts are left of the scene before. */
     EXPECT(OK, dibs_contacts_get_facts(contacts, &facts));
     EXPECT_THAT(facts.count == 0);

@@ -24,7 +24,7 @@ pub enum Event {
     Tick(u32, Capsule),
 }
 
-/// Frames of this motion in alternating encodings, with a tick after every packet. A packet is lost, another is
+/// Frames of this motion in alternating encodings, with a tick after every packet. Packets are lost, another is
 /// damaged, a frame is stretched too far, and at the end the line falls silent.
 pub fn events(built: &BuiltTree, motion: &[Vec<Vec3>], lines: &mut String) -> Vec<Event> {
     let tree = Tree::<u16>::from_bytes(built.blob()).expect("a tree");
@@ -46,7 +46,8 @@ pub fn events(built: &BuiltTree, motion: &[Vec<Vec3>], lines: &mut String) -> Ve
             number += 1;
             let mut packet = packet.to_vec();
             match (epoch, number) {
-                (4, 3) => continue,
+                // A row packet, and a begin.
+                (4, 3) | (9, 1) => continue,
                 (5, 2) => packet[20] ^= 1,
                 _ => (),
             }

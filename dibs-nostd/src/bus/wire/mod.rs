@@ -51,9 +51,12 @@ pub use quantised::{BoxError, QuantisedBox};
 pub use status::Status;
 #[doc(hidden)]
 pub use status::{Answer, PublishedStatus, StatusReport};
-pub use stream::{Deframer, StreamError, enframe, framed_bytes};
+#[doc(hidden)]
+pub use stream::framed_bytes;
+pub use stream::{Deframer, StreamError, enframe};
 
 /// The protocol's version: the first byte of every packet.
+#[doc(hidden)]
 pub const VERSION: u8 = 4;
 
 /// Bytes of the header that every packet starts with.
@@ -65,6 +68,7 @@ pub const HEADER_BYTES: usize = 18;
 pub const CHECKSUM_BYTES: usize = 4;
 
 /// Smallest transport unit: a CAN-FD message.
+#[doc(hidden)]
 pub const MIN_MTU: usize = 64;
 
 /// Largest packet: 255 `f32` positions and a tag.

@@ -68,7 +68,7 @@ impl Contact {
 /// contact, and some with no lower vertex next to theirs, at most half of `NEAR`. A tracker remembers up to `NEAR` opened nodes of the tree in
 /// the list, some hundred as a rule.
 ///
-/// RAM on a 32-bit processor: 88 bytes for each of the `N`, 32 for each of the `NEAR`, and 144.
+/// RAM on a 32-bit processor: 88 bytes for each of the `N`, 32 for each of the `NEAR`, and 152.
 ///
 /// Make it once, in a `static` or at start-up, and use it at every tick.
 ///

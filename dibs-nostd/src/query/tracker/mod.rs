@@ -40,7 +40,7 @@ const FARTHEST: u32 = 1 << 29;
 /// Where the axis crosses the surface, it remembers which parts of the axis cannot be deepest, and searches those points
 /// that may have become so.
 ///
-/// RAM: 8 bytes for each entry of the stack, 44 for each opened node, and 1,296.
+/// RAM: 8 bytes for each entry of the stack, 44 for each opened node, and 1,288.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
