@@ -39,7 +39,7 @@ use step::{Earlier, Step};
 /// With a gate of modes, `N` is their number, and frames hold weights instead: see
 /// [`Gate::weight_range`].
 ///
-/// RAM: less than half a kilobyte besides [`Frames`](crate::Frames) and gate, for any `N`. A surface's buffers with
+/// RAM: less than 600 bytes besides [`Frames`](crate::Frames) and gate, for any `N`. A surface's buffers with
 /// both ends, the assembler and the [`StretchMonitor`](crate::StretchMonitor) together take 24 bytes a vertex and at
 /// most 1,300 bytes.
 ///
