@@ -54,6 +54,7 @@ void bus_packet(const uint8_t *bytes, size_t length, uint32_t now) {
     const dibs_code accepted = dibs_receiver_accept(receiver, bytes, length, now, &progress);
     dibs_code checked = dibs_receiver_advance(receiver, WORK, &advance);
     while (checked == DIBS_CODE_OK && advance == DIBS_ADVANCE_PENDING) {
+        advance = DIBS_ADVANCE_IDLE; /* An error sets nothing. */
         checked = dibs_receiver_advance(receiver, WORK, &advance);
     }
     printf("packet %u %u %u %u\n", accepted, progress, checked, advance);
