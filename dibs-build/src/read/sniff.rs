@@ -43,8 +43,8 @@ pub(super) fn format(bytes: &[u8], path: &Path) -> Result<Format, ReadErrorKind>
         return Err(foreign);
     }
     match named {
-        // Its reader tells text from bytes no better than this.
-        Some(Format::StlAscii) if !is_text => Ok(Format::StlBinary),
+        // Text begins with "solid", even if a zero ends it: this is a binary file that was cut in its header.
+        Some(Format::StlAscii) if bytes.contains(&0) => Ok(Format::StlBinary),
         // So that the error is that of its reader.
         Some(format) => Ok(format),
         None => Err(ReadErrorKind::UnknownFormat),
