@@ -88,7 +88,11 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
                 found.direction = at.outward;
                 found.point_on_tool = on_axis - at.outward * tool.radius();
             }
-            if !(at.side == Side::Inside && has_length) {
+            // Too close for a side of its own, but too far to cross: its axis is on the side of any of its points.
+            let is_near = at.side == Side::Undefined(NoSide::BelowAccuracy)
+                && tree.is_closed()
+                && found.axis_distance <= 2.0 * found.accuracy;
+            if !((at.side == Side::Inside || is_near) && has_length) {
                 if let Some(known) = known {
                     known.forget();
                 }

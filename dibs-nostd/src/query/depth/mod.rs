@@ -385,8 +385,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
                 answer.point_on_tool = on_axis - outward * self.tool.radius();
             }
             let crosses = closest.axis_distance <= 0.0 || self.deepest > answer.accuracy;
-            answer.side =
-                if crosses { Side::Crossing } else { Side::Undefined(NoSide::BelowAccuracy) };
+            let is_near = closest.axis_distance > closest.accuracy;
+            answer.side = match (crosses, is_near) {
+                (false, _) => Side::Undefined(NoSide::BelowAccuracy),
+                (true, false) => Side::Crossing,
+                // It does not meet the surface, and a point of it is inside.
+                (true, true) => Side::Inside,
+            };
         }
         let most = if bound > self.deepest { bound } else { self.deepest };
         answer.separation = -self.tool.radius() - self.deepest;
