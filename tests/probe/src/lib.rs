@@ -249,7 +249,8 @@ fn contacts(
     options: &Options,
     machine: &impl Machine,
 ) -> Result<[u32; ANSWER_WORDS], Fault> {
-    let mut contacts = Contacts::<8>::new();
+    // A constant is copied into its place once: a call's result may be made elsewhere on the stack first.
+    let mut contacts = const { Contacts::<8>::new() };
     clocked(machine, || query.contacts(rows, tool, MARGIN, options, &mut contacts))
 }
 
