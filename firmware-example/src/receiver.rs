@@ -125,6 +125,11 @@ impl Receiver {
         false
     }
 
+    /// Registers the surface anew: the next whole frame may be anywhere within reach. Only an operator decides that.
+    pub const fn register(&mut self) {
+        self.assembler.register();
+    }
+
     /// The events on the bus since the start.
     #[must_use]
     pub const fn counters(&self) -> &Counters {

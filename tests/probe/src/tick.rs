@@ -8,6 +8,8 @@ pub const SKIP: u32 = 1;
 pub const BYTES: u32 = 2;
 /// Ticks to run: their number. Each is answered by [`ANSWER_WORDS`].
 pub const TICK: u32 = 3;
+/// The next frame is a new registration of the surface.
+pub const REGISTER: u32 = 4;
 /// Words of an answer: the tick's counts on the clock, its query's node and triangle tests, and the epoch of the frame
 /// searched, or 0 without an answer.
 pub const ANSWER_WORDS: usize = 4;

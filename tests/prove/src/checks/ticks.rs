@@ -16,7 +16,7 @@ use dibs_nostd::{
 use dibs_tests::deform::{Deformation, unit};
 use fastrand::Rng;
 use glam::{Quat, Vec3};
-use probe::tick::{ANSWER_WORDS, BYTES, END, SKIP, TICK};
+use probe::tick::{ANSWER_WORDS, BYTES, END, REGISTER, SKIP, TICK};
 use rayon::prelude::*;
 use xtask::firmware::{HEART_STRETCH, Surface};
 use xtask::process::run;
@@ -54,7 +54,7 @@ pub const CHECK: Check = Check {
 const TRIES: usize = 40;
 const STEPS: usize = 40;
 
-/// Ticks between two frames: enough that no limit on speed refuses any frame.
+/// Ticks between two frames. They are far apart, beyond any recovery, so each is a registration.
 const PAUSE: u32 = 1 << 20;
 
 /// Ticks on each published frame, the first with a warm start from the frame before.
@@ -229,7 +229,7 @@ impl Script {
     /// Adds a frame that is published right before its tick, and a tick between its packets.
     fn frame(&mut self, id: FrameId, frame: &Frame) -> Result<()> {
         let begins = id.epoch * PAUSE + frame.tick - 1;
-        self.words.extend([SKIP, begins - self.now]);
+        self.words.extend([SKIP, begins - self.now, REGISTER]);
         let (mut packet, mut line) = ([0; MTU], [0; framed_bytes(MTU)]);
         let mut lines = Vec::new();
         let mut beat = [0; 64];

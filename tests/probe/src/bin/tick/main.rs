@@ -18,7 +18,7 @@ use controller::{BusStatus, Control, Receiver, Trust};
 use cortex_m_rt::entry;
 use dibs_nostd::Ticks;
 use exit::exit;
-use probe::tick::{ANSWER_WORDS, BYTES, END, SKIP, TICK};
+use probe::tick::{ANSWER_WORDS, BYTES, END, REGISTER, SKIP, TICK};
 
 static FRAMES: Surface = Surface::new();
 static BUS: BusStatus = BusStatus::new();
@@ -51,6 +51,7 @@ fn run(tree: &'static surface::Tree) -> Option<()> {
                 let padding = count.wrapping_neg() as usize % 4;
                 script.read([0; 3].get_mut(..padding)?)?;
             }
+            REGISTER => receiver.register(),
             TICK => {
                 for _ in 0..word(&mut script)? {
                     for word in tick(&mut control) {
