@@ -61,8 +61,7 @@ void control_init(void) {
     before = instrument(0);
 }
 
-static void write(const dibs_proximity *found, float *moved,
-                     tick_record *record) {
+static void write(const dibs_proximity *found, tick_record *record) {
     record->answered = 1;
     record->separation = found->separation;
     record->lower = found->lower;
@@ -74,7 +73,8 @@ static void write(const dibs_proximity *found, float *moved,
 }
 
 /* The closest pair on the frame published last. What the fail-safe machine has to know goes to `seen`. */
-static dibs_code ask(const dibs_tool *tool, dibs_observation *seen, dibs_proximity *found, tick_record *record) {
+static dibs_code ask(const dibs_tool *tool, dibs_observation *seen, dibs_proximity *found, float *moved,
+                     tick_record *record) {
     /* The fail-safe machine decides how old a surface may be. */
     const dibs_code held = dibs_reader_latest(reader, tick, DIBS_UNLIMITED, frame, &seen->age);
     if (held != DIBS_CODE_OK) {
