@@ -12,6 +12,7 @@ use controller::{MTU, TICK_RATE};
 use dibs_build::faults::{Fault, FaultyLine};
 use dibs_build::stream::{SendError, Sender, Settings, SurfaceOrder};
 use dibs_build::transport::Line;
+use dibs_nostd::failsafe::State;
 use glam::Vec3;
 
 use super::bus::Bus;
@@ -141,6 +142,7 @@ fn send_all(
     let interval = (TICK_RATE as f32 / frame_rate) as u32;
     let rate = if faults.is_some() { Plan::RATE } else { 0.0 };
     let mut silence = faults.map(Plan::silence_at);
+    let mut is_recovering = false;
     // A board that starts has no network yet: the emulator would report the first packet as one that it cannot deliver.
     while link.now() == 0 {
         if link.is_over() {
@@ -156,8 +158,8 @@ fn send_all(
     }
     let mut start = link.now();
     for positions in frames.iter().cycle() {
-        // The last frame before the silence and the first after it have no faults, so that only the silence is
-        // measured.
+        // Before the silence and after it no frame has faults until the controller is nominal, so that only the silence
+        // is measured: faults keep the surface from being fresh for as long as that takes.
         if silence.is_some_and(|at| link.now() >= at) {
             sender.transport().set_rate(0.0);
         }
@@ -189,8 +191,15 @@ fn send_all(
             start = link.now();
             continue;
         }
-        sender.transport().set_rate(rate);
-        if silence.take_if(|at| link.now() >= *at).is_some() {
+        let nominal = State::Nominal as u8 + 1;
+        let is_nominal = sender.status().is_some_and(|status| status.safety == nominal);
+        is_recovering &= !is_nominal;
+        let is_due = silence.is_some_and(|at| link.now() >= at);
+        if !is_due && !is_recovering {
+            sender.transport().set_rate(rate);
+        }
+        if is_due && is_nominal {
+            (silence, is_recovering) = (None, true);
             let line = sender.transport();
             line.set_rate(0.0);
             line.cut(true);
