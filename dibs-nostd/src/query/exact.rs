@@ -1,7 +1,7 @@
-//! The side of a point in f64, where f32 cannot tell.
+//! The side of a point by the triangles of a tie.
 //!
-//! The triangles of a tie are put in order by their distances in f64. Of those that are the closest, each has a feature
-//! with the closest point, and the feature decides the side. The side is certain where all agree.
+//! The triangles are put in order by their distances. Of those that may be the closest, each has a feature with the
+//! closest point, and the feature decides the side. The side is certain where all agree.
 //!
 //! # The side at a feature
 //! Seen from the closest point, the surface is a cone, and the point is on the side of the cone's element that makes the
@@ -15,41 +15,27 @@
 //! A point on an edge that is nearly a vertex may be taken for the vertex: then the edge's angle is 90 degrees, and no
 //! other's is clearly less. One in a face is at a sine of 1 from it, and the edge has the face's side.
 
-use glam::{DVec3, Vec3};
-
 use super::NoSide;
 use super::normal::{Feature, MAX_RING, NORMAL, after, turned};
+use super::precision::Precision;
+use super::side::OnAxis;
 use crate::math::sqrt::sqrt;
 use crate::unavailable::QueryError;
 use crate::{Index, Tree, VertexTable};
-
-/// Rounding of a few operations, relative to the size of their terms.
-const ROUNDING: f64 = 1e-15;
-
-/// Square of the sine below which two edges span no plane.
-const FLAT: f64 = 1e-12;
-
-/// More than the rounding of the square of a sine, if no triangle is flat.
-const SINES: f64 = 1.0 + 1e-8;
-
-/// Node tests that take as long as the distance to a triangle, where f64 is software.
-const DISTANCE_COST: u32 = 24;
-
-/// The same for a triangle around a vertex.
-const RING_COST: u32 = 12;
 
 /// Above or not, where that is certain.
 pub(super) type Above = Result<bool, NoSide>;
 
 /// A point whose side is asked for, and the closest triangles so far.
-pub(super) struct Exact<'s, 't, I, V: ?Sized> {
+pub(super) struct Exact<'s, 't, I, V: ?Sized, P: Precision> {
     tree: &'s Tree<'t, I>,
     vertices: &'s V,
-    start: DVec3,
-    along: DVec3,
+    at: &'s OnAxis,
+    start: P::Vector,
+    along: P::Vector,
     /// Square of the least distance; its error.
-    least: f64,
-    doubt: f64,
+    least: P,
+    doubt: P,
     above: Above,
     /// The vertex asked for last, by the least row of a triangle around it, and its answer.
     vertex: Option<(u32, u32, Above)>,
@@ -58,33 +44,35 @@ pub(super) struct Exact<'s, 't, I, V: ?Sized> {
     pub work: u32,
 }
 
-/// A triangle's plane as seen from the point.
+/// A triangle as seen from the point.
 #[derive(Clone, Copy)]
-struct Facet {
-    normal: DVec3,
+struct Seen<P: Precision> {
+    /// The vectors from the point to the corners.
+    to: [P::Vector; 3],
+    /// Edge `e` leads from corner `e` to the next one.
+    edges: [P::Vector; 3],
+    normal: P::Vector,
     /// Square of the normal's length.
-    square: f64,
-    /// Height of the point above the plane, times the normal's length; its error, infinite for a flat triangle.
-    height: f64,
-    doubt: f64,
+    square: P,
+    /// Height of the point above the plane, times the normal's length; its error.
+    height: P,
+    doubt: P,
+    is_flat: bool,
+    /// The size of the terms whose sum `to` is.
+    far: P,
 }
 
-impl<'s, 't, I: Index, V: VertexTable + ?Sized> Exact<'s, 't, I, V> {
-    /// For the point `start + along`, with no more node tests than `left`.
-    pub fn new(
-        tree: &'s Tree<'t, I>,
-        vertices: &'s V,
-        start: Vec3,
-        along: DVec3,
-        left: u32,
-    ) -> Self {
+impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V, P> {
+    /// For a point, with no more node tests than `left`.
+    pub fn new(tree: &'s Tree<'t, I>, vertices: &'s V, at: &'s OnAxis, left: u32) -> Self {
         Self {
             tree,
             vertices,
-            start: start.as_dvec3(),
-            along,
-            least: f64::INFINITY,
-            doubt: 0.0,
+            at,
+            start: P::vector(at.start),
+            along: P::vector(at.span) * P::from(at.parameter),
+            least: P::from(f32::INFINITY),
+            doubt: P::from(0.0),
             above: Err(NoSide::BelowAccuracy),
             vertex: None,
             left,
@@ -92,9 +80,12 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized> Exact<'s, 't, I, V> {
         }
     }
 
+    /// The same in f64, with the rest of the work.
+    pub fn finer(&self) -> Exact<'s, 't, I, V, f64> {
+        Exact::new(self.tree, self.vertices, self.at, self.left)
+    }
+
     /// Whether the point is above the closest of the triangles.
-    #[cold]
-    #[inline(never)]
     pub fn of(&mut self, rows: impl Iterator<Item = u32>) -> Result<Above, QueryError> {
         for row in rows {
             if !self.add(row)? {
@@ -118,22 +109,26 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized> Exact<'s, 't, I, V> {
         is_enough
     }
 
-    /// Adds a triangle. Returns whether the tests left were enough.
+    /// Adds a triangle. Returns whether it was of use to go on.
+    #[cold]
+    #[inline(never)]
     pub fn add(&mut self, row: u32) -> Result<bool, QueryError> {
-        if !self.spend(DISTANCE_COST) {
+        if !self.spend(P::DISTANCE_COST) {
             self.above = Err(NoSide::CutShort);
             return Ok(false);
         }
-        let corners = self.corners(row)?;
-        let facet = self.facet(&corners);
-        let (square, feature) = self.closest(&corners, &facet);
-        let tilt = if feature == Feature::Face { facet.tilt(&corners) } else { 1.0 };
-        let size = (corners[0] - self.start).abs().element_sum() + self.along.abs().element_sum();
-        let doubt = 8.0 * ROUNDING * (square * tilt + size * root(square));
+        let seen = self.see(row)?;
+        if seen.is_flat && P::IS_FLAT_UNCLEAR {
+            self.above = Err(NoSide::BelowAccuracy);
+            return Ok(false);
+        }
+        let (square, feature) = seen.closest();
+        let tilt = if feature == Feature::Face { seen.tilt() } else { P::from(1.0) };
+        let doubt = P::from(8.0) * P::ROUNDING * (square * tilt + seen.far * square.root());
         if !(square - doubt <= self.least + self.doubt) {
             return Ok(true);
         }
-        let above = self.above(row, &corners, feature, &facet)?;
+        let above = self.above(row, feature, &seen)?;
         if square + doubt < self.least - self.doubt {
             self.above = above;
         } else if self.above != above {
@@ -150,86 +145,33 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized> Exact<'s, 't, I, V> {
         Ok(true)
     }
 
-    fn corners(&self, row: u32) -> Result<[DVec3; 3], QueryError> {
-        let [a, b, c] = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
-        let position = |row| {
-            let position = self.vertices.position(row).ok_or(QueryError::Corrupt { row })?;
-            Ok(position.as_dvec3())
-        };
-        Ok([position(a)?, position(b)?, position(c)?])
+    /// Whether the point is above a triangle's plane, where that is certain.
+    #[inline(always)]
+    pub fn is_above_plane(&self, row: u32) -> Result<Option<bool>, QueryError> {
+        Ok(self.see(row)?.is_above())
     }
 
-    /// From the point to another one.
-    fn to(&self, other: DVec3) -> DVec3 {
-        (other - self.start) - self.along
-    }
-
-    fn facet(&self, &[a, b, c]: &[DVec3; 3]) -> Facet {
-        let (ab, ac, to_a) = (b - a, c - a, self.to(a));
-        let normal = ab.cross(ac);
-        let square = normal.length_squared();
-        let size = |v: DVec3| v.abs().element_sum();
-        let far = size(a - self.start) + size(self.along);
-        let is_clear = square > FLAT * ab.length_squared() * ac.length_squared();
-        let doubt = 4.0 * ROUNDING * (size(ab) * size(ac) * size(to_a) + size(normal) * far);
-        Facet {
-            normal,
-            square,
-            height: -normal.dot(to_a),
-            doubt: if is_clear { doubt } else { f64::INFINITY },
-        }
-    }
-
-    /// The square of the distance to a triangle, and the feature with its closest point. A flat triangle is its edges.
-    fn closest(&self, corners: &[DVec3; 3], facet: &Facet) -> (f64, Feature) {
-        let [a, b, c] = *corners;
-        let (mut least, mut closest) = (f64::INFINITY, Feature::Face);
-        let mut is_over = !facet.is_flat();
-        for (edge, from, to) in [(0, a, b), (1, b, c), (2, c, a)] {
-            let (along, to_from) = (to - from, self.to(from));
-            if !facet.is_flat() && facet.normal.dot(to_from.cross(along)) > 0.0 {
-                continue;
-            }
-            is_over = false;
-            let whole = along.length_squared();
-            let part = -to_from.dot(along);
-            let (square, feature) = if !(part > 0.0) {
-                (to_from.length_squared(), Feature::Vertex(edge))
-            } else if part >= whole {
-                (self.to(to).length_squared(), Feature::Vertex(after(edge)))
-            } else {
-                (to_from.cross(along).length_squared() / whole, Feature::Edge(edge))
-            };
-            if square < least {
-                (least, closest) = (square, feature);
-            }
-        }
-        if is_over {
-            (facet.height * facet.height / facet.square, Feature::Face)
-        } else {
-            (least, closest)
-        }
+    #[inline(always)] // A tick asks for the planes alone.
+    fn see(&self, row: u32) -> Result<Seen<P>, QueryError> {
+        let rows = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
+        let [a, b, c] = rows.map(|row| self.vertices.position(row).map(P::vector));
+        let corrupt = QueryError::Corrupt { row };
+        let corners = [a.ok_or(corrupt)?, b.ok_or(corrupt)?, c.ok_or(corrupt)?];
+        Ok(Seen::new(corners, self.start, self.along))
     }
 
     /// Whether the point is above a triangle's feature.
-    fn above(
-        &mut self,
-        row: u32,
-        corners: &[DVec3; 3],
-        feature: Feature,
-        facet: &Facet,
-    ) -> Result<Above, QueryError> {
+    fn above(&mut self, row: u32, feature: Feature, seen: &Seen<P>) -> Result<Above, QueryError> {
         match feature {
-            Feature::Face => Ok(facet.is_above().ok_or(facet.reason())),
+            Feature::Face => Ok(seen.is_above().ok_or(NoSide::BelowAccuracy)),
             Feature::Edge(edge) => {
                 let Some((other, _)) = self.tree.across(row, edge) else {
                     return Ok(Err(NoSide::OpenBoundary));
                 };
-                if !self.spend(RING_COST) {
+                if !self.spend(P::RING_COST) {
                     return Ok(Err(NoSide::CutShort));
                 }
-                let other = self.corners(other)?;
-                Ok(facet.above_edge(&self.facet(&other)))
+                Ok(seen.above_edge(&self.see(other)?))
             }
             Feature::Vertex(corner) => {
                 let around = match self.first_around(row, corner) {
@@ -241,8 +183,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized> Exact<'s, 't, I, V> {
                 match self.vertex {
                     Some((same, first, above)) if same == vertex && first == around => Ok(above),
                     _ => {
-                        let above = self.above_vertex(row, corner, corners, facet)?;
-                        let above = self.unless_cut(above, row, corner, corners);
+                        let above = self.above_vertex(row, corner, seen)?;
+                        let above = self.unless_cut(above, row, corner, vertex);
                         self.vertex = Some((vertex, around, above));
                         Ok(above)
                     }
@@ -253,9 +195,9 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized> Exact<'s, 't, I, V> {
 
     /// Around a vertex whose triangles cut each other the angle-weighted pseudonormal (f32, as far as that is clear) may
     /// differ from the nearest triangle. Then no side is certain.
-    fn unless_cut(&self, above: Above, row: u32, corner: u32, corners: &[DVec3; 3]) -> Above {
-        let [centre, ..] = turned(*corners, corner);
-        let towards = -self.to(centre).as_vec3();
+    fn unless_cut(&self, above: Above, row: u32, corner: u32, vertex: u32) -> Above {
+        let Some(centre) = self.vertices.position(vertex) else { return above };
+        let towards = (self.at.start - centre) + self.at.span * self.at.parameter;
         let normal = Feature::Vertex(corner).pseudonormal(self.tree, self.vertices, row);
         let Ok(normal) = normal else { return above };
         let height = towards.dot(normal.vector);
@@ -287,35 +229,36 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized> Exact<'s, 't, I, V> {
         &mut self,
         first: u32,
         mut corner: u32,
-        corners: &[DVec3; 3],
-        facet: &Facet,
+        seen: &Seen<P>,
     ) -> Result<Above, QueryError> {
-        let (mut row, mut corners, mut facet) = (first, *corners, *facet);
+        let (mut row, mut seen) = (first, *seen);
         // The cosine's square, with its sign, times the square of the distance.
-        let (mut largest, mut above) = (f64::NEG_INFINITY, Err(NoSide::Degenerate));
+        let mut largest = P::from(f32::NEG_INFINITY);
+        let mut above = Err(NoSide::Degenerate);
         for _ in 0..MAX_RING {
-            let [centre, end, _] = turned(corners, corner);
             let Some((next, back)) = self.tree.across(row, corner) else {
                 return Ok(Err(NoSide::OpenBoundary));
             };
-            if !self.spend(RING_COST) {
+            if !self.spend(P::RING_COST) {
                 return Ok(Err(NoSide::CutShort));
             }
-            let other = self.corners(next)?;
-            let next_facet = self.facet(&other);
-            let (edge, towards) = (end - centre, -self.to(centre));
-            let cosine = towards.dot(edge);
-            let cosine = cosine * cosine.abs() / edge.length_squared();
-            if cosine.is_nan() {
+            let other = self.see(next)?;
+            let [edge, ..] = turned(seen.edges, corner);
+            let [to_centre, ..] = turned(seen.to, corner);
+            let cosine = -P::dot(to_centre, edge);
+            let cosine = cosine * cosine.absolute() / P::dot(edge, edge);
+            #[allow(clippy::eq_op)] // Not a number.
+            if cosine != cosine {
                 return Ok(Err(NoSide::Degenerate));
             }
-            let far = (centre - self.start).abs().element_sum() + self.along.abs().element_sum();
-            let size = towards.abs().element_sum();
-            let doubt = 8.0 * ROUNDING * size * (size + far);
+            let size = P::size(to_centre);
+            // Its coordinates are differences of no more than the size and the axis.
+            let far = P::from(2.0) * (size + P::size(self.along));
+            let doubt = P::from(8.0) * P::ROUNDING * size * far;
             if cosine > largest + doubt {
-                above = facet.above_edge(&next_facet);
+                above = seen.above_edge(&other);
             } else if cosine >= largest - doubt {
-                let this = facet.above_edge(&next_facet);
+                let this = seen.above_edge(&other);
                 above = if above == this { above } else { Err(NoSide::BelowAccuracy) };
             }
             if cosine > largest {
@@ -324,35 +267,92 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized> Exact<'s, 't, I, V> {
             if next == first {
                 return Ok(above);
             }
-            (row, corner, corners, facet) = (next, after(back), other, next_facet);
+            (row, corner, seen) = (next, after(back), other);
         }
         Ok(Err(NoSide::Degenerate))
     }
 }
 
-impl Facet {
-    fn is_flat(&self) -> bool {
-        !(self.doubt < f64::INFINITY)
+impl<P: Precision> Seen<P> {
+    /// A triangle from the point `start + along`.
+    #[inline(always)]
+    fn new(corners: [P::Vector; 3], start: P::Vector, along: P::Vector) -> Self {
+        let [a, b, c] = corners;
+        let to = corners.map(|corner| (corner - start) - along);
+        let edges = [b - a, c - b, a - c];
+        let [ab, _, ca] = edges;
+        let normal = P::cross(ca, ab);
+        let square = P::dot(normal, normal);
+        let limit = P::FLAT * P::dot(ab, ab) * P::dot(ca, ca);
+        let far = P::size(a - start) + P::size(along);
+        let terms = P::size(ab) * P::size(ca) * P::size(to[0]) + P::size(normal) * far;
+        Self {
+            to,
+            edges,
+            normal,
+            square,
+            height: -P::dot(normal, to[0]),
+            doubt: P::from(4.0) * P::ROUNDING * terms,
+            is_flat: !(square > limit && square > P::TINY),
+            far,
+        }
+    }
+
+    /// The square of the distance, and the feature with the closest point. A flat triangle is its edges.
+    fn closest(&self) -> (P, Feature) {
+        let (mut least, mut closest) = (P::from(f32::INFINITY), Feature::Face);
+        let zero = P::from(0.0);
+        let mut is_over = !self.is_flat;
+        for (edge, next) in [(0, 1), (1, 2), (2, 0)] {
+            let (along, from, to) = (self.edges[edge], self.to[edge], self.to[next]);
+            let across = P::cross(from, along);
+            if !self.is_flat && P::dot(self.normal, across) > zero {
+                continue;
+            }
+            is_over = false;
+            let (whole, part) = (P::dot(along, along), -P::dot(from, along));
+            let (square, feature) = if !(part > zero) {
+                (P::dot(from, from), Feature::Vertex(edge as u32))
+            } else if part >= whole {
+                (P::dot(to, to), Feature::Vertex(next as u32))
+            } else {
+                (P::dot(across, across) / whole, Feature::Edge(edge as u32))
+            };
+            if square < least {
+                (least, closest) = (square, feature);
+            }
+        }
+        if is_over {
+            (self.height * self.height / self.square, Feature::Face)
+        } else {
+            (least, closest)
+        }
     }
 
     const fn reason(&self) -> NoSide {
-        if self.doubt < f64::INFINITY { NoSide::BelowAccuracy } else { NoSide::Degenerate }
+        if self.is_flat { NoSide::Degenerate } else { NoSide::BelowAccuracy }
     }
 
     /// How much rounding tilts the plane.
-    fn tilt(&self, &[a, b, c]: &[DVec3; 3]) -> f64 {
-        root((b - a).length_squared() / self.square * (c - a).length_squared())
+    fn tilt(&self) -> P {
+        let [ab, _, ca] = self.edges;
+        (P::dot(ab, ab) / self.square * P::dot(ca, ca)).root()
     }
 
+    /// Whether the point is above the plane. The error covers a flat triangle, too.
+    #[inline(always)]
     fn is_above(&self) -> Option<bool> {
-        (self.height.abs() > self.doubt).then_some(self.height > 0.0)
+        let is_clear = self.height.absolute() > self.doubt;
+        is_clear.then_some(self.height > P::from(0.0))
     }
 
     /// Whether the point is at a larger sine from this plane than from another one, whatever the rounding.
     fn has_larger_sine_than(&self, other: &Self) -> bool {
-        let least = self.height.abs() - self.doubt;
-        let most = other.height.abs() + other.doubt;
-        least > 0.0 && least * least * other.square > SINES * (most * most * self.square)
+        let least = self.height.absolute() - self.doubt;
+        let most = other.height.absolute() + other.doubt;
+        let (least, most) = (least * least / self.square, most * most / other.square);
+        let are_clear = !self.is_flat && !other.is_flat && self.is_above().is_some();
+        are_clear && least > P::SINES * most
     }
 
     /// Whether the point is above the edge of this triangle and another one.
@@ -367,12 +367,7 @@ impl Facet {
         {
             Ok(above)
         } else {
-            Err(if self.is_flat() { self.reason() } else { other.reason() })
+            Err(if self.is_flat { self.reason() } else { other.reason() })
         }
     }
-}
-
-/// The square root, within 1e-6 of its size.
-fn root(square: f64) -> f64 {
-    f64::from(sqrt(square as f32))
 }

@@ -14,6 +14,7 @@ mod normal;
 mod options;
 mod passed;
 mod plane;
+mod precision;
 mod proximity;
 mod search;
 mod separation;
@@ -132,9 +133,11 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         vertices: &V,
         tool: &T,
         options: &Options,
-        found: Proximity,
+        mut found: Proximity,
     ) -> Result<Proximity, QueryError> {
         self.triangle = found.triangle.or(self.triangle);
-        signed(&self.tree, &mut self.stack, vertices, tool, options, found, (&mut self.ties, None))
+        let memory = (&mut self.ties, None);
+        signed(&self.tree, &mut self.stack, vertices, tool, options, &mut found, memory)?;
+        Ok(found)
     }
 }

@@ -32,42 +32,40 @@ pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     vertices: &V,
     tool: &T,
     options: &Options,
-    mut found: Proximity,
+    found: &mut Proximity,
     memory: (&mut Ties, Option<&mut Known>),
-) -> Result<Proximity, QueryError> {
+) -> Result<(), QueryError> {
     let asked = Asked { tree, vertices, tool, options };
-    let mut found = if !options.is_signed {
+    if !options.is_signed {
         found.side = Side::Undefined(NoSide::NotAsked);
-        found
     } else if !tree.has_adjacency() {
         found.side = Side::Undefined(NoSide::NoAdjacency);
-        found
     } else if tree.header().other_roots > 0 {
-        solids::signed(&asked, stack, &found, memory)?
+        solids::signed(&asked, stack, found, memory)?;
     } else {
-        asked.signed(stack, found, memory, RootSet::ALL)?
-    };
+        asked.signed(stack, found, memory, RootSet::ALL)?;
+    }
     found.coverage = options.coverage(vertices);
     found.accuracy = sum_up(found.accuracy, vertices.position_error());
-    Ok(found)
+    Ok(())
 }
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
-    /// The signed answer by the shells of some roots, of which `found` is the closest pair.
+    /// Makes `found`, the closest pair of the shells of some roots, their signed answer.
     #[inline(always)]
     pub fn signed(
         &self,
         stack: &mut [Waiting],
-        mut found: Proximity,
+        found: &mut Proximity,
         (ties, known): (&mut Ties, Option<&mut Known>),
         roots: RootSet,
-    ) -> Result<Proximity, QueryError> {
+    ) -> Result<(), QueryError> {
         let &Self { tree, vertices, tool, options } = self;
         // No triangle is closer than one that is touched, so its side is certain without the rest of the budget.
         let is_touching = found.triangle.is_some() && found.axis_distance <= found.accuracy;
         if found.is_cut_short() && !is_touching {
             found.side = Side::Undefined(NoSide::CutShort);
-            return Ok(found);
+            return Ok(());
         }
         if roots != RootSet::ALL {
             ties.keep(|row| roots.contains(tree.root_of(row)));
@@ -77,11 +75,11 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
             let on_axis = tool.axis_point(found.axis_parameter);
             let is_many = ties.are_lost() && !is_touching;
             let many = is_many
-                .then(|| side::of_many(roots, tree, stack, vertices, &mut found, on_axis, options))
+                .then(|| side::of_many(roots, tree, stack, vertices, found, on_axis, options))
                 .transpose()?;
             let point = OnAxis::new(tool, found.axis_parameter);
             let left = options.budget.node_tests.saturating_sub(found.node_tests);
-            let at = side::of_point(tree, vertices, &found, &point, ties, many, left)?;
+            let at = side::of_point(tree, vertices, found, &point, ties, many, left)?;
             found.node_tests = found.node_tests.saturating_add(at.work);
             found.side = at.side;
             if at.outward != Vec3::ZERO {
@@ -100,12 +98,14 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
                     found.separation = -found.axis_distance - tool.radius();
                     found.lower = found.separation;
                 }
-                return Ok(found);
+                return Ok(());
             }
         }
         let (known, around) = known.map(|known| known.now(roots)).unzip();
         let mut depth =
-            Depth::new(tree, stack, vertices, tool, options, &found, around, roots, ties);
-        depth.run(known)
+            Depth::new(tree, stack, vertices, tool, options, found, around, roots, ties);
+        let answer = depth.run(known)?;
+        *found = answer;
+        Ok(())
     }
 }

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use super::exact::{Above, Exact};
 use super::normal::{Feature, NORMAL, NoNormal, corners};
@@ -80,12 +80,6 @@ const AWAY: f32 = 1e-3;
 /// Within this many accuracies the difference of two points gives a poor direction, so the pseudonormal is used.
 const NEAR: f32 = 8.0;
 
-/// Rounding of a height above a plane: 12 `u` of the product of three lengths, which their sums of coordinates bound.
-const HEIGHT: f32 = 16.0 / 16_777_216.0;
-
-/// Rounding of the vector between two points, relative to the sizes of its terms.
-const VECTOR: f32 = 4.0 / 16_777_216.0;
-
 /// A point's side, and the unit vector that leads out; zero where no normal is known.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PointSide {
@@ -98,9 +92,9 @@ pub(super) struct PointSide {
 /// A point of an axis. Its parts are kept apart, so that far from the origin their sum is not rounded.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OnAxis {
-    start: Vec3,
-    span: Vec3,
-    parameter: f32,
+    pub start: Vec3,
+    pub span: Vec3,
+    pub parameter: f32,
     point: Vec3,
 }
 
@@ -108,27 +102,6 @@ impl OnAxis {
     pub fn new(tool: &impl Tool, parameter: f32) -> Self {
         let (start, span) = (tool.axis_start(), tool.axis_span());
         Self { start, span, parameter, point: tool.axis_point(parameter) }
-    }
-
-    /// Whether the point is above a triangle's plane, if f32 can tell.
-    #[inline(always)]
-    fn is_above(&self, &[a, b, c]: &[Vec3; 3]) -> Option<bool> {
-        let (ab, ac) = (b - a, c - a);
-        let normal = ab.cross(ac);
-        let (from_a, along) = (self.start - a, self.span * self.parameter);
-        let towards = from_a + along;
-        let height = normal.dot(towards);
-        let size = |v: Vec3| v.x.abs() + v.y.abs() + v.z.abs();
-        let doubt = HEIGHT * (size(ab) * size(ac) * size(towards))
-            + VECTOR * (size(from_a) + size(along)) * size(normal);
-        // Written so that NaN is not clear.
-        if height > doubt {
-            Some(true)
-        } else if height < -doubt {
-            Some(false)
-        } else {
-            None
-        }
     }
 }
 
@@ -174,25 +147,16 @@ pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
     if !(distance > 2.0 * pair.accuracy) {
         return undefined(NoSide::BelowAccuracy, 0);
     }
-    let mut work = 0;
-    let is_above = match clearly_above(tree, vertices, pair, at, ties)? {
-        Some(is_above) => is_above,
-        None => {
-            let along = at.span.as_dvec3() * f64::from(at.parameter);
-            let mut exact = Exact::new(tree, vertices, at.start, along, left);
-            let above = match ties.deciding() {
-                Some(rows) => exact.of(rows)?,
-                None => many.unwrap_or(Err(NoSide::BelowAccuracy)),
-            };
-            work = exact.work;
-            match above {
-                Ok(is_above) => is_above,
-                Err(NoSide::OpenBoundary) if is_crowded(tree, ties) => {
-                    return undefined(NoSide::NonManifold, work);
-                }
-                Err(reason) => return undefined(reason, work),
+    let rough = Exact::<_, _, f32>::new(tree, vertices, at, left);
+    let (is_above, work) = match clearly_above(tree, pair, &rough, ties)? {
+        Some(is_above) => (is_above, 0),
+        None => match decided(rough, ties, many)? {
+            (Ok(is_above), work) => (is_above, work),
+            (Err(NoSide::OpenBoundary), work) if is_crowded(tree, ties) => {
+                return undefined(NoSide::NonManifold, work);
             }
-        }
+            (Err(reason), work) => return undefined(reason, work),
+        },
     };
     let towards = at.point - pair.point_on_surface;
     let apart = sqrt(towards.length_squared());
@@ -203,6 +167,27 @@ pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
         None => -towards / apart,
     };
     Ok(PointSide { side: if is_above { Side::Outside } else { Side::Inside }, outward, work })
+}
+
+/// Whether the point is above the closest of the triangles that decide, by f32 where it can tell, else by f64; and the node
+/// tests that this takes as long as.
+#[cold]
+#[inline(never)]
+fn decided<I: Index, V: VertexTable + ?Sized>(
+    mut rough: Exact<'_, '_, I, V, f32>,
+    ties: &Ties,
+    many: Option<Above>,
+) -> Result<(Above, u32), QueryError> {
+    let (Some(rows), Some(again)) = (ties.deciding(), ties.deciding()) else {
+        return Ok((many.unwrap_or(Err(NoSide::BelowAccuracy)), 0));
+    };
+    let above = rough.of(rows)?;
+    if above.is_ok() {
+        return Ok((above, rough.work));
+    }
+    let mut fine = rough.finer();
+    let above = fine.of(again)?;
+    Ok((above, rough.work.saturating_add(fine.work)))
 }
 
 /// The side of a point with too many ties to remember: searches them again, from the closest pair on.
@@ -226,15 +211,13 @@ pub(super) fn of_many<I: Index, V: VertexTable + ?Sized>(
         pair.node_tests = pair.node_tests.saturating_add(made.node_tests);
         pair.triangle_tests = pair.triangle_tests.saturating_add(made.triangle_tests);
     };
+    let rough = Exact::<_, _, f32>::new(tree, vertices, &at, 0);
     if tree.is_closed() {
         let search =
             Search::start_in(roots, tree, stack, vertices, &tool, &rest(pair), first, None)?;
         let mut side = None;
         let (is_clear, made) = search.each_tie(|row| {
-            let this = match corners(tree, vertices, row) {
-                Err(NoNormal::Corrupt(row)) => return Err(QueryError::Corrupt { row }),
-                corners => corners.ok().and_then(|corners| at.is_above(&corners)),
-            };
+            let this = rough.is_above_plane(row)?;
             Ok(this.is_some() && *side.get_or_insert(this) == this)
         })?;
         add(pair, made);
@@ -246,7 +229,7 @@ pub(super) fn of_many<I: Index, V: VertexTable + ?Sized>(
     }
     let options = rest(pair);
     let left = options.budget.node_tests / 2;
-    let mut exact = Exact::new(tree, vertices, point, DVec3::ZERO, left);
+    let mut exact = Exact::<_, _, f64>::new(tree, vertices, &at, left);
     let options = options.budget(options.budget.less(left, 0));
     let search = Search::start_in(roots, tree, stack, vertices, &tool, &options, first, None)?;
     let (is_complete, made) = search.each_tie(|row| exact.add(row))?;
@@ -259,19 +242,14 @@ pub(super) fn of_many<I: Index, V: VertexTable + ?Sized>(
 /// counts only if the closest point is not there.
 fn clearly_above<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
-    vertices: &V,
     pair: &Proximity,
-    at: &OnAxis,
+    rough: &Exact<'_, '_, I, V, f32>,
     ties: &Ties,
 ) -> Result<Option<bool>, QueryError> {
     let Some(rows) = ties.rows() else { return Ok(None) };
     let mut side = None;
     for row in rows {
-        let corners = match corners(tree, vertices, row) {
-            Err(NoNormal::Corrupt(row)) => return Err(QueryError::Corrupt { row }),
-            corners => corners.ok(),
-        };
-        let this = corners.and_then(|corners| at.is_above(&corners));
+        let this = rough.is_above_plane(row)?;
         if this.is_none() || *side.get_or_insert(this) != this {
             return Ok(None);
         }

@@ -13,21 +13,22 @@ use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, VertexTable};
 
-/// The signed answer, where `closest` is the closest pair of all shells.
+/// Makes `answer`, the closest pair of all shells, the signed answer.
 #[cold]
 #[inline(never)]
 pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     asked: &Asked<'_, '_, I, V, T>,
     stack: &mut [Waiting],
-    closest: &Proximity,
+    answer: &mut Proximity,
     memory: (&mut Ties, Option<&mut depth::Known>),
-) -> Result<Proximity, QueryError> {
+) -> Result<(), QueryError> {
     let &Asked { tree, vertices, tool, options } = asked;
+    let closest = *answer;
     let root = closest.triangle.map_or(0, |row| tree.root_of(row.0));
     let nearest = tree.shells_of(root);
-    let mut answer = asked.signed(stack, *closest, memory, nearest)?;
+    asked.signed(stack, answer, memory, nearest)?;
     if answer.side == Side::Undefined(NoSide::CutShort) {
-        return Ok(answer);
+        return Ok(());
     }
     let stretch = options.stretch.or_else(|| vertices.stretch());
     let stretch = stretch.map_or(tree.stretch(), |measured| measured.sigma());
@@ -44,11 +45,11 @@ pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
             continue;
         }
         let roots = tree.shells_of(solid);
-        let other = of_solid(asked, stack, &answer, roots)?;
-        answer = nearer(answer, other, tool);
+        let other = of_solid(asked, stack, answer, roots)?;
+        *answer = nearer(*answer, other, tool);
     }
     answer.axis_distance = closest.axis_distance;
-    Ok(answer)
+    Ok(())
 }
 
 /// The signed answer of one solid, with the budget less the tests of the answer so far.
@@ -64,8 +65,9 @@ fn of_solid<I: Index, V: VertexTable + ?Sized, T: Tool>(
     let mut ties = Ties::new();
     let memory = Some(&mut ties);
     let search = Search::start_in(roots, tree, stack, vertices, tool, &rest, None, memory)?;
-    let found = search.run::<WHOLE>(f32::INFINITY)?;
-    asked.signed(stack, found, (&mut ties, None), roots)
+    let mut found = search.run::<WHOLE>(f32::INFINITY)?;
+    asked.signed(stack, &mut found, (&mut ties, None), roots)?;
+    Ok(found)
 }
 
 /// The nearer of the answers of two solids, with the interval and the tests of both. The tool is inside if it is inside one

@@ -89,6 +89,10 @@ impl Ties {
     #[inline(always)]
     pub(super) fn push(&mut self, row: u32, square: f32, limit: f32) {
         self.limit = limit;
+        // Otherwise each of thousands as close would look for room anew.
+        if self.are_lost {
+            return;
+        }
         if self.count == MOST {
             self.drop_farther();
         }

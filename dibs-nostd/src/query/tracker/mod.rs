@@ -220,7 +220,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         let outcome = tick.run(moved)?;
         let best = tick.triangle();
         self.triangle = best.or(self.triangle);
-        let (closest, is_complete) = match outcome {
+        let (mut closest, is_complete) = match outcome {
             Outcome::Ended { lower, is_complete, restarted } => {
                 if restarted {
                     fallback = Some(Fallback::Jump);
@@ -233,7 +233,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
             }
         };
         let memory = (&mut self.ties, Some(&mut self.known));
-        let closest = signed(&self.tree, &mut self.stack, surface, tool, options, closest, memory)?;
+        signed(&self.tree, &mut self.stack, surface, tool, options, &mut closest, memory)?;
         self.behind = if is_complete { 0 } else { self.behind.saturating_add(moved) };
         let is_closed = self.tree.is_closed();
         self.last = travel.map(|travel| Last::new(tool, travel, &closest, is_closed));

@@ -1,0 +1,119 @@
+//! The numbers that a side is decided in: f32 first, and f64 where its rounding hides the side.
+
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+use glam::{DVec3, Vec3};
+
+use crate::math::sqrt::sqrt;
+
+/// A number, its vectors and its rounding.
+pub(super) trait Precision:
+    Copy
+    + PartialOrd
+    + From<f32>
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    type Vector: Copy
+        + Sub<Output = Self::Vector>
+        + Mul<Self, Output = Self::Vector>
+        + Neg<Output = Self::Vector>;
+
+    /// Rounding of a few operations, relative to the size of their terms.
+    const ROUNDING: Self;
+    /// Square of the sine below which two edges span no plane.
+    const FLAT: Self;
+    /// More than the rounding of the square of a sine, if no triangle is flat.
+    const SINES: Self;
+    /// Squares of areas below this lose their digits.
+    const TINY: Self;
+    /// Where a flat triangle hides the side, rather than being its edges.
+    const IS_FLAT_UNCLEAR: bool;
+    /// Node tests that take as long as the distance to a triangle.
+    const DISTANCE_COST: u32;
+    /// The same for a triangle around a vertex.
+    const RING_COST: u32;
+
+    fn vector(vector: Vec3) -> Self::Vector;
+    fn cross(one: Self::Vector, other: Self::Vector) -> Self::Vector;
+    fn dot(one: Self::Vector, other: Self::Vector) -> Self;
+    /// The sum of the coordinates' absolute values, at least the length.
+    fn size(vector: Self::Vector) -> Self;
+    fn absolute(self) -> Self;
+    /// The square root, within 1e-6 of its size.
+    fn root(self) -> Self;
+}
+
+impl Precision for f32 {
+    type Vector = Vec3;
+    const ROUNDING: Self = 5e-7;
+    const FLAT: Self = 1e-4;
+    const SINES: Self = 1.0 + 1e-3;
+    const TINY: Self = 1e-30;
+    const IS_FLAT_UNCLEAR: bool = true;
+    const DISTANCE_COST: u32 = 4;
+    const RING_COST: u32 = 3;
+
+    fn vector(vector: Vec3) -> Vec3 {
+        vector
+    }
+
+    fn cross(one: Vec3, other: Vec3) -> Vec3 {
+        one.cross(other)
+    }
+
+    fn dot(one: Vec3, other: Vec3) -> Self {
+        one.dot(other)
+    }
+
+    fn size(vector: Vec3) -> Self {
+        vector.abs().element_sum()
+    }
+
+    fn absolute(self) -> Self {
+        self.abs()
+    }
+
+    fn root(self) -> Self {
+        sqrt(self)
+    }
+}
+
+/// Most controllers have f64 in software only, where an operation takes 40 to 80 instructions.
+impl Precision for f64 {
+    type Vector = DVec3;
+    const ROUNDING: Self = 1e-15;
+    const FLAT: Self = 1e-12;
+    const SINES: Self = 1.0 + 1e-8;
+    const TINY: Self = 0.0;
+    const IS_FLAT_UNCLEAR: bool = false;
+    const DISTANCE_COST: u32 = 96;
+    const RING_COST: u32 = 48;
+
+    fn vector(vector: Vec3) -> DVec3 {
+        vector.as_dvec3()
+    }
+
+    fn cross(one: DVec3, other: DVec3) -> DVec3 {
+        one.cross(other)
+    }
+
+    fn dot(one: DVec3, other: DVec3) -> Self {
+        one.dot(other)
+    }
+
+    fn size(vector: DVec3) -> Self {
+        vector.abs().element_sum()
+    }
+
+    fn absolute(self) -> Self {
+        self.abs()
+    }
+
+    fn root(self) -> Self {
+        Self::from(sqrt(self as f32))
+    }
+}
