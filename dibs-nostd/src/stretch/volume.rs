@@ -1,16 +1,15 @@
 //! The volume that a closed surface encloses, whose sign tells a surface from its inside-out image.
 //!
 //! A surface can be turned inside out through a plane, slowly and within every limit on stretch, size and speed: only
-//! the sign of its volume shows it. The volume is the sum, over the triangles, of the signed volume of the tetrahedron
-//! that each spans with one point. A whole frame sums up all triangles; a partial one replaces those of the regions
-//! that it moved.
+//! the sign of its volume shows it. The volume is the sum, over the triangles, of the signed volume between each and its
+//! shadow on a plane (the divergence theorem for the field (0, 0, z)). A whole frame sums up all triangles; a partial one
+//! replaces those of the regions that it moved.
 
 use core::ops::Range;
 
 use glam::Vec3;
 
 use super::StretchError;
-use crate::math::sqrt::sqrt;
 use crate::surface::VertexTable;
 use crate::tree::{Index, Tree};
 
@@ -18,15 +17,15 @@ use crate::tree::{Index, Tree};
 /// of its vertices.
 const FLAT: f32 = 1.0 / 64.0;
 
-/// The least volume that has a sign, as a part of the cube around the surface: a surface that is flat at rest has none
-/// but its rounding.
-const LEAST: f32 = 1.0 / (1 << 20) as f32;
+/// The least volume that has a sign, as a part of the sum of its terms' sizes: a surface that is flat at rest has none but
+/// its rounding.
+const LEAST: f32 = 1.0 / 4096.0;
 
 /// The volume of the frame in work, in mm³, and of the published one.
 #[derive(Clone, Debug)]
 pub(super) struct Volume {
-    /// Square of the largest distance of a triangle's first corner from there.
-    far: f32,
+    /// The sum of the terms' sizes.
+    terms: f32,
     work: f32,
     published: f32,
     /// The volume at rest, or that of the first frame where the tree has no rest shape. 0 if not known, and as long as
@@ -39,8 +38,7 @@ impl Volume {
     ///
     /// Cost: a pass over the triangles, if the surface is closed and the tree has its rest shape.
     pub fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
-        let (work, published, reference, far) = (0.0, 0.0, 0.0, 0.0);
-        let mut volume = Self { far, work, published, reference };
+        let mut volume = Self { terms: 0.0, work: 0.0, published: 0.0, reference: 0.0 };
         let rest = Rest(tree);
         if tree.is_closed() && rest.position(0).is_some() {
             volume.add(tree, &rest, None::<&Rest<'_, '_, I>>, 0..tree.triangle_count());
@@ -51,7 +49,7 @@ impl Volume {
 
     /// A frame begins.
     pub const fn begin(&mut self, is_whole: bool) {
-        self.work = if is_whole { 0.0 } else { self.published };
+        (self.terms, self.work) = (0.0, if is_whole { 0.0 } else { self.published });
     }
 
     /// Adds triangles, in place of those of the surface `before` if there is one.
@@ -66,21 +64,20 @@ impl Volume {
             return;
         }
         // Near the surface, so that the sum rounds little.
-        let origin = tree.rest_position(0).unwrap_or_default();
-        let mut sum = 0.0;
-        for corners in rows.filter_map(|row| tree.triangle(row)) {
+        let height = tree.rest_position(0).unwrap_or_default().z;
+        let (mut sum, mut terms) = (0.0, 0.0);
+        let count = rows.end.saturating_sub(rows.start);
+        for corners in tree.triangles(rows.start, count).into_iter().flatten() {
             let Some(now) = at(surface, corners) else { continue };
-            let [first, ..] = now;
-            sum += six_volumes(now, origin);
-            let squared = first.distance_squared(origin);
-            if squared > self.far {
-                self.far = squared;
-            }
+            let mut six_volumes = six_volumes(now, height);
+            terms += six_volumes.abs();
             if let Some(then) = before.and_then(|before| at(before, corners)) {
-                sum -= six_volumes(then, origin);
+                six_volumes -= self::six_volumes(then, height);
             }
+            sum += six_volumes;
         }
         self.work += sum / 6.0;
+        self.terms += terms / 6.0;
     }
 
     /// Whether the frame in work is not inside out.
@@ -103,8 +100,7 @@ impl Volume {
 
     /// The volume of the frame in work; 0 if it is too small to have a sign.
     fn significant(&self) -> f32 {
-        let cube = self.far * sqrt(self.far);
-        if self.work.abs() > LEAST * cube { self.work } else { 0.0 }
+        if self.work.abs() > LEAST * self.terms { self.work } else { 0.0 }
     }
 }
 
@@ -125,7 +121,8 @@ fn at<V: VertexTable + ?Sized>(surface: &V, [a, b, c]: [u32; 3]) -> Option<[Vec3
     Some([surface.position(a)?, surface.position(b)?, surface.position(c)?])
 }
 
-/// Six times the signed volume of a tetrahedron.
-fn six_volumes([a, b, c]: [Vec3; 3], origin: Vec3) -> f32 {
-    (a - origin).dot((b - origin).cross(c - origin))
+/// Six times the signed volume between a triangle and its shadow on the horizontal plane at this height.
+fn six_volumes([a, b, c]: [Vec3; 3], height: f32) -> f32 {
+    let (ab, ac) = (b - a, c - a);
+    (a.z + b.z + c.z - 3.0 * height) * (ab.x * ac.y - ab.y * ac.x)
 }
