@@ -1,5 +1,5 @@
 //! Queries any tree that passes validation, with any floats as vertices, tool and options. The outcome is an error, or
-//! an answer whose interval is in order and whose tests are within the budget and the tree's number of records.
+//! an answer whose interval is in order and whose tests are within the budget and a bound by the tree's records.
 #![no_main]
 
 use std::sync::LazyLock;
@@ -13,9 +13,14 @@ use dibs_nostd::{
 use dibs_tests::tree_bytes::reseal;
 use libfuzzer_sys::fuzz_target;
 
-/// Most searches of a query: one for the closest pair, the others for the depth of an axis (`POINTS` in the core's
-/// `query/depth.rs`).
-const MOST_LOOKS: u32 = 28;
+/// Most points of an axis that a depth looks at (`LOOKS` in the core's `query/depth/mod.rs`), and the node tests that it may
+/// take in any tree (`LEAST_WORK`).
+const LOOKS: u32 = 27;
+const LEAST_WORK: u32 = 3_072;
+
+/// Node tests that the order of ties in f64 takes for a triangle, and for one around a vertex (`query/exact.rs`).
+const DISTANCE_COST: u32 = 24;
+const RING_COST: u32 = 12;
 
 /// A valid tree and its rows. They are built before the first input: on a busy machine they would use up its time
 /// limit.
@@ -97,20 +102,54 @@ fn ask(
     budget: Budget,
 ) {
     let tree = *query.tree();
-    let both = [query.closest(rows, tool, options), query.closest_wide(rows, tool, options)];
-    for answer in both.into_iter().flatten() {
-        // Tests of one search. A query makes one search, or many where the tool's axis crosses the surface.
-        let most = 3 * tree.node_count() + tree.triangle_count() + 1;
-        let is_depth =
-            answer.side == Side::Crossing || answer.side == Side::Undefined(NoSide::BelowAccuracy);
-        let looks = if is_depth { MOST_LOOKS } else { 1 };
-        assert!(answer.node_tests <= budget.node_tests.saturating_add(1).min(looks * most));
-        let most = tree.triangle_count() + 1;
-        assert!(answer.triangle_tests <= budget.triangle_tests.min(looks * most));
+    let plain = options.unsigned();
+    let answers = [
+        query.closest(rows, tool, options),
+        query.closest_wide(rows, tool, options),
+        query.closest(rows, tool, &plain),
+        query.closest_wide(rows, tool, &plain),
+    ];
+    for answer in answers.into_iter().flatten() {
+        let most = most(&tree, tool, answer.side);
+        assert!(answer.node_tests <= budget.node_tests.saturating_add(1).min(most.node_tests));
+        assert!(answer.triangle_tests <= budget.triangle_tests.min(most.triangle_tests));
         assert!(answer.lower <= answer.separation);
-        let is_signed = is_depth || answer.side == Side::Inside;
+        let is_signed = is_depth(tool, answer.side) || answer.side == Side::Inside;
         assert!(is_signed || answer.lower >= -tool.radius());
         assert!(answer.separation.is_finite() && answer.accuracy > 0.0);
         assert!(answer.corners.iter().all(|&corner| corner < tree.vertex_count()));
     }
+}
+
+/// Whether an answer with this side may have searched points of the axis for the deepest.
+fn is_depth(tool: &impl Tool, side: Side) -> bool {
+    let is_near = side == Side::Undefined(NoSide::BelowAccuracy);
+    matches!(side, Side::Inside | Side::Crossing) && tool.axis_length() > 0.0 || is_near
+}
+
+/// The most tests of an answer with this side, without a budget.
+fn most(tree: &Tree<'_, u16>, tool: &impl Tool, side: Side) -> Budget {
+    let (nodes, triangles) = (tree.node_count(), tree.triangle_count());
+    // The closest pair.
+    let search = 3 * nodes + triangles;
+    let mut most = Budget { node_tests: search + 1, triangle_tests: triangles + 1 };
+    if matches!(side, Side::Undefined(NoSide::NotAsked | NoSide::NoAdjacency)) {
+        return most;
+    }
+    // Too many ties to remember are searched again, once for f32 and once for f64. At most all triangles tie, each at a
+    // vertex.
+    let mut around = vec![0; tree.vertex_count() as usize];
+    let corners: Vec<_> = (0..triangles).filter_map(|row| tree.corners(TriangleRow(row))).collect();
+    corners.iter().flatten().for_each(|&vertex| around[vertex as usize] += 1);
+    let ring = |&row: &u32| around[row as usize];
+    let rings: u32 = corners.iter().filter_map(|rows| rows.iter().map(ring).max()).sum();
+    most.node_tests += 2 * search + DISTANCE_COST * triangles + RING_COST * rings;
+    most.triangle_tests += 2 * triangles;
+    if is_depth(tool, side) {
+        // Each exact test beyond the first of a point comes with a node test.
+        let depth = nodes.max(LEAST_WORK);
+        most.node_tests += depth;
+        most.triangle_tests += depth + LOOKS;
+    }
+    most
 }

@@ -175,7 +175,10 @@ class Stretch(unittest.TestCase):
             stretch[needed.frame, np.arange(len(needed.frame))], needed.stretch, rtol=1e-5
         )
         limits = needed.limits(0.1)
-        np.testing.assert_allclose(limits, np.maximum(needed.stretch, 1) * 1.1, rtol=2e-4)
+        # No corner of the heart is sharp, so the check rounds by little more than its least.
+        least = np.maximum(needed.stretch, 1) * 1.1 * 1.0006
+        self.assertTrue((limits >= least).all())
+        np.testing.assert_allclose(limits, least, rtol=1e-4)
         tree = dibs.build(HEART, limits=limits)
         measured = [tree.stretch(frame) for frame in BEAT.frames]
         self.assertLess(max(measured), tree.summary["stretch"])

@@ -39,7 +39,7 @@ CASES = [
     (ValueError, "no triangles", lambda: dibs.build(VERTICES, np.empty((0, 3), int))),
     (ValueError, "read it with strict=False to drop them", lambda: dibs.build(VERTICES, [[0, 1, 1]], strict=True)),
     (ValueError, "largest_component=True", lambda: dibs.build(np.concatenate([np.add(TRIANGLE, [20 * part, 0, 0]) for part in range(65)]), np.arange(195).reshape(65, 3))),
-    (ValueError, "unit is 'ft'; give 'mm', 'cm', 'm' or 'in'", lambda: dibs.build(VERTICES, TRIANGLES, unit="ft")),
+    (ValueError, "unit is 'ft'; give 'mm', 'cm', 'm', 'in' or 'um'", lambda: dibs.build(VERTICES, TRIANGLES, unit="ft")),
     (ValueError, "weld tolerance is -1", lambda: dibs.build(VERTICES, TRIANGLES, weld=-1)),
     (ValueError, "origin: the shape is (1, 2)", lambda: dibs.build(VERTICES, TRIANGLES, origin=[0, 0])),
     (TypeError, "a Mesh has its triangles", lambda: dibs.build(HEART, TRIANGLES)),

@@ -130,9 +130,17 @@ class Budgets(unittest.TestCase):
         whole = TREE.contacts(tools, 15).found
         found, bound = TREE.contacts(tools, 15, budget=(300, 40))
         self.assertTrue((bound < 15).any() and np.isfinite(bound).any())
+        # Inside, the only contact is the deepest pair. A budget that ends leaves its point open, but not its depth.
+        pairs, short = TREE.query(tools), TREE.query(tools, budget=(300, 40))
+        is_open = (short["side"] == dibs.Side.INSIDE) & (short["separation"] > pairs["separation"])
+        self.assertTrue(is_open.any() and not is_open.all())
         for pose in range(300):
             certain = whole[(whole["pose"] == pose) & (whole["separation"] < bound[pose] - 1e-3)]
             mine = found[found["pose"] == pose]
+            if is_open[pose]:
+                self.assertEqual(len(mine), 1)
+                self.assertTrue((mine["separation"] <= certain["separation"] + 1e-3).all())
+                continue
             for contact in certain:
                 apart = np.linalg.norm(mine["point_on_surface"] - contact["point_on_surface"], axis=1)
                 self.assertLess(apart.min(), 1e-2)

@@ -8,7 +8,15 @@ use anyhow::{Result, bail};
 
 use crate::process::quiet;
 
-const LIMIT: Duration = Duration::from_secs(600);
+/// More than the limits below.
+const LIMIT: Duration = Duration::from_secs(620);
+
+/// Seconds in which packages are installed.
+const INSTALL: &str = "600";
+
+/// Seconds after which an update hangs, and the times that it is tried. It takes some ten seconds.
+const UPDATE: &str = "90";
+const TRIES: usize = 3;
 
 /// Installs packages, as root or by a `sudo` without a password.
 pub fn install(packages: &[&str]) -> Result<()> {
@@ -20,20 +28,26 @@ pub fn install(packages: &[&str]) -> Result<()> {
     if !root && quiet(Command::new("sudo").args(["-n", "true"]), seconds).is_err() {
         bail!("installing packages needs root, and `sudo -n` asks for a password");
     }
-    let apt = |arguments: &[&str]| {
-        let mut command = if root { Command::new("apt-get") } else { Command::new("sudo") };
+    // `timeout` ends what `sudo` started, so that no lock is left to the next try.
+    let apt = |seconds: &str, arguments: &[&str]| {
+        let mut command = Command::new(if root { "timeout" } else { "sudo" });
         if !root {
-            command.args(["-n", "apt-get"]);
+            command.args(["-n", "timeout"]);
         }
+        command.args(["--kill-after=10", seconds, "apt-get"]);
         command.args(arguments).env("DEBIAN_FRONTEND", "noninteractive");
         quiet(&mut command, LIMIT)
     };
     eprintln!("installing {} ...", packages.join(" "));
     let install = [&["install", "--yes", "--no-install-recommends"], packages].concat();
-    if apt(&install).is_err() {
+    if apt(INSTALL, &install).is_err() {
         // The package lists of a new machine are old or absent.
-        apt(&["update"])?;
-        apt(&install)?;
+        let mut updated = apt(UPDATE, &["update"]);
+        for _ in 1..TRIES {
+            updated = updated.or_else(|_| apt(UPDATE, &["update"]));
+        }
+        updated?;
+        apt(INSTALL, &install)?;
     }
     Ok(())
 }

@@ -80,7 +80,8 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     ///
     /// Where a capsule's axis crosses the surface or is inside, up to 27 more searches find the depth, with no more node tests than the
     /// tree has nodes, or 3,072 if that is more. Where they do not suffice, the interval is wider than the tolerance.
-    /// Of a tree with several solids, each whose sphere the axis reaches takes a search of its own.
+    /// Of a tree with several solids, each whose sphere the axis reaches takes a search of its own. Where f32 cannot tell the
+    /// side, f64 does, counted as the node tests that take as long; too many triangles that tie take two more searches.
     ///
     /// Cost: the budget at most; typical counts are in the repository's `docs/benchmarks.md`.
     ///

@@ -102,6 +102,8 @@ impl Feature {
     /// The pseudonormal of a feature of a triangle.
     ///
     /// Cost: one normal of a face, two of an edge, at most [`MAX_RING`] of a vertex.
+    #[cold]
+    #[inline(never)]
     pub fn pseudonormal<I: Index, V: VertexTable + ?Sized>(
         self,
         tree: &Tree<'_, I>,

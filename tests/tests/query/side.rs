@@ -161,6 +161,44 @@ fn the_way_out_of_a_ball_never_turns() {
     }
 }
 
+/// Axes above a face, at its edge and across it, closer than a side needs: the interval holds the distance all the same.
+#[test]
+fn next_to_a_face_the_interval_holds_the_distance() {
+    const TOP: f32 = 20.0;
+    let (positions, triangles) = cuboid(Vec3::ZERO, Vec3::splat(TOP));
+    let (positions, triangles) = (positions.to_vec(), triangles.to_vec());
+    let mesh = Mesh { positions, triangles, ..Mesh::default() };
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let axes = [
+        [Vec3::new(5.0, 6.0, 0.0), Vec3::new(15.0, 9.0, 0.0)],
+        [Vec3::new(-5.0, 6.0, 0.0), Vec3::new(30.0, 9.0, 0.0)],
+        [Vec3::new(5.0, 6.0, 0.0), Vec3::new(15.0, 9.0, 10.0)],
+    ];
+    let mut undefined = 0;
+    for [start, end] in axes {
+        let mut ask = |height: f32| {
+            let up = Vec3::Z * (TOP + height);
+            let capsule = Capsule::new(start + up, end + up, 2.5).expect("valid");
+            query.closest(rows.as_slice(), &capsule, &Options::cold()).expect("an answer")
+        };
+        let accuracy = ask(1.0).accuracy;
+        for step in 0..=40 {
+            let height = TOP + accuracy * step as f32 / 10.0 - TOP;
+            let found = ask(height);
+            let truth = f64::from(height) - 2.5;
+            let (lower, upper) = (f64::from(found.lower), f64::from(found.separation));
+            let accuracy = f64::from(found.accuracy);
+            let holds = lower - accuracy <= truth && truth <= upper + accuracy;
+            assert!(holds, "{height}: {found:?}");
+            undefined += u32::from(found.side == Side::Undefined(NoSide::BelowAccuracy));
+        }
+    }
+    assert!(undefined > 40, "{undefined}");
+}
+
 #[test]
 fn a_side_that_is_not_there_says_why() {
     let ask = |built: &BuiltTree, mesh: &Mesh, at: Vec3, options: Options| {

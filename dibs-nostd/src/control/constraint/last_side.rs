@@ -88,6 +88,8 @@ impl LastSide {
         Ok(now)
     }
 
+    #[cold]
+    #[inline(never)]
     fn without_side(&mut self, now: Proximity, last: Proximity) -> Proximity {
         let radius = now.axis_distance - now.separation;
         let (unsigned, signed) =

@@ -394,7 +394,10 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             };
         }
         let most = if bound > self.deepest { bound } else { self.deepest };
-        answer.separation = -self.tool.radius() - self.deepest;
+        // If no point is inside, it is still that of the closest pair, which may be farther than the accuracy.
+        if self.deepest > 0.0 {
+            answer.separation = -self.tool.radius() - self.deepest;
+        }
         answer.lower = -self.tool.radius() - most;
         Ok(answer)
     }

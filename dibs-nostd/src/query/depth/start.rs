@@ -16,15 +16,27 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             self.touches = Touches::NONE;
             return Ok(());
         }
-        let ties = *self.ties;
-        let Some(mut rows) = ties.touched().map(Iterator::peekable) else { return Ok(()) };
-        // A tracker's accuracy is larger than a search's, for which the closest triangle may be no touched one.
-        let closest = self.closest.triangle.filter(|_| rows.peek().is_none());
+        if !self.ties.has_touched() {
+            return Ok(());
+        }
         self.touches = Touches::NONE;
-        for row in rows.chain(closest.map(|TriangleRow(row)| row)) {
+        let mut next = 0;
+        loop {
+            let row = match (self.ties.touched_from(next), self.closest.triangle) {
+                (Some((place, row)), _) => {
+                    next = place + 1;
+                    row
+                }
+                // A tracker's accuracy is larger than a search's, for which the closest triangle may be no touched one.
+                (None, Some(TriangleRow(row))) if next == 0 => {
+                    next = usize::MAX;
+                    row
+                }
+                _ => return Ok(()),
+            };
             if self.is_spent() {
                 self.touches = Touches::ANYWHERE;
-                break;
+                return Ok(());
             }
             let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
             let corners = self.corners(corners)?;
@@ -35,7 +47,6 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
                 self.spend((1 + distances) * DISTANCE_COST);
             }
         }
-        Ok(())
     }
 
     /// The parts between the axis' ends and the places where it meets the surface.
