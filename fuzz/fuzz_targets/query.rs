@@ -18,9 +18,10 @@ use libfuzzer_sys::fuzz_target;
 const LOOKS: u32 = 27;
 const LEAST_WORK: u32 = 3_072;
 
-/// Node tests that the order of ties in f64 takes for a triangle, and for one around a vertex (`query/exact.rs`).
-const DISTANCE_COST: u32 = 24;
-const RING_COST: u32 = 12;
+/// Node tests that the order of ties in f32 and then in f64 takes for a triangle, and for one around a vertex
+/// (`query/precision.rs`).
+const DISTANCE_COST: u32 = 4 + 96;
+const RING_COST: u32 = 3 + 48;
 
 /// A valid tree and its rows. They are built before the first input: on a busy machine they would use up its time
 /// limit.

@@ -153,10 +153,10 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
 
     #[inline(always)] // A tick asks for the planes alone.
     fn see(&self, row: u32) -> Result<Seen<P>, QueryError> {
-        let rows = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
-        let [a, b, c] = rows.map(|row| self.vertices.position(row).map(P::vector));
         let corrupt = QueryError::Corrupt { row };
-        let corners = [a.ok_or(corrupt)?, b.ok_or(corrupt)?, c.ok_or(corrupt)?];
+        let [a, b, c] = self.tree.triangle(row).ok_or(corrupt)?;
+        let position = |row| self.vertices.position(row).map(P::vector).ok_or(corrupt);
+        let corners = [position(a)?, position(b)?, position(c)?];
         Ok(Seen::new(corners, self.start, self.along))
     }
 
@@ -278,20 +278,20 @@ impl<P: Precision> Seen<P> {
     #[inline(always)]
     fn new(corners: [P::Vector; 3], start: P::Vector, along: P::Vector) -> Self {
         let [a, b, c] = corners;
-        let to = corners.map(|corner| (corner - start) - along);
+        let to = [a, b, c].map(|corner| (corner - start) - along);
         let edges = [b - a, c - b, a - c];
-        let [ab, _, ca] = edges;
+        let ([to_a, ..], [ab, _, ca]) = (to, edges);
         let normal = P::cross(ca, ab);
         let square = P::dot(normal, normal);
         let limit = P::FLAT * P::dot(ab, ab) * P::dot(ca, ca);
         let far = P::size(a - start) + P::size(along);
-        let terms = P::size(ab) * P::size(ca) * P::size(to[0]) + P::size(normal) * far;
+        let terms = P::size(ab) * P::size(ca) * P::size(to_a) + P::size(normal) * far;
         Self {
             to,
             edges,
             normal,
             square,
-            height: -P::dot(normal, to[0]),
+            height: -P::dot(normal, to_a),
             doubt: P::from(4.0) * P::ROUNDING * terms,
             is_flat: !(square > limit && square > P::TINY),
             far,
@@ -303,8 +303,8 @@ impl<P: Precision> Seen<P> {
         let (mut least, mut closest) = (P::from(f32::INFINITY), Feature::Face);
         let zero = P::from(0.0);
         let mut is_over = !self.is_flat;
-        for (edge, next) in [(0, 1), (1, 2), (2, 0)] {
-            let (along, from, to) = (self.edges[edge], self.to[edge], self.to[next]);
+        let ([a, b, c], [ab, bc, ca]) = (self.to, self.edges);
+        for (edge, along, from, to) in [(0, ab, a, b), (1, bc, b, c), (2, ca, c, a)] {
             let across = P::cross(from, along);
             if !self.is_flat && P::dot(self.normal, across) > zero {
                 continue;
@@ -312,11 +312,11 @@ impl<P: Precision> Seen<P> {
             is_over = false;
             let (whole, part) = (P::dot(along, along), -P::dot(from, along));
             let (square, feature) = if !(part > zero) {
-                (P::dot(from, from), Feature::Vertex(edge as u32))
+                (P::dot(from, from), Feature::Vertex(edge))
             } else if part >= whole {
-                (P::dot(to, to), Feature::Vertex(next as u32))
+                (P::dot(to, to), Feature::Vertex(after(edge)))
             } else {
-                (P::dot(across, across) / whole, Feature::Edge(edge as u32))
+                (P::dot(across, across) / whole, Feature::Edge(edge))
             };
             if square < least {
                 (least, closest) = (square, feature);

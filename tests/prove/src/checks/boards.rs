@@ -94,8 +94,9 @@ const FOLDER: &str = "examples/stm32h743";
 const PROGRAM: &str = "stm32h743";
 
 /// Functions below the tick that few ticks call. They and what they alone call are in flash.
-const RARE: [&str; 14] = [
-    "query::exact::Exact",
+const RARE: [&str; 15] = [
+    "query::exact::",
+    "query::side::decided",
     "query::side::of_many",
     "query::side::is_crowded",
     "query::side::outward",
