@@ -72,7 +72,7 @@ impl fmt::Display for NoSide {
 }
 
 /// Rounding of a coordinate and of a few operations on it, relative to its size.
-const COORDINATES: f32 = 4.0 / 16_777_216.0;
+pub(super) const COORDINATES: f32 = 4.0 / 16_777_216.0;
 
 /// A corner's weight above which a point of a triangle is not on the edge across from it.
 const AWAY: f32 = 1e-3;

@@ -179,7 +179,9 @@ fn no_contact_is_missing_and_none_is_doubled() {
             checked += 1;
             crossing += usize::from(is_crossing);
             let (truth, label) = valleys(&rows, &triangles, [from, to]);
-            assert!(contacts.bound() >= MARGIN && !contacts.is_full());
+            // An axis that crosses may be inside in several parts, of which one is a contact.
+            let is_bounded = is_crossing && contacts.bound() == closest.lower;
+            assert!((contacts.bound() >= MARGIN || is_bounded) && !contacts.is_full());
             let surroundings = Surroundings::of(&rows, &triangles, [from, to]);
             let mut found = vec![Vec::new(); truth.len()];
             // The first contact of an axis that crosses is its deepest point, and stands for where it crosses.

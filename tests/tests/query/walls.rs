@@ -254,6 +254,35 @@ fn a_list_with_too_few_places_still_has_the_wall() {
     assert!(cut_short > 20, "{cut_short}");
 }
 
+/// A shaft through two lobes of an organ has one contact, the deepest, and its list does not say that this is all.
+#[test]
+fn a_shaft_through_two_lobes_has_no_complete_list() {
+    let block = |low: f32, high: f32| {
+        lattice(Vec3::new(low, -10.0, -10.0), Vec3::new(high, 10.0, 10.0), [6, 6, 6])
+    };
+    let mesh = joined(&[block(-30.0, -10.0), block(10.0, 26.0)]);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut list = Contacts::<16>::new();
+    let mut ask = |from: f32, to: f32| {
+        let [start, end] = [from, to].map(|x| Vec3::new(x, 1.3, 0.7));
+        let tool = Capsule::new(start, end, RADIUS).expect("valid");
+        let options = Options::cold();
+        let closest = query.contacts(rows.as_slice(), &tool, MARGIN, &options, &mut list);
+        assert_eq!(closest.expect("an answer").side, Side::Crossing);
+        let deepest = list.iter().next().expect("the deepest").separation;
+        (deepest, list.bound())
+    };
+    // The other lobe is left out: its contact would be deeper than -10.
+    let (deepest, bound) = ask(-60.0, 60.0);
+    assert!(deepest < -11.0 && bound == deepest, "{deepest} {bound}");
+    // One end in one lobe.
+    let (deepest, bound) = ask(-60.0, -15.0);
+    assert!(deepest < -7.0 && bound == MARGIN, "{deepest} {bound}");
+}
+
 /// Between two walls of a groove that both face the tool, no step changes the force by more than the walls change.
 #[test]
 fn the_force_between_two_walls_is_continuous() {

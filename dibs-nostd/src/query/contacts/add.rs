@@ -110,10 +110,11 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             made.triangle_tests += 1;
             pair.near(row, limit + ridge, accuracy).map(Some)
         };
-        let mut least = f32::INFINITY;
+        let (mut least, mut meets) = (f32::INFINITY, 0_u32);
         let (ridges, is_left_out) = ((ridge, 2.0 * accuracy), |row| !is_of(TriangleRow(row)));
         let missing = basins.each_valley(tree, ridges, is_left_out, look, |near| {
             let is_on = sqrt(near.square) <= accuracy;
+            meets += u32::from(is_on);
             // The crossing pair, inserted above, stands for these triangles.
             if has_crossing && is_on {
                 return Ok(());
@@ -148,6 +149,10 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         let mut from = if beyond < complete { beyond } else { complete };
         if let Some(missing) = missing.map(sqrt).filter(|&missing| missing < from) {
             from = missing;
+        }
+        // Where the axis meets the surface in several places, another part of it may be inside, less deep.
+        if is_crossing && meets > 1 {
+            found.lower_bound(closest.lower);
         }
         // Without a side the tool may be inside, deeper than every pair seen.
         if !has_side {

@@ -254,7 +254,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
 impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// Finds all locally closest pairs of the tool and the outer side of the surface whose separation is at most
     /// `margin` (mm). For a tool that is inside the only contact is its deepest pair; for one that crosses the surface
-    /// that pair is the first.
+    /// that pair is the first. An axis that meets the surface in several places may be inside in several parts: only the
+    /// deepest is a contact, and its separation is the list's [bound](Contacts::bound).
     ///
     /// Two valleys of the distance in much the same direction, within 7 degrees, are one contact unless a ridge of more than
     /// a 64th of the margin parts them, so a flat wall along a capsule is one. Walls in other directions are contacts of

@@ -23,7 +23,7 @@ mod walk;
 use glam::Vec3;
 
 use super::search::{Around, Search, Ties, UNTIL, Waiting};
-use super::side::{self, NoSide, OnAxis, Side};
+use super::side::{self, COORDINATES, NoSide, OnAxis, Side};
 use super::{Budget, Options, Proximity};
 use crate::tool::{AxisPoint, Tool};
 use crate::tree::RootSet;
@@ -340,8 +340,9 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             }
             _ => distance,
         };
-        if found.accuracy > answer.accuracy {
-            answer.accuracy = found.accuracy;
+        let accuracy = found.accuracy + COORDINATES * on_axis.abs().max_element();
+        if accuracy > answer.accuracy {
+            answer.accuracy = accuracy;
         }
         // Without a triangle of its own, its corners are a pin.
         let triangle = found.triangle.or(sample.triangle);
