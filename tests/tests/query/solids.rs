@@ -194,6 +194,54 @@ fn the_separation_changes_by_no_more_than_the_tool_moves() {
     }
 }
 
+/// Pairs of poses, one small motion apart, that climb towards the largest jump between their separations.
+#[test]
+fn no_pair_of_poses_is_found_between_which_the_separation_jumps() {
+    let (starts, steps) = if cfg!(debug_assertions) { (4, 20) } else { (60, 60) };
+    for (seed, case) in (10..).zip(CASES.iter()) {
+        let mut rng = Rng::with_seed(seed);
+        let tree = case.built.tree::<u16>().expect("valid");
+        let rows = case.built.to_rows(&joined(&case.parts).positions);
+        let mut odometer = Odometer::new(&tree);
+        let surface = odometer.start(rows.as_slice());
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        let mut tracker = Tracker::<u16, MAX_STACK, 256>::new(&tree).expect("deep enough");
+        let mut judged = 0;
+        for start in 0..starts {
+            let on = rows[rng.usize(..rows.len())];
+            let half = unit(&mut rng) * 12.0 * if start % 3 == 0 { 0.0 } else { rng.f32() };
+            let (mut pose, mut way) = ([on - half, on + half], unit(&mut rng) * 0.2);
+            let (mut best, mut size) = (f32::NEG_INFINITY, 10.0);
+            for _ in 0..steps {
+                let by = unit(&mut rng) * size * rng.f32();
+                let turn = if half == Vec3::ZERO { by } else { by + unit(&mut rng) * size * 0.3 };
+                let next = [pose[0] + by, pose[1] + turn];
+                let aim = (way + unit(&mut rng) * 0.1).normalize() * 0.2 * rng.f32();
+                size *= 0.95;
+                let mut ask = |moved: Vec3| {
+                    let tool = capsule(next[0] + moved, next[1] + moved);
+                    let found = query.closest(rows.as_slice(), &tool, &Options::cold());
+                    let tracked = tracker.closest(&surface, &tool, &Options::new());
+                    [found.expect("an answer"), tracked.expect("an answer").closest]
+                };
+                let (before, after) = (ask(Vec3::ZERO), ask(aim));
+                for (before, after) in before.iter().zip(&after) {
+                    if [before, after].iter().any(|at| matches!(at.side, Side::Undefined(_))) {
+                        continue;
+                    }
+                    judged += 1;
+                    let jump = jump(before, after, aim.length());
+                    assert!(jump <= 0.0, "{}: jump {jump}\n{before:?}\n{after:?}", case.name);
+                    if jump > best {
+                        (best, pose, way) = (jump, next, aim);
+                    }
+                }
+            }
+        }
+        assert!(judged * 10 > starts * steps * 18, "{}: {judged}", case.name);
+    }
+}
+
 #[test]
 fn one_geometry_has_one_answer_as_a_tree_and_as_a_scene() {
     let mut rng = Rng::with_seed(3);

@@ -127,7 +127,7 @@ fn no_wall_is_missing_from_a_list_of_contacts() {
         |low: f32, high: f32, cells| lattice(Vec3::splat(low), Vec3::splat(high), [cells; 3]);
     let plate = lattice(Vec3::new(-30.0, -30.0, 0.0), Vec3::new(30.0, 30.0, 0.5), [3, 3, 1]);
     let mut beside = cube(-20.0, 20.0, 1);
-    beside.positions.iter_mut().for_each(|at| at.x += 40.01);
+    beside.positions.iter_mut().for_each(|at| at.x += 40.0);
     let meshes = [
         ("box of 12 triangles", cube(-20.0, 20.0, 1)),
         ("lattice", cube(-20.0, 20.0, 6)),
