@@ -105,6 +105,15 @@ pub enum BuildError {
         /// Their number.
         components: usize,
     },
+    /// The triangles are connected in so many ways that paths between them take too long to find.
+    #[error(
+        "the {triangles} triangles are connected at random, or by edges of very many triangles, and not as a surface: check \
+         the vertex numbers of its faces"
+    )]
+    Tangled {
+        /// Triangles of the mesh.
+        triangles: usize,
+    },
     /// The tree does not pass its own validation: a defect of the builder.
     #[error("the builder made a tree that its own checker rejects ({0}); please report this mesh")]
     Invalid(#[from] dibs_nostd::FormatError),

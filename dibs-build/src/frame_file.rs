@@ -21,11 +21,9 @@ impl FrameCheck {
     ) -> Result<Vec<Vec3>, ReadError> {
         let path = path.as_ref();
         let frame = || {
-            let (positions, faces) = read::frame(path, unit, origin)?;
+            let (positions, faces) = read::frame(path, 0, unit, origin)?;
             let rows = self.to_rows(&positions)?;
-            if !faces.is_empty() {
-                self.check_faces(faces.iter().map(|face| &face[..]))?;
-            }
+            self.check_faces(&faces)?;
             Ok(rows)
         };
         frame().map_err(|kind: ReadErrorKind| ReadError { path: path.to_path_buf(), kind })

@@ -109,35 +109,43 @@ impl FrameCheck {
         self.order.iter().map(|&vertex| at(vertex)).collect::<Option<_>>().ok_or(missing)
     }
 
-    /// Checks that each triangle of the tree is one of these faces, or a part of one.
+    /// Checks that each triangle of the tree is one of these faces, or a part of one. A file without faces passes.
     ///
     /// # Errors
     /// [`FrameError::Triangle`] names the first that is not.
-    pub fn check_faces<'f>(
-        &self,
-        faces: impl IntoIterator<Item = &'f [u32]>,
-    ) -> Result<(), FrameError> {
-        let faces: Vec<&[u32]> = faces.into_iter().collect();
-        let mut at: Vec<Vec<u32>> = vec![Vec::new(); self.vertices];
-        for (number, face) in (0..).zip(&faces) {
-            for &corner in *face {
-                if let Some(at) = at.get_mut(corner as usize) {
-                    at.push(number);
-                }
+    pub fn check_faces(&self, faces: &[Vec<u32>]) -> Result<(), FrameError> {
+        check_faces(&self.triangles, self.vertices, faces)
+    }
+}
+
+/// Checks that each triangle is one of these faces, or a part of one, if there are any.
+pub(crate) fn check_faces(
+    triangles: &[[u32; 3]],
+    vertices: usize,
+    faces: &[Vec<u32>],
+) -> Result<(), FrameError> {
+    if faces.is_empty() {
+        return Ok(());
+    }
+    let mut at: Vec<Vec<u32>> = vec![Vec::new(); vertices];
+    for (number, face) in (0..).zip(faces) {
+        for &corner in face {
+            if let Some(at) = at.get_mut(corner as usize) {
+                at.push(number);
             }
         }
-        let has = |corners: &[u32; 3]| {
-            // At a hub of many faces another corner has few.
-            let few = corners.iter().filter_map(|&corner| at.get(corner as usize));
-            let few = few.min_by_key(|at| at.len());
-            let holds =
-                |&face: &u32| corners.iter().all(|corner| faces[face as usize].contains(corner));
-            few.is_some_and(|few| few.iter().any(holds))
-        };
-        match self.triangles.iter().find(|corners| !has(corners)) {
-            Some(&corners) => Err(FrameError::Triangle { corners }),
-            None => Ok(()),
-        }
+    }
+    let has = |corners: &[u32; 3]| {
+        // At a hub of many faces another corner has few.
+        let few = corners.iter().filter_map(|&corner| at.get(corner as usize));
+        let few = few.min_by_key(|at| at.len());
+        let holds =
+            |&face: &u32| corners.iter().all(|corner| faces[face as usize].contains(corner));
+        few.is_some_and(|few| few.iter().any(holds))
+    };
+    match triangles.iter().find(|corners| !has(corners)) {
+        Some(&corners) => Err(FrameError::Triangle { corners }),
+        None => Ok(()),
     }
 }
 

@@ -98,4 +98,6 @@ pub struct Motion {
     pub rate: f32,
     /// The [origin](Mesh::origin) of the mesh.
     pub origin: DVec3,
+    /// The faces that all files of a series have, by the vertices of each; none of other motions.
+    pub faces: Vec<Vec<u32>>,
 }

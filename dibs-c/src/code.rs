@@ -273,7 +273,7 @@ impl dibs_code {
             Self::TreeForm => c"the tree is not well formed",
             Self::TreeCorrupt => c"the tree's bytes changed since they were validated",
             Self::TreeNoMetric => c"the tree has no rest metric",
-            Self::TreeNoAdjacency => c"the tree has no adjacency",
+            Self::TreeNoAdjacency => c"the tree has no sides: its triangles are wound against each other (dibs build --orient), or it was built without adjacency",
             Self::TreeNoRestShape => c"the tree has no such rest position",
             Self::ToolCoordinate => c"a coordinate of the tool is not finite or too large",
             Self::ToolRadius => c"the tool's radius is negative, not finite or too large",

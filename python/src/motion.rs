@@ -24,7 +24,7 @@ impl MotionStretch {
             let positions = bytes::points(frames);
             let frames = positions.chunks_exact(mesh.positions.len());
             let frames = frames.map(|frame| mesh.local(frame)).collect();
-            let motion = Motion { frames, origin: mesh.origin, rate: 0.0 };
+            let motion = Motion { frames, origin: mesh.origin, ..Motion::default() };
             dibs_build::MotionStretch::new(mesh, &motion, Paths::default(), &|_| ())
         });
         measured.map(Self).map_err(invalid)

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dibs_build::glam::{DVec3, Vec3};
-use dibs_build::{FrameCheck, summarise};
+use dibs_build::{Format, FrameCheck, ReadErrorKind, summarise};
 use dibs_nostd::{FormatError, Index, StretchError, TriangleRow, measure_stretch};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -144,13 +144,26 @@ impl Tree {
 
     /// Validates the bytes of a tree.
     pub fn from_blob(blob: Vec<u8>) -> PyResult<Self> {
-        let validated = Validated::try_new(blob, |bytes| view(bytes))
-            .map_err(|error| invalid(format!("not a valid tree: {error}; build it again")))?;
+        let validated = Validated::try_new_or_recover(blob, |bytes| view(bytes))
+            .map_err(|(blob, error)| invalid(what_it_is(&blob, &error)))?;
         let (order, origin) = of_any_width!(validated.borrow_dependent(), tree => {
             let number = |row| tree.vertex_number(row).map_or(row, |number| number.0);
             ((0..tree.vertex_count()).map(number).collect(), tree.origin().into())
         });
         Ok(Self(Arc::new(Owned { validated, order, origin })))
+    }
+}
+
+/// Why bytes are no tree.
+fn what_it_is(bytes: &[u8], error: &FormatError) -> String {
+    match Format::of(bytes, "") {
+        Ok(format) if !bytes.starts_with(b"DIBS") => {
+            format!(
+                "not a tree: this is a mesh ({format}); give it to read_mesh and build its tree"
+            )
+        }
+        Err(ReadErrorKind::Foreign { what, .. }) => format!("not a tree: this is {what}"),
+        _ => format!("not a valid tree: {error}; build it again"),
     }
 }
 

@@ -54,6 +54,7 @@ pub fn test(options: &Options) -> Result<()> {
         ],
         &[("RUSTDOCFLAGS", "-D warnings")],
     );
+    steps.run("files of other programs", other_programs);
     let packages = ["-p", "dibs-nostd", "-p", "dibs-build", "--no-verify", "--allow-dirty"];
     steps.cargo("packages", &[&["package"], &packages[..]].concat(), &[]);
     steps.run("oldest compiler", oldest_compiler);
@@ -99,6 +100,22 @@ fn checks(demo_seconds: u32, is_whole: bool) -> Result<PathBuf> {
     }
     run(&mut prove)?;
     Ok(list)
+}
+
+/// Files that other programs write now, by those that are installed.
+fn other_programs() -> Result<Outcome> {
+    let mut command = Command::new("cargo");
+    command.args(["test", "--release", "--quiet", "-p", "dibs-build", "--test", "own"]);
+    command.args(["written_by_other_programs", "--", "--ignored", "--nocapture"]);
+    let output = command.current_dir(workspace::root()).output()?;
+    let said =
+        [output.stdout, output.stderr].map(|said| String::from_utf8_lossy(&said).into_owned());
+    let skipped = said.iter().find_map(|said| said.split_once("skipped: ")?.1.lines().next());
+    match skipped {
+        Some(reason) => Ok(Outcome::Skipped(reason.to_owned())),
+        None if output.status.success() => Ok(Outcome::Passed),
+        None => Err(anyhow!("{}", said.concat())),
+    }
 }
 
 /// `cargo check` with the compiler that `rust-version` names.

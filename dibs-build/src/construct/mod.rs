@@ -71,12 +71,24 @@ pub(crate) struct Constructor<'a> {
     /// Called with the number of triangles that reached their leaf.
     pub progress: &'a (dyn Fn(usize) + Sync),
     done: AtomicUsize,
+    /// Arcs that searches looked at.
+    work: AtomicUsize,
     /// Memory for searches that no thread is using.
     idle: Mutex<Vec<Searches>>,
 }
 
 /// Sections at this depth are halved, which bounds the depth.
 const MAX_DEPTH: u32 = 64;
+
+/// Most arcs that searches look at, for each triangle and level of a balanced tree: three times those of a closed surface.
+/// More take triangles that are connected at random, or edges of hundreds of triangles.
+const MOST_ARCS: usize = 768;
+
+/// The same where paths stay in their section, which a closed surface's take a twentieth of.
+const MOST_ARCS_RESTRICTED: usize = 256;
+
+/// And as many more, so that no small mesh is refused.
+const MOST_ARCS_LEAST: usize = 4_000_000;
 
 /// Sections of fewer triangles stay on one thread.
 const PARALLEL_ABOVE: usize = 512;
@@ -88,8 +100,9 @@ impl<'a> Constructor<'a> {
         leaf_triangles: usize,
         progress: &'a (dyn Fn(usize) + Sync),
     ) -> Self {
-        let (done, idle) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
-        Self { surface, construction, leaf_triangles, progress, done, idle }
+        let (done, work) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let idle = Mutex::new(Vec::new());
+        Self { surface, construction, leaf_triangles, progress, done, work, idle }
     }
 
     /// A tree for each component of the mesh, the largest first.
@@ -104,7 +117,8 @@ impl<'a> Constructor<'a> {
             let section = Section::new(mesh, triangles);
             self.cluster(&section, None, section.vertices[0], 0)
         };
-        components.into_iter().map(tree).collect()
+        let roots = components.into_iter().map(tree).collect::<Result<_, _>>()?;
+        self.check_work().map(|()| roots)
     }
 
     /// The tree of a section, which is part of the section `around` it: that one's sphere, and whether its parts meet nearby.
@@ -115,6 +129,7 @@ impl<'a> Constructor<'a> {
         start: u32,
         depth: u32,
     ) -> Result<Cluster, BuildError> {
+        self.check_work()?;
         let mut searches = self.take_searches();
         searches.enter(section, around.map(|(around, ..)| around));
         if let Some((.., false)) = around {
@@ -215,12 +230,25 @@ impl<'a> Constructor<'a> {
         }
     }
 
+    /// Whether all searches together look at more arcs than they may does not depend on the threads.
+    fn check_work(&self) -> Result<(), BuildError> {
+        let triangles = self.surface.mesh.triangles.len();
+        let levels = triangles.max(2).ilog2() as usize + 1;
+        let most = if self.surface.restricted { MOST_ARCS_RESTRICTED } else { MOST_ARCS };
+        let most = triangles.saturating_mul(most * levels).saturating_add(MOST_ARCS_LEAST);
+        if self.work.load(Ordering::Relaxed) > most {
+            return Err(BuildError::Tangled { triangles });
+        }
+        Ok(())
+    }
+
     fn take_searches(&self) -> Searches {
         let idle = self.idle.lock().unwrap_or_else(std::sync::PoisonError::into_inner).pop();
         idle.unwrap_or_else(|| Searches::new(self.surface.graph.vertices()))
     }
 
-    fn give_back(&self, searches: Searches) {
+    fn give_back(&self, mut searches: Searches) {
+        self.work.fetch_add(searches.take_arcs_seen(), Ordering::Relaxed);
         self.idle.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(searches);
     }
 }

@@ -74,10 +74,9 @@ impl Searches {
         }
     }
 
-    /// Arcs that all searches with this memory looked at.
-    #[cfg(test)]
-    pub fn arcs_seen(&self) -> usize {
-        self.seeds.iter().chain([&self.other]).map(Distances::arcs_seen).sum()
+    /// Arcs that the searches with this memory looked at since the last call.
+    pub fn take_arcs_seen(&mut self) -> usize {
+        self.seeds.iter_mut().chain([&mut self.other]).map(Distances::take_arcs_seen).sum()
     }
 
     /// Makes `section` the target of searches. Paths stay in the section `around` it if that is connected: paths

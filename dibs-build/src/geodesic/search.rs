@@ -15,7 +15,7 @@ pub(crate) struct Distances {
     heap: BinaryHeap<Reverse<u128>>,
     /// Vertices in the order in which they were settled.
     settled: Vec<u32>,
-    /// Arcs looked at by all searches: the work done.
+    /// Arcs looked at by searches and not yet taken: the work done.
     arcs_seen: usize,
 }
 
@@ -41,10 +41,9 @@ impl Distances {
         }
     }
 
-    /// Arcs that all searches with this memory looked at.
-    #[cfg(test)]
-    pub fn arcs_seen(&self) -> usize {
-        self.arcs_seen
+    /// Arcs that the searches with this memory looked at since the last call.
+    pub fn take_arcs_seen(&mut self) -> usize {
+        std::mem::take(&mut self.arcs_seen)
     }
 
     /// The vertices whose distances are final, nearest first.

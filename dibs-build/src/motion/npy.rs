@@ -49,7 +49,7 @@ pub(super) fn parse(bytes: &[u8], place: &Place) -> Result<Motion, ReadErrorKind
         place.frame_of(&points, frame)
     };
     let frames = (0..frames).map(frame).collect::<Result<_, _>>()?;
-    Ok(Motion { frames, rate: 0.0, origin: place.origin })
+    Ok(Motion { frames, rate: 0.0, origin: place.origin, faces: Vec::new() })
 }
 
 /// What follows a key of the header, which is a Python dictionary.

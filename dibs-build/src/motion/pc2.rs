@@ -4,7 +4,7 @@
 //! samples, then samples x points x 3 f32. Nothing in it says how many frames a second has. So this crate's own files
 //! say it after the last sample, where other readers do not look: `DIBSRATE`, f32 frames a second.
 
-use crate::frames::check_mesh_size;
+use crate::frames::{check_faces, check_mesh_size};
 use crate::read::{Place, ReadError, ReadErrorKind, file};
 use crate::write::{WriteErrorKind, write_atomically};
 use crate::{FrameError, Mesh, Motion, Unit, WriteError};
@@ -35,7 +35,7 @@ pub enum MotionMismatchError {
         /// Vertices of the frame.
         found: usize,
     },
-    /// A frame is far smaller than the mesh.
+    /// A frame is far smaller than the mesh, or has other triangles.
     #[error("frame {frame} of the motion: {error}")]
     Frame {
         /// The first such frame, counted from 0.
@@ -107,7 +107,8 @@ impl Motion {
         })
     }
 
-    /// Checks that every frame has one position for each of the mesh's vertices, from the mesh's origin.
+    /// Checks that every frame has one position for each of the mesh's vertices, from the mesh's origin, and the mesh's
+    /// triangles where its files have faces.
     ///
     /// # Errors
     /// [`MotionMismatchError`] for another origin, or the first frame that does not fit.
@@ -124,7 +125,8 @@ impl Motion {
         let sizes = self.frames.iter().map(|positions| check_mesh_size(mesh, positions).err());
         match (0..).zip(sizes).find_map(|(frame, error)| Some((frame, error?))) {
             Some((frame, error)) => Err(MotionMismatchError::Frame { frame, error }),
-            None => Ok(()),
+            None => check_faces(&mesh.triangles, expected, &self.faces)
+                .map_err(|error| MotionMismatchError::Frame { frame: 0, error }),
         }
     }
 }
@@ -167,7 +169,7 @@ pub(super) fn parse(bytes: &[u8], place: &Place) -> Result<Motion, ReadErrorKind
             points.iter().map(|p| p.map(|x| f32::from_le_bytes(x).into())).collect();
         frames.push(place.frame_of(&points, number)?);
     }
-    Ok(Motion { frames, rate: rate.unwrap_or(0.0), origin: place.origin })
+    Ok(Motion { frames, rate: rate.unwrap_or(0.0), origin: place.origin, faces: Vec::new() })
 }
 
 /// The frames a second that stand after the last sample.

@@ -1,6 +1,6 @@
 //! A numbered series of mesh files, each a frame: `heart_%03d.vtp`.
 
-use crate::read::{Format, Place, ReadError, ReadErrorKind, elements, file, unit_of};
+use crate::read::{self, ReadError, ReadErrorKind};
 use crate::{Motion, Unit};
 use glam::{DVec3, Vec3};
 use std::path::{Path, PathBuf};
@@ -62,7 +62,7 @@ impl<'a> Series<'a> {
         };
         let others = self.before.len() + self.after.len();
         let width = path.file_name().map_or(0, |name| name.len() - others);
-        let mut triangles = None;
+        let mut faces = None;
         let mut frames = Vec::with_capacity(files.len());
         for (number, (found, path)) in (*first..).zip(&files) {
             if *found < number {
@@ -72,30 +72,24 @@ impl<'a> Series<'a> {
                 let missing = self.file(number, width);
                 return Err(fail(&missing, ReadErrorKind::Gap { next: *found }));
             }
-            let frame = frame(path, number - first, &mut triangles, unit, origin);
+            let frame = frame(path, number - first, &mut faces, unit, origin);
             frames.push(frame.map_err(|kind| fail(path, kind))?);
         }
-        Ok(Motion { frames, rate: 0.0, origin })
+        Ok(Motion { frames, rate: 0.0, origin, faces: faces.unwrap_or_default() })
     }
 }
 
-/// Reads the positions in a file. Polygons that differ from the first file's are an error.
+/// Reads the positions in a file. Faces that differ from the first file's are an error.
 fn frame(
     path: &Path,
     number: u64,
-    polygons: &mut Option<(Vec<u32>, Vec<usize>)>,
+    of_first: &mut Option<Vec<Vec<u32>>>,
     unit: Option<Unit>,
     origin: DVec3,
 ) -> Result<Vec<Vec3>, ReadErrorKind> {
-    let (format, raw) = elements(file::whole(path)?, path, false)?;
-    if matches!(format, Format::StlAscii | Format::StlBinary) {
-        return Err(ReadErrorKind::UnnumberedFrame);
-    }
-    let of_first = polygons.get_or_insert_with(|| (raw.corners.clone(), raw.ends.clone()));
-    if *of_first != (raw.corners, raw.ends) {
+    let (positions, faces) = read::frame(path, number as usize, unit, origin)?;
+    if *of_first.get_or_insert_with(|| faces.clone()) != faces {
         return Err(ReadErrorKind::OtherTriangles);
     }
-    let unit = unit_of(format, raw.unit, unit)?;
-    let place = Place { unit, origin };
-    place.frame_of(&raw.positions, number as usize)
+    Ok(positions)
 }

@@ -219,6 +219,7 @@ pub(crate) fn unit_of(
 /// [`ReadErrorKind::UnnumberedFrame`] for STL, whose vertices may be others than the tree's.
 pub(crate) fn frame(
     path: &Path,
+    number: usize,
     unit: Option<Unit>,
     origin: DVec3,
 ) -> Result<(Vec<Vec3>, Vec<Vec<u32>>), ReadErrorKind> {
@@ -227,7 +228,7 @@ pub(crate) fn frame(
         return Err(ReadErrorKind::UnnumberedFrame);
     }
     let place = Place { unit: unit_of(format, raw.unit, unit)?, origin };
-    let positions = place.frame_of(&raw.positions, 0)?;
+    let positions = place.frame_of(&raw.positions, number)?;
     Ok((positions, raw.faces().map(<[u32]>::to_vec).collect()))
 }
 

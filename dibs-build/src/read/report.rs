@@ -1,8 +1,10 @@
 //! The counts and warnings of an import.
 
+use super::ReadErrorKind;
 use dibs_nostd::format::Unit;
 use serde::{Serialize, Serializer};
 use std::fmt;
+use std::path::Path;
 
 /// The format of a mesh: of a file, or none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -34,6 +36,14 @@ pub enum Format {
 }
 
 impl Format {
+    /// The format of a mesh file: by its content, or where that does not decide by its extension.
+    ///
+    /// # Errors
+    /// [`ReadErrorKind::Foreign`] names a file that is something else, [`ReadErrorKind::UnknownFormat`] is any other.
+    pub fn of(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self, ReadErrorKind> {
+        super::sniff::format(bytes, path.as_ref())
+    }
+
     /// Whether an extension, in any case, is one of the format's.
     pub(super) fn has_extension(self, extension: &str) -> bool {
         let other = match self {

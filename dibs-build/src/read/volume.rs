@@ -250,6 +250,29 @@ mod tests {
         }
     }
 
+    /// A cube of five tetrahedra, any of which are numbered inside out.
+    #[test]
+    fn each_cell_has_a_sign_of_its_own() {
+        let corner = |at: usize| [1, 2, 4].map(|bit| if at & bit == 0 { 0.0 } else { 1.0 });
+        let cells = [[0, 1, 2, 4], [3, 2, 1, 7], [5, 4, 7, 1], [6, 7, 4, 2], [1, 2, 4, 7]];
+        for mirrored in 0..32 {
+            let mut raw = Raw::new(0);
+            raw.positions = (0..8).map(corner).collect();
+            let mut volumes = Volumes::default();
+            for (number, [a, b, c, d]) in cells.into_iter().enumerate() {
+                let cell = if mirrored >> number & 1 == 1 { [a, b, d, c] } else { [a, b, c, d] };
+                assert!(volumes.push(Shape::Tetrahedron, &cell, 0.0));
+            }
+            volumes.finish(&mut raw, false, "").unwrap();
+            assert_eq!(raw.ends.len(), 12);
+            for face in raw.faces() {
+                let at = |i: usize| DVec3::from(raw.positions[face[i] as usize]);
+                let normal = (at(1) - at(0)).cross(at(2) - at(0));
+                assert!(normal.dot(at(0) - DVec3::splat(0.5)) > 0.0, "{mirrored:b} {face:?}");
+            }
+        }
+    }
+
     #[test]
     fn faces_between_cells_are_no_skin() {
         let mut raw = Raw::new(0);

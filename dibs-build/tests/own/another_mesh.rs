@@ -128,6 +128,39 @@ fn a_motion_of_another_mesh_or_unit_is_refused_before_anything_is_sent() {
     assert!(fails(folder, "stretch heart.ply large.pc2").contains("vertices"));
 }
 
+/// Each file of a series has the numbers of another mesh of as many vertices.
+#[test]
+fn the_files_of_a_series_have_the_triangles_of_the_tree() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    written(folder, "rest.obj", &obj([8.0, 8.0, 20.0], IN_ORDER));
+    written(folder, "path.csv", "sphere:4,4,30,1\n");
+    succeeds(folder, "build rest.obj -o rest.dibs --stretch 2");
+    for number in 1..3 {
+        let size = [8.0, 8.0, 20.0 + f64::from(number)];
+        written(folder, &format!("own_{number:03}.obj"), &obj(size, IN_ORDER));
+        let renumbered = obj(size, [3, 1, 2, 0, 7, 5, 6, 4]);
+        written(folder, &format!("other_{number:03}.obj"), &renumbered);
+    }
+    let right = json(folder, &format!("query rest.dibs --vertices own_%03d.obj --frame 1 {TOOL}"));
+    assert!((right["separation"].as_f64().unwrap() - 7.0).abs() < 1e-3, "{right}");
+    succeeds(folder, "track rest.dibs --motion own_%03d.obj --motion-rate 9 --path path.csv");
+    succeeds(folder, "stretch rest.obj own_%03d.obj");
+    succeeds(folder, "build rest.obj -o more.dibs --motion own_%03d.obj");
+    for line in [
+        &format!("query rest.dibs --vertices other_%03d.obj --frame 1 {TOOL}"),
+        "track rest.dibs --motion other_%03d.obj --motion-rate 9 --path path.csv",
+        "stream rest.dibs other_%03d.obj --to udp:127.0.0.1:9 --rate 9 --frames 1",
+        "stream rest.obj other_%03d.obj --to udp:127.0.0.1:9 --rate 9 --frames 1",
+        "stretch rest.obj other_%03d.obj",
+        "build rest.obj -o more.dibs --motion other_%03d.obj",
+        "build rest.obj -o more.dibs --motion other_%03d.obj --modes 2",
+    ] {
+        let error = fails(folder, line);
+        assert!(error.contains("no face with the vertices"), "{line}: {error}");
+    }
+}
+
 #[test]
 fn arrays_are_checked_as_files_are() {
     let generate::MovingMesh { mesh, motion } = generate::heart(320).unwrap();

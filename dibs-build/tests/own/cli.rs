@@ -1,6 +1,7 @@
 //! The `dibs` program, as a script would run it.
 
 use std::net::UdpSocket;
+use std::path::Path;
 use std::process::Command;
 
 use dibs_build::Format;
@@ -92,7 +93,7 @@ fn bad_input_is_one_sentence_and_no_output() {
         ("build ok.obj -o old.dibs --stretch 0.5", "stretch limit of 0.5"),
         ("build ok.obj -o old.txt", ".dibs or .rs"),
         ("build ok.obj -o absent/new.dibs", "absent/new.dibs"),
-        ("inspect ok.obj", "not a valid tree"),
+        ("inspect ok.obj", "this is a mesh file (OBJ)"),
         ("inspect absent.dibs", "absent.dibs"),
         ("generate heart --triangles 11 -o heart.ply", "11 triangles"),
     ] {
@@ -391,4 +392,90 @@ fn sides_contacts_chains_and_scenes() {
         let answer = json(folder, &format!("query {name}.dibs --tool sphere:1,2,15,2 --json"));
         assert_eq!(answer["side"], "inside", "{name}: {answer}");
     }
+}
+
+/// A file that is no tree is named, with the command that makes its tree.
+#[test]
+fn a_mesh_in_place_of_a_tree_is_named() {
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
+    for (file, what) in [
+        ("gmsh_41_binary.msh", "a mesh file (Gmsh)"),
+        ("scene.glb", "a mesh file (glTF)"),
+        ("scene.gltf", "a mesh file (glTF)"),
+        ("trimesh.3mf", "a mesh file (3MF)"),
+        ("vtk_42_binary.vtk", "a mesh file (legacy VTK)"),
+        ("vtk_raw.vtp", "a mesh file (VTK XML)"),
+        ("meshio.vtu", "a mesh file (VTK XML)"),
+        ("frames.npy", "a motion (NumPy)"),
+        ("meshio.inp", "an Abaqus input file"),
+    ] {
+        let error = fails(&fixtures, &format!("inspect {file}"));
+        assert!(error.contains(what) && error.contains("dibs build"), "{file}: {error}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeeds(folder, "generate heart --triangles 320 -o heart.ply --motion heart.pc2");
+    let mesh = dibs_build::read(folder.join("heart.ply")).unwrap().mesh;
+    let mut stl = vec![0_u8; 80];
+    stl.extend((mesh.triangles.len() as u32).to_le_bytes());
+    stl.resize(84 + 50 * mesh.triangles.len(), 0);
+    std::fs::write(folder.join("heart.stl"), stl).unwrap();
+    std::fs::write(folder.join("text.stl"), "solid s\nendsolid s\n").unwrap();
+    std::fs::write(folder.join("heart.off"), "OFF\n0 0 0\n").unwrap();
+    std::fs::write(folder.join("empty.dibs"), "").unwrap();
+    for (line, what) in [
+        ("inspect heart.ply", "PLY); make its tree first: `dibs build heart.ply -o heart.dibs`"),
+        ("query heart.ply --tool sphere:0,0,0,1", "PLY"),
+        ("track heart.ply --motion heart.pc2 --path absent.csv", "PLY"),
+        ("inspect heart.stl", "binary STL"),
+        ("inspect text.stl", "ASCII STL"),
+        ("inspect heart.off", "OFF"),
+        ("inspect heart.pc2", "a motion (PC2)"),
+        ("inspect empty.dibs", "the file is empty"),
+    ] {
+        let error = fails(folder, line);
+        assert!(error.contains("not a tree") && error.contains(what), "{line}: {error}");
+    }
+}
+
+/// Wound against itself, a surface has no side: the answer says so, and what to do.
+#[test]
+fn a_surface_wound_against_itself_is_told_how_to_be_turned() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let corners = "v 0 0 0\nv 10 0 0\nv 0 10 0\nv 0 0 10\n";
+    let faces = "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 3 4\n";
+    std::fs::write(folder.join("mixed.obj"), [corners, faces].concat()).unwrap();
+    succeeds(folder, "build mixed.obj -o mixed.dibs");
+    let is_told =
+        |said: &str| said.contains("wound against each other") && said.contains("--orient");
+    let answer = json(folder, "query mixed.dibs --tool sphere:20,20,20,1 --json");
+    assert!(is_told(answer["side_reason"].as_str().unwrap()), "{answer}");
+    let error = fails(folder, "query mixed.dibs --tool sphere:20,20,20,1 --contacts 50");
+    assert!(is_told(&error), "{error}");
+    succeeds(folder, "build mixed.obj -o turned.dibs --orient");
+    let answer = json(folder, "query turned.dibs --tool sphere:20,20,20,1 --json");
+    assert_eq!(answer["side"], "outside");
+}
+
+/// Two closed parts that overlap are one tree, and building says so.
+#[test]
+fn parts_that_overlap_are_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for (name, apart, is_said) in [("over.obj", 4, true), ("apart.obj", 14, false)] {
+        let corner = |x: i32, first: i32| {
+            format!("v {x} 0 0\nv {} 0 0\nv {x} 12 0\nv {x} 0 12\n", x + 12)
+                + &[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+                    .map(|f| format!("f {} {} {}\n", f[0] + first, f[1] + first, f[2] + first))
+                    .concat()
+        };
+        std::fs::write(folder.join(name), corner(0, 1) + &corner(apart, 5)).unwrap();
+        let output = dibs(folder, &format!("build {name} -o parts.dibs"));
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{said}");
+        assert_eq!(said.contains("two parts of the surface cross or touch"), is_said, "{said}");
+    }
+    let answer = json(folder, "query parts.dibs --tool sphere:1,1,1,0.5 --json");
+    assert_eq!(answer["side"], "inside");
 }

@@ -3,6 +3,8 @@
 use std::net::UdpSocket;
 use std::time::Duration;
 
+use dibs_build::glam::Vec3;
+use dibs_build::{Mesh, Motion};
 use dibs_nostd::modes::{ModalGate, ModalReader, Modes};
 use dibs_nostd::{Advance, Assembler, Frames, Millis, Tree, VertexTable};
 use serde_json::Value;
@@ -72,7 +74,7 @@ fn weights_are_streamed() {
     let gate = ModalGate::<_, MODES>::new(&modes, &tree).unwrap();
     let mut assembler = Assembler::new(writer, gate, tree.mesh_id(), 1e4);
     let mut reader = ModalReader::new(reader, &modes).unwrap();
-    let motion = dibs_build::Motion::read_pc2(folder.join("heart.pc2")).unwrap();
+    let motion = Motion::read_pc2(folder.join("heart.pc2")).unwrap();
     let (mut buffer, mut published) = ([0; 2048], 0);
     while let Ok(length) = socket.recv(&mut buffer) {
         assembler.accept(&buffer[..length], Millis(0)).unwrap();
@@ -185,4 +187,49 @@ fn what_the_stretch_check_cannot_measure_is_warned_of() {
         assert_eq!(warned, unmeasurable > 0, "{built}");
         assert_eq!(errors.contains("weld or drop them"), unmeasurable > 0, "{errors}");
     }
+}
+
+/// At the centre of a ball all triangles are as close: more than a tracker has places for.
+#[test]
+fn a_tracker_with_too_few_places_is_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    const RINGS: u32 = 100;
+    let mut positions = vec![Vec3::Z * 50.0];
+    for ring in 1..RINGS {
+        let (sin, cos) = (ring as f32 / RINGS as f32 * std::f32::consts::PI).sin_cos();
+        positions.extend((0..2 * RINGS).map(|at| {
+            let (y, x) = (at as f32 / RINGS as f32 * std::f32::consts::PI).sin_cos();
+            Vec3::new(sin * x, sin * y, cos) * 50.0
+        }));
+    }
+    positions.push(Vec3::Z * -50.0);
+    let last = positions.len() as u32 - 1;
+    let at = |ring: u32, place: u32| match ring {
+        0 => 0,
+        RINGS => last,
+        ring => 1 + (ring - 1) * 2 * RINGS + place % (2 * RINGS),
+    };
+    let quads = (0..RINGS).flat_map(|ring| (0..2 * RINGS).map(move |place| (ring, place)));
+    let triangles = quads.flat_map(|(ring, place)| {
+        let [a, b] = [at(ring, place), at(ring, place + 1)];
+        let [c, d] = [at(ring + 1, place), at(ring + 1, place + 1)];
+        [[a, c, d], [a, d, b]]
+    });
+    let has_area = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
+    let triangles: Vec<[u32; 3]> = triangles.filter(has_area).collect();
+    let mesh = Mesh { positions: positions.clone(), triangles, ..Mesh::default() };
+    mesh.write_ply(folder.join("ball.ply")).unwrap();
+    let motion = Motion { frames: vec![positions; 2], rate: 10.0, ..Motion::default() };
+    motion.write_pc2(folder.join("ball.pc2")).unwrap();
+    std::fs::write(folder.join("path.csv"), "sphere:0,0,0,1\n".repeat(3)).unwrap();
+    succeeds(folder, "build ball.ply -o ball.dibs");
+    let output = dibs(folder, "track ball.dibs --motion ball.pc2 --path path.csv");
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{said}");
+    assert!(said.starts_with("warning: 3 of 3 ticks were whole queries"), "{said}");
+    std::fs::write(folder.join("path.csv"), "sphere:0,0,70,1\n".repeat(3)).unwrap();
+    let output = dibs(folder, "track ball.dibs --motion ball.pc2 --path path.csv");
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && !said.contains("warning"), "{said}");
 }

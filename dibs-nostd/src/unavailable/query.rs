@@ -96,7 +96,10 @@ impl fmt::Display for QueryError {
                     "no triangle found within reach of vertex {pin}: over-stretched or corrupt"
                 )
             }
-            Self::NoAdjacency => write!(f, "the tree has no adjacency: build it with"),
+            Self::NoAdjacency => f.write_str(
+                "the tree has no sides: its triangles are wound against each other (`dibs build --orient` turns them), or \
+                 it was built without adjacency",
+            ),
             Self::Contacts { capacity, near } => {
                 write!(f, "a list cannot hold {capacity} contacts and look at {near} triangles")
             }

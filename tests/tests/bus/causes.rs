@@ -323,3 +323,21 @@ fn every_event_has_its_place_and_name() {
     assert!(Event::ALL.iter().enumerate().all(|(i, event)| *event as usize == i));
     assert_ne!(Content::Whole, Content::Modal);
 }
+
+/// Packets of a frame that a later one displaced come late, and say so.
+#[test]
+fn the_late_packets_of_an_abandoned_frame_name_the_cause() {
+    let (first, second) = (frame(1, false), frame(2, false));
+    let (mut assembler, mut reader) = bus();
+    give(&mut assembler, &first[0]).unwrap();
+    give(&mut assembler, &second[0]).unwrap();
+    let refused = ReceiveError::Refused { epoch: 1, cause: Event::Abandoned };
+    for packet in &first[1..] {
+        assert_eq!(give(&mut assembler, packet), Err(refused));
+    }
+    assert_eq!(assembler.health().rejections, 1);
+    for packet in &second[1..] {
+        give(&mut assembler, packet).unwrap();
+    }
+    assert!(published(&mut reader).is_some());
+}

@@ -2,7 +2,8 @@
 
 use anyhow::{Result, anyhow};
 use dibs_build::glam::DVec3;
-use dibs_build::{Import, Motion, ReadOptions, Unit};
+use dibs_build::{FrameCheck, Import, Motion, ReadOptions, Unit};
+use dibs_nostd::{Index, Tree};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::Path;
 use std::time::Duration;
@@ -60,6 +61,13 @@ impl Lengths {
     /// Reads a motion in this unit, of a mesh with this origin.
     pub fn motion(&self, path: &Path, origin: DVec3) -> Result<Motion> {
         Ok(Motion::read_around(path, self.unit(), origin)?)
+    }
+
+    /// Reads a motion in this unit, of the surface of a tree.
+    pub fn motion_of<I: Index>(&self, tree: &Tree<'_, I>, path: &Path) -> Result<Motion> {
+        let motion = self.motion(path, tree.origin().into())?;
+        let faces = FrameCheck::of(tree).check_faces(&motion.faces);
+        faces.map_err(|error| anyhow!("{}: {error}", path.display())).map(|()| motion)
     }
 }
 

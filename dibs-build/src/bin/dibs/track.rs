@@ -94,7 +94,7 @@ pub fn tools<T>(path: &Path, each: impl Fn(ToolSpec) -> Result<T>) -> Result<Vec
 fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
     let origin = tree.origin().into();
     let tools = tools(&args.path, |tool| tool.local(origin))?;
-    let mut motion = args.lengths.motion(&args.motion, tree.origin().into())?;
+    let mut motion = args.lengths.motion_of(tree, &args.motion)?;
     motion.rate = args.motion_rate.unwrap_or(motion.rate);
     let name = args.motion.display();
     if !(args.rate > 0.0 && args.rate.is_finite()) {
@@ -130,6 +130,7 @@ fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
         json: args.json,
         sums: [0; 2],
         fallbacks: 0,
+        full: 0,
     };
     let mut odometer = Odometer::new(tree);
     let frame_at = |tick: usize| tick as f64 / args.rate * f64::from(motion.rate);
@@ -168,6 +169,8 @@ struct Session<'t, I> {
     /// Node and triangle tests.
     sums: [u64; 2],
     fallbacks: usize,
+    /// Of these, those for want of places.
+    full: usize,
 }
 
 impl<I: Index> Session<'_, I> {
@@ -192,6 +195,7 @@ impl<I: Index> Session<'_, I> {
         self.sums[0] += u64::from(proximity.node_tests);
         self.sums[1] += u64::from(proximity.triangle_tests);
         self.fallbacks += usize::from(fallback.is_some());
+        self.full += usize::from(fallback == Some(Fallback::Full));
         let (separation, lower) = (proximity.separation, proximity.lower);
         let (nodes, triangles) = (proximity.node_tests, proximity.triangle_tests);
         let (side, _) = side_name(proximity.side);
@@ -256,10 +260,17 @@ impl<I: Index> Session<'_, I> {
             return Ok(());
         }
         let [nodes, triangles] = self.sums.map(|sum| sum as f64 / ticks as f64);
-        let fallbacks = self.fallbacks;
+        let (fallbacks, full) = (self.fallbacks, self.full);
+        if full > 0 {
+            eprintln!(
+                "warning: {full} of {ticks} ticks were whole queries: too many triangles are about as close as the closest \
+                 for the tracker's {OPENED} places"
+            );
+        }
         if self.json {
             let summary = serde_json::json!({
                 "ticks": ticks, "node_tests": nodes, "triangle_tests": triangles, "fallbacks": fallbacks,
+                "full": full,
             });
             eprintln!("{summary}");
         } else {

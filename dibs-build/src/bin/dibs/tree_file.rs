@@ -1,8 +1,8 @@
 //! Tree files of either index width.
 
 use anyhow::{Result, anyhow};
-use dibs_build::Summary;
 use dibs_build::glam::DVec3;
+use dibs_build::{ReadErrorKind, Summary};
 use dibs_nostd::{FormatError, Tree, TriangleRow};
 use std::path::Path;
 
@@ -40,7 +40,26 @@ pub fn validate<'a>(bytes: &'a [u8], path: &Path) -> Result<AnyTree<'a>> {
         Err(FormatError::Width { .. }) => Tree::<u32>::from_bytes(bytes).map(AnyTree::Wide),
         narrow => narrow.map(AnyTree::Narrow),
     }
-    .map_err(|e| anyhow!("{}: not a valid tree: {e}; build it again", path.display()))
+    .map_err(|error| {
+        let name = path.display();
+        match dibs_build::Format::of(bytes, path) {
+            _ if bytes.starts_with(b"DIBS") => {
+                anyhow!("{name}: not a valid tree: {error}; build it again")
+            }
+            Ok(format) => {
+                let tree = path.with_extension("dibs");
+                anyhow!(
+                    "{name}: not a tree: this is a mesh file ({format}); make its tree first: `dibs build {name} -o {}`",
+                    tree.display()
+                )
+            }
+            Err(ReadErrorKind::Foreign { what, .. }) => {
+                anyhow!("{name}: not a tree: this is {what}; give the file that `dibs build` wrote")
+            }
+            Err(ReadErrorKind::Empty) => anyhow!("{name}: not a tree: the file is empty; build it again"),
+            Err(_) => anyhow!("{name}: not a valid tree: {error}; build it again"),
+        }
+    })
 }
 
 pub fn print(summary: &Summary) {

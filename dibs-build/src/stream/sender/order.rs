@@ -47,6 +47,15 @@ impl SurfaceOrder {
         self.order.len()
     }
 
+    /// Checks that the faces of a motion's files are those of the tree, where the order is that of one.
+    ///
+    /// # Errors
+    /// [`SendError::Positions`] names the first triangle that is missing.
+    pub fn check_faces(&self, faces: &[Vec<u32>]) -> Result<(), SendError> {
+        let check = self.check.as_ref();
+        Ok(check.map_or(Ok(()), |check| check.check_faces(faces))?)
+    }
+
     /// Puts positions in the mesh's order into that of the tree's rows.
     ///
     /// # Errors

@@ -82,7 +82,7 @@ pub(super) struct Collector {
     packet: Option<Millis>,
     heartbeat_at: Option<Millis>,
     trouble: Trouble,
-    /// The frame refused last, and why: the cause of its packets that follow.
+    /// The frame refused or abandoned last, and why: the cause of its packets that follow.
     refused: Option<(FrameName, Event)>,
     pub counters: Counters,
 }
@@ -224,6 +224,7 @@ impl Collector {
                 return Err(ReceiveError::Stale { epoch });
             }
             self.counters.count(Event::Abandoned);
+            self.refused = Some((FrameName::of(&frame.id), Event::Abandoned));
             self.trouble.note_frame(FrameName::of(&frame.id), M::TAGGED);
         }
         let frame = Frame {

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use controller::TICK_RATE;
-use controller::telemetry::{Summary, Tick, cause_code};
+use controller::telemetry::{Summary, Tick, cause_code, fallback_code};
 use dibs_nostd::failsafe::State;
 use dibs_nostd::wire::Event;
-use dibs_nostd::{QueryError, Unavailable};
+use dibs_nostd::{Fallback, QueryError, Unavailable};
 use serde::Serialize;
 use xtask::qemu;
 
@@ -82,6 +82,8 @@ pub struct Report {
     front_max: u32,
     /// Answered ticks in which the front did not serve, the first among them.
     fallbacks: usize,
+    /// Of these, those because the front has too few places.
+    fallbacks_full: usize,
     deadline_misses: Option<u32>,
     /// Longest time from a tick's due moment to its first instruction, in microseconds.
     latency_max_us: Option<f64>,
@@ -178,6 +180,11 @@ impl Report {
             triangle_tests_mean: mean(|tick| tick.triangle_tests),
             front_max: outcome.ticks.iter().map(|tick| tick.front).max().unwrap_or_default(),
             fallbacks: outcome.ticks.iter().filter(|tick| tick.fallback != 0).count(),
+            fallbacks_full: outcome
+                .ticks
+                .iter()
+                .filter(|tick| tick.fallback == fallback_code(Some(Fallback::Full)))
+                .count(),
             deadline_misses: on_board.then_some(summary.deadline_misses),
             latency_max_us: on_board.then(|| microseconds(summary.latency_counts)),
             tick_max_us: on_board.then(|| microseconds(summary.tick_counts)),
@@ -370,6 +377,9 @@ impl Report {
             format!("{:.0} nodes, {:.0} triangles", self.node_tests_mean, self.triangle_tests_mean),
         );
         row("front", format!("{} nodes at most, {} fallbacks", self.front_max, self.fallbacks));
+        if self.fallbacks_full > 0 {
+            row("", format!("{} of them: too few places for the mesh", self.fallbacks_full));
+        }
         if let (Some(mean), Some(max)) = (self.instructions_mean, self.instructions_max) {
             row("instructions a query", format!("{mean:.0} mean, {max} max"));
             row(

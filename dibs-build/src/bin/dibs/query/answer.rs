@@ -1,7 +1,7 @@
 //! An answer, as JSON or for a reader.
 
 use dibs_build::glam::{DVec3, Vec3};
-use dibs_nostd::{Contact, Coverage, Proximity, Side};
+use dibs_nostd::{Contact, Coverage, NoSide, Proximity, QueryError, Side};
 use serde::Serialize;
 
 /// The closest pair of a tool and a surface.
@@ -40,6 +40,10 @@ pub fn side_name(side: Side) -> (&'static str, Option<String>) {
         Side::Outside => ("outside", None),
         Side::Inside => ("inside", None),
         Side::Crossing => ("crossing", None),
+        // With the remedy.
+        Side::Undefined(NoSide::NoAdjacency) => {
+            ("undefined", Some(QueryError::NoAdjacency.to_string()))
+        }
         Side::Undefined(reason) => ("undefined", Some(reason.to_string())),
         _ => ("undefined", None),
     }

@@ -255,7 +255,7 @@ fn current<I: Index>(
     match (is_motion, frame) {
         (true, None) => bail!("{name}: choose a frame of the motion with --frame"),
         (true, Some(frame)) => {
-            let mut frames = lengths.motion(path, origin)?.frames;
+            let mut frames = lengths.motion_of(tree, path)?.frames;
             if frame >= frames.len() {
                 bail!("{name}: no frame {frame}, the motion has {}", frames.len());
             }

@@ -92,6 +92,7 @@ pub fn run(args: &Args) -> Result<()> {
     if motion.frames.is_empty() {
         bail!("{name}: the motion has no frame");
     }
+    order.check_faces(&motion.faces).map_err(|error| anyhow!("{name}: {error}"))?;
     for (number, frame) in motion.frames.iter().enumerate() {
         order.to_rows(frame).map_err(|error| anyhow!("{name}, frame {number}: {error}"))?;
     }

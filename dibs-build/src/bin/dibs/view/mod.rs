@@ -129,7 +129,7 @@ fn data<I: Index>(args: &Args, tree: &Tree<'_, I>, bytes: &[u8]) -> Result<Strin
 /// The frames of a motion in the order of the tree's rows, none of them stretched too far.
 fn motion<I: Index>(args: &Args, tree: &Tree<'_, I>, path: &Path) -> Result<(Vec<Vec<Vec3>>, f32)> {
     let name = path.display();
-    let motion = args.lengths.motion(path, tree.origin().into())?;
+    let motion = args.lengths.motion_of(tree, path)?;
     let rate = args.motion_rate.unwrap_or(motion.rate);
     if !(rate > 0.0 && rate.is_finite()) || motion.frames.is_empty() {
         bail!("{name}: has {} frames at {rate} a second; give --motion-rate", motion.frames.len());
