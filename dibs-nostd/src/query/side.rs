@@ -58,7 +58,8 @@ impl fmt::Display for NoSide {
         f.write_str(match self {
             Self::NotAsked => "no side was asked for",
             Self::NoAdjacency => {
-                "the tree has no adjacency: it was built without, or triangles are wound against each other"
+                "the tree has no adjacency: its triangles are wound against each other (`dibs build --orient` turns them), or it \
+                 was built without"
             }
             Self::OpenBoundary => "the closest point is on an open boundary",
             Self::NonManifold => {

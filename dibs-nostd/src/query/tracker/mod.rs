@@ -123,7 +123,8 @@ pub enum Fallback {
     Surface,
     /// Tool or surface moved so far that more than half of the front ran out.
     Jump,
-    /// More nodes had to be opened than there are places. The next tick starts anew.
+    /// More nodes had to be opened than there are places. The next tick starts anew. Where it comes often, a tracker costs more
+    /// than a query: it has too few places for this surface and these poses, which `dibs track` counts.
     Full,
 }
 

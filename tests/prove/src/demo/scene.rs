@@ -2,6 +2,8 @@
 
 use anyhow::{Context, Result, ensure};
 use dibs_build::{Builder, BuiltTree, Motion, MotionStretch, Paths, Unit, generate, write_limits};
+use dibs_nostd::Tool;
+use glam::Vec3;
 use xtask::firmware::{HEART_STRETCH, Limits, Surface};
 use xtask::workspace;
 
@@ -43,6 +45,15 @@ impl Scene {
             }
         };
         motion.check_fits(&mesh)?;
+        let corner = |of: fn(Vec3, Vec3) -> Vec3| mesh.positions.iter().copied().reduce(of);
+        let size = corner(Vec3::max).zip(corner(Vec3::min)).map(|(high, low)| high - low);
+        let size = size.unwrap_or_default().max_element();
+        let thick = 2.0 * Tool::radius(&controller::instrument(0)?);
+        ensure!(
+            size > thick,
+            "the surface is {size} mm across, less than the instrument's {thick} mm: the demo takes mm; scale a mesh in \
+             another unit, and its motion"
+        );
         ensure!(!motion.frames.is_empty(), "the motion has no frame");
         let (limits, builder) = match (options.stretch, &options.mesh) {
             (None, Some(_)) => {
