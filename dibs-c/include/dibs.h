@@ -34,7 +34,7 @@
 /**
  * Bytes of a list's storage.
  */
-#define DIBS_CONTACTS_SIZE 18432
+#define DIBS_CONTACTS_SIZE 19456
 
 /**
  * Contacts that a list holds: of more, the deepest.
@@ -1063,7 +1063,8 @@ typedef struct {
  */
 typedef struct {
   /**
-   * Factors of the linear velocity: the contact's normal.
+   * Factors of the linear velocity: the contact's normal; where the deepest point is inside the tool's axis, the mean of
+   * two triangles'.
    */
   float linear[3];
   /**

@@ -13,7 +13,7 @@ use crate::query::{dibs_options, dibs_proximity, dibs_query};
 use crate::tool::{Shape, dibs_tool, dibs_vec3};
 
 /// Bytes of a list's storage.
-pub const DIBS_CONTACTS_SIZE: usize = 18_432;
+pub const DIBS_CONTACTS_SIZE: usize = 19_456;
 
 /// Contacts that a list holds: of more, the deepest.
 pub const DIBS_CONTACTS: usize = 16;
@@ -233,7 +233,8 @@ pub extern "C" fn dibs_contacts_set_velocities(
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct dibs_row {
-    /// Factors of the linear velocity: the contact's normal.
+    /// Factors of the linear velocity: the contact's normal; where the deepest point is inside the tool's axis, the mean of
+    /// two triangles'.
     pub linear: [f32; 3],
     /// Factors (mm) of the angular velocity.
     pub angular: [f32; 3],

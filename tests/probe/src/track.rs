@@ -85,7 +85,7 @@ type Follower = Tracker<'static, u16, STACK, OPENED>;
 /// The sizes that the documentation states.
 #[cfg(target_pointer_width = "32")]
 const _: () = {
-    assert!(size_of::<Contacts<8>>() == 88 * 8 + 32 * 512 + 152);
+    assert!(size_of::<Contacts<8>>() == 144 * 8 + 32 * 512 + 152);
     assert!(size_of::<Follower>() <= 8 * STACK + 44 * OPENED + 1_288);
 };
 

@@ -12,6 +12,7 @@ mod positions;
 mod proxy;
 mod refusals;
 mod roots;
+mod rows;
 mod shown_budgets;
 mod side;
 mod slack;

@@ -34,8 +34,6 @@
 //!   next, and with it the force's direction, but not its size. A narrow gap whose margins overlap is such a place:
 //!   choose the margin below half the gap.
 //! - A moving surface moves the wall: it does work on the tool, as a beating heart would.
-//! - Where a capsule's second end passes through the surface, the size falls: the depth of a crossing tool is its
-//!   deepest point's, that of a tool wholly inside its shallowest point's.
 //! - Saturation: a hand that pushes harder than `max_force` gets through.
 
 /// `?` in a `const fn`.

@@ -12,6 +12,14 @@ use crate::query::Contact;
 /// contact's separation falls towards [`stand_off`](Self::stand_off) no faster than exponentially, at a rate of
 /// [`gain`](Self::gain); below the stand-off it must grow. Plain arrays, for any solver of quadratic programs.
 ///
+/// Where a tool crosses the surface or is inside, and its deepest point is inside the axis, two triangles bound the depth,
+/// one to each side. The row is then the mean of both triangles' rows, with the weights that cancel the motion along the axis:
+/// the rate of the separation. The deepest point is known within the depth's tolerance
+/// ([`Options::depth_tolerance`](crate::Options::depth_tolerance)); of triangles that tie within it, the row has two.
+/// Between opposite walls its factors are small, and 0 between parallel ones: no small motion makes the tool less deep, so a
+/// row below its stand-off has no solution unless the solver may relax it. Where the budget ended before the second triangle
+/// was found, and for a contact of [`Contacts::settle`](crate::Contacts::settle), the row is that of the closest triangle.
+///
 /// ```
 /// use dibs_build::{Builder, generate};
 /// use dibs_nostd::constraint::VelocityRow;
@@ -37,9 +45,9 @@ use crate::query::Contact;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct VelocityRow {
-    /// Factors of the linear velocity: the contact's normal.
+    /// Factors of the linear velocity: the contact's normal, or the mean of two.
     pub linear: [f32; 3],
-    /// Factors of the angular velocity (mm): the lever arm's product with the normal.
+    /// Factors of the angular velocity (mm): the lever arm's product with those.
     pub angular: [f32; 3],
     /// The least sum allowed (mm/s).
     pub least: f32,
@@ -60,12 +68,18 @@ impl VelocityRow {
     /// Cost: some tens of f32 operations.
     #[must_use]
     pub fn new(contact: &Contact, accuracy: f32, origin: Vec3) -> Self {
-        let normal = contact.normal;
-        let lever = contact.point_on_tool - origin;
-        let surface = normal.dot(contact.velocity);
+        let (mut linear, mut point) = (contact.normal, contact.point_on_tool);
+        let mut surface = linear.dot(contact.velocity);
+        let across = &contact.across;
+        if across.share > 0.0 {
+            let own = 1.0 - across.share;
+            linear = linear * own + across.normal * across.share;
+            surface = surface * own + across.speed * across.share;
+            point = across.on_axis;
+        }
         Self {
-            linear: normal.to_array(),
-            angular: lever.cross(normal).to_array(),
+            linear: linear.to_array(),
+            angular: (point - origin).cross(linear).to_array(),
             least: surface,
             surface,
             separation: sum_down(contact.separation, -accuracy),

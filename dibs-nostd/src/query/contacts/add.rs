@@ -6,7 +6,7 @@ use super::basins::{Basins, Near, Place};
 use super::low::Found;
 use super::{Contact, Contacts};
 use crate::math::sqrt::sqrt;
-use crate::query::search::RangeFront;
+use crate::query::search::{RangeFront, Waiting};
 use crate::query::side::{self, OnAxis, Side};
 use crate::query::{NoSide, Options, Proximity};
 use crate::tool::AxisPair;
@@ -17,7 +17,7 @@ use crate::{Budget, Coverage, Index, Tool, Tree, TriangleRow, VertexTable};
 const RIDGE: f32 = 1.0 / 64.0;
 
 /// Accuracies within which two points are too close to give a direction.
-const NO_DIRECTION: f32 = 16.0;
+pub(super) const NO_DIRECTION: f32 = 16.0;
 
 /// A tool and a surface, with their numbers in a scene.
 pub(in crate::query) struct Pair<'a, I, V: ?Sized, T> {
@@ -69,10 +69,13 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     pub(super) fn add_from<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         pair: &Pair<'_, I, V, T>,
+        stack: &mut [Waiting],
         options: &Options,
         find: impl FnOnce(
             &mut Basins<NEAR>,
             &mut RangeFront<NEAR>,
+            &mut [Waiting],
+            &Options,
             f32,
             f32,
         ) -> Result<Found, QueryError>,
@@ -88,16 +91,25 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         let has_side = closest.side != Side::Undefined(NoSide::CutShort);
         found.has_no_side |= may_be_inside(closest);
         let is_of = |row| options.part.is_none() || tree.label(row) == options.part;
-        let own = pair.contact(closest).filter(|at| at.separation <= margin && is_of(at.triangle));
+        let mut own =
+            pair.contact(closest).filter(|at| at.separation <= margin && is_of(at.triangle));
+        let mut spent = Budget { node_tests: 0, triangle_tests: 0 };
+        if matches!(closest.side, Side::Inside | Side::Crossing)
+            && let Some(contact) = &mut own
+        {
+            (contact.across, spent) = pair.across(contact, stack, options)?;
+        }
         if closest.side == Side::Inside || (closest.lower > margin && has_side) {
             if let Some(contact) = own {
                 found.insert(contact);
             }
-            return Ok(Budget { node_tests: 0, triangle_tests: 0 });
+            return Ok(spent);
         }
+        let options = &options.budget(options.budget.less(spent.node_tests, spent.triangle_tests));
         let ridge = (margin * RIDGE) + 2.0 * accuracy;
         let limit = tool.radius() + margin + ridge;
-        let Found { complete, beyond, tests: mut made } = find(basins, front, limit, ridge)?;
+        let Found { complete, beyond, tests: mut made } =
+            find(basins, front, stack, options, limit, ridge)?;
         let is_crossing = closest.side == Side::Crossing;
         let has_crossing = is_crossing && own.is_some();
         if let Some(contact) = own.filter(|_| is_crossing) {
@@ -161,7 +173,10 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             // A valley's lowest triangle is less than a ridge below the low one that was visited.
             found.lower_bound(from - ridge - tool.radius());
         }
-        Ok(made)
+        Ok(Budget {
+            node_tests: made.node_tests.saturating_add(spent.node_tests),
+            triangle_tests: made.triangle_tests.saturating_add(spent.triangle_tests),
+        })
     }
 }
 

@@ -28,7 +28,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         stack: &mut [Waiting],
         options: &Options,
     ) -> Result<Budget, QueryError> {
-        self.add_from(pair, options, |basins, _, limit, ridge| {
+        self.add_from(pair, stack, options, |basins, _, stack, options, limit, ridge| {
             let mut low = Low::new(basins, limit, pair);
             let &Pair { tree, vertices, tool, .. } = pair;
             let search = Search::start(tree, stack, vertices, tool, options, None, None)?;
@@ -48,7 +48,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         travel: Travel,
         unit: Unit,
     ) -> Result<Budget, QueryError> {
-        self.add_from(pair, options, |basins, front, limit, ridge| {
+        self.add_from(pair, stack, options, |basins, front, stack, options, limit, ridge| {
             let mut front = front.moved_to(pair.tool, travel, unit, options.part);
             let mut low = Low::new(basins, limit, pair);
             let &Pair { tree, vertices, tool, .. } = pair;

@@ -1,5 +1,6 @@
 //! All locally closest pairs of a tool and a surface within a margin.
 
+mod across;
 mod add;
 mod basins;
 mod list;
@@ -11,6 +12,7 @@ use super::search::RangeFront;
 use super::{Options, Proximity, Query, Side};
 use crate::unavailable::{QueryError, Unavailable};
 use crate::{Index, Tool, TriangleRow, VertexTable};
+use across::Across;
 pub(super) use add::Pair;
 use basins::Basins;
 use list::List;
@@ -46,6 +48,8 @@ pub struct Contact {
     /// Velocity of the surface there (mm/s): zero until [`Contacts::move_with`] sets it.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub velocity: Vec3,
+    /// The other triangle that bounds the depth, where the tool crosses or is inside.
+    pub(crate) across: Across,
 }
 
 impl Contact {
@@ -61,6 +65,7 @@ impl Contact {
         corners: [0; 3],
         barycentric: [0.0; 3],
         velocity: Vec3::ZERO,
+        across: Across::NONE,
     };
 }
 
@@ -68,7 +73,7 @@ impl Contact {
 /// contact, and some with no lower vertex next to theirs, at most half of `NEAR`. A tracker remembers up to `NEAR` opened nodes of the tree in
 /// the list, some hundred as a rule.
 ///
-/// RAM on a 32-bit processor: 88 bytes for each of the `N`, 32 for each of the `NEAR`, and 152.
+/// RAM on a 32-bit processor: 144 bytes for each of the `N`, 32 for each of the `NEAR`, and 152.
 ///
 /// Make it once, in a `static` or at start-up, and use it at every tick.
 ///
@@ -237,15 +242,22 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     /// # Errors
     /// [`QueryError::VertexCount`] if a contact's corner has no row in the table.
     pub fn move_with<V: VertexTable + ?Sized>(&mut self, velocities: &V) -> Result<(), QueryError> {
-        for contact in self.found.list.iter_mut().take(self.found.count) {
+        let velocity = |corners: [u32; 3], weights: [f32; 3]| {
             let mut velocity = Vec3::ZERO;
-            for (corner, weight) in contact.corners.into_iter().zip(contact.barycentric) {
+            for (corner, weight) in corners.into_iter().zip(weights) {
                 let found = velocities.len() as u32;
                 let expected = corner.saturating_add(1);
                 let moving = velocities.position(corner);
                 velocity += weight * moving.ok_or(QueryError::VertexCount { expected, found })?;
             }
-            contact.velocity = velocity;
+            Ok(velocity)
+        };
+        for contact in self.found.list.iter_mut().take(self.found.count) {
+            contact.velocity = velocity(contact.corners, contact.barycentric)?;
+            let across = &mut contact.across;
+            if across.share > 0.0 {
+                across.speed = across.normal.dot(velocity(across.corners, across.barycentric)?);
+            }
         }
         Ok(())
     }
@@ -265,6 +277,9 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     ///
     /// Where the list has too few places, or the budget ends, the closest pair is in it all the same, and its
     /// [bound](Contacts::bound) says how far it is complete. One wall may then be several contacts.
+    ///
+    /// Where the tool crosses or is inside, up to five more searches of a point, as a rule one, find the second triangle at its
+    /// deepest point, for [`VelocityRow`](crate::constraint::VelocityRow). Without budget for them there is none.
     ///
     /// Cost: that of [`closest`](Self::closest), a range search that compares the corners of each triangle within the
     /// margin, and exact tests of about an eighth of these and of those around a contact.

@@ -1,0 +1,211 @@
+//! The rate of a deepest point's depth.
+//!
+//! Along an axis the depth is the least of the distances to the triangles, and each of these is convex. So it is largest
+//! inside the axis where two triangles are equally far: on the way along the axis one comes nearer, the other recedes. As
+//! tool and surface move, the largest depth changes at the mean rate of the two distances whose weights cancel the motion
+//! along the axis.
+//!
+//! The closest triangle is known. A few points of the axis in the direction in which it recedes are searched for the other
+//! one: first a point beyond the largest depth that the answer leaves possible, then the points where both would be equally
+//! far, until the depth there is no less than expected. All are nearer to the deepest point than the surface is, so they
+//! are inside, too.
+
+use glam::Vec3;
+
+use super::Contact;
+use super::add::{NO_DIRECTION, Pair};
+use crate::math::sqrt::sqrt;
+use crate::query::search::{Search, WHOLE, Waiting};
+use crate::query::{Options, Proximity};
+use crate::tool::AxisPoint;
+use crate::tree::RootSet;
+use crate::unavailable::QueryError;
+use crate::{Budget, Index, Tool, Tree, VertexTable};
+
+/// Most points of the axis searched.
+const LOOKS: u32 = 5;
+
+/// Node tests that take as long as the work for a point besides its search.
+const LOOK_COST: u32 = 16;
+
+/// Largest step along the axis, as a share of the depth.
+const STEP: f32 = 0.75;
+
+/// The other triangle of a deepest point inside the axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub(crate) struct Across {
+    /// Its weight in the rate of the depth; 0 if there is none. The closest triangle has the rest.
+    pub share: f32,
+    /// Unit vector that leads out through it.
+    #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
+    pub normal: Vec3,
+    /// The axis' point that is equally far from both triangles.
+    #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
+    pub on_axis: Vec3,
+    /// Its corners, as rows of the vertex table.
+    pub corners: [u32; 3],
+    /// Weights of the corners at its closest point.
+    pub barycentric: [f32; 3],
+    /// Velocity of that point along the normal (mm/s).
+    pub speed: f32,
+}
+
+impl Across {
+    pub const NONE: Self = Self {
+        share: 0.0,
+        normal: Vec3::ZERO,
+        on_axis: Vec3::ZERO,
+        corners: [0; 3],
+        barycentric: [0.0; 3],
+        speed: 0.0,
+    };
+}
+
+/// A point of the axis.
+#[derive(Clone, Copy)]
+struct Place {
+    /// Its distance (mm) from the deepest point, in the direction in which that point's triangle recedes.
+    along: f32,
+    depth: f32,
+    /// Growth of its triangle's distance with that way.
+    slope: f32,
+}
+
+impl Place {
+    /// Where the distances to the triangles of two places are equal, if they grow evenly; and that distance.
+    fn meeting(&self, far: &Self) -> (f32, f32) {
+        let between = far.along - self.along;
+        let step = (far.depth - self.depth - far.slope * between) / (self.slope - far.slope);
+        let step = if step > 0.0 { step } else { 0.0 };
+        let step = if step < between { step } else { between };
+        (self.along + step, self.depth + self.slope * step)
+    }
+}
+
+/// A search for a point's closest triangle.
+struct Look<'a, 't, I, V: ?Sized> {
+    tree: &'a Tree<'t, I>,
+    vertices: &'a V,
+    roots: RootSet,
+    options: Options,
+    spent: Budget,
+}
+
+impl<I: Index, V: VertexTable + ?Sized> Look<'_, '_, I, V> {
+    /// The closest triangle; `None` where the budget ends.
+    #[cold]
+    #[inline(never)]
+    fn at(&mut self, stack: &mut [Waiting], point: Vec3) -> Result<Option<Proximity>, QueryError> {
+        let Self { tree, vertices, roots, options, spent } = self;
+        let Budget { node_tests, triangle_tests } =
+            options.budget.less(spent.node_tests, spent.triangle_tests);
+        let Some(node_tests) = node_tests.checked_sub(1 + LOOK_COST) else { return Ok(None) };
+        let options = options.budget(Budget { node_tests, triangle_tests });
+        let (point, first) = (AxisPoint(point), options.first(None));
+        let search =
+            Search::start_in(*roots, tree, stack, *vertices, &point, &options, first, None)?;
+        let found = search.run::<WHOLE>(f32::INFINITY)?;
+        spent.node_tests = spent.node_tests.saturating_add(found.node_tests + LOOK_COST);
+        spent.triangle_tests = spent.triangle_tests.saturating_add(found.triangle_tests);
+        Ok(Some(found).filter(|found| !found.is_cut_short()))
+    }
+}
+
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
+    /// The other triangle at the deepest point of a tool that is inside or crosses, whose contact is `own`; and the tests
+    /// that it took. There is none if the point is an end of the axis, or where the budget ends.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn across(
+        &self,
+        own: &Contact,
+        stack: &mut [Waiting],
+        options: &Options,
+    ) -> Result<(Across, Budget), QueryError> {
+        let &Self { tree, vertices, tool, closest, .. } = self;
+        let mut look = Look {
+            tree,
+            vertices,
+            roots: tree.shells_of(tree.root_of(own.triangle.0)),
+            options: options.warm_start(Some(own.triangle)),
+            spent: Budget { node_tests: 0, triangle_tests: 0 },
+        };
+        // The searches take the positions as exact.
+        let accuracy = closest.accuracy - vertices.position_error();
+        let length = tool.axis_length();
+        let direction = tool.axis_span() / length;
+        let on_axis = tool.axis_point(own.axis_parameter);
+        let before = own.axis_parameter * length;
+        let growth = -own.normal.dot(direction);
+        let (way, mut end) =
+            if growth > 0.0 { (direction, length - before) } else { (-direction, before) };
+        let depth = -closest.separation - tool.radius();
+        let first = Place { along: 0.0, depth, slope: growth.abs() };
+        let has_way = first.slope * end > accuracy && depth > NO_DIRECTION * accuracy;
+        if !has_way {
+            return Ok((Across::NONE, look.spent));
+        }
+        // No point of the axis is deeper.
+        let most = -closest.lower - tool.radius() + accuracy;
+        let (mut near, mut far) = (first, None);
+        for _ in 0..LOOKS {
+            let (along, expected) = match &far {
+                Some((far, _)) => near.meeting(far),
+                None => {
+                    let mut along = near.along + (most - near.depth) / near.slope;
+                    for least in [near.along + STEP * near.depth, end] {
+                        along = if along < least { along } else { least };
+                    }
+                    (along, f32::INFINITY)
+                }
+            };
+            let is_known = |far: &Place| {
+                let deepest = if far.depth > near.depth { far.depth } else { near.depth };
+                expected <= deepest + accuracy
+            };
+            if far.as_ref().is_some_and(|(far, _)| is_known(far)) {
+                break;
+            }
+            let point = on_axis + way * along;
+            let Some(found) = look.at(stack, point)? else { break };
+            // From the point inside to the surface.
+            let slope = found.direction.dot(way);
+            let place = Place { along, depth: found.axis_distance, slope };
+            if far.is_some() && place.depth >= expected - accuracy {
+                break;
+            }
+            if !(slope > 0.0) {
+                far = Some((place, found));
+            } else if place.depth > near.depth {
+                near = place;
+                if !(along < end) && far.is_none() {
+                    break;
+                }
+            } else {
+                // The depth falls and rises again in between.
+                end = (near.along + along) * 0.5;
+                far = None;
+            }
+        }
+        let Some((far, other)) = far else { return Ok((Across::NONE, look.spent)) };
+        let (along, _) = near.meeting(&far);
+        let point = on_axis + way * along;
+        let [a, b, c] = other.corners;
+        let position = |row| vertices.position(row).ok_or(QueryError::Corrupt { row });
+        let corners = [position(a)?, position(b)?, position(c)?];
+        let pair = AxisPoint(point).closest_on_triangle(&corners, f32::INFINITY);
+        let Some(pair) = pair else { return Ok((Across::NONE, look.spent)) };
+        let outward = pair.on_surface - point;
+        let normal = outward / sqrt(outward.length_squared());
+        let fall = normal.dot(way);
+        let share = first.slope / (first.slope + fall);
+        if !(fall > 0.0 && share < 1.0) {
+            return Ok((Across::NONE, look.spent));
+        }
+        let barycentric = pair.barycentric;
+        let (on_axis, corners) = (point, other.corners);
+        let across = Across { share, normal, on_axis, corners, barycentric, speed: 0.0 };
+        Ok((across, look.spent))
+    }
+}
