@@ -7,6 +7,7 @@ use dibs_nostd::{
     Tracker,
 };
 use fastrand::Rng;
+use glam::Vec3;
 
 use dibs_tests::wanderer::Wanderer;
 
@@ -223,4 +224,45 @@ fn a_search_that_was_cut_short_doubles_no_contact() {
         }
     }
     assert!(compared > 500, "{compared}");
+}
+
+/// A jump of many times the surface's size is more than the bounds of a front can count.
+#[test]
+fn a_jump_far_away_starts_the_range_anew() {
+    let mesh = generate::heart(2_000).expect("a valid size").mesh;
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rest = built.to_rows(&mesh.positions);
+    let tip = rest.iter().copied().max_by(|p, q| p.length().total_cmp(&q.length()));
+    let tip = tip.expect("a vertex");
+    let size = tip.length();
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut compared = 0;
+    for jump in [64.0, 128.0, 160.0, 200.0, 256.0, 300.0] {
+        let shift = Vec3::X * (jump * size);
+        let far: Vec<Vec3> = rest.iter().map(|&p| p + shift).collect();
+        let mut odometer = Odometer::new(&tree);
+        let mut tracker = Tracked::new(&tree).expect("deep enough");
+        let (mut own, mut whole) = (Contacts::<64, 2048>::new(), Contacts::<64, 2048>::new());
+        let options = Options::new();
+        let out = |row: usize| rest[row] + rest[row].normalize() * 3.0;
+        let near = Sphere::new(tip + tip / size * 3.0, 1.0).expect("valid");
+        let surface = odometer.start(rest.as_slice());
+        tracker.contacts(&surface, &near, MARGIN, &options, &mut own).expect("an answer");
+        assert!(own.opened() > 0);
+        let step = odometer.step(rest.as_slice(), far.as_slice());
+        let surface = step.at(1.0);
+        for row in (1..rest.len()).step_by(97) {
+            let mut own = own.clone();
+            let tool = Sphere::new(out(row) + shift, 1.0).expect("valid");
+            let mut tracker = tracker.clone();
+            tracker.contacts(&surface, &tool, MARGIN, &options, &mut own).expect("an answer");
+            query
+                .contacts(&surface, &tool, MARGIN, &Options::cold(), &mut whole)
+                .expect("an answer");
+            assert_eq!(own.len(), whole.len(), "{jump} {row}: {own:?} {whole:?}");
+            compared += own.len();
+        }
+    }
+    assert!(compared > 60, "{compared}");
 }

@@ -283,6 +283,36 @@ fn a_shaft_through_two_lobes_has_no_complete_list() {
     assert!(deepest < -7.0 && bound == MARGIN, "{deepest} {bound}");
 }
 
+/// An axis that crosses ridges aslant is below each of their faces at one of its corners, and is outside of both.
+#[test]
+fn ridges_that_an_axis_crosses_aslant_are_contacts() {
+    let roof = |y: f32| {
+        let outline = [[0.0, 0.0], [10.0, -10.0], [-10.0, -10.0]];
+        let at = |x: f32| outline.map(|[across, z]| Vec3::new(x, y + across, z));
+        let mut triangles = vec![[0, 1, 2], [3, 5, 4]];
+        triangles.extend((0..3).flat_map(|a| {
+            let b = (a + 1) % 3;
+            [[a, b + 3, b], [a, a + 3, b + 3]]
+        }));
+        let positions = [at(-40.0), at(40.0)].concat();
+        Mesh { positions, triangles, ..Mesh::default() }
+    };
+    let mesh = joined(&[roof(-15.0), roof(15.0)]);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut list = Contacts::<8>::new();
+    let reach = Vec3::new(30.0, 30.0, 0.1);
+    let at = Vec3::Z * (RADIUS + 1.0);
+    let tool = Capsule::new(at - reach, at + reach, RADIUS).expect("valid");
+    let closest = query.contacts(rows.as_slice(), &tool, MARGIN, &Options::cold(), &mut list);
+    assert_eq!(closest.expect("an answer").side, Side::Outside);
+    let at_ridges: Vec<f32> = list.iter().map(|contact| contact.point_on_surface.y).collect();
+    assert_eq!(at_ridges.len(), 2, "{at_ridges:?}");
+    assert!(at_ridges[0] < -14.0 && at_ridges[1] > 14.0, "{at_ridges:?}");
+}
+
 /// Between two walls of a groove that both face the tool, no step changes the force by more than the walls change.
 #[test]
 fn the_force_between_two_walls_is_continuous() {
