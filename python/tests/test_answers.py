@@ -102,7 +102,9 @@ class Answers(unittest.TestCase):
         tools = capsules(200)
         contacts = TREE.contacts(tools, 12, surface=BEAT.frames[3])
         answers = TREE.query(tools, surface=BEAT.frames[3])
-        self.assertTrue((contacts.bound >= 12).all())
+        # Where the axis crosses, another part of it may be inside, less deep.
+        crossing = answers["side"] == dibs.Side.CROSSING
+        self.assertTrue((contacts.bound >= 12)[~crossing].all())
         self.assertTrue((contacts.found["separation"] <= 12).all())
         apart = (answers["side"] == dibs.Side.OUTSIDE) & (answers["separation"] < 12)
         self.assertGreater(apart.sum(), 10)
