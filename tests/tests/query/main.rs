@@ -1,5 +1,6 @@
 //! Queries, contacts and forces against exhaustive search.
 
+mod answers;
 mod chain;
 mod contacts;
 mod differential;
