@@ -9,8 +9,8 @@
 //! The program then says `dibs_nostd::include_tree!("heart")`. [`tree`] is made of parts: [`read`]
 //! imports and checks a mesh, [`Builder`] makes the tree, [`BuiltTree`] is written as a
 //! Rust module or as a blob. [`Motion`] is a recorded deformation, [`modes`] make a
-//! few weights of it, and [`generate`] makes procedural hearts and brains. The library prints nothing; the program
-//! `dibs` (feature `cli`, on by default) does.
+//! few weights of it, and `generate` makes procedural hearts and brains. The library prints nothing; the program `dibs` of
+//! the crate `dibs-cli` does.
 
 mod array;
 mod builder;
@@ -19,10 +19,9 @@ mod construct;
 mod crossing;
 mod error;
 mod export;
-#[cfg(feature = "stream")]
-pub mod faults;
 mod frame_file;
 mod frames;
+#[cfg(feature = "generate")]
 pub mod generate;
 mod geodesic;
 mod labels;
@@ -37,11 +36,7 @@ mod read;
 mod rest;
 mod rounding;
 mod script;
-#[cfg(feature = "stream")]
-pub mod stream;
 mod stretch;
-#[cfg(feature = "stream")]
-pub mod transport;
 mod write;
 
 pub use array::{BuiltTree, ModesSummary, Summary, summarise};

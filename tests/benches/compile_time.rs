@@ -91,7 +91,7 @@ fn script_time(folder: &Path, name: &str, lines: &str, mesh: &Path) -> Result<f6
     let builder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../dibs-build").canonicalize()?;
     let manifest = format!(
         "[package]\nname = {name:?}\nedition = \"2024\"\n[workspace]\n[build-dependencies]\n\
-         dibs-build = {{ path = {builder:?}, default-features = false }}\n{lines}"
+         dibs-build = {{ path = {builder:?} }}\n{lines}"
     );
     fs::write(root.join("Cargo.toml"), manifest)?;
     fs::copy(builder.join("../Cargo.lock"), root.join("Cargo.lock"))?;

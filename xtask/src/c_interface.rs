@@ -23,7 +23,7 @@ pub fn build(cross: &Cross, features: &str) -> Result<PathBuf> {
 /// Links every function of the header. A panic path that the compiler did not remove calls a symbol that does not
 /// exist, and breaks the link. A planted panic path must break it too: otherwise the check shows nothing.
 pub fn has_no_panic_path(cross: &Cross) -> Result<Outcome> {
-    let header = fs::read_to_string(workspace::root().join("dibs-c/include/dibs.h"))?;
+    let header = fs::read_to_string(workspace::root().join("bindings/c/include/dibs.h"))?;
     let functions = functions(&header);
     ensure!(functions.len() > 20, "the header has no functions");
 

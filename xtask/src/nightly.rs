@@ -14,7 +14,7 @@ const HOST: &str = "x86_64-unknown-linux-gnu";
 const MOMENT: Duration = Duration::from_secs(20);
 const DOWNLOAD: Duration = Duration::from_secs(300);
 
-/// The fuzz targets in `fuzz/`.
+/// The fuzz targets in `tests/fuzz/`.
 pub const TARGETS: [&str; 4] = ["tree", "packets", "mesh", "query"];
 
 /// A target that runs only when it is named: its readers compile for long.
@@ -80,7 +80,7 @@ pub fn fuzz(options: &FuzzOptions) -> Result<Vec<Fuzzed>> {
         run(cargo.args(["install", "--quiet", "cargo-fuzz", "--locked"]))
             .context("no cargo-fuzz")?;
     }
-    let folder = workspace::root().join("fuzz");
+    let folder = workspace::root().join("tests/fuzz");
     let built = workspace::target().join("fuzz");
     let mut build = nightly(&["fuzz", "build", "--release", "--target-dir"]);
     build.arg(&built);

@@ -50,13 +50,17 @@ pub fn test(options: &Options) -> Result<()> {
             "-p",
             "dibs-build",
             "-p",
+            "dibs-stream",
+            "-p",
             "firmware-example",
         ],
         &[("RUSTDOCFLAGS", "-D warnings")],
     );
     steps.run("files of other programs", other_programs);
-    let packages = ["-p", "dibs-nostd", "-p", "dibs-build", "--no-verify", "--allow-dirty"];
-    steps.cargo("packages", &[&["package"], &packages[..]].concat(), &[]);
+    let published = ["dibs-nostd", "dibs-build", "dibs-stream", "dibs-cli"];
+    let published = published.iter().flat_map(|name| ["-p", name]);
+    let package = ["package", "--no-verify", "--allow-dirty"].into_iter().chain(published);
+    steps.cargo("packages", &package.collect::<Vec<_>>(), &[]);
     steps.run("oldest compiler", oldest_compiler);
 
     // Found first, since both sides would install them. Then a thread, because the board's builds take one core.
@@ -105,7 +109,7 @@ fn checks(demo_seconds: u32, is_whole: bool) -> Result<PathBuf> {
 /// Files that other programs write now, by those that are installed.
 fn other_programs() -> Result<Outcome> {
     let mut command = Command::new("cargo");
-    command.args(["test", "--release", "--quiet", "-p", "dibs-build", "--test", "own"]);
+    command.args(["test", "--release", "--quiet", "-p", "dibs-build", "--test", "readers"]);
     command.args(["written_by_other_programs", "--", "--ignored", "--nocapture"]);
     let output = command.current_dir(workspace::root()).output()?;
     let said =

@@ -14,7 +14,7 @@
  *     packet NOW BYTES                   a packet from the bus, in hexadecimal
  *     tick NOW START END RADIUS          a control tick, with the surface from the bus
  *
- * dibs-c/tests/host.rs answers the same script in Rust, and compares the bits.
+ * bindings/c/tests/host.rs answers the same script in Rust, and compares the bits.
  */
 #include <dibs.h>
 

@@ -4,13 +4,13 @@
 use std::cell::Cell;
 use std::time::Duration;
 
-use dibs_build::stream::SendError;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
     AesCmac, Code, Content, Direction, Encoding, FrameEncoder, FrameId, Freshness, Mac, NoMac,
     encode_heartbeat,
 };
 use dibs_nostd::{Assembler, Millis, ReceiveError, Unchecked};
+use dibs_stream::SendError;
 use dibs_tests::bus::*;
 
 use crate::line::*;

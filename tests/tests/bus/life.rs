@@ -3,7 +3,6 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use dibs_build::stream::{SendError, SurfaceOrder};
 use dibs_nostd::failsafe::LinkStatus;
 use dibs_nostd::format::Unit;
 use dibs_nostd::wire::{
@@ -11,6 +10,7 @@ use dibs_nostd::wire::{
     encode_hello, encode_status,
 };
 use dibs_nostd::{Assembler, Millis, ReceiveError, SurfaceFacts, Tree};
+use dibs_stream::{SendError, SurfaceOrder};
 use dibs_tests::bus::*;
 
 use crate::line::*;

@@ -4,11 +4,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use dibs_build::stream::{SendError, Sender, Settings, SurfaceOrder};
-use dibs_build::transport::Transport;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{AesCmac, Encoding, FrameEncoder, FrameId, Freshness, Mac, encode_status};
 use dibs_nostd::{Advance, Assembler, FrameReader, Frames, Millis, Unchecked};
+use dibs_stream::transport::Transport;
+use dibs_stream::{SendError, Sender, Settings, SurfaceOrder};
 use dibs_tests::bus::*;
 
 pub const KEY: [u8; 16] = *b"a secret of ours";

@@ -134,7 +134,7 @@ fn with_paths(manifest: &str) -> String {
     let [core, build] = ["dibs-nostd", "dibs-build"].map(path);
     let here = manifest
         .replace("dibs-nostd = \"0.1\"", &format!("dibs-nostd = {{ path = {core:?} }}"))
-        .replace("dibs-build = { version = \"0.1\"", &format!("dibs-build = {{ path = {build:?}"));
+        .replace("dibs-build = \"0.1\"", &format!("dibs-build = {{ path = {build:?} }}"));
     assert_eq!(here.matches("path = ").count(), 2, "{here}");
     here
 }

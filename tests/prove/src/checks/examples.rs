@@ -7,11 +7,11 @@ use std::time::{Duration, Instant};
 use std::{fs, thread};
 
 use anyhow::{Context, Result, ensure};
-use dibs_build::stream::{SendError, Sender, Settings, SurfaceOrder};
-use dibs_build::transport::Line;
 use dibs_build::{Builder, generate};
 use dibs_nostd::constraint::{ForbiddenRegion, SpringDamper};
 use dibs_nostd::{Capsule, Options, Query, Tree, measure_stretch};
+use dibs_stream::transport::Line;
+use dibs_stream::{SendError, Sender, Settings, SurfaceOrder};
 use glam::Vec3;
 use xtask::process::run;
 use xtask::qemu;

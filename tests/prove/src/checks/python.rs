@@ -29,7 +29,7 @@ fn check(effort: &Effort, _: &mut Figures) -> Result<Outcome> {
         Ok(python) => python,
         Err(error) => return Ok(Outcome::Skipped(format!("{error:#}"))),
     };
-    let source = workspace::root().join("python");
+    let source = workspace::root().join("bindings/python");
     let mut types = Command::new(&python);
     types.args(["-m", "mypy", "--strict", "--cache-dir"]).arg(folder.join("mypy"));
     run(types.arg(source.join("dibs")))?;

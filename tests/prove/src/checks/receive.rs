@@ -1,9 +1,9 @@
 //! Instructions of receiving a frame and checking its stretch on the board, for each vertex and packet.
 
 use anyhow::{Result, ensure};
-use dibs_build::stream::{Sender, Settings, SurfaceOrder};
 use dibs_build::{Builder, BuiltTree, IndexWidth, Motion, generate};
 use dibs_nostd::wire::{AesCmac, Mac, NoMac};
+use dibs_stream::{Sender, Settings, SurfaceOrder};
 use glam::Vec3;
 use probe::receive::{ANSWER_WORDS, KEY, TAGGED, UNTAGGED, VERTICES};
 use xtask::steps::Outcome;

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use anyhow::Result;
 use controller::{MTU, TICK_RATE, Trust, network};
 use dibs_build::Motion;
-use dibs_build::transport::Line;
+use dibs_stream::transport::Line;
 use glam::Vec3;
 use xtask::qemu;
 

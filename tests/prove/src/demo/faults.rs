@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use controller::TICK_RATE;
 use controller::telemetry::Tick;
-use dibs_build::faults::Fault;
 use dibs_nostd::failsafe::State;
+use dibs_stream::faults::Fault;
 use serde::Serialize;
 
 use super::bus::Bus;

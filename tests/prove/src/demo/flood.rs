@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use anyhow::Result;
 use controller::network::{ADDRESS, HARDWARE, PORT};
-use dibs_build::transport::Line;
+use dibs_stream::transport::Line;
 use etherparse::{
     ArpEthIpv4Packet, ArpOperation, EtherType, Ethernet2Header, IpFragOffset, IpNumber, Ipv4Header,
     PacketBuilder, SlicedPacket, TransportSlice,

@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use controller::{MTU, TICK_RATE};
-use dibs_build::faults::{Fault, FaultyLine};
-use dibs_build::stream::{SendError, Sender, Settings, SurfaceOrder};
-use dibs_build::transport::Line;
 use dibs_nostd::failsafe::State;
+use dibs_stream::faults::{Fault, FaultyLine};
+use dibs_stream::transport::Line;
+use dibs_stream::{SendError, Sender, Settings, SurfaceOrder};
 use glam::Vec3;
 
 use super::bus::Bus;

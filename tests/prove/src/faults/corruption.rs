@@ -4,9 +4,9 @@ use std::fmt;
 use std::mem::take;
 
 use anyhow::{Result, anyhow};
-use dibs_build::faults::{Fault, Injector};
 use dibs_nostd::Frames;
 use dibs_nostd::wire::NoMac;
+use dibs_stream::faults::{Fault, Injector};
 use fastrand::Rng;
 use plotters::prelude::*;
 use serde::Serialize;

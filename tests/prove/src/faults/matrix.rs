@@ -4,9 +4,9 @@ use std::mem::take;
 use std::path::Path;
 
 use anyhow::{Result, ensure};
-use dibs_build::faults::{Fault, Injector};
 use dibs_nostd::Frames;
 use dibs_nostd::wire::{Event, Mac, NoMac};
+use dibs_stream::faults::{Fault, Injector};
 use fastrand::Rng;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;

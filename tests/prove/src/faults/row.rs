@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use dibs_build::faults::Fault;
+use dibs_stream::faults::Fault;
 use serde::Serialize;
 
 /// The outcomes of the faults of one kind.

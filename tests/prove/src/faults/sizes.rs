@@ -5,10 +5,10 @@ use std::fmt;
 
 use anyhow::Result;
 use dibs_build::modes::ModalFit;
-use dibs_build::stream::{Sender, Settings, SurfaceOrder};
 use dibs_build::{Builder, Mesh, Motion, generate};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::modes::MAX_MODES;
+use dibs_stream::{Sender, Settings, SurfaceOrder};
 use serde::Serialize;
 
 use crate::data::real;

@@ -8,8 +8,6 @@ use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use dibs_build::stream::{Sender, Settings, SurfaceOrder};
-use dibs_build::transport::Transport;
 use dibs_build::{Builder, BuiltTree, Mesh};
 use dibs_nostd::format::CRC;
 use dibs_nostd::glam::Vec3;
@@ -19,6 +17,8 @@ use dibs_nostd::wire::{
 use dibs_nostd::{
     Advance, Assembler, FrameReader, Frames, Millis, StretchMonitor, Tree, VertexTable,
 };
+use dibs_stream::transport::Transport;
+use dibs_stream::{Sender, Settings, SurfaceOrder};
 pub use probe::bus::MTU;
 use probe::bus::{KEY, RECEIVER, VERTICES, WORK};
 

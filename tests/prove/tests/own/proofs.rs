@@ -25,7 +25,9 @@ fn the_page_of_proofs_names_every_check_and_files_that_exist() {
         "tests/tests",
         "tests/prove/tests",
         "dibs-build/tests",
-        "dibs-c/tests",
+        "dibs-stream/tests",
+        "dibs-cli/tests",
+        "bindings/c/tests",
         "firmware-example/tests",
     ];
     for folder in folders {

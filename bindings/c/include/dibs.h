@@ -1,0 +1,2140 @@
+/**
+ * @file
+ * dibs: the closest point between a tool and a deforming mesh, on a microcontroller.
+ *
+ * Objects are made by an `_init` function in storage of the caller's: of the size that a constant states or more, aligned
+ * to `DIBS_ALIGNMENT`, without an initial value, and kept, unmoved, for as long as the object is used. Nothing is allocated.
+ *
+ * Calls return a `dibs_code`: `DIBS_CODE_OK`, an error of the call's own, or a misuse, which is one of the codes below 100.
+ * After an error nothing is written to the places for results, unless a function says otherwise.
+ *
+ * A pointer is null, or it points to as much as its function says: more is not checked. Lengths are in the mesh's own unit,
+ * mm in these comments; positions are in the mesh's frame.
+ */
+/* Generated from bindings/c/src by `DIBS_WRITE=1 cargo test -p dibs-c --test header`. */
+
+
+#ifndef DIBS_H
+#define DIBS_H
+
+#include <stddef.h>
+#include <stdint.h>
+/** Bytes of the storage of a surface of so many vertices. */
+#define DIBS_SURFACE_SIZE(vertices) (DIBS_SURFACE_BASE + (size_t)DIBS_SURFACE_VERTEX * (vertices))
+
+/** Bytes of the storage of a tracker on a tree of so many vertices. */
+#define DIBS_TRACKER_SIZE(vertices) (DIBS_TRACKER_BASE + (size_t)DIBS_TRACKER_VERTEX * (vertices))
+
+
+/**
+ * Alignment, in bytes, of the storage of every object.
+ */
+#define DIBS_ALIGNMENT 8
+
+/**
+ * Bytes of a list's storage.
+ */
+#define DIBS_CONTACTS_SIZE 19456
+
+/**
+ * Contacts that a list holds: of more, the deepest.
+ */
+#define DIBS_CONTACTS 16
+
+/**
+ * Triangles that a list looks at together: of more, the nearest.
+ */
+#define DIBS_NEAR 512
+
+/**
+ * Bytes of a machine's storage.
+ */
+#define DIBS_FAILSAFE_SIZE 192
+
+/**
+ * Bytes of a frame's storage.
+ */
+#define DIBS_FRAME_SIZE 192
+
+/**
+ * Bytes of a query's storage.
+ */
+#define DIBS_QUERY_SIZE 4864
+
+/**
+ * As much as it takes, for either number of a budget.
+ */
+#define DIBS_UNLIMITED UINT32_MAX
+
+/**
+ * A flag of options: neither answer nor cost depends on earlier queries.
+ */
+#define DIBS_COLD 1
+
+/**
+ * A flag of options: no side is asked for, at the cost of the distance alone. The separation is that of a tool outside.
+ */
+#define DIBS_UNSIGNED 2
+
+/**
+ * List only contacts of the triangles with the options' label, as if the others were not there.
+ */
+#define DIBS_CONTACTS_OF 4
+
+/**
+ * In place of a triangle's row: none.
+ */
+#define DIBS_NO_TRIANGLE UINT32_MAX
+
+/**
+ * Bytes of a reader's storage.
+ */
+#define DIBS_READER_SIZE 128
+
+/**
+ * Bytes of a receiver's storage.
+ */
+#define DIBS_RECEIVER_SIZE 2816
+
+/**
+ * Largest packet of a byte stream: that of an Ethernet frame.
+ */
+#define DIBS_MTU 1472
+
+/**
+ * Largest status, framed or not.
+ */
+#define DIBS_STATUS 98
+
+/**
+ * Events that a receiver counts.
+ */
+#define DIBS_EVENTS 26
+
+/**
+ * Most surfaces of a scene.
+ */
+#define DIBS_SURFACES 8
+
+/**
+ * Bytes of a surface's storage besides its vertices.
+ */
+#define DIBS_SURFACE_BASE 384
+
+/**
+ * Bytes of a surface's storage for each vertex: two positions.
+ */
+#define DIBS_SURFACE_VERTEX 24
+
+/**
+ * Most tools of a chain.
+ */
+#define DIBS_TOOLS 16
+
+/**
+ * Bytes of a tracker's storage besides its vertices.
+ */
+#define DIBS_TRACKER_BASE 17152
+
+/**
+ * Bytes of a tracker's storage for each vertex: the surface as it is, and as it was.
+ */
+#define DIBS_TRACKER_VERTEX 24
+
+/**
+ * Nodes of the tree that a tracker remembers: more, and ticks are whole queries.
+ */
+#define DIBS_OPENED 256
+
+/**
+ * Bytes of a tree's storage.
+ */
+#define DIBS_TREE_SIZE 384
+
+/**
+ * Bytes of a scrub's storage.
+ */
+#define DIBS_SCRUB_SIZE 128
+
+/**
+ * The outcome of a call. Numbers do not change from version to version; those from 1 to 99 are misuses.
+ */
+enum dibs_code
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * No error.
+   */
+  DIBS_CODE_OK = 0,
+  /**
+   * A pointer is null.
+   */
+  DIBS_CODE_NULL = 1,
+  /**
+   * A pointer is not aligned for its type.
+   */
+  DIBS_CODE_MISALIGNED = 2,
+  /**
+   * The storage has fewer bytes than the object's `_SIZE`.
+   */
+  DIBS_CODE_STORAGE_SIZE = 3,
+  /**
+   * The storage is not aligned to `DIBS_ALIGNMENT`.
+   */
+  DIBS_CODE_STORAGE_ALIGNMENT = 4,
+  /**
+   * No object of this kind was made in that storage.
+   */
+  DIBS_CODE_NOT_INITIALISED = 5,
+  /**
+   * Another call that has not returned uses the object.
+   */
+  DIBS_CODE_IN_USE = 6,
+  /**
+   * This end of the surface's buffers was taken before: one receiver, one reader.
+   */
+  DIBS_CODE_TAKEN = 7,
+  /**
+   * A frame is held already: release it first.
+   */
+  DIBS_CODE_HELD = 8,
+  /**
+   * The objects are not of one tree, or of one number of vertices.
+   */
+  DIBS_CODE_OTHER_TREE = 9,
+  /**
+   * A number that is not one of those allowed: flags, counts, states.
+   */
+  DIBS_CODE_ARGUMENT = 10,
+  /**
+   * The caller's buffer is too small for the result.
+   */
+  DIBS_CODE_CAPACITY = 11,
+  /**
+   * The tree has fewer bytes than its header states.
+   */
+  DIBS_CODE_TREE_LENGTH = 100,
+  /**
+   * The bytes are no tree.
+   */
+  DIBS_CODE_TREE_MAGIC = 101,
+  /**
+   * The tree is of another format version: build it again.
+   */
+  DIBS_CODE_TREE_VERSION = 102,
+  /**
+   * The tree has 32-bit indices: more than 65,536 vertices.
+   */
+  DIBS_CODE_TREE_WIDTH = 103,
+  /**
+   * The tree's bytes changed since they were written.
+   */
+  DIBS_CODE_TREE_CHECKSUM = 104,
+  /**
+   * The tree is not well formed: no builder writes such bytes.
+   */
+  DIBS_CODE_TREE_FORM = 105,
+  /**
+   * The tree's bytes changed since they were validated.
+   */
+  DIBS_CODE_TREE_CORRUPT = 106,
+  /**
+   * The tree was built without the section that stretch is measured with.
+   */
+  DIBS_CODE_TREE_NO_METRIC = 107,
+  /**
+   * The tree was built without adjacency: sides and contacts need it.
+   */
+  DIBS_CODE_TREE_NO_ADJACENCY = 108,
+  /**
+   * The tree was built without its rest shape, or has no such row.
+   */
+  DIBS_CODE_TREE_NO_REST_SHAPE = 109,
+  /**
+   * A coordinate of the tool is not finite or too large.
+   */
+  DIBS_CODE_TOOL_COORDINATE = 200,
+  /**
+   * The tool's radius is negative, not finite or too large.
+   */
+  DIBS_CODE_TOOL_RADIUS = 201,
+  /**
+   * The surface has not one vertex for each of the tree's.
+   */
+  DIBS_CODE_VERTEX_COUNT = 202,
+  /**
+   * The position of a vertex is not finite or too large.
+   */
+  DIBS_CODE_POSITION = 203,
+  /**
+   * The stretch was measured with another tree.
+   */
+  DIBS_CODE_STRETCH_OF_OTHER_TREE = 204,
+  /**
+   * The stretch was measured on another frame.
+   */
+  DIBS_CODE_STRETCH_OF_OTHER_FRAME = 205,
+  /**
+   * The surface is stretched beyond what the query was told.
+   */
+  DIBS_CODE_UNCOVERED = 206,
+  /**
+   * The margin is negative, not finite, or larger than that of the contacts.
+   */
+  DIBS_CODE_MARGIN = 207,
+  /**
+   * The query failed for another cause.
+   */
+  DIBS_CODE_QUERY_FAILED = 208,
+  /**
+   * No surface was published, or the frame is empty.
+   */
+  DIBS_CODE_NO_SURFACE = 300,
+  /**
+   * The surface is older than allowed.
+   */
+  DIBS_CODE_STALE = 301,
+  /**
+   * No good packet came for longer than allowed.
+   */
+  DIBS_CODE_LINK_LOST = 302,
+  /**
+   * No heartbeat came for longer than allowed.
+   */
+  DIBS_CODE_HEARTBEAT_LOST = 303,
+  /**
+   * More frames were refused or abandoned than allowed.
+   */
+  DIBS_CODE_REJECTIONS = 304,
+  /**
+   * The surface was longer on its way than allowed.
+   */
+  DIBS_CODE_DELAYED = 305,
+  /**
+   * The surface was older than allowed when it was sent.
+   */
+  DIBS_CODE_SOURCE_STALE = 306,
+  /**
+   * More packets were forged than allowed.
+   */
+  DIBS_CODE_FORGERIES = 307,
+  /**
+   * The tool's axis touches the surface: no direction leads out.
+   */
+  DIBS_CODE_NO_DIRECTION = 308,
+  /**
+   * The budget ended before the side or the contacts were known.
+   */
+  DIBS_CODE_CUT_SHORT = 309,
+  /**
+   * A number is not finite.
+   */
+  DIBS_CODE_NOT_FINITE = 310,
+  /**
+   * A triangle is stretched beyond its limit.
+   */
+  DIBS_CODE_STRETCH_EXCEEDED = 311,
+  /**
+   * A region of the surface has shrunk below its limit.
+   */
+  DIBS_CODE_SHRUNK = 312,
+  /**
+   * A vertex moved farther than the limits on speed and recovery allow.
+   */
+  DIBS_CODE_TOO_FAST = 313,
+  /**
+   * There is no surface for another cause.
+   */
+  DIBS_CODE_UNAVAILABLE = 314,
+  /**
+   * The tool's side is not known, so it may be inside.
+   */
+  DIBS_CODE_NO_SIDE = 315,
+  /**
+   * A closed surface is mirrored or inside out.
+   */
+  DIBS_CODE_INSIDE_OUT = 316,
+  /**
+   * The packet's checksum does not match, or it is too short for one.
+   */
+  DIBS_CODE_PACKET_DAMAGED = 400,
+  /**
+   * The packet is of another protocol version.
+   */
+  DIBS_CODE_PACKET_VERSION = 401,
+  /**
+   * The packet's checksum is right and its form is not.
+   */
+  DIBS_CODE_PACKET_FORM = 402,
+  /**
+   * The packet is of another mesh.
+   */
+  DIBS_CODE_PACKET_MESH = 403,
+  /**
+   * The packet has no genuine tag.
+   */
+  DIBS_CODE_PACKET_FORGED = 404,
+  /**
+   * The packet's frame is not later than the published one.
+   */
+  DIBS_CODE_PACKET_STALE = 405,
+  /**
+   * The packet's frame is not being received.
+   */
+  DIBS_CODE_PACKET_UNEXPECTED = 406,
+  /**
+   * The frame before is still being checked.
+   */
+  DIBS_CODE_PACKET_BUSY = 407,
+  /**
+   * The frame changes another one than that published.
+   */
+  DIBS_CODE_PACKET_BASE = 408,
+  /**
+   * Rows came before the published frame was copied that far.
+   */
+  DIBS_CODE_PACKET_NOT_READY = 409,
+  /**
+   * The frame's rows are not those of this surface.
+   */
+  DIBS_CODE_PACKET_ROWS = 410,
+  /**
+   * The frame's content or encoding is not received here.
+   */
+  DIBS_CODE_PACKET_ENCODING = 411,
+  /**
+   * The packet's place in the frame does not fit the others, or leaves too many gaps.
+   */
+  DIBS_CODE_PACKET_ORDER = 412,
+  /**
+   * A coordinate in the packet is not finite.
+   */
+  DIBS_CODE_PACKET_NOT_FINITE = 413,
+  /**
+   * A coordinate in the packet is beyond the reach.
+   */
+  DIBS_CODE_PACKET_TOO_FAR = 414,
+  /**
+   * The packets are not all of one frame.
+   */
+  DIBS_CODE_PACKET_DIGEST = 415,
+  /**
+   * Bytes between two zeros of the stream are no packet.
+   */
+  DIBS_CODE_FRAMING = 416,
+  /**
+   * The packet was refused for another cause.
+   */
+  DIBS_CODE_PACKET_REFUSED = 417,
+  /**
+   * The surface was captured before the published one.
+   */
+  DIBS_CODE_PACKET_EARLIER = 418,
+  /**
+   * The surface was 65,535 ms old or older when it was sent.
+   */
+  DIBS_CODE_PACKET_TOO_OLD = 419,
+  /**
+   * A stiffness, damping, largest force or margin is out of range.
+   */
+  DIBS_CODE_GAIN = 500,
+  /**
+   * A safe limit is below the degraded one.
+   */
+  DIBS_CODE_LIMIT_ORDER = 501,
+  /**
+   * A limit is 2^31 or more, or the age is not watched.
+   */
+  DIBS_CODE_LIMIT_TOO_LONG = 502,
+  /**
+   * The tissue's speed is negative or not finite.
+   */
+  DIBS_CODE_LIMIT_SPEED = 503,
+  /**
+   * No frame cannot recover a surface.
+   */
+  DIBS_CODE_LIMIT_RECOVERY = 504,
+  /**
+   * The acknowledgement came before the machine waited for it.
+   */
+  DIBS_CODE_ACKNOWLEDGE = 505,
+  /**
+   * A limit is so high that its input never exceeds it.
+   */
+  DIBS_CODE_LIMIT_UNTRIPPABLE = 506,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_code dibs_code;
+#else
+typedef uint32_t dibs_code;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * The origin of a force.
+ */
+enum dibs_force_state
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * The tool is outside the margin: no force.
+   */
+  DIBS_FORCE_STATE_INACTIVE = 0,
+  /**
+   * The wall acts.
+   */
+  DIBS_FORCE_STATE_ACTIVE = 1,
+  /**
+   * The wall acts with its largest force.
+   */
+  DIBS_FORCE_STATE_SATURATED = 2,
+  /**
+   * The answer cannot be used: the force is the hold.
+   */
+  DIBS_FORCE_STATE_SAFE = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_force_state dibs_force_state;
+#else
+typedef uint32_t dibs_force_state;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * The outcome of a packet.
+ */
+enum dibs_progress
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * No packet is complete yet.
+   */
+  DIBS_PROGRESS_NONE = 0,
+  /**
+   * A frame began.
+   */
+  DIBS_PROGRESS_BEGUN = 1,
+  /**
+   * The packet was taken.
+   */
+  DIBS_PROGRESS_STORED = 2,
+  /**
+   * The packet had come before, and was ignored.
+   */
+  DIBS_PROGRESS_DUPLICATE = 3,
+  /**
+   * The frame is complete: `dibs_receiver_advance` checks and publishes it.
+   */
+  DIBS_PROGRESS_COMPLETE = 4,
+  /**
+   * The sender lives.
+   */
+  DIBS_PROGRESS_HEARTBEAT = 5,
+  /**
+   * The sender asks for a status: it is due now.
+   */
+  DIBS_PROGRESS_HELLO = 6,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_progress dibs_progress;
+#else
+typedef uint32_t dibs_progress;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * The outcome of a slice of work.
+ */
+enum dibs_advance
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * No complete frame waits to be checked.
+   */
+  DIBS_ADVANCE_IDLE = 0,
+  /**
+   * More work is left.
+   */
+  DIBS_ADVANCE_PENDING = 1,
+  /**
+   * The frame is admitted, but the last one is being read: a later call publishes it.
+   */
+  DIBS_ADVANCE_HELD = 2,
+  /**
+   * The frame is published.
+   */
+  DIBS_ADVANCE_PUBLISHED = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_advance dibs_advance;
+#else
+typedef uint32_t dibs_advance;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * The reason for a whole query.
+ */
+enum dibs_fallback
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * It was none.
+   */
+  DIBS_FALLBACK_NONE = 0,
+  /**
+   * The first tick, or the one after an error.
+   */
+  DIBS_FALLBACK_START = 1,
+  /**
+   * The surface's motion was not measured all the way.
+   */
+  DIBS_FALLBACK_SURFACE = 2,
+  /**
+   * Tool or surface moved too far.
+   */
+  DIBS_FALLBACK_JUMP = 3,
+  /**
+   * More nodes had to be opened than there are places.
+   */
+  DIBS_FALLBACK_FULL = 4,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_fallback dibs_fallback;
+#else
+typedef uint32_t dibs_fallback;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * On which side of the surface a tool's axis is.
+ */
+enum dibs_side
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * Outside: where the triangles' corners are seen counter-clockwise.
+   */
+  DIBS_SIDE_OUTSIDE = 0,
+  /**
+   * The whole axis is inside.
+   */
+  DIBS_SIDE_INSIDE = 1,
+  /**
+   * The axis crosses the surface.
+   */
+  DIBS_SIDE_CROSSING = 2,
+  /**
+   * No side: none was asked for.
+   */
+  DIBS_SIDE_NOT_ASKED = 3,
+  /**
+   * No side: the tree has no adjacency.
+   */
+  DIBS_SIDE_NO_ADJACENCY = 4,
+  /**
+   * No side: the closest point is on an open boundary of the surface.
+   */
+  DIBS_SIDE_OPEN_BOUNDARY = 5,
+  /**
+   * No side: the sides are closer than the accuracy.
+   */
+  DIBS_SIDE_BELOW_ACCURACY = 6,
+  /**
+   * No side: the triangles at the closest point have no clear normal.
+   */
+  DIBS_SIDE_DEGENERATE = 7,
+  /**
+   * No side: the budget ran out.
+   */
+  DIBS_SIDE_CUT_SHORT = 8,
+  /**
+   * No side: the closest point is on an edge of more than two triangles that are no pairs.
+   */
+  DIBS_SIDE_NON_MANIFOLD = 9,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_side dibs_side;
+#else
+typedef uint32_t dibs_side;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * How it is known that the tree's spheres cover the surface, so that no part of it is nearer than an answer says.
+ */
+enum dibs_coverage
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * The stretch was measured on these positions.
+   */
+  DIBS_COVERAGE_MEASURED = 0,
+  /**
+   * A bound on the stretch follows from measured frames.
+   */
+  DIBS_COVERAGE_PROVEN = 1,
+  /**
+   * Nothing was measured: the tree's stretch limit is taken to hold. If it does not, a nearer part of the surface can be
+   * missed.
+   */
+  DIBS_COVERAGE_ASSUMED = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_coverage dibs_coverage;
+#else
+typedef uint32_t dibs_coverage;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * A list of contacts.
+ *
+ * One context at a time.
+ */
+typedef struct dibs_contacts dibs_contacts;
+
+/**
+ * The machine. It begins in the safe state.
+ *
+ * One context at a time.
+ */
+typedef struct dibs_failsafe dibs_failsafe;
+
+/**
+ * The surface at one moment: vertices of the caller's, or the frame that a reader holds. Queries search it.
+ *
+ * One context at a time.
+ */
+typedef struct dibs_frame dibs_frame;
+
+/**
+ * A query on one tree. It starts from its last answer.
+ *
+ * One context at a time.
+ */
+typedef struct dibs_query dibs_query;
+
+/**
+ * Reads the frame that was published last.
+ *
+ * One context at a time: the control interrupt.
+ */
+typedef struct dibs_reader dibs_reader;
+
+/**
+ * Assembles frames from packets, checks them, and publishes those that are complete and right.
+ *
+ * One context at a time, of lower priority than the reader's: the bus interrupt.
+ */
+typedef struct dibs_receiver dibs_receiver;
+
+/**
+ * A background check of a tree's bytes: flash that rots after start-up gives wrong answers, and no error.
+ *
+ * One context at a time.
+ */
+typedef struct dibs_scrub dibs_scrub;
+
+/**
+ * Two buffers of vertices: the receiver fills one, the reader holds the other, and neither waits.
+ *
+ * Any number of contexts may use it at once.
+ */
+typedef struct dibs_surface dibs_surface;
+
+/**
+ * A query that remembers its last answer's proof.
+ *
+ * It keeps a copy of the surface, so that a frame is held for its copying alone, or it searches a reader's frame itself. One
+ * context at a time.
+ */
+typedef struct dibs_tracker dibs_tracker;
+
+/**
+ * A validated tree, by name `heart.dibs` of `dibs build heart.ply -o heart.dibs`. At most 65,536 vertices.
+ *
+ * Any number of contexts may use it at once.
+ */
+typedef struct dibs_tree dibs_tree;
+
+/**
+ * A point, a direction, a force or a velocity.
+ */
+typedef struct {
+  /**
+   * Along x.
+   */
+  float x;
+  /**
+   * Along y.
+   */
+  float y;
+  /**
+   * Along z.
+   */
+  float z;
+} dibs_vec3;
+
+/**
+ * The closest pair. `dibs_proximity_interval` gives the interval that holds its separation.
+ *
+ * Where the side is none of the first three, the numbers are those of a tool outside.
+ */
+typedef struct {
+  /**
+   * Signed separation (mm) of the best pair found: negative where tool and surface overlap.
+   */
+  float separation;
+  /**
+   * The interval's lower end (mm): equal to `separation`, unless the budget ran out or the axis crosses.
+   */
+  float lower;
+  /**
+   * No separation above is off by more (mm).
+   */
+  float accuracy;
+  /**
+   * A `dibs_side`.
+   */
+  uint32_t side;
+  /**
+   * A `dibs_coverage`: whether the stretch that the answer rests on was checked.
+   */
+  uint32_t coverage;
+  /**
+   * Distance (mm) from the tool's axis to the surface: 0 where it crosses.
+   */
+  float axis_distance;
+  /**
+   * The surface's point of the pair (mm).
+   */
+  dibs_vec3 point_on_surface;
+  /**
+   * The tool's point of the pair, on the tool's surface (mm).
+   */
+  dibs_vec3 point_on_tool;
+  /**
+   * Unit vector that leads out; zero where none does.
+   */
+  dibs_vec3 direction;
+  /**
+   * Place of the pair along the tool's axis: 0 at its start, 1 at its end; 0 for a sphere.
+   */
+  float axis_parameter;
+  /**
+   * Row of the triangle of `point_on_surface`, or `DIBS_NO_TRIANGLE`.
+   */
+  uint32_t triangle;
+  /**
+   * That triangle's corners: rows of vertices.
+   */
+  uint32_t corners[3];
+  /**
+   * Weights of the corners at `point_on_surface`: not negative, sum 1.
+   */
+  float barycentric[3];
+  /**
+   * Sphere bounds evaluated.
+   */
+  uint32_t node_tests;
+  /**
+   * Exact tests of tool and triangle.
+   */
+  uint32_t triangle_tests;
+} dibs_proximity;
+
+/**
+ * The last answer whose side was certain, widened by the motion since. All zeros are no past. Keep one for each tool.
+ */
+typedef struct {
+  /**
+   * The answer.
+   */
+  dibs_proximity proximity;
+  /**
+   * 1 where there is one; else 0.
+   */
+  uint32_t has_past;
+} dibs_last_side;
+
+/**
+ * A wall: a margin around the surface, with a spring and a damper.
+ *
+ * A sampled wall is passive only if the device's own damping is above `stiffness * tick / 2 + damping`.
+ */
+typedef struct {
+  /**
+   * In N/mm, above 0.
+   */
+  float stiffness;
+  /**
+   * In N s/mm, at least 0.
+   */
+  float damping;
+  /**
+   * Damping (N s/mm, at least 0) where there is no answer to act on; 0 lets go of the tool.
+   */
+  float hold_damping;
+  /**
+   * In N, above 0.
+   */
+  float max_force;
+  /**
+   * Reach of the wall from the surface (mm, above 0).
+   */
+  float margin;
+} dibs_wall;
+
+/**
+ * A force and a torque on the tool.
+ */
+typedef struct {
+  /**
+   * In N. Always finite.
+   */
+  dibs_vec3 force;
+  /**
+   * In N mm, about the point asked for. Always finite; zero of one pair.
+   */
+  dibs_vec3 torque;
+  /**
+   * Their origin.
+   */
+  dibs_force_state state;
+  /**
+   * The cause of a hold; otherwise `DIBS_CODE_OK`.
+   */
+  dibs_code cause;
+} dibs_force;
+
+/**
+ * A rigid instrument: all points within `radius` of the segment from `start` to `end`, in the mesh's frame and unit
+ * (mm). A capsule; a sphere where both ends are equal.
+ */
+typedef struct {
+  /**
+   * One end of the axis (mm): at most 2^29 on each axis.
+   */
+  dibs_vec3 start;
+  /**
+   * The other end (mm).
+   */
+  dibs_vec3 end;
+  /**
+   * Radius (mm): 0 to 2^29.
+   */
+  float radius;
+} dibs_tool;
+
+/**
+ * The most work that a query may do.
+ */
+typedef struct {
+  /**
+   * Most sphere bounds evaluated.
+   */
+  uint32_t node_tests;
+  /**
+   * Most exact tests of a tool and a triangle.
+   */
+  uint32_t triangle_tests;
+} dibs_budget;
+
+/**
+ * Options of a query. Null for none: no budget, a warm start, signed.
+ */
+typedef struct {
+  /**
+   * The most work. Zeros ask for next to nothing: set both.
+   */
+  dibs_budget budget;
+  /**
+   * Largest length (mm) of the interval of a depth where the tool's axis crosses the surface; 0 for a 512th of the
+   * axis' length.
+   */
+  float depth_tolerance;
+  /**
+   * The sum of any of `DIBS_COLD`, `DIBS_UNSIGNED` and `DIBS_CONTACTS_OF`.
+   */
+  uint32_t flags;
+  /**
+   * A triangle's label, for `DIBS_CONTACTS_OF`: at most 255.
+   */
+  uint32_t label;
+} dibs_options;
+
+/**
+ * Facts that hold for a list.
+ */
+typedef struct {
+  /**
+   * Contacts in the list.
+   */
+  uint32_t count;
+  /**
+   * Every contact whose separation is below this (mm) is in the list.
+   */
+  float bound;
+  /**
+   * No separation is off by more (mm).
+   */
+  float accuracy;
+  /**
+   * 1 where contacts within the margin were left out because the list is full; else 0.
+   */
+  uint32_t is_full;
+} dibs_contacts_facts;
+
+/**
+ * A locally closest pair of tool and surface.
+ */
+typedef struct {
+  /**
+   * Signed separation (mm), within the list's accuracy.
+   */
+  float separation;
+  /**
+   * Unit vector that leads out.
+   */
+  dibs_vec3 normal;
+  /**
+   * The surface's point (mm).
+   */
+  dibs_vec3 point_on_surface;
+  /**
+   * The tool's point (mm).
+   */
+  dibs_vec3 point_on_tool;
+  /**
+   * Place of the pair along the tool's axis: 0 at its start, 1 at its end.
+   */
+  float axis_parameter;
+  /**
+   * The surface's number in a scene; 0 for a single surface.
+   */
+  uint32_t surface;
+  /**
+   * The tool's number in a chain; 0 for a single tool.
+   */
+  uint32_t tool;
+  /**
+   * Row of the triangle.
+   */
+  uint32_t triangle;
+  /**
+   * That triangle's corners: rows of vertices.
+   */
+  uint32_t corners[3];
+  /**
+   * Weights of the corners at `point_on_surface`.
+   */
+  float barycentric[3];
+  /**
+   * Velocity (mm/s) of the surface there: zero until `dibs_contacts_set_velocities`.
+   */
+  dibs_vec3 velocity;
+} dibs_contact;
+
+/**
+ * One inequality on the tool's velocity: `linear . v + angular . w >= least`, with the velocity `v` (mm/s) of a point of
+ * the tool and the tool's angular velocity `w` (1/s). For any solver of quadratic programs.
+ */
+typedef struct {
+  /**
+   * Factors of the linear velocity: the contact's normal; where the deepest point is inside the tool's axis, the mean of
+   * two triangles'.
+   */
+  float linear[3];
+  /**
+   * Factors (mm) of the angular velocity.
+   */
+  float angular[3];
+  /**
+   * The least sum allowed (mm/s).
+   */
+  float least;
+} dibs_row;
+
+/**
+ * Two limits on one input: beyond the first the state is degraded, beyond the second safe. Both `DIBS_UNLIMITED` where
+ * the input is not watched; otherwise below 2^31.
+ */
+typedef struct {
+  /**
+   * The first limit.
+   */
+  uint32_t degraded;
+  /**
+   * The second limit, not below the first.
+   */
+  uint32_t safe;
+} dibs_watch;
+
+/**
+ * The machine's limits. Times are in ms.
+ */
+typedef struct {
+  /**
+   * Age of the surface; must be watched.
+   */
+  dibs_watch age;
+  /**
+   * Time since any good packet.
+   */
+  dibs_watch silence;
+  /**
+   * Time since the last heartbeat.
+   */
+  dibs_watch heartbeat;
+  /**
+   * Frames refused or abandoned since the last one was published.
+   */
+  dibs_watch rejections;
+  /**
+   * Time that the published frame was on its way. With `DIBS_UNLIMITED` it has no limit, and is in the margin.
+   */
+  dibs_watch transit;
+  /**
+   * Age of the published frame when it was sent; a safe limit is below 65,534.
+   */
+  dibs_watch source_age;
+  /**
+   * Forged packets, of which 10 are forgotten each second; the limits are below 1,000.
+   */
+  dibs_watch forgeries;
+  /**
+   * Largest speed of any point of the tissue, in mm per ms (m/s); at least 0.
+   */
+  float tissue_speed;
+  /**
+   * Frames in a row that recover: 1 to 65,535.
+   */
+  uint32_t recovery_frames;
+  /**
+   * Steps in a row with every input within its first limit, before the one that recovers.
+   */
+  uint32_t dwell;
+  /**
+   * Other than 0 to leave the time on the way out of the margin and the limits: a delay is then not detected.
+   */
+  uint32_t without_transit;
+  /**
+   * 0 to leave the safe state by an acknowledgement alone; otherwise without one.
+   */
+  uint32_t automatic;
+} dibs_limits;
+
+/**
+ * The frame that was published last, and its age.
+ */
+typedef struct {
+  /**
+   * 0 before the first frame; then the rest is 0, too.
+   */
+  uint32_t is_published;
+  /**
+   * Number of the frame; wraps.
+   */
+  uint32_t epoch;
+  /**
+   * When its first packet came, on the receiver's clock; wraps.
+   */
+  uint32_t received;
+  /**
+   * Time since then, in the clock's unit.
+   */
+  uint32_t age;
+} dibs_age;
+
+/**
+ * The health of the bus. Times in ms, `UINT32_MAX` for one that is not known.
+ */
+typedef struct {
+  /**
+   * Time since the last good packet.
+   */
+  uint32_t silence;
+  /**
+   * Time since the last heartbeat.
+   */
+  uint32_t heartbeat;
+  /**
+   * Frames refused or abandoned since the last one was published.
+   */
+  uint32_t rejections;
+  /**
+   * Packets without a genuine tag, less 10 for each second.
+   */
+  uint32_t forgeries;
+  /**
+   * Time that the published frame was on its way, at most.
+   */
+  uint32_t transit;
+  /**
+   * Age of the published frame when it was sent.
+   */
+  uint32_t source_age;
+} dibs_link;
+
+/**
+ * The input of a step.
+ */
+typedef struct {
+  /**
+   * The published frame and its age: of `dibs_reader_latest`.
+   */
+  dibs_age age;
+  /**
+   * The bus's health: of `dibs_reader_link`.
+   */
+  dibs_link link;
+  /**
+   * Code of the query on that frame: `DIBS_CODE_OK` where it gave an answer, and where it was not asked.
+   */
+  uint32_t query;
+  /**
+   * Other than 0 once the tree's bytes were found changed: of `dibs_scrub_step`. Leave it set.
+   */
+  uint32_t is_tree_corrupt;
+} dibs_observation;
+
+/**
+ * The result of a step.
+ */
+typedef struct {
+  /**
+   * A `dibs_state`.
+   */
+  uint32_t state;
+  /**
+   * Cause of a state that is not nominal: a `dibs_code`.
+   */
+  uint32_t cause;
+  /**
+   * Largest way (mm) of the tissue in the surface's age and the time that it was on its way.
+   */
+  float margin;
+  /**
+   * 1 where only an acknowledgement is missing to leave the safe state; else 0.
+   */
+  uint32_t waits_for_acknowledgement;
+} dibs_verdict;
+
+/**
+ * Facts about a frame.
+ */
+typedef struct {
+  /**
+   * Vertices.
+   */
+  uint32_t vertices;
+  /**
+   * No vertex is farther (mm) than this from where it is here. Part of the accuracy of every answer.
+   */
+  float position_error;
+  /**
+   * The largest stretch, 1 for none; 0 where it was not measured.
+   */
+  float stretch;
+} dibs_frame_facts;
+
+/**
+ * An interval of separations (mm).
+ */
+typedef struct {
+  /**
+   * No true separation is less.
+   */
+  float lower;
+  /**
+   * No true separation is more.
+   */
+  float upper;
+} dibs_interval;
+
+/**
+ * Limits of a surface besides the tree's stretch limit. A limit that is not a number refuses every frame.
+ */
+typedef struct {
+  /**
+   * No coordinate is beyond this (mm) on any axis. The smaller, the more damage it tells from a surface.
+   */
+  float reach;
+  /**
+   * Largest speed of a vertex, in mm per ms (m/s); `INFINITY` for no limit.
+   */
+  float speed;
+  /**
+   * Least size of a region as a part of its size at rest, 0.25 for example; 0 for no limit.
+   */
+  float shrinkage;
+  /**
+   * Farthest (mm) that a vertex may be from its place in the published frame, however long ago that was; 0 for a
+   * tenth of the reach, `INFINITY` for no limit.
+   */
+  float recovery;
+} dibs_surface_limits;
+
+/**
+ * A chain of tools, whose axes touch each other, and the surfaces around it. A chain and one surface are a scene too.
+ */
+typedef struct {
+  /**
+   * Addresses of queries, one for each surface, on the surface's tree. No query is there twice.
+   */
+  dibs_query *const *queries;
+  /**
+   * Addresses of the surfaces' frames, in the same order. No frame is there twice.
+   */
+  dibs_frame *const *frames;
+  /**
+   * Surfaces: 1 to `DIBS_SURFACES`.
+   */
+  uint32_t surface_count;
+  /**
+   * The chain's tools.
+   */
+  const dibs_tool *tools;
+  /**
+   * Tools: 1 to `DIBS_TOOLS`.
+   */
+  uint32_t tool_count;
+} dibs_scene;
+
+/**
+ * The closest pair of a scene.
+ */
+typedef struct {
+  /**
+   * The surface's number in the scene.
+   */
+  uint32_t surface;
+  /**
+   * The tool's number in the chain.
+   */
+  uint32_t tool;
+  /**
+   * The pair. Its interval begins at the least lower end of all pairs, its accuracy is the worst, its tests are those
+   * of all. Its side is `DIBS_SIDE_CUT_SHORT` if the budget left that of any pair open.
+   */
+  dibs_proximity proximity;
+} dibs_closest;
+
+/**
+ * The answer of several trackers.
+ */
+typedef struct {
+  /**
+   * The closest pair. Its interval begins at the least lower end of all pairs, its accuracy is the worst, its tests are
+   * those of all. Its side is `DIBS_SIDE_CUT_SHORT` if the budget left that of any pair open.
+   */
+  dibs_proximity proximity;
+  /**
+   * That pair's number.
+   */
+  uint32_t pair;
+  /**
+   * Pairs that were searched; the others were certain to be farther.
+   */
+  uint32_t searched;
+  /**
+   * The first reason for a whole query, of those that were searched.
+   */
+  dibs_fallback fallback;
+} dibs_tracked;
+
+/**
+ * Facts about a tree.
+ */
+typedef struct {
+  /**
+   * Vertices: rows of a surface.
+   */
+  uint32_t vertices;
+  /**
+   * Triangles.
+   */
+  uint32_t triangles;
+  /**
+   * Nodes.
+   */
+  uint32_t nodes;
+  /**
+   * Identity of the mesh, which packets carry.
+   */
+  uint32_t mesh_id;
+  /**
+   * Checksum of the tree's bytes.
+   */
+  uint32_t checksum;
+  /**
+   * The stretch limit that the tree was built for; 1 for no stretch.
+   */
+  float stretch;
+  /**
+   * Largest distance (mm) of a vertex from its place in the mesh's file.
+   */
+  float position_error;
+  /**
+   * Vertices of the mesh's file, those of no triangle too: positions of a frame in the file's order.
+   */
+  uint32_t file_vertices;
+  /**
+   * Triangles of the mesh's file, those too that the builder dropped.
+   */
+  uint32_t file_triangles;
+  /**
+   * Unit of the mesh's file: 0 not known, 1 mm, 2 cm, 3 m, 4 inch, 5 micrometre. All lengths of the tree are in mm.
+   */
+  uint8_t unit;
+} dibs_tree_facts;
+
+/**
+ * A point of the mesh's file (mm), which single precision may not hold.
+ */
+typedef struct {
+  /**
+   * Along the first axis.
+   */
+  double x;
+  /**
+   * Along the second axis.
+   */
+  double y;
+  /**
+   * Along the third axis.
+   */
+  double z;
+} dibs_point;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+/**
+ * One sentence about a code, in English, without a full stop.
+ *
+ * Never null, also for a number that is no code. The text is static.
+ */
+const char *dibs_code_text(uint32_t code);
+
+/**
+ * Gives a wall an answer to act on where a tick's own has no side: the last one with a side and its force, by the motion
+ * since. Call it at every tick, before `dibs_wall_force`; a wall on its own has no past, and damps without a side.
+ *
+ * @param last       The tool's past, which goes on.
+ * @param outcome    As for `dibs_wall_force`.
+ * @param proximity  The closest pair, in place of which the pair to act on is written; not read, and may be null, where the
+ *                   outcome is an error.
+ * @param moved      The most (mm) that tool and surface together have moved since the last call, as of
+ *                   `dibs_tracker_closest`; negative where it is not known, which ends the past.
+ * @return `DIBS_CODE_OK`, also for an outcome that is an error; `DIBS_CODE_ARGUMENT` for a side or coverage that is none; or
+ *         a misuse.
+ */
+dibs_code dibs_last_side_settle(dibs_last_side *last,
+                                uint32_t outcome,
+                                dibs_proximity *proximity,
+                                float moved);
+
+/**
+ * The force of a wall on the tool, from its closest pair.
+ *
+ * Call it at every tick, with the code of whatever the pair came from: with an error the force is the hold, pure damping.
+ *
+ * @param wall       The wall.
+ * @param outcome    The code of the query, of the fail-safe machine, or of the reader: of the first that was not
+ *                   `DIBS_CODE_OK`.
+ * @param proximity  The closest pair; not read, and may be null, where the outcome is an error.
+ * @param velocity   Velocity (mm/s) of the tool's closest point against the surface.
+ * @param force      Receives the force.
+ * @return `DIBS_CODE_OK`, also where the force is the hold; `DIBS_CODE_GAIN`; or a misuse.
+ */
+dibs_code dibs_wall_force(const dibs_wall *wall,
+                          uint32_t outcome,
+                          const dibs_proximity *proximity,
+                          dibs_vec3 velocity,
+                          dibs_force *force);
+
+/**
+ * The force and the torque of a wall on the tool, from all its contacts: a proxy that they hold outside together.
+ *
+ * @param wall      The wall. Its margin is at most that of the contacts.
+ * @param outcome   As for `dibs_wall_force`.
+ * @param contacts  The list.
+ * @param origin    The tool's point (mm) that the torque and the velocity are about.
+ * @param velocity  Velocity (mm/s) of the tool at `origin`.
+ * @param angular   Angular velocity (1/s) of the tool.
+ * @param force     Receives force and torque.
+ * @return `DIBS_CODE_OK`, also where the force is the hold; `DIBS_CODE_GAIN`; or a misuse.
+ */
+dibs_code dibs_wall_proxy_force(const dibs_wall *wall,
+                                uint32_t outcome,
+                                dibs_contacts *contacts,
+                                dibs_vec3 origin,
+                                dibs_vec3 velocity,
+                                dibs_vec3 angular,
+                                dibs_force *force);
+
+/**
+ * Makes an empty list of contacts.
+ *
+ * @param storage   `DIBS_CONTACTS_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+ * @param size      Bytes of the storage.
+ * @param contacts  Receives the list's address.
+ */
+dibs_code dibs_contacts_init(void *storage, size_t size, dibs_contacts **contacts);
+
+/**
+ * Fills the list with all locally closest pairs whose separation is at most `margin`, deepest first.
+ *
+ * Cost: that of `dibs_query_closest`, a range search, and some hundred instructions a triangle within the margin.
+ *
+ * @param query      The query.
+ * @param frame      The surface.
+ * @param tool       The tool.
+ * @param margin     In mm, at least 0.
+ * @param options    Options, or null. A budget that runs out shows in the list's bound.
+ * @param contacts   The list; empty after an error.
+ * @param proximity  Receives the closest pair, or null.
+ * @return As `dibs_query_closest`, `DIBS_CODE_MARGIN`, or `DIBS_CODE_TREE_NO_ADJACENCY`.
+ */
+dibs_code dibs_query_contacts(dibs_query *query,
+                              dibs_frame *frame,
+                              const dibs_tool *tool,
+                              float margin,
+                              const dibs_options *options,
+                              dibs_contacts *contacts,
+                              dibs_proximity *proximity);
+
+/**
+ * Gives a list whose tool may be inside, because the closest pair has no side, that of `closest`: a pair whose side is
+ * certain from the tool's past, of `dibs_last_side_settle`. That pair is a contact then, and the only one unless the tool is
+ * outside. Other lists stay as they are.
+ *
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a side or coverage that is none, or a misuse.
+ */
+dibs_code dibs_contacts_settle(dibs_contacts *contacts,
+                               const dibs_proximity *closest);
+
+/**
+ * Facts that hold for the list.
+ */
+dibs_code dibs_contacts_get_facts(dibs_contacts *contacts, dibs_contacts_facts *facts);
+
+/**
+ * One contact of the list, the deepest being number 0.
+ *
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` where there are not so many, or a misuse.
+ */
+dibs_code dibs_contacts_get(dibs_contacts *contacts, uint32_t number, dibs_contact *contact);
+
+/**
+ * Sets each contact's velocity to that of the surface there.
+ *
+ * @param velocities  x, y and z (mm/s) of each vertex, in the tree's order of rows; only read during the call.
+ * @param vertices    Their number.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_VERTEX_COUNT` where a contact's corner has no row, or a misuse.
+ */
+dibs_code dibs_contacts_set_velocities(dibs_contacts *contacts,
+                                       const float *velocities,
+                                       uint32_t vertices);
+
+/**
+ * The rows of all contacts in the list, deepest first.
+ *
+ * With a row, a contact's separation falls towards `stand_off` no faster than exponentially, at a rate of `gain`; below, it
+ * has to grow.
+ *
+ * @param contacts   The list.
+ * @param origin     The tool's point (mm) whose velocity the rows are about.
+ * @param stand_off  In mm.
+ * @param gain       In 1/s.
+ * @param capacity   Rows that there is room for.
+ * @param rows       Receives them.
+ * @param count      Receives their number.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY` where there is room for fewer, or a misuse.
+ */
+dibs_code dibs_contacts_rows(dibs_contacts *contacts,
+                             dibs_vec3 origin,
+                             float stand_off,
+                             float gain,
+                             size_t capacity,
+                             dibs_row *rows,
+                             size_t *count);
+
+/**
+ * Makes a machine.
+ *
+ * @param storage   `DIBS_FAILSAFE_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+ * @param size      Bytes of the storage.
+ * @param limits    Its limits.
+ * @param failsafe  Receives the machine's address.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`, `DIBS_CODE_LIMIT_UNTRIPPABLE`, or a misuse.
+ */
+dibs_code dibs_failsafe_init(void *storage,
+                             size_t size,
+                             const dibs_limits *limits,
+                             dibs_failsafe **failsafe);
+
+/**
+ * One control tick of the machine.
+ *
+ * Cost: a comparison of two limits for each input.
+ *
+ * @return `DIBS_CODE_OK`, whatever the state; `DIBS_CODE_ARGUMENT` for a query's code that is none; or a misuse.
+ */
+dibs_code dibs_failsafe_step(dibs_failsafe *failsafe,
+                             const dibs_observation *seen,
+                             dibs_verdict *verdict);
+
+/**
+ * An operator's acknowledgement: the next step leaves the safe state if its inputs are within their limits.
+ *
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_ACKNOWLEDGE` unless the last step waited for it, or a misuse.
+ */
+dibs_code dibs_failsafe_acknowledge(dibs_failsafe *failsafe);
+
+/**
+ * Widens an answer by the verdict's margin, if it may be acted on.
+ *
+ * @param verdict    The verdict of this tick.
+ * @param proximity  The answer of this tick, which is widened.
+ * @return `DIBS_CODE_OK`; in the safe state the cause, to be passed on to a wall; `DIBS_CODE_ARGUMENT` for numbers that are
+ *         no state or no code; or a misuse.
+ */
+dibs_code dibs_verdict_admit(const dibs_verdict *verdict,
+                             dibs_proximity *proximity);
+
+/**
+ * Makes an empty frame. Storage of a frame that a reader holds is released before it is used anew.
+ *
+ * @param storage  `DIBS_FRAME_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+ * @param size     Bytes of the storage.
+ * @param frame    Receives the frame's address.
+ */
+dibs_code dibs_frame_init(void *storage, size_t size, dibs_frame **frame);
+
+/**
+ * Makes the frame one of these vertices. Its stretch is not measured: queries take the tree's limit.
+ *
+ * @param frame           The frame; one that a reader holds is released first.
+ * @param positions       x, y and z (mm) of each vertex, in the tree's order of rows. Not copied: unchanged until the
+ *                        frame is given other vertices or released.
+ * @param vertices        Their number.
+ * @param position_error  No vertex is farther (mm, at least 0) than this from where it is here. Part of the accuracy of
+ *                        every answer.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for an error that is negative or not finite, or a misuse.
+ */
+dibs_code dibs_frame_set_vertices(dibs_frame *frame,
+                                  const float *positions,
+                                  uint32_t vertices,
+                                  float position_error);
+
+/**
+ * Measures the stretch of the frame's vertices, which makes queries on it cheaper. Frames from a receiver are measured.
+ *
+ * Cost: linear in the triangles.
+ *
+ * @param stretch  Receives the largest stretch, 1 for none; or null.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_STRETCH_EXCEEDED` where distances on this frame would be wrong, `DIBS_CODE_NO_SURFACE` of an
+ *         empty frame, `DIBS_CODE_TREE_NO_METRIC`, `DIBS_CODE_VERTEX_COUNT`, or a misuse.
+ */
+dibs_code dibs_frame_measure(dibs_frame *frame,
+                             dibs_tree *tree,
+                             float *stretch);
+
+/**
+ * Facts about the frame.
+ *
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, or a misuse.
+ */
+dibs_code dibs_frame_get_facts(dibs_frame *frame, dibs_frame_facts *facts);
+
+/**
+ * Lets go of the vertices, or of the frame that a reader holds: the next one can then be published.
+ */
+dibs_code dibs_frame_release(dibs_frame *frame);
+
+/**
+ * The certified interval of a pair's separation: both ends include the accuracy, rounded outwards. Act on its lower end.
+ *
+ * Without a side the tool may be inside at any depth: the lower end is negative infinity. With `DIBS_SIDE_NOT_ASKED` and
+ * `DIBS_SIDE_NO_ADJACENCY` it is that of a tool outside.
+ *
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a side or coverage that is none, or a misuse.
+ */
+dibs_code dibs_proximity_interval(const dibs_proximity *proximity,
+                                  dibs_interval *interval);
+
+/**
+ * Makes a query on a tree.
+ *
+ * @param storage  `DIBS_QUERY_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+ * @param size     Bytes of the storage.
+ * @param tree     The tree.
+ * @param query    Receives the query's address.
+ */
+dibs_code dibs_query_init(void *storage, size_t size, dibs_tree *tree, dibs_query **query);
+
+/**
+ * The closest pair of the tool and the surface in the frame.
+ *
+ * Exact within `accuracy`, as long as the surface keeps to its stretch. A budget that runs out is no error: the interval is
+ * wider then.
+ *
+ * Cost: the budget at most.
+ *
+ * @param query      The query.
+ * @param frame      The surface.
+ * @param tool       The tool.
+ * @param options    Options, or null.
+ * @param proximity  Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_TOOL_COORDINATE` to `DIBS_CODE_QUERY_FAILED`,
+ *         `DIBS_CODE_TREE_CORRUPT`, or a misuse.
+ */
+dibs_code dibs_query_closest(dibs_query *query,
+                             dibs_frame *frame,
+                             const dibs_tool *tool,
+                             const dibs_options *options,
+                             dibs_proximity *proximity);
+
+/**
+ * The budget of a query that is to end within so many instructions, by a fit with a margin of 20 %.
+ *
+ * @param cost  A `dibs_cost`.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a number that is no `dibs_cost`, or a misuse.
+ */
+dibs_code dibs_budget_for_instructions(uint32_t instructions, uint32_t cost, dibs_budget *budget);
+
+/**
+ * Makes the reader of a surface, once.
+ *
+ * @param storage  `DIBS_READER_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+ * @param size     Bytes of the storage.
+ * @param surface  The surface.
+ * @param reader   Receives the reader's address.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_TAKEN` where the surface has a reader, or a misuse.
+ */
+dibs_code dibs_reader_init(void *storage, size_t size, dibs_surface *surface, dibs_reader **reader);
+
+/**
+ * Holds the frame that was published last, if it is not too old. Until it is released no frame is published, so release it
+ * after the tick's queries.
+ *
+ * @param reader  The reader.
+ * @param now     The receiver's clock, in ms; wraps.
+ * @param limit   The greatest age, in ms; UINT32_MAX leaves the age to the fail-safe machine.
+ * @param frame   The frame that holds it; what it held before is released.
+ * @param age     Receives its age, also where it is too old; or null.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE`, `DIBS_CODE_STALE`, `DIBS_CODE_HELD` where another frame holds one of this
+ *         surface, or a misuse. The frame is then empty.
+ */
+dibs_code dibs_reader_latest(dibs_reader *reader,
+                             uint32_t now,
+                             uint32_t limit,
+                             dibs_frame *frame,
+                             dibs_age *age);
+
+/**
+ * The health of the bus at `now`, on the receiver's clock in ms.
+ */
+dibs_code dibs_reader_link(dibs_reader *reader, uint32_t now, dibs_link *link);
+
+/**
+ * Makes the receiver of a surface, once.
+ *
+ * @param storage   `DIBS_RECEIVER_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+ * @param size      Bytes of the storage.
+ * @param surface   The surface.
+ * @param tree      Its tree.
+ * @param limits    Limits of every frame.
+ * @param receiver  Receives the receiver's address.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many vertices; `DIBS_CODE_TAKEN` where
+ *         the surface has a receiver; `DIBS_CODE_TREE_NO_METRIC`; or a misuse.
+ */
+dibs_code dibs_receiver_init(void *storage,
+                             size_t size,
+                             dibs_surface *surface,
+                             dibs_tree *tree,
+                             const dibs_surface_limits *limits,
+                             dibs_receiver **receiver);
+
+/**
+ * Registers the surface anew: the next whole frame is compared with none before it. For an operator who knows that the
+ * tissue was moved farther than `dibs_surface_limits.recovery`; until then no frame that far away is published.
+ *
+ * @return `DIBS_CODE_OK`, or a misuse.
+ */
+dibs_code dibs_receiver_register(dibs_receiver *receiver);
+
+/**
+ * Takes one packet, whole: a datagram, or the data of a CAN-FD message.
+ *
+ * Cost: linear in the bytes.
+ *
+ * @param receiver  The receiver.
+ * @param packet    The packet, read during the call.
+ * @param length    Its bytes.
+ * @param now       The receiver's clock, in ms; wraps.
+ * @param progress  Receives its outcome, or null.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_PACKET_DAMAGED` to `DIBS_CODE_PACKET_REFUSED` where the packet was not taken, which
+ *         has been counted, or a misuse.
+ */
+dibs_code dibs_receiver_accept(dibs_receiver *receiver,
+                               const uint8_t *packet,
+                               size_t length,
+                               uint32_t now,
+                               dibs_progress *progress);
+
+/**
+ * Takes one byte of a stream of COBS frames, each ended by a zero: a serial line.
+ *
+ * @param receiver  The receiver.
+ * @param byte      The byte.
+ * @param now       The receiver's clock, in ms; wraps.
+ * @param progress  Receives the outcome of the packet that the byte completes, or `DIBS_PROGRESS_NONE`; or null.
+ * @return As `dibs_receiver_accept`; `DIBS_CODE_FRAMING` where bytes between two zeros are no packet.
+ */
+dibs_code dibs_receiver_byte(dibs_receiver *receiver,
+                             uint8_t byte,
+                             uint32_t now,
+                             dibs_progress *progress);
+
+/**
+ * Does some of the work that is due: checks rows and triangles, and publishes a frame that keeps to its limits.
+ *
+ * Worth calling after each packet, and from time to time when the bus is quiet. Cost: linear in `work`.
+ *
+ * @param receiver  The receiver.
+ * @param work      Most rows and triangles that are checked or copied.
+ * @param advance   Receives the outcome, or null.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_STRETCH_EXCEEDED`, `DIBS_CODE_SHRUNK` or `DIBS_CODE_TOO_FAST` where the frame is refused,
+ *         which has been counted; or a misuse.
+ */
+dibs_code dibs_receiver_advance(dibs_receiver *receiver,
+                                uint32_t work,
+                                dibs_advance *advance);
+
+/**
+ * Writes the receiver's status for the sender: every 100 ms or so, and as soon as a hello asks for it.
+ *
+ * @param receiver  The receiver.
+ * @param now       The receiver's clock, in ms.
+ * @param safety    0 not reported, 1 nominal, 2 degraded, 3 safe.
+ * @param framed    0 for a packet; otherwise a COBS frame with the zero that ends it, for a stream.
+ * @param out       Receives it.
+ * @param capacity  Bytes that there is room for: `DIBS_STATUS` are enough.
+ * @param length    Receives its length.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY`, or a misuse.
+ */
+dibs_code dibs_receiver_status(dibs_receiver *receiver,
+                               uint32_t now,
+                               uint8_t safety,
+                               uint32_t framed,
+                               uint8_t *out,
+                               size_t capacity,
+                               size_t *length);
+
+/**
+ * Number of the frame that was published last, which wraps.
+ *
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, or a misuse.
+ */
+dibs_code dibs_receiver_epoch(dibs_receiver *receiver, uint32_t *epoch);
+
+/**
+ * Position (mm) of a vertex in the frame that was published last, for a checksum of the published rows, or a log.
+ *
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` outside the table, or a misuse.
+ */
+dibs_code dibs_receiver_position(dibs_receiver *receiver,
+                                 uint32_t row,
+                                 dibs_vec3 *position);
+
+/**
+ * Name of an event, in English: published, abandoned, duplicate, heartbeat, and from the fifth on rejections by their
+ * cause.
+ *
+ * @param event  Its place among the counters.
+ * @return A static text; never null, also for a number that is no event.
+ */
+const char *dibs_event_name(uint32_t event);
+
+/**
+ * The count of each event since the start, in the order of `dibs_event_name`.
+ *
+ * @param receiver  The receiver.
+ * @param counters  Room for `DIBS_EVENTS` numbers.
+ */
+dibs_code dibs_receiver_counters(dibs_receiver *receiver, uint32_t *counters);
+
+/**
+ * The closest pair of a chain of tools and the surfaces of a scene.
+ *
+ * Exact within its accuracy, as `dibs_query_closest`. Query tools whose axes do not touch each other one by one: of such
+ * tools, one deep inside a surface may be missed.
+ *
+ * Cost: the budget at most, for all pairs together, and a node test a pair.
+ *
+ * @param scene    The scene.
+ * @param options  Options, or null.
+ * @param closest  Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
+ * @return As `dibs_query_closest`, of any surface; `DIBS_CODE_ARGUMENT` for no surface, no tool, or too many.
+ */
+dibs_code dibs_scene_closest(const dibs_scene *scene,
+                             const dibs_options *options,
+                             dibs_closest *closest);
+
+/**
+ * Fills the list with the contacts of all pairs of a tool and a surface, deepest first, and finds the closest pair:
+ * `surface` and `tool` of a `dibs_contact` tell the pairs apart.
+ *
+ * Cost: that of `dibs_scene_closest`, and for each pair within the margin that of `dibs_query_contacts`.
+ *
+ * @param scene     The scene.
+ * @param margin    In mm, at least 0.
+ * @param options   Options, or null. A budget that runs out shows in the list's bound, which holds for all pairs.
+ * @param contacts  The list; empty after an error.
+ * @param closest   Receives the closest pair, or null.
+ * @return As `dibs_scene_closest`, `DIBS_CODE_MARGIN`, or `DIBS_CODE_TREE_NO_ADJACENCY`.
+ */
+dibs_code dibs_scene_contacts(const dibs_scene *scene,
+                              float margin,
+                              const dibs_options *options,
+                              dibs_contacts *contacts,
+                              dibs_closest *closest);
+
+/**
+ * Makes a surface without a frame.
+ *
+ * @param storage   `DIBS_SURFACE_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`. Needs no initial value. For as long as
+ *                  its receiver, its reader and their frames are used.
+ * @param size      Bytes of the storage.
+ * @param vertices  Vertices of the surface: those of the tree.
+ * @param surface   Receives the surface's address.
+ */
+dibs_code dibs_surface_init(void *storage,
+                            size_t size,
+                            uint32_t vertices,
+                            dibs_surface **surface);
+
+/**
+ * Makes a tracker on a tree, without a surface.
+ *
+ * @param storage  `DIBS_TRACKER_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`; `DIBS_TRACKER_SIZE(0)` are enough for
+ *                 `dibs_tracker_closest_on` alone. Needs no initial value.
+ * @param size     Bytes of the storage.
+ * @param tree     The tree.
+ * @param tracker  Receives the tracker's address.
+ */
+dibs_code dibs_tracker_init(void *storage,
+                            size_t size,
+                            dibs_tree *tree,
+                            dibs_tracker **tracker);
+
+/**
+ * Takes over a new surface: copies it, and measures how far it moved. Call it for each new frame, and release the frame
+ * then; ticks with no new frame go without.
+ *
+ * Cost: linear in the vertices.
+ *
+ * @param tracker  The tracker.
+ * @param frame    The surface.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_VERTEX_COUNT` (also where the storage has no
+ *         room for copies), or a misuse. After an error the surface is the one before.
+ */
+dibs_code dibs_tracker_set_frame(dibs_tracker *tracker,
+                                 dibs_frame *frame);
+
+/**
+ * The closest pair of the tool and the tracker's surface: the answer of `dibs_query_closest`, within its accuracy.
+ *
+ * Cost: the budget at most, and a number for each opened node.
+ *
+ * @param tracker    The tracker.
+ * @param tool       The tool.
+ * @param options    Options, or null.
+ * @param proximity  Receives the answer; its counts of tests are this tick's.
+ * @param fallback   Receives the reason for a whole query; or null.
+ * @param moved      Receives the most (mm) that tool and surface together have moved since the tracker's last search;
+ *                   -1 where it is not known; or null.
+ * @return As `dibs_query_closest`.
+ */
+dibs_code dibs_tracker_closest(dibs_tracker *tracker,
+                               const dibs_tool *tool,
+                               const dibs_options *options,
+                               dibs_proximity *proximity,
+                               dibs_fallback *fallback,
+                               float *moved);
+
+/**
+ * The closest pair of the tool and the frame that a reader holds: the answer of `dibs_tracker_closest`, without a copy of the
+ * surface. The receiver has measured the frame's motion. The frame is held for the whole call, and released after it. For a
+ * control tick that has no time for `dibs_tracker_set_frame`.
+ *
+ * Cost: the budget at most, and a number for each opened node.
+ *
+ * @param tracker    The tracker.
+ * @param frame      A reader's frame.
+ * @param tool       The tool.
+ * @param options    Options, or null.
+ * @param proximity  Receives the answer; its counts of tests are this tick's.
+ * @param fallback   Receives the reason for a whole query; or null.
+ * @param moved      Receives the most (mm) that tool and surface together have moved since the tracker's last search;
+ *                   -1 where it is not known; or null.
+ * @return As `dibs_query_closest`; `DIBS_CODE_ARGUMENT` of a frame of the caller's vertices.
+ */
+dibs_code dibs_tracker_closest_on(dibs_tracker *tracker,
+                                  dibs_frame *frame,
+                                  const dibs_tool *tool,
+                                  const dibs_options *options,
+                                  dibs_proximity *proximity,
+                                  dibs_fallback *fallback,
+                                  float *moved);
+
+/**
+ * Fills the list with all locally closest pairs whose separation is at most `margin`, deepest first: that of
+ * `dibs_query_contacts`.
+ *
+ * Cost: that of `dibs_tracker_closest`, and where the surface is within the margin a range search, which has no memory of
+ * the last tick.
+ *
+ * @param tracker    The tracker.
+ * @param tool       The tool.
+ * @param margin     In mm, at least 0.
+ * @param options    Options, or null. A budget that runs out shows in the list's bound.
+ * @param contacts   The list; empty after an error.
+ * @param proximity  Receives the closest pair, or null.
+ * @param fallback   Receives the reason for a whole query; or null.
+ * @param moved      As of `dibs_tracker_closest`.
+ * @return As `dibs_query_contacts`.
+ */
+dibs_code dibs_tracker_contacts(dibs_tracker *tracker,
+                                const dibs_tool *tool,
+                                float margin,
+                                const dibs_options *options,
+                                dibs_contacts *contacts,
+                                dibs_proximity *proximity,
+                                dibs_fallback *fallback,
+                                float *moved);
+
+/**
+ * The closest pair of several, each a tracker, on its surface, with a tool: of a chain of tools, of several surfaces, or of
+ * both. A pair that is certain to be farther than the closest is not searched.
+ *
+ * Cost: the budget at most, for all pairs together.
+ *
+ * @param trackers  Addresses of the trackers, one for each pair. No tracker is there twice.
+ * @param tools     The tool of each pair, in the same order.
+ * @param count     Pairs: 1 to `DIBS_TOOLS`.
+ * @param options   Options, or null.
+ * @param tracked   Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
+ * @return As `dibs_tracker_closest`, of any pair; `DIBS_CODE_ARGUMENT` for no pair or too many.
+ */
+dibs_code dibs_tracker_closest_of(dibs_tracker *const *trackers,
+                                  const dibs_tool *tools,
+                                  uint32_t count,
+                                  const dibs_options *options,
+                                  dibs_tracked *tracked);
+
+/**
+ * Validates the bytes of a tree, and makes the tree that every other object is made with.
+ *
+ * Cost: linear in the bytes; once, at start-up.
+ *
+ * @param storage  `DIBS_TREE_SIZE` bytes, aligned to `DIBS_ALIGNMENT`, for as long as the tree is used.
+ * @param size     Bytes of the storage.
+ * @param bytes    The tree, in flash or in memory. Not copied: it stays unchanged for as long as the tree, and any
+ *                 object made with it, is used. Aligned to 4 it is read faster.
+ * @param length   Bytes of the tree.
+ * @param tree     Receives the tree's address.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_TREE_LENGTH` to `DIBS_CODE_TREE_FORM`, or a misuse.
+ */
+dibs_code dibs_tree_init(void *storage,
+                         size_t size,
+                         const uint8_t *bytes,
+                         size_t length,
+                         dibs_tree **tree);
+
+/**
+ * Facts about the tree.
+ */
+dibs_code dibs_tree_get_facts(dibs_tree *tree, dibs_tree_facts *facts);
+
+/**
+ * Rest position (mm) of the vertex in a row.
+ *
+ * @return `DIBS_CODE_OK`, or `DIBS_CODE_TREE_NO_REST_SHAPE` outside the table or where the tree was built without.
+ */
+dibs_code dibs_tree_rest_position(dibs_tree *tree,
+                                  uint32_t row,
+                                  dibs_vec3 *position);
+
+/**
+ * Label of the triangle in a row, say of its tissue.
+ *
+ * @return `DIBS_CODE_OK`, or `DIBS_CODE_ARGUMENT` outside the table or where the tree was built without labels.
+ */
+dibs_code dibs_tree_label(dibs_tree *tree,
+                          uint32_t triangle,
+                          uint8_t *label);
+
+/**
+ * Compares the tree's header and places of sections, which are in memory, with its bytes. A scrub does not read that
+ * memory: call this once a tick.
+ *
+ * Cost: some hundred instructions.
+ *
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_TREE_CORRUPT` where the two differ: make the output safe; or a misuse.
+ */
+dibs_code dibs_tree_check(dibs_tree *tree);
+
+/**
+ * Makes a check of the tree's bytes.
+ */
+dibs_code dibs_scrub_init(void *storage, size_t size, dibs_tree *tree, dibs_scrub **scrub);
+
+/**
+ * Checks the next bytes, at most `most`, and at the end of a round compares the checksum.
+ *
+ * @return `DIBS_CODE_OK`, or `DIBS_CODE_TREE_CORRUPT` at the end of a round in which the bytes did not match: make the output
+ *         safe.
+ */
+dibs_code dibs_scrub_step(dibs_scrub *scrub,
+                          size_t most);
+
+/**
+ * The point of the mesh's file that all coordinates of the tree count from: of vertices, tools and answers. Zero unless
+ * the file's coordinates are so far from their own origin that single precision would lose them; then subtract it, in
+ * double precision, from each point in the file's coordinates.
+ */
+dibs_code dibs_tree_origin(dibs_tree *tree,
+                           dibs_point *origin);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* DIBS_H */

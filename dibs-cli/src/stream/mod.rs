@@ -1,0 +1,180 @@
+//! `dibs stream`: a recorded motion, sent to a controller.
+
+mod interrupt;
+mod key;
+mod player;
+mod report;
+
+use crate::mesh_file::Lengths;
+use crate::tree_file::{self, AnyTree};
+use crate::{modes, overwrite};
+use anyhow::{Context, Result, anyhow, bail};
+use dibs_build::glam::{DVec3, Vec3};
+use dibs_build::{Builder, Import, ReadOptions};
+use dibs_nostd::wire::AesCmac;
+use dibs_stream::transport::Target;
+use dibs_stream::{Sender, Settings, SurfaceOrder};
+use interrupt::Interrupt;
+use player::Player;
+use std::path::{Path, PathBuf};
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  dibs stream heart.dibs heart.pc2 --to serial:/dev/ttyUSB0@921600 --quantise --partial 0.05 --loop
+  dibs stream heart.dibs heart.pc2 --to tcp:192.168.1.20:5000 --rate 40
+  dibs stream heart.dibs heart.pc2 --to udp:192.168.1.20:5000 --rate 1000 --modes
+  dibs stream heart.ply heart.pc2 --to unix:/tmp/uart --frames 100 --json
+  dibs stream heart.dibs heart.pc2 --to serial:/dev/ttyUSB0 --key heart.key
+  dibs stream heart.dibs heart.pc2 --to udp:192.168.1.20:5000@5001 --key heart.key --receiver 3
+
+An emulated serial line is a server for this: qemu-system-arm -serial unix:/tmp/uart,server=on,wait=off")]
+pub struct Args {
+    /// The tree that the receiver has (NAME.dibs), or its mesh, of which `dibs build` with default
+    /// options makes the same tree
+    surface: PathBuf,
+    /// The motion, with a position for each of the mesh's vertices in every frame: .pc2, .npy or a series (heart_%03d.vtp)
+    motion: PathBuf,
+    /// Where to: `serial:PORT` or `serial:PORT@BAUD`, `tcp:HOST:PORT`, `udp:HOST:PORT` or
+    /// `udp:HOST:PORT@LOCAL_PORT`, `unix:PATH`. A frame's UDP packets are spread over half of the time to the next one
+    #[arg(long)]
+    to: Target,
+    /// Frames a second; by default the motion's own rate
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+    /// 6 bytes a vertex instead of 12, in a box around each frame
+    #[arg(long)]
+    quantise: bool,
+    /// Send only the vertices that moved by more than this (in the mesh's unit)
+    #[arg(long, value_name = "TOLERANCE")]
+    partial: Option<f32>,
+    /// Send the weights of the displacement modes that the tree was built with, instead of positions
+    #[arg(long, conflicts_with_all = ["quantise", "partial"])]
+    modes: bool,
+    /// Put a tag on every packet, by the 128-bit key in this file: 32 hexadecimal digits. Waits for the
+    /// receiver's challenge
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
+    /// The receiver's challenge, where it has no way to report one: 0, if it was made with none
+    #[arg(long, value_name = "NUMBER", requires = "key")]
+    challenge: Option<u64>,
+    /// The receiver's id under the tags: a key may be shared by several receivers, each with its own
+    #[arg(long, value_name = "NUMBER", default_value_t = 0, requires = "key")]
+    receiver: u32,
+    /// Largest packet, in bytes: no more than the receiver takes. 64 is a CAN-FD message
+    #[arg(long, value_name = "BYTES", default_value = "1024", value_parser = ["64", "1024"])]
+    mtu: String,
+    /// Start over at the end of the motion
+    #[arg(long = "loop")]
+    repeat: bool,
+    /// Stop after this many frames. Ctrl-C stops too, and prints the totals
+    #[arg(long)]
+    frames: Option<u64>,
+    /// Frames that may be on their way before the next one waits, where the receiver reports
+    #[arg(long, default_value_t = 2)]
+    window: u32,
+    /// How long to try to connect again after the connection broke; 0 gives up at once
+    #[arg(long, value_name = "SECONDS", default_value_t = 10)]
+    retry: u64,
+    #[command(flatten)]
+    lengths: Lengths,
+    /// Print the totals as a JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args) -> Result<()> {
+    overwrite::check([&args.surface, &args.motion].into_iter().chain(&args.key), [])?;
+    let key = args.key.as_deref().map(key::read).transpose()?;
+    let (order, origin) = order(&args.surface, &args.lengths)?;
+    let motion = args.lengths.motion(&args.motion, origin)?;
+    let name = args.motion.display();
+    if motion.frames.is_empty() {
+        bail!("{name}: the motion has no frame");
+    }
+    order.check_faces(&motion.faces).map_err(|error| anyhow!("{name}: {error}"))?;
+    for (number, frame) in motion.frames.iter().enumerate() {
+        order.to_rows(frame).map_err(|error| anyhow!("{name}, frame {number}: {error}"))?;
+    }
+    let rate = match (args.rate, motion.rate) {
+        (Some(rate), _) => rate,
+        (None, recorded) if recorded > 0.0 => f64::from(recorded),
+        _ => bail!("{name}: the file does not say how fast it was recorded; give --rate"),
+    };
+    if !(1e-3..=1e5).contains(&rate) {
+        bail!("--rate {rate}: a rate is 0.001 to 100000 frames a second");
+    }
+    if args.partial.is_some_and(|tolerance| !(tolerance >= 0.0 && tolerance.is_finite())) {
+        bail!("--partial: a tolerance is a length of at least 0");
+    }
+    let weights =
+        if args.modes { Some(modes::weights(&args.surface, &order, &motion)?) } else { None };
+    let recording = Recording { frames: motion.frames, weights, rate };
+    if args.mtu == "64" {
+        connect::<64>(args, key, order, &recording)
+    } else {
+        connect::<1024>(args, key, order, &recording)
+    }
+}
+
+/// The surface to send.
+struct Recording {
+    /// Positions, in the mesh's order.
+    frames: Vec<Vec<Vec3>>,
+    /// The weights of each frame, if weights are sent.
+    weights: Option<Vec<Vec<f32>>>,
+    /// Frames a second.
+    rate: f64,
+}
+
+/// Makes the sender: without tags, or with them once the receiver's challenge is known.
+fn connect<const MTU: usize>(
+    args: &Args,
+    key: Option<[u8; 16]>,
+    order: SurfaceOrder,
+    recording: &Recording,
+) -> Result<()> {
+    let settings =
+        Settings { quantised: args.quantise, partial: args.partial, ..Settings::default() };
+    let interrupt = Interrupt::new()?;
+    let to = args.to.clone();
+    let Some(line) = interrupt.unless_raised(move || to.open()) else {
+        bail!("{}: stopped before it was open", args.to);
+    };
+    let line = line?.until(interrupt.flag());
+    let Some(key) = key else {
+        let sender = Sender::<_, MTU>::new(line, order, settings);
+        return Player::new(args, recording, sender, interrupt).run();
+    };
+    let receiver = args.receiver;
+    let keyed_mac = move |challenge| AesCmac::new(&key, receiver, challenge);
+    let mut sender = Sender::<_, MTU, _>::with_mac(line, order, settings, keyed_mac);
+    if let Some(challenge) = args.challenge {
+        sender.challenge(challenge);
+    }
+    Player::new(args, recording, sender, interrupt).run()
+}
+
+/// The order and origin of a tree's vertices: of the tree file given, or of the tree built from the mesh file given.
+fn order(path: &Path, lengths: &Lengths) -> Result<(SurfaceOrder, DVec3)> {
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("dibs")) {
+        let bytes = tree_file::load(path)?;
+        let tree = tree_file::validate(&bytes, path)?;
+        let order = match &tree {
+            AnyTree::Narrow(tree) => SurfaceOrder::of(tree),
+            AnyTree::Wide(tree) => SurfaceOrder::of(tree),
+        };
+        return Ok((order, tree.origin()));
+    }
+    let options = ReadOptions { unit: lengths.unit(), ..Import::options() };
+    let mesh = options.read(path)?.mesh;
+    let name = path.display();
+    let built = Builder::new()
+        .build(&mesh)
+        .map_err(|error| anyhow!("{name}: no tree can be built: {error}"))?;
+    let order = match built.index_bits() {
+        16 => SurfaceOrder::of(&built.tree::<u16>().context("the tree just built")?),
+        _ => SurfaceOrder::of(&built.tree::<u32>().context("the tree just built")?),
+    };
+    Ok((order, built.origin()))
+}

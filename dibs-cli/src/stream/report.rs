@@ -1,0 +1,183 @@
+//! The display of `dibs stream`, while it runs and at the end.
+
+use dibs_nostd::wire::{Content, Counters, Event, Mac};
+use dibs_stream::transport::Line;
+use dibs_stream::{Sender, Sent};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::fmt::Write;
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+/// Progress: one line on a terminal, one line each second elsewhere.
+pub struct Display {
+    bar: ProgressBar,
+    last: Instant,
+}
+
+/// Totals of a stream besides the sender's.
+#[derive(Default)]
+pub struct Outcome {
+    /// Frames that were sent later than they were due.
+    pub late: u64,
+    /// Times that the connection was made again.
+    pub reconnections: u64,
+    /// Datagrams that came back.
+    pub refused: u64,
+    /// Whether the user ended it.
+    pub is_interrupted: bool,
+}
+
+impl Display {
+    pub fn new() -> Self {
+        let bar = ProgressBar::new_spinner();
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {wide_msg}") {
+            bar.set_style(style);
+        }
+        Self { bar, last: Instant::now() }
+    }
+
+    pub fn show<M: Mac, const MTU: usize>(&mut self, sender: &Sender<Line, MTU, M>, sent: &Sent) {
+        let pause = Duration::from_millis(if std::io::stderr().is_terminal() { 100 } else { 1000 });
+        if self.last.elapsed() < pause {
+            return;
+        }
+        self.last = Instant::now();
+        let text = line(sender, sent);
+        if std::io::stderr().is_terminal() {
+            self.bar.set_message(text);
+            self.bar.tick();
+        } else {
+            eprintln!("{text}");
+        }
+    }
+
+    /// Warns that frames wait although the receiver reports.
+    pub fn warn<M: Mac, const MTU: usize>(&self, sender: &Sender<Line, MTU, M>) {
+        let mut text = format!("{} frames are not acknowledged", sender.in_flight());
+        text += match sender.status().and_then(|status| status.published) {
+            Some(_) => "; the receiver has published others",
+            None => "; the receiver has published none",
+        };
+        let causes = causes(sender.counters());
+        if !causes.is_empty() {
+            let _ = write!(text, "; it rejected {}", causes.join(", "));
+        }
+        self.bar.suspend(|| eprintln!("{text}"));
+    }
+
+    /// Shows a line above the progress.
+    pub fn note(&self, text: &str) {
+        self.bar.suspend(|| eprintln!("{text}"));
+    }
+
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+fn line<M: Mac, const MTU: usize>(sender: &Sender<Line, MTU, M>, sent: &Sent) -> String {
+    let kind = match sent.content {
+        Content::Whole => "whole, of vertices:",
+        Content::Modal => "modal, of weights:",
+        _ => "partial, of vertices:",
+    };
+    let Sent { epoch, bytes, rows, .. } = sent;
+    let mut text = format!("frame {epoch}: {bytes} bytes, {kind} {rows}");
+    match (sender.status(), sender.acknowledged()) {
+        (None, _) => text += "; no status from the receiver yet",
+        (Some(_), None) => text += "; nothing published yet",
+        (Some(status), Some(newest)) => {
+            let published = status.published;
+            let age = published.map_or(0, |p| p.age_ms);
+            let _ = write!(text, "; published {newest}, {age} ms old");
+            if let Some(stretch) = published.and_then(|p| p.stretch) {
+                let _ = write!(text, ", stretch {stretch:.3}");
+            }
+        }
+    }
+    let safety = sender.status().map_or("", |status| match status.safety {
+        1 => ", nominal",
+        2 => ", degraded",
+        3 => ", SAFE",
+        _ => "",
+    });
+    text += safety;
+    let rejected = sender.counters().rejected();
+    if rejected > 0 {
+        let _ = write!(text, "; {rejected} rejected: {}", causes(sender.counters()).join(", "));
+    }
+    text
+}
+
+/// The causes of rejection that have occurred, with their counts.
+fn causes(counters: &Counters) -> Vec<String> {
+    Event::ALL
+        .into_iter()
+        .filter(|&event| event.is_rejection() && counters.of(event) > 0)
+        .map(|event| format!("{} {event}", counters.of(event)))
+        .collect()
+}
+
+/// The totals.
+pub fn print<M: Mac, const MTU: usize>(
+    sender: &Sender<Line, MTU, M>,
+    outcome: &Outcome,
+    json: bool,
+) {
+    let Outcome { late, reconnections, refused, is_interrupted } = *outcome;
+    let totals = sender.totals();
+    let per_frame = totals.bytes as f64 / totals.frames.max(1) as f64;
+    let (published, rejected) =
+        (sender.counters().of(Event::Published), sender.counters().rejected());
+    if json {
+        let causes: serde_json::Map<String, serde_json::Value> = Event::ALL
+            .into_iter()
+            .filter(|event| event.is_rejection())
+            .map(|event| (event.name().to_owned(), sender.counters().of(event).into()))
+            .collect();
+        println!(
+            "{:#}",
+            serde_json::json!({
+                "frames": totals.frames,
+                "partial": totals.partial,
+                "packets": totals.packets,
+                "bytes": totals.bytes,
+                "bytes_per_frame": per_frame,
+                "late": late,
+                "reconnections": reconnections,
+                "refused": refused,
+                "interrupted": is_interrupted,
+                "statuses": totals.statuses,
+                "acknowledged": sender.acknowledged(),
+                "published": published,
+                "rejected": causes,
+            })
+        );
+        return;
+    }
+    println!(
+        "sent      {} frames, {} of them partial; {} packets, {per_frame:.0} bytes a frame",
+        totals.frames, totals.partial, totals.packets
+    );
+    if late > 0 {
+        println!("late      {late} frames: the line is slower than the motion");
+    }
+    if reconnections > 0 {
+        println!("line      broke and came back {reconnections} times");
+    }
+    if refused > 0 {
+        println!("refused   {refused} datagrams came back");
+    }
+    if is_interrupted {
+        println!("stopped   by a signal");
+    }
+    if totals.statuses == 0 {
+        println!("receiver  no status came back");
+        return;
+    }
+    let newest = sender.acknowledged().map_or("none of these".to_owned(), |n| n.to_string());
+    println!("receiver  published {published} since its start, the newest {newest}");
+    if rejected > 0 {
+        println!("rejected  {rejected}: {}", causes(sender.counters()).join(", "));
+    }
+}

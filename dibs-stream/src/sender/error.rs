@@ -1,0 +1,55 @@
+//! Why a frame was not sent.
+
+use dibs_nostd::SurfaceFacts;
+use dibs_nostd::wire::EncodeError;
+use thiserror::Error;
+
+/// Why a frame was not sent.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SendError {
+    /// The frame has too few vertices.
+    #[error(
+        "the frame has {found} vertices and the tree uses vertex {vertex}: send the positions of \
+         the mesh that the tree was built from"
+    )]
+    Vertices {
+        /// A vertex of the tree.
+        vertex: u32,
+        /// Vertices of the frame.
+        found: usize,
+    },
+    /// The positions are no frame of the tree's surface.
+    #[error("the frame {0}")]
+    Positions(#[from] dibs_build::FrameError),
+    /// The positions cannot be put into packets.
+    #[error("the frame cannot be sent: {0}")]
+    Frame(EncodeError),
+    /// Packets must carry tags, but no status has brought the receiver's challenge.
+    #[error("no genuine status came from the receiver: is it on, and has it the same key?")]
+    NoChallenge,
+    /// Another sender has taken over the receiver: a surface has one sender.
+    #[error(
+        "another sender has taken over with session {session}: there can be only one; stop it, and start \
+         this one again"
+    )]
+    Superseded {
+        /// The other sender's session.
+        session: u32,
+    },
+    /// The receiver has another surface.
+    #[error(
+        "the receiver's surface (mesh {:#010x}) has {}; this sender's (mesh {:#010x}) has {}: build both \
+         from one file",
+        there.0, there.1, here.0, here.1
+    )]
+    OtherSurface {
+        /// Mesh id and facts of the receiver's.
+        there: (u32, SurfaceFacts),
+        /// Mesh id and facts of this sender's.
+        here: (u32, SurfaceFacts),
+    },
+    /// The connection failed.
+    #[error("the connection broke: {0}")]
+    Line(std::io::Error),
+}

@@ -1,0 +1,421 @@
+//! From positions to packets, and the statuses on the way back.
+
+mod clock;
+mod error;
+mod frame;
+mod greeting;
+mod objection;
+mod order;
+mod reply;
+mod settings;
+mod totals;
+
+pub use error::SendError;
+pub use frame::{Prepared, Sent};
+pub use order::SurfaceOrder;
+pub use settings::Settings;
+pub use totals::Totals;
+
+use std::fmt;
+use std::time::Duration;
+
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::wire::{
+    Content, Counters, Encoding, FrameEncoder, FrameId, Freshness, Mac, NoMac, QuantisedBox,
+    Status, WeightsEncoder, encode_heartbeat,
+};
+
+use crate::transport::Transport;
+use clock::Clock;
+use frame::{apply, coarsened, packets_of};
+use greeting::Greeting;
+use objection::Objection;
+
+/// Sends the frames of a moving surface, in packets of at most `MTU` bytes, and takes the receiver's statuses.
+///
+/// ```
+/// use dibs_stream::{Sender, Settings, SurfaceOrder};
+/// use dibs_build::{Builder, generate};
+///
+/// let generate::MovingMesh { mesh: heart, motion } = generate::heart(500)?;
+/// let tree = Builder::new().build(&heart)?;
+/// let order = SurfaceOrder::of(&tree.tree::<u16>()?);
+/// // A `Vec` collects the packets; `Target::open` gives a line.
+/// let mut sender = Sender::<_, 64>::new(Vec::new(), order, Settings::default());
+/// for frame in &motion.frames {
+///     sender.send(frame)?; // positions in the mesh's order
+///     sender.poll()?; // heartbeats there, statuses back
+/// }
+/// assert_eq!(sender.totals().frames, motion.frames.len() as u64);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Sender<T, const MTU: usize, M = NoMac> {
+    transport: T,
+    /// `None` until the receiver's challenge is known.
+    mac: Option<M>,
+    /// The MAC under a challenge.
+    keyed_mac: Box<dyn Fn(u64) -> M + Send>,
+    clock: Clock,
+    /// The hello that waits for its answer.
+    greeting: Option<Greeting>,
+    surface: SurfaceOrder,
+    settings: Settings,
+    epoch: u32,
+    /// The epoch before the session's first.
+    before: u32,
+    /// A frame of this session was acknowledged.
+    is_established: bool,
+    /// Why the receiver does not want this sender's frames.
+    objection: Option<Objection>,
+    /// An answer has shown the receiver's surface to be this one.
+    is_compared: bool,
+    beat: u32,
+    last_beat: Option<Duration>,
+    /// The last positions or weights, and the time when they first came.
+    capture: Option<(Vec<f32>, Duration)>,
+    /// The last frame of positions, as the receiver has it if it arrived.
+    held: Option<(u32, Vec<Vec3>)>,
+    since_whole: u32,
+    whole_wanted: bool,
+    /// The last whole frame: until it is acknowledged, requests for a whole frame may be from before it.
+    whole: Option<(u32, Duration)>,
+    status: Option<Status>,
+    counters: Counters,
+    totals: Totals,
+}
+
+/// Without its key.
+impl<T: fmt::Debug, const MTU: usize, M> fmt::Debug for Sender<T, MTU, M> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut sender = f.debug_struct("Sender");
+        sender.field("transport", &self.transport).field("epoch", &self.epoch);
+        sender.field("totals", &self.totals).finish_non_exhaustive()
+    }
+}
+
+impl<T: Transport, const MTU: usize> Sender<T, MTU> {
+    /// A sender that has sent nothing yet.
+    #[must_use]
+    pub fn new(transport: T, surface: SurfaceOrder, settings: Settings) -> Self {
+        let sender = Self::with_mac(transport, surface, settings, |_| NoMac);
+        Self { mac: Some(NoMac), ..sender }
+    }
+}
+
+impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
+    /// A sender of packets with tags. `keyed_mac(challenge)` returns the MAC under the receiver's challenge, which the
+    /// receiver draws when it starts and reports in its answer to a hello. Until one has come, [`poll`](Self::poll)
+    /// sends hellos, and no frame can be sent.
+    ///
+    /// For a receiver without a way back, which uses the challenge 0: [`challenge`](Self::challenge).
+    #[must_use]
+    pub fn with_mac(
+        transport: T,
+        surface: SurfaceOrder,
+        settings: Settings,
+        keyed_mac: impl Fn(u64) -> M + Send + 'static,
+    ) -> Self {
+        Self {
+            transport,
+            mac: None,
+            keyed_mac: Box::new(keyed_mac),
+            clock: Clock::system(),
+            greeting: None,
+            surface,
+            settings,
+            epoch: 0,
+            before: 0,
+            is_established: false,
+            objection: None,
+            is_compared: false,
+            beat: 0,
+            last_beat: None,
+            capture: None,
+            held: None,
+            since_whole: 0,
+            whole_wanted: true,
+            whole: None,
+            status: None,
+            counters: Counters::new(),
+            totals: Totals::default(),
+        }
+    }
+
+    /// Takes a challenge as the receiver's.
+    pub fn challenge(&mut self, challenge: u64) {
+        self.mac = Some((self.keyed_mac)(challenge));
+    }
+
+    /// Takes the time from `now` instead of the system's clock, for tests and simulations. It may start anywhere, but
+    /// must not go back.
+    #[must_use]
+    pub fn with_clock(mut self, now: impl Fn() -> Duration + Send + 'static) -> Self {
+        self.clock = Clock::of(now);
+        self
+    }
+
+    /// Continues on another transport with a whole frame, as soon as the receiver has answered. Returns the broken
+    /// transport.
+    pub fn reconnect(&mut self, transport: T) -> T {
+        self.whole_wanted = true;
+        self.greeting = Some(Greeting::new());
+        std::mem::replace(&mut self.transport, transport)
+    }
+
+    /// Whether frames can be sent: without tags always, with tags once the challenge is known.
+    #[must_use]
+    pub const fn is_ready(&self) -> bool {
+        self.mac.is_some()
+    }
+
+    /// Sends a frame of positions (mm) in the mesh's order: whole or partial, as settings and receiver require, with
+    /// heartbeats in between when due.
+    ///
+    /// The frame counts as captured now, unless its positions equal the last frame's in every bit: then it is as old as
+    /// that frame. So a source that stands still grows old, although its sender lives. If the time of capture is known,
+    /// use [`send_captured`](Self::send_captured).
+    ///
+    /// # Errors
+    /// [`SendError`] names the vertex that cannot be sent, or the line's error.
+    pub fn send(&mut self, positions: &[Vec3]) -> Result<Sent, SendError> {
+        let frame = self.prepare(positions)?;
+        self.transmit(frame)
+    }
+
+    /// Sends a frame that was captured some time ago.
+    ///
+    /// # Errors
+    /// As [`send`](Self::send).
+    pub fn send_captured(&mut self, positions: &[Vec3], ago: Duration) -> Result<Sent, SendError> {
+        let frame = self.prepare_captured(positions, ago)?;
+        self.transmit(frame)
+    }
+
+    /// The first half of [`send`](Self::send): makes the packets. From here on [`held`](Self::held) includes this
+    /// frame, which must be transmitted next.
+    ///
+    /// # Errors
+    /// [`SendError`] names the vertex that cannot be sent.
+    pub fn prepare(&mut self, positions: &[Vec3]) -> Result<Prepared, SendError> {
+        let ago = self.since_change(positions.iter().flat_map(Vec3::to_array));
+        self.prepare_captured(positions, ago)
+    }
+
+    /// The first half of [`send_captured`](Self::send_captured).
+    ///
+    /// # Errors
+    /// [`SendError`] names the vertex that cannot be sent.
+    pub fn prepare_captured(
+        &mut self,
+        positions: &[Vec3],
+        ago: Duration,
+    ) -> Result<Prepared, SendError> {
+        self.check()?;
+        let freshness = self.freshness(ago);
+        let rows = self.surface.to_rows(positions)?;
+        let encoding = self.encoding(&rows)?;
+        let is_partial = self.is_partial_wanted();
+        let base = self.held.take().filter(|_| is_partial);
+        let id = self.next_id();
+        let frame = match &base {
+            Some((epoch, held)) => {
+                FrameEncoder::partial(id, encoding, &rows[..], *epoch, &held[..])
+            }
+            None => FrameEncoder::new(id, encoding, &rows[..]),
+        };
+        let mac = self.mac.as_ref().ok_or(SendError::NoChallenge)?;
+        let facts = self.surface.facts;
+        let frame = frame
+            .and_then(|frame| frame.with_freshness(freshness).with_surface(facts).with_mac(mac));
+        let packets = packets_of::<_, MTU>(frame.map_err(SendError::Frame)?);
+
+        let content = match base {
+            Some((base_epoch, _)) => Content::Partial { base_epoch },
+            None => Content::Whole,
+        };
+        let mut held = base.map_or_else(|| vec![Vec3::ZERO; rows.len()], |(_, held)| held);
+        let rows_sent = packets.iter().map(|packet| apply(packet, encoding, &mut held)).sum();
+        self.held = Some((id.epoch, held));
+        if content == Content::Whole {
+            self.since_whole = 0;
+        } else {
+            self.since_whole += 1;
+        }
+        // A receiver refuses a frame of an age that cannot be stated: none can build on it.
+        self.whole_wanted = freshness.age_ms == u16::MAX;
+        Ok(Prepared::new(id.epoch, content, rows_sent, encoding.error(), packets))
+    }
+
+    /// Makes the packets of a modal frame: the weights of the receiver's displacement modes.
+    ///
+    /// # Errors
+    /// [`SendError`] names the weight that cannot be sent.
+    pub fn prepare_weights(&mut self, weights: &[f32]) -> Result<Prepared, SendError> {
+        let ago = self.since_change(weights.iter().copied());
+        self.prepare_weights_captured(weights, ago)
+    }
+
+    /// The same for weights that were captured some time ago.
+    ///
+    /// # Errors
+    /// [`SendError`] names the weight that cannot be sent.
+    pub fn prepare_weights_captured(
+        &mut self,
+        weights: &[f32],
+        ago: Duration,
+    ) -> Result<Prepared, SendError> {
+        self.check()?;
+        let freshness = self.freshness(ago);
+        let id = self.next_id();
+        let mac = self.mac.as_ref().ok_or(SendError::NoChallenge)?;
+        let frame = WeightsEncoder::<MTU>::new(id, weights).map_err(SendError::Frame)?;
+        let frame = frame.with_freshness(freshness).with_surface(self.surface.facts);
+        let mut frame = frame.with_mac(mac);
+        let (mut buffer, mut packets) = ([0; MTU], Vec::new());
+        while let Some(packet) = frame.next_packet(&mut buffer) {
+            packets.push(packet.to_vec());
+        }
+        Ok(Prepared::new(id.epoch, Content::Modal, weights.len(), 0.0, packets))
+    }
+
+    /// Sends a prepared frame, with heartbeats in between when due.
+    ///
+    /// # Errors
+    /// [`SendError::Line`] when the connection is gone.
+    pub fn transmit(&mut self, frame: Prepared) -> Result<Sent, SendError> {
+        self.transmit_paced(frame, || ())
+    }
+
+    /// The same, with a call of `wait` before each packet: a [`Pace`](super::Pace) spreads them.
+    ///
+    /// # Errors
+    /// As [`transmit`](Self::transmit).
+    pub fn transmit_paced(
+        &mut self,
+        frame: Prepared,
+        mut wait: impl FnMut(),
+    ) -> Result<Sent, SendError> {
+        let Prepared { sent, packets } = frame;
+        for packet in &packets {
+            wait();
+            self.heartbeat()?;
+            self.put(packet)?;
+        }
+        if sent.content == Content::Whole {
+            self.whole = Some((sent.epoch, self.clock.now()));
+        }
+        self.totals.partial += u64::from(matches!(sent.content, Content::Partial { .. }));
+        self.totals.frames += 1;
+        Ok(sent)
+    }
+
+    /// Sends a heartbeat or a hello if one is due, and takes the statuses that have come. Does not block. Call it a few
+    /// times between two heartbeats.
+    ///
+    /// # Errors
+    /// [`SendError::Line`] when the connection is gone, [`SendError::Superseded`] while another sender has taken over,
+    /// [`SendError::OtherSurface`] while the receiver has another surface.
+    pub fn poll(&mut self) -> Result<(), SendError> {
+        self.greet()?;
+        self.heartbeat()?;
+        while let Some(packet) = self.transport.receive().map_err(SendError::Line)? {
+            self.take(&packet);
+        }
+        self.object()
+    }
+
+    /// Totals since the start.
+    #[must_use]
+    pub const fn totals(&self) -> &Totals {
+        &self.totals
+    }
+
+    /// The last frame of positions, as the receiver has it if all of it arrived: its number, and the positions in the
+    /// order of the rows.
+    #[must_use]
+    pub fn held(&self) -> Option<(u32, &[Vec3])> {
+        self.held.as_ref().map(|(epoch, held)| (*epoch, held.as_slice()))
+    }
+
+    /// The transport.
+    pub const fn transport(&mut self) -> &mut T {
+        &mut self.transport
+    }
+
+    /// Makes the next frame a whole one.
+    pub const fn want_whole(&mut self) {
+        self.whole_wanted = true;
+    }
+
+    fn id(&self) -> FrameId {
+        let Settings { session, .. } = self.settings;
+        FrameId { mesh_id: self.surface.mesh_id, session, epoch: self.epoch }
+    }
+
+    fn next_id(&mut self) -> FrameId {
+        self.epoch = self.epoch.wrapping_add(1);
+        self.id()
+    }
+
+    fn is_partial_wanted(&self) -> bool {
+        self.settings.partial.is_some()
+            && !self.whole_wanted
+            && self.since_whole + 1 < self.settings.whole_every
+    }
+
+    fn encoding(&self, rows: &[Vec3]) -> Result<Encoding, SendError> {
+        if !self.settings.quantised {
+            return Ok(Encoding::Float);
+        }
+        // No box means a position that is not finite, which the encoder names.
+        let Some(grid) = QuantisedBox::covering(rows) else { return Ok(Encoding::Float) };
+        let tolerance = self.settings.partial.unwrap_or(0.0);
+        Ok(Encoding::Quantised(coarsened(grid, tolerance)))
+    }
+
+    /// An error unless a frame can be sent.
+    fn check(&self) -> Result<(), SendError> {
+        self.object()?;
+        if self.is_ready() { Ok(()) } else { Err(SendError::NoChallenge) }
+    }
+
+    /// Time since these numbers last changed.
+    fn since_change(&mut self, numbers: impl Iterator<Item = f32> + Clone) -> Duration {
+        let now = self.clock.now();
+        match &self.capture {
+            Some((last, at)) if numbers.clone().eq(last.iter().copied()) => now.saturating_sub(*at),
+            _ => {
+                self.capture = Some((numbers.collect(), now));
+                Duration::ZERO
+            }
+        }
+    }
+
+    fn freshness(&self, age: Duration) -> Freshness {
+        let age_ms = u16::try_from(age.as_millis()).unwrap_or(u16::MAX);
+        Freshness { age_ms, echo: self.status.map(|status| status.clock) }
+    }
+
+    fn heartbeat(&mut self) -> Result<(), SendError> {
+        let Some(interval) = self.settings.heartbeat.filter(|_| self.is_ready()) else {
+            return Ok(());
+        };
+        let now = self.clock.now();
+        if self.last_beat.is_some_and(|last| now.saturating_sub(last) < interval) {
+            return Ok(());
+        }
+        self.last_beat = Some(now);
+        self.beat = self.beat.wrapping_add(1);
+        let mut buffer = [0; 64];
+        let Some(mac) = &self.mac else { return Ok(()) };
+        let echo = self.status.map(|status| status.clock);
+        let beat = encode_heartbeat(&self.id(), self.beat, echo, mac, &mut buffer).to_vec();
+        self.put(&beat)
+    }
+
+    fn put(&mut self, packet: &[u8]) -> Result<(), SendError> {
+        self.transport.send(packet).map_err(SendError::Line)?;
+        self.totals.count(packet);
+        Ok(())
+    }
+}

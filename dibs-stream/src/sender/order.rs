@@ -1,0 +1,77 @@
+//! The mesh's vertex of each row of the receiver's table.
+
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::{Index, SurfaceFacts, Tree};
+
+use super::SendError;
+use dibs_build::FrameCheck;
+
+/// A mesh, and the order in which its vertices are sent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceOrder {
+    pub(super) mesh_id: u32,
+    pub(super) facts: SurfaceFacts,
+    /// The mesh's vertex of each row.
+    order: Vec<u32>,
+    /// Of the tree that it was made of.
+    check: Option<FrameCheck>,
+}
+
+impl SurfaceOrder {
+    /// The order of a tree: the receiver's, or one built from the same mesh in the same way.
+    #[must_use]
+    pub fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
+        let number = |row| tree.vertex_number(row).map_or(row, |number| number.0);
+        let order = (0..tree.vertex_count()).map(number);
+        let (mesh_id, facts) = (tree.mesh_id(), tree.surface_facts());
+        Self { mesh_id, facts, order: order.collect(), check: Some(FrameCheck::of(tree)) }
+    }
+
+    /// An order from the mesh's vertex of each row of the vertex table. Unit and triangles are not known.
+    #[must_use]
+    pub fn new(mesh_id: u32, order: Vec<u32>) -> Self {
+        let vertices = u32::try_from(order.len()).unwrap_or(0);
+        let facts = SurfaceFacts { vertices, ..SurfaceFacts::default() };
+        Self { mesh_id, facts, order, check: None }
+    }
+
+    /// Identity of the mesh.
+    #[must_use]
+    pub const fn mesh_id(&self) -> u32 {
+        self.mesh_id
+    }
+
+    /// Rows of the vertex table.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.order.len()
+    }
+
+    /// Checks that the faces of a motion's files are those of the tree, where the order is that of one.
+    ///
+    /// # Errors
+    /// [`SendError::Positions`] names the first triangle that is missing.
+    pub fn check_faces(&self, faces: &[Vec<u32>]) -> Result<(), SendError> {
+        let check = self.check.as_ref();
+        Ok(check.map_or(Ok(()), |check| check.check_faces(faces))?)
+    }
+
+    /// Puts positions in the mesh's order into that of the tree's rows.
+    ///
+    /// # Errors
+    /// [`SendError::Vertices`] if a vertex of the tree has no position, and where the order is that of a tree
+    /// [`SendError::Positions`] if they are no frame of its surface.
+    pub fn to_rows(&self, positions: &[Vec3]) -> Result<Vec<Vec3>, SendError> {
+        let row = |&vertex: &u32| {
+            positions
+                .get(vertex as usize)
+                .copied()
+                .ok_or(SendError::Vertices { vertex, found: positions.len() })
+        };
+        let rows: Result<Vec<Vec3>, SendError> = self.order.iter().map(row).collect();
+        match &self.check {
+            Some(check) if rows.is_ok() => Ok(check.to_rows(positions)?),
+            _ => rows,
+        }
+    }
+}
