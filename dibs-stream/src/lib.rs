@@ -18,8 +18,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The bytes are specified in `dibs-nostd`'s `docs/wire.md`; [`transport`](crate::transport) carries them, and
-//! [`faults`](crate::faults) damages them, for tests.
+//! The bytes are specified in `dibs-nostd`'s `docs/wire.md`; [`transport`] carries them, and
+//! [`faults`] damages them, for tests.
 
 pub mod faults;
 mod pace;

@@ -45,6 +45,7 @@ pub fn test(options: &Options) -> Result<()> {
             "doc",
             "--release",
             "--no-deps",
+            "--all-features",
             "-p",
             "dibs-nostd",
             "-p",
