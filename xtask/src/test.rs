@@ -39,23 +39,14 @@ pub fn test(options: &Options) -> Result<()> {
     steps.cargo("lints", &lints, &[]);
     // This also runs the examples in the documentation.
     steps.cargo("tests", &["test", "--release", "--workspace", "--no-fail-fast"], &[]);
+    let strict = [("RUSTDOCFLAGS", "-D warnings")];
+    let doc = ["doc", "--release", "--no-deps", "-p"];
+    let libraries = ["dibs-nostd", "-p", "dibs-build", "-p", "dibs-stream", "--all-features"];
+    steps.cargo("documentation", &[&doc[..], &libraries].concat(), &strict);
     steps.cargo(
-        "documentation",
-        &[
-            "doc",
-            "--release",
-            "--no-deps",
-            "--all-features",
-            "-p",
-            "dibs-nostd",
-            "-p",
-            "dibs-build",
-            "-p",
-            "dibs-stream",
-            "-p",
-            "firmware-example",
-        ],
-        &[("RUSTDOCFLAGS", "-D warnings")],
+        "documentation of the firmware",
+        &[&doc[..], &["firmware-example"]].concat(),
+        &strict,
     );
     steps.run("files of other programs", other_programs);
     let published = ["dibs-nostd", "dibs-build", "dibs-stream", "dibs-cli"];
