@@ -1,6 +1,6 @@
 //! How much longer a crate takes to compile for the tree that it includes, and how long a build script takes to build it.
 //!
-//! `cargo bench -p dibs-tests --bench compile_time -- --write` writes `docs/compile-time.md`. The times are those of
+//! `cargo bench -p dibs-tests --bench compile_time -- --write` writes `docs/evidence/compile-time.md`. The times are those of
 //! the machine that runs it; nothing asserts them. `DIBS_FOLDER` keeps the compiled dependencies for the next run,
 //! `DIBS_TRIANGLES` takes other sizes. The program `dibs` comes from `cargo build --release --workspace`.
 
@@ -45,7 +45,7 @@ fn main() -> Result<()> {
     let page = page(&rows, &scripts);
     print!("{page}");
     if env::args().any(|argument| argument == "--write") {
-        fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/compile-time.md"), page)?;
+        fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/evidence/compile-time.md"), page)?;
     }
     Ok(())
 }

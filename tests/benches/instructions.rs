@@ -1,5 +1,5 @@
 //! Instructions of every hot function on this computer, counted by callgrind: the same at every run.
-//! `cargo xtask test` compares them with docs/guarantees.json.
+//! `cargo xtask test` compares them with docs/evidence/guarantees.json.
 
 // The macros make public items without documentation.
 #![allow(missing_docs)]

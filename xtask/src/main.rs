@@ -28,10 +28,10 @@ enum Task {
     /// Runs the paper's experiments.
     #[command(disable_help_flag = true)]
     Bench(Passed),
-    /// Measures every promise, and writes docs/guarantees.json and docs/guarantees.md.
+    /// Measures every promise, and writes docs/evidence/guarantees.json and docs/evidence/guarantees.md.
     #[command(disable_help_flag = true)]
     Guarantees(Passed),
-    /// Writes docs/performance.md: where a query's instructions go on the emulated board.
+    /// Writes docs/evidence/performance.md: where a query's instructions go on the emulated board.
     #[command(disable_help_flag = true)]
     Profile(Passed),
     Viewer(viewer::Options),

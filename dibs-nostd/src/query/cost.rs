@@ -8,7 +8,7 @@ use super::Budget;
 ///
 /// The constants are the plane above some hundred thousand adversarial queries about four small surfaces, on an
 /// emulated Cortex-M7 and on x86-64, plus a margin of 20 %. They are checked on surfaces and poses that the fit has not
-/// seen: the repository's `docs/guarantees.md` lists these, the queries above the bound, its tightness, and the cycles
+/// seen: the repository's `docs/evidence/guarantees.md` lists these, the queries above the bound, its tightness, and the cycles
 /// of an instruction. They are for [`Query::closest`](crate::Query::closest), vertex tables that are slices of `Vec3`,
 /// and the firmware's profile or an optimised build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -83,7 +83,7 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     /// Of a tree with several solids, each whose sphere the axis reaches takes a search of its own. Where f32 cannot tell the
     /// side, f64 does, counted as the node tests that take as long; too many triangles that tie take two more searches.
     ///
-    /// Cost: the budget at most; typical counts are in the repository's `docs/benchmarks.md`.
+    /// Cost: the budget at most; typical counts are in the repository's `docs/evidence/benchmarks.md`.
     ///
     /// # Errors
     /// [`QueryError`]: a table of the wrong size, a root pin that is not finite, a measurement of another mesh, or

@@ -22,7 +22,7 @@ struct Arguments {
 enum Task {
     Demo(demo::Options),
     Guarantees(harness::Options),
-    /// Writes docs/performance.md: where a query's instructions go on the emulated board.
+    /// Writes docs/evidence/performance.md: where a query's instructions go on the emulated board.
     Profile,
     #[cfg(feature = "peers")]
     Bench(dibs_prove::paper::Options),

@@ -49,7 +49,7 @@ const PARTS: [Part; 6] = [
 /// The rest.
 const REST: &str = "loop over subtrees";
 
-/// Measures, and writes docs/performance.md.
+/// Measures, and writes docs/evidence/performance.md.
 pub fn run() -> Result<()> {
     qemu::find()?;
     let program = build_for_board(&Cross::find()?, "probe")?;
@@ -63,7 +63,7 @@ pub fn run() -> Result<()> {
         }
     }
     let queries = script.queries() as f64;
-    let file = workspace::root().join("docs").join("performance.md");
+    let file = workspace::root().join("docs/evidence").join("performance.md");
     fs::write(&file, document(&parts, queries)?)
         .with_context(|| format!("cannot write {}", file.display()))?;
     println!("{}", file.display());
@@ -127,7 +127,7 @@ fn document(parts: &BTreeMap<&str, u64>, queries: f64) -> Result<String> {
         let share = 100.0 * count as f64 / total as f64;
         writeln!(text, "| {part} | {:.0} | {share:.1} % |", count as f64 / queries)?;
     }
-    text += "\n## On the whole path\n\nFrom `cargo xtask guarantees`, docs/guarantees.json.\n\n\
+    text += "\n## On the whole path\n\nFrom `cargo xtask guarantees`, docs/evidence/guarantees.json.\n\n\
              | queries | mean | 99 % below | largest | node tests | triangle tests |\n\
              |---|---:|---:|---:|---:|---:|\n";
     for (name, what) in [

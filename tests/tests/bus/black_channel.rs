@@ -119,19 +119,6 @@ fn the_checksum_finds_as_many_flips_as_the_page_says() {
     assert!(pairs.windows(2).all(|two| two[0] != two[1]), "four bits");
 }
 
-/// The guarantees repeat the page's tables and arithmetic.
-#[test]
-fn the_guarantees_show_the_black_channel() {
-    let guarantees = include_str!("../../../docs/guarantees.md");
-    let page = include_str!("../../../docs/black-channel.md");
-    let section = guarantees.split("\n## ").find(|section| section.contains("| masquerade |"));
-    let section = section.expect("a section with the table");
-    for line in page.lines().filter(|line| line.starts_with('|')) {
-        assert!(section.contains(line), "{line}");
-    }
-    assert!(section.contains(&arithmetic()));
-}
-
 #[test]
 fn the_black_channel_page_is_true() {
     let page = include_str!("../../../docs/black-channel.md");

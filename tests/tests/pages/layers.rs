@@ -1,6 +1,6 @@
 //! Dependencies between the folders of a crate point one way.
 //!
-//! `docs/dependencies.md` lists them, and `DIBS_WRITE=1` writes that list anew. `DIBS_CHECKOUT=FOLDER cargo test -p
+//! `docs/evidence/dependencies.md` lists them, and `DIBS_WRITE=1` writes that list anew. `DIBS_CHECKOUT=FOLDER cargo test -p
 //! dibs-tests --test pages layers -- --nocapture` prints the list of another checkout.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -40,7 +40,7 @@ fn the_page_lists_the_imports_of_today() {
     if env::var_os("DIBS_CHECKOUT").is_some() {
         return;
     }
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/dependencies.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/evidence/dependencies.md");
     let page = fs::read_to_string(&path).expect("the page");
     let (head, listed) = page.split_once("\n\n|").expect("a table");
     if env::var_os("DIBS_WRITE").is_some() {

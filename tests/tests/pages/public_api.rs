@@ -1,4 +1,4 @@
-//! `docs/public-api.txt` lists the public items of the libraries. `DIBS_WRITE=1` writes it anew.
+//! `docs/evidence/public-api.txt` lists the public items of the libraries. `DIBS_WRITE=1` writes it anew.
 //!
 //! An item has a path: a type, trait, function, constant or macro. Methods and fields are not listed.
 
@@ -29,7 +29,7 @@ fn the_public_items_are_those_that_are_listed() {
     assert!(core.len() < MOST, "{} public items", core.len());
     let lines: Vec<&str> = core.iter().chain(&builder).chain(&sender).map(String::as_str).collect();
     let listing = lines.join("\n") + "\n";
-    let path = Path::new(REPOSITORY).join("docs/public-api.txt");
+    let path = Path::new(REPOSITORY).join("docs/evidence/public-api.txt");
     if env::var_os("DIBS_WRITE").is_some() {
         fs::write(path, listing).expect("writable");
     } else {

@@ -34,7 +34,7 @@ const FARTHEST: u32 = 1 << 29;
 /// bounds hold for any.
 ///
 /// `STACK` must be at least [`Tree::stack`]. `OPENED` nodes of the tree are remembered with their children, some hundred
-/// as a rule; the repository's `docs/guarantees.md` has the most that a beating heart took. If `OPENED` is too small,
+/// as a rule; the repository's `docs/evidence/guarantees.md` has the most that a beating heart took. If `OPENED` is too small,
 /// ticks are whole queries. Keep it in a `static`: it can be larger than a controller's stack.
 ///
 /// Where the axis crosses the surface, it remembers which parts of the axis cannot be deepest, and searches those points

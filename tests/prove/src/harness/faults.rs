@@ -1,5 +1,5 @@
-//! The fault matrix in docs/guarantees.md: of the host from docs/faults.json, of the board from
-//! docs/faults-board.json, which have the same rows.
+//! The fault matrix in docs/evidence/guarantees.md: of the host from docs/evidence/faults.json, of the board from
+//! docs/evidence/faults-board.json, which have the same rows.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -103,7 +103,7 @@ fn of(out: &mut String, run: Option<&Run>) -> Result<()> {
 }
 
 fn read(name: &str) -> Result<Option<Faults>> {
-    let file = workspace::root().join("docs").join(name);
+    let file = workspace::root().join("docs/evidence").join(name);
     if !file.is_file() {
         return Ok(None);
     }

@@ -1,4 +1,4 @@
-//! docs/guarantees.md, from the records and the texts in `texts/`.
+//! docs/evidence/guarantees.md, from the records and the texts in `texts/`.
 
 use std::fmt::Write;
 
@@ -47,18 +47,8 @@ pub fn render(records: &[Record]) -> Result<String> {
     }
     out.push('\n');
     out.push_str(&faults::render()?);
-    out.push_str(&one_level_down(include_str!("../../../../docs/black-channel.md")));
-    out.push('\n');
     out.push_str(include_str!("texts/tail.md"));
     Ok(out)
-}
-
-/// A page as a section: its headings one level down.
-fn one_level_down(page: &str) -> String {
-    let is_heading = |line: &str| line.starts_with('#');
-    page.lines()
-        .map(|line| format!("{}{line}\n", if is_heading(line) { "#" } else { "" }))
-        .collect()
 }
 
 /// The last run that made a measurement.

@@ -1,5 +1,5 @@
 //! One harness for every promise. A check, one file in `checks/`, measures figures and states a promise for each; the
-//! records join both in docs/guarantees.json, and docs/guarantees.md is made from the records. `cargo xtask test` runs
+//! records join both in docs/evidence/guarantees.json, and docs/evidence/guarantees.md is made from the records. `cargo xtask test` runs
 //! the same checks on fewer cases, and compares their figures with the records.
 
 mod effort;
@@ -32,7 +32,7 @@ pub struct Check {
     pub run: fn(&Effort, &mut Figures) -> Result<Outcome>,
 }
 
-/// Measures every promise, and writes docs/guarantees.json and docs/guarantees.md.
+/// Measures every promise, and writes docs/evidence/guarantees.json and docs/evidence/guarantees.md.
 #[derive(clap::Args)]
 pub struct Options {
     /// Fits the constants of the cost model anew (`--only board`, `--only host`: of one machine), and ends; the
@@ -42,7 +42,7 @@ pub struct Options {
     /// Seconds of each fuzz target.
     #[arg(long, default_value_t = 60)]
     fuzz_seconds: u32,
-    /// Makes docs/guarantees.md anew from docs/guarantees.json, and measures nothing.
+    /// Makes docs/evidence/guarantees.md anew from docs/evidence/guarantees.json, and measures nothing.
     #[arg(long)]
     render: bool,
     /// As few cases as `cargo xtask test` takes, for a quick look.

@@ -1,4 +1,4 @@
-//! The records in docs/guarantees.json: one a promise, each with the run that measured it.
+//! The records in docs/evidence/guarantees.json: one a promise, each with the run that measured it.
 
 use std::fs;
 use std::path::PathBuf;
@@ -43,7 +43,7 @@ pub struct Raise<'a> {
 }
 
 pub fn json() -> PathBuf {
-    workspace::root().join("docs").join("guarantees.json")
+    workspace::root().join("docs/evidence").join("guarantees.json")
 }
 
 pub fn committed() -> Result<Vec<Record>> {
@@ -110,7 +110,7 @@ pub fn merge(
     (records, broken)
 }
 
-/// Makes docs/guarantees.md from docs/guarantees.json, without a measurement. A record keeps the words under which its
+/// Makes docs/evidence/guarantees.md from docs/evidence/guarantees.json, without a measurement. A record keeps the words under which its
 /// figure was measured.
 pub fn render() -> Result<()> {
     save(&committed()?)
@@ -136,13 +136,17 @@ pub fn compare(measured: &Measured) -> Result<()> {
     if fs::read_to_string(json().with_extension("md")).unwrap_or_default()
         != markdown::render(&before)?
     {
-        broken
-            .push("docs/guarantees.md is not made from guarantees.json: run with --render".into());
+        broken.push(
+            "docs/evidence/guarantees.md is not made from guarantees.json: run with --render"
+                .into(),
+        );
     }
     for (check, promise) in promises() {
         let (id, name) = (promise.id, check.name);
         let Some(record) = before.iter().find(|record| record.id == id) else {
-            broken.push(format!("{id} is not in docs/guarantees.json: record --only \"{name}\""));
+            broken.push(format!(
+                "{id} is not in docs/evidence/guarantees.json: record --only \"{name}\""
+            ));
             continue;
         };
         match measured.figures.get(id) {

@@ -1,4 +1,4 @@
-//! `docs/paper.md`: the paper's numbers, each beside this run's.
+//! `docs/evidence/paper.md`: the paper's numbers, each beside this run's.
 //!
 //! The paper's numbers are typed here, from its tables; this run's come from the records; the verdicts follow from
 //! both.

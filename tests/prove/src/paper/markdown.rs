@@ -1,4 +1,4 @@
-//! `docs/benchmarks.md`: every number in it is a record's.
+//! `docs/evidence/benchmarks.md`: every number in it is a record's.
 
 use std::fmt::Write;
 

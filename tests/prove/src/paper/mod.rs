@@ -34,7 +34,7 @@ use crate::demo;
 /// Runs the benchmark, or makes its documents anew.
 pub fn bench(options: &Options) -> Result<()> {
     let quick = || workspace::target().join("bench");
-    let default = if options.quick { quick() } else { workspace::root().join("docs") };
+    let default = if options.quick { quick() } else { workspace::root().join("docs/evidence") };
     let folder = options.out.clone().unwrap_or(default);
     let records = if options.render {
         Records::read(&folder.join("benchmarks.json"))?

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Runs the paper's experiments: DIBS, the paper's baselines and today's peers, on the same surfaces and
-/// tools. Writes docs/benchmarks.json and everything that is made from it.
+/// tools. Writes docs/evidence/benchmarks.json and everything that is made from it.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct Options {
     /// A few minutes instead of half an hour: fewer queries. Writes to target/bench, not to docs.
