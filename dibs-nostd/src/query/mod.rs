@@ -1,6 +1,5 @@
 //! The traversal: the closest pair between a tool and the surface as it is now.
 
-mod axis;
 mod chain;
 mod contacts;
 mod cost;
@@ -10,6 +9,7 @@ mod depth;
 #[cfg(test)]
 mod distances;
 mod exact;
+mod memory;
 mod normal;
 mod options;
 mod passed;

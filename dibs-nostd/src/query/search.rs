@@ -1,8 +1,8 @@
 //! One search: the tests of nodes, leaves and triangles, and the best pair so far.
 
-mod around;
 mod finish;
 mod heights;
+mod leaves;
 mod low;
 mod near;
 mod range;
@@ -14,8 +14,6 @@ mod wide;
 
 use glam::Vec3;
 
-pub(super) use around::Around;
-pub(super) use range::RangeFront;
 pub(super) use tick::{Outcome, Tick};
 pub(super) use ties::Ties;
 pub(super) use wide::WideSearch;

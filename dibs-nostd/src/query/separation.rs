@@ -5,7 +5,8 @@
 
 use glam::Vec3;
 
-use super::depth::{Depth, Known};
+use super::depth::Depth;
+use super::memory::depth::KnownDepthMut;
 use super::search::{Ties, Waiting};
 use super::side::{self, NoSide, OnAxis, Side};
 use super::{Options, Proximity, solids};
@@ -33,7 +34,7 @@ pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     tool: &T,
     options: &Options,
     found: &mut Proximity,
-    memory: (&mut Ties, Option<&mut Known>),
+    memory: (&mut Ties, Option<KnownDepthMut<'_>>),
 ) -> Result<(), QueryError> {
     let asked = Asked { tree, vertices, tool, options };
     if !options.is_signed {
@@ -57,7 +58,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
         &self,
         stack: &mut [Waiting],
         found: &mut Proximity,
-        (ties, known): (&mut Ties, Option<&mut Known>),
+        (ties, known): (&mut Ties, Option<KnownDepthMut<'_>>),
         roots: RootSet,
     ) -> Result<(), QueryError> {
         let &Self { tree, vertices, tool, options } = self;
@@ -101,9 +102,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
                 return Ok(());
             }
         }
-        let (known, around) = known.map(|known| known.now(roots)).unzip();
+        let (known, leaves) = known.map(|known| known.now(roots)).unzip();
         let mut depth =
-            Depth::new(tree, stack, vertices, tool, options, found, around, roots, ties);
+            Depth::new(tree, stack, vertices, tool, options, found, leaves, roots, ties);
         let answer = depth.run(known)?;
         *found = answer;
         Ok(())

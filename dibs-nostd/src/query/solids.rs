@@ -4,10 +4,11 @@
 //! sheet of all decides nothing. The least of their separations changes by no more than tool and surface move, as each
 //! of them does.
 
+use super::Proximity;
+use super::memory::depth::KnownDepthMut;
 use super::search::{Search, Ties, WHOLE, Waiting};
 use super::separation::Asked;
 use super::side::{NoSide, Side};
-use super::{Proximity, depth};
 use crate::math::sqrt::sqrt;
 use crate::tree::RootSet;
 use crate::unavailable::QueryError;
@@ -20,7 +21,7 @@ pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     asked: &Asked<'_, '_, I, V, T>,
     stack: &mut [Waiting],
     answer: &mut Proximity,
-    memory: (&mut Ties, Option<&mut depth::Known>),
+    memory: (&mut Ties, Option<KnownDepthMut<'_>>),
 ) -> Result<(), QueryError> {
     let &Asked { tree, vertices, tool, options } = asked;
     let closest = *answer;

@@ -42,10 +42,10 @@ fn contacts_of_a_tracker_are_those_of_a_query() {
         let step = step.as_ref().expect("the first tick has a frame");
         let surface = step.at((tick % 30) as f32 / 30.0);
         let options = Options::new();
-        let opened = own.opened();
+        let opened = tracker.opened_in_range();
         let found = tracker.contacts(&surface, &tool, MARGIN, &options, &mut own);
         // A front that is kept only grows.
-        restarts += usize::from(own.opened() < opened);
+        restarts += usize::from(tracker.opened_in_range() < opened);
         let found = found.expect("an answer");
         let closest = query.contacts(&surface, &tool, MARGIN, &Options::cold(), &mut whole);
         let closest = closest.expect("an answer");
@@ -60,7 +60,11 @@ fn contacts_of_a_tracker_are_those_of_a_query() {
     println!("{compared} contacts, {fronts} ticks by the front, {restarts} of the range anew");
     if !cfg!(debug_assertions) {
         assert!(compared > 400 && fronts > 2_000, "{compared} {fronts}");
-        assert!(own.opened() > 0 && restarts < 30, "{} {restarts}", own.opened());
+        assert!(
+            tracker.opened_in_range() > 0 && restarts < 30,
+            "{} {restarts}",
+            tracker.opened_in_range()
+        );
     }
     let refused = {
         let surface = odometer.start(frames[0].as_slice());
@@ -249,7 +253,7 @@ fn a_jump_far_away_starts_the_range_anew() {
         let near = Sphere::new(tip + tip / size * 3.0, 1.0).expect("valid");
         let surface = odometer.start(rest.as_slice());
         tracker.contacts(&surface, &near, MARGIN, &options, &mut own).expect("an answer");
-        assert!(own.opened() > 0);
+        assert!(tracker.opened_in_range() > 0);
         let step = odometer.step(rest.as_slice(), far.as_slice());
         let surface = step.at(1.0);
         for row in (1..rest.len()).step_by(97) {

@@ -6,7 +6,7 @@ use super::basins::{Basins, Near, Place};
 use super::low::Found;
 use super::{Contact, Contacts};
 use crate::math::sqrt::sqrt;
-use crate::query::search::{RangeFront, Waiting};
+use crate::query::search::Waiting;
 use crate::query::side::{self, OnAxis, Side};
 use crate::query::{NoSide, Options, Proximity};
 use crate::tool::AxisPair;
@@ -73,14 +73,13 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         options: &Options,
         find: impl FnOnce(
             &mut Basins<NEAR>,
-            &mut RangeFront<NEAR>,
             &mut [Waiting],
             &Options,
             f32,
             f32,
         ) -> Result<Found, QueryError>,
     ) -> Result<Budget, QueryError> {
-        let Self { found, basins, front } = self;
+        let Self { found, basins } = self;
         let &Pair { tree, vertices, tool, closest, .. } = pair;
         let margin = found.margin;
         if closest.accuracy > found.accuracy {
@@ -109,7 +108,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         let ridge = (margin * RIDGE) + 2.0 * accuracy;
         let limit = tool.radius() + margin + ridge;
         let Found { complete, beyond, tests: mut made } =
-            find(basins, front, stack, options, limit, ridge)?;
+            find(basins, stack, options, limit, ridge)?;
         let is_crossing = closest.side == Side::Crossing;
         let has_crossing = is_crossing && own.is_some();
         if let Some(contact) = own.filter(|_| is_crossing) {

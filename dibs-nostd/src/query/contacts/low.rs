@@ -5,11 +5,11 @@ use super::add::{Pair, near};
 use super::basins::Basins;
 use crate::math::sqrt::sqrt;
 use crate::query::Options;
+use crate::query::memory::range::RangeFrontMut;
 use crate::query::search::{Search, Waiting};
-use crate::surface::motion::Unit;
 use crate::tool::AxisPair;
 use crate::unavailable::QueryError;
-use crate::{Budget, Index, Tool, Travel, VertexTable};
+use crate::{Budget, Index, Tool, VertexTable};
 
 /// The end of a search for low triangles. All that are closer than both distances were entered.
 pub(super) struct Found {
@@ -28,7 +28,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         stack: &mut [Waiting],
         options: &Options,
     ) -> Result<Budget, QueryError> {
-        self.add_from(pair, stack, options, |basins, _, stack, options, limit, ridge| {
+        self.add_from(pair, stack, options, |basins, stack, options, limit, ridge| {
             let mut low = Low::new(basins, limit, pair);
             let &Pair { tree, vertices, tool, .. } = pair;
             let search = Search::start(tree, stack, vertices, tool, options, None, None)?;
@@ -45,11 +45,9 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         pair: &Pair<'_, I, V, T>,
         stack: &mut [Waiting],
         options: &Options,
-        travel: Travel,
-        unit: Unit,
+        mut front: RangeFrontMut<'_>,
     ) -> Result<Budget, QueryError> {
-        self.add_from(pair, stack, options, |basins, front, stack, options, limit, ridge| {
-            let mut front = front.moved_to(pair.tool, travel, unit, options.part);
+        self.add_from(pair, stack, options, |basins, stack, options, limit, ridge| {
             let mut low = Low::new(basins, limit, pair);
             let &Pair { tree, vertices, tool, .. } = pair;
             let search = Search::start(tree, stack, vertices, tool, options, None, None)?;
@@ -58,7 +56,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             let (beyond, tests) =
                 search.each_low_from(&mut front, limit, (ridge, options.part), visit)?;
             if beyond == f32::INFINITY {
-                front.keep(pair.tool, travel);
+                front.keep();
             }
             Ok(Found { complete: low.complete, beyond, tests })
         })

@@ -8,7 +8,6 @@ mod low;
 
 use glam::Vec3;
 
-use super::search::RangeFront;
 use super::{Options, Proximity, Query, Side};
 use crate::unavailable::{QueryError, Unavailable};
 use crate::{Index, Tool, TriangleRow, VertexTable};
@@ -70,10 +69,9 @@ impl Contact {
 }
 
 /// Up to `N` contacts, deepest first, and a bound on the others. A query compares up to `NEAR` triangles: those near a
-/// contact, and some with no lower vertex next to theirs, at most half of `NEAR`. A tracker remembers up to `NEAR` opened nodes of the tree in
-/// the list, some hundred as a rule.
+/// contact, and some with no lower vertex next to theirs, at most half of `NEAR`.
 ///
-/// RAM on a 32-bit processor: 144 bytes for each of the `N`, 32 for each of the `NEAR`, and 152.
+/// RAM on a 32-bit processor: 144 bytes for each of the `N`, 20 for each of the `NEAR`, and 120.
 ///
 /// Make it once, in a `static` or at start-up, and use it at every tick.
 ///
@@ -98,8 +96,6 @@ impl Contact {
 pub struct Contacts<const N: usize, const NEAR: usize = 512> {
     found: List<N>,
     basins: Basins<NEAR>,
-    /// Of a tracker's last search.
-    front: RangeFront<NEAR>,
 }
 
 /// The contacts of a list that a constraint acts on, deepest first: see [`Contacts::within`].
@@ -147,7 +143,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     /// An empty list.
     #[must_use]
     pub const fn new() -> Self {
-        Self { found: List::new(), basins: Basins::new(), front: RangeFront::new() }
+        Self { found: List::new(), basins: Basins::new() }
     }
 
     /// The contacts, deepest first.
@@ -228,13 +224,6 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     #[must_use]
     pub const fn is_full(&self) -> bool {
         self.found.is_full
-    }
-
-    /// Of `NEAR` places, those that a tracker's last search used for opened nodes. Once all are used, the next search
-    /// starts anew; nodes for which there is no place are searched as a query does.
-    #[must_use]
-    pub const fn opened(&self) -> u32 {
-        self.front.opened()
     }
 
     /// Sets each contact's velocity to that of the surface there, from a table of the vertices' velocities (mm/s).

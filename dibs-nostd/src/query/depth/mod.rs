@@ -14,7 +14,6 @@
 //! A tracker keeps the bounds. Tool and surface change a depth by at most their motion, so the next tick looks only at
 //! the parts whose bounds have come above the deepest point by more than the tolerance.
 
-mod known;
 mod part;
 mod start;
 mod touches;
@@ -22,14 +21,15 @@ mod walk;
 
 use glam::Vec3;
 
-use super::search::{Around, Search, Ties, UNTIL, Waiting};
+use super::memory::depth::{Point, Points};
+use super::memory::leaves::Leaves;
+use super::search::{Search, Ties, UNTIL, Waiting};
 use super::side::{self, COORDINATES, NoSide, OnAxis, Side};
 use super::{Budget, Options, Proximity};
 use crate::tool::{AxisPoint, Tool};
 use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, Tree, TriangleRow, VertexTable};
-pub(super) use known::{Known, Points};
 use part::{Bound, Fit, Part, Parts, Sample, larger};
 use touches::Touches;
 
@@ -77,7 +77,7 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
     /// Points searched.
     looks: u32,
     /// The leaves around the deepest point of the last tick.
-    around: Option<&'s mut Around>,
+    leaves: Option<&'s mut Leaves>,
     /// Roots of the shells that decide.
     roots: RootSet,
     /// The triangles that the axis may meet; then those that may be the closest to the point searched last.
@@ -95,7 +95,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         tool: &'s T,
         options: &Options,
         closest: &'s Proximity,
-        around: Option<&'s mut Around>,
+        leaves: Option<&'s mut Leaves>,
         roots: RootSet,
         ties: &'s mut Ties,
     ) -> Self {
@@ -124,7 +124,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             deepest,
             deepest_at,
             looks: 0,
-            around,
+            leaves,
             roots,
             ties,
         }
@@ -157,7 +157,12 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         };
         let bound = self.divide(&mut parts, tolerance, last)?;
         if let Some(known) = known {
-            known.keep(&mut parts, self.deepest_at);
+            while parts.count() > Points::MOST && parts.join(self.deepest_at, f32::INFINITY) {}
+            let point = |Part { from, bound, .. }: Part| {
+                let Sample { parameter, depth, triangle, .. } = from;
+                Some(Point { parameter, depth, bound, triangle: triangle? })
+            };
+            known.keep(parts.in_order().map(point), self.deepest_at);
         }
         self.finish(bound)
     }
@@ -247,8 +252,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     /// Searches the point of a sample to the end; the leaves around it are remembered.
     fn look_again(&mut self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
         let sample = parts.sample(row);
-        if let Some(around) = &mut self.around {
-            around.move_to(sample.parameter, self.tool.axis_length());
+        if let Some(leaves) = &mut self.leaves {
+            leaves.move_to(sample.parameter, self.tool.axis_length());
         }
         let sample = self.look(sample, EXACT)?;
         parts.set_sample(row, sample);
@@ -288,12 +293,12 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             Some(&mut *self.ties),
         )?;
         // A bound that is just low enough would not be so at the next tick.
-        let enough = if self.around.is_some() { EXACT } else { enough };
+        let enough = if self.leaves.is_some() { EXACT } else { enough };
         let length = self.tool.axis_length();
-        let around = self.around.as_deref_mut();
-        let mut found = match around.map(|around| (around.way_to(parameter, length), around)) {
-            Some((way, around)) if search.is_among(around, way) => search.among(around, way)?,
-            Some((way, around)) if way <= 0.0 => search.gather(around)?,
+        let leaves = self.leaves.as_deref_mut();
+        let mut found = match leaves.map(|leaves| (leaves.way_to(parameter, length), leaves)) {
+            Some((way, leaves)) if search.is_among(leaves, way) => search.among(leaves, way)?,
+            Some((way, leaves)) if way <= 0.0 => search.gather(leaves)?,
             _ => search.run::<UNTIL>(enough)?,
         };
         let (tree, vertices, roots) = (self.tree, self.vertices, self.roots);

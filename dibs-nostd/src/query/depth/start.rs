@@ -1,10 +1,10 @@
 //! The parts of the axis that a search begins with: between the places where it meets the surface, or the last tick's.
 
-use super::known::Point;
 use super::part::{Part, Parts, Sample};
 use super::touches::Touches;
 use super::{DISTANCE_COST, Depth};
 use crate::query::Proximity;
+use crate::query::memory::depth::Point;
 use crate::tool::Tool;
 use crate::unavailable::QueryError;
 use crate::{Index, TriangleRow, VertexTable};

@@ -1,9 +1,7 @@
 //! A search that begins with the front of the one before, and tests only the bounds that have run out.
 //!
-//! The odometer counts how far tool and surface have moved, rounded up. A bound found at reading `now` is stored as the
-//! reading `now + bound`, at which it runs out. Until then the difference of the readings is a bound. So a child is due
-//! again once its reading is not beyond `now` plus the cutoff. That sum never falls while answers are exact, since a
-//! distance shrinks by no more than the odometer counts.
+//! A child is due again once its bound's deadline is not beyond that of the cutoff. The latter never falls while answers
+//! are exact, since a distance shrinks by no more than the clock counts.
 //!
 //! Rounding. A bound is stored less the slack of its own search, and compared with the cutoff, which has the slack of
 //! this one: so both errors are covered, whatever their scales. Both slacks include 16 * 2^-24 of the coordinates,
@@ -18,9 +16,10 @@ use facing::Facing;
 use super::{Search, Step, THIRD, Waiting};
 use crate::math::sqrt::sqrt;
 use crate::query::Budget;
+use crate::query::memory::clock::{Deadline, MotionClock};
+use crate::query::memory::front::{FrontMut, NOWHERE, Place, UNUSED};
 use crate::query::plane::least;
-use crate::query::tracker::front::{FrontMut, NOWHERE, Place, UNUSED, is_before};
-use crate::surface::motion::{FAR, Unit};
+use crate::surface::motion::FAR;
 use crate::tree::format::{Link, Node};
 use crate::unavailable::QueryError;
 use crate::{Index, Proximity, Tool, TriangleRow, VertexTable};
@@ -41,9 +40,7 @@ pub(in crate::query) enum Outcome {
 pub(in crate::query) struct Tick<'s, 't, 'f, I, V: ?Sized, T> {
     search: Search<'s, 't, I, V, T>,
     front: FrontMut<'f>,
-    unit: Unit,
-    /// The odometer.
-    now: u32,
+    clock: MotionClock,
     /// Taken off a bound before it is stored.
     margin: f32,
     /// Distance from the axis beyond which nothing is searched.
@@ -57,8 +54,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
     pub fn new(
         mut search: Search<'s, 't, I, V, T>,
         front: FrontMut<'f>,
-        unit: Unit,
-        now: u32,
+        clock: MotionClock,
         budget: Budget,
         separation: f32,
     ) -> Self {
@@ -71,7 +67,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         let limit =
             if separation < f32::INFINITY { search.limit_to(separation) } else { f32::INFINITY };
         let facing = Facing::new(&search);
-        Self { search, front, unit, now, margin, limit, facing }
+        Self { search, front, clock, margin, limit, facing }
     }
 
     /// Tests the bounds that run out with a motion of `moved` units.
@@ -90,10 +86,11 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             self.front.clear();
         }
         if self.front.is_empty() {
+            let now = self.clock.deadline(0.0);
             for row in 0..=self.search.tree.header().other_roots {
                 let root = self.search.tree.record(row).ok_or(corrupt)?;
                 let nowhere = Place { node: NOWHERE, slot: 0 };
-                if self.front.open(root.link, nowhere, self.now).is_none() {
+                if self.front.open(root.link, nowhere, now).is_none() {
                     self.front.clear();
                     return Ok(Outcome::Full {
                         tests: Budget { node_tests: 0, triangle_tests: 0 },
@@ -109,7 +106,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 Visit::OutOfBudget => {
                     self.put_back_waiting().ok_or(corrupt)?;
                     self.search.leave_unfinished();
-                    let least = self.unit.length(self.front.least(self.now));
+                    let least = self.clock.left(self.front.first(&self.clock));
                     let lower = if least > 0.0 { least } else { 0.0 };
                     return Ok(Outcome::Ended { lower, is_complete: false, restarted });
                 }
@@ -136,23 +133,23 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         self.search.best.map(|_| TriangleRow(self.search.best_triangle))
     }
 
-    /// A bound whose key is not beyond this is due.
+    /// A bound whose deadline is not after this is due.
     #[inline(always)]
-    fn threshold(&self) -> u32 {
-        self.now.wrapping_add(self.unit.up(self.search.cutoff + self.search.coordinate_slack))
+    fn threshold(&self) -> Deadline {
+        self.clock.within(self.search.cutoff + self.search.coordinate_slack)
     }
 
     #[inline(always)]
-    fn key(&self, bound: f32) -> u32 {
-        self.now.wrapping_add(self.unit.down(bound - self.margin))
+    fn deadline(&self, bound: f32) -> Deadline {
+        self.clock.deadline(bound - self.margin)
     }
 
     /// The answer. No part of the surface that was not searched is closer to the axis than `lower`.
     #[inline(always)]
     pub fn finish(&mut self, lower: f32) -> Result<Proximity, QueryError> {
         if let Some(place) = *self.front.best {
-            let key = self.key(sqrt(self.search.best_squared));
-            *self.key_of(place).ok_or(QueryError::Corrupt { row: 0 })? = key;
+            let deadline = self.deadline(sqrt(self.search.best_squared));
+            *self.deadline_of(place).ok_or(QueryError::Corrupt { row: 0 })? = deadline;
         }
         let mut closest = self.search.finish(lower)?;
         // A triangle that is closer by less than the accuracy may have been passed over.
@@ -161,8 +158,8 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
     }
 
     #[inline(always)]
-    fn key_of(&mut self, place: Place) -> Option<&mut u32> {
-        self.front.node(place.node)?.keys.get_mut(usize::from(place.slot))
+    fn deadline_of(&mut self, place: Place) -> Option<&mut Deadline> {
+        self.front.node(place.node)?.deadlines.get_mut(usize::from(place.slot))
     }
 
     /// Tests the bounds that are due below an opened node, and opens the children within the cutoff.
@@ -179,13 +176,12 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 self.front.put_back(place).ok_or(corrupt)?;
                 continue;
             }
-            let key = *self.key_of(place).ok_or(corrupt)?;
+            let deadline = *self.deadline_of(place).ok_or(corrupt)?;
             let link = self.record(place).ok_or(corrupt)?.link;
-            let Some(opened) = self.front.open(link, place, key) else {
+            let Some(opened) = self.front.open(link, place, deadline) else {
                 return Ok(Visit::Full);
             };
             self.search.waiting = top;
-            *self.key_of(place).ok_or(corrupt)? = u32::from(opened);
             if let Step::OutOfBudget = self.test_due(opened)? {
                 return Ok(Visit::OutOfBudget);
             }
@@ -218,7 +214,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         let threshold = self.threshold();
         let opened = self.front.node(at).ok_or(corrupt)?;
         let (step, count) = match Link::decode(opened.link) {
-            // A free place falls due once the odometer has counted `FAR` units; it is scheduled anew.
+            // A free place falls due once the clock has counted `FAR` units; it is scheduled anew.
             _ if opened.link == UNUSED => (Step::Done, 0),
             Link::Children { first, count } => {
                 let due = opened.due(count, threshold);
@@ -229,7 +225,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 (self.test_triangles(at, first, due)?, count)
             }
         };
-        self.front.schedule(usize::from(at), count, self.now).ok_or(corrupt)?;
+        self.front.schedule(usize::from(at), count, &self.clock).ok_or(corrupt)?;
         Ok(step)
     }
 
@@ -237,17 +233,14 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
     fn test_children(&mut self, at: u16, first: u32, mut due: u32) -> Result<Step, QueryError> {
         let corrupt = QueryError::Corrupt { row: first };
         let base = self.search.waiting;
-        let (now, unit, margin) = (self.now, self.unit, self.margin);
-        let later = |key: u32, bound: f32| {
-            let own = now.wrapping_add(unit.down(bound - margin));
-            if is_before(key, own) { own } else { key }
-        };
+        let (clock, margin) = (self.clock, self.margin);
+        let later = |due: Deadline, bound: f32| due.or_later(clock.deadline(bound - margin));
         let search = &mut self.search;
         let tree = search.tree;
         let opened = self.front.node(at).ok_or(corrupt)?;
         while let Some(slot) = next(&mut due) {
             let node = tree.whole_record(first + u32::from(slot)).ok_or(corrupt)?;
-            let key = opened.keys.get_mut(usize::from(slot)).ok_or(corrupt)?;
+            let due = opened.deadlines.get_mut(usize::from(slot)).ok_or(corrupt)?;
             let Some(left) = search.left.node_tests.checked_sub(1) else {
                 return Ok(Step::OutOfBudget);
             };
@@ -257,7 +250,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             let distance = sqrt(normal.dot(normal));
             search.lower_cutoff_to_pin(node.pin, distance);
             let own = distance - node.radius_code as f32 * search.radius_scale;
-            *key = later(*key, own);
+            *due = later(*due, own);
             if own > search.cutoff {
                 continue;
             }
@@ -268,7 +261,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 let plane = search.plane_across(normal, position, distance);
                 let excess = plane.excess(tree, search.vertices, first, count).ok_or(corrupt)?;
                 if excess > 0.0 {
-                    *key = later(*key, search.cutoff + excess / distance);
+                    *due = later(*due, search.cutoff + excess / distance);
                     continue;
                 }
             }
@@ -310,8 +303,8 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                     None => continue,
                 }
             };
-            let key = self.key(bound);
-            *self.key_of(place).ok_or(corrupt)? = key;
+            let deadline = self.deadline(bound);
+            *self.deadline_of(place).ok_or(corrupt)? = deadline;
         }
         Ok(Step::Done)
     }
@@ -372,7 +365,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         let corrupt = QueryError::Corrupt { row: 0 };
         for _ in 0..number {
             let Some((at, due)) = self.front.next_closable() else { continue };
-            let left = due.wrapping_sub(self.threshold()) as i32;
+            let left = due.units_after(self.threshold());
             if left <= 0 {
                 continue;
             }
@@ -383,10 +376,9 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             let node = self.record(place).ok_or(corrupt)?;
             let distance =
                 sqrt(self.search.tool.axis_distance_squared(self.search.position(node.pin)?));
-            let own = self.key(distance - node.radius_code as f32 * self.search.radius_scale);
-            if (own.wrapping_sub(self.threshold()) as i32).saturating_mul(2) >= left {
-                let key = if is_before(own, due) { due } else { own };
-                self.front.close(at, key, self.now).ok_or(corrupt)?;
+            let own = self.deadline(distance - node.radius_code as f32 * self.search.radius_scale);
+            if own.units_after(self.threshold()).saturating_mul(2) >= left {
+                self.front.close(at, due.or_later(own), &self.clock).ok_or(corrupt)?;
             }
         }
         Ok(())

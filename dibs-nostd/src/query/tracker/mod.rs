@@ -1,22 +1,17 @@
 //! The closest pair from tick to tick: a tick costs in proportion to the change.
 
-pub(super) mod front;
 mod several;
 #[cfg(test)]
 mod tests;
 
-use super::axis::Axis;
 use super::contacts::Pair;
-use super::depth::Known;
+use super::memory::clock::Reading;
+use super::memory::{Lost, Memory};
 use super::search::{Outcome, Search, Tick, Ties, WHOLE, Waiting};
 use super::{Budget, Contacts, NoSide, Options, Proximity, Side, signed};
 use crate::surface::motion::Unit;
 use crate::unavailable::QueryError;
-use crate::{Index, MovingSurface, Tool, Travel, Tree, TriangleRow};
-use front::Front;
-
-/// Most units that the odometer may count between two tests of a bound: half of the range that it can tell apart.
-const FARTHEST: u32 = 1 << 29;
+use crate::{Index, MovingSurface, Tool, Tree, TriangleRow};
 
 /// A query that remembers its last answer's proof.
 ///
@@ -40,7 +35,7 @@ const FARTHEST: u32 = 1 << 29;
 /// Where the axis crosses the surface, it remembers which parts of the axis cannot be deepest, and searches those points
 /// that may have become so.
 ///
-/// RAM: 8 bytes for each entry of the stack, 44 for each opened node, and 1,288.
+/// RAM: 8 bytes for each entry of the stack, 56 for each opened node, and 1,288.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -66,30 +61,22 @@ const FARTHEST: u32 = 1 << 29;
 #[derive(Clone, Debug)]
 pub struct Tracker<'t, I, const STACK: usize, const OPENED: usize> {
     tree: Tree<'t, I>,
-    unit: Unit,
     stack: [Waiting; STACK],
-    front: Front<OPENED>,
+    memory: Memory<OPENED>,
     last: Option<Last>,
-    /// The odometer: units that tool and surface have moved; wraps.
-    now: u32,
-    /// Units since every bound due was tested.
-    behind: u32,
-    known: Known,
     ties: Ties,
     triangle: Option<TriangleRow>,
 }
 
-/// Tool and surface at the last tick.
+/// The last tick, for those of several trackers.
 #[derive(Clone, Copy, Debug)]
 struct Last {
-    axis: Axis,
-    travel: Travel,
     /// No point of the surface is closer to the axis, unless the tool may be inside: then negative infinity.
     clear: f32,
     /// The side was asked for.
     is_signed: bool,
-    /// Units moved since a search of several pairs last came to its end; less than [`FARTHEST`].
-    stale: u32,
+    /// When a search of several pairs last came to its end.
+    searched: Reading,
 }
 
 /// The answer of a tick.
@@ -140,13 +127,9 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         }
         Ok(Self {
             tree: *tree,
-            unit: Unit::of(tree),
             stack: [Waiting { lower: 0.0, link: 0 }; STACK],
-            front: Front::new(),
+            memory: Memory::new(Unit::of(tree)),
             last: None,
-            now: 0,
-            behind: 0,
-            known: Known::new(Unit::of(tree)),
             ties: Ties::new(),
             triangle: None,
         })
@@ -161,11 +144,19 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
     /// The front, for pictures and tests: rows of the nodes ([`Tree::node`]) that have a bound or, of leaves, whose
     /// triangles have. Every triangle is below exactly one of them. Empty until the first tick.
     pub fn front(&self) -> impl Iterator<Item = u32> {
-        self.front.rows()
+        self.memory.front.rows()
+    }
+
+    /// Opened nodes that the last search for [contacts](Self::contacts) left, of `OPENED` places. Once all are used, the
+    /// next one starts anew; nodes for which there is no place are searched as a query does.
+    #[must_use]
+    pub const fn opened_in_range(&self) -> u32 {
+        self.memory.range.opened()
     }
 
     /// Forgets the last tick: the next one is a whole query.
     pub fn forget(&mut self) {
+        self.memory.forget();
         self.last = None;
     }
 
@@ -196,28 +187,24 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         separation: f32,
     ) -> Result<Tracked, QueryError> {
         let travel = surface.travel();
-        let moved = self.moved(tool, travel);
+        let memory = &mut self.memory;
+        let moved = memory.moved(tool, travel);
+        memory.begin(moved);
         self.last = None;
         // Rounded to nearest from whole units.
-        let length = |units: u32| self.unit.length(units as i32) * (1.0 + 4.0 * f32::EPSILON);
+        let length = |units: u32| memory.clock.length(units.into()) * (1.0 + 4.0 * f32::EPSILON);
         let moved_by = moved.ok().map(length);
-        let (moved, mut fallback) = match moved {
-            Ok(moved) => (moved, self.front.borrow().is_empty().then_some(Fallback::Start)),
-            Err(fallback) => {
-                self.front.borrow().clear();
-                self.behind = 0;
-                self.known.forget();
-                (0, Some(fallback))
-            }
+        let mut fallback = match moved {
+            Ok(_) => memory.front.borrow().is_empty().then_some(Fallback::Start),
+            Err(lost) => Some(lost.into()),
         };
-        self.now = self.now.wrapping_add(moved);
-        self.known.add_motion(moved);
+        let moved = moved.unwrap_or(0);
         let first = self.triangle.or(options.first(None));
         let ties = Some(&mut self.ties);
         let search =
             Search::start(&self.tree, &mut self.stack, surface, tool, options, first, ties)?;
-        let front = self.front.borrow();
-        let mut tick = Tick::new(search, front, self.unit, self.now, options.budget, separation);
+        let front = memory.front.borrow();
+        let mut tick = Tick::new(search, front, memory.clock, options.budget, separation);
         let outcome = tick.run(moved)?;
         let best = tick.triangle();
         self.triangle = best.or(self.triangle);
@@ -233,22 +220,22 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
                 (self.whole(surface, tool, options, best, tests)?, true)
             }
         };
-        let memory = (&mut self.ties, Some(&mut self.known));
-        signed(&self.tree, &mut self.stack, surface, tool, options, &mut closest, memory)?;
-        self.behind = if is_complete { 0 } else { self.behind.saturating_add(moved) };
-        let is_closed = self.tree.is_closed();
-        self.last = travel.map(|travel| Last::new(tool, travel, &closest, is_closed));
-        let opened = self.front.borrow().used() as u32;
+        let memory = &mut self.memory;
+        let known = (&mut self.ties, Some(memory.depth.at(memory.clock)));
+        signed(&self.tree, &mut self.stack, surface, tool, options, &mut closest, known)?;
+        memory.keep(tool, travel, is_complete);
+        let (is_closed, now) = (self.tree.is_closed(), memory.clock.now());
+        self.last = travel.map(|_| Last::new(tool, &closest, is_closed, now));
+        let opened = memory.front.borrow().used() as u32;
         Ok(Tracked { closest, fallback, moved: moved_by, opened, pair: 0, searched: 1 })
     }
 
     /// The closest pair, and all contacts within `margin` (mm): those of [`Query::contacts`](crate::Query::contacts).
     ///
-    /// Where the surface is within the margin, a range search finds the others. The list remembers its front: the nodes that
-    /// it opened, and for how long their other children are beyond the margin. So give a tracker the same list at every
-    /// tick. The front starts anew for another surface, for a tool as far from the last as a 16th of the root sphere's radius,
-    /// after a search that ran out of budget, and once all of the list's places are used ([`Contacts::opened`]). Where the
-    /// budget ends, the list's bound can be less than a query's, which looks at near parts first.
+    /// Where the surface is within the margin, a range search finds the others. The tracker remembers the nodes that it
+    /// opened, and for how long their other children are beyond the margin. It starts anew for another surface, for a tool as
+    /// far from the last as a 16th of the root sphere's radius, after a search that ran out of budget, and once all places
+    /// are used ([`opened_in_range`](Self::opened_in_range)). Where the budget ends, the list's bound can be less than a query's, which looks at near parts first.
     ///
     /// Cost: that of [`closest`](Self::closest), a few instructions for each opened node, and what a query takes to compare
     /// the triangles within the margin.
@@ -282,8 +269,9 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         let pair =
             Pair { tree: &self.tree, vertices: surface, tool, closest, surface: 0, number: 0 };
         match surface.travel() {
-            Some(travel) => {
-                contacts.add_tracked(&pair, &mut self.stack, &options, travel, self.unit)?
+            Some(_) => {
+                let front = self.memory.range.now(self.memory.clock, options.part);
+                contacts.add_tracked(&pair, &mut self.stack, &options, front)?
             }
             None => contacts.add(&pair, &mut self.stack, &options)?,
         };
@@ -309,23 +297,20 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         closest.triangle_tests = closest.triangle_tests.saturating_add(tests.triangle_tests);
         Ok(closest)
     }
+}
 
-    /// Motion of tool and surface since the last tick, in units.
-    #[inline(always)]
-    fn moved(&self, tool: &impl Tool, travel: Option<Travel>) -> Result<u32, Fallback> {
-        let last = self.last.ok_or(Fallback::Start)?;
-        let surface = travel.and_then(|travel| travel.since(&last.travel));
-        let surface = surface.ok_or(Fallback::Surface)?;
-        let moved = surface.saturating_add(u64::from(last.axis.step(tool, self.unit)));
-        if moved.saturating_add(u64::from(self.behind)) > u64::from(FARTHEST) {
-            return Err(Fallback::Jump);
+impl From<Lost> for Fallback {
+    fn from(lost: Lost) -> Self {
+        match lost {
+            Lost::Start => Self::Start,
+            Lost::Surface => Self::Surface,
+            Lost::Jump => Self::Jump,
         }
-        Ok(moved as u32)
     }
 }
 
 impl Last {
-    fn new(tool: &impl Tool, travel: Travel, closest: &Proximity, is_closed: bool) -> Self {
+    fn new(tool: &impl Tool, closest: &Proximity, is_closed: bool, searched: Reading) -> Self {
         let clear = closest.lower + tool.radius() - closest.accuracy;
         let (clear, is_signed) = match closest.side {
             Side::Undefined(NoSide::NotAsked) => (clear, false),
@@ -334,7 +319,7 @@ impl Last {
             Side::Outside if is_closed => (clear, true),
             _ => (f32::NEG_INFINITY, true),
         };
-        Self { axis: Axis::of(tool), travel, clear, is_signed, stale: 0 }
+        Self { clear, is_signed, searched }
     }
 
     /// The distance within which nothing is certain to be, after a motion.

@@ -1,6 +1,6 @@
 //! Several trackers: the closest of all pairs. A pair that is certain to be farther is not looked at.
 
-use super::{Tracked, Tracker};
+use super::{Last, Tracked, Tracker};
 use crate::query::{Budget, NoSide, Options, Proximity, Side};
 use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Tool};
@@ -10,7 +10,7 @@ const AHEAD: Budget = Budget { node_tests: 64, triangle_tests: 16 };
 
 /// How much farther than the closest pair others are shown to be, in units: an eighth to a sixteenth of the root sphere's
 /// radius.
-const LEAD: i32 = 1 << 21;
+const LEAD: u64 = 1 << 21;
 
 /// A bound on a pair that is not searched.
 struct Bound {
@@ -115,16 +115,17 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
         closest: f32,
         options: &Options,
     ) -> Result<Budget, QueryError> {
-        let (Some(before), Ok(moved)) = (self.last, self.moved(tool, surface.travel())) else {
+        let moved = self.memory.moved(tool, surface.travel());
+        let (Some(before), Ok(moved)) = (self.last, moved) else {
             return Ok(Budget { node_tests: 0, triangle_tests: 0 });
         };
-        let clear = before.clear_after(self.unit.length(moved as i32));
+        let clear = before.clear_after(self.memory.clock.length(moved.into()));
         // A tool that has not touched a closed surface since is on the same side.
         let keeps_side = before.is_signed && clear > 0.0 && self.tree.is_closed();
         let (options, separation) = if options.is_signed && !keeps_side {
             (*options, f32::INFINITY)
         } else {
-            (options.unsigned(), closest + self.unit.length(LEAD))
+            (options.unsigned(), closest + self.memory.clock.length(LEAD))
         };
         let Budget { node_tests, triangle_tests } = options.budget;
         let options = options.budget(Budget {
@@ -135,8 +136,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
         if let Some(last) = &mut self.last {
             last.is_signed |= keeps_side;
             if last.clear < clear {
-                (last.clear, last.is_signed) = (clear, before.is_signed);
-                last.stale = before.stale.saturating_add(moved);
+                *last = Last { clear, ..before };
             }
         }
         Ok(Budget { node_tests: found.node_tests, triangle_tests: found.triangle_tests })
@@ -167,11 +167,13 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
         const NONE: Bound = Bound { apart: f32::NEG_INFINITY, stale: 0.0 };
         let last = self.last.filter(|last| last.is_signed || !options.is_signed);
         let Some(last) = last else { return NONE };
-        let Ok(moved) = self.moved(tool, surface.travel()) else { return NONE };
-        let clear = last.clear_after(self.unit.length(moved as i32));
+        let Ok(moved) = self.memory.moved(tool, surface.travel()) else { return NONE };
+        let (clock, moved) = (&self.memory.clock, u64::from(moved));
+        let clear = last.clear_after(clock.length(moved));
         let apart = clear - surface.position_error() - tool.radius();
         let apart = if apart.is_nan() { f32::NEG_INFINITY } else { apart };
-        Bound { apart, stale: self.unit.length(last.stale.saturating_add(moved) as i32) }
+        let stale = clock.since(last.searched).saturating_add(moved);
+        Bound { apart, stale: clock.length(stale) }
     }
 }
 

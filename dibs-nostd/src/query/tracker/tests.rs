@@ -10,8 +10,9 @@ use fastrand::Rng;
 use glam::Vec3;
 
 use super::Tracker;
-use super::front::{NOWHERE, UNUSED};
 use crate::query::distances::{distance, least};
+use crate::query::memory::clock::Deadline;
+use crate::query::memory::front::{NOWHERE, UNUSED};
 use crate::tree::format::Link;
 use crate::{
     Budget, Capsule, Coverage, Odometer, Options, Sphere, Tree, VertexTable, measure_stretch,
@@ -22,7 +23,7 @@ struct Bound {
     /// The opened node's place, and the child.
     place: (u16, u32),
     /// The reading at which it runs out; tells it from a bound found later.
-    key: u32,
+    deadline: Deadline,
     bound: f64,
     /// The distance of the nearest vertex below it.
     distance: f64,
@@ -33,8 +34,8 @@ fn bounds<const STACK: usize, const OPENED: usize>(
     tracker: &mut Tracker<'_, u16, STACK, OPENED>,
     far: &impl Fn(u32) -> f64,
 ) -> Vec<Bound> {
-    let (tree, unit, now) = (tracker.tree, tracker.unit, tracker.now);
-    let mut front = tracker.front.borrow();
+    let (tree, clock) = (tracker.tree, tracker.memory.clock);
+    let mut front = tracker.memory.front.borrow();
     let mut bounds = Vec::new();
     for place in 0..front.used() as u16 {
         let node = *front.node(place).expect("a place");
@@ -52,11 +53,11 @@ fn bounds<const STACK: usize, const OPENED: usize>(
             } else {
                 tree.node(first + slot).expect("a node").2
             };
-            let key = node.keys[slot as usize];
-            let bound = f64::from(unit.length(key.wrapping_sub(now) as i32));
+            let deadline = node.deadlines[slot as usize];
+            let bound = f64::from(clock.left(deadline));
             let distance = least(&tree, link, far);
             assert!(bound <= distance, "{node:?} {slot}: {bound} {distance}");
-            bounds.push(Bound { place: (place, slot), key, bound, distance });
+            bounds.push(Bound { place: (place, slot), deadline, bound, distance });
         }
     }
     bounds
@@ -215,9 +216,9 @@ fn approach(built: &BuiltTree, moves_tool: bool) -> f64 {
         assert_eq!(found.fallback.is_some(), tick == 0, "{tick}: {found:?}");
         let bounds = bounds(&mut tracker, &|row| distance(&tool, after[row as usize]));
         if tick == 0 {
-            first = bounds.iter().map(|bound| (bound.place, bound.key)).collect();
+            first = bounds.iter().map(|bound| (bound.place, bound.deadline)).collect();
         } else {
-            let old = bounds.iter().filter(|bound| first.contains(&(bound.place, bound.key)));
+            let old = bounds.iter().filter(|bound| first.contains(&(bound.place, bound.deadline)));
             let least = old.map(|bound| bound.distance - bound.bound).fold(f64::INFINITY, f64::min);
             spare = spare.min(least / f64::from(way));
         }

@@ -8,8 +8,10 @@ use dibs_build::{Builder, generate};
 use fastrand::Rng;
 use glam::Vec3;
 
-use super::{RangeFront, Search};
+use super::Search;
 use crate::query::distances::{distance, least};
+use crate::query::memory::Memory;
+use crate::query::memory::clock::MotionClock;
 use crate::query::search::Waiting;
 use crate::surface::motion::Unit;
 use crate::tree::format::Link;
@@ -23,15 +25,15 @@ const RIDGE: f32 = 0.1;
 /// is less than the limit, but for rounding. All triangles are below one of them, or in a leaf within the range, and no
 /// triangle twice.
 fn bounds<const M: usize>(
-    front: &RangeFront<M>,
+    memory: &mut Memory<M>,
     tree: &Tree<'_, u16>,
     far: &impl Fn(u32) -> f64,
 ) -> Vec<f64> {
-    let unit = Unit::of(tree);
+    let clock = memory.clock;
     let (mut bounds, mut seen) = (Vec::new(), std::vec![0; tree.triangle_count() as usize]);
-    for node in &front.nodes[..front.state.count] {
+    for node in memory.range.clone().now(clock, None).rest(0) {
         let Link::Children { first, count } = Link::decode(node.link) else { unreachable!() };
-        let bound = f64::from(unit.length(node.key.wrapping_sub(front.state.now) as i32));
+        let bound = f64::from(clock.left(node.deadline));
         for slot in (0..count).filter(|slot| node.opened >> slot & 1 == 0) {
             let link = tree.node(first + slot).expect("a node").2;
             count_triangles(tree, link, &mut seen);
@@ -71,9 +73,9 @@ fn no_bound_of_a_range_exceeds_the_distance() {
     let mut rng = Rng::with_seed(16);
     let mut vector = |size: f32| Vec3::from([(); 3].map(|()| (rng.f32() - 0.5) * size));
     let mut stack = [Waiting { lower: 0.0, link: 0 }; 128];
-    let mut front = RangeFront::<256>::new();
-    // The odometer wraps soon.
-    front.state.now = u32::MAX - (1 << 22);
+    let mut memory = Memory::<256>::new(Unit::of(&tree));
+    // Deadlines wrap soon.
+    memory.clock = MotionClock::wrapping_after(Unit::of(&tree), 1 << 22);
     let (mut tip, mut span) = (Vec3::new(50.0, 0.0, 20.0), Vec3::new(30.0, 20.0, 40.0));
     let (mut checked, mut kept) = (0, 0);
     for (number, pair) in positions.windows(2).cycle().take(60).enumerate() {
@@ -89,16 +91,19 @@ fn no_bound_of_a_range_exceeds_the_distance() {
             let share = tick as f32 / 8.0;
             let surface = step.at(share);
             let travel = surface.travel().expect("measured");
+            let moved = memory.moved(&tool, Some(travel));
+            memory.begin(moved);
+            memory.keep(&tool, Some(travel), true);
             let mut search = |options: &Options| {
                 let search = Search::start(&tree, &mut stack, &surface, &tool, options, None, None);
-                let mut moved = front.moved_to(&tool, travel, Unit::of(&tree), None);
-                kept += usize::from(moved.state.count > 0);
+                let mut moved = memory.range.now(memory.clock, None);
+                kept += usize::from(!moved.is_empty());
                 let visit = |_, _: &_| LIMIT;
                 let search = search.expect("valid");
                 let (beyond, _) = search.each_low_from(&mut moved, LIMIT, (RIDGE, None), visit)?;
                 let is_whole = beyond == f32::INFINITY;
                 if is_whole {
-                    moved.keep(&tool, travel);
+                    moved.keep();
                 }
                 Ok::<_, QueryError>(is_whole)
             };
@@ -113,9 +118,9 @@ fn no_bound_of_a_range_exceeds_the_distance() {
                 let (a, b) = (before[row as usize].as_dvec3(), after[row as usize].as_dvec3());
                 (a + (b - a) * f64::from(share)).as_vec3()
             };
-            checked += bounds(&front, &tree, &|row| distance(&tool, at(row))).len();
+            checked += bounds(&mut memory, &tree, &|row| distance(&tool, at(row))).len();
         }
     }
-    std::println!("{checked} bounds, {kept} fronts kept, {:?}", front.state);
-    assert!(checked > 20_000 && kept > 300 && front.state.now < 1 << 31);
+    std::println!("{checked} bounds, {kept} fronts kept, {:?}", memory.clock);
+    assert!(checked > 20_000 && kept > 300 && memory.clock.has_wrapped());
 }

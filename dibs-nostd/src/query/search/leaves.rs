@@ -1,110 +1,35 @@
-//! The leaves around a point of the axis.
+//! The search for the leaves around a point of the axis, and in them.
 //!
-//! A search that goes farther than the closest triangle gathers them, each with a bound. Until tool and surface have moved
-//! too far, the closest triangle is in one of them, and the next ticks look only at those whose bounds have run out.
+//! A search that goes farther than the closest triangle gathers them, each with a bound. The next ticks look only at those
+//! whose bounds have run out.
 //!
 //! Rounding. A bound is stored less the slack of its own search, and compared with the cutoff, which has the slack of this
 //! one.
 
 use super::{Search, THIRD, Waiting};
 use crate::math::sqrt::sqrt;
+use crate::query::memory::leaves::{Leaf, Leaves};
 use crate::query::plane::{Plane, least};
 use crate::tree::format::Link;
 use crate::unavailable::QueryError;
 use crate::{Index, Proximity, Tool, VertexTable};
 
-/// Most of them.
-const MOST: usize = 48;
-
 /// A search goes as much farther as tool and surface move in so many ticks, but not more than twice as far, and less where
 /// there are too many leaves.
 const TICKS: f32 = 60.0;
 
-/// The leaves around a point.
-#[derive(Clone, Debug)]
-pub(in crate::query) struct Around {
-    leaves: [Leaf; MOST],
-    /// More than there are places if some were lost.
-    count: usize,
-    /// Motion of tool and surface, and of the point along its axis, since they were gathered.
-    moved: f32,
-    /// All other leaves were at least as far as this; 0 if that is not known.
-    beyond: f32,
-    /// Where the point is on its axis: 0 at the start, 1 at the end.
-    parameter: f32,
-    /// The motion of the last tick.
-    step: f32,
-}
-
-/// A leaf.
-#[derive(Clone, Copy, Debug)]
-struct Leaf {
-    link: u32,
-    /// It was at least as far as this when the leaves were gathered.
-    bound: f32,
-}
-
-impl Around {
-    pub const fn new() -> Self {
-        let leaves = [Leaf { link: 0, bound: 0.0 }; MOST];
-        Self { leaves, count: 0, moved: 0.0, beyond: 0.0, parameter: 0.0, step: 0.0 }
-    }
-
-    pub fn forget(&mut self) {
-        (self.count, self.moved, self.beyond) = (0, 0.0, 0.0);
-    }
-
-    /// Tool and surface have moved.
-    pub fn add_motion(&mut self, moved: f32) {
-        self.moved = sum(self.moved, moved);
-        self.step = moved;
-    }
-
-    /// The way from the point to another one of its axis, which is as long as `length`.
-    pub fn way_to(&self, parameter: f32, length: f32) -> f32 {
-        (parameter - self.parameter).abs() * length * (1.0 + 4.0 * f32::EPSILON)
-    }
-
-    /// The point is another one of its axis.
-    pub fn move_to(&mut self, parameter: f32, length: f32) {
-        self.moved = sum(self.moved, self.way_to(parameter, length));
-        self.parameter = parameter;
-    }
-
-    fn push(&mut self, leaf: Leaf) {
-        if let Some(place) = self.leaves.get_mut(self.count) {
-            *place = leaf;
-        }
-        self.count = self.count.saturating_add(1);
-    }
-
-    /// Keeps the leaves that may be within `distance`.
-    fn keep_within(&mut self, distance: f32) {
-        let mut kept = 0;
-        for at in 0..self.count {
-            if let Some(&leaf) = self.leaves.get(at)
-                && !(leaf.bound > distance)
-                && let Some(place) = self.leaves.get_mut(kept)
-            {
-                *place = leaf;
-                kept += 1;
-            }
-        }
-        self.count = kept;
-    }
-}
-
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// Whether the leaves hold the closest triangle. The search's point is as far as `way` from theirs.
-    pub fn is_among(&self, around: &Around, way: f32) -> bool {
-        self.cutoff + self.coordinate_slack + sum(around.moved, way) <= around.beyond
+    pub fn is_among(&self, leaves: &Leaves, way: f32) -> bool {
+        leaves.has_all(self.cutoff + self.coordinate_slack, leaves.moved(way))
     }
 
     /// Searches these leaves alone.
-    pub fn among(mut self, around: &mut Around, way: f32) -> Result<Proximity, QueryError> {
-        let moved = sum(around.moved, way);
+    pub fn among(mut self, leaves: &mut Leaves, way: f32) -> Result<Proximity, QueryError> {
+        let moved = leaves.moved(way);
         let slack = self.slack + self.coordinate_slack;
-        for leaf in around.leaves.iter_mut().take(around.count) {
+        let (leaves, moved_before) = leaves.each();
+        for leaf in leaves {
             if leaf.bound - moved > self.cutoff + self.coordinate_slack {
                 continue;
             }
@@ -112,7 +37,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 return Err(QueryError::Corrupt { row: leaf.link });
             };
             let Some(bound) = self.leaf_bound(first, count)? else { return self.finish(0.0) };
-            let bound = (bound - slack - way + around.moved) * (1.0 - f32::EPSILON);
+            let bound = (bound - slack - way + moved_before) * (1.0 - f32::EPSILON);
             if bound > leaf.bound {
                 leaf.bound = bound;
             }
@@ -121,10 +46,10 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     }
 
     /// Searches the tree, and gathers the leaves around the point.
-    pub fn gather(mut self, around: &mut Around) -> Result<Proximity, QueryError> {
-        around.forget();
+    pub fn gather(mut self, leaves: &mut Leaves) -> Result<Proximity, QueryError> {
+        leaves.forget();
         let slack = self.slack + self.coordinate_slack;
-        let mut wider = TICKS * around.step;
+        let mut wider = TICKS * leaves.step();
         if wider > self.cutoff {
             wider = self.cutoff;
         }
@@ -146,18 +71,16 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             };
             let Some(own) = self.leaf_bound(first, count)? else { return self.finish(0.0) };
             let bound = (if own > lower { own } else { lower }) - slack;
-            if around.count == MOST {
+            if leaves.is_full() {
                 wider *= 0.5;
-                around.keep_within(self.cutoff + wider - slack);
+                leaves.keep_within(self.cutoff + wider - slack);
             }
             if !(bound > self.cutoff + wider - slack) {
-                around.push(Leaf { link, bound });
+                leaves.push(Leaf { link, bound });
             }
         }
         let found = self.finish(f32::INFINITY)?;
-        if around.count <= MOST {
-            around.beyond = found.axis_distance + wider - 2.0 * slack;
-        }
+        leaves.close(found.axis_distance + wider - 2.0 * slack);
         Ok(found)
     }
 
@@ -263,9 +186,4 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         self.add_tie(triangle, pair.distance_squared);
         Ok(Some(distance))
     }
-}
-
-/// The sum of two lengths, rounded up.
-fn sum(a: f32, b: f32) -> f32 {
-    (a + b) * (1.0 + f32::EPSILON)
 }

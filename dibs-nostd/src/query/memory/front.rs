@@ -2,14 +2,8 @@
 
 use core::ops::Range;
 
-use crate::surface::motion::FAR;
+use super::clock::{Deadline, MotionClock};
 use crate::tree::format::{Link, MAX_CHILDREN};
-
-/// Whether reading `a` of the odometer comes before `b`: readings wrap, and are less than half of a turn apart.
-#[inline(always)]
-pub(in crate::query) fn is_before(a: u32, b: u32) -> bool {
-    (a.wrapping_sub(b) as i32) < 0
-}
 
 /// A node whose children (or, of a leaf, whose triangles) have separate bounds.
 #[derive(Clone, Copy, Debug)]
@@ -22,8 +16,8 @@ pub(in crate::query) struct Opened {
     pub slot: u8,
     /// The children without a bound, one bit each: they are opened, on the search's stack, or the closest triangle.
     pub apart: u8,
-    /// The odometer's reading at which each child's bound has come down to zero. Of an opened child, its place.
-    pub keys: [u32; MAX_CHILDREN as usize],
+    /// Of each child's bound; not read of one without.
+    pub deadlines: [Deadline; MAX_CHILDREN as usize],
 }
 
 /// A link that no node has: eight children in rows beyond every tree.
@@ -32,15 +26,20 @@ pub(in crate::query) const UNUSED: u32 = u32::MAX >> 1;
 pub(in crate::query) const NOWHERE: u16 = u16::MAX;
 
 impl Opened {
-    const FREE: Self =
-        Self { link: UNUSED, parent: NOWHERE, slot: 0, apart: 0, keys: [0; MAX_CHILDREN as usize] };
+    const FREE: Self = Self {
+        link: UNUSED,
+        parent: NOWHERE,
+        slot: 0,
+        apart: 0,
+        deadlines: [Deadline::UNUSED; MAX_CHILDREN as usize],
+    };
 
     /// The children whose bounds have run out, one bit each.
     #[inline(always)]
-    pub fn due(&self, count: u32, threshold: u32) -> u32 {
+    pub fn due(&self, count: u32, threshold: Deadline) -> u32 {
         let mut due = 0;
-        for &key in self.keys.iter().rev() {
-            due = due << 1 | u32::from(!is_before(threshold, key));
+        for &deadline in self.deadlines.iter().rev() {
+            due = due << 1 | u32::from(!threshold.is_before(deadline));
         }
         due & !u32::from(self.apart) & !(u32::MAX << count)
     }
@@ -66,12 +65,11 @@ impl Place {
     }
 }
 
-/// The opened nodes, one to a place. A tick reads one key for each opened node, not for each child.
+/// The opened nodes, one to a place. A tick reads one deadline for each opened node, not for each child.
 #[derive(Clone, Debug)]
 pub(in crate::query) struct Front<const OPENED: usize> {
-    /// The reading at which the first of each node's bounds runs out. (A separate table, since each tick reads all of
-    /// it.)
-    due: [u32; OPENED],
+    /// The first of each node's deadlines. (A separate table, since each tick reads all of it.)
+    due: [Deadline; OPENED],
     nodes: [Opened; OPENED],
     /// Places from here on are unused since the last clear.
     end: usize,
@@ -88,7 +86,7 @@ impl<const OPENED: usize> Front<OPENED> {
     pub const fn new() -> Self {
         const { assert!(OPENED > 0 && OPENED < NOWHERE as usize) };
         Self {
-            due: [0; OPENED],
+            due: [Deadline::UNUSED; OPENED],
             nodes: [Opened::FREE; OPENED],
             end: 0,
             free: NOWHERE,
@@ -101,7 +99,7 @@ impl<const OPENED: usize> Front<OPENED> {
 /// The front without its size, so that a search is compiled once for all sizes.
 #[derive(Debug)]
 pub(in crate::query) struct FrontMut<'f> {
-    due: &'f mut [u32],
+    due: &'f mut [Deadline],
     nodes: &'f mut [Opened],
     end: &'f mut usize,
     free: &'f mut u16,
@@ -162,36 +160,35 @@ impl FrontMut<'_> {
 
     /// The first place in a range whose node is due.
     #[inline(always)]
-    pub fn next_due(&self, places: Range<usize>, threshold: u32) -> Option<usize> {
+    pub fn next_due(&self, places: Range<usize>, threshold: Deadline) -> Option<usize> {
         let from = places.start;
         let due = self.due.get(places)?;
         // Eight at a time: as a rule none of them is due.
         let (eights, _) = due.as_chunks::<8>();
-        let waits = |eight: &&[u32; 8]| {
-            let before = eight.map(|due| threshold.wrapping_sub(due));
-            before.iter().fold(u32::MAX, |all, before| all & before) >> 31 == 1
+        let waits = |eight: &&[Deadline; 8]| {
+            let before = eight.map(|due| threshold.units_after(due));
+            before.iter().fold(-1, |all, before| all & before) < 0
         };
         let passed = 8 * eights.iter().take_while(waits).count();
-        let at = due.get(passed..)?.iter().position(|&due| !is_before(threshold, due))?;
+        let at = due.get(passed..)?.iter().position(|&due| !threshold.is_before(due))?;
         Some(from + passed + at)
     }
 
     /// Number of nodes due.
-    pub fn count_due(&self, threshold: u32) -> usize {
+    pub fn count_due(&self, threshold: Deadline) -> usize {
         let due = self.due.get(..*self.end).unwrap_or_default();
-        due.iter().filter(|&&due| !is_before(threshold, due)).count()
+        due.iter().filter(|&&due| !threshold.is_before(due)).count()
     }
 
-    /// The least remainder of any bound, in units.
-    pub fn least(&self, now: u32) -> i32 {
+    /// The first deadline of all.
+    pub fn first(&self, clock: &MotionClock) -> Deadline {
         let due = self.due.get(..*self.end).unwrap_or_default();
-        let left = due.iter().map(|due| due.wrapping_sub(now) as i32);
-        left.fold(FAR, |least, left| if left < least { left } else { least })
+        due.iter().fold(clock.never(), |first, &due| if due.is_before(first) { due } else { first })
     }
 
     /// Opens a node in a free place, with one bound for all below; `None` if there is no place.
     #[inline(always)]
-    pub fn open(&mut self, link: u32, parent: Place, key: u32) -> Option<u16> {
+    pub fn open(&mut self, link: u32, parent: Place, deadline: Deadline) -> Option<u16> {
         let at = if *self.free == NOWHERE { *self.end } else { usize::from(*self.free) };
         let node = self.nodes.get_mut(at)?;
         if at == *self.end {
@@ -199,21 +196,21 @@ impl FrontMut<'_> {
         } else {
             *self.free = node.parent;
         }
-        *self.due.get_mut(at)? = key;
-        let keys = [key; MAX_CHILDREN as usize];
-        *node = Opened { link, parent: parent.node, slot: parent.slot, apart: 0, keys };
+        *self.due.get_mut(at)? = deadline;
+        let deadlines = [deadline; MAX_CHILDREN as usize];
+        *node = Opened { link, parent: parent.node, slot: parent.slot, apart: 0, deadlines };
         Some(at as u16)
     }
 
     /// Frees a place, and gives its parent a bound for it.
-    pub fn close(&mut self, at: u16, key: u32, now: u32) -> Option<()> {
+    pub fn close(&mut self, at: u16, deadline: Deadline, clock: &MotionClock) -> Option<()> {
         let free = *self.free;
         let node = self.node(at)?;
         let place = Place { node: node.parent, slot: node.slot };
         *node = Opened { parent: free, ..Opened::FREE };
         *self.free = at;
-        *self.due.get_mut(usize::from(at))? = now.wrapping_add(FAR as u32);
-        *self.node(place.node)?.keys.get_mut(usize::from(place.slot))? = key;
+        *self.due.get_mut(usize::from(at))? = clock.never();
+        *self.node(place.node)?.deadlines.get_mut(usize::from(place.slot))? = deadline;
         self.put_back(place)
     }
 
@@ -223,31 +220,31 @@ impl FrontMut<'_> {
         let due = self.due.get_mut(usize::from(node))?;
         let node = self.nodes.get_mut(usize::from(node))?;
         node.apart &= !(1 << slot);
-        let &key = node.keys.get(usize::from(slot))?;
-        if is_before(key, *due) {
-            *due = key;
+        let &deadline = node.deadlines.get(usize::from(slot))?;
+        if deadline.is_before(*due) {
+            *due = deadline;
         }
         Some(())
     }
 
-    /// Sets the reading at which the first of a node's bounds runs out.
+    /// Notes the first of a node's deadlines.
     #[inline(always)]
-    pub fn schedule(&mut self, at: usize, count: u32, now: u32) -> Option<()> {
+    pub fn schedule(&mut self, at: usize, count: u32, clock: &MotionClock) -> Option<()> {
         let node = self.nodes.get(at)?;
         let mut apart = node.apart;
-        let mut least = now.wrapping_add(FAR as u32);
-        for &key in node.keys.get(..count as usize)? {
-            if apart & 1 == 0 && is_before(key, least) {
-                least = key;
+        let mut first = clock.never();
+        for &deadline in node.deadlines.get(..count as usize)? {
+            if apart & 1 == 0 && deadline.is_before(first) {
+                first = deadline;
             }
             apart >>= 1;
         }
-        *self.due.get_mut(at)? = least;
+        *self.due.get_mut(at)? = first;
         Some(())
     }
 
     /// The next place, in turn, of a node below the root whose children all have bounds.
-    pub fn next_closable(&mut self) -> Option<(u16, u32)> {
+    pub fn next_closable(&mut self) -> Option<(u16, Deadline)> {
         *self.hand = if *self.hand + 1 < *self.end { *self.hand + 1 } else { 0 };
         let node = self.nodes.get(*self.hand)?;
         let &due = self.due.get(*self.hand)?;

@@ -8,7 +8,7 @@ use crate::surface::motion::Unit;
 
 /// An axis as it was.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Axis {
+pub(in crate::query) struct Axis {
     start: Vec3,
     span: Vec3,
     length: f32,

@@ -1,0 +1,117 @@
+//! The leaves around a point of the axis, each with a bound.
+//!
+//! Until tool and surface have moved too far, the closest triangle to the point is in one of them.
+
+/// Most leaves.
+pub(in crate::query) const MOST: usize = 48;
+
+/// The leaves around a point.
+#[derive(Clone, Debug)]
+pub(in crate::query) struct Leaves {
+    leaves: [Leaf; MOST],
+    /// More than there are places if some were lost.
+    count: usize,
+    /// Motion (mm) of tool and surface, and of the point along its axis, since they were gathered.
+    moved: f32,
+    /// All other leaves were at least as far (mm) as this; 0 if that is not known.
+    beyond: f32,
+    /// Where the point is on its axis: 0 at the start, 1 at the end.
+    parameter: f32,
+    /// The motion (mm) of the last tick.
+    step: f32,
+}
+
+/// A leaf.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::query) struct Leaf {
+    pub link: u32,
+    /// It was at least as far (mm) as this when the leaves were gathered.
+    pub bound: f32,
+}
+
+impl Leaves {
+    pub const fn new() -> Self {
+        let leaves = [Leaf { link: 0, bound: 0.0 }; MOST];
+        Self { leaves, count: 0, moved: 0.0, beyond: 0.0, parameter: 0.0, step: 0.0 }
+    }
+
+    pub fn forget(&mut self) {
+        (self.count, self.moved, self.beyond) = (0, 0.0, 0.0);
+    }
+
+    /// Tool and surface have moved.
+    pub fn add_motion(&mut self, moved: f32) {
+        self.moved = sum(self.moved, moved);
+        self.step = moved;
+    }
+
+    /// The way from the point to another one of its axis, which is as long as `length`.
+    pub fn way_to(&self, parameter: f32, length: f32) -> f32 {
+        (parameter - self.parameter).abs() * length * (1.0 + 4.0 * f32::EPSILON)
+    }
+
+    /// The point is another one of its axis.
+    pub fn move_to(&mut self, parameter: f32, length: f32) {
+        self.moved = sum(self.moved, self.way_to(parameter, length));
+        self.parameter = parameter;
+    }
+
+    /// The motion of the last tick.
+    pub const fn step(&self) -> f32 {
+        self.step
+    }
+
+    /// The motion since the leaves were gathered, to a point farther by `way`.
+    pub fn moved(&self, way: f32) -> f32 {
+        sum(self.moved, way)
+    }
+
+    /// The leaves, and the motion since they were gathered.
+    pub fn each(&mut self) -> (&mut [Leaf], f32) {
+        let count = if self.count < MOST { self.count } else { MOST };
+        (self.leaves.get_mut(..count).unwrap_or_default(), self.moved)
+    }
+
+    /// Whether all leaves within `distance` of a point that has moved by so much are among these.
+    pub fn has_all(&self, distance: f32, moved: f32) -> bool {
+        distance + moved <= self.beyond
+    }
+
+    pub const fn is_full(&self) -> bool {
+        self.count == MOST
+    }
+
+    /// All other leaves are at least as far as this, unless some were lost.
+    pub fn close(&mut self, beyond: f32) {
+        if self.count <= MOST {
+            self.beyond = beyond;
+        }
+    }
+
+    pub fn push(&mut self, leaf: Leaf) {
+        if let Some(place) = self.leaves.get_mut(self.count) {
+            *place = leaf;
+        }
+        self.count = self.count.saturating_add(1);
+    }
+
+    /// Keeps the leaves that may be within `distance`.
+    pub fn keep_within(&mut self, distance: f32) {
+        let mut kept = 0;
+        for at in 0..self.count {
+            if let Some(&leaf) = self.leaves.get(at)
+                && !(leaf.bound > distance)
+                && let Some(place) = self.leaves.get_mut(kept)
+            {
+                *place = leaf;
+                kept += 1;
+            }
+        }
+        self.count = kept;
+    }
+}
+
+/// The sum of two lengths, rounded up.
+fn sum(a: f32, b: f32) -> f32 {
+    (a + b) * (1.0 + f32::EPSILON)
+}

@@ -1,0 +1,107 @@
+//! What a tracker remembers from tick to tick: bounds that motion uses up.
+//!
+//! | part | bounds on |
+//! |---|---|
+//! | [`front`] | the subtrees and triangles that the closest pair's search passed over |
+//! | [`range`] | the children of opened nodes that are farther than a range search went |
+//! | [`leaves`] | the leaves around the deepest point of an axis |
+//! | [`depth`] | the depth of an axis' parts |
+//!
+//! One clock counts the motion for all.
+
+mod axis;
+pub mod clock;
+pub mod depth;
+pub mod front;
+pub mod leaves;
+pub mod range;
+
+use crate::surface::motion::Unit;
+use crate::{Tool, Travel};
+use axis::Axis;
+use clock::{MotionClock, Reading};
+use depth::KnownDepth;
+use front::Front;
+use range::RangeFront;
+
+/// Most units that the clock may count between two tests of a bound: half of the range that deadlines can tell apart.
+const FARTHEST: u64 = 1 << 29;
+
+/// A tracker's memory.
+#[derive(Clone, Debug)]
+pub(super) struct Memory<const OPENED: usize> {
+    pub clock: MotionClock,
+    /// Tool and surface at the last tick; none if its motion was not measured, or it ended in an error.
+    last: Option<(Axis, Travel)>,
+    /// When all due bounds of the front had last been tested.
+    complete: Reading,
+    pub front: Front<OPENED>,
+    pub range: RangeFront<OPENED>,
+    pub depth: KnownDepth,
+}
+
+/// Why a motion is of no use to the bounds.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Lost {
+    /// There was no last tick.
+    Start,
+    /// The surface's motion was not measured all the way.
+    Surface,
+    /// It is too large.
+    Jump,
+}
+
+impl<const OPENED: usize> Memory<OPENED> {
+    #[inline(always)]
+    pub const fn new(unit: Unit) -> Self {
+        let clock = MotionClock::new(unit);
+        Self {
+            clock,
+            last: None,
+            complete: clock.now(),
+            front: Front::new(),
+            range: RangeFront::new(),
+            depth: KnownDepth::new(&clock),
+        }
+    }
+
+    /// The motion of tool and surface since the last tick, in units.
+    #[inline(always)]
+    pub fn moved(&self, tool: &impl Tool, travel: Option<Travel>) -> Result<u32, Lost> {
+        let (axis, before) = self.last.ok_or(Lost::Start)?;
+        let surface = travel.and_then(|travel| travel.since(&before)).ok_or(Lost::Surface)?;
+        let moved = surface.saturating_add(u64::from(axis.step(tool, self.clock.unit())));
+        if moved.saturating_add(self.clock.since(self.complete)) > FARTHEST {
+            return Err(Lost::Jump);
+        }
+        Ok(moved as u32)
+    }
+
+    /// Begins a tick after a motion. Until it is [kept](Self::keep), the next one has no last tick.
+    #[inline(always)]
+    pub fn begin(&mut self, moved: Result<u32, Lost>) {
+        self.last = None;
+        match moved {
+            Ok(units) => self.clock.advance(units),
+            Err(_) => {
+                self.front.borrow().clear();
+                self.range.forget();
+                self.depth.forget();
+                self.complete = self.clock.now();
+            }
+        }
+    }
+
+    /// Ends a tick, in which all due bounds of the front were tested if it is complete.
+    pub fn keep(&mut self, tool: &impl Tool, travel: Option<Travel>, is_complete: bool) {
+        self.last = travel.map(|travel| (Axis::of(tool), travel));
+        if is_complete {
+            self.complete = self.clock.now();
+        }
+    }
+
+    /// Forgets the last tick.
+    pub fn forget(&mut self) {
+        self.last = None;
+    }
+}

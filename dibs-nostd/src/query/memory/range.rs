@@ -1,0 +1,119 @@
+//! The front of a range search: the nodes that were opened.
+//!
+//! Of their children some are opened themselves, some are leaves within the range, and the others are farther: those of a
+//! node have one deadline. Leaves within the range are looked at in every tick, all others once the deadline has come.
+//! Nodes that were opened stay so until no place is left; then the front starts anew.
+
+use super::clock::{Deadline, MotionClock, Reading};
+use crate::tree::format::{Link, MAX_CHILDREN};
+
+/// After a motion of more units, a 16th to a 32nd of the root sphere's radius, the front starts anew.
+const JUMP: u64 = 1 << 20;
+
+/// A node whose children are apart.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::query) struct Opened {
+    /// Its children, as a link.
+    pub link: u32,
+    /// Of the least bound of those that are farther.
+    pub deadline: Deadline,
+    /// Children that are opened, a bit each.
+    pub opened: u8,
+    /// Leaves that neither their sphere nor their plane has rejected, a bit each.
+    pub near: u8,
+}
+
+/// The opened nodes, at most `M`.
+#[derive(Clone, Debug)]
+pub(in crate::query) struct RangeFront<const M: usize> {
+    nodes: [Opened; M],
+    state: State,
+}
+
+#[derive(Clone, Debug)]
+struct State {
+    count: usize,
+    /// The end of the last search; none if it did not come to its end.
+    searched: Option<Reading>,
+    /// The label whose leaves are near.
+    part: Option<u8>,
+}
+
+/// The front without its size, in a tick.
+pub(in crate::query) struct RangeFrontMut<'f> {
+    nodes: &'f mut [Opened],
+    state: &'f mut State,
+    pub clock: MotionClock,
+}
+
+impl<const M: usize> RangeFront<M> {
+    pub const fn new() -> Self {
+        let none = Opened { link: 0, deadline: Deadline::UNUSED, opened: 0, near: 0 };
+        Self { nodes: [none; M], state: State { count: 0, searched: None, part: None } }
+    }
+
+    /// Number of opened nodes.
+    pub const fn opened(&self) -> u32 {
+        self.state.count as u32
+    }
+
+    pub fn forget(&mut self) {
+        self.state.searched = None;
+    }
+
+    /// The front at a reading, for a search of the whole surface or of a label's part.
+    pub fn now(&mut self, clock: MotionClock, part: Option<u8>) -> RangeFrontMut<'_> {
+        let Self { nodes, state } = self;
+        let searched = state.searched.filter(|_| state.part == part);
+        if !searched.is_some_and(|at| clock.since(at) <= JUMP && state.count < M) {
+            state.count = 0;
+        }
+        (state.searched, state.part) = (None, part);
+        RangeFrontMut { nodes, state, clock }
+    }
+}
+
+impl RangeFrontMut<'_> {
+    /// The search has come to its end.
+    pub fn keep(&mut self) {
+        self.state.searched = Some(self.clock.now());
+    }
+
+    pub const fn is_empty(&self) -> bool {
+        self.state.count == 0
+    }
+
+    /// Opens a node; `None` if there is no place.
+    pub fn open(&mut self, link: u32, deadline: Deadline) -> Option<()> {
+        let opened = Opened { link, deadline, opened: 0, near: 0 };
+        *self.nodes.get_mut(self.state.count)? = opened;
+        self.state.count += 1;
+        Some(())
+    }
+
+    /// Opens the whole tree, if nothing is opened.
+    pub fn start(&mut self, roots: u32) -> Option<()> {
+        let now = self.clock.deadline(0.0);
+        for first in (0..roots).step_by(MAX_CHILDREN as usize) {
+            let rest = roots - first;
+            let count = if rest < MAX_CHILDREN { rest } else { MAX_CHILDREN };
+            self.open(Link::Children { first, count }.encode(), now)?;
+        }
+        Some(())
+    }
+
+    #[inline(always)]
+    pub fn node(&self, at: usize) -> Option<Opened> {
+        if at < self.state.count { self.nodes.get(at).copied() } else { None }
+    }
+
+    #[inline(always)]
+    pub fn node_mut(&mut self, at: usize) -> Option<&mut Opened> {
+        self.nodes.get_mut(at)
+    }
+
+    /// The opened nodes from a place on.
+    pub fn rest(&self, from: usize) -> &[Opened] {
+        self.nodes.get(from..self.state.count).unwrap_or_default()
+    }
+}
