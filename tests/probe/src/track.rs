@@ -85,8 +85,8 @@ type Follower = Tracker<'static, u16, STACK, OPENED>;
 /// The sizes that the documentation states.
 #[cfg(target_pointer_width = "32")]
 const _: () = {
-    assert!(size_of::<Contacts<8>>() == 144 * 8 + 20 * 512 + 120);
-    assert!(size_of::<Follower>() <= 8 * STACK + 56 * OPENED + 1_288);
+    assert!(size_of::<Contacts<8>>() == 144 * 8 + 20 * 512 + 60);
+    assert!(size_of::<Follower>() <= 8 * STACK + 56 * OPENED + 1_336);
 };
 
 impl Trackers {

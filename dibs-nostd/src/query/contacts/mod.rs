@@ -71,7 +71,7 @@ impl Contact {
 /// Up to `N` contacts, deepest first, and a bound on the others. A query compares up to `NEAR` triangles: those near a
 /// contact, and some with no lower vertex next to theirs, at most half of `NEAR`.
 ///
-/// RAM on a 32-bit processor: 144 bytes for each of the `N`, 20 for each of the `NEAR`, and 120.
+/// RAM on a 32-bit processor: 144 bytes for each of the `N`, 20 for each of the `NEAR`, and 60.
 ///
 /// Make it once, in a `static` or at start-up, and use it at every tick.
 ///

@@ -36,13 +36,15 @@ impl MotionClock {
     /// Tool and surface have moved.
     #[inline(always)]
     pub fn advance(&mut self, units: u32) {
-        self.now = self.now.saturating_add(units.into());
+        self.now = self.now.wrapping_add(units.into());
     }
 
-    /// The units since an earlier reading of this clock.
+    /// The units since an earlier reading of this clock, or half a turn if they are more.
     #[inline(always)]
-    pub const fn since(&self, before: Reading) -> u64 {
-        self.now.saturating_sub(before.0)
+    pub const fn since(&self, before: Reading) -> u32 {
+        const MOST: u32 = i32::MAX as u32;
+        let units = self.now.wrapping_sub(before.0);
+        if units < MOST as u64 { units as u32 } else { MOST }
     }
 
     /// The deadline of a bound (mm), rounded down. That of a bound below zero, or not a number, is now.
@@ -57,10 +59,10 @@ impl MotionClock {
         Deadline((self.now as u32).wrapping_add(self.unit.up(distance)))
     }
 
-    /// The length (mm) of so many units, to the nearest number; no more than that of half a turn.
-    pub fn length(&self, units: u64) -> f32 {
-        let most = i32::MAX as u64;
-        self.unit.length(if units < most { units } else { most } as i32)
+    /// The length (mm) of so many units, to the nearest number; they are less than half a turn.
+    #[inline(always)]
+    pub fn length(&self, units: u32) -> f32 {
+        self.unit.length(units as i32)
     }
 
     /// A deadline after that of every bound.

@@ -25,7 +25,7 @@ use front::Front;
 use range::RangeFront;
 
 /// Most units that the clock may count between two tests of a bound: half of the range that deadlines can tell apart.
-const FARTHEST: u64 = 1 << 29;
+const FARTHEST: u32 = 1 << 29;
 
 /// A tracker's memory.
 #[derive(Clone, Debug)]
@@ -71,7 +71,7 @@ impl<const OPENED: usize> Memory<OPENED> {
         let (axis, before) = self.last.ok_or(Lost::Start)?;
         let surface = travel.and_then(|travel| travel.since(&before)).ok_or(Lost::Surface)?;
         let moved = surface.saturating_add(u64::from(axis.step(tool, self.clock.unit())));
-        if moved.saturating_add(self.clock.since(self.complete)) > FARTHEST {
+        if moved > u64::from(FARTHEST.saturating_sub(self.clock.since(self.complete))) {
             return Err(Lost::Jump);
         }
         Ok(moved as u32)

@@ -8,7 +8,7 @@ use super::clock::{Deadline, MotionClock, Reading};
 use crate::tree::format::{Link, MAX_CHILDREN};
 
 /// After a motion of more units, a 16th to a 32nd of the root sphere's radius, the front starts anew.
-const JUMP: u64 = 1 << 20;
+const JUMP: u32 = 1 << 20;
 
 /// A node whose children are apart.
 #[derive(Clone, Copy, Debug)]

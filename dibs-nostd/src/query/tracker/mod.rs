@@ -35,7 +35,7 @@ use crate::{Index, MovingSurface, Tool, Tree, TriangleRow};
 /// Where the axis crosses the surface, it remembers which parts of the axis cannot be deepest, and searches those points
 /// that may have become so.
 ///
-/// RAM: 8 bytes for each entry of the stack, 56 for each opened node, and 1,288.
+/// RAM: 8 bytes for each entry of the stack, 56 for each opened node, and 1,336.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -192,7 +192,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         memory.begin(moved);
         self.last = None;
         // Rounded to nearest from whole units.
-        let length = |units: u32| memory.clock.length(units.into()) * (1.0 + 4.0 * f32::EPSILON);
+        let length = |units: u32| memory.clock.length(units) * (1.0 + 4.0 * f32::EPSILON);
         let moved_by = moved.ok().map(length);
         let mut fallback = match moved {
             Ok(_) => memory.front.borrow().is_empty().then_some(Fallback::Start),

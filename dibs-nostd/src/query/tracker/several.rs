@@ -10,7 +10,7 @@ const AHEAD: Budget = Budget { node_tests: 64, triangle_tests: 16 };
 
 /// How much farther than the closest pair others are shown to be, in units: an eighth to a sixteenth of the root sphere's
 /// radius.
-const LEAD: u64 = 1 << 21;
+const LEAD: u32 = 1 << 21;
 
 /// A bound on a pair that is not searched.
 struct Bound {
@@ -119,7 +119,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
         let (Some(before), Ok(moved)) = (self.last, moved) else {
             return Ok(Budget { node_tests: 0, triangle_tests: 0 });
         };
-        let clear = before.clear_after(self.memory.clock.length(moved.into()));
+        let clear = before.clear_after(self.memory.clock.length(moved));
         // A tool that has not touched a closed surface since is on the same side.
         let keeps_side = before.is_signed && clear > 0.0 && self.tree.is_closed();
         let (options, separation) = if options.is_signed && !keeps_side {
@@ -168,12 +168,12 @@ impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OP
         let last = self.last.filter(|last| last.is_signed || !options.is_signed);
         let Some(last) = last else { return NONE };
         let Ok(moved) = self.memory.moved(tool, surface.travel()) else { return NONE };
-        let (clock, moved) = (&self.memory.clock, u64::from(moved));
+        let clock = &self.memory.clock;
         let clear = last.clear_after(clock.length(moved));
         let apart = clear - surface.position_error() - tool.radius();
         let apart = if apart.is_nan() { f32::NEG_INFINITY } else { apart };
-        let stale = clock.since(last.searched).saturating_add(moved);
-        Bound { apart, stale: clock.length(stale) }
+        let stale = clock.length(clock.since(last.searched)) + clock.length(moved);
+        Bound { apart, stale }
     }
 }
 
