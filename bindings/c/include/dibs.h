@@ -34,7 +34,7 @@
 /**
  * Bytes of a list's storage.
  */
-#define DIBS_CONTACTS_SIZE 19456
+#define DIBS_CONTACTS_SIZE 13056
 
 /**
  * Contacts that a list holds: of more, the deepest.
@@ -134,7 +134,7 @@
 /**
  * Bytes of a tracker's storage besides its vertices.
  */
-#define DIBS_TRACKER_BASE 17152
+#define DIBS_TRACKER_BASE 20288
 
 /**
  * Bytes of a tracker's storage for each vertex: the surface as it is, and as it was.

@@ -13,7 +13,7 @@ use crate::query::{dibs_options, dibs_proximity, dibs_query};
 use crate::tool::{Shape, dibs_tool, dibs_vec3};
 
 /// Bytes of a list's storage.
-pub const DIBS_CONTACTS_SIZE: usize = 19_456;
+pub const DIBS_CONTACTS_SIZE: usize = 13_056;
 
 /// Contacts that a list holds: of more, the deepest.
 pub const DIBS_CONTACTS: usize = 16;
