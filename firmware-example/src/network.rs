@@ -1,7 +1,7 @@
 //! The network end of the bus: packets in Ethernet frames, by ARP, IPv4 and UDP.
 //!
 //! It is as small as the bus: one address, one port, no fragments, no options, and one peer, the sender of the last good
-//! packet. `ARCHITECTURE.md` says why it is not a whole network stack.
+//! packet. `docs/decisions.md` says why it is not a whole network stack.
 
 use etherparse::checksum::Sum16BitWords;
 use etherparse::{
