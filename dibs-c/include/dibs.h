@@ -109,7 +109,7 @@
 /**
  * Events that a receiver counts.
  */
-#define DIBS_EVENTS 26
+#define DIBS_EVENTS 27
 
 /**
  * Most surfaces of a scene.
@@ -436,6 +436,10 @@ enum dibs_code
    * The surface was 65,535 ms old or older when it was sent.
    */
   DIBS_CODE_PACKET_TOO_OLD = 419,
+  /**
+   * A hello came too soon after another to be answered at once.
+   */
+  DIBS_CODE_PACKET_THROTTLED = 420,
   /**
    * A stiffness, damping, largest force or margin is out of range.
    */
