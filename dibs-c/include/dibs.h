@@ -1002,7 +1002,7 @@ typedef struct {
    */
   float bound;
   /**
-   * No separation is off by more (mm).
+   * No separation is too high by more (mm).
    */
   float accuracy;
   /**
@@ -1016,7 +1016,7 @@ typedef struct {
  */
 typedef struct {
   /**
-   * Signed separation (mm), within the list's accuracy.
+   * Signed separation (mm): the lower end of the pair's interval, as `lower` of `dibs_proximity`.
    */
   float separation;
   /**
