@@ -10,7 +10,7 @@ use crate::surface::{self, CENTRE, REACH};
 /// Largest packet on the bus, in bytes: 167 quantised vertices.
 pub const MTU: usize = 1024;
 
-/// Largest status, in bytes: 13 counters, so that two statuses carry all.
+/// Largest status, in bytes: 13 counters, so that three statuses carry all.
 pub const STATUS_MTU: usize = 96;
 
 /// Largest status on a serial line.

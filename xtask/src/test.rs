@@ -106,10 +106,14 @@ fn other_programs() -> Result<Outcome> {
     let output = command.current_dir(workspace::root()).output()?;
     let said =
         [output.stdout, output.stderr].map(|said| String::from_utf8_lossy(&said).into_owned());
-    let skipped = said.iter().find_map(|said| said.split_once("skipped: ")?.1.lines().next());
-    match skipped {
-        Some(reason) => Ok(Outcome::Skipped(reason.to_owned())),
-        None if output.status.success() => Ok(Outcome::Passed),
+    let lines = || said.iter().flat_map(|said| said.lines());
+    if output.status.success() {
+        let is_report = |line: &&str| line.starts_with("read ") || line.starts_with("skipped: ");
+        lines().filter(is_report).for_each(|line| println!("{line}"));
+        return Ok(Outcome::Passed);
+    }
+    match lines().find_map(|line| line.split_once("skipped: ")) {
+        Some((_, reason)) => Ok(Outcome::Skipped(reason.to_owned())),
         None => Err(anyhow!("{}", said.concat())),
     }
 }

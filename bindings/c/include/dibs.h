@@ -109,7 +109,7 @@
 /**
  * Events that a receiver counts.
  */
-#define DIBS_EVENTS 26
+#define DIBS_EVENTS 27
 
 /**
  * Most surfaces of a scene.
@@ -436,6 +436,10 @@ enum dibs_code
    * The surface was 65,535 ms old or older when it was sent.
    */
   DIBS_CODE_PACKET_TOO_OLD = 419,
+  /**
+   * A hello came too soon after another to be answered at once.
+   */
+  DIBS_CODE_PACKET_THROTTLED = 420,
   /**
    * A stiffness, damping, largest force or margin is out of range.
    */
@@ -998,7 +1002,7 @@ typedef struct {
    */
   float bound;
   /**
-   * No separation is off by more (mm).
+   * No separation is too high by more (mm).
    */
   float accuracy;
   /**
@@ -1012,7 +1016,7 @@ typedef struct {
  */
 typedef struct {
   /**
-   * Signed separation (mm), within the list's accuracy.
+   * Signed separation (mm): the lower end of the pair's interval, as `lower` of `dibs_proximity`.
    */
   float separation;
   /**

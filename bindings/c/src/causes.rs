@@ -102,6 +102,7 @@ impl From<ReceiveError> for dibs_code {
             ReceiveError::Stale { .. } => Self::PacketStale,
             ReceiveError::Earlier { .. } => Self::PacketEarlier,
             ReceiveError::TooOld => Self::PacketTooOld,
+            ReceiveError::Throttled { .. } => Self::PacketThrottled,
             ReceiveError::Refused { cause, .. }
             | ReceiveError::Unverifiable { cause: Some(cause), .. } => cause.into(),
             ReceiveError::Unexpected { .. } | ReceiveError::Unverifiable { .. } => {

@@ -142,6 +142,8 @@ pub enum dibs_code {
     PacketEarlier = 418,
     /// The surface was 65,535 ms old or older when it was sent.
     PacketTooOld = 419,
+    /// A hello came too soon after another to be answered at once.
+    PacketThrottled = 420,
     /// A stiffness, damping, largest force or margin is out of range.
     Gain = 500,
     /// A safe limit is below the degraded one.
@@ -237,6 +239,7 @@ impl dibs_code {
         Self::PacketRefused,
         Self::PacketEarlier,
         Self::PacketTooOld,
+        Self::PacketThrottled,
         Self::Gain,
         Self::LimitOrder,
         Self::LimitTooLong,
@@ -321,6 +324,7 @@ impl dibs_code {
             Self::PacketRefused => c"the packet was refused",
             Self::PacketEarlier => c"the surface was captured before the published one",
             Self::PacketTooOld => c"the surface was too old when it was sent to say how old",
+            Self::PacketThrottled => c"a hello came too soon after the one before",
             Self::Gain => c"a gain of the constraint is out of range",
             Self::LimitOrder => c"a safe limit is below the degraded one",
             Self::LimitTooLong => c"a limit is 2^31 or more",

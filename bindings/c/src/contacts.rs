@@ -51,7 +51,7 @@ impl Kind for dibs_contacts {
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_contact {
-    /// Signed separation (mm), within the list's accuracy.
+    /// Signed separation (mm): the lower end of the pair's interval, as `lower` of `dibs_proximity`.
     pub separation: f32,
     /// Unit vector that leads out.
     pub normal: dibs_vec3,
@@ -102,7 +102,7 @@ pub struct dibs_contacts_facts {
     pub count: u32,
     /// Every contact whose separation is below this (mm) is in the list.
     pub bound: f32,
-    /// No separation is off by more (mm).
+    /// No separation is too high by more (mm).
     pub accuracy: f32,
     /// 1 where contacts within the margin were left out because the list is full; else 0.
     pub is_full: u32,

@@ -343,7 +343,7 @@ pub extern "C" fn dibs_receiver_position(
 }
 
 /// Events that a receiver counts.
-pub const DIBS_EVENTS: usize = 26;
+pub const DIBS_EVENTS: usize = 27;
 
 const _: () = assert!(Event::ALL.len() == DIBS_EVENTS);
 

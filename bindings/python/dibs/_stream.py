@@ -131,6 +131,11 @@ class Sender:
         return Totals(*self._native.totals())
 
     @property
+    def events(self) -> dict[str, int]:
+        """The receiver's count of each event, by name, as its statuses report it: published frames, and rejections by cause."""
+        return dict(self._native.events())
+
+    @property
     def in_flight(self) -> int:
         """Frames that the receiver has not acknowledged."""
         return self._native.way()[0]

@@ -53,7 +53,8 @@ class Contacts(NamedTuple):
     """All locally closest pairs within a margin."""
 
     found: npt.NDArray[Any]
-    """Records of `CONTACT`, in the order of the poses, deepest first."""
+    """Records of `CONTACT`, in the order of the poses, deepest first. Their `separation` is the lower end of the pair's
+    interval, as the `lower` of an answer."""
     bound: npt.NDArray[np.float32]
     """For each pose: every contact with a separation below is listed. The margin, unless there were too many, or the
     budget ended."""

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use dibs_build::glam::DVec3;
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::wire::{AesCmac, Content, Mac};
+use dibs_nostd::wire::{AesCmac, Content, Counters, Event, Mac};
 use dibs_stream::transport::{Line, Target, Transport};
 use dibs_stream::{self, SendError, Sent, Settings, SurfaceOrder, Totals};
 use pyo3::prelude::*;
@@ -44,6 +44,8 @@ trait AnySender: Send {
     fn totals(&self) -> Totals;
     /// Whether frames can be sent.
     fn is_ready(&self) -> bool;
+    /// The receiver's counters, as it last reported them.
+    fn counters(&self) -> Counters;
     /// Frames on their way, and the last that the receiver acknowledged.
     fn way(&self) -> (u32, Option<u32>);
     fn outlet(&mut self) -> &mut Outlet;
@@ -67,6 +69,10 @@ impl<const MTU: usize, M: Mac + Send> AnySender for dibs_stream::Sender<Outlet, 
 
     fn is_ready(&self) -> bool {
         self.is_ready()
+    }
+
+    fn counters(&self) -> Counters {
+        *self.counters()
     }
 
     fn way(&self) -> (u32, Option<u32>) {
@@ -162,6 +168,12 @@ impl Sender {
     fn totals(&self) -> [u64; 5] {
         let Totals { frames, partial, packets, bytes, statuses } = self.lock().totals();
         [frames, partial, packets, bytes, statuses]
+    }
+
+    /// Each event that the receiver counts, with its count.
+    fn events(&self) -> Vec<(&'static str, u32)> {
+        let counters = self.lock().counters();
+        Event::ALL.into_iter().map(|event| (event.name(), counters.of(event))).collect()
     }
 
     fn way(&self) -> (u32, Option<u32>) {

@@ -61,6 +61,7 @@ class Streams(unittest.TestCase):
         self.assertEqual(received, here.packets())
         self.assertEqual(totals, here.totals)
         self.assertEqual((over.in_flight, over.acknowledged), (here.in_flight, None))
+        self.assertEqual(set(here.events.values()), {0}, "no status came")
 
     def test_a_frame_is_as_old_as_is_said(self):
         begins = []
@@ -139,6 +140,16 @@ class Tags(unittest.TestCase):
             sender.wait()
             totals = sender.play(BEAT.frames[:2], rate=200)
             self.assertEqual((totals.frames, totals.statuses), (2, 1))
+            # A status with a count of each event.
+            count = len(sender.events)
+            body = struct.pack("<HBBIIfI", 0, 2, 0, 2, 0, 0, 0) + struct.pack(f"<{count}I", *range(count))
+            status = bytes([4, 128 + 7, 0, 0]) + hello[4:8] + bytes(6) + bytes([count]) + bytes(3) + body
+            status += tag(status, TO_SENDER, 0)
+            line.sendto(status + zlib.crc32(status).to_bytes(4, "little"), address)
+            time.sleep(0.05)
+            sender.poll()
+            self.assertEqual(list(sender.events.values()), list(range(count)))
+            self.assertEqual(sender.events["forged"], list(sender.events).index("forged"))
 
 
 if __name__ == "__main__":

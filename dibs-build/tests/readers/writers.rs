@@ -88,8 +88,9 @@ fn files_written_by_other_programs_now_are_read() {
     writers.sort_unstable();
     writers.dedup();
     assert!(!files.is_empty(), "skipped: none of {} is installed", absent.join(", "));
-    println!("read {} files of {}", files.len(), writers.join(", "));
-    if !absent.is_empty() {
-        println!("skipped: {} not installed", absent.join(", "));
+    for writer in writers {
+        let count = files.iter().filter(|file| file.writer == writer).count();
+        println!("read {count} files of {writer}");
     }
+    absent.iter().for_each(|name| println!("skipped: {name} is not installed"));
 }

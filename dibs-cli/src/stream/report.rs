@@ -127,12 +127,9 @@ pub fn print<M: Mac, const MTU: usize>(
     let Outcome { late, reconnections, refused, is_interrupted } = *outcome;
     let totals = sender.totals();
     let per_frame = totals.bytes as f64 / totals.frames.max(1) as f64;
-    let (published, rejected) =
-        (sender.counters().of(Event::Published), sender.counters().rejected());
     if json {
-        let causes: serde_json::Map<String, serde_json::Value> = Event::ALL
+        let events: serde_json::Map<String, serde_json::Value> = Event::ALL
             .into_iter()
-            .filter(|event| event.is_rejection())
             .map(|event| (event.name().to_owned(), sender.counters().of(event).into()))
             .collect();
         println!(
@@ -149,8 +146,7 @@ pub fn print<M: Mac, const MTU: usize>(
                 "interrupted": is_interrupted,
                 "statuses": totals.statuses,
                 "acknowledged": sender.acknowledged(),
-                "published": published,
-                "rejected": causes,
+                "events": events,
             })
         );
         return;
@@ -175,9 +171,8 @@ pub fn print<M: Mac, const MTU: usize>(
         println!("receiver  no status came back");
         return;
     }
-    let newest = sender.acknowledged().map_or("none of these".to_owned(), |n| n.to_string());
-    println!("receiver  published {published} since its start, the newest {newest}");
-    if rejected > 0 {
-        println!("rejected  {rejected}: {}", causes(sender.counters()).join(", "));
-    }
+    let newest =
+        sender.acknowledged().map_or("none of these frames".to_owned(), |n| format!("frame {n}"));
+    println!("receiver  published {newest} last");
+    println!("events    {}", sender.counters());
 }

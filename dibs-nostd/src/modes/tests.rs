@@ -1,7 +1,7 @@
 //! The motion of a modal surface as its odometer states it, which only the crate can read.
 
 use dibs_build::modes::ModalFit;
-use dibs_build::{Builder, BuiltTree, generate};
+use dibs_build::{Builder, BuiltTree, Motion, generate};
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -129,4 +129,52 @@ fn a_steady_extrapolation_moves_by_its_error() {
     }
     let [found, stated] = sums;
     assert!(found > 100.0 && stated < 2.0 * found, "{sums:?}");
+}
+
+/// At hundreds of radii a frame the numbers of a course do not fit: the odometer then knows less, and never states a way
+/// that is too short.
+#[test]
+fn no_speed_makes_the_odometer_understate() {
+    let mesh = generate::heart(320).unwrap().mesh;
+    let mut farthest = 0.0_f64;
+    for speed in 1..40_u8 {
+        // A root radius is about 128 mm.
+        let step = 700.0 * f32::from(speed);
+        let moved_by = |frame: i8| {
+            mesh.positions.iter().map(|p| *p + Vec3::X * step * f32::from(frame)).collect()
+        };
+        let frames = (-8..=8).map(moved_by).collect();
+        let motion = Motion { frames, ..Motion::default() };
+        let fit = ModalFit::new(&mesh, &motion).unwrap();
+        let built = Builder::new().stretch(1.5).build(&mesh).unwrap().with_modes(&fit, 1).unwrap();
+        let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
+        let modes = Modes::of(&tree).unwrap();
+        let weights = &built.modal_motion().unwrap().weights;
+        let frames = Frames::<1>::new();
+        let (mut writer, reader) = frames.split().unwrap();
+        let mut reader = ModalReader::new(reader, &modes).unwrap();
+        let unit = f64::from(Unit::of(&tree).length(1 << 20)) / f64::from(1 << 20);
+        let mut before: Option<ModalFrame<'_, 1>> = None;
+        for epoch in 0..8_u8 {
+            writer.begin();
+            writer.push(Vec3::new(weights[4 + usize::from(epoch)][0], 0.0, 0.0)).unwrap();
+            let (received, position_error) = (Millis(100 * u32::from(epoch)), 0.0);
+            let stretch = Some(modes.stretch_bound(&weights[4 + usize::from(epoch)]).unwrap());
+            let epoch = u32::from(epoch) + 1;
+            writer.publish(FrameLabel { epoch, received, position_error, stretch }).unwrap();
+            for age in [10, 150, 200] {
+                let at = Millis(received.0 + age);
+                let surface = reader.latest(at).of_any_age().unwrap().extrapolated();
+                let travel = before.as_ref().and_then(MovingSurface::travel);
+                let units = travel.and_then(|before| surface.travel()?.since(&before));
+                if let (Some(before), Some(units)) = (&before, units) {
+                    let (stated, found) = (units as f64 * unit, f64::from(moved(before, &surface)));
+                    assert!(stated >= found * 0.999_99, "{step}, {epoch}, {age}: {found} {stated}");
+                    farthest = farthest.max(found);
+                }
+                before = Some(surface);
+            }
+        }
+    }
+    assert!(farthest > 20_000.0, "{farthest}");
 }

@@ -57,6 +57,7 @@ struct Seen<P: Precision> {
     /// Height of the point above the plane, times the normal's length; its error.
     height: P,
     doubt: P,
+    /// It spans no plane, as far as the precision tells.
     is_flat: bool,
     /// The size of the terms whose sum `to` is.
     far: P,
@@ -118,11 +119,11 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
             return Ok(false);
         }
         let seen = self.see(row)?;
-        if seen.is_flat && P::IS_FLAT_UNCLEAR {
+        let (square, feature) = seen.closest();
+        if (seen.is_flat && P::IS_ROUGH) || square.is_not_a_number() {
             self.above = Err(NoSide::BelowAccuracy);
             return Ok(false);
         }
-        let (square, feature) = seen.closest();
         let tilt = if feature == Feature::Face { seen.tilt() } else { P::from(1.0) };
         let doubt = P::from(8.0) * P::ROUNDING * (square * tilt + seen.far * square.root());
         if !(square - doubt <= self.least + self.doubt) {
@@ -246,9 +247,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
             let [edge, ..] = turned(seen.edges, corner);
             let [to_centre, ..] = turned(seen.to, corner);
             let cosine = -P::dot(to_centre, edge);
-            let cosine = cosine * cosine.absolute() / P::dot(edge, edge);
-            #[allow(clippy::eq_op)] // Not a number.
-            if cosine != cosine {
+            let cosine = cosine / P::dot(edge, edge) * cosine.absolute();
+            if cosine.is_not_a_number() {
                 return Ok(Err(NoSide::Degenerate));
             }
             let size = P::size(to_centre);
@@ -286,6 +286,7 @@ impl<P: Precision> Seen<P> {
         let limit = P::FLAT * P::dot(ab, ab) * P::dot(ca, ca);
         let far = P::size(a - start) + P::size(along);
         let terms = P::size(ab) * P::size(ca) * P::size(to_a) + P::size(normal) * far;
+        let is_told = far + P::size(ab) + P::size(ca) < P::MOST;
         Self {
             to,
             edges,
@@ -293,7 +294,7 @@ impl<P: Precision> Seen<P> {
             square,
             height: -P::dot(normal, to_a),
             doubt: P::from(4.0) * P::ROUNDING * terms,
-            is_flat: !(square > limit && square > P::TINY),
+            is_flat: !(square > limit && square > P::TINY && is_told),
             far,
         }
     }
@@ -316,14 +317,14 @@ impl<P: Precision> Seen<P> {
             } else if part >= whole {
                 (P::dot(to, to), Feature::Vertex(after(edge)))
             } else {
-                (P::dot(across, across) / whole, Feature::Edge(edge))
+                (P::dot(across * (P::from(1.0) / whole), across), Feature::Edge(edge))
             };
             if square < least {
                 (least, closest) = (square, feature);
             }
         }
         if is_over {
-            (self.height * self.height / self.square, Feature::Face)
+            (self.height / self.square * self.height, Feature::Face)
         } else {
             (least, closest)
         }
@@ -350,7 +351,7 @@ impl<P: Precision> Seen<P> {
     fn has_larger_sine_than(&self, other: &Self) -> bool {
         let least = self.height.absolute() - self.doubt;
         let most = other.height.absolute() + other.doubt;
-        let (least, most) = (least * least / self.square, most * most / other.square);
+        let (least, most) = (least / self.square * least, most / other.square * most);
         let are_clear = !self.is_flat && !other.is_flat && self.is_above().is_some();
         are_clear && least > P::SINES * most
     }
@@ -368,6 +369,27 @@ impl<P: Precision> Seen<P> {
             Ok(above)
         } else {
             Err(if self.is_flat { self.reason() } else { other.reason() })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_f64_tells_the_plane_of_a_triangle_whose_area_squared_leaves_f32() {
+        fn seen<P: Precision>(size: f32) -> Seen<P> {
+            let corners = [[1.0, 1.0, 1.0], [-2.0, 1.0, 1.0], [1.0, -2.0, 1.0]];
+            let corners = corners.map(|at| P::vector(glam::Vec3::from(at) * size));
+            Seen::new(corners, P::vector(glam::Vec3::ZERO), P::vector(glam::Vec3::ZERO))
+        }
+        for (size, is_told) in [(1e-14, false), (1.0, true), (1e8, true), (1e10, false)] {
+            let (rough, fine) = (seen::<f32>(size), seen::<f64>(size));
+            assert!(rough.is_flat != is_told && !fine.is_flat, "{size:e}");
+            let (square, feature) = fine.closest();
+            let square = square / f64::from(size) / f64::from(size);
+            assert!((square - 1.0).abs() < 1e-6 && feature == Feature::Face, "{size:e}");
         }
     }
 }

@@ -8,6 +8,7 @@ use core::f32::consts::{FRAC_PI_2, PI};
 
 use glam::Vec3;
 
+use super::precision::Precision;
 use crate::math::sqrt::sqrt;
 use crate::{Index, Tree, VertexTable};
 
@@ -68,9 +69,10 @@ impl Feature {
         for (edge, from, to) in [(0, a, b), (1, b, c), (2, c, a)] {
             let along = to - from;
             let squared = along.length_squared();
-            let across = (point - from).cross(along).length_squared();
-            if across <= nearest * squared && squared > TINY {
-                nearest = across / squared;
+            let across = (point - from).cross(along);
+            let apart = across.dot(across / squared);
+            if apart <= nearest && squared > TINY {
+                nearest = apart;
                 feature = Self::Edge(edge);
             }
         }
@@ -170,48 +172,32 @@ fn normal(corners: &[Vec3; 3]) -> Result<(Vec3, f32), NoNormal> {
     let (ab, ac) = (b - a, c - a);
     let across = ab.cross(ac);
     let squared = across.length_squared();
-    if squared > FLAT * ab.length_squared() * ac.length_squared() && squared > TINY {
+    let is_clear = squared > FLAT * ab.length_squared() * ac.length_squared() && squared > TINY;
+    if is_clear && squared <= f32::MAX {
         let area = sqrt(squared);
         return Ok((across / area, area));
     }
     flat_normal(corners)
 }
 
-/// [`normal`] in f64, for a triangle too flat or small for f32.
+/// [`normal`] in f64, for a triangle too flat, small or large for f32.
 #[cold]
 #[inline(never)]
 fn flat_normal(corners: &[Vec3; 3]) -> Result<(Vec3, f32), NoNormal> {
-    let [a, b, c] = corners.map(|corner| corner.to_array().map(f64::from));
-    let (ab, ac) = (minus(b, a), minus(c, a));
-    let [x, y, z] = cross(ab, ac);
-    let mut largest = 0.0;
-    for size in [x.abs(), y.abs(), z.abs()] {
-        if size > largest {
-            largest = size;
-        }
-    }
+    let [a, b, c] = corners.map(f64::vector);
+    let (ab, ac) = (b - a, c - a);
+    let across = ab.cross(ac);
+    let size = f64::size(across);
     // Written so that NaN has no normal.
-    let is_clear = squared([x, y, z]) > FLAT_DOUBLE * squared(ab) * squared(ac);
-    let scaled = Vec3::new((x / largest) as f32, (y / largest) as f32, (z / largest) as f32);
+    let is_clear = f64::dot(across, across) > FLAT_DOUBLE * f64::dot(ab, ab) * f64::dot(ac, ac);
+    let scaled = (across / size).as_vec3();
     let length = sqrt(scaled.length_squared());
-    let area = largest as f32 * length;
+    let area = size as f32 * length;
     if is_clear && area > 0.0 && area.is_finite() {
         Ok((scaled / length, area))
     } else {
         Err(NoNormal::Unclear)
     }
-}
-
-fn minus([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
-    [a - x, b - y, c - z]
-}
-
-fn cross([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
-    [b * z - c * y, c * x - a * z, a * y - b * x]
-}
-
-fn squared([x, y, z]: [f64; 3]) -> f64 {
-    x * x + y * y + z * z
 }
 
 /// The angle, 0 to pi, of a sine above 0 and a cosine, both times the same length. Within 1e-6.
@@ -261,6 +247,9 @@ mod tests {
             assert!((unit - Vec3::NEG_Y).length() < 1e-6, "{unit}");
             assert!((area / (8.0 * height) - 1.0).abs() < 1e-6, "{area}");
         }
+        let large = [Vec3::ZERO, Vec3::X * 8e9, Vec3::Y * 8e9];
+        let (unit, area) = normal(&large).expect("it has an area");
+        assert!(unit == Vec3::Z && (area / 6.4e19 - 1.0).abs() < 1e-6, "{unit} {area}");
         assert!(normal(&[Vec3::ZERO, Vec3::X, Vec3::X * 3.0]).is_err());
         assert!(normal(&[Vec3::ZERO, Vec3::X, Vec3::NAN]).is_err());
     }

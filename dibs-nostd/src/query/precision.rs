@@ -30,8 +30,10 @@ pub(super) trait Precision:
     const SINES: Self;
     /// Squares of areas below this lose their digits.
     const TINY: Self;
+    /// The product of four lengths below this is a number.
+    const MOST: Self;
     /// Where a flat triangle hides the side, rather than being its edges.
-    const IS_FLAT_UNCLEAR: bool;
+    const IS_ROUGH: bool;
     /// Node tests that take as long as the distance to a triangle.
     const DISTANCE_COST: u32;
     /// The same for a triangle around a vertex.
@@ -43,6 +45,7 @@ pub(super) trait Precision:
     /// The sum of the coordinates' absolute values, at least the length.
     fn size(vector: Self::Vector) -> Self;
     fn absolute(self) -> Self;
+    fn is_not_a_number(self) -> bool;
     /// The square root, within 1e-6 of its size.
     fn root(self) -> Self;
 }
@@ -53,7 +56,8 @@ impl Precision for f32 {
     const FLAT: Self = 1e-4;
     const SINES: Self = 1.0 + 1e-3;
     const TINY: Self = 1e-30;
-    const IS_FLAT_UNCLEAR: bool = true;
+    const MOST: Self = 1e9;
+    const IS_ROUGH: bool = true;
     const DISTANCE_COST: u32 = 4;
     const RING_COST: u32 = 3;
 
@@ -77,6 +81,10 @@ impl Precision for f32 {
         self.abs()
     }
 
+    fn is_not_a_number(self) -> bool {
+        self.is_nan()
+    }
+
     fn root(self) -> Self {
         sqrt(self)
     }
@@ -89,7 +97,8 @@ impl Precision for f64 {
     const FLAT: Self = 1e-12;
     const SINES: Self = 1.0 + 1e-8;
     const TINY: Self = 0.0;
-    const IS_FLAT_UNCLEAR: bool = false;
+    const MOST: Self = 1e75;
+    const IS_ROUGH: bool = false;
     const DISTANCE_COST: u32 = 96;
     const RING_COST: u32 = 48;
 
@@ -111,6 +120,10 @@ impl Precision for f64 {
 
     fn absolute(self) -> Self {
         self.abs()
+    }
+
+    fn is_not_a_number(self) -> bool {
+        self.is_nan()
     }
 
     fn root(self) -> Self {

@@ -288,4 +288,10 @@ fn without_the_time_nothing_moves_on() {
     assert!(send(&mut bus, tree.mesh_id(), 4, &motion[4], None, 60, &mut rng));
     let frame = reader.latest(Millis(70)).of_any_age().expect("published");
     assert_eq!((frame.extrapolated().share(), frame.interpolated().share()), (1.0, 1.0));
+    drop(frame);
+    // Nor have two in the wrong order, by a clock's jitter.
+    assert!(send(&mut bus, tree.mesh_id(), 5, &motion[5], None, 55, &mut rng));
+    let frame = reader.latest(Millis(70)).of_any_age().expect("published");
+    assert_eq!((frame.extrapolated().share(), frame.interpolated().share()), (1.0, 1.0));
+    assert!(off(&positions(&frame.interpolated()), &motion[5], &motion[5], 1.0) < 1e-4);
 }

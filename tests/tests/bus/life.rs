@@ -6,7 +6,7 @@ use std::time::Duration;
 use dibs_nostd::failsafe::LinkStatus;
 use dibs_nostd::format::Unit;
 use dibs_nostd::wire::{
-    Body, Counters, FrameId, Mac, NoMac, Packet, PublishedStatus, Status, encode_heartbeat,
+    Body, Counters, Event, FrameId, Mac, NoMac, Packet, PublishedStatus, Status, encode_heartbeat,
     encode_hello, encode_status,
 };
 use dibs_nostd::{Assembler, Millis, ReceiveError, SurfaceFacts, Tree};
@@ -97,6 +97,13 @@ fn heartbeats_are_as_old_as_the_status_that_they_echo() {
         open.accept(&beat, Millis(later)).unwrap();
         assert_eq!(open.health().heartbeat, Some(Millis(later)));
     }
+    // The newest echo counts, in whatever order echoes come.
+    let (mut open, _reader) = guarded(NoMac);
+    for (n, echo) in [(1, 90), (2, 40), (3, 95)] {
+        let beat = encode_heartbeat(&id(1), n, Some(echo), &NoMac, &mut [0; 64]).to_vec();
+        open.accept(&beat, Millis(100 + n)).unwrap();
+        assert_eq!(open.health().heartbeat, Some(Millis(echo.max(90))));
+    }
     // An echo ahead of the clock is of another run of the receiver: no sign of life in this one.
     let (mut anew, _reader) = guarded(NoMac);
     for (n, echo) in [(1, 40), (2, 1 << 30), (3, i32::MAX as u32 - 10)] {
@@ -170,6 +177,32 @@ fn a_forged_status_stops_no_sender() {
     }
 }
 
+/// The answer to a hello of a run of the receiver that is over, played back when no hello waits, changes nothing.
+#[test]
+fn an_answer_to_no_hello_is_not_taken() {
+    let (mut before, _before_reader) = guarded(keyed(5));
+    let mut source = Source::new(9, keyed);
+    source.set_clock(0);
+    source.sender.poll().unwrap();
+    for packet in source.pipe.sent() {
+        before.accept(&packet, Millis(0)).unwrap();
+    }
+    let recorded = status(&mut before, 0, 1);
+    // That receiver starts again, before the sender has heard it.
+    let (mut assembler, _reader) = guarded(keyed(6));
+    for n in 1..4 {
+        source.hear(&mut assembler, 60 * n, 1).unwrap();
+    }
+    assert!(source.sender.is_ready());
+    assert!(source.frame(&mut assembler, 1, 300).is_some());
+    source.hear(&mut assembler, 310, 1).unwrap();
+    let known = *source.sender.status().unwrap();
+    source.pipe.answer(&recorded);
+    source.sender.poll().unwrap();
+    assert_eq!(source.sender.status(), Some(&known));
+    assert!(source.frame(&mut assembler, 2, 330).is_some(), "under the challenge of this run");
+}
+
 /// Somebody who sees the hello forges its answer, too: the sender stops, asks again, and goes on.
 #[test]
 fn a_sender_that_was_stopped_goes_on() {
@@ -226,6 +259,62 @@ fn strangers_collect_no_answers_and_jam_none() {
         }
     }
     panic!("the sender never heard an answer");
+}
+
+/// Without a key anybody may ask, and is answered at most each 20 ms, and by statuses; a stranger's hellos keep no sender
+/// from its answer for long.
+#[test]
+fn hellos_without_a_tag_are_answered_at_a_bounded_rate() {
+    let mut rng = fastrand::Rng::with_seed(19);
+    for apart in [1, 5, 19, 20, 21] {
+        let (mut assembler, _reader) = guarded(NoMac);
+        let mut source = Source::new(9, |_| NoMac);
+        let (mut taken, mut throttled, mut answers) = (0, 0, 0);
+        let (mut genuine, mut answered) = (None, None);
+        for now in 0..20_000_u32 {
+            source.set_clock(now);
+            source.sender.poll().unwrap();
+            let mut packets = source.pipe.sent();
+            if now % apart == 0 {
+                let stranger = u64::from(now) + 1;
+                packets.push(encode_hello(&id(0), stranger, &NoMac, &mut [0; 64]).to_vec());
+                rng.shuffle(&mut packets);
+            }
+            let mut report = |assembler: &mut Guarded<NoMac>, genuine: Option<u64>| {
+                let status = assembler.status(Millis(now), 1);
+                answers += u32::from(status.answer.is_some());
+                if status.answer.is_some_and(|answer| Some(answer.nonce) == genuine) {
+                    answered = answered.or(Some(now));
+                }
+                let counters = assembler.counters();
+                let packet = encode_status(MESH, &status, counters, &NoMac, &mut [0; 256]).to_vec();
+                source.pipe.answer(&packet);
+            };
+            for packet in packets {
+                let Body::Hello(hello) = Packet::decode(&packet).unwrap().body else { continue };
+                genuine = Some(hello.nonce).filter(|&nonce| nonce > 20_000).or(genuine);
+                match assembler.accept(&packet, Millis(now)) {
+                    Ok(_) => {
+                        taken += 1;
+                        report(&mut assembler, genuine);
+                    }
+                    Err(ReceiveError::Throttled { after }) => {
+                        assert!(after < Millis(20));
+                        throttled += 1;
+                    }
+                    other => panic!("{other:?}"),
+                }
+            }
+            if now % 97 == 0 {
+                report(&mut assembler, genuine);
+            }
+        }
+        assert!(taken <= 1_000, "{apart} ms apart: {taken} in 20 s");
+        assert!(answers <= taken + 20_000 / 97 + 1, "{apart} ms apart: {answers}");
+        assert_eq!(assembler.counters().of(Event::Throttled), throttled);
+        assert_eq!(assembler.health().rejections, 0);
+        assert!(answered.is_some_and(|at| at < 10_000), "{apart} ms apart: {answered:?}");
+    }
 }
 
 /// Sender and receiver of surfaces that differ in unit or size, though not in the mesh id, and of other meshes.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use dibs_nostd::glam::Vec3;
+use dibs_nostd::glam::{DVec3, Vec3};
 use dibs_nostd::wire::{Deframer, Encoding, Event, Packet, QuantisedBox, enframe, framed_bytes};
 use dibs_nostd::{Millis, ReceiveError};
 use dibs_tests::bus::*;
@@ -158,6 +158,27 @@ proptest! {
             prop_assert!(off.cmple(step.as_dvec3() * 0.5 + rounding).all(), "{off} of {step}");
             prop_assert!(off.length() <= f64::from(grid.error()));
             prop_assert!(decoded.cmpge(low).all() && decoded.cmple(high).all());
+        }
+    }
+
+    /// Of boxes that are hardly inside f32's range, too, whose squares are not.
+    #[test]
+    fn boxes_of_any_size_keep_their_bound(
+        exponents in prop::array::uniform3(-37.0_f32..37.0),
+        origin in prop::array::uniform3(-3.0_f32..3.0),
+        cells in prop::collection::vec(prop::array::uniform3(0.0_f64..65_535.0), 1..30),
+    ) {
+        let step = Vec3::from(exponents.map(|exponent| 10_f32.powf(exponent)));
+        let Ok(grid) = QuantisedBox::new(step * Vec3::from(origin), step * 0.1) else {
+            return Ok(());
+        };
+        for cell in cells {
+            let (low, step) = (grid.origin().as_dvec3(), grid.step().as_dvec3());
+            let point = (low + step * DVec3::from(cell)).as_vec3();
+            if let Some(row) = grid.quantise(point) {
+                let off = (grid.position(row).as_dvec3() - point.as_dvec3()).length();
+                prop_assert!(off <= f64::from(grid.error()), "{off} of {}, {grid:?}", grid.error());
+            }
         }
     }
 

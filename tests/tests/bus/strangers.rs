@@ -255,3 +255,24 @@ fn forgeries_are_forgotten_across_the_wrap_of_the_clock() {
     }
     assert_eq!(left, [100, 90, 50, 0]);
 }
+
+/// A clock that goes back, by a packet stamped on another core, forgets no forgery.
+#[test]
+fn a_clock_that_goes_back_forgets_no_forgery() {
+    let (mut assembler, _reader) = line(mac());
+    for packet in sent(1, mac()) {
+        give_at(&mut assembler, &packet, 10_000).unwrap();
+    }
+    let mut at = |now: u32, forgeries: u32| {
+        for n in 0..forgeries {
+            let forged = encode_heartbeat(&id(1), n, None, &NoMac, &mut [0; 64]).to_vec();
+            let _ = assembler.accept(&forged, Millis(now));
+        }
+        let _ = assembler.accept(&[], Millis(now));
+        assembler.health().forgeries
+    };
+    assert_eq!(at(10_000, 40), 40);
+    assert_eq!([1, 100, 9_000].map(|back| at(10_000 - back, 0)), [40; 3]);
+    assert_eq!(at(9_990, 2), 42);
+    assert_eq!(at(11_000, 0), 32);
+}

@@ -82,9 +82,9 @@ most, in {} ticks. From [docs/evidence/benchmarks.md](docs/evidence/benchmarks.m
     block
 }
 
-/// The rows of a record under `docs`.
+/// The rows of a record under `docs/evidence`.
 fn records(name: &str) -> Vec<Value> {
-    let path = format!("{}/../docs/{name}", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/../docs/evidence/{name}", env!("CARGO_MANIFEST_DIR"));
     let text = fs::read_to_string(path).expect("a record");
     serde_json::from_str(&text).expect("rows")
 }

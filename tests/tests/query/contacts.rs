@@ -153,7 +153,7 @@ fn no_contact_is_missing_and_none_is_doubled() {
         ("rough", sheet(40, 60.0, |x, y| ((12.9898 * x + 78.233 * y).sin() * 43_758.547).fract())),
     ];
     let poses = if cfg!(debug_assertions) { 10 } else { 120 };
-    let (mut checked, mut crossing, mut several) = (0, 0, 0);
+    let (mut checked, mut crossing, mut open, mut several) = (0, 0, 0, 0);
     for (seed, (name, mesh)) in (1..).zip(shapes) {
         let mut rng = Rng::with_seed(seed);
         let (built, rows) = build(&mesh);
@@ -178,6 +178,10 @@ fn no_contact_is_missing_and_none_is_doubled() {
             }
             checked += 1;
             crossing += usize::from(is_crossing);
+            if let Some(first) = contacts.iter().next().filter(|_| is_crossing) {
+                assert_eq!(first.separation, closest.lower, "{name}: {closest:?}");
+                open += usize::from(closest.lower < closest.separation);
+            }
             let (truth, label) = valleys(&rows, &triangles, [from, to]);
             // An axis that crosses may be inside in several parts, of which one is a contact.
             let is_bounded = is_crossing && contacts.bound() == closest.lower;
@@ -220,6 +224,7 @@ fn no_contact_is_missing_and_none_is_doubled() {
     }
     println!("{checked} poses, {crossing} cross, {several} with several contacts");
     assert!(checked > poses * 3 && crossing > checked / 20 && several > checked / 20);
+    assert!(open > 0, "no interval that is longer than a point");
 }
 
 /// Most of several thousand triangles within the margin lead down to a contact, and are not kept.

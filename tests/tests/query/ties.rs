@@ -179,12 +179,15 @@ struct Asked<'t> {
     triangles: Vec<[u32; 3]>,
     query: Query<'t, u16, 512>,
     tracker: Tracker<'t, u16, MAX_STACK, 256>,
+    /// Units a millimetre.
+    unit: f32,
     tally: Tally,
 }
 
 impl<'t> Asked<'t> {
-    fn new(tree: &'t Tree<'t, u16>, rows: Vec<Vec3>) -> Self {
+    fn new(tree: &'t Tree<'t, u16>, rows: Vec<Vec3>, unit: f32) -> Self {
         Self {
+            unit,
             triangles: triangles(tree),
             rows,
             query: Query::new(tree).expect("deep enough"),
@@ -252,15 +255,18 @@ impl<'t> Asked<'t> {
         let corners = self.triangles[rng.usize(..self.triangles.len())];
         let [a, b, c] = corners.map(|v| self.rows[v as usize]);
         let across = (b - a).cross(c - a).normalize_or(Vec3::Z);
-        let off = 10_f32.powf(rng.f32() * 4.0 - 2.5);
+        let off = self.unit * 10_f32.powf(rng.f32() * 4.0 - 2.5);
+        let lattice = 2.0 / self.unit;
         let mut at = match rng.u32(..4) {
             0 => a + unit(rng) * off,
             1 => a.lerp(b, rng.f32()) + unit(rng) * off,
             2 => a.lerp(b, rng.f32()).lerp(c, rng.f32()) + across * off * (rng.f32() - 0.5) * 4.0,
             // In the plane of the triangle, on a lattice.
-            _ => ((a + (b - a) * 2.0 * rng.f32() + (a - c) * rng.f32()) * 2.0).round() * 0.5,
+            _ => {
+                ((a + (b - a) * 2.0 * rng.f32() + (a - c) * rng.f32()) * lattice).round() / lattice
+            }
         };
-        let span = (rng.bool()).then(|| unit(rng) * 30.0 * rng.f32());
+        let span = (rng.bool()).then(|| unit(rng) * self.unit * 30.0 * rng.f32());
         let mut best = f64::INFINITY;
         for _ in 0..steps {
             let step = unit(rng) * off * 10_f32.powf(-5.0 * rng.f32());
@@ -288,19 +294,36 @@ impl<'t> Asked<'t> {
 /// Climbs to ties of every kind of surface: no side is wrong there, by a query, a wide one, or a tracker.
 #[test]
 fn no_side_is_wrong_where_sheets_tie() {
+    climb_everywhere(1.0);
+}
+
+/// The same in long and in short units, where squares of areas leave the range of f32.
+#[test]
+fn no_side_is_wrong_in_any_unit() {
+    for unit in [1e-9, 1e-6, 1e5, 1e6] {
+        climb_everywhere(unit);
+    }
+}
+
+/// With this many units a millimetre.
+fn climb_everywhere(unit: f32) {
     let climbs = std::env::var("DIBS_CLIMBS").map_or(12, |n| n.parse().expect("a number"));
     let (mut ties, mut asked) = (0, 0);
-    for (seed, subject) in (1..).zip(subjects()) {
+    for (seed, mut subject) in (1..).zip(subjects()) {
         let mut rng = Rng::with_seed(seed);
+        for position in subject.rest.positions.iter_mut().chain(&mut subject.frame) {
+            *position *= unit;
+        }
         let built = build(&subject.rest);
         let tree = built.tree::<u16>().expect("valid");
-        let mut all = Asked::new(&tree, built.to_rows(&subject.frame));
+        let mut all = Asked::new(&tree, built.to_rows(&subject.frame), unit);
         for _ in 0..climbs {
             all.climb(&mut rng, 40);
         }
-        println!("{:20} {:?}", subject.name, all.tally);
-        assert_eq!(all.tally.wrong, 0, "{}: {:?}", subject.name, all.tally);
-        assert!(all.tally.undefined * 100 <= all.tally.asked, "{}: {:?}", subject.name, all.tally);
+        let Subject { name, .. } = subject;
+        println!("{unit:e} {name:20} {:?}", all.tally);
+        assert_eq!(all.tally.wrong, 0, "{unit:e} {name}: {:?}", all.tally);
+        assert!(all.tally.undefined * 100 <= all.tally.asked, "{unit:e} {name}: {:?}", all.tally);
         (ties, asked) = (ties + all.tally.ties, asked + all.tally.asked);
     }
     assert!(ties * 20 > asked, "{ties} ties of {asked}");
@@ -313,7 +336,7 @@ fn lattice_points_have_a_side() {
     for rest in [tetrahedron(), ball(0), block(Vec3::splat(-20.0), Vec3::splat(20.0)), pinched()] {
         let built = build(&rest);
         let tree = built.tree::<u16>().expect("valid");
-        let mut all = Asked::new(&tree, built.to_rows(&rest.positions));
+        let mut all = Asked::new(&tree, built.to_rows(&rest.positions), 1.0);
         let mut sides = [0; 2];
         for number in 0..17_i32.pow(3) {
             let place = |n: i32| (n % 17 - 8) as f32 * 5.0;

@@ -213,6 +213,14 @@ fn a_silence_admits_no_other_surface() {
     assert_eq!(bus.send(&moved, 40, 64), Ok(()));
     assert!(bus.send(&rest, 60, 64).is_err());
     assert_eq!(bus.send(&moved, 80, 64), Ok(()));
+    // A partial frame is no registration, and does not end it.
+    let mut bus = Bus::new(built, reach);
+    bus.send(&rest, 0, 64).unwrap();
+    bus.assembler.register();
+    let near = of(&|p| p + Vec3::X);
+    bus.send_on(Some(&rest), &near, 20, 64).unwrap();
+    assert_eq!(bus.send(&moved, 40, 64), Ok(()));
+    assert!(bus.send(&rest, 60, 64).is_err());
 }
 
 /// A closed surface is turned inside out through a plane, by small steps within all other limits: by whole frames, and

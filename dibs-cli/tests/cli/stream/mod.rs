@@ -9,7 +9,7 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use dibs_nostd::wire::{AesCmac, Mac, NoMac, encode_status};
+use dibs_nostd::wire::{AesCmac, Event, Mac, NoMac, encode_status};
 use dibs_nostd::{Assembler, Frames, Millis, Tree};
 use serde_json::Value;
 
@@ -68,9 +68,12 @@ fn assert_all(seen: &Seen, totals: &Value) {
     assert_eq!((seen.published, seen.rejected), (FRAMES as u32, 0));
     assert_eq!(totals["frames"], FRAMES);
     assert_eq!(totals["acknowledged"], FRAMES);
-    assert_eq!(totals["published"], FRAMES);
+    assert_eq!(totals["events"]["published"], FRAMES);
     assert!(totals["statuses"].as_u64().unwrap() >= 1, "{totals}");
-    assert!(totals["rejected"].as_object().unwrap().values().all(|count| count == 0), "{totals}");
+    let events = totals["events"].as_object().unwrap();
+    assert_eq!(events.len(), Event::ALL.len());
+    let mut rejections = Event::ALL.iter().filter(|event| event.is_rejection());
+    assert!(rejections.all(|event| events[event.name()] == 0), "{totals}");
 }
 
 #[test]

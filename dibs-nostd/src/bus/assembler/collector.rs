@@ -73,8 +73,11 @@ pub(super) struct Collector {
     pub is_registration: bool,
     /// Statuses made so far.
     statuses: u32,
-    /// The nonce of the last hello, until a status answers it.
-    hello: Option<u64>,
+    /// The nonce of the last hello, until a status answers it; as bytes, which take less room.
+    hello: Option<[u8; 8]>,
+    /// The receiver's clock at the hello that was taken last, if one was.
+    greeted_at: Millis,
+    is_greeted: bool,
     /// The heartbeat refused last as not later, where nothing is under a tag.
     straggler: Option<(u32, u32)>,
     /// The receiver's clock at the packet in work, and at the last packet and heartbeat that were taken.
@@ -86,6 +89,9 @@ pub(super) struct Collector {
     refused: Option<(FrameName, Event)>,
     pub counters: Counters,
 }
+
+/// Time in which one hello without a tag is taken: anybody can send them. A sender repeats its own after 50 ms.
+const GREETING: Millis = Millis(20);
 
 /// Most heartbeats lost between two that are taken for one sender's.
 const STRAGGLERS: u32 = 16;
@@ -108,6 +114,8 @@ impl Collector {
             is_registration: false,
             statuses: 0,
             hello: None,
+            greeted_at: Millis(0),
+            is_greeted: false,
             straggler: None,
             now: Millis(0),
             packet: None,
@@ -154,7 +162,13 @@ impl Collector {
         if !packet.is_genuine(mac, hello.session) {
             return Err(ReceiveError::Forged { epoch: packet.epoch });
         }
-        self.hello = Some(hello.nonce);
+        // The last one is answered, so that strangers with many do not keep a sender from its answer.
+        self.hello = Some(hello.nonce.to_le_bytes());
+        let after = self.now.since(self.greeted_at);
+        if !M::TAGGED && self.is_greeted && after < GREETING {
+            return Err(ReceiveError::Throttled { after });
+        }
+        (self.greeted_at, self.is_greeted) = (self.now, true);
         Ok(())
     }
 
@@ -476,7 +490,8 @@ impl Collector {
                 stretch: stretch.filter(|_| self.hello.is_none()),
             }
         });
-        let answer = self.hello.take().map(|nonce| Answer { nonce, challenge, surface });
+        let nonce = self.hello.take().map(u64::from_le_bytes);
+        let answer = nonce.map(|nonce| Answer { nonce, challenge, surface });
         Status { published, wants_whole: self.wants_whole, safety, number, clock: now.0, answer }
     }
 }

@@ -64,6 +64,11 @@ pub enum ReceiveError {
         /// The event by which the frame's begin was refused, if one came.
         cause: Option<Event>,
     },
+    /// A hello without a tag, so soon after another that it is not answered at once. The next status answers the last one.
+    Throttled {
+        /// Time since the hello that was taken.
+        after: Millis,
+    },
     /// A packet for senders.
     ForSenders,
     /// The previous frame is complete and still being checked.
@@ -159,6 +164,7 @@ impl ReceiveError {
             Self::NotFinite { .. } => Event::NotFinite,
             Self::TooFar { .. } => Event::TooFar,
             Self::Digest { .. } => Event::Digest,
+            Self::Throttled { .. } => Event::Throttled,
             Self::Stretch(StretchError::Shrunk { .. }) => Event::Shrunk,
             Self::Stretch(StretchError::TooFast { .. }) => Event::TooFast,
             Self::Stretch(_) => Event::Stretch,
@@ -195,6 +201,9 @@ impl fmt::Display for ReceiveError {
             }
             Self::Unverifiable { epoch, cause: None } => {
                 write!(f, "a packet of frame {epoch} is of a session that has not begun")
+            }
+            Self::Throttled { after } => {
+                write!(f, "a hello without a tag came {after} after the one before")
             }
             Self::ForSenders => write!(f, "a packet for senders came to a receiver"),
             Self::Busy { epoch } => {

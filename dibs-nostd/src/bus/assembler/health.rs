@@ -97,6 +97,7 @@ impl Trouble {
             | ReceiveError::WrongMesh { .. }
             | ReceiveError::Stale { .. }
             | ReceiveError::Unverifiable { .. }
+            | ReceiveError::Throttled { .. }
             | ReceiveError::ForSenders => (),
             _ => self.note_frame(name, is_keyed),
         }

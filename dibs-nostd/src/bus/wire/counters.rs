@@ -97,6 +97,8 @@ events! {
     Shrunk: "shrunk",
     /// The gate refused the surface: a vertex moved too fast.
     TooFast: "too fast",
+    /// A hello without a tag came too soon after one that is answered.
+    Throttled: "throttled",
 }
 
 impl Event {

@@ -128,7 +128,15 @@ impl QuantisedBox {
         let upper = self.upper_corner().to_array();
         let axes = zip(self.origin.to_array(), upper, rounding);
         let axes = Vec3::from(axes) + self.step * 0.5;
-        sqrt(axes.length_squared()) * (1.0 + 4.0 * f32::EPSILON)
+        // The squares of steps below 1e-19 mm lose digits, and all of them below 1e-22; so do those of a box that is
+        // hardly inside f32's range. Then the sum of the axes, which is not less than the root of their squares.
+        let squared = axes.length_squared();
+        let length = if squared >= 1e-34 && squared <= f32::MAX {
+            sqrt(squared)
+        } else {
+            axes.x + axes.y + axes.z
+        };
+        length * (1.0 + 4.0 * f32::EPSILON)
     }
 }
 

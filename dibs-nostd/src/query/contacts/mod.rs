@@ -21,7 +21,8 @@ use list::List;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct Contact {
-    /// Signed separation (mm), as [`Proximity::separation`].
+    /// Signed separation (mm): the lower end of the pair's interval, as [`Proximity::lower`]. Of a tool that crosses or is inside
+    /// it may be too low by the depth's tolerance, or by more where the budget ended.
     pub separation: f32,
     /// Unit vector that leads out of the surface; never zero.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
@@ -214,7 +215,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         self.found.bound
     }
 
-    /// No separation is off by more than this.
+    /// No separation is too high by more than this (mm).
     #[must_use]
     pub const fn accuracy(&self) -> f32 {
         self.found.accuracy

@@ -201,6 +201,9 @@ fn a_course_is_not_cut_to_the_numbers_that_fit() {
         known += 1;
     }
     assert!(known > 10_000 && unknown > 1_000, "{known} {unknown}");
+    let ahead = Ahead { passed: 5, off: 5, ..Ahead::UNKNOWN };
+    assert_eq!(Course::new(1 << 32, &ahead, 1.0), Course::NONE);
+    assert_ne!(Course::new((1 << 32) - 1, &ahead, 1.0), Course::NONE);
 }
 
 /// An odometer that cannot count on starts anew.
