@@ -101,8 +101,15 @@ fn checks(demo_seconds: u32, is_whole: bool) -> Result<PathBuf> {
 /// Files that other programs write now, by those that are installed.
 fn other_programs() -> Result<Outcome> {
     let mut command = Command::new("cargo");
-    command.args(["test", "--release", "--quiet", "-p", "dibs-build", "--test", "readers"]);
-    command.args(["written_by_other_programs", "--", "--ignored", "--nocapture"]);
+    command.args(["test", "--release", "--quiet", "-p", "dibs-build", "--features", "formats"]);
+    command.args([
+        "--test",
+        "readers",
+        "written_by_other_programs",
+        "--",
+        "--ignored",
+        "--nocapture",
+    ]);
     let output = command.current_dir(workspace::root()).output()?;
     let said =
         [output.stdout, output.stderr].map(|said| String::from_utf8_lossy(&said).into_owned());

@@ -64,7 +64,7 @@ fn check(folder: &Path, file: &File) {
 
 /// Fails where no such program is installed: the list of `cargo xtask test` says then that it was skipped.
 #[test]
-#[ignore = "needs a Python with vtk, gmsh, meshio, trimesh or pymeshlab: `cargo test -p dibs-build -- --ignored writ`"]
+#[ignore = "needs a Python with vtk, gmsh, meshio, trimesh or pymeshlab: `cargo test -p dibs-build --features formats --test readers -- --ignored`"]
 fn files_written_by_other_programs_now_are_read() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let own = root.join("../target/writers/bin/python3");

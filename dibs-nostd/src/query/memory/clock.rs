@@ -21,6 +21,7 @@ pub(in crate::query) struct Reading(u64);
 pub(in crate::query) struct Deadline(u32);
 
 impl MotionClock {
+    #[inline(always)]
     pub const fn new(unit: Unit) -> Self {
         Self { unit, now: 0 }
     }

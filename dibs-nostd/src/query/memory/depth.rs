@@ -51,6 +51,7 @@ pub(in crate::query) struct Points {
 }
 
 impl KnownDepth {
+    #[inline(always)]
     pub const fn new(clock: &MotionClock) -> Self {
         let none = Point { parameter: 0.0, depth: 0.0, bound: 0.0, triangle: TriangleRow(0) };
         let points = Points { points: [none; KEPT], count: 0, deepest: f32::NAN };

@@ -30,6 +30,7 @@ pub(in crate::query) struct Leaf {
 }
 
 impl Leaves {
+    #[inline(always)]
     pub const fn new() -> Self {
         let leaves = [Leaf { link: 0, bound: 0.0 }; MOST];
         Self { leaves, count: 0, moved: 0.0, beyond: 0.0, parameter: 0.0, step: 0.0 }

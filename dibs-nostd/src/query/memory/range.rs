@@ -47,6 +47,7 @@ pub(in crate::query) struct RangeFrontMut<'f> {
 }
 
 impl<const M: usize> RangeFront<M> {
+    #[inline(always)]
     pub const fn new() -> Self {
         let none = Opened { link: 0, deadline: Deadline::UNUSED, opened: 0, near: 0 };
         Self { nodes: [none; M], state: State { count: 0, searched: None, part: None } }
