@@ -31,7 +31,7 @@ pub const DIBS_OPENED: usize = 256;
 /// It keeps a copy of the surface, so that a frame is held for its copying alone, or it searches a reader's frame itself. One
 /// context at a time.
 pub struct dibs_tracker {
-    tracker: Tracker<'static, u16, STACK, DIBS_OPENED>,
+    tracker: Tracker<'static, u16, STACK, DIBS_OPENED, DIBS_OPENED>,
     odometer: Odometer,
     /// The copies: the surface's, and the one to be written next.
     copies: [&'static Copied; 2],
@@ -124,7 +124,7 @@ pub extern "C" fn dibs_tracker_init(
             let words = storage.words(size, DIBS_TRACKER_BASE, both)?;
             let (first, second) = words.split_at_mut_checked(each).ok_or(dibs_code::Argument)?;
             Ok(dibs_tracker {
-                tracker: Tracker::new(tree)?,
+                tracker: Tracker::with_range(tree)?,
                 odometer: Odometer::new(tree),
                 copies: [
                     storage.keep(size, HEADS, Copied::new(first))?,

@@ -115,7 +115,7 @@ pub mod {name} {{
     pub type Query = ::dibs_nostd::Query<'static, Index, STACK>;
 
     /// A tracker with the same stack and room for so many opened nodes.
-    pub type Tracker<const OPENED: usize> = ::dibs_nostd::Tracker<'static, Index, STACK, OPENED>;
+    pub type Tracker<const OPENED: usize, const RANGE: usize = 0> = ::dibs_nostd::Tracker<'static, Index, STACK, OPENED, RANGE>;
 
     /// A query with the longer stack of the wide search, for large processors.
     pub type WideQuery = ::dibs_nostd::Query<'static, Index, {{ STACK + 128 }}>;

@@ -68,7 +68,9 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized, T: Tool> Sweep<'_, '_, W,
     }
 }
 
-impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OPENED> {
+impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
+    Tracker<'_, I, STACK, OPENED, RANGE>
+{
     /// Whether tool and surface come closer than `margin` (mm, not negative) on their way, and when first.
     ///
     /// By conservative advancement (Mirtich 1996): a distance changes by no more than tool and surface move, so a pair

@@ -80,7 +80,7 @@ pub struct Trackers {
     lists: [Contacts<8>; 2],
 }
 
-type Follower = Tracker<'static, u16, STACK, OPENED>;
+type Follower = Tracker<'static, u16, STACK, OPENED, OPENED>;
 
 /// The sizes that the documentation states.
 #[cfg(target_pointer_width = "32")]
@@ -145,7 +145,7 @@ pub fn run<const KINDS: u32>(
 /// Makes a tracker. A separate function, because it passes over the stack.
 #[inline(never)]
 fn place(tree: &Tree<'static, u16>, tracker: &mut Option<Follower>) -> Result<(), Fault> {
-    *tracker = Some(Tracker::new(tree).map_err(|_| Fault)?);
+    *tracker = Some(Tracker::with_range(tree).map_err(|_| Fault)?);
     Ok(())
 }
 

@@ -249,7 +249,7 @@ fn tracked(script: &mut Script) {
     let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
     let tree = built.tree::<u16>().expect("16-bit indices");
     let frames: Vec<_> = motion.frames.iter().map(|frame| built.to_rows(frame)).collect();
-    let new = || Tracker::<u16, MAX_STACK, 256>::new(&tree).expect("deep enough");
+    let new = || Tracker::<u16, MAX_STACK, 256, 512>::with_range(&tree).expect("deep enough");
     let all_kinds = [
         ("tracked", Options::new().unsigned(), false),
         ("tracked, budget", Options::new().unsigned(), false),

@@ -213,8 +213,8 @@ fn a_trackers_contacts_are_those_of_every_part_however_short_the_list() {
     let mut odometer = Odometer::new(&tree);
     let surface = odometer.start(rows.as_slice());
     // The roots have no place in the one tracker, and all have in the other.
-    let mut low = Tracker::<u16, MAX_STACK, 6>::new(&tree).expect("deep enough");
-    let mut high = Tracker::<u16, MAX_STACK, 64>::new(&tree).expect("deep enough");
+    let mut low = Tracker::<u16, MAX_STACK, 64, 6>::with_range(&tree).expect("deep enough");
+    let mut high = Tracker::<u16, MAX_STACK, 64, 64>::with_range(&tree).expect("deep enough");
     let (mut short, mut long) = (Contacts::<32, 6>::new(), Contacts::<32, 64>::new());
     for at in 0..60 {
         let tool = Sphere::new(Vec3::new(4.0 * at as f32 + 0.3, 0.4, 4.0), 1.0).expect("valid");

@@ -17,14 +17,14 @@ const LEAST_OUTSIDE: f32 = -1.999;
 /// How far contacts are looked for, in mm.
 const MARGIN: f32 = 8.0;
 
-type Tracked<'t> = Tracker<'t, u16, MAX_STACK, 256>;
+type Tracked<'t> = Tracker<'t, u16, MAX_STACK, 256, 256>;
 
 #[test]
 fn contacts_of_a_tracker_are_those_of_a_query() {
     let generate::MovingMesh { mesh, motion } = generate::heart(2_000).expect("a valid size");
     let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
     let tree = built.tree::<u16>().expect("16-bit indices");
-    let mut tracker = Tracked::new(&tree).expect("deep enough");
+    let mut tracker = Tracked::with_range(&tree).expect("deep enough");
     let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
     let mut chain = Wanderer::new(2);
     let frames: Vec<_> = motion.frames.iter().map(|frame| built.to_rows(frame)).collect();
@@ -129,7 +129,7 @@ fn contacts_survive_leaps_rests_budgets_and_other_trackers() {
     let frames = [&heart, &other].map(|built| -> Vec<_> {
         motion.frames.iter().map(|frame| built.to_rows(frame)).collect()
     });
-    let [mut one, mut two] = [0, 1].map(|at| Tracked::new(&trees[at]).expect("deep enough"));
+    let [mut one, mut two] = [0, 1].map(|at| Tracked::with_range(&trees[at]).expect("deep enough"));
     let mut odometers = [0, 1].map(|at| Odometer::new(&trees[at]));
     // Too short for any front, for most, and long enough.
     let (mut short, mut middle, mut long) =
@@ -180,7 +180,7 @@ fn no_budget_hides_contacts_for_which_the_front_has_no_place() {
     let built = Builder::new().build(&mesh).expect("a valid mesh");
     let tree = built.tree::<u16>().expect("16-bit indices");
     let rows = built.to_rows(&mesh.positions);
-    let mut tracker = Tracked::new(&tree).expect("deep enough");
+    let mut tracker = Tracked::with_range(&tree).expect("deep enough");
     let mut odometer = Odometer::new(&tree);
     let surface = odometer.start(rows.as_slice());
     let mut list = Contacts::<64, 4>::new();
@@ -207,7 +207,7 @@ fn a_search_that_was_cut_short_doubles_no_contact() {
     let built = Builder::new().build(&mesh).expect("a valid mesh");
     let tree = built.tree::<u16>().expect("16-bit indices");
     let rows = built.to_rows(&mesh.positions);
-    let mut tracker = Tracked::new(&tree).expect("deep enough");
+    let mut tracker = Tracked::with_range(&tree).expect("deep enough");
     let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
     let mut odometer = Odometer::new(&tree);
     let surface = odometer.start(rows.as_slice());
@@ -246,7 +246,7 @@ fn a_jump_far_away_starts_the_range_anew() {
         let shift = Vec3::X * (jump * size);
         let far: Vec<Vec3> = rest.iter().map(|&p| p + shift).collect();
         let mut odometer = Odometer::new(&tree);
-        let mut tracker = Tracked::new(&tree).expect("deep enough");
+        let mut tracker = Tracked::with_range(&tree).expect("deep enough");
         let (mut own, mut whole) = (Contacts::<64, 2048>::new(), Contacts::<64, 2048>::new());
         let options = Options::new();
         let out = |row: usize| rest[row] + rest[row].normalize() * 3.0;

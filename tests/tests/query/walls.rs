@@ -146,7 +146,8 @@ fn no_wall_is_missing_from_a_list_of_contacts() {
         let tree = built.tree::<u16>().expect("valid");
         let (rows, triangles) = (built.to_rows(&mesh.positions), surfaces::triangles(&tree));
         let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
-        let mut tracker = Tracker::<u16, MAX_STACK, 256>::new(&tree).expect("deep enough");
+        let mut tracker =
+            Tracker::<u16, MAX_STACK, 256, 256>::with_range(&tree).expect("deep enough");
         let mut odometer = Odometer::new(&tree);
         let surface = odometer.start(rows.as_slice());
         let (mut list, mut own) = (Contacts::<64, 1024>::new(), Contacts::<64, 1024>::new());
@@ -382,7 +383,8 @@ fn a_label_keeps_its_margin_beside_a_nearer_part() {
         let tree = built.tree::<u16>().expect("valid");
         let (rows, triangles) = (built.to_rows(&mesh.positions), surfaces::triangles(&tree));
         let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
-        let mut tracker = Tracker::<u16, MAX_STACK, 256>::new(&tree).expect("deep enough");
+        let mut tracker =
+            Tracker::<u16, MAX_STACK, 256, 256>::with_range(&tree).expect("deep enough");
         let mut odometer = Odometer::new(&tree);
         let surface = odometer.start(rows.as_slice());
         let mut rng = Rng::with_seed(seed);

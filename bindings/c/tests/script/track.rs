@@ -12,7 +12,7 @@ use super::print::Line;
 /// Trackers, and the last frame that they were given.
 pub struct Track<'t> {
     closest: Tracker<'t, u16, 512, 256>,
-    touch: Tracker<'t, u16, 512, 256>,
+    touch: Tracker<'t, u16, 512, 256, 256>,
     chain: [Tracker<'t, u16, 512, 256>; 2],
     contacts: Contacts<16>,
     odometer: Odometer,
@@ -33,7 +33,7 @@ impl<'t> Track<'t> {
         let tracker = || Tracker::new(tree).expect("a stack");
         Self {
             closest: tracker(),
-            touch: tracker(),
+            touch: Tracker::with_range(tree).expect("a stack"),
             chain: [tracker(), tracker()],
             contacts: Contacts::new(),
             odometer: Odometer::new(tree),

@@ -16,6 +16,11 @@ pub(in crate::query) struct MotionClock {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::query) struct Reading(u64);
 
+impl Reading {
+    /// That of a clock that has counted nothing.
+    pub const START: Self = Self(0);
+}
+
 /// The reading at which a bound is used up, its low half: deadlines are less than half a turn of it apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::query) struct Deadline(u32);
@@ -26,6 +31,7 @@ impl MotionClock {
         Self { unit, now: 0 }
     }
 
+    #[inline(always)]
     pub const fn now(&self) -> Reading {
         Reading(self.now)
     }

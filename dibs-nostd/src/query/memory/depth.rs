@@ -52,11 +52,11 @@ pub(in crate::query) struct Points {
 
 impl KnownDepth {
     #[inline(always)]
-    pub const fn new(clock: &MotionClock) -> Self {
+    pub const fn new() -> Self {
         let none = Point { parameter: 0.0, depth: 0.0, bound: 0.0, triangle: TriangleRow(0) };
         let points = Points { points: [none; KEPT], count: 0, deepest: f32::NAN };
         let shells = RootSet::ALL.key();
-        Self { points, leaves: Leaves::new(), shells, at: clock.now() }
+        Self { points, leaves: Leaves::new(), shells, at: Reading::START }
     }
 
     pub fn forget(&mut self) {
@@ -141,7 +141,7 @@ mod tests {
         let built = dibs_build::Builder::new().build(&mesh).unwrap();
         let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
         let mut clock = MotionClock::new(Unit::of(&tree));
-        let mut known = KnownDepth::new(&clock);
+        let mut known = KnownDepth::new();
         for _ in 0..5 {
             clock.advance(u32::MAX / 3);
             known.forget();

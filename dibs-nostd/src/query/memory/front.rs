@@ -34,6 +34,15 @@ impl Opened {
         deadlines: [Deadline::UNUSED; MAX_CHILDREN as usize],
     };
 
+    /// All zeros, so that memory is cleared in its place, and no copy of it passes over the stack.
+    const NEVER_USED: Self = Self {
+        link: 0,
+        parent: 0,
+        slot: 0,
+        apart: 0,
+        deadlines: [Deadline::UNUSED; MAX_CHILDREN as usize],
+    };
+
     /// The children whose bounds have run out, one bit each.
     #[inline(always)]
     pub fn due(&self, count: u32, threshold: Deadline) -> u32 {
@@ -87,7 +96,7 @@ impl<const OPENED: usize> Front<OPENED> {
         const { assert!(OPENED > 0 && OPENED < NOWHERE as usize) };
         Self {
             due: [Deadline::UNUSED; OPENED],
-            nodes: [Opened::FREE; OPENED],
+            nodes: [Opened::NEVER_USED; OPENED],
             end: 0,
             free: NOWHERE,
             best: None,

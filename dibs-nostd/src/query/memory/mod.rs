@@ -29,14 +29,14 @@ const FARTHEST: u32 = 1 << 29;
 
 /// A tracker's memory.
 #[derive(Clone, Debug)]
-pub(super) struct Memory<const OPENED: usize> {
+pub(super) struct Memory<const OPENED: usize, const RANGE: usize> {
     pub clock: MotionClock,
     /// Tool and surface at the last tick; none if its motion was not measured, or it ended in an error.
     last: Option<(Axis, Travel)>,
     /// When all due bounds of the front had last been tested.
     complete: Reading,
     pub front: Front<OPENED>,
-    pub range: RangeFront<OPENED>,
+    pub range: RangeFront<RANGE>,
     pub depth: KnownDepth,
 }
 
@@ -51,17 +51,16 @@ pub(super) enum Lost {
     Jump,
 }
 
-impl<const OPENED: usize> Memory<OPENED> {
+impl<const OPENED: usize, const RANGE: usize> Memory<OPENED, RANGE> {
     #[inline(always)]
     pub const fn new(unit: Unit) -> Self {
-        let clock = MotionClock::new(unit);
         Self {
-            clock,
+            clock: MotionClock::new(unit),
             last: None,
-            complete: clock.now(),
+            complete: Reading::START,
             front: Front::new(),
             range: RangeFront::new(),
-            depth: KnownDepth::new(&clock),
+            depth: KnownDepth::new(),
         }
     }
 

@@ -35,7 +35,7 @@ use crate::{Index, MovingSurface, Tool, Tree, TriangleRow};
 /// Where the axis crosses the surface, it remembers which parts of the axis cannot be deepest, and searches those points
 /// that may have become so.
 ///
-/// RAM: 8 bytes for each entry of the stack, 56 for each opened node, and 1,336.
+/// RAM: 8 bytes for each entry of the stack, 44 for each of the `OPENED`, 12 for each of the `RANGE`, and 1,336.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -59,10 +59,10 @@ use crate::{Index, MovingSurface, Tool, Tree, TriangleRow};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct Tracker<'t, I, const STACK: usize, const OPENED: usize> {
+pub struct Tracker<'t, I, const STACK: usize, const OPENED: usize, const RANGE: usize = 0> {
     tree: Tree<'t, I>,
     stack: [Waiting; STACK],
-    memory: Memory<OPENED>,
+    memory: Memory<OPENED, RANGE>,
     last: Option<Last>,
     ties: Ties,
     triangle: Option<TriangleRow>,
@@ -116,12 +116,26 @@ pub enum Fallback {
 }
 
 impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK, OPENED> {
-    /// A tracker on `tree` that has seen nothing yet.
+    /// A tracker on `tree` that has seen nothing yet, and remembers nothing between searches for contacts.
     ///
     /// # Errors
     /// [`QueryError::Stack`] if `STACK` is less than the tree needs.
     #[inline(always)]
     pub const fn new(tree: &Tree<'t, I>) -> Result<Self, QueryError> {
+        Self::with_range(tree)
+    }
+}
+
+impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
+    Tracker<'t, I, STACK, OPENED, RANGE>
+{
+    /// As [`new`](Tracker::new), and remembers `RANGE` opened nodes between searches for [contacts](Self::contacts): some
+    /// hundred as a rule.
+    ///
+    /// # Errors
+    /// [`QueryError::Stack`] if `STACK` is less than the tree needs.
+    #[inline(always)]
+    pub const fn with_range(tree: &Tree<'t, I>) -> Result<Self, QueryError> {
         if tree.stack() as usize > STACK {
             return Err(QueryError::Stack { needed: tree.stack(), available: STACK as u32 });
         }
@@ -147,7 +161,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
         self.memory.front.rows()
     }
 
-    /// Opened nodes that the last search for [contacts](Self::contacts) left, of `OPENED` places. Once all are used, the
+    /// Opened nodes that the last search for [contacts](Self::contacts) left, of `RANGE` places. Once all are used, the
     /// next one starts anew; nodes for which there is no place are searched as a query does.
     #[must_use]
     pub const fn opened_in_range(&self) -> u32 {
@@ -233,7 +247,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
     /// The closest pair, and all contacts within `margin` (mm): those of [`Query::contacts`](crate::Query::contacts).
     ///
     /// Where the surface is within the margin, a range search finds the others. The tracker remembers the nodes that it
-    /// opened, and for how long their other children are beyond the margin. It starts anew for another surface, for a tool as
+    /// opened, up to `RANGE`, and for how long their other children are beyond the margin. It starts anew for another surface, for a tool as
     /// far from the last as a 16th of the root sphere's radius, after a search that ran out of budget, and once all places
     /// are used ([`opened_in_range`](Self::opened_in_range)). Where the budget ends, the list's bound can be less than a query's, which looks at near parts first.
     ///

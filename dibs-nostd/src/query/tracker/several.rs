@@ -20,7 +20,9 @@ struct Bound {
     stale: f32,
 }
 
-impl<I: Index, const STACK: usize, const OPENED: usize> Tracker<'_, I, STACK, OPENED> {
+impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
+    Tracker<'_, I, STACK, OPENED, RANGE>
+{
     /// The closest of several pairs of a surface and a tool, each with a tracker of its own; `None` for an empty slice. A
     /// chain of tools is a pair for each of them and its surface.
     ///

@@ -97,7 +97,7 @@ fn follow_with<I: Index>(
     let rest = Motion { frames: vec![mesh.positions.clone()], ..Motion::default() };
     let (beat, outline) = (Beat::new(&rest), Outline::of(&built.to_rows(&mesh.positions)));
     let mut query = Query::<I, MAX_STACK>::new(tree)?;
-    let mut tracker = Box::new(Tracker::<I, MAX_STACK, OPENED>::new(tree)?);
+    let mut tracker = Box::new(Tracker::<I, MAX_STACK, OPENED, OPENED>::with_range(tree)?);
     let mut list = Box::new(List::new());
     let frame = |number: u32| -> Result<_> {
         let mut positions = Vec::new();
