@@ -10,7 +10,7 @@ use crate::tree::format::{Link, MAX_CHILDREN};
 pub(in crate::query) struct Opened {
     /// The node's children or triangles, as a link; [`UNUSED`] where this place is free.
     pub link: u32,
-    /// Place of the node above; of a free place, the next free one.
+    /// Place of the node above; of a free place, the next free one, counted from 1.
     pub parent: u16,
     /// Index among the parent's children.
     pub slot: u8,
@@ -24,17 +24,18 @@ pub(in crate::query) struct Opened {
 pub(in crate::query) const UNUSED: u32 = u32::MAX >> 1;
 /// No place: one more than the largest.
 pub(in crate::query) const NOWHERE: u16 = u16::MAX;
+/// No free place. Free places are counted from 1, so that this is zero.
+const NO_FREE: u16 = 0;
 
 impl Opened {
     const FREE: Self = Self {
         link: UNUSED,
-        parent: NOWHERE,
+        parent: NO_FREE,
         slot: 0,
         apart: 0,
         deadlines: [Deadline::UNUSED; MAX_CHILDREN as usize],
     };
 
-    /// All zeros, so that memory is cleared in its place, and no copy of it passes over the stack.
     const NEVER_USED: Self = Self {
         link: 0,
         parent: 0,
@@ -82,7 +83,7 @@ pub(in crate::query) struct Front<const OPENED: usize> {
     nodes: [Opened; OPENED],
     /// Places from here on are unused since the last clear.
     end: usize,
-    /// The first free place below.
+    /// The first free place, counted from 1; [`NO_FREE`] where there is none.
     free: u16,
     /// The closest triangle's place.
     pub best: Option<Place>,
@@ -91,18 +92,18 @@ pub(in crate::query) struct Front<const OPENED: usize> {
 }
 
 impl<const OPENED: usize> Front<OPENED> {
-    #[inline(always)]
-    pub const fn new() -> Self {
-        const { assert!(OPENED > 0 && OPENED < NOWHERE as usize) };
+    /// All zeros, so that memory is cleared in its place, and no copy of it passes over the stack.
+    pub const EMPTY: Self = {
+        assert!(OPENED > 0 && OPENED < NOWHERE as usize);
         Self {
             due: [Deadline::UNUSED; OPENED],
             nodes: [Opened::NEVER_USED; OPENED],
             end: 0,
-            free: NOWHERE,
+            free: NO_FREE,
             best: None,
             hand: 0,
         }
-    }
+    };
 }
 
 /// The front without its size, so that a search is compiled once for all sizes.
@@ -150,7 +151,7 @@ impl<const OPENED: usize> Front<OPENED> {
 impl FrontMut<'_> {
     /// Frees all places.
     pub fn clear(&mut self) {
-        (*self.end, *self.free, *self.best, *self.hand) = (0, NOWHERE, None, 0);
+        (*self.end, *self.free, *self.best, *self.hand) = (0, NO_FREE, None, 0);
     }
 
     pub fn is_empty(&self) -> bool {
@@ -198,7 +199,7 @@ impl FrontMut<'_> {
     /// Opens a node in a free place, with one bound for all below; `None` if there is no place.
     #[inline(always)]
     pub fn open(&mut self, link: u32, parent: Place, deadline: Deadline) -> Option<u16> {
-        let at = if *self.free == NOWHERE { *self.end } else { usize::from(*self.free) };
+        let at = self.free.checked_sub(1).map_or(*self.end, usize::from);
         let node = self.nodes.get_mut(at)?;
         if at == *self.end {
             *self.end = at + 1;
@@ -217,7 +218,7 @@ impl FrontMut<'_> {
         let node = self.node(at)?;
         let place = Place { node: node.parent, slot: node.slot };
         *node = Opened { parent: free, ..Opened::FREE };
-        *self.free = at;
+        *self.free = at.wrapping_add(1);
         *self.due.get_mut(usize::from(at))? = clock.never();
         *self.node(place.node)?.deadlines.get_mut(usize::from(place.slot))? = deadline;
         self.put_back(place)

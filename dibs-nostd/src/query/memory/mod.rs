@@ -58,8 +58,8 @@ impl<const OPENED: usize, const RANGE: usize> Memory<OPENED, RANGE> {
             clock: MotionClock::new(unit),
             last: None,
             complete: Reading::START,
-            front: Front::new(),
-            range: RangeFront::new(),
+            front: Front::EMPTY,
+            range: RangeFront::EMPTY,
             depth: KnownDepth::new(),
         }
     }

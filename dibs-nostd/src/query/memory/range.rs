@@ -47,11 +47,11 @@ pub(in crate::query) struct RangeFrontMut<'f> {
 }
 
 impl<const M: usize> RangeFront<M> {
-    #[inline(always)]
-    pub const fn new() -> Self {
+    /// All zeros, as [`Front::EMPTY`](super::front::Front::EMPTY).
+    pub const EMPTY: Self = {
         let none = Opened { link: 0, deadline: Deadline::UNUSED, opened: 0, near: 0 };
         Self { nodes: [none; M], state: State { count: 0, searched: None, part: None } }
-    }
+    };
 
     /// Number of opened nodes.
     pub const fn opened(&self) -> u32 {
