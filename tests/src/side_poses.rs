@@ -128,6 +128,10 @@ pub const POSES_OF_A_FRAME: usize = 100;
 /// Parts of an axis whose depth is sampled.
 const POINTS: u32 = 16;
 
+/// Parts of an axis at whose ends the surface may be shown to cut itself: where a sheet lies behind another one for less
+/// than a sample's distance, the depth jumps between two samples.
+const CUTS: u32 = 8 * POINTS;
+
 /// Judges poses on one shape of a surface; prints the wrong ones.
 ///
 /// # Panics
@@ -197,10 +201,7 @@ pub fn judge(surface: &Closed, seed: u64) -> Tally {
         tally.inside += usize::from(inside);
         let off = off(&rows, &triangles, &tool, &pair, inside, &found);
         let is_off = off > f64::from(found.accuracy);
-        if inside == says
-            && inside
-            && is_off
-            && sides::is_cut_along(&rows, &triangles, &tool, POINTS)
+        if inside == says && inside && is_off && sides::is_cut_along(&rows, &triangles, &tool, CUTS)
         {
             tally.self_cut += 1;
             continue;

@@ -106,7 +106,7 @@ const RARE: [&str; 15] = [
     "query::search::roots::Roots::with_others",
     "query::search::ties::Ties::drop_farther",
     "query::search::Search<I,V,T>::not_finite",
-    "query::tracker::Tracker<I,_,_>::whole",
+    "query::tracker::Tracker<I,_,_,_>::whole",
     "tool::triangle::closest_of_all",
     "tool::edge::nearly_parallel",
     "constraint::last_side::LastSide::without_side",
