@@ -18,6 +18,20 @@ fn the_core_has_no_mutual_imports() {
 }
 
 #[test]
+fn no_folder_of_the_core_has_mutual_imports_inside() {
+    let all = imports("dibs-nostd");
+    let source = source("dibs-nostd");
+    let folders = all.keys().filter(|folder| source.join(folder).join("mod.rs").is_file());
+    let mut edges = 0;
+    for folder in folders {
+        let inside = inner_imports(&source, folder);
+        edges += inside.values().map(BTreeSet::len).sum::<usize>();
+        assert_eq!(cycle(&inside), None, "{folder}: {inside:?}");
+    }
+    assert!(edges >= 9, "{edges} imports were read");
+}
+
+#[test]
 fn the_builder_has_no_mutual_imports() {
     let imports = imports("dibs-build");
     assert!(imports["builder"].contains("array"), "nothing was read: {imports:?}");
@@ -75,10 +89,46 @@ fn cycle(imports: &Imports) -> Option<BTreeSet<&str>> {
     (!left.is_empty()).then_some(left)
 }
 
+fn source(package: &str) -> PathBuf {
+    let checkout = env::var("DIBS_CHECKOUT").unwrap_or_else(|_| "..".to_owned());
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(checkout).join(package).join("src")
+}
+
+/// The imports between the folders inside of a top folder. Its own files are its front: they may import from all, and all
+/// from them.
+fn inner_imports(source: &Path, folder: &str) -> Imports {
+    let root = source.join(folder);
+    let front = fs::read_to_string(root.join("mod.rs")).expect("a source file");
+    let home = homes(&front.replace("#[cfg(test)]", ""));
+    let is_folder = |name: &String| {
+        // One with files besides tests.
+        root.join(name).is_dir() && !files(&root.join(name)).is_empty()
+    };
+    let mut imports = Imports::new();
+    for file in files(&root) {
+        let inner = file.strip_prefix(&root).expect("inside").with_extension("");
+        let mut module: Vec<String> =
+            inner.iter().map(|name| name.to_string_lossy().into_owned()).collect();
+        if module.last().is_some_and(|name| name == "mod") {
+            module.pop();
+        }
+        let Some(from) = module.first().cloned().filter(is_folder) else { continue };
+        let to = imports.entry(from.clone()).or_default();
+        let code = code(&file);
+        let above = "super::".repeat(module.len());
+        for prefix in [format!("crate::{folder}::"), above] {
+            // A path that goes up farther, or less far, is another one.
+            let code = code.replace(&format!("super::{prefix}"), "");
+            to.extend(names(&code, &prefix).filter_map(|name| home.get(&name).cloned()));
+        }
+        to.retain(|to| *to != from && is_folder(to));
+    }
+    imports
+}
+
 /// The imports between the top folders of a crate.
 fn imports(package: &str) -> Imports {
-    let checkout = env::var("DIBS_CHECKOUT").unwrap_or_else(|_| "..".to_owned());
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join(checkout).join(package).join("src");
+    let source = source(package);
     let lib = code(&source.join("lib.rs"));
     let home = homes(&lib);
     let mut imports = Imports::new();
@@ -89,7 +139,7 @@ fn imports(package: &str) -> Imports {
             continue;
         }
         let to = imports.entry(from.clone()).or_default();
-        to.extend(names(&code(&file)).filter_map(|name| home.get(&name).cloned()));
+        to.extend(names(&code(&file), "crate::").filter_map(|name| home.get(&name).cloned()));
         to.remove(&from);
     }
     // A module without a folder of its own, such as `wire`, has no row.
@@ -127,9 +177,9 @@ fn homes(lib: &str) -> BTreeMap<String, String> {
     home
 }
 
-/// The first name of every path that begins at the crate's root.
-fn names(code: &str) -> impl Iterator<Item = String> {
-    code.split("crate::").skip(1).flat_map(|path| {
+/// The first name of every path after a prefix.
+fn names(code: &str, prefix: &str) -> impl Iterator<Item = String> {
+    code.split(prefix).skip(1).flat_map(|path| {
         let Some(group) = path.strip_prefix('{') else {
             return words(path).take(1).collect::<Vec<_>>();
         };
@@ -159,7 +209,12 @@ fn words(text: &str) -> impl Iterator<Item = String> {
 /// A file without its comments and its unit tests.
 fn code(file: &Path) -> String {
     let text = fs::read_to_string(file).expect("a source file");
-    let code = text.split("#[cfg(test)]\nmod ").next().unwrap_or_default();
+    let ends = |(at, _): &(usize, &str)| {
+        let line = text[*at..].lines().nth(1);
+        line.is_some_and(|line| line.ends_with('{'))
+    };
+    let end = text.match_indices("#[cfg(test)]\nmod ").find(ends).map_or(text.len(), |(at, _)| at);
+    let code = &text[..end];
     let lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));
     lines.collect::<Vec<_>>().join("\n")
 }
