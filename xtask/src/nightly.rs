@@ -82,7 +82,8 @@ pub fn fuzz(options: &FuzzOptions) -> Result<Vec<Fuzzed>> {
     }
     let folder = workspace::root().join("tests/fuzz");
     let built = workspace::target().join("fuzz");
-    let mut build = nightly(&["fuzz", "build", "--release", "--target-dir"]);
+    let mut build =
+        nightly(&["fuzz", "build", "--release", "--fuzz-dir", "tests/fuzz", "--target-dir"]);
     build.arg(&built);
     if options.target.as_deref() == Some(FORMATS) {
         build.args(["--features", FORMATS]);

@@ -7,7 +7,7 @@ use super::passed::{self, Passed};
 use super::search::{Search, WITHIN};
 use super::{Contacts, NoSide, Options, Proximity, Query, Side};
 use crate::unavailable::QueryError;
-use crate::{Coverage, Index, Tool, TriangleRow, VertexTable};
+use crate::{Index, Tool, TriangleRow, VertexTable};
 
 /// The closest pair of a chain of tools and the surfaces of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -242,6 +242,8 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
             scene.add(surface, number, found, &mut best);
             let is_outside = found.side == Side::Outside;
             if is_outside || is_farther {
+                // Without the accuracy an end next to the surface might count as outside; no test shows it, since a tool
+                // whose end is there is searched.
                 passed.add(number, found.lower + tool.radius() - found.accuracy, is_outside);
             }
             if !is_farther {
@@ -302,12 +304,8 @@ fn nearest_first(nearest: usize, count: usize) -> impl Iterator<Item = usize> {
 
 /// The pairs so far.
 struct Scene {
+    /// The closest, with the interval and the tests of all.
     best: Option<Closest>,
-    lower: f32,
-    accuracy: f32,
-    coverage: Coverage,
-    node_tests: u32,
-    triangle_tests: u32,
     /// With the rest of the budget.
     options: Options,
     /// Pairs as close as this are searched, even if another one is closer.
@@ -326,11 +324,6 @@ impl Scene {
     fn new(options: &Options) -> Self {
         Self {
             best: None,
-            lower: f32::INFINITY,
-            accuracy: 0.0,
-            coverage: Coverage::Measured,
-            node_tests: 0,
-            triangle_tests: 0,
             options: *options,
             margin: f32::NEG_INFINITY,
             is_entered: false,
@@ -363,35 +356,26 @@ impl Scene {
     fn add(&mut self, surface: usize, tool: usize, found: Proximity, own: &mut Option<Proximity>) {
         self.is_entered = true;
         self.options.budget = self.options.budget.less(found.node_tests, found.triangle_tests);
-        self.node_tests = self.node_tests.saturating_add(found.node_tests);
-        self.triangle_tests = self.triangle_tests.saturating_add(found.triangle_tests);
         let side = found.side;
         if matches!(side, Side::Inside | Side::Crossing | Side::Undefined(NoSide::BelowAccuracy)) {
             self.is_outside = false;
         }
-        if found.lower < self.lower {
-            self.lower = found.lower;
-        }
-        if found.accuracy > self.accuracy {
-            self.accuracy = found.accuracy;
-        }
-        self.coverage = self.coverage.or_weaker(found.coverage);
         if own.is_none_or(|own| found.separation < own.separation) {
             *own = Some(found);
         }
-        if self.best.is_none_or(|best| found.separation < best.proximity.separation) {
-            self.best = Some(Closest { surface, tool, proximity: found });
-        }
+        let new = Closest { surface, tool, proximity: found };
+        self.best = Some(self.best.map_or(new, |best| {
+            let proximity = best.proximity.or_nearer(found);
+            let is_nearer = found.separation < best.proximity.separation;
+            Closest { proximity, ..if is_nearer { new } else { best } }
+        }));
     }
 
     fn finish(self) -> Option<Closest> {
-        let Self { lower, accuracy, coverage, node_tests, triangle_tests, .. } = self;
-        let Closest { surface, tool, mut proximity } = self.best?;
+        let mut best = self.best?;
         if self.is_cut_short {
-            proximity.side = Side::Undefined(NoSide::CutShort);
+            best.proximity.side = Side::Undefined(NoSide::CutShort);
         }
-        let proximity =
-            Proximity { lower, accuracy, coverage, node_tests, triangle_tests, ..proximity };
-        Some(Closest { surface, tool, proximity })
+        Some(best)
     }
 }

@@ -111,6 +111,20 @@ impl Proximity {
         self.side == Side::Undefined(NoSide::BelowAccuracy) && self.axis_distance <= 2.0 * error
     }
 
+    /// The nearer of the pairs of two searches, with what is certain of both: the least lower end, the worst accuracy and
+    /// coverage, all tests.
+    pub(super) fn or_nearer(self, other: Self) -> Self {
+        let nearer = if other.separation < self.separation { other } else { self };
+        Self {
+            lower: if other.lower < self.lower { other.lower } else { self.lower },
+            accuracy: if other.accuracy > self.accuracy { other.accuracy } else { self.accuracy },
+            coverage: self.coverage.or_weaker(other.coverage),
+            node_tests: self.node_tests.saturating_add(other.node_tests),
+            triangle_tests: self.triangle_tests.saturating_add(other.triangle_tests),
+            ..nearer
+        }
+    }
+
     /// Whether the budget ran out before the closest point was certain.
     pub(super) fn is_cut_short(&self) -> bool {
         self.triangle.is_none() || self.lower < self.separation

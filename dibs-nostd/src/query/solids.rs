@@ -75,13 +75,9 @@ fn of_solid<I: Index, V: VertexTable + ?Sized, T: Tool>(
 /// of them, and on no known side if that of another one is not known.
 fn nearer(one: Proximity, other: Proximity, tool: &impl Tool) -> Proximity {
     let is_nearer = other.separation < one.separation;
-    let (mut nearer, farther) = if is_nearer { (other, one) } else { (one, other) };
-    nearer.lower = least(nearer.lower, least_possible(&farther, tool));
-    if farther.accuracy > nearer.accuracy {
-        nearer.accuracy = farther.accuracy;
-    }
-    nearer.node_tests = nearer.node_tests.saturating_add(farther.node_tests);
-    nearer.triangle_tests = nearer.triangle_tests.saturating_add(farther.triangle_tests);
+    let (near, farther) = if is_nearer { (other, one) } else { (one, other) };
+    let mut nearer = one.or_nearer(other);
+    nearer.lower = least(near.lower, least_possible(&farther, tool));
     if nearer.side == Side::Outside && matches!(farther.side, Side::Undefined(_)) {
         nearer.side = farther.side;
         nearer.lower = least(nearer.separation, farther.lower);

@@ -3,6 +3,7 @@
 mod answers;
 mod chain;
 mod contacts;
+mod cut_short;
 mod differential;
 mod flat;
 mod hand;

@@ -131,7 +131,7 @@ impl QuantisedBox {
         // The squares of steps below 1e-19 mm lose digits, and all of them below 1e-22; so do those of a box that is
         // hardly inside f32's range. Then the sum of the axes, which is not less than the root of their squares.
         let squared = axes.length_squared();
-        let length = if squared >= 1e-34 && squared <= f32::MAX {
+        let length = if (1e-34..=f32::MAX).contains(&squared) {
             sqrt(squared)
         } else {
             axes.x + axes.y + axes.z

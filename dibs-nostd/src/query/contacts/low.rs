@@ -55,9 +55,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             let visit = |row, at: &AxisPair| low.add(row, at);
             let (beyond, tests) =
                 search.each_low_from(&mut front, limit, (ridge, options.part), visit)?;
-            if beyond == f32::INFINITY {
-                front.keep();
-            }
+            front.keep();
             Ok(Found { complete: low.complete, beyond, tests })
         })
     }

@@ -33,7 +33,7 @@ pub(in crate::query) struct RangeFront<const M: usize> {
 #[derive(Clone, Debug)]
 struct State {
     count: usize,
-    /// The end of the last search; none if it did not come to its end.
+    /// The last search; none after an error.
     searched: Option<Reading>,
     /// The label whose leaves are near.
     part: Option<u8>,
@@ -75,7 +75,7 @@ impl<const M: usize> RangeFront<M> {
 }
 
 impl RangeFrontMut<'_> {
-    /// The search has come to its end.
+    /// The search has ended. Nodes that its budget did not reach are as they were, and stay due.
     pub fn keep(&mut self) {
         self.state.searched = Some(self.clock.now());
     }

@@ -79,6 +79,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 continue;
             }
             let Some(left) = self.left.node_tests.checked_sub(1) else {
+                // The rest stays due.
+                let deadline = node.deadline;
+                *front.node_mut(at).ok_or(corrupt)? = Opened { link, deadline, opened, near };
                 return Ok(false);
             };
             self.left.node_tests = left;

@@ -248,8 +248,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     ///
     /// Where the surface is within the margin, a range search finds the others. The tracker remembers the nodes that it
     /// opened, up to `RANGE`, and for how long their other children are beyond the margin. It starts anew for another surface, for a tool as
-    /// far from the last as a 16th of the root sphere's radius, after a search that ran out of budget, and once all places
-    /// are used ([`opened_in_range`](Self::opened_in_range)). Where the budget ends, the list's bound can be less than a query's, which looks at near parts first.
+    /// far from the last as a 16th of the root sphere's radius, and once all places are used
+    /// ([`opened_in_range`](Self::opened_in_range)). Where the budget ends, the list's bound can be less than a query's, which looks at near parts first.
     ///
     /// Cost: that of [`closest`](Self::closest), a few instructions for each opened node, and what a query takes to compare
     /// the triangles within the margin.

@@ -187,15 +187,10 @@ impl Tracked {
         // A pair whose side the budget left open may be inside.
         let cut_short = Side::Undefined(NoSide::CutShort);
         let is_open = one.side == cut_short || two.side == cut_short;
-        let closest = Proximity {
-            lower: if two.lower < one.lower { two.lower } else { one.lower },
-            accuracy: if two.accuracy > one.accuracy { two.accuracy } else { one.accuracy },
-            node_tests: one.node_tests.saturating_add(two.node_tests),
-            triangle_tests: one.triangle_tests.saturating_add(two.triangle_tests),
-            coverage: one.coverage.or_weaker(two.coverage),
-            side: if is_open { cut_short } else { closer.closest.side },
-            ..closer.closest
-        };
+        let mut closest = one.or_nearer(two);
+        if is_open {
+            closest.side = cut_short;
+        }
         Self {
             closest,
             fallback: self.fallback.or(other.fallback),

@@ -101,11 +101,8 @@ fn no_bound_of_a_range_exceeds_the_distance() {
                 let visit = |_, _: &_| LIMIT;
                 let search = search.expect("valid");
                 let (beyond, _) = search.each_low_from(&mut moved, LIMIT, (RIDGE, None), visit)?;
-                let is_whole = beyond == f32::INFINITY;
-                if is_whole {
-                    moved.keep();
-                }
-                Ok::<_, QueryError>(is_whole)
+                moved.keep();
+                Ok::<_, QueryError>(beyond == f32::INFINITY)
             };
             // Budgets that end anywhere, until one is enough.
             let budgets = if tick == 4 { 0..2_000 } else { 2_000..2_001 };

@@ -1,0 +1,74 @@
+//! Depths whose search a limit ends: by the budget, or by the most work that a depth may take.
+
+use dibs_build::{Builder, Mesh};
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{Budget, Capsule, Options, Query, Side};
+use dibs_tests::surfaces::ball;
+use glam::Vec3;
+
+/// Two balls of 40 mm beside each other.
+fn two_balls() -> Mesh {
+    let one = ball(3);
+    let count = one.positions.len() as u32;
+    let beside = one.positions.iter().map(|&p| p + Vec3::X * 100.0);
+    let positions = one.positions.iter().copied().chain(beside).collect();
+    let other = one.triangles.iter().map(|corners| corners.map(|v| v + count));
+    let triangles = one.triangles.iter().copied().chain(other).collect();
+    Mesh { positions, triangles, ..Mesh::default() }
+}
+
+/// An axis that meets the surface in several places: wherever the budget ends, the interval holds what the whole search
+/// finds.
+#[test]
+fn an_axis_through_several_walls_is_as_deep_under_any_budget() {
+    let meshes = [two_balls(), ball(2)];
+    let (mut cut, mut crossing) = (0, 0);
+    for mesh in &meshes {
+        let built = Builder::new().stretch(2.0).build(mesh).expect("a valid mesh");
+        let tree = built.tree::<u16>().expect("16-bit indices");
+        let rows = built.to_rows(&mesh.positions);
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        for slope in 0..12 {
+            let lean = Vec3::new(0.0, 3.0 * slope as f32, 1.7 * slope as f32 - 9.0);
+            let (from, to) = (Vec3::X * -60.0 + lean, Vec3::X * 170.0 - 0.7 * lean);
+            let tool = Capsule::new(from, to, 1.0).expect("a valid tool");
+            let whole = query.closest(rows.as_slice(), &tool, &Options::cold()).expect("an answer");
+            let budgets = (0..200).map(|tests| (3 * tests, u32::MAX));
+            let budgets = budgets.chain((0..60).map(|tests| (u32::MAX, tests)));
+            for (node_tests, triangle_tests) in budgets {
+                let budget = Budget { node_tests, triangle_tests };
+                let options = Options::cold().budget(budget);
+                let found = query.closest(rows.as_slice(), &tool, &options).expect("an answer");
+                cut += usize::from(found.lower < whole.lower);
+                crossing += usize::from(found.side == Side::Crossing);
+                let (true_interval, interval) = (whole.interval(), found.interval());
+                assert!(
+                    interval.lower <= true_interval.upper && true_interval.lower <= interval.upper,
+                    "{slope} {budget:?}: {whole:?} {found:?}"
+                );
+            }
+        }
+    }
+    assert!(cut > 500 && crossing > 500, "{cut} {crossing}");
+}
+
+/// Around the middle of a ball all vertices are equally far, so that each point of the axis takes a search of the whole
+/// tree.
+#[test]
+fn a_depth_takes_no_more_work_than_it_states() {
+    let mesh = ball(5);
+    let built = Builder::new().stretch(1.2).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let tool = Capsule::new(Vec3::X * -3.0, Vec3::new(3.0, 0.1, 0.0), 1.0).expect("a valid tool");
+    let options = Options::cold().depth_tolerance(0.0);
+    let closest = query.closest(rows.as_slice(), &tool, &options.unsigned()).expect("an answer");
+    let found = query.closest(rows.as_slice(), &tool, &options).expect("an answer");
+    let most = tree.node_count().max(3_072);
+    println!("{} of {most}, beside {}", found.node_tests, closest.node_tests);
+    assert_eq!(found.side, Side::Inside);
+    // The side's own work comes first.
+    assert!(found.node_tests <= closest.node_tests + most + 512, "{found:?} {closest:?} {most}");
+    assert!(found.node_tests > closest.node_tests + most / 2, "the limit was not met");
+}
