@@ -55,7 +55,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             let visit = |row, at: &AxisPair| low.add(row, at);
             let (beyond, tests) =
                 search.each_low_from(&mut front, limit, (ridge, options.part), visit)?;
-            front.keep();
+            front.keep(beyond == f32::INFINITY);
             Ok(Found { complete: low.complete, beyond, tests })
         })
     }

@@ -33,7 +33,7 @@ pub(in crate::query) struct RangeFront<const M: usize> {
 #[derive(Clone, Debug)]
 struct State {
     count: usize,
-    /// The last search; none after an error.
+    /// When every node had last been looked at, at most [`JUMP`] before the last search; none after an error.
     searched: Option<Reading>,
     /// The label whose leaves are near.
     part: Option<u8>,
@@ -43,6 +43,7 @@ struct State {
 pub(in crate::query) struct RangeFrontMut<'f> {
     nodes: &'f mut [Opened],
     state: &'f mut State,
+    searched: Reading,
     pub clock: MotionClock,
 }
 
@@ -66,18 +67,20 @@ impl<const M: usize> RangeFront<M> {
     pub fn now(&mut self, clock: MotionClock, part: Option<u8>) -> RangeFrontMut<'_> {
         let Self { nodes, state } = self;
         let searched = state.searched.filter(|_| state.part == part);
-        if !searched.is_some_and(|at| clock.since(at) <= JUMP && state.count < M) {
+        let kept = searched.filter(|&at| clock.since(at) <= JUMP && state.count < M);
+        if kept.is_none() {
             state.count = 0;
         }
         (state.searched, state.part) = (None, part);
-        RangeFrontMut { nodes, state, clock }
+        RangeFrontMut { nodes, state, searched: kept.unwrap_or(clock.now()), clock }
     }
 }
 
 impl RangeFrontMut<'_> {
-    /// The search has ended. Nodes that its budget did not reach are as they were, and stay due.
-    pub fn keep(&mut self) {
-        self.state.searched = Some(self.clock.now());
+    /// The search has ended. Nodes that its budget did not reach are as they were, and stay due; deadlines wrap, so the front
+    /// starts anew where that goes on for long.
+    pub fn keep(&mut self, is_whole: bool) {
+        self.state.searched = Some(if is_whole { self.clock.now() } else { self.searched });
     }
 
     pub const fn is_empty(&self) -> bool {

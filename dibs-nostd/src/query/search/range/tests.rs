@@ -101,8 +101,9 @@ fn no_bound_of_a_range_exceeds_the_distance() {
                 let visit = |_, _: &_| LIMIT;
                 let search = search.expect("valid");
                 let (beyond, _) = search.each_low_from(&mut moved, LIMIT, (RIDGE, None), visit)?;
-                moved.keep();
-                Ok::<_, QueryError>(beyond == f32::INFINITY)
+                let is_whole = beyond == f32::INFINITY;
+                moved.keep(is_whole);
+                Ok::<_, QueryError>(is_whole)
             };
             // Budgets that end anywhere, until one is enough.
             let budgets = if tick == 4 { 0..2_000 } else { 2_000..2_001 };
@@ -120,4 +121,40 @@ fn no_bound_of_a_range_exceeds_the_distance() {
     }
     std::println!("{checked} bounds, {kept} fronts kept, {:?}", memory.clock);
     assert!(checked > 20_000 && kept > 300 && memory.clock.has_wrapped());
+}
+
+/// Nodes that a budget never reaches stay due, however far tool and surface move meanwhile: deadlines wrap.
+#[test]
+fn a_node_that_no_search_reaches_stays_due() {
+    let mesh = generate::heart(1_280).expect("a valid size").mesh;
+    let built = Builder::new().build(&mesh).expect("builds");
+    let tree = Tree::<u16>::from_bytes(built.blob()).expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let mut by_x = rows.clone();
+    by_x.sort_by(|a, b| a.x.total_cmp(&b.x));
+    let at = |tip: Vec3, out: Vec3| Capsule::new(tip + out, tip + out * 9.0, 0.5);
+    let first = at(by_x[by_x.len() - 1], Vec3::X).expect("a valid capsule");
+    let last = at(by_x[0], -Vec3::X).expect("a valid capsule");
+    let mut stack = [Waiting { lower: 0.0, link: 0 }; 128];
+    let mut memory = Memory::<1, 256>::new(Unit::of(&tree));
+    let mut visited = 0;
+    for tick in 0..=6_000 {
+        memory.begin(Ok(1 << 19));
+        let tool = if tick < 6_000 { first } else { last };
+        let options = Options::cold().budget(Budget {
+            node_tests: if tick == 0 || tick == 6_000 { u32::MAX } else { 0 },
+            triangle_tests: u32::MAX,
+        });
+        let search = Search::start(&tree, &mut stack, rows.as_slice(), &tool, &options, None, None);
+        let mut front = memory.range.now(memory.clock, None);
+        visited = 0;
+        let visit = |_, _: &_| {
+            visited += 1;
+            LIMIT
+        };
+        let search = search.expect("valid");
+        let found = search.each_low_from(&mut front, LIMIT, (RIDGE, None), visit);
+        front.keep(found.expect("an answer").0 == f32::INFINITY);
+    }
+    assert!(visited > 0, "{:?}", memory.clock);
 }
