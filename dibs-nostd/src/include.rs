@@ -7,7 +7,8 @@
 /// | item | is |
 /// |---|---|
 /// | `TREE` | the bytes in flash, a [`TreeBytes`](crate::TreeBytes): `TREE.validate()` gives the `Tree` |
-/// | `Surface` | the double buffer for its vertices, a [`Frames`](crate::Frames) |
+/// | `Surface`, `start` | the vertices as they are now and their two ends, `Bus` and `Guard`: [`guard`](crate::guard) |
+/// | `Frames` | a double buffer for its vertices, a [`Frames`](crate::Frames), for a loop of your own |
 /// | `Receiver` | the bus's end of it (feature `bus`), an [`Assembler`](crate::Assembler) that measures stretch in slices; `receiver` makes one |
 /// | `Reader` | the control loop's end of it |
 /// | `Query` | a [`Query`](crate::Query) with the stack that the tree needs; `WideQuery` for large processors |
@@ -39,6 +40,22 @@ macro_rules! if_bus {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! if_bus {
+    ($($item:item)*) => {};
+}
+
+/// Items of the generated module that need the features `bus` and `control`.
+#[cfg(all(feature = "bus", feature = "control"))]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! if_guard {
+    ($($item:item)*) => { $($item)* };
+}
+
+/// Nothing: a feature is off.
+#[cfg(not(all(feature = "bus", feature = "control")))]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! if_guard {
     ($($item:item)*) => {};
 }
 

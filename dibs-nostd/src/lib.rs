@@ -59,6 +59,8 @@ mod bus;
 #[cfg(feature = "control")]
 mod control;
 mod error;
+#[cfg(all(feature = "bus", feature = "control"))]
+pub mod guard;
 mod include;
 mod math;
 #[cfg(feature = "modes")]

@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 use dibs_build::{Builder, Mesh};
 use dibs_nostd::constraint::{ForbiddenRegion, SpringDamper};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Assembler, Capsule, Frames, Millis, Options, SurfaceLimits, Tracker, Tree};
+use dibs_nostd::guard::{GuardLimits, Surface};
+use dibs_nostd::{Capsule, Millis, Tree, TreeBytes};
 use dibs_stream::transport::Target;
 use dibs_stream::{Sender, Settings, SurfaceOrder};
 
@@ -29,7 +30,7 @@ fn octahedron() -> Mesh {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    static FRAMES: Frames<6> = Frames::new();
+    static OCTAHEDRON: Surface<6> = Surface::new();
     let mesh = octahedron();
     let built = Builder::new().stretch(1.5).build(&mesh)?;
     let tree = Tree::<u16>::from_bytes(built.blob())?;
@@ -40,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let order = SurfaceOrder::of(&tree);
     let mut sender = Sender::<_, 1024>::new(target.open()?, order, Settings::default());
     let sending = thread::spawn(move || {
-        for frame in 0..40 {
+        for frame in 0..100 {
             let size = 1.0 + 0.1 * (0.3 * frame as f32).sin();
             let positions: Vec<Vec3> = mesh.positions.iter().map(|&p| p * size).collect();
             sender.send(&positions).expect("sent");
@@ -49,29 +50,29 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     });
 
-    // The controller: packets, checks in slices, and the force.
-    let (writer, mut reader) = FRAMES.split()?;
-    let limits = SurfaceLimits::reach_mm(100.0).speed(0.5);
-    let mut assembler = Assembler::for_tree(writer, &tree, limits)?;
-    let mut tracker = Tracker::<_, 32, 64>::new(&tree)?;
+    // The controller: packets, checks in slices, statuses, and the force. Nobody is there to acknowledge.
+    let limits = GuardLimits::new(500.0, Millis(100)).automatic();
+    let stored = TreeBytes::<u16>::new(built.blob());
+    let (mut bus, mut guard) = OCTAHEDRON.start::<_, 32, 64>(stored, limits)?;
     let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
     let wall = ForbiddenRegion::new(spring, 5.0)?;
     let tool = Capsule::new(Vec3::new(0.0, 0.0, 35.0), Vec3::new(0.0, 0.0, 90.0), 2.5)?;
     socket.set_read_timeout(Some(Duration::from_millis(1)))?;
-    let (start, mut packet, mut pushed) = (Instant::now(), [0; 1472], 0);
+    let (start, mut packet, mut status) = (Instant::now(), [0; 1472], [0; 96]);
+    let mut pushed = 0;
     while !sending.is_finished() {
         let now = Millis(start.elapsed().as_millis() as u32);
-        if let Ok(length) = socket.recv(&mut packet) {
+        if let Ok((length, sender)) = socket.recv_from(&mut packet) {
             // An error says what was wrong with the packet; `counters` counts it by cause.
-            let _counted = assembler.accept(&packet[..length], now);
+            let _counted = bus.packet(&packet[..length], now);
+            if let Some(status) = bus.status(now, &mut status) {
+                socket.send_to(status, sender)?;
+            }
         }
-        let _pending = assembler.advance(100);
-        let surface = reader.latest(now).within(Millis(100));
-        let answer = surface
-            .and_then(|surface| Ok(tracker.closest(&surface, &tool, &Options::new())?.closest));
-        pushed += u32::from(wall.force(&answer, Vec3::ZERO).force.z > 0.0);
+        let _counted = bus.work(100);
+        pushed += u32::from(guard.closest(&tool, now).force(&wall).force.z > 0.0);
     }
-    println!("{}", assembler.counters());
+    println!("{}", bus.counters());
     println!("the wall pushed in {pushed} ticks");
     assert!(pushed > 0);
     Ok(())

@@ -1,21 +1,13 @@
-//! The control tick: pose, query, force, record.
-
-use core::fmt;
+//! The control tick: pose, answer, force, record.
 
 use bytemuck::Zeroable;
-use dibs_nostd::constraint::{ForbiddenRegion, GainError, LastSide, SpringDamper};
-use dibs_nostd::failsafe::{FailSafe, LimitError, Observation};
-use dibs_nostd::glam::Vec3;
-use dibs_nostd::{
-    Budget, Capsule, Cost, FrameAge, Millis, Options, Proximity, QueryError, Ticks, Tool,
-    Unavailable, VertexTable,
-};
+use dibs_nostd::constraint::{ForbiddenRegion, SpringDamper};
+use dibs_nostd::guard::{Answer, GuardLimits};
+use dibs_nostd::{Budget, Capsule, Cost, Error, Millis, Options, Proximity, Ticks, Tool};
 
-use crate::surface::{self, TREE};
-#[cfg(not(feature = "wide"))]
-use crate::telemetry::fallback_code;
-use crate::telemetry::{Tick, cause_code};
-use crate::{BusStatus, TICK_RATE, Trust, instrument, time_of};
+use crate::surface;
+use crate::telemetry::{Tick, cause_code, fallback_code};
+use crate::{BusStatus, Receiver, TICK_RATE, Trust, instrument, time_of};
 
 /// The budget of a query: more than the closest pair on the heart needs, and within a tick on every admitted surface. It
 /// is less than [`Cost`] would allow, because a position of a moving surface is a sum of two.
@@ -43,50 +35,42 @@ pub const MAX_FORCE: f32 = 5.0;
 /// How far it reaches from the surface, in mm.
 pub const MARGIN: f32 = 5.0;
 
-/// A search that keeps what it found from tick to tick, with room for so many opened nodes.
-#[cfg(not(feature = "wide"))]
-type Search = surface::Tracker<256>;
+/// Limit on a vertex's speed, in mm/s: twice the generated heart's top speed in real time, 1.57 mm in a thirtieth of a
+/// second. Over the emulated serial line it beats in slow motion, over Ethernet in real time.
+const SPEED: f32 = 100.0;
 
-/// A search from the root at every tick, to show that the wide one has no panic path either.
-#[cfg(feature = "wide")]
-type Search = surface::Query;
+/// The controller's two ends of a surface, on a bus that is trusted so far.
+///
+/// # Errors
+/// [`Error`] when the tree is damaged, a constant above out of range, or the surface was started before.
+#[inline(always)]
+pub fn start(
+    surface: &'static surface::Surface,
+    bus: &'static BusStatus,
+    trust: &Trust,
+) -> Result<(Receiver, Control), Error> {
+    let options = Options::new().budget(BUDGET).depth_tolerance(DEPTH_TOLERANCE);
+    let limits = GuardLimits::new(SPEED, Millis(trust.age.1)).ticks_a_second(TICK_RATE);
+    let (receiver, guard) =
+        surface::start(surface, limits.options(options).trust(trust.limits()?))?;
+    let spring = SpringDamper::stiffness(STIFFNESS).damping(DAMPING).max_force(MAX_FORCE);
+    let wall = ForbiddenRegion::new(spring, MARGIN)?;
+    Ok((Receiver::new(receiver, bus), Control { guard, wall, bus, tick: Ticks(0) }))
+}
 
 /// The controller's state from tick to tick.
 pub struct Control {
-    search: Search,
-    surface: surface::continuous::Reader,
+    guard: surface::Guard,
     wall: ForbiddenRegion,
-    /// For ticks whose answer has no side.
-    last_side: LastSide,
-    failsafe: FailSafe,
     bus: &'static BusStatus,
     tick: Ticks,
-    /// The last tick's instrument, for its velocity.
-    before: Option<Capsule>,
 }
 
 impl Control {
-    /// A controller that searches `tree` with the surface published through `surface`, and trusts it as far as `trust`.
-    ///
-    /// # Errors
-    /// [`SetupError`] when a constant above is out of range, or the query's stack too small.
-    pub fn new(
-        tree: &surface::Tree,
-        surface: surface::continuous::Reader,
-        bus: &'static BusStatus,
-        trust: &Trust,
-    ) -> Result<Self, SetupError> {
-        let spring = SpringDamper::stiffness(STIFFNESS).damping(DAMPING).max_force(MAX_FORCE);
-        Ok(Self {
-            search: Search::new(tree).map_err(SetupError::Query)?,
-            surface,
-            wall: ForbiddenRegion::new(spring, MARGIN).map_err(SetupError::Gain)?,
-            last_side: LastSide::new(),
-            failsafe: FailSafe::new(trust.limits().map_err(SetupError::Limit)?),
-            bus,
-            tick: Ticks(0),
-            before: None,
-        })
+    /// The tree that is searched.
+    #[must_use]
+    pub const fn tree(&self) -> &surface::Tree {
+        self.guard.tracker().tree()
     }
 
     /// The time of the next tick.
@@ -100,162 +84,69 @@ impl Control {
         self.tick = self.tick.after(ticks);
     }
 
-    /// Runs one tick. `clock` is any free-running counter; it only measures the query.
+    /// Runs one tick. `clock` is any free-running counter; it only measures the answer.
     pub fn tick(&mut self, clock: impl Fn() -> u32) -> Tick {
         let (tick, now) = (self.tick.0 as u32, time_of(self.tick));
-        let mut record = Tick { kind: Tick::KIND, tick, ..Tick::zeroed() };
-        record.triangle = u32::MAX;
-        record.shown_error = -1.0;
-        record.bytes = self.bus.bytes();
-        record.frames_published = self.bus.published();
-        record.rejected = self.bus.rejected();
-
-        let tool = instrument(tick).ok();
-        let before = self.before;
-        self.before = tool;
-        let Asked { age: frame, lag, answer, moved } = match &tool {
-            Some(tool) => self.ask(tool, now, clock, &mut record),
+        let tool = instrument(tick);
+        let start = clock();
+        let answer = match &tool {
+            Ok(tool) => self.guard.closest(tool, now),
             // The pose is not finite, so no query is possible.
-            None => {
-                Asked { age: None, lag: None, answer: Err(Unavailable::NotFinite), moved: None }
-            }
+            Err(_) => self.guard.without_pose(now),
         };
-        let link = self.bus.link.read(now);
-        let verdict = self.failsafe.step(&Observation {
-            frame,
-            lag,
-            link,
-            query_error: match answer {
-                Err(Unavailable::Query(error)) => Some(error),
-                _ => None,
-            },
-            is_tree_corrupt: self.bus.is_tree_corrupt()
-                || self.search.tree().check(TREE.bytes()).is_err(),
-        });
-        self.bus.set_state(verdict.state);
-        let admitted = answer.and_then(|closest| verdict.admit(closest));
-        let settled = self.last_side.settle(admitted, moved);
-        let along = answer.map_or(0.5, |closest| closest.axis_parameter);
-        let velocity = match (before, tool) {
-            (Some(before), Some(now)) => velocity(&before, &now, along),
-            (None, Some(_)) => Vec3::ZERO,
-            // Without a pose there is no velocity to damp.
-            (_, None) => Vec3::NAN,
-        };
-        let force = self.wall.force(&settled, velocity);
-
-        record.state = verdict.state as u32;
-        record.cause = verdict.cause.map_or(0, |cause| cause_code(&cause));
-        record.margin = verdict.margin;
-        record.silence = link.silence.0;
-        (record.read_epoch, record.read_digest) = self.bus.fingerprint();
-        record.force = force.force.to_array();
+        let took = clock().wrapping_sub(start);
+        let force = answer.force(&self.wall);
         self.tick = self.tick.after(Ticks(1));
-        record
+        Tick {
+            tick,
+            query_counts: took,
+            force: force.force.to_array(),
+            ..record(&answer, tool.ok().as_ref(), self.bus)
+        }
     }
+}
 
-    /// The closest pair on the surface as it has moved on from the frame published last, and that frame's age.
-    fn ask(
-        &mut self,
-        tool: &Capsule,
-        now: Millis,
-        clock: impl Fn() -> u32,
-        record: &mut Tick,
-    ) -> Asked {
+fn record(answer: &Answer, tool: Option<&Capsule>, bus: &BusStatus) -> Tick {
+    let mut record = Tick { kind: Tick::KIND, triangle: u32::MAX, ..Tick::zeroed() };
+    (record.age, record.shown_error) = (u32::MAX, -1.0);
+    record.bytes = bus.bytes();
+    record.frames_published = bus.published();
+    record.rejected = bus.rejected();
+    (record.read_epoch, record.read_digest) = bus.fingerprint();
+    if let Some(tool) = tool {
         record.tool_start = tool.start().to_array();
         record.tool_end = tool.end().to_array();
         record.tool_radius = tool.radius();
-        let latest = self.surface.latest(now);
-        let age = latest.frame();
-        // The fail-safe machine decides how old a surface may be.
-        let frame = match latest.of_any_age() {
-            Ok(frame) => frame,
-            Err(unavailable) => {
-                return Asked { age, lag: None, answer: Err(unavailable), moved: None };
-            }
-        };
-        let label = frame.label();
-        record.epoch = label.epoch;
-        record.age = age.map_or(u32::MAX, |age| age.age.0);
-        let surface = frame.extrapolated();
-        record.epoch_before = surface.before().epoch().unwrap_or(label.epoch);
-        record.share = surface.share();
-        record.shown_error = surface.shown_error().unwrap_or(-1.0);
-        record.position_error = surface.position_error();
-        let lag = surface.lag();
-
-        let options = Options::new().budget(BUDGET).depth_tolerance(DEPTH_TOLERANCE);
-        let start = clock();
-        #[cfg(not(feature = "wide"))]
-        let answer = self.search.closest(&surface, tool, &options).map(|tracked| {
-            record.front = tracked.opened;
-            record.fallback = fallback_code(tracked.fallback);
-            (tracked.closest, tracked.moved)
-        });
-        #[cfg(feature = "wide")]
-        let answer = self.search.closest_wide(&surface, tool, &options).map(|found| (found, None));
-        record.query_counts = clock().wrapping_sub(start);
-        drop(frame);
-
-        match answer {
-            Ok((closest, moved)) => {
-                write(&closest, record);
-                Asked { age, lag, answer: Ok(closest), moved }
-            }
-            Err(error) => Asked { age, lag, answer: Err(Unavailable::Query(error)), moved: None },
-        }
     }
+    if let Some(searched) = &answer.searched {
+        record.epoch = searched.frame.epoch;
+        record.age = searched.frame.age.0;
+        record.epoch_before = searched.before;
+        record.share = searched.share;
+        record.shown_error = searched.shown_error.unwrap_or(-1.0);
+        record.position_error = searched.position_error;
+        record.surface_velocity = searched.velocity.to_array();
+    }
+    if let Ok(tracked) = &answer.tracked {
+        record.front = tracked.opened;
+        record.fallback = fallback_code(tracked.fallback);
+        write(&tracked.closest, &mut record);
+    }
+    let trust = &answer.trust;
+    record.state = trust.state as u32;
+    record.cause = trust.cause.map_or(0, |cause| cause_code(&cause));
+    record.margin = trust.margin;
+    record.silence = answer.link.silence.0;
+    record
 }
 
-/// What a tick asked for.
-struct Asked {
-    /// Of the frame published last.
-    age: Option<FrameAge>,
-    /// The part of the age that the answer's accuracy does not cover.
-    lag: Option<Millis>,
-    answer: Result<Proximity, Unavailable>,
-    /// Most (mm) that tool and surface have moved since the tick before, where it is known.
-    moved: Option<f32>,
-}
-
-/// Velocity of the point at `along` (0 to 1) of the instrument's axis, in mm/s.
-fn velocity(before: &Capsule, now: &Capsule, along: f32) -> Vec3 {
-    let start = now.start() - before.start();
-    let end = now.end() - before.end();
-    (start + (end - start) * along) * TICK_RATE as f32
-}
-
-fn write(answer: &Proximity, record: &mut Tick) {
+fn write(closest: &Proximity, record: &mut Tick) {
     record.answered = 1;
-    record.separation = answer.separation;
-    record.lower = answer.lower;
-    record.accuracy = answer.accuracy;
-    record.point_on_surface = answer.point_on_surface.to_array();
-    record.triangle = answer.triangle.map_or(u32::MAX, |triangle| triangle.0);
-    record.node_tests = answer.node_tests;
-    record.triangle_tests = answer.triangle_tests;
+    record.separation = closest.separation;
+    record.lower = closest.lower;
+    record.accuracy = closest.accuracy;
+    record.point_on_surface = closest.point_on_surface.to_array();
+    record.triangle = closest.triangle.map_or(u32::MAX, |triangle| triangle.0);
+    record.node_tests = closest.node_tests;
+    record.triangle_tests = closest.triangle_tests;
 }
-
-/// Why a controller cannot be made.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum SetupError {
-    /// A gain of the constraint is out of range.
-    Gain(GainError),
-    /// A limit of the fail-safe machine is out of range.
-    Limit(LimitError),
-    /// The query cannot search the tree.
-    Query(QueryError),
-}
-
-impl fmt::Display for SetupError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Gain(error) => error.fmt(f),
-            Self::Limit(error) => error.fmt(f),
-            Self::Query(error) => error.fmt(f),
-        }
-    }
-}
-
-impl core::error::Error for SetupError {}

@@ -15,7 +15,7 @@ pub struct Fingerprint {
 }
 
 impl Fingerprint {
-    pub fn new() -> Self {
+    pub const fn new() -> Self {
         Self { epoch: 0, digest: CRC.digest(), next: None }
     }
 

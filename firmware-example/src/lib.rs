@@ -3,15 +3,15 @@
 //! It compiles for board and host: `no_std`, no allocation, no panic, and no access to hardware. Three contexts share
 //! it:
 //!
-//! - the control tick, 1 kHz, highest priority: [`Control::tick`] poses the instrument, finds the closest pair on the
-//!   frame published last, judges the trust in that frame, and makes a force of the answer;
-//! - bus reception, any lower priority: [`Receiver::byte`] takes vertices as they come over a serial line,
+//! - the control tick, 1 kHz, highest priority: [`Control::tick`] poses the instrument, asks the guard, and makes a force
+//!   of its answer;
+//! - bus reception, any lower priority: [`Receiver::bytes`] takes vertices as they come over a serial line,
 //!   [`Receiver::packet`] those that [`network`] finds in Ethernet frames;
-//! - the background: [`Receiver::work`] checks complete frames in slices and publishes them, [`Receiver::report`] makes
-//!   statuses for the sender, and [`Upkeep::step`] checks the tree in flash.
+//! - the background: [`Receiver::work`] checks complete frames and the tree in flash in slices, and
+//!   [`Receiver::report`] makes statuses for the sender.
 //!
-//! They share [`Frames`](dibs_nostd::Frames), where one atomic operation publishes a frame, and [`BusStatus`], counters
-//! and flags. [`telemetry`] is the tick's record for the host.
+//! They share a [`Surface`](dibs_nostd::guard::Surface), where one atomic operation publishes a frame, and
+//! [`BusStatus`], counters for the records. [`telemetry`] is the tick's record for the host.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
@@ -23,21 +23,19 @@ mod receiver;
 mod status;
 pub mod telemetry;
 mod trust;
-mod upkeep;
 
 use core::num::NonZeroU32;
 
 use dibs_nostd::{Millis, Ticks};
 
 pub use control::{
-    BUDGET, Control, DAMPING, MARGIN, MAX_FORCE, STIFFNESS, SetupError, TICK_INSTRUCTIONS,
+    BUDGET, Control, DAMPING, MARGIN, MAX_FORCE, STIFFNESS, TICK_INSTRUCTIONS, start,
 };
 pub use fingerprint::fingerprint;
 pub use instrument::instrument;
 pub use receiver::{MTU, Receiver, STATUS_FRAMED, STATUS_MTU};
 pub use status::BusStatus;
 pub use trust::{DWELL, Trust};
-pub use upkeep::Upkeep;
 
 // The surface: `build.rs` emitted its tree.
 dibs_nostd::include_tree!("surface");

@@ -1,24 +1,18 @@
-//! Messages between control tick, bus and background besides the frames themselves.
+//! Counters of the bus for the control tick's records.
 
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU32, Ordering};
 
-use dibs_nostd::failsafe::{LinkStatus, State};
 use dibs_nostd::wire::{Counters, Event};
 
-/// Counters since the start, written by the bus side, and the controller's state, written by the control tick. Each is
-/// exact, but two of them may be of different moments.
+/// Counters since the start, written by the bus side. Each is exact, but two of them may be of different moments.
 #[derive(Debug, Default)]
 pub struct BusStatus {
-    /// The numbers that the fail-safe machine watches.
-    pub link: LinkStatus,
     bytes: AtomicU32,
     published: AtomicU32,
     rejected: AtomicU32,
-    safety: AtomicU32,
     /// Epoch and digest of a published frame: [`fingerprint`](Self::fingerprint).
     epoch: AtomicU32,
     digest: AtomicU32,
-    is_tree_corrupt: AtomicBool,
 }
 
 impl BusStatus {
@@ -26,14 +20,11 @@ impl BusStatus {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            link: LinkStatus::new(),
             bytes: AtomicU32::new(0),
             published: AtomicU32::new(0),
             rejected: AtomicU32::new(0),
-            safety: AtomicU32::new(0),
             epoch: AtomicU32::new(0),
             digest: AtomicU32::new(0),
-            is_tree_corrupt: AtomicBool::new(false),
         }
     }
 
@@ -55,12 +46,6 @@ impl BusStatus {
         self.rejected.load(Ordering::Relaxed)
     }
 
-    /// The controller's state as the wire protocol's status has it; 0 before the first tick.
-    #[must_use]
-    pub fn safety(&self) -> u8 {
-        self.safety.load(Ordering::Relaxed) as u8
-    }
-
     /// Epoch of the frame last read in full, and the CRC-32 of its positions in memory; epoch 0 while there is none.
     #[must_use]
     pub fn fingerprint(&self) -> (u32, u32) {
@@ -70,13 +55,8 @@ impl BusStatus {
         if is_one { (epoch, digest) } else { (0, 0) }
     }
 
-    /// Whether the tree was ever found changed. It is never cleared: flash that read wrong once is not trusted.
-    #[must_use]
-    pub fn is_tree_corrupt(&self) -> bool {
-        self.is_tree_corrupt.load(Ordering::Relaxed)
-    }
-
-    pub(crate) fn count_bytes(&self, bytes: u32) {
+    pub(crate) fn count_bytes(&self, bytes: usize) {
+        let bytes = u32::try_from(bytes).unwrap_or(u32::MAX);
         self.bytes.store(self.bytes().wrapping_add(bytes), Ordering::Relaxed);
     }
 
@@ -85,17 +65,9 @@ impl BusStatus {
         self.rejected.store(counters.rejected(), Ordering::Relaxed);
     }
 
-    pub(crate) fn set_state(&self, state: State) {
-        self.safety.store(state as u32 + 1, Ordering::Relaxed);
-    }
-
     pub(crate) fn set_fingerprint(&self, epoch: u32, digest: u32) {
         self.epoch.store(0, Ordering::Relaxed);
         self.digest.store(digest, Ordering::Release);
         self.epoch.store(epoch, Ordering::Release);
-    }
-
-    pub(crate) fn set_tree_corrupt(&self) {
-        self.is_tree_corrupt.store(true, Ordering::Relaxed);
     }
 }

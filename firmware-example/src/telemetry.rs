@@ -64,7 +64,7 @@ pub struct Tick {
     pub triangle_tests: u32,
     /// The force on the instrument, in N.
     pub force: [f32; 3],
-    /// Clock counts that the query took; 0 without a clock.
+    /// Clock counts that the guard's answer took; 0 without a clock.
     pub query_counts: u32,
     /// Bytes that the bus had brought; wraps.
     pub bytes: u32,
@@ -88,6 +88,8 @@ pub struct Tick {
     pub share: f32,
     /// The error of the last extrapolations, in mm: `dibs_nostd::Between::shown_error`; -1 if unknown.
     pub shown_error: f32,
+    /// The surface's velocity at the pair, in mm/s.
+    pub surface_velocity: [f32; 3],
 }
 
 /// A fallback as a number.

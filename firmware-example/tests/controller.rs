@@ -3,9 +3,9 @@
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
-use controller::surface::{self, continuous::Surface};
+use controller::surface::{self, Surface};
 use controller::telemetry::{Tick, cause_code};
-use controller::{BusStatus, Control, DWELL, MTU, Receiver, Trust};
+use controller::{BusStatus, Control, DWELL, MTU, Receiver, Trust, start};
 use dibs_build::{Builder, generate};
 use dibs_nostd::failsafe::State;
 use dibs_nostd::glam::Vec3;
@@ -30,11 +30,10 @@ fn firmware_tree() -> &'static surface::Tree {
 
 /// A controller's two ends, and its notes.
 fn controller() -> (Receiver, Control, &'static BusStatus) {
-    let frames: &'static Surface = Box::leak(Box::new(Surface::new()));
+    let surface: &'static Surface = Box::leak(Box::new(Surface::new()));
     let bus: &'static BusStatus = Box::leak(Box::new(BusStatus::new()));
-    let (writer, reader) = frames.split().unwrap();
-    let receiver = Receiver::new(firmware_tree(), writer, bus).unwrap();
-    (receiver, Control::new(firmware_tree(), reader, bus, &Trust::SERIAL).unwrap(), bus)
+    let (receiver, control) = start(surface, bus, &Trust::SERIAL).unwrap();
+    (receiver, control, bus)
 }
 
 /// The sending side: the generated heart, in the tree's order.
@@ -125,8 +124,8 @@ fn every_answer_is_that_of_whole_frames() {
         let bytes = sender.bytes(epoch, control.now());
         let chunks: Vec<&[u8]> = bytes.chunks(122).collect();
         for chunk in chunks.iter().copied().chain(chunks.iter().map(|_| &[][..])) {
-            for &byte in chunk {
-                receiver.byte(byte, control.now());
+            for byte in chunk.chunks(1) {
+                receiver.bytes(byte, control.now());
                 while receiver.work() {}
             }
             let tick = control.tick(|| 0);
@@ -155,8 +154,8 @@ fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
     let (mut receiver, mut control, bus) = controller();
     let mut sender = Sender::new();
     let mut feed = |bytes: &[u8], now: Millis| {
-        for &byte in bytes {
-            receiver.byte(byte, now);
+        for byte in bytes.chunks(1) {
+            receiver.bytes(byte, now);
             while receiver.work() {}
         }
     };
@@ -240,8 +239,8 @@ fn a_late_frame_an_old_one_and_a_row_of_refused_ones_make_the_output_safe() {
         if is_damaged {
             bytes[9_000] ^= 4;
         }
-        for byte in bytes {
-            receiver.byte(byte, control.now());
+        for byte in bytes.chunks(1) {
+            receiver.bytes(byte, control.now());
             while receiver.work() {}
         }
         // The state gets worse at once, and better after the dwell.

@@ -48,9 +48,32 @@ pub mod {name} {{
     /// The validated tree.
     pub type Tree = ::dibs_nostd::Tree<'static, Index>;
 
+    ::dibs_nostd::if_guard! {{
+        /// The vertices as they are now, shared by both ends of a guard: 36 bytes of RAM a vertex. Meant for a `static`.
+        pub type Surface = ::dibs_nostd::guard::Surface<VERTICES>;
+
+        /// The bus's end.
+        pub type Bus = ::dibs_nostd::guard::Bus<'static, 'static, Index, VERTICES>;
+
+        /// The control tick's end, with room for 256 opened nodes.
+        pub type Guard = ::dibs_nostd::guard::Guard<'static, 'static, Index, VERTICES, STACK, 256>;
+
+        /// Validates the tree, and makes the two ends of its surface, once.
+        ///
+        /// # Errors
+        /// Where the tree is damaged, a limit out of range, or the ends were taken before.
+        #[inline(always)]
+        pub fn start(
+            surface: &'static Surface,
+            limits: ::dibs_nostd::guard::GuardLimits,
+        ) -> ::core::result::Result<(Bus, Guard), ::dibs_nostd::Error> {{
+            surface.start(TREE, limits)
+        }}
+    }}
+
     /// Two buffers for the vertices as they are now, 24 bytes of RAM a vertex: one is read while the bus fills
     /// the other.
-    pub type Surface = ::dibs_nostd::Frames<VERTICES>;
+    pub type Frames = ::dibs_nostd::Frames<VERTICES>;
 
     /// The bus's end of the buffers.
     pub type Writer = ::dibs_nostd::FrameWriter<'static, VERTICES>;
@@ -60,8 +83,8 @@ pub mod {name} {{
 
     ::dibs_nostd::if_bus! {{
         /// Publishes frames that are complete and within the stretch limit, which it checks in slices.
-        pub type Receiver<'t> =
-            ::dibs_nostd::Assembler<'static, ::dibs_nostd::StretchMonitor<'t, Index>, VERTICES>;
+        pub type Receiver =
+            ::dibs_nostd::Assembler<'static, ::dibs_nostd::StretchMonitor<'static, Index>, VERTICES>;
 
         /// A receiver for surfaces of this tree that keep to these limits.
         ///
@@ -71,7 +94,7 @@ pub mod {name} {{
             tree: &Tree,
             writer: Writer,
             limits: ::dibs_nostd::SurfaceLimits,
-        ) -> ::core::result::Result<Receiver<'_>, ::dibs_nostd::StretchError> {{
+        ) -> ::core::result::Result<Receiver, ::dibs_nostd::StretchError> {{
             Receiver::for_tree(writer, tree, limits)
         }}
     }}
@@ -79,22 +102,22 @@ pub mod {name} {{
     /// The same for a surface that moves between frames: with a third buffer, 36 bytes of RAM a vertex.
     pub mod continuous {{
         /// Three buffers for the vertices: the frame published last, the one before, and the one that arrives.
-        pub type Surface = ::dibs_nostd::Frames<{{ super::VERTICES }}, 3>;
+        pub type Frames = ::dibs_nostd::Frames<{{ super::VERTICES }}, 3>;
 
         /// The bus's end of the buffers.
-        pub type Writer = ::dibs_nostd::FrameWriter<'static, {{ super::VERTICES }}, Surface>;
+        pub type Writer = ::dibs_nostd::FrameWriter<'static, {{ super::VERTICES }}, Frames>;
 
         /// The control loop's end of the buffers.
-        pub type Reader = ::dibs_nostd::FrameReader<'static, {{ super::VERTICES }}, Surface>;
+        pub type Reader = ::dibs_nostd::FrameReader<'static, {{ super::VERTICES }}, Frames>;
 
         ::dibs_nostd::if_bus! {{
             /// Publishes frames that are complete and within the stretch limit, and measures the surface beyond them.
-            pub type Receiver<'t> = ::dibs_nostd::Assembler<
+            pub type Receiver = ::dibs_nostd::Assembler<
                 'static,
-                ::dibs_nostd::StretchMonitor<'t, super::Index, 2>,
+                ::dibs_nostd::StretchMonitor<'static, super::Index, 2>,
                 {{ super::VERTICES }},
                 ::dibs_nostd::wire::NoMac,
-                Surface,
+                Frames,
             >;
 
             /// A receiver for surfaces of this tree that keep to these limits.
@@ -105,7 +128,7 @@ pub mod {name} {{
                 tree: &super::Tree,
                 writer: Writer,
                 limits: ::dibs_nostd::SurfaceLimits,
-            ) -> ::core::result::Result<Receiver<'_>, ::dibs_nostd::StretchError> {{
+            ) -> ::core::result::Result<Receiver, ::dibs_nostd::StretchError> {{
                 Receiver::continuous(writer, tree, limits)
             }}
         }}
@@ -189,7 +212,7 @@ fn modal_source(ModesSummary { count, position_error, .. }: &ModesSummary) -> St
         use super::MODES;
 
         /// Two buffers for the weights.
-        pub type Surface = ::dibs_nostd::Frames<MODES>;
+        pub type Frames = ::dibs_nostd::Frames<MODES>;
 
         /// The bus's end of the buffers.
         pub type Writer = ::dibs_nostd::FrameWriter<'static, MODES>;
@@ -199,9 +222,9 @@ fn modal_source(ModesSummary { count, position_error, .. }: &ModesSummary) -> St
 
         ::dibs_nostd::if_bus! {{
             /// Publishes frames whose weights, and the stretch that follows from them, are within their limits.
-            pub type Receiver<'t> = ::dibs_nostd::Assembler<
+            pub type Receiver = ::dibs_nostd::Assembler<
                 'static,
-                ::dibs_nostd::modes::ModalGate<'static, ::dibs_nostd::StretchMonitor<'t, super::Index>, MODES>,
+                ::dibs_nostd::modes::ModalGate<'static, ::dibs_nostd::StretchMonitor<'static, super::Index>, MODES>,
                 MODES,
             >;
         }}

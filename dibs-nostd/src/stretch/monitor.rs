@@ -30,7 +30,7 @@ const BLOCKS: usize = 32;
 /// `now + 2 (now - before)`, with the published frame before. By convexity the two bound the stretch of all surfaces on
 /// the way.
 ///
-/// Cost: [`advance`](Gate::advance) checks at most `work` rows and triangles, plus O([`REGIONS`]). RAM: 600 bytes
+/// Cost: [`advance`](Gate::advance) checks at most `work` rows and triangles, plus O([`REGIONS`]). RAM: 800 bytes
 /// at most, whatever the surface, and 300 bytes more with the extrapolation. [`new`](Self::new) makes two passes over
 /// the triangles.
 ///
@@ -64,7 +64,7 @@ const BLOCKS: usize = 32;
 /// ```
 #[derive(Clone, Debug)]
 pub struct StretchMonitor<'t, I, const SURFACES: usize = 1> {
-    tree: &'t Tree<'t, I>,
+    tree: Tree<'t, I>,
     /// The regions with corners in each block of `1 << block_shift` vertex rows.
     touched: [u32; BLOCKS],
     block_shift: u8,
@@ -91,7 +91,7 @@ impl<'t, I: Index> StretchMonitor<'t, I> {
     ///
     /// # Errors
     /// [`StretchError::NoMetric`] where the tree was emitted without its metric.
-    pub fn new(tree: &'t Tree<'t, I>) -> Result<Self, StretchError> {
+    pub fn new(tree: &Tree<'t, I>) -> Result<Self, StretchError> {
         Self::with_passes(tree)
     }
 }
@@ -102,13 +102,13 @@ impl<'t, I: Index> StretchMonitor<'t, I, 2> {
     ///
     /// # Errors
     /// [`StretchError::NoMetric`] where the tree was emitted without its metric.
-    pub fn continuous(tree: &'t Tree<'t, I>) -> Result<Self, StretchError> {
+    pub fn continuous(tree: &Tree<'t, I>) -> Result<Self, StretchError> {
         Self::with_passes(tree)
     }
 }
 
 impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
-    fn with_passes(tree: &'t Tree<'t, I>) -> Result<Self, StretchError> {
+    fn with_passes(tree: &Tree<'t, I>) -> Result<Self, StretchError> {
         let limits = SurfaceLimits::reach_mm(f32::INFINITY);
         if tree.sections().metric.is_empty() {
             return Err(StretchError::NoMetric);
@@ -133,7 +133,7 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
             }
         }
         Ok(Self {
-            tree,
+            tree: *tree,
             touched,
             block_shift: block_shift as u8,
             changed: Changed::Whole,
@@ -162,8 +162,8 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
 
     /// The tree whose surfaces are measured.
     #[must_use]
-    pub const fn tree(&self) -> &'t Tree<'t, I> {
-        self.tree
+    pub const fn tree(&self) -> &Tree<'t, I> {
+        &self.tree
     }
 
     /// Most rows and triangles checked for one frame: the sum of its slices' work.
@@ -230,10 +230,10 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
         }
         let surface = Between::ahead(before, surface);
         // Beyond the limit, or not finite: no extrapolation.
-        let measured = ahead.advance(self.tree, &surface, ready, (0.0, &self.rest), work, |_| ());
+        let measured = ahead.advance(&self.tree, &surface, ready, (0.0, &self.rest), work, |_| ());
         self.is_beyond = measured.is_err();
         let is_done = measured.is_ok_and(|(_, is_done)| is_done);
-        self.ahead = if is_done { ahead.measured(self.tree, None).sigma() } else { f32::NAN };
+        self.ahead = if is_done { ahead.measured(&self.tree, None).sigma() } else { f32::NAN };
         is_done || self.is_beyond
     }
 }
@@ -274,7 +274,7 @@ impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
     ) -> Result<Verdict, StretchError> {
         let Arriving { surface, ready, before } = arriving;
         let before = before.map(|(before, _)| before);
-        check_tables(self.tree, surface)?;
+        check_tables(&self.tree, surface)?;
         let is_complete = ready >= self.tree.vertex_count();
         if self.changed == Changed::Partial && !is_complete {
             return Ok(Verdict::Pending);
@@ -282,7 +282,7 @@ impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
         let (work, is_compared) = self.compare(arriving, work)?;
         // Half of the work each, so that both keep up with the frame.
         let ahead = if SURFACES > 1 { work / 2 } else { 0 };
-        let (tree, size) = (self.tree, (self.shrinkage, &self.rest));
+        let (tree, size) = (&self.tree, (self.shrinkage, &self.rest));
         let Some(own) = self.passes.first_mut() else { return Ok(Verdict::Pending) };
         // What a partial frame moved replaces what was there.
         let replaced = if self.changed == Changed::Partial { before } else { None };
@@ -296,7 +296,7 @@ impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
         }
         self.volume.check()?;
         let Some(own) = self.passes.first() else { return Ok(Verdict::Pending) };
-        Ok(Verdict::Admitted(Some(own.measured(tree, surface.epoch()))))
+        Ok(Verdict::Admitted(Some(own.measured(&self.tree, surface.epoch()))))
     }
 
     fn ahead(&self) -> Option<f32> {
@@ -304,7 +304,7 @@ impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
     }
 
     fn travel_unit(&self) -> Option<TravelUnit> {
-        Some(TravelUnit::of(self.tree))
+        Some(TravelUnit::of(&self.tree))
     }
 
     fn surface_facts(&self) -> SurfaceFacts {

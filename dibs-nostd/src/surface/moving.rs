@@ -101,6 +101,8 @@ pub struct Between<'v, W: ?Sized, V: ?Sized> {
     share: f32,
     travel: Option<Travel>,
     ahead: Ahead,
+    /// Steps from the earlier frame to the later a second; 0 where it stands still, or has no clock.
+    rate: f32,
     /// The time by which it is behind the present, as far as its error does not cover it; `None` without a clock.
     lag: Option<Millis>,
 }
@@ -118,7 +120,7 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
         // Off by less than a few units, within a tracker's slack.
         let along = (share * units as f32) as u64;
         let travel = Some(from.along(along));
-        Self { before, after, share, travel, ahead: Ahead::UNKNOWN, lag: None }
+        Self { before, after, share, travel, ahead: Ahead::UNKNOWN, rate: 0.0, lag: None }
     }
 
     /// The surface after the later frame.
@@ -131,7 +133,15 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
     ) -> Self {
         let share = clamped(share, FARTHEST);
         let travel = last.beside((share * units as f32) as u64);
-        Self { before, after, share: 1.0 + share, travel, ahead: Ahead::UNKNOWN, lag: None }
+        Self {
+            before,
+            after,
+            share: 1.0 + share,
+            travel,
+            ahead: Ahead::UNKNOWN,
+            rate: 0.0,
+            lag: None,
+        }
     }
 
     /// The same on a course.
@@ -143,6 +153,12 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
     /// The same with what was measured of the later frame.
     pub(super) const fn measured(mut self, ahead: Ahead) -> Self {
         self.ahead = ahead;
+        self
+    }
+
+    /// The same, at so many steps a second.
+    pub(super) const fn at_rate(mut self, rate: f32) -> Self {
+        self.rate = rate;
         self
     }
 
@@ -175,6 +191,21 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
         self.before
     }
 
+    /// The velocity (mm/s) of a point of a triangle, by its corners and their weights: that from one frame to the other; zero
+    /// for a surface that is held, one of a [`Step`], and corners outside of the table.
+    #[must_use]
+    pub fn velocity(&self, corners: [u32; 3], weights: [f32; 3]) -> Vec3 {
+        let mut step = Vec3::ZERO;
+        if self.rate > 0.0 {
+            for (corner, weight) in corners.into_iter().zip(weights) {
+                let (before, after) = (self.before.position(corner), self.after.position(corner));
+                let moved = before.zip(after).map_or(Vec3::ZERO, |(before, after)| after - before);
+                step += moved * weight;
+            }
+        }
+        step * self.rate
+    }
+
     /// The largest distance (mm) of a vertex of a frame from its extrapolation by the two frames before, the larger of
     /// the last two frames': an estimate of this surface's own error by the time of the next frame. Where the time
     /// between frames grew, it is that of a velocity that changes steadily, after as long a time again.
@@ -189,13 +220,21 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
 impl<'v, V: VertexTable + ?Sized> Between<'v, V, V> {
     /// A frame, held.
     pub(super) const fn held(frame: &'v V, travel: Option<Travel>) -> Self {
-        Self { before: frame, after: frame, share: 1.0, travel, ahead: Ahead::UNKNOWN, lag: None }
+        Self {
+            before: frame,
+            after: frame,
+            share: 1.0,
+            travel,
+            ahead: Ahead::UNKNOWN,
+            rate: 0.0,
+            lag: None,
+        }
     }
 
     /// The end of the extrapolation, whose motion is not measured.
     pub(crate) const fn ahead(before: &'v V, after: &'v V) -> Self {
         let share = 1.0 + FARTHEST;
-        Self { before, after, share, travel: None, ahead: Ahead::UNKNOWN, lag: None }
+        Self { before, after, share, travel: None, ahead: Ahead::UNKNOWN, rate: 0.0, lag: None }
     }
 }
 

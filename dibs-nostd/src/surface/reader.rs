@@ -218,7 +218,9 @@ impl LastStep {
         [before, after]: [&'v V; 2],
         age: Millis,
     ) -> Between<'v, V, V> {
-        Between::inside(before, after, self.share(age), self.from, self.units)
+        let share = self.share(age);
+        let between = Between::inside(before, after, share, self.from, self.units);
+        between.at_rate(self.rate(share, 1.0))
     }
 
     /// The surface `age` after the later frame, if every vertex keeps its velocity. `ahead` was measured of that.
@@ -231,7 +233,7 @@ impl LastStep {
         let share = clamped(self.share(age), FARTHEST);
         let course = Course::new(self.units, &ahead, share);
         let between = Between::outside(before, after, share, self.travel, self.units);
-        between.on(course).measured(ahead)
+        between.on(course).measured(ahead).at_rate(self.rate(share, FARTHEST))
     }
 
     /// The share of the step that an extrapolation adds to the later frame after this time.
@@ -249,6 +251,11 @@ impl LastStep {
     /// The age at which the extrapolation ends, rounded down.
     const fn end(&self) -> Millis {
         Millis((self.interval.0 as f32 * FARTHEST) as u32)
+    }
+
+    /// Steps a second of a surface that stands still from a share on.
+    fn rate(&self, share: f32, most: f32) -> f32 {
+        if share < most { 1_000.0 / self.interval.0 as f32 } else { 0.0 }
     }
 
     fn share(&self, age: Millis) -> f32 {

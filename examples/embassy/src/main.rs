@@ -14,8 +14,8 @@ use cortex_m_rt::exception;
 use cortex_m_semihosting::hprintln;
 use dibs_nostd::constraint::{ForbiddenRegion, SpringDamper};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::wire::Deframer;
-use dibs_nostd::{Advance, Budget, Capsule, Cost, Error, Millis, Options, SurfaceLimits};
+use dibs_nostd::guard::GuardLimits;
+use dibs_nostd::{Advance, Budget, Capsule, Cost, Error, Millis};
 use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
@@ -24,8 +24,11 @@ use embassy_sync::signal::Signal;
 dibs_nostd::include_tree!("heart");
 static SURFACE: heart::Surface = heart::Surface::new();
 
-const OPTIONS: Options =
-    Options::new().budget(Budget::for_instructions(400_000, &Cost::M7_CAPSULE));
+/// Tissue that hardly moves: 1 mm/s. The emulated line takes long for a frame, and brings no status back.
+const LIMITS: GuardLimits = GuardLimits::new(1.0, Millis(2_000))
+    .without_transit()
+    .automatic()
+    .budget(Budget::for_instructions(400_000, &Cost::M7_CAPSULE));
 
 static CONTROL: InterruptExecutor = InterruptExecutor::new();
 static TICK: Signal<CriticalSectionRawMutex, Millis> = Signal::new();
@@ -41,32 +44,25 @@ async fn main(_spawner: Spawner) {
 
 /// Starts the control task, and takes the bus's packets.
 async fn bus() -> Result<(), Error> {
-    let tree = heart::TREE.validate()?;
-    let (writer, reader) = SURFACE.split()?;
-    let farthest = heart::CENTRE.abs().max_element() + 2.0 * heart::REACH;
-    let mut receiver = heart::receiver(&tree, writer, SurfaceLimits::reach_mm(farthest))?;
+    let (mut receiver, guard) = heart::start(&SURFACE, LIMITS)?;
     let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
-    start(reader, heart::Query::new(&tree)?, ForbiddenRegion::new(spring, 5.0)?);
-    let (mut deframer, mut bytes) = (Deframer::<1024>::new(), [0; 64]);
+    start(guard, ForbiddenRegion::new(spring, 5.0)?);
+    let mut bytes = [0; 64];
     loop {
         let count = BYTES.read(&mut bytes).await;
-        for &byte in &bytes[..count] {
-            if let Some(Ok(packet)) = deframer.push(byte) {
-                let _counted = receiver.accept(packet, Millis(NOW.load(Ordering::Relaxed)));
-            }
-        }
-        while receiver.advance(100) == Ok(Advance::Pending) {}
+        receiver.receive(&bytes[..count], Millis(NOW.load(Ordering::Relaxed)));
+        while receiver.work(100) == Ok(Advance::Pending) {}
     }
 }
 
-fn start(reader: heart::Reader, query: heart::Query, wall: ForbiddenRegion) {
+fn start(guard: heart::Guard, wall: ForbiddenRegion) {
     let Some(mut core) = Peripherals::take() else { end(false) };
     // SAFETY: no critical section relies on priorities; lower values are more urgent.
     unsafe {
         core.NVIC.set_priority(board::Interrupt::Spare, 0x40);
         core.NVIC.set_priority(board::Interrupt::UART0, 0x80);
     }
-    match control(reader, query, wall) {
+    match control(guard, wall) {
         Ok(task) => CONTROL.start(board::Interrupt::Spare).spawn(task),
         Err(_) => end(false),
     }
@@ -77,15 +73,14 @@ fn start(reader: heart::Reader, query: heart::Query, wall: ForbiddenRegion) {
 }
 
 #[embassy_executor::task]
-async fn control(mut reader: heart::Reader, mut query: heart::Query, wall: ForbiddenRegion) {
+async fn control(mut guard: heart::Guard, wall: ForbiddenRegion) {
     loop {
         let now = TICK.wait().await;
         let (tip, top) = (Vec3::new(32.0, 0.0, 60.0), Vec3::new(32.0, 0.0, 150.0));
         let Ok(tool) = Capsule::new(tip, top, 2.5) else { end(false) };
-        let surface = reader.latest(now).within(Millis(2_000));
-        let closest = surface.and_then(|surface| Ok(query.closest(&surface, &tool, &OPTIONS)?));
-        let force = wall.force(&closest, Vec3::ZERO).force;
-        if let Ok(closest) = closest {
+        let answer = guard.closest(&tool, now);
+        let force = answer.force(&wall).force;
+        if let Ok(closest) = answer.closest {
             hprintln!("{} mm, {} N", closest.separation, force.length());
             end(true)
         }

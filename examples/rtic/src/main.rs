@@ -28,14 +28,17 @@ mod app {
     use cortex_m_semihosting::hprintln;
     use dibs_nostd::constraint::{ForbiddenRegion, SpringDamper};
     use dibs_nostd::glam::Vec3;
-    use dibs_nostd::wire::Deframer;
-    use dibs_nostd::{Budget, Capsule, Cost, Error, Millis, Options, SurfaceLimits};
+    use dibs_nostd::guard::GuardLimits;
+    use dibs_nostd::{Budget, Capsule, Cost, Error, Millis};
 
     use crate::board::{self, end};
     use crate::{SURFACE, heart};
 
-    const OPTIONS: Options =
-        Options::new().budget(Budget::for_instructions(400_000, &Cost::M7_CAPSULE));
+    /// Tissue that hardly moves: 1 mm/s. The emulated line takes long for a frame, and brings no status back.
+    const LIMITS: GuardLimits = GuardLimits::new(1.0, Millis(2_000))
+        .without_transit()
+        .automatic()
+        .budget(Budget::for_instructions(400_000, &Cost::M7_CAPSULE));
 
     /// Control ticks so far: the time, in ms.
     static NOW: AtomicU32 = AtomicU32::new(0);
@@ -45,58 +48,43 @@ mod app {
 
     #[local]
     struct Local {
-        deframer: Deframer<1024>,
-        receiver: heart::Receiver<'static>,
-        reader: heart::Reader,
-        query: heart::Query,
+        bus: heart::Bus,
+        guard: heart::Guard,
         wall: ForbiddenRegion,
     }
 
-    #[init(local = [tree: Option<heart::Tree> = None])]
+    #[init]
     fn init(mut cx: init::Context) -> (Shared, Local) {
         // Anything wrong here is wrong before the robot moves: stop.
-        let Ok(local) = start(cx.local.tree) else { end(false) };
+        let Ok(local) = start() else { end(false) };
         board::start_bus();
         board::start_ticks(&mut cx.core.SYST);
         (Shared {}, local)
     }
 
-    fn start(tree: &'static mut Option<heart::Tree>) -> Result<Local, Error> {
-        let tree: &'static heart::Tree = tree.insert(heart::TREE.validate()?);
-        let (writer, reader) = SURFACE.split()?;
-        let farthest = heart::CENTRE.abs().max_element() + 2.0 * heart::REACH;
+    fn start() -> Result<Local, Error> {
+        let (bus, guard) = heart::start(&SURFACE, LIMITS)?;
         let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
-        Ok(Local {
-            deframer: Deframer::new(),
-            receiver: heart::receiver(tree, writer, SurfaceLimits::reach_mm(farthest))?,
-            reader,
-            query: heart::Query::new(tree)?,
-            wall: ForbiddenRegion::new(spring, 5.0)?,
-        })
+        Ok(Local { bus, guard, wall: ForbiddenRegion::new(spring, 5.0)? })
     }
 
-    #[task(binds = UART0, priority = 1, local = [deframer, receiver])]
-    fn bus(cx: bus::Context) {
+    #[task(binds = UART0, priority = 1, local = [bus])]
+    fn receive(cx: receive::Context) {
         board::acknowledge();
         while let Some(byte) = board::byte() {
-            if let Some(Ok(packet)) = cx.local.deframer.push(byte) {
-                let _counted =
-                    cx.local.receiver.accept(packet, Millis(NOW.load(Ordering::Relaxed)));
-            }
-            let _pending = cx.local.receiver.advance(100);
+            cx.local.bus.receive(&[byte], Millis(NOW.load(Ordering::Relaxed)));
+            let _counted = cx.local.bus.work(100);
         }
     }
 
-    #[task(binds = SysTick, priority = 2, local = [reader, query, wall])]
+    #[task(binds = SysTick, priority = 2, local = [guard, wall])]
     fn control(cx: control::Context) {
         let now = Millis(NOW.fetch_add(1, Ordering::Relaxed));
         let (tip, top) = (Vec3::new(32.0, 0.0, 60.0), Vec3::new(32.0, 0.0, 150.0));
         let Ok(tool) = Capsule::new(tip, top, 2.5) else { end(false) };
-        let surface = cx.local.reader.latest(now).within(Millis(2_000));
-        let closest =
-            surface.and_then(|surface| Ok(cx.local.query.closest(&surface, &tool, &OPTIONS)?));
-        let force = cx.local.wall.force(&closest, Vec3::ZERO).force;
-        if let Ok(closest) = closest {
+        let answer = cx.local.guard.closest(&tool, now);
+        let force = answer.force(cx.local.wall).force;
+        if let Ok(closest) = answer.closest {
             hprintln!("{} mm, {} N", closest.separation, force.length());
             end(true)
         }

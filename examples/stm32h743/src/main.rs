@@ -21,18 +21,17 @@ mod tick;
 use core::panic::PanicInfo;
 
 use bus::Bus;
-use controller::{BusStatus, Control, Receiver, Upkeep, surface};
+use controller::{BusStatus, Receiver, surface};
 use cortex_m::Peripherals;
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::entry;
 
-static FRAMES: surface::continuous::Surface = surface::continuous::Surface::new();
+static SURFACE: surface::Surface = surface::Surface::new();
 static BUS: BusStatus = BusStatus::new();
 
 #[entry]
 fn main() -> ! {
-    static mut TREE: Option<surface::Tree> = None;
-    match start(TREE) {
+    match start() {
         Some((receiver, bus)) => idle(receiver, bus),
         // Anything wrong here is wrong before the robot moves.
         None => loop {
@@ -42,16 +41,12 @@ fn main() -> ! {
 }
 
 /// Starts the control tick and the bus; `None` if the tree is damaged or a constant out of range.
-fn start(tree: &'static mut Option<surface::Tree>) -> Option<(Receiver, Bus)> {
+fn start() -> Option<(Receiver, Bus)> {
     let mut core = Peripherals::take()?;
     memory::protect(&mut core);
     let parts = clocks::start();
     memory::start_sram3();
-    // Validated once, before its first use; from then on `Upkeep` checks it.
-    let tree: &'static surface::Tree = tree.insert(surface::TREE.validate().ok()?);
-    let (writer, reader) = FRAMES.split().ok()?;
-    let control = Control::new(tree, reader, &BUS, &bus::TRUST).ok()?;
-    let receiver = Receiver::new(tree, writer, &BUS).ok()?;
+    let (receiver, control) = controller::start(&SURFACE, &BUS, &bus::TRUST).ok()?;
     let bus = Bus::start(parts)?;
     tick::start(&mut core, control);
     Some((receiver, bus))
@@ -59,11 +54,9 @@ fn start(tree: &'static mut Option<surface::Tree>) -> Option<(Receiver, Bus)> {
 
 fn idle(mut receiver: Receiver, mut bus: Bus) -> ! {
     let mut status = [0; bus::STATUS_MTU];
-    let mut upkeep = Upkeep::new(&BUS);
     loop {
         bus.poll(tick::now().0, |packet| take(&mut receiver, packet));
         receiver.work();
-        upkeep.step();
         if let Some(status) = receiver.status(tick::now(), &mut status) {
             bus.send(status);
         }

@@ -13,7 +13,7 @@
 #![no_std]
 #![no_main]
 
-use controller::surface::{CENTRE, Query, REACH, Surface, TREE};
+use controller::surface::{CENTRE, Frames, Query, REACH, TREE};
 use core::panic::PanicInfo;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{DCB, DWT, Peripherals, SYST};
@@ -28,7 +28,7 @@ const POSES: u32 = 2_000;
 const HALF_AXIS: f32 = 75.0;
 const RADIUS: f32 = 3.0;
 
-static FRAMES: Surface = Surface::new();
+static FRAMES: Frames = Frames::new();
 
 #[entry]
 fn main() -> ! {

@@ -10,16 +10,16 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use std::{env, thread};
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result};
 use controller::telemetry::{MAX_FRAMED, Summary, frame};
-use controller::{BusStatus, Control, Receiver, STATUS_FRAMED, TICK_RATE, Trust, Upkeep, surface};
+use controller::{BusStatus, STATUS_FRAMED, TICK_RATE, Trust, start, surface};
 use dibs_nostd::Millis;
 use dibs_nostd::wire::{Counters, Event};
 
 /// Slices of background work between two looks at the bus.
 const SLICES: u32 = 1_000;
 
-static FRAMES: surface::continuous::Surface = surface::continuous::Surface::new();
+static SURFACE: surface::Surface = surface::Surface::new();
 static BUS: BusStatus = BusStatus::new();
 static NOW: AtomicU32 = AtomicU32::new(0);
 static COUNTERS: Mutex<Counters> = Mutex::new(Counters::new());
@@ -31,21 +31,17 @@ fn main() -> Result<()> {
     let telemetry = UnixStream::connect(argument("TELEMETRY")?)?;
     let ticks: u32 = argument("TICKS")?.to_str().and_then(|t| t.parse().ok()).context("TICKS")?;
 
-    let (writer, reader) = FRAMES.split()?;
-    let tree = surface::TREE.validate().context("the tree")?;
-    let tree: &'static surface::Tree = Box::leak(Box::new(tree));
-    let mut receiver = Receiver::new(tree, writer, &BUS).map_err(|error| anyhow!("{error}"))?;
+    let (mut receiver, mut control) = start(&SURFACE, &BUS, &Trust::SERIAL)?;
     bus.set_read_timeout(Some(Duration::from_millis(1)))?;
     thread::spawn(move || {
         let (mut buffer, mut line) = ([0; 1024], [0; STATUS_FRAMED]);
-        let mut upkeep = Upkeep::new(&BUS);
         loop {
             let now = Millis(NOW.load(Ordering::Relaxed));
             match bus.read(&mut buffer) {
                 Ok(0) => return,
                 Ok(bytes) => {
-                    for &byte in &buffer[..bytes] {
-                        receiver.byte(byte, now);
+                    for byte in buffer[..bytes].chunks(1) {
+                        receiver.bytes(byte, now);
                         while receiver.work() {}
                     }
                 }
@@ -55,7 +51,6 @@ fn main() -> Result<()> {
             // The work of the board's idle loop.
             for _ in 0..SLICES {
                 receiver.work();
-                upkeep.step();
             }
             *counters() = *receiver.counters();
             let status = receiver.report(now, &mut line).unwrap_or_default();
@@ -65,14 +60,12 @@ fn main() -> Result<()> {
         }
     });
 
-    let mut control =
-        Control::new(tree, reader, &BUS, &Trust::SERIAL).map_err(|error| anyhow!("{error}"))?;
     let mut out = BufWriter::new(telemetry);
     let mut line = [0; MAX_FRAMED];
     let period = Duration::from_secs(1) / TICK_RATE;
-    let start = Instant::now();
+    let begun = Instant::now();
     for tick in 0..ticks {
-        thread::sleep((start + period * tick).saturating_duration_since(Instant::now()));
+        thread::sleep((begun + period * tick).saturating_duration_since(Instant::now()));
         let record = control.tick(|| 0);
         NOW.store(control.now().0, Ordering::Relaxed);
         out.write_all(frame(&record, &mut line).context("a record fits its line")?)?;

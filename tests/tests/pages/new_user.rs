@@ -68,13 +68,14 @@ use dibs_nostd::constraint::ConstraintForce;
 use dibs_nostd::glam::Vec3;
 
 dibs_nostd::include_tree!("heart");
-static SURFACE: heart::Surface = heart::Surface::new();
+static HEART: heart::Surface = heart::Surface::new();
 
 fn apply(_: ConstraintForce) {}
 fn receive() -> (&'static [u8], Millis) { (&[], Millis(0)) }
-fn pose() -> (Capsule, Vec3, Millis) {
+fn send(_: Option<&[u8]>) {}
+fn pose() -> (Capsule, Millis) {
     match Capsule::new(Vec3::ZERO, Vec3::X, 2.5) {
-        Ok(tool) => (tool, Vec3::ZERO, Millis(0)),
+        Ok(tool) => (tool, Millis(0)),
         Err(_) => loop {},
     }
 }

@@ -14,10 +14,10 @@ const fn besides<const N: usize>() -> usize {
 
 /// References on this computer are at least as long as the board's, so the board takes no more.
 #[test]
-fn a_surface_takes_1300_bytes_besides_its_positions() {
+fn a_surface_takes_1550_bytes_besides_its_positions() {
     let all = [besides::<162>(), besides::<5_138>(), besides::<65_536>()];
     println!("{all:?} bytes besides 24 a vertex");
-    assert!(all.iter().all(|&bytes| bytes == all[0] && bytes <= 1_300), "{all:?}");
+    assert!(all.iter().all(|&bytes| bytes == all[0] && bytes <= 1_550), "{all:?}");
 }
 
 /// Besides its gate and the ends of the buffers.
@@ -31,7 +31,7 @@ fn an_assembler_takes_less_than_600_bytes() {
 
 /// A surface that moves between frames has a third buffer, and the stretch of its extrapolation.
 #[test]
-fn a_continuous_surface_takes_36_bytes_a_vertex_and_1650() {
+fn a_continuous_surface_takes_36_bytes_a_vertex_and_1900() {
     type Continuous = Frames<5_138, 3>;
     type Monitor = StretchMonitor<'static, u16, 2>;
     let all = size_of::<Continuous>()
@@ -39,5 +39,5 @@ fn a_continuous_surface_takes_36_bytes_a_vertex_and_1650() {
         + size_of::<Assembler<'static, Monitor, 5_138, NoMac, Continuous>>();
     let besides = all - 3 * 12 * 5_138;
     println!("{besides} bytes besides 36 a vertex");
-    assert!(besides <= 1_650, "{besides}");
+    assert!(besides <= 1_900, "{besides}");
 }

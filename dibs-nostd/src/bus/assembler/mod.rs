@@ -41,7 +41,7 @@ use step::{Earlier, Step};
 ///
 /// RAM: less than 600 bytes besides [`Frames`](crate::Frames) and gate, for any `N`. A surface's buffers with
 /// both ends, the assembler and the [`StretchMonitor`](crate::StretchMonitor) together take 24 bytes a vertex and at
-/// most 1,300 bytes.
+/// most 1,550 bytes.
 ///
 /// ```
 /// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
@@ -149,7 +149,7 @@ impl<'f, 't, I: Index, const N: usize, F: Buffers>
     /// [`StretchError::NoMetric`] where the tree was emitted without its metric section.
     pub fn for_tree(
         writer: FrameWriter<'f, N, F>,
-        tree: &'t Tree<'t, I>,
+        tree: &Tree<'t, I>,
         limits: SurfaceLimits,
     ) -> Result<Self, StretchError> {
         let monitor = StretchMonitor::new(tree)?.limits(limits);
@@ -167,7 +167,7 @@ impl<'f, 't, I: Index, const N: usize>
     /// [`StretchError::NoMetric`] where the tree was emitted without its metric section.
     pub fn continuous(
         writer: FrameWriter<'f, N, Frames<N, 3>>,
-        tree: &'t Tree<'t, I>,
+        tree: &Tree<'t, I>,
         limits: SurfaceLimits,
     ) -> Result<Self, StretchError> {
         let monitor = StretchMonitor::continuous(tree)?.limits(limits);

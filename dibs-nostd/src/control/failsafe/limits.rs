@@ -253,6 +253,8 @@ pub enum LimitError {
         /// The speed.
         tissue_speed: f32,
     },
+    /// No limit on the reach follows from a tree without its rest shape.
+    NoReach,
     /// Recovery with 0 new frames.
     Recovery {
         /// The frames asked for.
@@ -271,6 +273,9 @@ impl fmt::Display for LimitError {
                 write!(f, "a limit of {safe} can never be exceeded")
             }
             Self::Speed { tissue_speed } => write!(f, "tissue cannot move at {tissue_speed}"),
+            Self::NoReach => {
+                write!(f, "the tree has no rest shape: give the surface's limits, with their reach")
+            }
             Self::Recovery { frames } => write!(f, "{frames} frames cannot recover a surface"),
         }
     }

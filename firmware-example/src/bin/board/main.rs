@@ -21,7 +21,7 @@ mod uart;
 mod vectors;
 
 use controller::telemetry::{MAX_FRAMED, Tick, frame};
-use controller::{BusStatus, Control, Receiver, STATUS_FRAMED, STATUS_MTU, Trust, Upkeep, surface};
+use controller::{BusStatus, STATUS_FRAMED, STATUS_MTU, Trust, start, surface};
 use cortex_m_rt::entry;
 use dibs_nostd::wire::enframe;
 use heapless::spsc::{Consumer, Queue};
@@ -31,31 +31,15 @@ use semihosting::Arguments;
 /// Records that wait for the line.
 const QUEUE: usize = 64;
 
-static FRAMES: surface::continuous::Surface = surface::continuous::Surface::new();
+static SURFACE: surface::Surface = surface::Surface::new();
 static BUS: BusStatus = BusStatus::new();
 
 #[entry]
 fn main() -> ! {
     static mut RECORDS: Queue<Tick, QUEUE> = Queue::new();
-    static mut TREE: Option<surface::Tree> = None;
     static mut NETWORK: Option<Network> = None;
     let (producer, consumer) = RECORDS.split();
 
-    // Validated once, before its first use; from then on `Upkeep` checks it.
-    let tree = match surface::TREE.validate() {
-        Ok(tree) => TREE.insert(tree),
-        Err(_) => {
-            defmt::error!("the tree in flash is damaged");
-            semihosting::exit(false)
-        }
-    };
-    defmt::info!(
-        "{} triangles, {} vertices, mesh {=u32:08x}, stretch limit {}",
-        tree.triangle_count(),
-        tree.vertex_count(),
-        tree.mesh_id(),
-        tree.stretch()
-    );
     let arguments = Arguments::read();
     if arguments.is_ethernet {
         *NETWORK = Network::start();
@@ -65,15 +49,21 @@ fn main() -> ! {
         }
     }
     let trust = if arguments.is_ethernet { &Trust::ETHERNET } else { &Trust::SERIAL };
-    let Ok((writer, reader)) = FRAMES.split() else { semihosting::exit(false) };
-    let Ok(control) = Control::new(tree, reader, &BUS, trust) else {
-        defmt::error!("the controller's constants are out of range");
-        semihosting::exit(false)
+    let (receiver, control) = match start(&SURFACE, &BUS, trust) {
+        Ok(ends) => ends,
+        Err(_) => {
+            defmt::error!("the tree in flash is damaged, or a constant out of range");
+            semihosting::exit(false)
+        }
     };
-    let Ok(receiver) = Receiver::new(tree, writer, &BUS) else {
-        defmt::error!("the tree has nothing to measure stretch against");
-        semihosting::exit(false)
-    };
+    let tree = control.tree();
+    defmt::info!(
+        "{} triangles, {} vertices, mesh {=u32:08x}, stretch limit {}",
+        tree.triangle_count(),
+        tree.vertex_count(),
+        tree.mesh_id(),
+        tree.stretch()
+    );
     schedule::start(control, producer, receiver, !arguments.is_ethernet);
     uart::TELEMETRY.start_sending();
     idle(consumer, NETWORK.as_mut(), arguments.ticks)
@@ -89,7 +79,8 @@ fn idle(
     #[cfg(feature = "planted-overflow")]
     line.fill(overflow(1));
     let mut status = [0; STATUS_MTU];
-    let mut upkeep = Upkeep::new(&BUS);
+    #[cfg(feature = "wide")]
+    core::hint::black_box(wide());
     #[cfg(feature = "planted-panic")]
     core::hint::black_box([0; 4][core::hint::black_box(0_usize)]);
     loop {
@@ -101,9 +92,8 @@ fn idle(
             None if ticks != 0 && schedule::ticks() >= ticks => break,
             None => (),
         }
-        // There is always work, so the loop does not sleep. To save power, `wfi` after a round of `upkeep`; but an
+        // There is always work, so the loop does not sleep. To save power, `wfi` after a round of the tree's check; but an
         // emulated processor that sleeps loses its exact time.
-        upkeep.step();
         if let Some(network) = &mut network {
             network.poll();
         }
@@ -120,7 +110,7 @@ fn idle(
     if let Some(network) = network {
         send(frame(network.record(), &mut line));
     }
-    let summary = schedule::summary(stack::high_water(), upkeep.rounds());
+    let summary = schedule::summary(stack::high_water());
     send(frame(&summary, &mut line));
     defmt::info!(
         "{} ticks, {} deadlines missed, {} frames published, {} bytes of stack",
@@ -141,6 +131,16 @@ fn overflow(depth: u8) -> u8 {
         return 0;
     }
     overflow(depth | 1).wrapping_add(below.iter().fold(0, |sum, byte| sum ^ byte))
+}
+
+/// A wide query, to show that it has no panic path either.
+#[cfg(feature = "wide")]
+fn wide() -> Option<f32> {
+    let tree = surface::TREE.validate().ok()?;
+    let mut query = surface::WideQuery::new(&tree).ok()?;
+    let rows = core::hint::black_box([glam::Vec3::ZERO; 4]);
+    let tool = controller::instrument(core::hint::black_box(0)).ok()?;
+    Some(query.closest_wide(&rows[..], &tool, &dibs_nostd::Options::new()).ok()?.separation)
 }
 
 /// Sends a status over the serial bus.

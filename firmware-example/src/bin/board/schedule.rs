@@ -138,7 +138,7 @@ pub fn ticks() -> u32 {
 }
 
 /// The run so far; after `stop`, all of it.
-pub fn summary(stack_bytes: u32, scrub_rounds: u32) -> Summary {
+pub fn summary(stack_bytes: u32) -> Summary {
     let mut summary = Summary {
         kind: Summary::KIND,
         ticks: ticks(),
@@ -150,12 +150,13 @@ pub fn summary(stack_bytes: u32, scrub_rounds: u32) -> Summary {
         stack_bytes,
         masked_counts: MASKED.load(Ordering::Relaxed),
         bus_masked_counts: BUS_MASKED.load(Ordering::Relaxed),
-        scrub_rounds,
+        scrub_rounds: 0,
         events: [0; Event::ALL.len()],
     };
     RECEIVER.with(|receiver| {
         if let Some(receiver) = receiver {
             summary.events = Event::ALL.map(|event| receiver.counters().of(event));
+            summary.scrub_rounds = receiver.rounds();
         }
     });
     TIMELINE.with(|timeline| {
@@ -220,7 +221,7 @@ pub extern "C" fn bus_interrupt() {
     RECEIVER.with(|receiver| {
         while let Some(byte) = uart::BUS.read() {
             if let Some(receiver) = receiver {
-                receiver.byte(byte, now());
+                receiver.bytes(&[byte], now());
             }
         }
     });

@@ -170,7 +170,7 @@ const VARIANTS: [Variant; 2] = [
         panics: "panics.ethernet",
         interrupts: &["ETH"],
         places: &[
-            ("stm32h743::FRAMES", &AXI),
+            ("stm32h743::SURFACE", &AXI),
             ("stm32h743::tick::CONTROL", &DTCM),
             ("controller::surface::BYTES", &FLASH),
             ("stm32h743::bus::QUEUE", &SRAM3),
@@ -181,7 +181,7 @@ const VARIANTS: [Variant; 2] = [
         panics: "panics.fdcan",
         interrupts: &["FDCAN1_IT0", "FDCAN1_IT1"],
         places: &[
-            ("stm32h743::FRAMES", &AXI),
+            ("stm32h743::SURFACE", &AXI),
             ("stm32h743::tick::CONTROL", &DTCM),
             ("controller::surface::BYTES", &FLASH),
         ],

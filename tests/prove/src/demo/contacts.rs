@@ -123,7 +123,8 @@ impl Touches {
         if tick.separation < 0.0 {
             let ends = [(tick.tool_start, before.tool_start), (tick.tool_end, before.tool_end)];
             let moved = ends.map(|(now, was)| Vec3::from(now).distance(Vec3::from(was)));
-            let speed = moved[0].max(moved[1]) * TICK_RATE as f32;
+            let flow = Vec3::from(tick.surface_velocity).length();
+            let speed = moved[0].max(moved[1]) * TICK_RATE as f32 + flow;
             let first = (STIFFNESS * MARGIN).min(MAX_FORCE) - DAMPING * speed - 1e-3;
             self.ticks_inside += 1;
             self.ticks_too_weak += usize::from(force(tick) < first);

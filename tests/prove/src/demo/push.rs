@@ -64,7 +64,8 @@ fn expected(before: &Tick, tick: &Tick) -> Option<DVec3> {
     }
     let direction = away.normalize();
     let moved = (start - was_start).lerp(end - was_end, along);
-    let speed = moved.dot(direction) * f64::from(TICK_RATE);
+    let flow = Vec3::from(tick.surface_velocity).as_dvec3();
+    let speed = (moved * f64::from(TICK_RATE) - flow).dot(direction);
     let separation = f64::from(tick.lower) - f64::from(tick.accuracy) - f64::from(tick.margin);
     let depth = f64::from(MARGIN) - separation;
     if depth <= 0.0 {

@@ -13,28 +13,24 @@ mod exit;
 #[path = "../board/files.rs"]
 mod files;
 
-use controller::surface::{self, continuous::Surface};
-use controller::{BusStatus, Control, Receiver, Trust};
+use controller::surface::Surface;
+use controller::{BusStatus, Control, Trust};
 use cortex_m_rt::entry;
 use dibs_nostd::Ticks;
 use exit::exit;
 use probe::tick::{ANSWER_WORDS, BYTES, END, REGISTER, SKIP, TICK};
 
-static FRAMES: Surface = Surface::new();
+static SURFACE: Surface = Surface::new();
 static BUS: BusStatus = BusStatus::new();
 
 #[entry]
 fn main() -> ! {
-    static mut TREE: Option<surface::Tree> = None;
     clock::start();
-    let done = surface::TREE.validate().ok().and_then(|tree| run(TREE.insert(tree)));
-    exit(done.is_some());
+    exit(run().is_some());
 }
 
-fn run(tree: &'static surface::Tree) -> Option<()> {
-    let (writer, reader) = FRAMES.split().ok()?;
-    let mut receiver = Receiver::new(tree, writer, &BUS).ok()?;
-    let mut control = Control::new(tree, reader, &BUS, &Trust::SERIAL).ok()?;
+fn run() -> Option<()> {
+    let (mut receiver, mut control) = controller::start(&SURFACE, &BUS, &Trust::SERIAL).ok()?;
     let mut script = files::Input::open()?;
     let mut answers = files::Output::create()?;
     loop {
@@ -45,7 +41,7 @@ fn run(tree: &'static surface::Tree) -> Option<()> {
                 for _ in 0..count {
                     let mut byte = [0];
                     script.read(&mut byte)?;
-                    receiver.byte(byte[0], control.now());
+                    receiver.bytes(&byte, control.now());
                 }
                 while receiver.work() {}
                 let padding = count.wrapping_neg() as usize % 4;

@@ -1,0 +1,179 @@
+//! The bus's end: bytes in, published frames and statuses out.
+
+use super::Surface;
+use crate::surface::FrameView;
+use crate::wire::{Counters, Deframer, Mac, NoMac, encode_status, enframe, framed_bytes};
+use crate::{
+    Advance, Assembler, FrameWriter, Frames, Index, Millis, Progress, ReceiveError, Scrub,
+    StretchError, StretchMonitor, SurfaceLimits, Tree, TreeBytes,
+};
+
+/// Largest packet on a byte stream; a network's packets can be larger.
+const MTU: usize = 1_024;
+
+/// Largest status, in bytes: 13 counters, so that three statuses carry all.
+const STATUS: usize = 96;
+
+/// Time between two statuses, unless a frame was published or refused before.
+const INTERVAL: Millis = Millis(100);
+
+/// Bytes of the tree that an idle slice checks for each unit of its work.
+const SCRUBBED: u32 = 4;
+
+type Receiver<'s, 't, I, const N: usize, M> =
+    Assembler<'s, StretchMonitor<'t, I, 2>, N, M, Frames<N, 3>>;
+
+/// The bus's end of a [`Surface`]: it takes packets, checks complete frames in slices, publishes them, watches the tree's
+/// bytes, and makes the statuses that go back.
+///
+/// Two contexts may use it, one at a time: an interrupt that takes bytes, and an idle loop that works. Both are below the
+/// control tick's priority. RAM: less than 3 kB.
+#[derive(Debug)]
+pub struct Bus<'s, 't, I, const N: usize, M: Mac = NoMac> {
+    surface: &'s Surface<N>,
+    deframer: Deframer<MTU>,
+    assembler: Receiver<'s, 't, I, N, M>,
+    scrub: Scrub<'t>,
+    /// Time of the last status.
+    reported: Millis,
+    /// A frame was published or refused since, or the sender asks.
+    has_news: bool,
+}
+
+impl<'s, 't, I: Index, const N: usize, M: Mac> Bus<'s, 't, I, N, M> {
+    /// Bytes of a status on a byte stream before its framing, and room enough on a network.
+    pub const STATUS_BYTES: usize = STATUS;
+
+    /// Bytes of the longest status on a byte stream.
+    pub const STATUS_FRAMED: usize = framed_bytes(STATUS);
+
+    #[inline(always)]
+    pub(super) fn new(
+        surface: &'s Surface<N>,
+        writer: FrameWriter<'s, N, Frames<N, 3>>,
+        (tree, bytes): (&Tree<'t, I>, TreeBytes<'t, I>),
+        limits: SurfaceLimits,
+        mac: M,
+    ) -> Result<Self, StretchError> {
+        let monitor = StretchMonitor::continuous(tree)?.limits(limits);
+        Ok(Self {
+            surface,
+            deframer: Deframer::new(),
+            assembler: Assembler::with_mac(writer, monitor, tree.mesh_id(), limits.reach, mac),
+            scrub: bytes.scrub(),
+            reported: Millis(0),
+            has_news: false,
+        })
+    }
+
+    /// Takes bytes of a serial line or another stream, at the time `now`. [`counters`](Self::counters) says what became of
+    /// them, by cause.
+    ///
+    /// Cost: O(bytes). [`work`](Self::work) must keep up: a complete frame is dropped where the next one begins before it
+    /// was checked.
+    pub fn receive(&mut self, bytes: &[u8], now: Millis) {
+        for &byte in bytes {
+            match self.deframer.push(byte) {
+                None => continue,
+                Some(Ok(packet)) => {
+                    let outcome = self.assembler.accept(packet, now);
+                    self.has_news |= outcome == Ok(Progress::Hello);
+                }
+                Some(Err(error)) => self.assembler.count_framing(&error),
+            }
+            self.surface.link.set(&self.assembler.health());
+        }
+    }
+
+    /// Takes one packet, from a bus that keeps packets apart.
+    ///
+    /// Cost: O(bytes).
+    ///
+    /// # Errors
+    /// [`ReceiveError`] names why the packet or its frame was not taken; the event has been counted.
+    pub fn packet(&mut self, packet: &[u8], now: Millis) -> Result<Progress, ReceiveError> {
+        let outcome = self.assembler.accept(packet, now);
+        self.has_news |= outcome == Ok(Progress::Hello);
+        self.surface.link.set(&self.assembler.health());
+        outcome
+    }
+
+    /// Does a slice of the checks: looks at most at `work` rows and triangles of the frame that arrives, and publishes it
+    /// once it is complete and admitted. Without a frame it checks the tree's bytes. `Ok(Advance::Pending)` if more is due
+    /// at once.
+    ///
+    /// Cost: O(`work`).
+    ///
+    /// # Errors
+    /// [`ReceiveError::Stretch`] when a surface is refused; it has been counted.
+    // Not inlined: in a large loop its branches would become jumps through a register, whose targets no check of the binary
+    // can see.
+    #[inline(never)]
+    pub fn work(&mut self, work: u32) -> Result<Advance, ReceiveError> {
+        let outcome = self.assembler.advance(work);
+        self.surface.link.set(&self.assembler.health());
+        match outcome {
+            Ok(Advance::Pending | Advance::Held { .. }) => (),
+            Ok(Advance::Idle) => self.check_tree(work),
+            Ok(Advance::Published { .. }) | Err(_) => self.has_news = true,
+        }
+        outcome
+    }
+
+    fn check_tree(&mut self, work: u32) {
+        let bytes = work.saturating_mul(SCRUBBED) as usize;
+        if self.scrub.step(bytes).is_err() {
+            self.surface.set_tree_corrupt();
+        }
+    }
+
+    /// The status that is due for the sender, of at most `BYTES`; `None` unless there is news, or 100 ms went by. The sender's next frame echoes
+    /// it, which shows how long frames are on their way.
+    pub fn status<'b, const BYTES: usize>(
+        &mut self,
+        now: Millis,
+        packet: &'b mut [u8; BYTES],
+    ) -> Option<&'b [u8]> {
+        if !self.has_news && now.since(self.reported) < INTERVAL {
+            return None;
+        }
+        (self.reported, self.has_news) = (now, false);
+        let status = self.assembler.status(now, self.surface.safety());
+        let (counters, mac) = (self.assembler.counters(), self.assembler.mac());
+        let mesh_id = self.assembler.gate().tree().mesh_id();
+        Some(encode_status(mesh_id, &status, counters, mac, packet))
+    }
+
+    /// The same, framed for a byte stream.
+    pub fn status_framed<'b>(
+        &mut self,
+        now: Millis,
+        line: &'b mut [u8; framed_bytes(STATUS)],
+    ) -> Option<&'b [u8]> {
+        let mut packet = [0_u8; STATUS];
+        enframe(self.status(now, &mut packet)?, line)
+    }
+
+    /// The events since the start, by cause.
+    #[must_use]
+    pub const fn counters(&self) -> &Counters {
+        self.assembler.counters()
+    }
+
+    /// The frame published last.
+    #[must_use]
+    pub fn surface(&self) -> Option<FrameView<'_, N, Frames<N, 3>>> {
+        self.assembler.surface()
+    }
+
+    /// Whole rounds of the check of the tree's bytes; wraps.
+    #[must_use]
+    pub const fn rounds(&self) -> u32 {
+        self.scrub.rounds()
+    }
+
+    /// Registers the surface anew, as [`Assembler::register`] does: only an operator decides that.
+    pub const fn register(&mut self) {
+        self.assembler.register();
+    }
+}

@@ -1,0 +1,130 @@
+//! The limits of a controller: numbers that only its user knows.
+
+use crate::failsafe::{LimitError, Limits, Watch};
+use crate::{Budget, Index, Millis, Options, SurfaceLimits, Tree};
+
+/// How far a surface is trusted, and how a tick asks.
+///
+/// From two numbers, the tissue's largest speed and the largest age, follow the limits of [`Bus`](super::Bus) and
+/// [`Guard`](super::Guard); each can be given on its own.
+#[derive(Clone, Copy, Debug)]
+pub struct GuardLimits {
+    /// mm a millisecond.
+    speed: f32,
+    age: Millis,
+    trust: Option<Limits>,
+    surface: Option<SurfaceLimits>,
+    is_automatic: bool,
+    has_transit: bool,
+    pub(super) rate: f32,
+    pub(super) options: Options,
+}
+
+/// The reach by default, in sizes of the rest shape: half its largest extent.
+const ROOM: f32 = 4.0;
+
+impl GuardLimits {
+    /// Limits for tissue of at most this speed (mm/s), and surfaces of at most this age: about two periods of the source and
+    /// the time on the way. From three quarters of the age on the state is degraded, beyond it safe.
+    ///
+    /// By default the control loop runs at 1 kHz, an operator acknowledges the end of a safe state, the time on the way is
+    /// watched by the status that each frame echoes ([`Bus::status`](super::Bus::status)), vertices keep within four sizes
+    /// of the rest shape, and a tick's budget is not limited.
+    #[must_use]
+    pub const fn new(speed_mm_per_s: f32, age: Millis) -> Self {
+        Self {
+            speed: speed_mm_per_s / 1_000.0,
+            age,
+            trust: None,
+            surface: None,
+            is_automatic: false,
+            has_transit: true,
+            rate: 1_000.0,
+            options: Options::new(),
+        }
+    }
+
+    /// Ticks of the control loop a second: velocities count from it.
+    #[must_use]
+    pub const fn ticks_a_second(mut self, rate: u32) -> Self {
+        self.rate = rate as f32;
+        self
+    }
+
+    /// The most work of a tick: [`Budget::for_instructions`].
+    #[must_use]
+    pub const fn budget(mut self, budget: Budget) -> Self {
+        self.options = self.options.budget(budget);
+        self
+    }
+
+    /// Options of every tick's query.
+    #[must_use]
+    pub const fn options(mut self, options: Options) -> Self {
+        self.options = options;
+        self
+    }
+
+    /// Leaves the safe state without an acknowledgement.
+    #[must_use]
+    pub const fn automatic(mut self) -> Self {
+        self.is_automatic = true;
+        self
+    }
+
+    /// Does without the time on the way, for a line on which no status goes back: a delayed frame is then taken for a new
+    /// one, and no margin covers the delay.
+    #[must_use]
+    pub const fn without_transit(mut self) -> Self {
+        self.has_transit = false;
+        self
+    }
+
+    /// The fail-safe machine's limits, instead of those that follow from speed and age.
+    #[must_use]
+    pub const fn trust(mut self, limits: Limits) -> Self {
+        self.trust = Some(limits);
+        self
+    }
+
+    /// The published surfaces' limits, instead of those that follow from the speed and the tree's rest shape.
+    #[must_use]
+    pub const fn surfaces(mut self, limits: SurfaceLimits) -> Self {
+        self.surface = Some(limits);
+        self
+    }
+
+    /// The fail-safe machine's limits.
+    pub(super) fn failsafe(&self) -> Result<Limits, LimitError> {
+        if let Some(limits) = self.trust {
+            return Ok(limits);
+        }
+        let limits = Limits::new(Watch::new(Millis(self.age.0 / 4 * 3), self.age)?, self.speed)?;
+        let limits = if self.has_transit { limits } else { limits.without_transit() };
+        Ok(if self.is_automatic { limits.automatic() } else { limits })
+    }
+
+    /// The published surfaces' limits.
+    pub(super) fn surface<I: Index>(
+        &self,
+        tree: &Tree<'_, I>,
+    ) -> Result<SurfaceLimits, LimitError> {
+        match self.surface {
+            Some(limits) => Ok(limits),
+            None => Ok(SurfaceLimits::reach_mm(reach(tree)?).speed(self.speed)),
+        }
+    }
+}
+
+/// The farthest coordinate of a surface that moves by its own size.
+fn reach<I: Index>(tree: &Tree<'_, I>) -> Result<f32, LimitError> {
+    let mut corners = None;
+    for row in 0..tree.vertex_count() {
+        let at = tree.rest_position(row).ok_or(LimitError::NoReach)?;
+        let (low, high) = corners.unwrap_or((at, at));
+        corners = Some((at.min(low), at.max(high)));
+    }
+    let (low, high) = corners.ok_or(LimitError::NoReach)?;
+    let size = (high - low).max_element() * 0.5;
+    Ok(((low + high) * 0.5).abs().max_element() + ROOM * size)
+}

@@ -1,0 +1,90 @@
+//! The memory that both ends share.
+
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+use super::{Bus, Guard, GuardLimits};
+use crate::failsafe::{LinkStatus, State};
+use crate::wire::{Mac, NoMac};
+use crate::{Error, Frames, Index, TreeBytes};
+
+/// The vertices of a surface as they are now, and the notes of its two ends for one another. Meant for a `static`; the
+/// module that [`include_tree!`](crate::include_tree) includes has its type as `Surface`.
+///
+/// Neither end waits for the other. RAM: 36 bytes a vertex, and less than 400.
+#[derive(Debug)]
+pub struct Surface<const N: usize> {
+    pub(super) frames: Frames<N, 3>,
+    pub(super) link: LinkStatus,
+    /// As [`Status::safety`](crate::wire::Status::safety).
+    safety: AtomicU32,
+    /// Never cleared: flash that read wrong once is not trusted.
+    is_tree_corrupt: AtomicBool,
+}
+
+impl<const N: usize> Surface<N> {
+    /// No frame was published yet.
+    #[cfg(not(loom))]
+    #[must_use]
+    #[expect(clippy::new_without_default, reason = "it is too large for a stack")]
+    pub const fn new() -> Self {
+        Self {
+            frames: Frames::new(),
+            link: LinkStatus::new(),
+            safety: AtomicU32::new(0),
+            is_tree_corrupt: AtomicBool::new(false),
+        }
+    }
+
+    /// Validates the tree, and makes the two ends, once. `STACK` is the tree's [`TreeBytes::stack`] at least, and the guard
+    /// has places for `OPENED` opened nodes: see [`Tracker`](crate::Tracker).
+    ///
+    /// Cost: linear in the tree, for start-up.
+    ///
+    /// # Errors
+    /// [`Error`], with the damage of the tree, the limit that is out of range, or that the ends were taken before.
+    #[inline(always)]
+    pub fn start<'t, I: Index, const STACK: usize, const OPENED: usize>(
+        &self,
+        tree: TreeBytes<'t, I>,
+        limits: GuardLimits,
+    ) -> Result<(Bus<'_, 't, I, N>, Guard<'_, 't, I, N, STACK, OPENED>), Error> {
+        self.start_with_mac(tree, limits, NoMac)
+    }
+
+    /// The same, for packets with tags.
+    ///
+    /// # Errors
+    /// Those of [`start`](Self::start).
+    #[inline(always)]
+    pub fn start_with_mac<'t, I: Index, M: Mac, const STACK: usize, const OPENED: usize>(
+        &self,
+        bytes: TreeBytes<'t, I>,
+        limits: GuardLimits,
+        mac: M,
+    ) -> Result<(Bus<'_, 't, I, N, M>, Guard<'_, 't, I, N, STACK, OPENED>), Error> {
+        let tree = bytes.validate()?;
+        let (writer, reader) = self.frames.split()?;
+        let bus = Bus::new(self, writer, (&tree, bytes), limits.surface(&tree)?, mac)?;
+        let guard = Guard::new(self, reader, (&tree, bytes), limits)?;
+        Ok((bus, guard))
+    }
+
+    /// The frame-to-frame state that the guard is in, for the sender.
+    pub(super) fn safety(&self) -> u8 {
+        self.safety.load(Ordering::Relaxed) as u8
+    }
+
+    pub(super) fn set_state(&self, state: State) {
+        self.safety.store(state as u32 + 1, Ordering::Relaxed);
+    }
+
+    /// Whether the tree's bytes were ever found changed.
+    #[must_use]
+    pub fn is_tree_corrupt(&self) -> bool {
+        self.is_tree_corrupt.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn set_tree_corrupt(&self) {
+        self.is_tree_corrupt.store(true, Ordering::Relaxed);
+    }
+}
