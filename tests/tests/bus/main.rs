@@ -7,6 +7,7 @@ mod causes;
 mod complete;
 mod continuous;
 mod exhaustive;
+mod guard;
 mod life;
 mod line;
 mod order;

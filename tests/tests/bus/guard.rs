@@ -1,0 +1,198 @@
+//! The guard: its velocities, its limits, and what it does before the first frame and after the last.
+
+use dibs_build::{Builder, generate};
+use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
+use dibs_nostd::failsafe::{LimitError, State};
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Surface};
+use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, Freshness, enframe};
+use dibs_nostd::{Advance, Capsule, Error, Millis, SurfaceLimits, TreeBytes, Unavailable};
+use dibs_tests::bus::collect;
+
+const ROWS: usize = 162;
+
+/// Ticks between two frames.
+const PERIOD: u32 = 30;
+
+/// The tissue's velocity, in mm/s.
+const FLOW: Vec3 = Vec3::new(12.0, -5.0, 9.0);
+
+type Ends<'t> = (Bus<'static, 't, u16, ROWS>, Guard<'static, 't, u16, ROWS, 64, 96>);
+
+fn surface() -> &'static Surface<ROWS> {
+    Box::leak(Box::new(Surface::new()))
+}
+
+/// A heart that drifts as a whole, its bus and its guard, from tick to tick.
+struct World<'t> {
+    ends: Ends<'t>,
+    mesh_id: u32,
+    rest: Vec<Vec3>,
+    now: u32,
+    is_serial: bool,
+}
+
+impl<'t> World<'t> {
+    fn new(built: &'t dibs_build::BuiltTree, rest: &[Vec3], limits: GuardLimits) -> Self {
+        let ends = surface().start(TreeBytes::new(built.blob()), limits).expect("valid");
+        let (mesh_id, rest) = (built.summary().mesh_id, built.to_rows(rest));
+        // A serial line's times echo a status from the clock's first turn on.
+        Self { ends, mesh_id, rest, now: 1_000, is_serial: false }
+    }
+
+    fn shift(&self) -> Vec3 {
+        FLOW * ((self.now - 1_000) as f32 * 1e-3)
+    }
+
+    /// One frame, at once.
+    fn frame(&mut self) {
+        let rows: Vec<Vec3> = self.rest.iter().map(|&row| row + self.shift()).collect();
+        let epoch = self.now;
+        let id = FrameId { mesh_id: self.mesh_id, session: 1, epoch };
+        let fresh = Freshness { age_ms: 0, echo: Some(self.now) };
+        let sender = FrameEncoder::<_, 256>::new(id, Encoding::Float, &rows[..]).expect("valid");
+        for packet in collect(sender.with_freshness(fresh)) {
+            if self.is_serial {
+                let mut line = [0; 512];
+                self.ends.0.receive(enframe(&packet, &mut line).expect("room"), Millis(self.now));
+            } else {
+                self.ends.0.packet(&packet, Millis(self.now)).expect("a good packet");
+            }
+        }
+        while self.ends.0.work(100).expect("admitted") == Advance::Pending {}
+    }
+
+    /// A tick with a tool whose centre is so far from the rest shape's.
+    fn tick(&mut self, at: Vec3) -> Answer {
+        let tool = Capsule::new(at, at + Vec3::new(30.0, 4.0, 10.0), 2.0).expect("valid");
+        self.now += 1;
+        self.ends.1.closest(&tool, Millis(self.now))
+    }
+}
+
+#[test]
+fn the_velocity_is_that_of_the_tool_relative_to_the_tissue() {
+    let heart = generate::heart(320).expect("a valid size").mesh;
+    let built = Builder::new().stretch(1.5).build(&heart).expect("a valid mesh");
+    let limits = GuardLimits::new(300.0, Millis(200)).automatic();
+    let mut world = World::new(&built, &heart.positions, limits);
+    let start = Vec3::new(75.0, 0.0, 20.0);
+    let (mut along, mut still) = (0, 0);
+    for tick in 0..2_000 {
+        if tick % PERIOD == 0 {
+            world.is_serial = tick % 2 == 0;
+            world.frame();
+        }
+        // With the tissue, and then at rest beside it.
+        let is_along = tick < 1_200;
+        let next = world.now + 1 - 1_000;
+        let at = if is_along { start + FLOW * (next as f32 * 1e-3) } else { start + FLOW * 1.2 };
+        let answer = world.tick(at);
+        if tick < 4 * PERIOD || (1_195..1_205).contains(&tick) {
+            continue;
+        }
+        let expected = if is_along { Vec3::ZERO } else { -FLOW };
+        let searched = answer.searched.expect("a surface");
+        assert!((answer.velocity - expected).length() < 0.3, "tick {tick}: {}", answer.velocity);
+        assert!((searched.velocity - FLOW).length() < 0.3 && searched.lag == Some(Millis(0)));
+        *if is_along { &mut along } else { &mut still } += 1;
+    }
+    assert!(along > 1_000 && still > 700);
+}
+
+/// Ticks that were left out make no tool faster than it is.
+#[test]
+fn a_missed_tick_does_not_damp_more() {
+    let heart = generate::heart(320).expect("a valid size").mesh;
+    let built = Builder::new().build(&heart).expect("a valid mesh");
+    let limits = GuardLimits::new(0.0, Millis(1_000)).ticks_a_second(1_000);
+    let mut world = World::new(&built, &heart.positions, limits);
+    let at = Vec3::new(75.0, 0.0, 20.0);
+    assert_eq!(world.tick(at).velocity, Vec3::ZERO, "the first");
+    assert!((world.tick(at + Vec3::X * 0.1).velocity - Vec3::X * 100.0).length() < 0.1);
+    world.now += 9; // ten ms in all
+    let velocity = world.tick(at + Vec3::X * 1.1).velocity;
+    assert!((100.0..=112.0).contains(&velocity.x), "{velocity}");
+    // Without a pose nothing is known, and the next tick starts anew.
+    let blind = world.ends.1.without_pose(Millis(world.now));
+    assert!(blind.velocity.is_nan() && blind.closest == Err(Unavailable::NotFinite));
+    assert_eq!(world.tick(at).velocity, Vec3::ZERO);
+}
+
+#[test]
+fn the_state_is_safe_until_acknowledged_and_after_the_age() {
+    let heart = generate::heart(320).expect("a valid size").mesh;
+    let built = Builder::new().build(&heart).expect("a valid mesh");
+    let mut world = World::new(&built, &heart.positions, GuardLimits::new(20.0, Millis(100)));
+    let spring = SpringDamper::stiffness(1.0).max_force(5.0);
+    let wall = ForbiddenRegion::new(spring, 50.0).expect("valid");
+    let at = Vec3::new(75.0, 0.0, 20.0);
+    for tick in 0..1_500 {
+        if tick % PERIOD == 0 {
+            world.frame();
+        }
+        let answer = world.tick(at);
+        assert_eq!(answer.trust.state, State::Safe, "nobody acknowledged");
+        assert!(matches!(answer.force(&wall).state, ConstraintState::Safe(_)));
+    }
+    world.ends.1.acknowledge().expect("it waits");
+    let mut found = Vec::new();
+    for _ in 0..150 {
+        let answer = world.tick(at);
+        found.push((answer.trust.state, answer.searched.expect("a surface").frame.age.0));
+    }
+    for (state, age) in found {
+        let expected = match age {
+            ..=75 => State::Nominal,
+            76..=100 => State::Degraded,
+            _ => State::Safe,
+        };
+        assert_eq!(state, expected, "at {age} ms");
+    }
+    let mut status = [0; 96];
+    let said = world.ends.0.status(Millis(world.now), &mut status).map(<[u8]>::len);
+    assert!(said.is_some_and(|bytes| bytes > 32), "there is news: {said:?}");
+    assert!(world.ends.0.status(Millis(world.now), &mut status).is_none(), "and then none");
+}
+
+/// A frame without an echo may have been on its way for any time.
+#[test]
+fn a_line_without_statuses_is_a_written_choice() {
+    let heart = generate::heart(320).expect("a valid size").mesh;
+    let built = Builder::new().build(&heart).expect("a valid mesh");
+    for (is_left_out, expected) in [(false, State::Safe), (true, State::Nominal)] {
+        let limits = GuardLimits::new(20.0, Millis(3_000)).automatic();
+        let limits = if is_left_out { limits.without_transit() } else { limits };
+        let mut world = World::new(&built, &heart.positions, limits);
+        let rows = world.rest.clone();
+        let id = FrameId { mesh_id: world.mesh_id, session: 1, epoch: 1 };
+        let sender = FrameEncoder::<_, 256>::new(id, Encoding::Float, &rows[..]).expect("valid");
+        for packet in collect(sender) {
+            world.ends.0.packet(&packet, Millis(world.now)).expect("a good packet");
+        }
+        while world.ends.0.work(100).expect("admitted") == Advance::Pending {}
+        let states = (0..1_100).map(|_| world.tick(Vec3::X * 80.0).trust.state);
+        assert_eq!(states.last(), Some(expected));
+    }
+}
+
+#[test]
+fn a_start_names_what_is_wrong() {
+    let heart = generate::heart(320).expect("a valid size").mesh;
+    let built = Builder::new().build(&heart).expect("a valid mesh");
+    let bare = Builder::new().with_rest_shape(false).build(&heart).expect("a valid mesh");
+    let limits = GuardLimits::new(20.0, Millis(100));
+    let start = |blob, limits| surface().start::<u16, 64, 96>(TreeBytes::new(blob), limits).err();
+    assert_eq!(start(built.blob(), limits), None);
+    assert_eq!(start(bare.blob(), limits), Some(Error::Limit(LimitError::NoReach)));
+    assert_eq!(start(bare.blob(), limits.surfaces(SurfaceLimits::reach_mm(200.0))), None);
+    let backwards = start(built.blob(), GuardLimits::new(-1.0, Millis(100)));
+    assert!(matches!(backwards, Some(Error::Limit(LimitError::Speed { .. }))), "{backwards:?}");
+    assert!(matches!(start(&built.blob()[1..], limits), Some(Error::Format(_))));
+    let shallow = surface().start::<u16, 1, 96>(TreeBytes::new(built.blob()), limits).err();
+    assert!(matches!(shallow, Some(Error::Query(_))), "{shallow:?}");
+    let once = surface();
+    let twice = || once.start::<u16, 64, 96>(TreeBytes::new(built.blob()), limits).err();
+    assert_eq!(twice(), None);
+    assert!(matches!(twice(), Some(Error::Split(_))));
+}
