@@ -130,6 +130,8 @@ impl MotionStretch {
     /// admits every frame of the motion that does not turn a closed surface inside out, even with a margin of 0.
     #[must_use]
     pub fn limits(&self, margin: f32) -> Vec<f32> {
+        // No frame is known that `SHARED` alone refuses: 400,000 pairs of flat triangles reached 0.00056. The proven bound
+        // on such a pair's two roundings is 0.00085, so both factors stay.
         let limit = |(needed, rounding): (&Needed, &f64)| {
             round_up(needed.stretch.max(1.0) * (1.0 + f64::from(margin)) * SHARED * rounding)
         };

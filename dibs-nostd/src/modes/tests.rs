@@ -178,3 +178,65 @@ fn no_speed_makes_the_odometer_understate() {
     }
     assert!(farthest > 20_000.0, "{farthest}");
 }
+
+/// The same where a course's numbers nearly fit: a surface that became shorter on its way goes on without becoming shorter
+/// still, so its far end is farther from where it was shown than the error of its expected place.
+#[test]
+fn a_course_of_weights_is_not_cut_to_the_numbers_that_fit() {
+    const K: usize = 2;
+    let mesh = generate::heart(320).unwrap().mesh;
+    let built = Builder::new().stretch(20.0).build(&mesh).unwrap();
+    let (unit, radius) = {
+        let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
+        (Unit::of(&tree), tree.node(0).unwrap().1)
+    };
+    // The length whose units no longer fit.
+    let most = unit.length(1 << 30) * 4.0;
+    let ends = mesh.positions.iter().fold([f32::MAX, f32::MIN], |[left, right], p| {
+        [if p.x < left { p.x } else { left }, if p.x > right { p.x } else { right }]
+    });
+    // `far` on its way, and pressed together towards its left end by `shorter` radii.
+    let shape = |(far, shorter): (f32, f32)| {
+        let pressed = |p: &Vec3| (p.x - ends[0]) / (ends[1] - ends[0]) * shorter * radius;
+        mesh.positions.iter().map(|p| *p + Vec3::X * (far * most - pressed(p))).collect()
+    };
+    let shown = [(-2.0, 0.0), (-1.33, 0.4), (-0.66, 0.8), (0.34, 0.8)];
+    // Where the third and the fourth go on to: no weight leaves its range before.
+    let beyond = [(0.68, 1.6), (2.4, 0.0)];
+    let frames = shown.into_iter().chain(beyond).map(shape).collect();
+    let motion = Motion { frames, ..Motion::default() };
+    let built = built.with_modes(&ModalFit::new(&mesh, &motion).unwrap(), K).unwrap();
+    let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
+    let modes = Modes::of(&tree).unwrap();
+    let weights = &built.modal_motion().unwrap().weights;
+    let (mut unknown, mut known) = (0, 0);
+    for (short, late) in (0..10_u16).flat_map(|short| (0..40_u32).map(move |late| (short, late))) {
+        let frames = Frames::<K>::new();
+        let (mut writer, reader) = frames.split().unwrap();
+        let mut reader = ModalReader::new(reader, &modes).unwrap();
+        let mut read = |now: [f32; K], epoch: u32, received: u32, age: u32| {
+            writer.begin();
+            now.iter().for_each(|&weight| writer.push(Vec3::X * weight).unwrap());
+            let stretch = Some(modes.stretch_bound(&now).unwrap());
+            let received = Millis(received);
+            writer.publish(FrameLabel { epoch, received, position_error: 0.0, stretch }).unwrap();
+            let at = Millis(received.0 + age);
+            reader.latest(at).of_any_age().unwrap().extrapolated()
+        };
+        let [first, second, third, fourth] = [0, 1, 2, 3].map(|n| [weights[n][0], weights[n][1]]);
+        let part = 1.0 - 5e-4 * f32::from(short);
+        let last = [0, 1].map(|mode| third[mode] + (fourth[mode] - third[mode]) * part);
+        read(first, 1, 0, 0);
+        read(second, 2, 10_000, 0);
+        // Its units nearly do not fit.
+        let before = read(third, 3, 20_000, 14_920);
+        let after = read(last, 4, 34_860 + 5 * late, 0);
+        let units = after.travel().unwrap().since(&before.travel().unwrap()).unwrap();
+        let stated = units as f64 / 2f64.powi(32) * f64::from(most);
+        let found = f64::from(moved(&before, &after));
+        assert!(stated >= found * 0.999_99, "{short} {late}: {found} {stated}");
+        // Where nothing is known of the course, the way between the frames counts.
+        *(if stated > f64::from(most) { &mut unknown } else { &mut known }) += 1;
+    }
+    assert!(unknown > 50 && known > 50, "{unknown} {known}");
+}

@@ -91,6 +91,11 @@ fn a_limit_of_exactly_one_admits_the_rest_shape() {
     let rigid =
         |n: u8| whole.mesh.positions.iter().map(|p| *p + Vec3::X * 8.0 * f32::from(n)).collect();
     let motion = Motion { frames: (0..4).map(rigid).collect(), ..Motion::default() };
+    for paths in PATHS {
+        let needed = MotionStretch::new(&whole.mesh, &motion, paths, &|_| ()).expect("fits");
+        assert!(needed.worst().stretch > 1.0, "nothing is rounded");
+        assert_eq!(needed.beyond(&vec![1.0; whole.mesh.triangles.len()]), None);
+    }
     let fit = ModalFit::new(&whole.mesh, &motion).expect("fits");
     let built = Builder::new().stretch(1.0).build(&whole.mesh).expect("a valid mesh");
     let built = built.with_modes(&fit, 1).expect("modes of a rigid motion");
@@ -152,4 +157,29 @@ fn every_frame_that_limits_were_learned_from_is_admitted() {
     }
     println!("{refused} of {frames_seen} frames are inside out");
     assert!(refused < frames_seen / 64, "{refused} of {frames_seen}");
+}
+
+/// The stretch of the worst triangle of a motion is a tree's limit, as learned, also where that triangle joins a flat one:
+/// their shared edge is rounded as the flat one's.
+#[test]
+fn a_learned_limit_admits_a_triangle_beside_a_flat_one() {
+    let mut rng = Rng::with_seed(192);
+    for _ in 0..2_000 {
+        // Both are measured from the corner at (1, 0): the flat one has nearly 180 degrees there.
+        let (open, flat) = (1.2 + rng.f32() * 0.2, 0.1 + rng.f32() * 0.1);
+        let corner = |angle: f32| Vec3::new(1.0 + angle.cos(), angle.sin(), 0.0);
+        let turn = Mat3::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), rng.f32() * 6.0);
+        let positions = [Vec3::ZERO, Vec3::X, corner(open), corner(-flat)].map(|p| turn * p * 50.0);
+        let triangles = vec![[0, 1, 2], [1, 0, 3]];
+        let mesh = Mesh { positions: positions.to_vec(), triangles, ..Mesh::default() };
+        let mut stretched = mesh.positions.clone();
+        stretched[2] += turn * Vec3::Y * 10.0 * rng.f32();
+        let motion = Motion { frames: vec![stretched], ..Motion::default() };
+        let needed = MotionStretch::new(&mesh, &motion, Paths::default(), &|_| ()).expect("fits");
+        let largest = needed.limits(0.0).into_iter().fold(1.0, f32::max);
+        let built = Builder::new().stretch(largest).build(&mesh).expect("a valid mesh");
+        let tree = built.tree::<u16>().expect("small");
+        let found = measure_stretch(&tree, built.to_rows(&motion.frames[0]).as_slice());
+        assert!(found.is_ok(), "{found:?}, limit {largest}, {:?}", needed.worst());
+    }
 }
