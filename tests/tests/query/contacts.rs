@@ -227,7 +227,7 @@ fn no_contact_is_missing_and_none_is_doubled() {
     assert!(open > 0, "no interval that is longer than a point");
 }
 
-/// Most of several thousand triangles within the margin lead down to a contact, and are not kept.
+/// Most of up to several thousand triangles within the margin lead down to a contact, and are not kept.
 #[test]
 fn a_fine_surface_needs_little_room() {
     let waves = |x: f32, y: f32| 2.5 * (0.4 * x).sin() * (0.3 * y).cos();
@@ -244,8 +244,8 @@ fn a_fine_surface_needs_little_room() {
         assert!(contacts.bound() >= MARGIN, "{cells}: only within {}", contacts.bound());
         contacts.len()
     };
-    let (coarse, fine) = (found(40), found(126));
-    assert!(fine > 3 && fine <= coarse, "{coarse} and {fine}");
+    let counts = [20, 40, 80, 126].map(found);
+    assert!(counts.iter().all(|count| (4..=12).contains(count)), "{counts:?}");
 }
 
 #[test]

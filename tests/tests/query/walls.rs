@@ -314,7 +314,8 @@ fn ridges_that_an_axis_crosses_aslant_are_contacts() {
     assert!(at_ridges[0] < -14.0 && at_ridges[1] > 14.0, "{at_ridges:?}");
 }
 
-/// Between two walls of a groove that both face the tool, no step changes the force by more than the walls change.
+/// Between two walls of a groove that both face the tool, no step changes the force by more than the walls change, and
+/// their shares.
 #[test]
 fn the_force_between_two_walls_is_continuous() {
     const STEP: f32 = 1e-3;
@@ -357,7 +358,10 @@ fn the_force_between_two_walls_is_continuous() {
                 }
             }
             steepest = steepest.max(largest / STEP);
-            assert!(largest < 20.0 * STEP, "{angle}: {largest} N at {at} within {STEP} mm");
+            let nearest = (at.y * angle.cos() - at.x.abs() * angle.sin()).max(0.1);
+            let by_shares = 45.0 * (RADIUS + MARGIN - nearest) / nearest;
+            let most = (20.0 + by_shares) * STEP;
+            assert!(largest < most, "{angle}: {largest} N of {most} at {at} within {STEP} mm");
         }
     }
     println!("the force changes by at most {steepest} N for each mm");

@@ -3,7 +3,7 @@
 //! Each wall requires that `normal . t` be at least its depth, and yields in proportion to the force on it. With the
 //! compliance `c`, `t` minimises the convex function
 //!
-//! `c |t|^2 + sum of max(0, wanted - normal . t)^2`, `wanted = (1 + c) depth`, or the depth itself below 0,
+//! `c |t|^2 + sum of weight max(0, wanted - normal . t)^2`, `wanted = (1 + c) depth`,
 //!
 //! of three unknowns. A wall *acts* where its term is not 0; while the same walls act, the function is quadratic. The
 //! search starts at `t = 0`, where every wall with a depth above 0 acts. A step leads towards the minimum of the
@@ -29,24 +29,26 @@ pub(super) struct Wall {
     pub normal: Vec3,
     /// The depth (mm), plus the yield of the wall where it holds alone.
     wanted: f32,
+    /// How stiff it is beside the others, from 0 to 1.
+    weight: f32,
     acts: bool,
 }
 
 impl Wall {
     /// None.
-    pub const NONE: Self = Self { normal: Vec3::ZERO, wanted: 0.0, acts: false };
+    pub const NONE: Self = Self { normal: Vec3::ZERO, wanted: 0.0, weight: 0.0, acts: false };
 
-    /// A wall with the tool `depth` mm in it; a negative depth is a distance.
-    pub fn new(normal: Vec3, depth: f32) -> Self {
-        let wanted = if depth < 0.0 { depth } else { depth * (1.0 + COMPLIANCE) };
-        Self { normal, wanted, acts: depth > 0.0 }
+    /// A wall with the tool `depth` mm in it, above 0. Alone, it would move the tool by `share` of that, from 0 to 1.
+    pub fn new(normal: Vec3, depth: f32, share: f32) -> Self {
+        let weight = COMPLIANCE * share / (1.0 + COMPLIANCE - share);
+        Self { normal, wanted: depth * (1.0 + COMPLIANCE), weight, acts: true }
     }
 
-    /// The part of the wanted displacement that is missing (mm); 0 where none is.
-    pub fn above(&self, moved: Vec3) -> f32 {
+    /// Its share of the displacement (mm), along its normal.
+    pub fn push(&self, moved: Vec3) -> f32 {
         let left = self.left(moved);
         // Written so that NaN stays.
-        if left <= 0.0 { 0.0 } else { left }
+        if left <= 0.0 { 0.0 } else { left * self.weight / COMPLIANCE }
     }
 
     fn left(&self, moved: Vec3) -> f32 {
@@ -87,10 +89,11 @@ fn to_least(walls: &[Wall; MOST], at: Vec3) -> Vec3 {
     let mut right = at * -COMPLIANCE;
     for wall in walls.iter().filter(|wall| wall.acts) {
         let normal = wall.normal;
-        x += normal * normal.x;
-        y += normal * normal.y;
-        z += normal * normal.z;
-        right += normal * wall.left(at);
+        let weighed = normal * wall.weight;
+        x += weighed * normal.x;
+        y += weighed * normal.y;
+        z += weighed * normal.z;
+        right += weighed * wall.left(at);
     }
     let (yz, zx, xy) = (y.cross(z), z.cross(x), x.cross(y));
     Vec3::new(right.dot(yz), right.dot(zx), right.dot(xy)) / x.dot(yz)

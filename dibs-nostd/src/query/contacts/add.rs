@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::basins::{Basins, Near, Place};
 use super::low::Found;
+use super::share::Looking;
 use super::{Contact, Contacts};
 use crate::math::sqrt::sqrt;
 use crate::query::search::Waiting;
@@ -146,6 +147,20 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             }
             Ok(())
         })?;
+        let (left, limit) =
+            (options.budget.triangle_tests.saturating_sub(made.triangle_tests), limit + ridge);
+        let mut look = Looking { pair, limit, accuracy, left };
+        let deepest =
+            own.map_or(least, |own| if own.separation < least { own.separation } else { least });
+        for contact in found.list.iter_mut().take(found.count) {
+            let is_own = (contact.surface, contact.tool) == (pair.surface, pair.number);
+            if is_own && contact.separation > deepest {
+                let ridges = (0.5 * RIDGE * margin, 2.0 * accuracy);
+                let row = contact.triangle.0;
+                contact.share = basins.share(tree, row, ridges, is_left_out, &mut look)?;
+            }
+        }
+        made.triangle_tests = made.triangle_tests.saturating_add(left - look.left);
         let is_known = has_side && (is_crossing || !closest.is_cut_short());
         // The closest pair is certain then, whatever became of the search.
         if is_known
@@ -181,7 +196,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
     /// A triangle, and the square of its distance from the axis; infinite if beyond the limit.
-    fn near(&self, row: u32, limit: f32, accuracy: f32) -> Result<Near, QueryError> {
+    pub(super) fn near(&self, row: u32, limit: f32, accuracy: f32) -> Result<Near, QueryError> {
         let (rows, corners) = corners(self.tree, self.vertices, row)?;
         match self.tool.closest_on_triangle(&corners, limit * limit) {
             Some(found) => Ok(near(row, &found, accuracy)),
@@ -190,6 +205,20 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
                 None => Ok(Near { square: f32::INFINITY, row, place: Place::NONE }),
             },
         }
+    }
+}
+
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
+    /// The distance of a triangle's edge from the axis; infinite if beyond the limit.
+    pub(super) fn edge_distance(&self, row: u32, edge: u32, limit: f32) -> Result<f32, QueryError> {
+        let (_, [a, b, c]) = corners(self.tree, self.vertices, row)?;
+        let ends = match edge {
+            0 => [a, b, b],
+            1 => [b, c, c],
+            _ => [c, a, a],
+        };
+        let found = self.tool.closest_on_triangle(&ends, limit * limit);
+        Ok(found.map_or(f32::INFINITY, |found| sqrt(found.distance_squared)))
     }
 }
 

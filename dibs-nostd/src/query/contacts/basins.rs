@@ -2,8 +2,9 @@
 //!
 //! The distance from the tool is a height over the surface, and each valley of it is a contact. A flood from each low
 //! triangle, the lowest first, goes down to a place with nothing lower next to it. Then it rises by the height of a ridge,
-//! over triangles in much the same direction. If it runs into the flood of a lower one, both are one valley: a flat wall
-//! along a capsule is one, however many triangles are equally far, and two walls are two, however low the ridge between.
+//! over triangles in much the same direction. If it runs into the flood of a lower one in much the same direction, both
+//! are one valley: a flat wall along a capsule is one, however many triangles are equally far, and two walls are two,
+//! however low the ridge between.
 //!
 //! Over a triangle the height is convex. So the way from its lowest point to a neighbour leads over no ridge exactly if
 //! that point is on the edge between.
@@ -55,7 +56,7 @@ impl Place {
         Self(edges | bits(vector.x) | bits(vector.y) << 9 | bits(vector.z) << 18)
     }
 
-    const fn is_on(self, edge: u32) -> bool {
+    pub const fn is_on(self, edge: u32) -> bool {
         self.0 >> (27 + edge) & 1 == 1
     }
 
@@ -115,8 +116,9 @@ pub(super) struct Basins<const N: usize> {
 
 /// The end of a flood.
 enum Flood {
-    /// It has reached all that is below its level; the lowest.
-    Ended(Near),
+    /// It has reached all that is below its level; the lowest. If a ridge led to that, and it is in another direction, the
+    /// lowest before the ridge, too.
+    Ended(Near, Option<Near>),
     /// It has met the flood of a lower triangle in much the same direction.
     Joined,
     /// Without room or budget, something lower may be next to it.
@@ -182,7 +184,12 @@ impl<const N: usize> Basins<N> {
         let mut missing = None;
         for entry in 0..low {
             match self.flood(tree, entry as u16, ridges, &is_left_out, &mut look)? {
-                Flood::Ended(lowest) => visit(lowest)?,
+                Flood::Ended(lowest, beside) => {
+                    visit(lowest)?;
+                    if let Some(beside) = beside {
+                        visit(beside)?;
+                    }
+                }
                 Flood::Joined => (),
                 Flood::CutShort => {
                     missing = missing.or(self.near.get(entry).map(|key| key.square()));
@@ -205,6 +212,8 @@ impl<const N: usize> Basins<N> {
             return Ok(Flood::Joined);
         };
         let mut height = sqrt(lowest.square());
+        // The lowest before any ridge; the entry of the lowest; whether that is beyond a ridge, and leads to another flood.
+        let (mut own, mut at_lowest, mut has_crossed, mut leads_away) = (lowest, low, false, false);
         let mut count = 0;
         if !self.reach(low, low, &mut count) {
             return Ok(Flood::Joined);
@@ -229,19 +238,42 @@ impl<const N: usize> Basins<N> {
                     continue;
                 };
                 let is_within = sqrt(key.square()) <= height + ridge;
-                if by == low || !is_within || !(is_level || key.place.is_like(lowest.place)) {
+                if by == low || !is_within || !(is_level || key.place.is_like(own.place)) {
                     continue;
                 }
                 if !self.reach(next, low, &mut count) {
+                    let other = self.near.get(usize::from(by));
+                    let is_other = other.is_some_and(|other| !other.place.is_like(own.place));
+                    if (has_crossed || !is_level) && is_other {
+                        leads_away |= key < lowest;
+                        continue;
+                    }
                     return Ok(Flood::Joined);
                 }
                 if key < lowest {
-                    lowest = key;
+                    (lowest, at_lowest, leads_away) = (key, next, false);
                     height = sqrt(lowest.square());
+                    has_crossed |= !is_level;
+                    if !has_crossed {
+                        own = key;
+                    }
                 }
             }
         }
-        Ok(Flood::Ended(lowest.near()))
+        // The flood's direction is that of its lowest.
+        for entry in self.reached.iter().take(count) {
+            if let Some(by) = self.reached_by.get_mut(usize::from(*entry)) {
+                *by = at_lowest;
+            }
+        }
+        if !has_crossed || !leads_away && lowest.place.is_like(own.place) {
+            return Ok(Flood::Ended(lowest.near(), None));
+        }
+        Ok(if leads_away {
+            Flood::Ended(own.near(), None)
+        } else {
+            Flood::Ended(lowest.near(), Some(own.near()))
+        })
     }
 
     /// Adds an entry to the flood of `low`, of `count` entries. Returns whether it is the first to reach it.
@@ -257,7 +289,7 @@ impl<const N: usize> Basins<N> {
     }
 
     /// The entry of a triangle, made if there is none. `None` without room or budget.
-    fn entry(
+    pub(super) fn entry(
         &mut self,
         row: u32,
         look: &mut impl FnMut(u32) -> Result<Option<Near>, QueryError>,
@@ -274,6 +306,31 @@ impl<const N: usize> Basins<N> {
         Ok(Some((self.count - 1) as u16))
     }
 
+    /// An entry's triangle.
+    pub(super) fn at(&self, entry: u16) -> Option<Near> {
+        self.near.get(usize::from(entry)).map(|key| key.near())
+    }
+
+    /// An entry's distance.
+    pub(super) fn height(&self, entry: u16) -> Option<f32> {
+        self.at(entry).map(|near| sqrt(near.square))
+    }
+
+    /// Takes the marks of all entries, those of floods too.
+    pub(super) fn forget(&mut self) {
+        self.reached_by.get_mut(..self.count).unwrap_or_default().fill(NONE);
+    }
+
+    pub(super) fn mark(&mut self, entry: u16) {
+        if let Some(by) = self.reached_by.get_mut(usize::from(entry)) {
+            *by = entry;
+        }
+    }
+
+    pub(super) fn is_marked(&self, entry: u16) -> bool {
+        self.reached_by.get(usize::from(entry)).is_none_or(|&by| by != NONE)
+    }
+
     /// Enters an entry into the hash table.
     fn enter(&mut self, entry: usize) {
         let Some(row) = self.near.get(entry).map(|key| key.row) else { return };
@@ -286,7 +343,7 @@ impl<const N: usize> Basins<N> {
         }
     }
 
-    fn find(&self, row: u32) -> Option<u16> {
+    pub(super) fn find(&self, row: u32) -> Option<u16> {
         let bucket = (row as usize).checked_rem(N)?;
         let mut entry = *self.heads.get(bucket)?;
         for _ in 0..N {

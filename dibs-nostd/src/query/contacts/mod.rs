@@ -5,6 +5,7 @@ mod add;
 mod basins;
 mod list;
 mod low;
+mod share;
 
 use glam::Vec3;
 
@@ -50,6 +51,8 @@ pub struct Contact {
     pub velocity: Vec3,
     /// The other triangle that bounds the depth, where the tool crosses or is inside.
     pub(crate) across: Across,
+    /// How much of a wall of its own it is: 0 where it begins beside a nearer one, 1 beyond a ridge (see `share`).
+    pub(crate) share: f32,
 }
 
 impl Contact {
@@ -66,13 +69,14 @@ impl Contact {
         barycentric: [0.0; 3],
         velocity: Vec3::ZERO,
         across: Across::NONE,
+        share: 1.0,
     };
 }
 
 /// Up to `N` contacts, deepest first, and a bound on the others. A query compares up to `NEAR` triangles: those near a
 /// contact, and some with no lower vertex next to theirs, at most half of `NEAR`.
 ///
-/// RAM on a 32-bit processor: 144 bytes for each of the `N`, 20 for each of the `NEAR`, and 60.
+/// RAM on a 32-bit processor: 148 bytes for each of the `N`, 20 for each of the `NEAR`, and 60.
 ///
 /// Make it once, in a `static` or at start-up, and use it at every tick.
 ///
@@ -260,8 +264,8 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// deepest is a contact, and its separation is the list's [bound](Contacts::bound).
     ///
     /// Two valleys of the distance in much the same direction, within 7 degrees, are one contact unless a ridge of more than
-    /// a 64th of the margin parts them, so a flat wall along a capsule is one. Walls in other directions are contacts of
-    /// their own. Pairs with the inner side of a sheet, say the far side of an organ, are not
+    /// a 64th of the margin parts them, so a flat wall along a capsule is one; so may be two within 15 degrees. Walls in
+    /// other directions are contacts of their own. Pairs with the inner side of a sheet, say the far side of an organ, are not
     /// contacts. Where the side is undefined the tool is taken to be outside. If that is because the budget ended,
     /// contacts may be missing at any distance: see [`Contacts::within`].
     ///
@@ -272,7 +276,8 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// deepest point, for [`VelocityRow`](crate::constraint::VelocityRow). Without budget for them there is none.
     ///
     /// Cost: that of [`closest`](Self::closest), a range search that compares the corners of each triangle within the
-    /// margin, and exact tests of about an eighth of these and of those around a contact.
+    /// margin, and exact tests of about an eighth of these and of those around a contact: a second time for each that is
+    /// not the closest, to see whether a ridge parts it from nearer ones, with what is left of the budget.
     ///
     /// # Errors
     /// [`QueryError`]: those of [`closest`](Self::closest); [`QueryError::NoAdjacency`] for a tree without;

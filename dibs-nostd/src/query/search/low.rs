@@ -2,7 +2,7 @@
 //!
 //! The square of the distance from the axis is convex in space, and twice the vector from the axis is its gradient. So
 //! over a triangle it is at least the value at the lowest corner plus the least rise towards the other two. Where that
-//! is no more than `ridge / 2` below the corner's distance, and a vertex next to that corner is lower, the triangle is
+//! is no more than `ridge / 2` below the corner's distance, and no more than a 512th of it, and a vertex next to that corner is lower, the triangle is
 //! not the lowest: the triangles around the corner lead down, over no ridge of that height. Where the triangle may dip
 //! across one edge, and the vertex beyond it is lower than the dip, neither is it. All others may be.
 //!
@@ -19,6 +19,9 @@ use crate::{Index, VertexTable};
 
 /// Most triangles that are turned through around a vertex.
 pub(super) const MAX_RING: u32 = 256;
+
+/// A fall by no more than this part of the square of a distance is none: a ridge of a 512th of the distance.
+const FLAT: f32 = 1.0 / 256.0;
 
 /// A triangle, seen from the axis.
 struct Seen {
@@ -151,7 +154,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         // The rounding of a rise is less than the tilt's slack, and so is that of the square.
         let fall = if least < 0.0 { -2.0 * least } else { 0.0 } + 3.0 * self.tilt_slack;
         let quarter = 0.25 * ridge * ridge;
-        let dip = if (fall + quarter) * (fall + quarter) <= ridge * ridge * square {
+        let is_level = (fall + quarter) * (fall + quarter) <= ridge * ridge * square;
+        let dip = if is_level && fall <= square * FLAT {
             Dip::Nowhere
         } else if across >= self.tilt_slack {
             Dip::Edge(index)

@@ -1,0 +1,148 @@
+//! How much of a wall of its own a contact is, so that none begins or ends all at once.
+//!
+//! A contact begins beside a lower one, where the way down to that one leads over no ridge. There its share is 0. It
+//! grows with the ridge, and is 1 once the ridge is a 64th of the contact's distance: some 10 degrees, seen from the
+//! axis. The closest contact has all. So has one that is equally near, whatever the ridge, so that nothing changes where
+//! two contacts change their order; with a difference in height the share falls.
+//!
+//! A change of all heights by `e` changes a ridge by at most `2 e` (persistence: Cohen-Steiner, Edelsbrunner & Harer
+//! 2007). So a share changes by at most `256 / distance` of the motion. Between flat walls it is at most 45 / distance,
+//! since a ridge there grows by the sine of the 10 degrees.
+
+use super::add::Pair;
+use super::basins::{Basins, Near};
+use crate::math::sqrt::sqrt;
+use crate::unavailable::QueryError;
+use crate::{Index, Tool, Tree, VertexTable};
+
+/// Up to a ridge of this part of its distance a contact has no share, and all from twice that on.
+const RIDGE: f32 = 1.0 / 128.0;
+
+/// Most ways at a time that lead out of the triangles passed.
+const WAYS: usize = 48;
+
+/// Most triangles passed.
+const STEPS: usize = 128;
+
+/// A way to a triangle.
+#[derive(Clone, Copy)]
+struct Way {
+    /// The largest height on it.
+    height: f32,
+    entry: u16,
+}
+
+/// Looks at triangles while tests are left.
+pub(super) struct Looking<'p, 'a, I, V: ?Sized, T> {
+    pub pair: &'p Pair<'a, I, V, T>,
+    /// No height beyond this counts.
+    pub limit: f32,
+    pub accuracy: f32,
+    /// Tests left.
+    pub left: u32,
+}
+
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> Looking<'_, '_, I, V, T> {
+    fn pay(&mut self) -> Option<()> {
+        self.left = self.left.checked_sub(1)?;
+        Some(())
+    }
+
+    /// A triangle; `None` without budget.
+    pub fn triangle(&mut self, row: u32) -> Result<Option<Near>, QueryError> {
+        let Some(()) = self.pay() else { return Ok(None) };
+        self.pair.near(row, self.limit, self.accuracy).map(Some)
+    }
+
+    /// The distance of an edge; `None` without budget.
+    fn edge(&mut self, row: u32, edge: u32) -> Result<Option<f32>, QueryError> {
+        let Some(()) = self.pay() else { return Ok(None) };
+        self.pair.edge_distance(row, edge, self.limit).map(Some)
+    }
+}
+
+impl<const N: usize> Basins<N> {
+    /// The share of the contact at a triangle, from 0 to 1. Without room or budget it is 1.
+    ///
+    /// Follows the ways out of its valley, the lowest first. `most` limits the ridge below which it has none, for an axis
+    /// far away; `error` is that of two heights. Triangles that `is_left_out` are not passed.
+    pub fn share<I: Index, V: VertexTable + ?Sized, T: Tool>(
+        &mut self,
+        tree: &Tree<'_, I>,
+        row: u32,
+        (most, error): (f32, f32),
+        is_left_out: impl Fn(u32) -> bool,
+        look: &mut Looking<'_, '_, I, V, T>,
+    ) -> Result<f32, QueryError> {
+        self.forget();
+        let Some((entry, own)) =
+            self.find(row).and_then(|entry| Some((entry, self.height(entry)?)))
+        else {
+            return Ok(1.0);
+        };
+        let none = own * RIDGE;
+        let none = if none < most { none } else { most } + error;
+        let full = 2.0 * none;
+        let mut least = full;
+        let mut ways = [Way { height: own, entry }; WAYS];
+        let mut count = 1;
+        for _ in 0..STEPS {
+            let Some(Way { height, entry }) = take_lowest(&mut ways, &mut count) else { break };
+            let ridge = height - own;
+            if !(ridge < least) {
+                break;
+            }
+            if self.is_marked(entry) {
+                continue;
+            }
+            self.mark(entry);
+            let (Some(near), Some(())) = (self.at(entry), look.pay()) else { return Ok(1.0) };
+            // Beside a place that is hardly lower, the ridge does not count.
+            let tied = full - (own - sqrt(near.square));
+            let parted = if tied > ridge { tied } else { ridge };
+            if parted < least {
+                least = parted;
+            }
+            for edge in 0..3 {
+                let Some(across) = tree.row_across(near.row, edge) else { continue };
+                if is_left_out(across) {
+                    continue;
+                }
+                let Some(next) = self.entry(across, &mut |row| look.triangle(row))? else {
+                    return Ok(1.0);
+                };
+                let beyond = self.height(next).unwrap_or(f32::INFINITY);
+                let mut over = if beyond > height { beyond } else { height };
+                if self.is_marked(next) || !(over - own < least) {
+                    continue;
+                }
+                if !near.place.is_on(edge) {
+                    let Some(edge) = look.edge(near.row, edge)? else { return Ok(1.0) };
+                    over = if edge > over { edge } else { over };
+                }
+                if over - own < least {
+                    let Some(way) = ways.get_mut(count) else { return Ok(1.0) };
+                    *way = Way { height: over, entry: next };
+                    count += 1;
+                }
+            }
+        }
+        Ok(if least > none { (least - none) / none } else { 0.0 })
+    }
+}
+
+/// Takes out the lowest of the first `count` ways.
+fn take_lowest(ways: &mut [Way; WAYS], count: &mut usize) -> Option<Way> {
+    let last = count.checked_sub(1)?;
+    let (&lowest, _) = ways.split_first()?;
+    let (mut at, mut lowest) = (0, lowest);
+    for (place, &way) in ways.iter().enumerate().take(*count) {
+        if way.height < lowest.height {
+            (at, lowest) = (place, way);
+        }
+    }
+    let moved = *ways.get(last)?;
+    *ways.get_mut(at)? = moved;
+    *count = last;
+    Some(lowest)
+}
