@@ -259,10 +259,12 @@ fn no_force_jumps_where_a_wall_begins_or_ends() {
             };
             let found = found.expect("an answer");
             let (within, accuracy) = (list.within(MARGIN), list.accuracy());
+            let is_complete = within.as_ref().is_ok_and(|all| all.is_complete());
             let wrench = proxy.wrench(within, accuracy, start, Vec3::ZERO, Vec3::ZERO);
             let contacts = list.iter().map(|at| (at.separation, at.normal)).collect();
             let held = Held { force: wrench.force, depth: MARGIN - found.lower, contacts };
             let is_clear = found.side == Side::Outside && found.axis_distance > NEAREST;
+            assert!(is_complete || !is_clear, "{found:?}");
             is_clear.then_some(held)
         };
         let mut rng = Rng::with_seed(11);

@@ -115,16 +115,12 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         if let Some(contact) = own.filter(|_| is_crossing) {
             found.insert(contact);
         }
-        let look = |row| {
-            if made.triangle_tests >= options.budget.triangle_tests {
-                return Ok(None);
-            }
-            made.triangle_tests += 1;
-            pair.near(row, limit + ridge, accuracy).map(Some)
-        };
+        let left = options.budget.triangle_tests.saturating_sub(made.triangle_tests);
+        let mut look = Looking { pair, limit: limit + ridge, accuracy, left };
         let (mut least, mut meets) = (f32::INFINITY, 0_u32);
         let (ridges, is_left_out) = ((ridge, 2.0 * accuracy), |row| !is_of(TriangleRow(row)));
-        let missing = basins.each_valley(tree, ridges, is_left_out, look, |near| {
+        let look_at = |row| look.triangle(row);
+        let missing = basins.each_valley(tree, ridges, is_left_out, look_at, |near| {
             let is_on = sqrt(near.square) <= accuracy;
             meets += u32::from(is_on);
             // The crossing pair, inserted above, stands for these triangles.
@@ -147,9 +143,6 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             }
             Ok(())
         })?;
-        let (left, limit) =
-            (options.budget.triangle_tests.saturating_sub(made.triangle_tests), limit + ridge);
-        let mut look = Looking { pair, limit, accuracy, left };
         let deepest =
             own.map_or(least, |own| if own.separation < least { own.separation } else { least });
         for contact in found.list.iter_mut().take(found.count) {
