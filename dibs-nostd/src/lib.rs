@@ -97,7 +97,7 @@ pub use surface::{
 };
 /// Surfaces of a size that no type has, for the C interface. They may change with any version.
 #[doc(hidden)]
-pub use surface::{BorrowedFrames, Buffer, Position};
+pub use surface::{Buffer, Buffers, Head, Position};
 #[doc(hidden)]
 pub use tool::{ACCURACY, MAX_COORDINATE};
 pub use tool::{AxisPair, Capsule, Sphere, Tool, ToolError};

@@ -127,7 +127,7 @@ fn stretch_of_a_thousand_triangles(scene: Scene) -> f32 {
 }
 
 /// A bus, and the packets of two frames.
-type Bus = (Assembler<'static, Unchecked, N>, Vec<Vec<u8>>);
+type Bus = (Assembler<'static, Unchecked>, Vec<Vec<u8>>);
 
 fn bus(quantised: bool) -> Bus {
     let frames: &'static Frames<N> = Box::leak(Box::new(Frames::new()));

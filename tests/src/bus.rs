@@ -11,7 +11,7 @@ pub const MESH: u32 = 0xD1B5_0001;
 /// Vertices of the surface.
 pub const N: usize = 40;
 /// An assembler without a gate, and the reader of its frames.
-pub type Bus = (Assembler<'static, Unchecked, N>, FrameReader<'static, N>);
+pub type Bus = (Assembler<'static, Unchecked>, FrameReader<'static>);
 
 /// A fresh bus without a gate.
 pub fn bus() -> Bus {
@@ -22,7 +22,7 @@ pub fn bus() -> Bus {
 ///
 /// # Panics
 /// Never: the frames are new.
-pub fn bus_with<G: Gate>(gate: G) -> (Assembler<'static, G, N>, FrameReader<'static, N>) {
+pub fn bus_with<G: Gate>(gate: G) -> (Assembler<'static, G>, FrameReader<'static>) {
     let frames: &'static Frames<N> = Box::leak(Box::new(Frames::new()));
     let (writer, reader) = frames.split().unwrap();
     (Assembler::new(writer, gate, MESH, 100.0), reader)
@@ -90,8 +90,8 @@ pub fn frame(epoch: u32, quantised: bool) -> Vec<Vec<u8>> {
 ///
 /// # Errors
 /// The assembler's rejection.
-pub fn give<G: Gate, M: Mac, const N: usize>(
-    assembler: &mut Assembler<'_, G, N, M>,
+pub fn give<G: Gate, M: Mac>(
+    assembler: &mut Assembler<'_, G, M>,
     packet: &[u8],
 ) -> Result<Option<u32>, ReceiveError> {
     give_at(assembler, packet, 0)
@@ -101,8 +101,8 @@ pub fn give<G: Gate, M: Mac, const N: usize>(
 ///
 /// # Errors
 /// The assembler's rejection.
-pub fn give_at<G: Gate, M: Mac, const N: usize>(
-    assembler: &mut Assembler<'_, G, N, M>,
+pub fn give_at<G: Gate, M: Mac>(
+    assembler: &mut Assembler<'_, G, M>,
     packet: &[u8],
     now: u32,
 ) -> Result<Option<u32>, ReceiveError> {
@@ -113,7 +113,8 @@ pub fn give_at<G: Gate, M: Mac, const N: usize>(
             Advance::Pending => {}
             // A few more slices, which copy rows ahead.
             _ => {
-                for _ in 0..N / 7 + 1 {
+                let rows = assembler.surface().map_or(0, |surface| surface.len());
+                for _ in 0..rows / 7 + 1 {
                     assembler.advance(7)?;
                 }
                 return Ok(None);
@@ -171,7 +172,7 @@ pub fn checksum(packet: &[u8]) -> u32 {
 ///
 /// # Panics
 /// If a vertex is missing.
-pub fn published(reader: &mut FrameReader<'_, N>) -> Option<(u32, Vec<[u32; 3]>)> {
+pub fn published(reader: &mut FrameReader<'_>) -> Option<(u32, Vec<[u32; 3]>)> {
     let frame = reader.read()?;
     let positions = (0..N as u32).map(|v| frame.position(v).unwrap().to_array().map(f32::to_bits));
     Some((frame.label().epoch, positions.collect()))

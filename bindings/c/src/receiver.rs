@@ -3,10 +3,9 @@
 use core::ffi::{c_char, c_void};
 
 use bytemuck::AnyBitPattern;
-use dibs_nostd::wire::{Deframer, Event, NoMac, encode_status, enframe, framed_bytes};
+use dibs_nostd::wire::{Deframer, Event, encode_status, enframe, framed_bytes};
 use dibs_nostd::{
-    Advance, Assembler, BorrowedFrames, Millis, Progress, StretchMonitor, SurfaceLimits,
-    VertexTable,
+    Advance, Assembler, Millis, Progress, StretchMonitor, SurfaceLimits, VertexTable,
 };
 
 use crate::border::{Handle, Input, Kind, Output, Storage};
@@ -33,7 +32,7 @@ const _: () = assert!(DIBS_STATUS == framed_bytes(STATUS));
 ///
 /// One context at a time, of lower priority than the reader's: the bus interrupt.
 pub struct dibs_receiver {
-    assembler: Assembler<'static, StretchMonitor<'static, u16>, 0, NoMac, BorrowedFrames<'static>>,
+    assembler: Assembler<'static, StretchMonitor<'static, u16>>,
     deframer: Deframer<DIBS_MTU>,
     surface: &'static dibs_surface,
     mesh_id: u32,

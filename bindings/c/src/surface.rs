@@ -2,13 +2,13 @@
 
 use core::ffi::c_void;
 use core::mem;
-use core::ptr;
+use core::slice;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use dibs_nostd::failsafe::LinkStatus;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
-    BorrowedFrames, Buffer, FrameGuard, FrameReader, FrameWriter, MeasuredStretch, Position,
+    Buffer, Buffers, FrameGuard, FrameReader, FrameWriter, Head, MeasuredStretch, Position,
     VertexTable,
 };
 
@@ -25,7 +25,7 @@ pub const DIBS_SURFACE_VERTEX: usize = 24;
 ///
 /// Any number of contexts may use it at once.
 pub struct dibs_surface {
-    frames: BorrowedFrames<'static>,
+    buffers: Buffers<'static>,
     /// Ends that were taken: the receiver's and the reader's.
     taken: [AtomicBool; 2],
     /// A reader holds a frame.
@@ -39,20 +39,18 @@ impl Kind for dibs_surface {
     const SIZE: usize = DIBS_SURFACE_BASE;
 }
 
-/// The ends' type has no size: `0` stands for it.
-type Rows = Buffer<[Position]>;
-pub(crate) type Writer = FrameWriter<'static, 0, BorrowedFrames<'static>>;
-pub(crate) type Reader = FrameReader<'static, 0, BorrowedFrames<'static>>;
-type Guard<'f> = FrameGuard<'f, 0, BorrowedFrames<'static>>;
+pub(crate) type Writer = FrameWriter<'static>;
+pub(crate) type Reader = FrameReader<'static>;
+type Guard<'f> = FrameGuard<'f>;
 
 /// Offset of the buffers, after the object and the word of their state.
 const BUFFERS: usize = 256;
-const HEAD: usize = size_of::<Buffer<[Position; 0]>>();
+const HEAD: usize = size_of::<Head>();
 
 const _: () = assert!(BUFFERS + 4 + 2 * HEAD <= DIBS_SURFACE_BASE);
 const _: () = assert!(size_of::<dibs_surface>() + DIBS_ALIGNMENT <= BUFFERS);
 const _: () = assert!(2 * size_of::<Position>() == DIBS_SURFACE_VERTEX);
-const _: () = assert!(align_of::<Buffer<[Position; 0]>>() == 4);
+const _: () = assert!(align_of::<Head>() == 4 && align_of::<Position>() == 4);
 
 /// Makes a surface without a frame.
 ///
@@ -84,11 +82,12 @@ pub extern "C" fn dibs_surface_init(
             let (second, rest) = rest.split_at_mut_checked(each).ok_or(dibs_code::Argument)?;
             let state = rest.first_mut().ok_or(dibs_code::Argument)?;
             Ok(dibs_surface {
-                frames: BorrowedFrames {
+                buffers: Buffers::new(
                     // SAFETY: a word of this surface's own, aligned, and from here on never used but as an atomic.
-                    state: unsafe { AtomicU32::from_ptr(state) },
-                    buffers: [buffer(first, vertices), buffer(second, vertices)],
-                },
+                    unsafe { AtomicU32::from_ptr(state) },
+                    [buffer(first, vertices), buffer(second, vertices)],
+                    None,
+                ),
                 taken: [AtomicBool::new(false), AtomicBool::new(false)],
                 is_held: AtomicBool::new(false),
                 link: LinkStatus::new(),
@@ -98,31 +97,34 @@ pub extern "C" fn dibs_surface_init(
 }
 
 /// A buffer of so many vertices in zeroed words: a head, and three a vertex.
-fn buffer(words: &'static mut [u32], vertices: usize) -> &'static Rows {
+fn buffer(words: &'static mut [u32], vertices: usize) -> Buffer<'static> {
     debug_assert!(words.len() == HEAD / 4 + 3 * vertices);
-    let rows = ptr::slice_from_raw_parts(words.as_mut_ptr().cast::<Position>(), vertices);
-    // SAFETY: a `Buffer` is `repr(C)`: its head, then its positions, all of words and of a word's alignment, as long as
-    // the slice. Zeros are atomics.
-    unsafe { &*(rows as *const Rows) }
+    let head = words.as_mut_ptr();
+    // SAFETY: the words are as many as a head and the positions, all of a word's alignment. Zeros are atomics, and from here
+    // on nothing else refers to them.
+    unsafe {
+        let rows = head.add(HEAD / 4).cast::<Position>();
+        Buffer { head: &*head.cast::<Head>(), rows: slice::from_raw_parts(rows, vertices) }
+    }
 }
 
 impl dibs_surface {
     /// Vertices of the surface.
     pub(crate) fn vertices(&self) -> usize {
-        let (writer, _) = self.frames.ends();
+        let (writer, _) = self.buffers.ends();
         writer.back().len()
     }
 
     /// The receiver's end, once.
     pub(crate) fn take_writer(&'static self) -> Result<Writer, dibs_code> {
         self.take(0)?;
-        Ok(self.frames.ends().0)
+        Ok(self.buffers.ends().0)
     }
 
     /// The reader's end, once.
     pub(crate) fn take_reader(&'static self) -> Result<Reader, dibs_code> {
         self.take(1)?;
-        Ok(self.frames.ends().1)
+        Ok(self.buffers.ends().1)
     }
 
     fn take(&self, end: usize) -> Result<(), dibs_code> {

@@ -53,10 +53,10 @@ pub mod {name} {{
         pub type Surface = ::dibs_nostd::guard::Surface<VERTICES>;
 
         /// The bus's end.
-        pub type Bus = ::dibs_nostd::guard::Bus<'static, 'static, Index, VERTICES>;
+        pub type Bus = ::dibs_nostd::guard::Bus<'static, 'static, Index>;
 
         /// The control tick's end, with room for 256 opened nodes.
-        pub type Guard = ::dibs_nostd::guard::Guard<'static, 'static, Index, VERTICES, STACK, 256>;
+        pub type Guard = ::dibs_nostd::guard::Guard<'static, 'static, Index, STACK, 256>;
 
         /// Validates the tree, and makes the two ends of its surface, once.
         ///
@@ -76,15 +76,15 @@ pub mod {name} {{
     pub type Frames = ::dibs_nostd::Frames<VERTICES>;
 
     /// The bus's end of the buffers.
-    pub type Writer = ::dibs_nostd::FrameWriter<'static, VERTICES>;
+    pub type Writer = ::dibs_nostd::FrameWriter<'static>;
 
     /// The control loop's end of the buffers.
-    pub type Reader = ::dibs_nostd::FrameReader<'static, VERTICES>;
+    pub type Reader = ::dibs_nostd::FrameReader<'static>;
 
     ::dibs_nostd::if_bus! {{
         /// Publishes frames that are complete and within the stretch limit, which it checks in slices.
         pub type Receiver =
-            ::dibs_nostd::Assembler<'static, ::dibs_nostd::StretchMonitor<'static, Index>, VERTICES>;
+            ::dibs_nostd::Assembler<'static, ::dibs_nostd::StretchMonitor<'static, Index>>;
 
         /// A receiver for surfaces of this tree that keep to these limits.
         ///
@@ -105,19 +105,16 @@ pub mod {name} {{
         pub type Frames = ::dibs_nostd::Frames<{{ super::VERTICES }}, 3>;
 
         /// The bus's end of the buffers.
-        pub type Writer = ::dibs_nostd::FrameWriter<'static, {{ super::VERTICES }}, Frames>;
+        pub type Writer = ::dibs_nostd::FrameWriter<'static>;
 
         /// The control loop's end of the buffers.
-        pub type Reader = ::dibs_nostd::FrameReader<'static, {{ super::VERTICES }}, Frames>;
+        pub type Reader = ::dibs_nostd::FrameReader<'static>;
 
         ::dibs_nostd::if_bus! {{
             /// Publishes frames that are complete and within the stretch limit, and measures the surface beyond them.
             pub type Receiver = ::dibs_nostd::Assembler<
                 'static,
                 ::dibs_nostd::StretchMonitor<'static, super::Index, 2>,
-                {{ super::VERTICES }},
-                ::dibs_nostd::wire::NoMac,
-                Frames,
             >;
 
             /// A receiver for surfaces of this tree that keep to these limits.
@@ -215,7 +212,7 @@ fn modal_source(ModesSummary { count, position_error, .. }: &ModesSummary) -> St
         pub type Frames = ::dibs_nostd::Frames<MODES>;
 
         /// The bus's end of the buffers.
-        pub type Writer = ::dibs_nostd::FrameWriter<'static, MODES>;
+        pub type Writer = ::dibs_nostd::FrameWriter<'static>;
 
         /// The control loop's end of the buffers.
         pub type Reader = ::dibs_nostd::modes::ModalReader<'static, 'static, MODES>;
@@ -225,7 +222,6 @@ fn modal_source(ModesSummary { count, position_error, .. }: &ModesSummary) -> St
             pub type Receiver = ::dibs_nostd::Assembler<
                 'static,
                 ::dibs_nostd::modes::ModalGate<'static, ::dibs_nostd::StretchMonitor<'static, super::Index>, MODES>,
-                MODES,
             >;
         }}
     }}

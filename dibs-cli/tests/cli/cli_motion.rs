@@ -73,7 +73,7 @@ fn weights_are_streamed() {
     let (writer, reader) = frames.split().unwrap();
     let gate = ModalGate::<_, MODES>::new(&modes, &tree).unwrap();
     let mut assembler = Assembler::new(writer, gate, tree.mesh_id(), 1e4);
-    let mut reader = ModalReader::new(reader, &modes).unwrap();
+    let mut reader = ModalReader::<MODES>::new(reader, &modes).unwrap();
     let motion = Motion::read_pc2(folder.join("heart.pc2")).unwrap();
     let (mut buffer, mut published) = ([0; 2048], 0);
     while let Ok(length) = socket.recv(&mut buffer) {

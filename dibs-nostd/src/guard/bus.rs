@@ -1,11 +1,11 @@
 //! The bus's end: bytes in, published frames and statuses out.
 
-use super::Surface;
+use super::surface::Notes;
 use crate::surface::FrameView;
 use crate::wire::{Counters, Deframer, Mac, NoMac, encode_status, enframe, framed_bytes};
 use crate::{
-    Advance, Assembler, FrameWriter, Frames, Index, Millis, Progress, ReceiveError, Scrub,
-    StretchError, StretchMonitor, SurfaceLimits, Tree, TreeBytes,
+    Advance, Assembler, FrameWriter, Index, Millis, Progress, ReceiveError, Scrub, StretchError,
+    StretchMonitor, SurfaceLimits, Tree, TreeBytes,
 };
 
 /// Largest packet on a byte stream; a network's packets can be larger.
@@ -20,19 +20,18 @@ const INTERVAL: Millis = Millis(100);
 /// Bytes of the tree that an idle slice checks for each unit of its work.
 const SCRUBBED: u32 = 4;
 
-type Receiver<'s, 't, I, const N: usize, M> =
-    Assembler<'s, StretchMonitor<'t, I, 2>, N, M, Frames<N, 3>>;
+type Receiver<'s, 't, I, M> = Assembler<'s, StretchMonitor<'t, I, 2>, M>;
 
-/// The bus's end of a [`Surface`]: it takes packets, checks complete frames in slices, publishes them, watches the tree's
+/// The bus's end of a [`Surface`](super::Surface): it takes packets, checks complete frames in slices, publishes them, watches the tree's
 /// bytes, and makes the statuses that go back.
 ///
 /// Two contexts may use it, one at a time: an interrupt that takes bytes, and an idle loop that works. Both are below the
 /// control tick's priority. RAM: less than 3 kB.
 #[derive(Debug)]
-pub struct Bus<'s, 't, I, const N: usize, M: Mac = NoMac> {
-    surface: &'s Surface<N>,
+pub struct Bus<'s, 't, I, M: Mac = NoMac> {
+    notes: &'s Notes,
     deframer: Deframer<MTU>,
-    assembler: Receiver<'s, 't, I, N, M>,
+    assembler: Receiver<'s, 't, I, M>,
     scrub: Scrub<'t>,
     /// Time of the last status.
     reported: Millis,
@@ -40,7 +39,7 @@ pub struct Bus<'s, 't, I, const N: usize, M: Mac = NoMac> {
     has_news: bool,
 }
 
-impl<'s, 't, I: Index, const N: usize, M: Mac> Bus<'s, 't, I, N, M> {
+impl<'s, 't, I: Index, M: Mac> Bus<'s, 't, I, M> {
     /// Bytes of a status on a byte stream before its framing, and room enough on a network.
     pub const STATUS_BYTES: usize = STATUS;
 
@@ -49,15 +48,15 @@ impl<'s, 't, I: Index, const N: usize, M: Mac> Bus<'s, 't, I, N, M> {
 
     #[inline(always)]
     pub(super) fn new(
-        surface: &'s Surface<N>,
-        writer: FrameWriter<'s, N, Frames<N, 3>>,
+        notes: &'s Notes,
+        writer: FrameWriter<'s>,
         (tree, bytes): (&Tree<'t, I>, TreeBytes<'t, I>),
         limits: SurfaceLimits,
         mac: M,
     ) -> Result<Self, StretchError> {
         let monitor = StretchMonitor::continuous(tree)?.limits(limits);
         Ok(Self {
-            surface,
+            notes,
             deframer: Deframer::new(),
             assembler: Assembler::with_mac(writer, monitor, tree.mesh_id(), limits.reach, mac),
             scrub: bytes.scrub(),
@@ -81,7 +80,7 @@ impl<'s, 't, I: Index, const N: usize, M: Mac> Bus<'s, 't, I, N, M> {
                 }
                 Some(Err(error)) => self.assembler.count_framing(&error),
             }
-            self.surface.link.set(&self.assembler.health());
+            self.notes.link.set(&self.assembler.health());
         }
     }
 
@@ -94,7 +93,7 @@ impl<'s, 't, I: Index, const N: usize, M: Mac> Bus<'s, 't, I, N, M> {
     pub fn packet(&mut self, packet: &[u8], now: Millis) -> Result<Progress, ReceiveError> {
         let outcome = self.assembler.accept(packet, now);
         self.has_news |= outcome == Ok(Progress::Hello);
-        self.surface.link.set(&self.assembler.health());
+        self.notes.link.set(&self.assembler.health());
         outcome
     }
 
@@ -111,7 +110,7 @@ impl<'s, 't, I: Index, const N: usize, M: Mac> Bus<'s, 't, I, N, M> {
     #[inline(never)]
     pub fn work(&mut self, work: u32) -> Result<Advance, ReceiveError> {
         let outcome = self.assembler.advance(work);
-        self.surface.link.set(&self.assembler.health());
+        self.notes.link.set(&self.assembler.health());
         match outcome {
             Ok(Advance::Pending | Advance::Held { .. }) => (),
             Ok(Advance::Idle) => self.check_tree(work),
@@ -123,7 +122,7 @@ impl<'s, 't, I: Index, const N: usize, M: Mac> Bus<'s, 't, I, N, M> {
     fn check_tree(&mut self, work: u32) {
         let bytes = work.saturating_mul(SCRUBBED) as usize;
         if self.scrub.step(bytes).is_err() {
-            self.surface.set_tree_corrupt();
+            self.notes.set_tree_corrupt();
         }
     }
 
@@ -138,7 +137,7 @@ impl<'s, 't, I: Index, const N: usize, M: Mac> Bus<'s, 't, I, N, M> {
             return None;
         }
         (self.reported, self.has_news) = (now, false);
-        let status = self.assembler.status(now, self.surface.safety());
+        let status = self.assembler.status(now, self.notes.safety());
         let (counters, mac) = (self.assembler.counters(), self.assembler.mac());
         let mesh_id = self.assembler.gate().tree().mesh_id();
         Some(encode_status(mesh_id, &status, counters, mac, packet))
@@ -162,7 +161,7 @@ impl<'s, 't, I: Index, const N: usize, M: Mac> Bus<'s, 't, I, N, M> {
 
     /// The frame published last.
     #[must_use]
-    pub fn surface(&self) -> Option<FrameView<'_, N, Frames<N, 3>>> {
+    pub fn surface(&self) -> Option<FrameView<'_>> {
         self.assembler.surface()
     }
 

@@ -13,12 +13,8 @@ use crate::{Error, Frames, Index, TreeBytes};
 /// Neither end waits for the other. RAM: 36 bytes a vertex, and less than 400.
 #[derive(Debug)]
 pub struct Surface<const N: usize> {
-    pub(super) frames: Frames<N, 3>,
-    pub(super) link: LinkStatus,
-    /// As [`Status::safety`](crate::wire::Status::safety).
-    safety: AtomicU32,
-    /// Never cleared: flash that read wrong once is not trusted.
-    is_tree_corrupt: AtomicBool,
+    frames: Frames<N, 3>,
+    notes: Notes,
 }
 
 impl<const N: usize> Surface<N> {
@@ -27,12 +23,7 @@ impl<const N: usize> Surface<N> {
     #[must_use]
     #[expect(clippy::new_without_default, reason = "it is too large for a stack")]
     pub const fn new() -> Self {
-        Self {
-            frames: Frames::new(),
-            link: LinkStatus::new(),
-            safety: AtomicU32::new(0),
-            is_tree_corrupt: AtomicBool::new(false),
-        }
+        Self { frames: Frames::new(), notes: Notes::new() }
     }
 
     /// Validates the tree, and makes the two ends, once. `STACK` is the tree's [`TreeBytes::stack`] at least, and the guard
@@ -47,7 +38,7 @@ impl<const N: usize> Surface<N> {
         &self,
         tree: TreeBytes<'t, I>,
         limits: GuardLimits,
-    ) -> Result<(Bus<'_, 't, I, N>, Guard<'_, 't, I, N, STACK, OPENED>), Error> {
+    ) -> Result<(Bus<'_, 't, I>, Guard<'_, 't, I, STACK, OPENED>), Error> {
         self.start_with_mac(tree, limits, NoMac)
     }
 
@@ -61,30 +52,47 @@ impl<const N: usize> Surface<N> {
         bytes: TreeBytes<'t, I>,
         limits: GuardLimits,
         mac: M,
-    ) -> Result<(Bus<'_, 't, I, N, M>, Guard<'_, 't, I, N, STACK, OPENED>), Error> {
+    ) -> Result<(Bus<'_, 't, I, M>, Guard<'_, 't, I, STACK, OPENED>), Error> {
         let tree = bytes.validate()?;
         let (writer, reader) = self.frames.split()?;
-        let bus = Bus::new(self, writer, (&tree, bytes), limits.surface(&tree)?, mac)?;
-        let guard = Guard::new(self, reader, (&tree, bytes), limits)?;
+        let bus = Bus::new(&self.notes, writer, (&tree, bytes), limits.surface(&tree)?, mac)?;
+        let guard = Guard::new(&self.notes, reader, (&tree, bytes), limits)?;
         Ok((bus, guard))
     }
+}
 
-    /// The frame-to-frame state that the guard is in, for the sender.
-    pub(super) fn safety(&self) -> u8 {
+/// The notes of the two ends for one another.
+#[derive(Debug)]
+pub(super) struct Notes {
+    pub link: LinkStatus,
+    /// As [`Status::safety`](crate::wire::Status::safety).
+    safety: AtomicU32,
+    /// Never cleared: flash that read wrong once is not trusted.
+    is_tree_corrupt: AtomicBool,
+}
+
+impl Notes {
+    const fn new() -> Self {
+        Self {
+            link: LinkStatus::new(),
+            safety: AtomicU32::new(0),
+            is_tree_corrupt: AtomicBool::new(false),
+        }
+    }
+
+    pub fn safety(&self) -> u8 {
         self.safety.load(Ordering::Relaxed) as u8
     }
 
-    pub(super) fn set_state(&self, state: State) {
+    pub fn set_state(&self, state: State) {
         self.safety.store(state as u32 + 1, Ordering::Relaxed);
     }
 
-    /// Whether the tree's bytes were ever found changed.
-    #[must_use]
     pub fn is_tree_corrupt(&self) -> bool {
         self.is_tree_corrupt.load(Ordering::Relaxed)
     }
 
-    pub(super) fn set_tree_corrupt(&self) {
+    pub fn set_tree_corrupt(&self) {
         self.is_tree_corrupt.store(true, Ordering::Relaxed);
     }
 }

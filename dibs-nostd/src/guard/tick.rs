@@ -2,21 +2,22 @@
 
 use glam::Vec3;
 
-use super::{Answer, GuardLimits, Searched, Surface};
+use super::surface::Notes;
+use super::{Answer, GuardLimits, Searched};
 use crate::constraint::LastSide;
 use crate::failsafe::{AcknowledgeError, FailSafe, Observation};
 use crate::{
-    Error, FrameReader, Frames, Index, Millis, Options, Tool, Tracked, Tracker, Tree, TreeBytes,
+    Error, FrameReader, Index, Millis, Options, Tool, Tracked, Tracker, Tree, TreeBytes,
     Unavailable, VertexTable,
 };
 
-/// The control tick's end of a [`Surface`]: the closest pair of one tool on the surface as it is now, and the trust in it.
+/// The control tick's end of a [`Surface`](super::Surface): the closest pair of one tool on the surface as it is now, and the trust in it.
 ///
 /// Keep it in a `static` or in a task's memory. RAM: that of a [`Tracker`] with `OPENED` places, and 400 bytes.
 #[derive(Debug)]
-pub struct Guard<'s, 't, I, const N: usize, const STACK: usize, const OPENED: usize> {
-    surface: &'s Surface<N>,
-    reader: FrameReader<'s, N, Frames<N, 3>>,
+pub struct Guard<'s, 't, I, const STACK: usize, const OPENED: usize> {
+    notes: &'s Notes,
+    reader: FrameReader<'s>,
     tree: TreeBytes<'t, I>,
     tracker: Tracker<'t, I, STACK, OPENED>,
     failsafe: FailSafe,
@@ -51,18 +52,16 @@ impl Pose {
     }
 }
 
-impl<'s, 't, I: Index, const N: usize, const STACK: usize, const OPENED: usize>
-    Guard<'s, 't, I, N, STACK, OPENED>
-{
+impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I, STACK, OPENED> {
     #[inline(always)]
     pub(super) fn new(
-        surface: &'s Surface<N>,
-        reader: FrameReader<'s, N, Frames<N, 3>>,
+        notes: &'s Notes,
+        reader: FrameReader<'s>,
         (tree, bytes): (&Tree<'t, I>, TreeBytes<'t, I>),
         limits: GuardLimits,
     ) -> Result<Self, Error> {
         Ok(Self {
-            surface,
+            notes,
             reader,
             tree: bytes,
             tracker: Tracker::new(tree)?,
@@ -128,7 +127,7 @@ impl<'s, 't, I: Index, const N: usize, const STACK: usize, const OPENED: usize>
         velocity: Vec3,
         now: Millis,
     ) -> Answer {
-        let link = self.surface.link.read(now);
+        let link = self.notes.link.read(now);
         let trust = self.failsafe.step(&Observation {
             frame: searched.map(|searched| searched.frame),
             lag: searched.and_then(|searched| searched.lag),
@@ -137,10 +136,10 @@ impl<'s, 't, I: Index, const N: usize, const STACK: usize, const OPENED: usize>
                 Err(Unavailable::Query(error)) => Some(error),
                 _ => None,
             },
-            is_tree_corrupt: self.surface.is_tree_corrupt()
+            is_tree_corrupt: self.notes.is_tree_corrupt()
                 || self.tracker.tree().check(self.tree.bytes()).is_err(),
         });
-        self.surface.set_state(trust.state);
+        self.notes.set_state(trust.state);
         let admitted = tracked.and_then(|tracked| trust.admit(tracked.closest));
         let moved = tracked.ok().and_then(|tracked| tracked.moved);
         let closest = self.last_side.settle(admitted, moved);

@@ -14,7 +14,7 @@ use crate::surface::{FrameGuard, FrameLabel, FrameReader, Latest, Millis, Travel
 /// RAM: `20 K` bytes and some 300.
 #[derive(Debug)]
 pub struct ModalReader<'f, 'a, const K: usize> {
-    frames: FrameReader<'f, K>,
+    frames: FrameReader<'f>,
     modes: Modes<'a>,
     reach: Reach<K>,
     last: Option<Last<K>>,
@@ -32,16 +32,18 @@ struct Last<const K: usize> {
 }
 
 impl<'f, 'a, const K: usize> ModalReader<'f, 'a, K> {
-    /// A reader of surfaces of exactly `K` modes.
+    /// A reader of surfaces of exactly `K` modes, whose buffers have a row for each.
     ///
     /// Cost: two passes over the displacements of all vertices.
     ///
     /// # Errors
-    /// [`WeightsError::Count`] for another number of modes.
-    pub fn new(frames: FrameReader<'f, K>, modes: &Modes<'a>) -> Result<Self, WeightsError> {
-        let (expected, found) = (modes.count() as u32, K as u32);
-        if expected != found {
-            return Err(WeightsError::Count { expected, found });
+    /// [`WeightsError::Count`] for another number of modes, or of rows.
+    pub fn new(frames: FrameReader<'f>, modes: &Modes<'a>) -> Result<Self, WeightsError> {
+        let expected = modes.count() as u32;
+        for found in [K as u32, frames.rows()] {
+            if expected != found {
+                return Err(WeightsError::Count { expected, found });
+            }
         }
         Ok(Self { frames, modes: *modes, reach: Reach::of(modes), last: None })
     }
@@ -69,7 +71,7 @@ fn next<'a, const K: usize>(
     modes: &Modes<'a>,
     reach: &Reach<K>,
     last: &mut Option<Last<K>>,
-    frame: &FrameGuard<'_, K>,
+    frame: &FrameGuard<'_>,
 ) -> ModalFrame<'a, K> {
     let label = frame.label();
     let mut weights = Weights { values: [0.0; K], stretch: label.stretch };

@@ -34,7 +34,7 @@ fn moved(before: &impl VertexTable, after: &impl VertexTable) -> f32 {
         .fold(0.0, f32::max)
 }
 
-fn publish(writer: &mut FrameWriter<'_, MODES>, weights: &[f32], epoch: u32, received: u32) {
+fn publish(writer: &mut FrameWriter<'_>, weights: &[f32], epoch: u32, received: u32) {
     writer.begin();
     for weight in weights {
         writer.push(Vec3::new(*weight, 0.0, 0.0)).unwrap();
@@ -213,7 +213,7 @@ fn a_course_of_weights_is_not_cut_to_the_numbers_that_fit() {
     for (short, late) in (0..10_u16).flat_map(|short| (0..40_u32).map(move |late| (short, late))) {
         let frames = Frames::<K>::new();
         let (mut writer, reader) = frames.split().unwrap();
-        let mut reader = ModalReader::new(reader, &modes).unwrap();
+        let mut reader = ModalReader::<K>::new(reader, &modes).unwrap();
         let mut read = |now: [f32; K], epoch: u32, received: u32, age: u32| {
             writer.begin();
             now.iter().for_each(|&weight| writer.push(Vec3::X * weight).unwrap());

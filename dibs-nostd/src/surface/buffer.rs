@@ -1,6 +1,4 @@
-//! One of the buffers: positions and the label of their frame, in relaxed atomics.
-
-use core::fmt;
+//! The parts of a buffer: positions and the label of their frame, in relaxed atomics.
 
 use glam::Vec3;
 
@@ -47,6 +45,16 @@ impl Ahead {
 pub struct Position([AtomicU32; 3]);
 
 impl Position {
+    #[cfg(not(loom))]
+    pub(super) const fn new() -> Self {
+        Self([const { AtomicU32::new(0) }; 3])
+    }
+
+    #[cfg(loom)]
+    pub(super) fn new() -> Self {
+        Self(core::array::from_fn(|_| AtomicU32::new(0)))
+    }
+
     #[inline(always)]
     pub(crate) fn get(&self) -> Vec3 {
         let [x, y, z] = &self.0;
@@ -71,32 +79,12 @@ impl Position {
     }
 }
 
-/// The positions of a buffer: an array, or a slice where only the program that runs knows how many there are.
-pub trait Rows: fmt::Debug {
-    fn rows(&self) -> &[Position];
-}
-
-impl<const N: usize> Rows for [Position; N] {
-    #[inline(always)]
-    fn rows(&self) -> &[Position] {
-        self
-    }
-}
-
-impl Rows for [Position] {
-    #[inline(always)]
-    fn rows(&self) -> &[Position] {
-        self
-    }
-}
-
-/// One buffer: positions as bits of `f32`, and the label of the frame in it. All zero at start, so that memory of
-/// zeros is one.
+/// The facts about the frame in a buffer. All zero at start, so that memory of zeros is one.
 #[derive(Debug)]
 #[repr(C)]
-pub struct Buffer<P: ?Sized> {
-    pub(super) epoch: AtomicU32,
-    pub(super) received: AtomicU32,
+pub struct Head {
+    epoch: AtomicU32,
+    received: AtomicU32,
     position_error: AtomicU32,
     /// Measured stretch; the first word is a NaN if there is none.
     stretch: [AtomicU32; MeasuredStretch::WORDS],
@@ -104,10 +92,9 @@ pub struct Buffer<P: ?Sized> {
     travel: [AtomicU32; Travel::WORDS],
     /// The numbers of [`Ahead`].
     ahead: [AtomicU32; 4],
-    positions: P,
 }
 
-impl<const N: usize> Buffer<[Position; N]> {
+impl Head {
     #[cfg(not(loom))]
     pub(super) const fn new() -> Self {
         Self {
@@ -117,7 +104,6 @@ impl<const N: usize> Buffer<[Position; N]> {
             stretch: [const { AtomicU32::new(0) }; MeasuredStretch::WORDS],
             travel: [const { AtomicU32::new(0) }; Travel::WORDS],
             ahead: [const { AtomicU32::new(0) }; 4],
-            positions: [const { Position([const { AtomicU32::new(0) }; 3]) }; N],
         }
     }
 
@@ -131,20 +117,7 @@ impl<const N: usize> Buffer<[Position; N]> {
             stretch: from_fn(|_| AtomicU32::new(0)),
             travel: from_fn(|_| AtomicU32::new(0)),
             ahead: from_fn(|_| AtomicU32::new(0)),
-            positions: from_fn(|_| Position(from_fn(|_| AtomicU32::new(0)))),
         }
-    }
-}
-
-impl<P: Rows + ?Sized> Buffer<P> {
-    #[inline(always)]
-    pub(super) fn rows(&self) -> &[Position] {
-        self.positions.rows()
-    }
-
-    #[inline(always)]
-    pub(super) fn position(&self, vertex: u32) -> Option<Vec3> {
-        self.rows().get(vertex as usize).map(Position::get)
     }
 
     pub(super) fn set_label(&self, label: FrameLabel, travel: Option<Travel>, ahead: Ahead) {
@@ -175,10 +148,18 @@ impl<P: Rows + ?Sized> Buffer<P> {
         Ahead { sigma: f32::from_bits(sigma), shown: f32::from_bits(shown), passed, off }
     }
 
+    pub(super) fn epoch(&self) -> u32 {
+        self.epoch.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn received(&self) -> Millis {
+        Millis(self.received.load(Ordering::Relaxed))
+    }
+
     pub(super) fn label(&self) -> FrameLabel {
         FrameLabel {
-            epoch: self.epoch.load(Ordering::Relaxed),
-            received: Millis(self.received.load(Ordering::Relaxed)),
+            epoch: self.epoch(),
+            received: self.received(),
             position_error: self.position_error(),
             stretch: self.stretch(),
         }
@@ -194,8 +175,17 @@ impl<P: Rows + ?Sized> Buffer<P> {
 
     pub(super) fn stretch(&self) -> Option<MeasuredStretch> {
         let words = self.stretch.each_ref().map(|word| word.load(Ordering::Relaxed));
-        let epoch = self.epoch.load(Ordering::Relaxed);
+        let epoch = self.epoch();
         let is_measured = words.first().is_some_and(|&sigma| !f32::from_bits(sigma).is_nan());
         is_measured.then(|| MeasuredStretch::from_words(words, epoch))
     }
+}
+
+/// One buffer, wherever it is.
+#[derive(Clone, Copy, Debug)]
+pub struct Buffer<'m> {
+    /// The facts about its frame.
+    pub head: &'m Head,
+    /// Its positions.
+    pub rows: &'m [Position],
 }

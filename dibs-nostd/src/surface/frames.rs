@@ -34,7 +34,7 @@ use core::ops::Range;
 use glam::Vec3;
 
 use super::atomic::{AtomicBool, AtomicU32, Ordering};
-use super::buffer::{Ahead, Buffer, FrameLabel, Position, Rows};
+use super::buffer::{Ahead, Buffer, FrameLabel, Head, Position};
 use super::error::{OutOfTableError, PublishError, SplitError};
 use super::motion::Travel;
 use super::reader::{FrameReader, FrameView};
@@ -75,18 +75,21 @@ const PUBLISHED: u32 = 8;
 /// ```
 #[derive(Debug)]
 pub struct Frames<const N: usize, const BUFFERS: usize = 2> {
-    buffers: [Buffer<[Position; N]>; BUFFERS],
+    heads: [Head; BUFFERS],
+    rows: [[Position; N]; BUFFERS],
     state: AtomicU32,
     split: AtomicBool,
 }
 
 impl<const N: usize, const BUFFERS: usize> Frames<N, BUFFERS> {
-    /// Empty buffers: nothing is published.
+    /// Empty buffers, two or three: nothing is published.
     #[cfg(not(loom))]
     #[must_use]
     pub const fn new() -> Self {
+        const { assert!(BUFFERS == 2 || BUFFERS == 3, "two or three buffers") }
         Self {
-            buffers: [const { Buffer::new() }; BUFFERS],
+            heads: [const { Head::new() }; BUFFERS],
+            rows: [const { [const { Position::new() }; N] }; BUFFERS],
             state: AtomicU32::new(0),
             split: AtomicBool::new(false),
         }
@@ -96,81 +99,94 @@ impl<const N: usize, const BUFFERS: usize> Frames<N, BUFFERS> {
     #[cfg(loom)]
     #[must_use]
     pub fn new() -> Self {
+        use core::array::from_fn;
         Self {
-            buffers: core::array::from_fn(|_| Buffer::new()),
+            heads: from_fn(|_| Head::new()),
+            rows: from_fn(|_| from_fn(|_| Position::new())),
             state: AtomicU32::new(0),
             split: AtomicBool::new(false),
         }
     }
-}
 
-impl<const N: usize, const BUFFERS: usize> Frames<N, BUFFERS>
-where
-    Self: Buffers,
-{
     /// The two ends, once, so that there is one writer and one reader.
     ///
     /// # Errors
     /// [`SplitError`] at every later call.
-    pub fn split(
-        &self,
-    ) -> Result<(FrameWriter<'_, N, Self>, FrameReader<'_, N, Self>), SplitError> {
+    pub fn split(&self) -> Result<(FrameWriter<'_>, FrameReader<'_>), SplitError> {
         if self.split.swap(true, Ordering::AcqRel) {
             return Err(SplitError);
         }
-        Ok(ends(self))
+        let mut all = self.heads.iter().zip(&self.rows);
+        let mut next = || all.next().map(|(head, rows)| Buffer { head, rows });
+        let (Some(first), Some(second)) = (next(), next()) else { return Err(SplitError) };
+        Ok(Buffers::new(&self.state, [first, second], next()).ends())
     }
 }
 
-/// Buffers and their state: [`Frames`], or memory of a size that no type has.
-pub trait Buffers {
-    /// Positions of a buffer.
-    type Rows: Rows + ?Sized;
-
-    /// How many there are.
-    const COUNT: u32;
-
-    fn state(&self) -> &AtomicU32;
-
-    /// The buffer with this number, below [`COUNT`](Self::COUNT).
-    fn buffer(&self, number: u32) -> &Buffer<Self::Rows>;
+/// The buffers of a surface in anybody's memory, and their state: those of [`Frames`], or of the C interface. All of it must
+/// be zero at first, and the buffers of one size.
+#[derive(Clone, Copy, Debug)]
+pub struct Buffers<'m> {
+    state: &'m AtomicU32,
+    /// Of two buffers the last is the first once more.
+    all: [Buffer<'m>; 3],
+    count: u32,
 }
 
-impl<const N: usize> Buffers for Frames<N> {
-    type Rows = [Position; N];
+impl<'m> Buffers<'m> {
+    /// Two buffers, or three.
+    #[must_use]
+    pub const fn new(
+        state: &'m AtomicU32,
+        [first, second]: [Buffer<'m>; 2],
+        third: Option<Buffer<'m>>,
+    ) -> Self {
+        match third {
+            Some(third) => Self { state, all: [first, second, third], count: 3 },
+            None => Self { state, all: [first, second, first], count: 2 },
+        }
+    }
 
-    const COUNT: u32 = 2;
+    /// The two ends. Whoever calls it sees to it that each is used once.
+    #[must_use]
+    pub fn ends(self) -> (FrameWriter<'m>, FrameReader<'m>) {
+        let back = self.buffer(self.places(0).back);
+        (FrameWriter { buffers: self, back, state: 0, filled: 0 }, FrameReader::new(self))
+    }
 
-    #[inline(always)]
-    fn state(&self) -> &AtomicU32 {
-        &self.state
+    #[cfg(feature = "modes")]
+    pub(super) const fn rows(&self) -> u32 {
+        let [first, ..] = &self.all;
+        first.rows.len() as u32
+    }
+
+    pub(super) const fn state(&self) -> &'m AtomicU32 {
+        self.state
     }
 
     #[inline(always)]
-    fn buffer(&self, number: u32) -> &Buffer<[Position; N]> {
-        let [first, second] = &self.buffers;
-        if number == 0 { first } else { second }
-    }
-}
-
-impl<const N: usize> Buffers for Frames<N, 3> {
-    type Rows = [Position; N];
-
-    const COUNT: u32 = 3;
-
-    #[inline(always)]
-    fn state(&self) -> &AtomicU32 {
-        &self.state
-    }
-
-    #[inline(always)]
-    fn buffer(&self, number: u32) -> &Buffer<[Position; N]> {
-        let [first, second, third] = &self.buffers;
+    fn buffer(&self, number: u32) -> Buffer<'m> {
+        let [first, second, third] = self.all;
         match number {
             0 => first,
             1 => second,
             _ => third,
         }
+    }
+
+    #[inline(always)]
+    const fn places(&self, state: u32) -> Places {
+        let front = state & FRONT;
+        let back = if front + 1 < self.count { front + 1 } else { 0 };
+        let before = if back + 1 < self.count { back + 1 } else { 0 };
+        Places { front, back, before }
+    }
+
+    /// The published buffer and the one before it; of two buffers, the published one twice. `None` before the first frame.
+    #[inline(always)]
+    pub(super) fn published(&self, state: u32) -> Option<[Buffer<'m>; 2]> {
+        let Places { front, before, .. } = self.places(state);
+        (state & PUBLISHED != 0).then_some([self.buffer(front), self.buffer(before)])
     }
 }
 
@@ -180,61 +196,6 @@ struct Places {
     front: u32,
     back: u32,
     before: u32,
-}
-
-impl Places {
-    #[inline(always)]
-    const fn of<F: Buffers>(state: u32) -> Self {
-        let front = state & FRONT;
-        let back = if front + 1 < F::COUNT { front + 1 } else { 0 };
-        let before = if back + 1 < F::COUNT { back + 1 } else { 0 };
-        Self { front, back, before }
-    }
-}
-
-/// The published buffer and the one before it; of two buffers, the published one twice. `None` before the first frame.
-#[inline(always)]
-pub(super) fn published<F: Buffers>(frames: &F, state: u32) -> Option<[&Buffer<F::Rows>; 2]> {
-    let Places { front, before, .. } = Places::of::<F>(state);
-    (state & PUBLISHED != 0).then_some([frames.buffer(front), frames.buffer(before)])
-}
-
-/// Buffers in somebody else's memory, of the same size, and their state. All of it must be zero at first.
-#[derive(Debug)]
-pub struct BorrowedFrames<'m> {
-    /// As that of [`Frames`].
-    pub state: &'m AtomicU32,
-    /// The same.
-    pub buffers: [&'m Buffer<[Position]>; 2],
-}
-
-impl Buffers for BorrowedFrames<'_> {
-    type Rows = [Position];
-
-    const COUNT: u32 = 2;
-
-    fn state(&self) -> &AtomicU32 {
-        self.state
-    }
-
-    fn buffer(&self, number: u32) -> &Buffer<[Position]> {
-        let [first, second] = self.buffers;
-        if number == 0 { first } else { second }
-    }
-}
-
-impl BorrowedFrames<'_> {
-    /// The two ends. Whoever calls it sees to it that each is used once.
-    #[must_use]
-    pub fn ends(&self) -> (FrameWriter<'_, 0, Self>, FrameReader<'_, 0, Self>) {
-        ends(self)
-    }
-}
-
-/// The two ends of these buffers.
-fn ends<const N: usize, F: Buffers>(frames: &F) -> (FrameWriter<'_, N, F>, FrameReader<'_, N, F>) {
-    let back = frames.buffer(Places::of::<F>(0).back);
-    (FrameWriter { frames, back, state: 0, filled: 0 }, FrameReader::new(frames))
 }
 
 impl<const N: usize, const BUFFERS: usize> Default for Frames<N, BUFFERS> {
@@ -249,19 +210,19 @@ impl<const N: usize, const BUFFERS: usize> Default for Frames<N, BUFFERS> {
 /// [`publish`](Self::publish). An [`Assembler`](crate::Assembler) takes rows in any order, and proves that all have
 /// come.
 #[derive(Debug)]
-pub struct FrameWriter<'f, const N: usize, F: Buffers = Frames<N>> {
-    frames: &'f F,
-    back: &'f Buffer<F::Rows>,
+pub struct FrameWriter<'f> {
+    buffers: Buffers<'f>,
+    back: Buffer<'f>,
     /// The state word after the last publication; only the writer changes these bits.
     state: u32,
     /// Rows pushed since the last `begin`.
     filled: u32,
 }
 
-impl<const N: usize, F: Buffers> FrameWriter<'_, N, F> {
+impl<'f> FrameWriter<'f> {
     /// Rows of a frame.
     pub(crate) fn len(&self) -> u32 {
-        self.back.rows().len() as u32
+        self.back.rows.len() as u32
     }
 
     /// Starts a frame and forgets an unfinished one. O(1).
@@ -292,16 +253,16 @@ impl<const N: usize, F: Buffers> FrameWriter<'_, N, F> {
 
     /// Rows of the back buffer; `None` outside it.
     #[inline]
-    pub(crate) fn rows(&self, rows: Range<u32>) -> Option<&[Position]> {
-        self.back.rows().get(rows.start as usize..rows.end as usize)
+    pub(crate) fn rows(&self, rows: Range<u32>) -> Option<&'f [Position]> {
+        self.back.rows.get(rows.start as usize..rows.end as usize)
     }
 
     /// Copies rows of the published frame to the back buffer. O(rows).
     #[cfg(feature = "bus")]
     pub(crate) fn copy(&self, rows: Range<u32>) {
         let range = rows.start as usize..rows.end as usize;
-        let front = self.front_buffer().rows().get(range.clone()).unwrap_or_default();
-        let back = self.back.rows().get(range).unwrap_or_default();
+        let front = self.front_buffer().rows.get(range.clone()).unwrap_or_default();
+        let back = self.back.rows.get(range).unwrap_or_default();
         for (to, from) in back.iter().zip(front) {
             to.copy(from);
         }
@@ -309,27 +270,27 @@ impl<const N: usize, F: Buffers> FrameWriter<'_, N, F> {
 
     /// The frame being written, complete or not: for a check before it is published.
     #[must_use]
-    pub const fn back(&self) -> FrameView<'_, N, F> {
+    pub const fn back(&self) -> FrameView<'f> {
         FrameView { buffer: self.back, is_published: false }
     }
 
     /// The published frame, `None` before the first.
     #[must_use]
-    pub fn front(&self) -> Option<FrameView<'_, N, F>> {
-        let [front, _] = published(self.frames, self.state)?;
+    pub fn front(&self) -> Option<FrameView<'f>> {
+        let [front, _] = self.buffers.published(self.state)?;
         Some(FrameView::published(front))
     }
 
     /// The published frame and the one before it, in the order of time, if three buffers keep both.
     #[cfg(feature = "bus")]
-    pub(crate) fn last_two(&self) -> Option<[FrameView<'_, N, F>; 2]> {
-        let [front, before] = published(self.frames, self.state)?;
-        (F::COUNT > 2).then_some([before, front].map(FrameView::published))
+    pub(crate) fn last_two(&self) -> Option<[FrameView<'f>; 2]> {
+        let [front, before] = self.buffers.published(self.state)?;
+        (self.buffers.count > 2).then_some([before, front].map(FrameView::published))
     }
 
     #[cfg(feature = "bus")]
-    fn front_buffer(&self) -> &Buffer<F::Rows> {
-        self.frames.buffer(Places::of::<F>(self.state).front)
+    fn front_buffer(&self) -> Buffer<'f> {
+        self.buffers.buffer(self.buffers.places(self.state).front)
     }
 
     /// Publishes the frame, by one compare-exchange. The next frame begins with [`begin`](Self::begin).
@@ -347,17 +308,17 @@ impl<const N: usize, F: Buffers> FrameWriter<'_, N, F> {
 
     /// Labels the frame being written, with its odometer's reading if its motion since the published one is measured.
     pub(crate) fn set_label(&mut self, label: FrameLabel, travel: Option<Travel>, ahead: Ahead) {
-        self.back.set_label(label, travel, ahead);
+        self.back.head.set_label(label, travel, ahead);
     }
 
     /// Publishes a labelled frame that the caller has proven complete.
     pub(crate) fn publish_complete(&mut self) -> Result<(), PublishError> {
-        let next = Places::of::<F>(self.state).back | PUBLISHED;
-        self.frames
-            .state()
+        let next = self.buffers.places(self.state).back | PUBLISHED;
+        self.buffers
+            .state
             .compare_exchange(self.state, next, Ordering::AcqRel, Ordering::Relaxed)
             .map_err(|_| PublishError::Busy)?;
-        self.back = self.frames.buffer(Places::of::<F>(next).back);
+        self.back = self.buffers.buffer(self.buffers.places(next).back);
         self.state = next;
         // The back buffer now holds an old frame: it must be begun before it is published.
         self.filled = 0;

@@ -18,11 +18,11 @@ pub(crate) use crate::time::{AHEAD, elapsed};
 pub use crate::time::{Millis, Ticks};
 #[cfg(any(feature = "bus", feature = "modes"))]
 pub(crate) use buffer::Ahead;
-pub use buffer::{Buffer, FrameLabel, Position};
+pub use buffer::{Buffer, FrameLabel, Head, Position};
 #[cfg(feature = "modes")]
 pub(crate) use course::Course;
 pub use error::{OutOfTableError, PublishError, SplitError};
-pub use frames::{BorrowedFrames, Buffers, FrameWriter, Frames};
+pub use frames::{Buffers, FrameWriter, Frames};
 pub use latest::{FrameAge, Latest};
 pub(crate) use measured::share;
 pub use measured::{Coverage, MeasuredStretch, REGIONS};

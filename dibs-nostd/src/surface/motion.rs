@@ -25,7 +25,7 @@ pub(crate) mod sealed {
     pub trait Sealed {}
     impl<V: super::VertexTable + ?Sized> Sealed for super::Moved<'_, V> {}
     impl<S: super::MovingSurface + ?Sized> Sealed for &S {}
-    impl<const N: usize, F: crate::surface::Buffers> Sealed for crate::FrameGuard<'_, N, F> {}
+    impl Sealed for crate::FrameGuard<'_> {}
     impl<W, V> Sealed for crate::surface::moving::Between<'_, W, V>
     where
         W: super::VertexTable + ?Sized,

@@ -4,9 +4,9 @@
 use glam::Vec3;
 
 use super::atomic::{AtomicU32, Ordering};
-use super::buffer::{Ahead, Buffer, FrameLabel};
+use super::buffer::{Ahead, Buffer, FrameLabel, Position};
 use super::course::Course;
-use super::frames::{Buffers, Frames, READING, published};
+use super::frames::{Buffers, READING};
 use super::motion::{MovingSurface, Travel};
 use super::moving::Between;
 use super::moving::{FARTHEST, clamped};
@@ -15,23 +15,29 @@ use crate::time::elapsed;
 
 /// The end that reads: owned by the control tick.
 #[derive(Debug)]
-pub struct FrameReader<'f, const N: usize, F: Buffers = Frames<N>> {
-    frames: &'f F,
+pub struct FrameReader<'f> {
+    buffers: Buffers<'f>,
     /// Epoch and age of the frame read last.
     ageing: (u32, Ageing),
 }
 
-impl<'f, const N: usize, F: Buffers> FrameReader<'f, N, F> {
-    pub(super) fn new(frames: &'f F) -> Self {
-        Self { frames, ageing: (0, Ageing::default()) }
+impl<'f> FrameReader<'f> {
+    pub(super) fn new(buffers: Buffers<'f>) -> Self {
+        Self { buffers, ageing: (0, Ageing::default()) }
+    }
+
+    /// Rows of a frame.
+    #[cfg(feature = "modes")]
+    pub(crate) const fn rows(&self) -> u32 {
+        self.buffers.rows()
     }
 
     /// The published frame and its age at `now`, on the receiver's clock. [`Latest::within`] a limit gives the frame,
     /// held as by [`read`](Self::read).
     #[inline]
-    pub fn latest(&mut self, now: Millis) -> Latest<FrameGuard<'_, N, F>> {
+    pub fn latest(&mut self, now: Millis) -> Latest<FrameGuard<'_>> {
         let (epoch_before, before) = self.ageing;
-        let Some(mut guard) = read(self.frames) else { return Latest::new(None) };
+        let Some(mut guard) = read(&self.buffers) else { return Latest::new(None) };
         let FrameLabel { epoch, received, .. } = guard.label();
         let before = if epoch == epoch_before { before } else { Ageing::default() };
         let ageing = before.at(now, received);
@@ -45,34 +51,34 @@ impl<'f, const N: usize, F: Buffers> FrameReader<'f, N, F> {
     /// Keep the guard for one query, not longer: no frame is published meanwhile. A leaked guard keeps the surface at
     /// its present frame, whose age then grows. This does not check the age: use [`latest`](Self::latest).
     #[inline]
-    pub fn read(&mut self) -> Option<FrameGuard<'_, N, F>> {
-        read(self.frames)
+    pub fn read(&mut self) -> Option<FrameGuard<'_>> {
+        read(&self.buffers)
     }
 }
 
 #[inline]
-fn read<const N: usize, F: Buffers>(frames: &F) -> Option<FrameGuard<'_, N, F>> {
-    let state = frames.state().fetch_or(READING, Ordering::Acquire);
-    let Some([buffer, before]) = published(frames, state) else {
-        frames.state().fetch_and(!READING, Ordering::Release);
+fn read<'g>(buffers: &'g Buffers<'_>) -> Option<FrameGuard<'g>> {
+    let state = buffers.state().fetch_or(READING, Ordering::Acquire);
+    let Some([buffer, before]) = buffers.published(state) else {
+        buffers.state().fetch_and(!READING, Ordering::Release);
         return None;
     };
     let [view, before] = [buffer, before].map(FrameView::published);
-    Some(FrameGuard { state: frames.state(), view, before, age: Millis(0) })
+    Some(FrameGuard { state: buffers.state(), view, before, age: Millis(0) })
 }
 
 /// The published frame, held still: a [`VertexTable`] that carries its measured stretch and its position error.
 #[derive(Debug)]
-pub struct FrameGuard<'f, const N: usize, F: Buffers = Frames<N>> {
+pub struct FrameGuard<'f> {
     state: &'f AtomicU32,
-    view: FrameView<'f, N, F>,
+    view: FrameView<'f>,
     /// The frame before, if there are three buffers.
-    before: FrameView<'f, N, F>,
+    before: FrameView<'f>,
     /// Age of the frame when it was read.
     age: Millis,
 }
 
-impl<const N: usize, F: Buffers> FrameGuard<'_, N, F> {
+impl FrameGuard<'_> {
     /// The facts about this frame.
     #[must_use]
     pub fn label(&self) -> FrameLabel {
@@ -91,10 +97,10 @@ impl<const N: usize, F: Buffers> FrameGuard<'_, N, F> {
 /// Both surfaces below hold the published frame until a second one has come whose motion was measured, from
 /// [`Assembler::continuous`](crate::Assembler::continuous). Their time is that of [`FrameReader::latest`]; a frame from
 /// [`FrameReader::read`] is as it was received.
-impl<'f, const N: usize> FrameGuard<'f, N, Frames<N, 3>> {
+impl<'f> FrameGuard<'f> {
     /// The surface as long ago as the time between the last two frames: certain, and late by that time.
     #[must_use]
-    pub fn interpolated(&self) -> Between<'_, ContinuousView<'f, N>, ContinuousView<'f, N>> {
+    pub fn interpolated(&self) -> Between<'_, FrameView<'f>, FrameView<'f>> {
         match self.last_step() {
             Some(step) => {
                 let lag = if step.interval > self.age { step.interval } else { self.age };
@@ -113,8 +119,8 @@ impl<'f, const N: usize> FrameGuard<'f, N, Frames<N, 3>> {
     /// shows the error, and where the surface, moved on for so long, would be stretched beyond the tree's limit. The
     /// time for which it is held is its [`lag`](Between::lag).
     #[must_use]
-    pub fn extrapolated(&self) -> Between<'_, ContinuousView<'f, N>, ContinuousView<'f, N>> {
-        let (ahead, before) = (self.view.buffer.ahead(), self.before.buffer.ahead());
+    pub fn extrapolated(&self) -> Between<'_, FrameView<'f>, FrameView<'f>> {
+        let (ahead, before) = (self.view.buffer.head.ahead(), self.before.buffer.head.ahead());
         match self.last_step() {
             Some(step) if ahead.sigma >= 0.0 && ahead.shown >= 0.0 => {
                 // The change of the motion may have been none by chance. False for NaN.
@@ -131,11 +137,11 @@ impl<'f, const N: usize> FrameGuard<'f, N, Frames<N, 3>> {
     /// The frame that was published before this one; as it was at the start, if there is none.
     #[cfg(loom)]
     #[must_use]
-    pub fn before(&self) -> &ContinuousView<'f, N> {
+    pub fn before(&self) -> &FrameView<'f> {
         &self.before
     }
 
-    fn held(&self) -> Between<'_, ContinuousView<'f, N>, ContinuousView<'f, N>> {
+    fn held(&self) -> Between<'_, FrameView<'f>, FrameView<'f>> {
         Between::held(&self.view, self.view.travel()).lagging(self.age)
     }
 
@@ -144,23 +150,20 @@ impl<'f, const N: usize> FrameGuard<'f, N, Frames<N, 3>> {
     }
 }
 
-/// A frame of three buffers.
-type ContinuousView<'f, const N: usize> = FrameView<'f, N, Frames<N, 3>>;
-
-impl<const N: usize, F: Buffers> Drop for FrameGuard<'_, N, F> {
+impl Drop for FrameGuard<'_> {
     fn drop(&mut self) {
         self.state.fetch_and(!READING, Ordering::Release);
     }
 }
 
-impl<const N: usize, F: Buffers> VertexTable for FrameGuard<'_, N, F> {
+impl VertexTable for FrameGuard<'_> {
     fn len(&self) -> usize {
         self.view.len()
     }
 
     #[inline(always)]
     fn position(&self, vertex: u32) -> Option<Vec3> {
-        self.view.buffer.position(vertex)
+        self.view.position(vertex)
     }
 
     fn epoch(&self) -> Option<u32> {
@@ -177,7 +180,7 @@ impl<const N: usize, F: Buffers> VertexTable for FrameGuard<'_, N, F> {
 }
 
 /// Its motion since other frames is known if an [`Assembler`](crate::Assembler) with a tree's gate published them all.
-impl<const N: usize, F: Buffers> MovingSurface for FrameGuard<'_, N, F> {
+impl MovingSurface for FrameGuard<'_> {
     fn travel(&self) -> Option<Travel> {
         self.view.travel()
     }
@@ -196,10 +199,7 @@ pub(crate) struct LastStep {
 
 impl LastStep {
     /// `None` where the motion between the two was not measured, or they are of one time.
-    pub fn between<const N: usize, F: Buffers>(
-        before: &FrameView<'_, N, F>,
-        after: &FrameView<'_, N, F>,
-    ) -> Option<Self> {
+    pub fn between(before: &FrameView<'_>, after: &FrameView<'_>) -> Option<Self> {
         let (from, travel) = (before.travel()?, after.travel()?);
         let units = travel.after(&from)?;
         // Of two captures in the wrong order, or of one time, no velocity follows.
@@ -264,63 +264,55 @@ impl LastStep {
 }
 
 /// A view of one buffer: a [`VertexTable`] with the facts about its frame, once that is published.
-#[derive(Debug)]
-pub struct FrameView<'f, const N: usize, F: Buffers = Frames<N>> {
-    pub(super) buffer: &'f Buffer<F::Rows>,
+#[derive(Clone, Copy, Debug)]
+pub struct FrameView<'f> {
+    pub(super) buffer: Buffer<'f>,
     /// Whether the buffer's label is that of its positions.
     pub(super) is_published: bool,
 }
 
-impl<const N: usize, F: Buffers> Clone for FrameView<'_, N, F> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<const N: usize, F: Buffers> Copy for FrameView<'_, N, F> {}
-
-impl<'f, const N: usize, F: Buffers> FrameView<'f, N, F> {
+impl<'f> FrameView<'f> {
     /// The view of a labelled buffer.
-    pub(super) const fn published(buffer: &'f Buffer<F::Rows>) -> Self {
+    pub(super) const fn published(buffer: Buffer<'f>) -> Self {
         Self { buffer, is_published: true }
     }
 
     /// The facts about the frame; arbitrary for a frame not yet labelled.
     pub(crate) fn label(&self) -> FrameLabel {
-        self.buffer.label()
+        self.buffer.head.label()
     }
 
     /// Its odometer's reading.
     pub(crate) fn travel(&self) -> Option<Travel> {
-        self.buffer.travel()
+        self.buffer.head.travel()
     }
 
     /// Time from this frame to one with the stamp `received`.
     #[cfg(feature = "bus")]
     pub(crate) fn time_to(&self, received: Millis) -> Millis {
-        elapsed(received, Millis(self.buffer.received.load(Ordering::Relaxed)))
+        elapsed(received, self.buffer.head.received())
     }
 }
 
-impl<const N: usize, F: Buffers> VertexTable for FrameView<'_, N, F> {
+impl VertexTable for FrameView<'_> {
     fn len(&self) -> usize {
-        self.buffer.rows().len()
+        self.buffer.rows.len()
     }
 
     #[inline(always)]
     fn position(&self, vertex: u32) -> Option<Vec3> {
-        self.buffer.position(vertex)
+        self.buffer.rows.get(vertex as usize).map(Position::get)
     }
 
     fn epoch(&self) -> Option<u32> {
-        self.is_published.then(|| self.buffer.epoch.load(Ordering::Relaxed))
+        self.is_published.then(|| self.buffer.head.epoch())
     }
 
     fn stretch(&self) -> Option<MeasuredStretch> {
-        if self.is_published { self.buffer.stretch() } else { None }
+        if self.is_published { self.buffer.head.stretch() } else { None }
     }
 
     fn position_error(&self) -> f32 {
-        if self.is_published { self.buffer.position_error() } else { 0.0 }
+        if self.is_published { self.buffer.head.position_error() } else { 0.0 }
     }
 }

@@ -76,7 +76,7 @@ pub fn run<const K: usize>(
     for epoch in 0.. {
         match word(machine)? {
             command::END => break,
-            command::FRAME => publish(&modes, &mut writer, epoch, machine)?,
+            command::FRAME => publish::<K>(&modes, &mut writer, epoch, machine)?,
             command::TICK => {
                 let now = word(machine)?;
                 let (start, end) = (point(machine)?, point(machine)?);
@@ -117,7 +117,7 @@ fn place(tree: &Tree<'static, u16>, tracker: &mut Option<Follower>) -> Result<()
 /// Publishes the script's next weights, with the bound on their stretch.
 fn publish<const K: usize>(
     modes: &Modes<'_>,
-    writer: &mut FrameWriter<'_, K>,
+    writer: &mut FrameWriter<'_>,
     epoch: u32,
     machine: &mut impl Machine,
 ) -> Result<(), Fault> {

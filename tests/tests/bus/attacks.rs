@@ -231,7 +231,7 @@ fn keys_differ_by_receiver_and_direction() {
 #[test]
 fn a_frame_counts_once() {
     let (mut assembler, _reader) = bus();
-    let rejections = |assembler: &Assembler<'static, Unchecked, N>| assembler.health().rejections;
+    let rejections = |assembler: &Assembler<'static, Unchecked>| assembler.health().rejections;
     for packet in frame(1, true) {
         give(&mut assembler, &packet).unwrap();
     }

@@ -14,7 +14,7 @@ const KEY: [u8; 16] = *b"0123456789abcdef";
 const CHALLENGE: u64 = 0x5EED_0000_00C0_FFEE;
 const RECEIVER: u32 = 7;
 
-type Guarded = (Assembler<'static, Unchecked, N, AesCmac>, FrameReader<'static, N>);
+type Guarded = (Assembler<'static, Unchecked, AesCmac>, FrameReader<'static>);
 
 fn mac() -> AesCmac {
     AesCmac::new(&KEY, RECEIVER, CHALLENGE)

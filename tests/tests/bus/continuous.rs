@@ -18,8 +18,8 @@ const ROWS: usize = 162;
 
 /// Three buffers, and so a surface that moves.
 type Continuous = Frames<ROWS, 3>;
-type Reader = FrameReader<'static, ROWS, Continuous>;
-type Bus<G> = Assembler<'static, G, ROWS, dibs_nostd::wire::NoMac, Continuous>;
+type Reader = FrameReader<'static>;
+type Bus<G> = Assembler<'static, G>;
 
 fn heart() -> (Mesh, Vec<Vec<Vec3>>, BuiltTree) {
     let generate::MovingMesh { mesh, motion } = generate::heart(320).expect("a valid size");

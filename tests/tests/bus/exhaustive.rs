@@ -10,9 +10,7 @@ use dibs_tests::bus::*;
 /// Rows of the surface: three packets.
 const ROWS: usize = 9;
 
-fn receiver<const R: usize>(
-    frames: &Frames<R>,
-) -> (Assembler<'_, Unchecked, R>, FrameReader<'_, R>) {
+fn receiver<const R: usize>(frames: &Frames<R>) -> (Assembler<'_, Unchecked>, FrameReader<'_>) {
     let (writer, reader) = frames.split().unwrap();
     (Assembler::new(writer, Unchecked, MESH, 1e3), reader)
 }

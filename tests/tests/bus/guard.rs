@@ -17,7 +17,7 @@ const PERIOD: u32 = 30;
 /// The tissue's velocity, in mm/s.
 const FLOW: Vec3 = Vec3::new(12.0, -5.0, 9.0);
 
-type Ends<'t> = (Bus<'static, 't, u16, ROWS>, Guard<'static, 't, u16, ROWS, 64, 96>);
+type Ends<'t> = (Bus<'static, 't, u16>, Guard<'static, 't, u16, 64, 96>);
 
 fn surface() -> &'static Surface<ROWS> {
     Box::leak(Box::new(Surface::new()))

@@ -18,9 +18,9 @@ pub fn mac() -> AesCmac {
     AesCmac::new(&KEY, RECEIVER, 77)
 }
 
-pub type Guarded<M = AesCmac> = Assembler<'static, Unchecked, N, M>;
+pub type Guarded<M = AesCmac> = Assembler<'static, Unchecked, M>;
 
-pub fn guarded<M: Mac>(mac: M) -> (Guarded<M>, FrameReader<'static, N>) {
+pub fn guarded<M: Mac>(mac: M) -> (Guarded<M>, FrameReader<'static>) {
     let frames: &'static Frames<N> = Box::leak(Box::new(Frames::new()));
     let (writer, reader) = frames.split().unwrap();
     (Assembler::with_mac(writer, Unchecked, MESH, 100.0, mac), reader)

@@ -12,15 +12,15 @@ use fastrand::Rng;
 /// Rows of the larger surface, which takes several packets and several slices of copying.
 const ROWS: usize = 300;
 
-fn large() -> (Assembler<'static, Unchecked, ROWS>, FrameReader<'static, ROWS>) {
+fn large() -> (Assembler<'static, Unchecked>, FrameReader<'static>) {
     let frames: &'static Frames<ROWS> = Box::leak(Box::new(Frames::new()));
     let (writer, reader) = frames.split().unwrap();
     (Assembler::new(writer, Unchecked, MESH, 1e4), reader)
 }
 
-fn read<const N: usize>(reader: &mut FrameReader<'_, N>) -> Vec<Vec3> {
+fn read(reader: &mut FrameReader<'_>) -> Vec<Vec3> {
     let frame = reader.read().expect("published");
-    (0..N as u32).map(|row| frame.position(row).unwrap()).collect()
+    (0..frame.len() as u32).map(|row| frame.position(row).unwrap()).collect()
 }
 
 fn partial(epoch: u32, encoding: Encoding, now: &[Vec3], base: u32, held: &[Vec3]) -> Vec<Vec<u8>> {
@@ -222,7 +222,7 @@ fn copying_is_bounded_and_rows_wait_for_it() {
 #[test]
 fn memory_does_not_grow_with_marks() {
     fn besides<const N: usize>() -> (usize, usize) {
-        (size_of::<Frames<N>>() - 24 * N, size_of::<Assembler<'static, Unchecked, N>>())
+        (size_of::<Frames<N>>() - 24 * N, size_of::<Assembler<'static, Unchecked>>())
     }
     let one = besides::<1>();
     assert_eq!(one, besides::<42>());
@@ -230,5 +230,5 @@ fn memory_does_not_grow_with_marks() {
     assert_eq!(one, besides::<250_000>());
     let monitor = size_of::<StretchMonitor<'static, u16>>();
     println!("besides the vertices: frames {}, assembler {}, monitor {monitor}", one.0, one.1);
-    assert!(one.0 + one.1 <= 768, "{one:?}");
+    assert!(one.0 + one.1 <= 848, "{one:?}");
 }

@@ -7,7 +7,7 @@ use dibs_nostd::wire::{
 use dibs_nostd::{Assembler, BusHealth, FrameReader, Frames, Millis, Unchecked};
 use dibs_tests::bus::*;
 
-type Line<M> = (Assembler<'static, Unchecked, N, M>, FrameReader<'static, N>);
+type Line<M> = (Assembler<'static, Unchecked, M>, FrameReader<'static>);
 
 fn line<M: Mac>(mac: M) -> Line<M> {
     let frames: &'static Frames<N> = Box::leak(Box::new(Frames::new()));

@@ -19,8 +19,8 @@ const ROWS: usize = 162;
 const SPEED: f32 = 0.3;
 
 struct Bus {
-    assembler: Assembler<'static, StretchMonitor<'static, u16>, ROWS>,
-    reader: FrameReader<'static, ROWS>,
+    assembler: Assembler<'static, StretchMonitor<'static, u16>>,
+    reader: FrameReader<'static>,
     rest: &'static [Vec3],
     mesh_id: u32,
     epoch: u32,

@@ -18,7 +18,7 @@ use glam::Vec3;
 struct Bus {
     tree: Tree<'static, u16>,
     modes: Modes<'static>,
-    assembler: Assembler<'static, ModalGate<'static, &'static Tree<'static, u16>, 4>, 4>,
+    assembler: Assembler<'static, ModalGate<'static, &'static Tree<'static, u16>, 4>>,
     reader: ModalReader<'static, 'static, 4>,
     recorded: Vec<Vec<f32>>,
 }

@@ -19,7 +19,7 @@ use fastrand::Rng;
 
 const MODES: usize = 4;
 
-type Bus<G> = Assembler<'static, G, MODES>;
+type Bus<G> = Assembler<'static, G>;
 type Reader = ModalReader<'static, 'static, MODES>;
 
 fn surface() -> &'static Tree<'static, u16> {
@@ -31,7 +31,7 @@ fn surface() -> &'static Tree<'static, u16> {
     Box::leak(Box::new(tree))
 }
 
-fn buffers(modes: &Modes<'static>) -> (FrameWriter<'static, MODES>, Reader) {
+fn buffers(modes: &Modes<'static>) -> (FrameWriter<'static>, Reader) {
     let frames: &'static Frames<MODES> = Box::leak(Box::new(Frames::new()));
     let (writer, reader) = frames.split().expect("once");
     (writer, ModalReader::new(reader, modes).expect("four modes"))
@@ -207,7 +207,7 @@ fn label(epoch: u32, received: u32) -> FrameLabel {
 }
 
 /// Publishes weights by hand.
-fn publish(writer: &mut FrameWriter<'static, MODES>, weights: &[f32], label: FrameLabel) {
+fn publish(writer: &mut FrameWriter<'static>, weights: &[f32], label: FrameLabel) {
     writer.begin();
     for weight in weights {
         writer.push(Vec3::new(*weight, 0.0, 0.0)).expect("in the table");

@@ -42,7 +42,7 @@ fn publish<'f>(
     frames: &'f Frames<N>,
     rows: &[Vec3],
     stretch: Option<MeasuredStretch>,
-) -> FrameReader<'f, N> {
+) -> FrameReader<'f> {
     let (mut writer, reader) = frames.split().expect("new");
     writer.begin();
     for &row in rows {

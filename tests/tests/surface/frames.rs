@@ -144,7 +144,7 @@ fn a_frame_does_not_grow_young_again() {
     assert_eq!(age(&mut reader, clock.wrapping_add(7)), 7);
 }
 
-fn age<const N: usize>(reader: &mut FrameReader<'_, N>, now: u32) -> u32 {
+fn age(reader: &mut FrameReader<'_>, now: u32) -> u32 {
     reader.latest(Millis(now)).frame().expect("published").age.0
 }
 

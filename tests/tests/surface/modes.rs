@@ -7,8 +7,8 @@ use std::path::Path;
 use dibs_build::modes::{MARGIN, ModalFit, ModesError, Projector};
 use dibs_build::{Builder, IndexWidth, Motion, MotionStretch, Paths, generate};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::modes::{self, MAX_MODES, ModalSurface, Modes, WeightsError};
-use dibs_nostd::{Index, Options, Query, StretchError, Tree, VertexTable, measure_stretch};
+use dibs_nostd::modes::{self, MAX_MODES, ModalReader, ModalSurface, Modes, WeightsError};
+use dibs_nostd::{Frames, Index, Options, Query, StretchError, Tree, VertexTable, measure_stretch};
 use dibs_tests::modal::{anywhere, positions, small};
 use dibs_tests::motions::trembling;
 use dibs_tests::oracle::exhaustive;
@@ -140,6 +140,10 @@ fn weights_that_make_no_surface_are_refused() {
         let refused = modes.surface::<8>(&weights).expect_err("another number");
         assert_eq!(refused, WeightsError::Count { expected: 4, found: length as u32 });
     }
+    let frames = Frames::<3>::new();
+    let (_, reader) = frames.split().expect("once");
+    let refused = ModalReader::<4>::new(reader, &modes).expect_err("a row is missing");
+    assert_eq!(refused, WeightsError::Count { expected: 4, found: 3 });
     for mode in 0..4 {
         let [low, high] = modes.range(mode).expect("there");
         let with = |weight: f32| {

@@ -50,7 +50,7 @@ fn a_modal_surface_that_jumps_is_too_fast() {
     let monitor = StretchMonitor::new(&tree).expect("measurable").limits(limits);
     let gate = ModalGate::<_, MODES>::new(&modes, monitor).expect("four modes");
     let mut assembler = Assembler::new(writer, gate, tree.mesh_id(), 1e4);
-    let mut reader = ModalReader::new(reader, &modes).expect("four modes");
+    let mut reader = ModalReader::<MODES>::new(reader, &modes).expect("four modes");
     let mut send = |epoch: u32, weights: &[f32]| {
         let id = FrameId { mesh_id: tree.mesh_id(), session: 1, epoch };
         let mut encoder = WeightsEncoder::<64>::new(id, weights).expect("can be sent");

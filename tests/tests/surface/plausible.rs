@@ -18,8 +18,8 @@ const N: usize = 502;
 const SPEED: f32 = 0.3;
 
 struct Bus {
-    assembler: Assembler<'static, StretchMonitor<'static, u16>, N>,
-    reader: FrameReader<'static, N>,
+    assembler: Assembler<'static, StretchMonitor<'static, u16>>,
+    reader: FrameReader<'static>,
     tree: &'static Tree<'static, u16>,
     epoch: u32,
 }

@@ -12,9 +12,7 @@ use crate::bus::wire::{
     Body, Content, Counters, Event, FrameId, Mac, NoMac, Packet, Status, StreamError,
 };
 use crate::stretch::{Arriving, Gate, StretchError, StretchMonitor, SurfaceLimits, Verdict};
-use crate::surface::{
-    Ahead, Buffers, FrameLabel, FrameView, FrameWriter, Frames, LastStep, Millis, PublishError,
-};
+use crate::surface::{Ahead, FrameLabel, FrameView, FrameWriter, LastStep, Millis, PublishError};
 use crate::tree::{Index, SurfaceFacts, Tree};
 
 use collector::Collector;
@@ -24,7 +22,7 @@ pub use health::BusHealth;
 use health::FrameName;
 use step::{Earlier, Step};
 
-/// Assembles frames of `N` vertices from packets, and publishes the complete and admitted ones.
+/// Assembles frames of vertices from packets, and publishes the complete and admitted ones.
 ///
 /// [`accept`](Self::accept) takes packets, in the bus interrupt. [`advance`](Self::advance) does the longer work, in
 /// slices: it checks the surface ([`Gate`]), publishes it, and copies the rows that partial frames build on. The two
@@ -36,12 +34,12 @@ use step::{Earlier, Step};
 /// last stays. `docs/wire.md` has the whole table of packets and outcomes. With a [`Mac`], a packet without a genuine
 /// tag is dropped first.
 ///
-/// With a gate of modes, `N` is their number, and frames hold weights instead: see
+/// With a gate of modes the buffers have a row for each, and frames hold weights instead: see
 /// [`Gate::weight_range`].
 ///
-/// RAM: less than 600 bytes besides [`Frames`](crate::Frames) and gate, for any `N`. A surface's buffers with
+/// RAM: less than 700 bytes besides [`Frames`](crate::Frames) and gate, for any number of vertices. A surface's buffers with
 /// both ends, the assembler and the [`StretchMonitor`](crate::StretchMonitor) together take 24 bytes a vertex and at
-/// most 1,550 bytes.
+/// most 1,750 bytes.
 ///
 /// ```
 /// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
@@ -62,8 +60,8 @@ use step::{Earlier, Step};
 /// assert_eq!(reader.read().unwrap().position(2), Some(Vec3::Z));
 /// ```
 #[derive(Debug)]
-pub struct Assembler<'f, G, const N: usize, M = NoMac, F: Buffers = Frames<N>> {
-    writer: FrameWriter<'f, N, F>,
+pub struct Assembler<'f, G, M = NoMac> {
+    writer: FrameWriter<'f>,
     gate: G,
     mac: M,
     max_coordinate: f32,
@@ -129,26 +127,24 @@ pub enum Advance {
     },
 }
 
-impl<'f, G: Gate, const N: usize, F: Buffers> Assembler<'f, G, N, NoMac, F> {
+impl<'f, G: Gate> Assembler<'f, G> {
     /// An assembler for the mesh with this id, whose vertices keep within `max_coordinate` (mm) of the origin on each
     /// axis, at most [`MAX_COORDINATE`]. A smaller limit detects more damage, and bounds the accuracy of every query.
     /// With NaN nothing is ever published.
     #[must_use]
-    pub fn new(writer: FrameWriter<'f, N, F>, gate: G, mesh_id: u32, max_coordinate: f32) -> Self {
+    pub fn new(writer: FrameWriter<'f>, gate: G, mesh_id: u32, max_coordinate: f32) -> Self {
         Assembler::with_mac(writer, gate, mesh_id, max_coordinate, NoMac)
     }
 }
 
-impl<'f, 't, I: Index, const N: usize, F: Buffers>
-    Assembler<'f, StretchMonitor<'t, I>, N, NoMac, F>
-{
+impl<'f, 't, I: Index> Assembler<'f, StretchMonitor<'t, I>> {
     /// An assembler for surfaces of this tree. It checks them in slices, and publishes those within the tree's stretch
     /// limit and these limits.
     ///
     /// # Errors
     /// [`StretchError::NoMetric`] where the tree was emitted without its metric section.
     pub fn for_tree(
-        writer: FrameWriter<'f, N, F>,
+        writer: FrameWriter<'f>,
         tree: &Tree<'t, I>,
         limits: SurfaceLimits,
     ) -> Result<Self, StretchError> {
@@ -157,16 +153,14 @@ impl<'f, 't, I: Index, const N: usize, F: Buffers>
     }
 }
 
-impl<'f, 't, I: Index, const N: usize>
-    Assembler<'f, StretchMonitor<'t, I, 2>, N, NoMac, Frames<N, 3>>
-{
+impl<'f, 't, I: Index> Assembler<'f, StretchMonitor<'t, I, 2>> {
     /// The same, for three buffers: the frames that it publishes move between their times and beyond
     /// ([`FrameGuard::extrapolated`](crate::FrameGuard::extrapolated)). It measures twice as much.
     ///
     /// # Errors
     /// [`StretchError::NoMetric`] where the tree was emitted without its metric section.
     pub fn continuous(
-        writer: FrameWriter<'f, N, Frames<N, 3>>,
+        writer: FrameWriter<'f>,
         tree: &Tree<'t, I>,
         limits: SurfaceLimits,
     ) -> Result<Self, StretchError> {
@@ -175,11 +169,11 @@ impl<'f, 't, I: Index, const N: usize>
     }
 }
 
-impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> {
+impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
     /// The same, for packets with tags.
     #[must_use]
     pub fn with_mac(
-        writer: FrameWriter<'f, N, F>,
+        writer: FrameWriter<'f>,
         gate: G,
         mesh_id: u32,
         max_coordinate: f32,
@@ -320,7 +314,7 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
 
     /// The frame published last.
     #[must_use]
-    pub fn surface(&self) -> Option<FrameView<'_, N, F>> {
+    pub fn surface(&self) -> Option<FrameView<'_>> {
         self.writer.front()
     }
 
@@ -380,7 +374,7 @@ impl<'f, G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'f, G, N, M, F> 
         // A registration is compared with nothing. A partial frame is none: the rest of it is the published one's.
         let is_registration = self.collector.is_registration && !frame.is_partial();
         let before = front.as_ref().filter(|_| !is_registration);
-        let time = |front: &FrameView<'_, N, F>| {
+        let time = |front: &FrameView<'_>| {
             let time = self.collector.time_to(frame);
             time.unwrap_or_else(|| front.time_to(frame.captured()))
         };

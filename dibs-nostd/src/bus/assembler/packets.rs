@@ -11,9 +11,9 @@ use crate::bus::wire::{
     quantised_row,
 };
 use crate::stretch::{Changed, Gate};
-use crate::surface::{Buffers, Position};
+use crate::surface::Position;
 
-impl<G: Gate, M: Mac, const N: usize, F: Buffers> Assembler<'_, G, N, M, F> {
+impl<G: Gate, M: Mac> Assembler<'_, G, M> {
     #[inline]
     pub(super) fn take(&mut self, packet: &Packet<'_>) -> Result<Progress, ReceiveError> {
         let epoch = packet.epoch;

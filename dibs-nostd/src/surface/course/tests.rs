@@ -11,7 +11,7 @@ use glam::Vec3;
 
 use super::{Ahead, Course};
 use crate::surface::motion::{Travel, Unit};
-use crate::wire::{Encoding, FrameEncoder, FrameId, NoMac};
+use crate::wire::{Encoding, FrameEncoder, FrameId};
 use crate::{
     Advance, Assembler, Frames, Millis, MovingSurface, StretchMonitor, SurfaceLimits, Tree,
     VertexTable,
@@ -33,7 +33,7 @@ enum Motion {
     Creeping,
 }
 
-type Bus<'t> = Assembler<'t, StretchMonitor<'t, u16, 2>, ROWS, NoMac, Frames<ROWS, 3>>;
+type Bus<'t> = Assembler<'t, StretchMonitor<'t, u16, 2>>;
 
 /// Sends a frame that is published.
 fn send(bus: &mut Bus<'_>, mesh_id: u32, epoch: u32, rows: &[Vec3], now: u32) {
@@ -71,7 +71,7 @@ fn follow(motion: Motion) {
     let mesh = generate::heart(320).unwrap().mesh;
     let built = Builder::new().stretch(4.0).build(&mesh).unwrap();
     let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
-    let frames = Frames::new();
+    let frames = Frames::<ROWS, 3>::new();
     let (writer, mut reader) = frames.split().unwrap();
     let mut bus = Assembler::continuous(writer, &tree, SurfaceLimits::reach_mm(1e4)).unwrap();
     let unit = Unit::of(&tree);
@@ -143,7 +143,7 @@ fn the_order_of_two_readings_does_not_matter() {
     let mesh = generate::heart(320).unwrap().mesh;
     let built = Builder::new().stretch(4.0).build(&mesh).unwrap();
     let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
-    let frames = Frames::new();
+    let frames = Frames::<ROWS, 3>::new();
     let (writer, mut reader) = frames.split().unwrap();
     let mut bus = Assembler::continuous(writer, &tree, SurfaceLimits::reach_mm(1e4)).unwrap();
     // Sums of coarse numbers are exact.

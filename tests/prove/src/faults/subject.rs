@@ -191,8 +191,8 @@ pub trait Receiver {
 /// The receiver on this computer: the work of the bus interrupt, and a check of the control tick's view.
 pub struct Controller<'f, M> {
     deframer: Deframer<MTU>,
-    assembler: Assembler<'f, StretchMonitor<'f, u16>, N, M>,
-    reader: FrameReader<'f, N>,
+    assembler: Assembler<'f, StretchMonitor<'f, u16>, M>,
+    reader: FrameReader<'f>,
     published: u32,
     wrong: u64,
     /// In ms: some pass with each status.

@@ -58,8 +58,8 @@ fn run(bytes: &mut [u8]) -> Option<()> {
 struct Receiver<'t, M> {
     mesh_id: u32,
     deframer: Deframer<MTU>,
-    assembler: Assembler<'static, StretchMonitor<'t, u16>, VERTICES, M>,
-    reader: FrameReader<'static, VERTICES>,
+    assembler: Assembler<'static, StretchMonitor<'t, u16>, M>,
+    reader: FrameReader<'static>,
     received: u32,
     published: u32,
     epoch: u32,
@@ -69,8 +69,8 @@ struct Receiver<'t, M> {
 impl<'t, M: Mac> Receiver<'t, M> {
     fn new(
         tree: &'t Tree<'t, u16>,
-        writer: FrameWriter<'static, VERTICES>,
-        reader: FrameReader<'static, VERTICES>,
+        writer: FrameWriter<'static>,
+        reader: FrameReader<'static>,
         limit: f32,
         mac: M,
     ) -> Option<Self> {

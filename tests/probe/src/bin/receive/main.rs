@@ -32,7 +32,7 @@ const SLICE: u32 = 512;
 static FRAMES: [Frames<VERTICES>; 2] = [const { Frames::new() }; 2];
 static BYTES: Mutex<RefCell<[u8; TREE_BYTES]>> = Mutex::new(RefCell::new([0; TREE_BYTES]));
 
-type Receiver<'t, M> = Assembler<'static, StretchMonitor<'t, u16>, VERTICES, M>;
+type Receiver<'t, M> = Assembler<'static, StretchMonitor<'t, u16>, M>;
 
 #[entry]
 fn main() -> ! {

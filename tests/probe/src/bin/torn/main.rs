@@ -41,7 +41,7 @@ static PUT_OFF: AtomicU32 = AtomicU32::new(0);
 
 /// The interrupt's state.
 struct Sender {
-    writer: FrameWriter<'static, VERTICES>,
+    writer: FrameWriter<'static>,
     rest: [Vec3; VERTICES],
     epoch: u32,
     next: usize,
