@@ -5,14 +5,14 @@ use std::path::Path;
 use dibs_nostd::format::Unit;
 use glam::{DVec3, Vec3};
 
-use crate::frames::FrameCheck;
+use crate::frames::{FrameCheck, FrameError};
 use crate::read::{self, ReadError, ReadErrorKind};
 
 impl FrameCheck {
     /// Reads a mesh file that is a frame: positions in the order of the tree's rows.
     ///
     /// # Errors
-    /// [`ReadError`], and for a file of other vertices, triangles or size.
+    /// [`ReadError`], and for a file of other vertices, triangles or size, or that is inside out.
     pub fn read(
         &self,
         path: impl AsRef<Path>,
@@ -22,9 +22,12 @@ impl FrameCheck {
         let path = path.as_ref();
         let frame = || {
             let (positions, faces) = read::frame(path, 0, unit, origin)?;
-            let rows = self.to_rows(&positions)?;
-            self.check_faces(&faces)?;
-            Ok(rows)
+            let rows = self.to_rows(&positions);
+            // Faces tell another mesh from another size.
+            if !matches!(rows, Err(FrameError::Vertices { .. })) {
+                self.check_faces(&faces)?;
+            }
+            Ok(rows?)
         };
         frame().map_err(|kind: ReadErrorKind| ReadError { path: path.to_path_buf(), kind })
     }

@@ -41,6 +41,15 @@ pub enum FrameError {
         /// The unit of the mesh's file, where it is known.
         unit: Option<Unit>,
     },
+    /// A closed surface is turned inside out, so that inside and outside are exchanged.
+    #[error(
+        "is inside out: its volume is {part:.3} times that at rest; an axis is mirrored or two are exchanged, in the mesh or \
+         in the frame: convert both in the same way"
+    )]
+    InsideOut {
+        /// The signed volume that it encloses, as a part of that at rest.
+        part: f64,
+    },
 }
 
 fn of_unit(unit: Option<Unit>) -> String {
@@ -55,6 +64,15 @@ const LEAST: f64 = 0.25;
 /// And at most so many times as long, or twice the stretch limit.
 const MOST: f64 = 4.0;
 
+/// And at most so many times where limits are learned from them: below the factor of every other unit.
+const MOST_LEARNED: f64 = 8.0;
+
+/// A flat surface's volume has the other sign by rounding: by this part of the volume at rest it may, as for a receiver.
+const FLAT: f64 = 1.0 / 64.0;
+
+/// The least volume at rest that has a sign, as a part of the sum of its terms' sizes.
+const LEAST_VOLUME: f64 = 1.0 / 4096.0;
+
 /// Checks frames against a tree, and puts their positions into the order of its rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameCheck {
@@ -68,6 +86,8 @@ pub struct FrameCheck {
     /// The sum of the squares of all edges at rest, where the tree has its rest shape.
     rest: Option<f64>,
     most: f64,
+    /// The volume at rest, where the surface is closed and has one.
+    volume: Option<f64>,
 }
 
 impl FrameCheck {
@@ -81,6 +101,11 @@ impl FrameCheck {
         let rows = (0..tree.triangle_count()).filter_map(|row| tree.corners(TriangleRow(row)));
         let rows: Vec<[u32; 3]> = rows.collect();
         let at_rest = |row| tree.rest_position(row);
+        let has_neighbours =
+            |row| (0..3).all(|edge| tree.neighbour(TriangleRow(row), edge).is_some());
+        let is_closed = (0..tree.triangle_count()).all(has_neighbours);
+        let volume = is_closed.then(|| volume(&rows, at_rest)).flatten();
+        let has_sign = |&(volume, terms): &(f64, f64)| volume.abs() > LEAST_VOLUME * terms;
         Self {
             triangles: rows.iter().map(|corners| corners.map(number)).collect(),
             order,
@@ -89,13 +114,14 @@ impl FrameCheck {
             unit: tree.unit(),
             rest: squares(&rows, at_rest),
             most: (2.0 * f64::from(tree.stretch())).max(MOST),
+            volume: volume.filter(has_sign).map(|(volume, _)| volume),
         }
     }
 
     /// Positions in the mesh's order (mm), in the order of the tree's rows.
     ///
     /// # Errors
-    /// [`FrameError`] for another number of vertices, and for another size.
+    /// [`FrameError`] for another number of vertices, for another size, and for a closed surface turned inside out.
     pub fn to_rows(&self, positions: &[Vec3]) -> Result<Vec<Vec3>, FrameError> {
         if positions.len() != self.vertices {
             let (expected, found) = (self.vertices, positions.len());
@@ -104,6 +130,13 @@ impl FrameCheck {
         let at = |vertex: u32| positions.get(vertex as usize).copied();
         if let (Some(rest), Some(now)) = (self.rest, squares(&self.triangles, at)) {
             check_size(rest, now, self.most, self.unit)?;
+        }
+        if let (Some(rest), Some((now, _))) = (self.volume, volume(&self.triangles, at)) {
+            let part = now / rest;
+            // False for NaN: what is not finite has an error of its own.
+            if part < -FLAT {
+                return Err(FrameError::InsideOut { part });
+            }
         }
         let missing = FrameError::Vertices { expected: self.vertices, found: positions.len() };
         self.order.iter().map(|&vertex| at(vertex)).collect::<Option<_>>().ok_or(missing)
@@ -153,7 +186,7 @@ pub(crate) fn check_faces(
 pub(crate) fn check_mesh_size(mesh: &Mesh, frame: &[Vec3]) -> Result<(), FrameError> {
     let of = |positions: &[Vec3]| squares(&mesh.triangles, |v| positions.get(v as usize).copied());
     match (of(&mesh.positions), of(frame)) {
-        (Some(rest), Some(now)) => check_size(rest, now, f64::INFINITY, None),
+        (Some(rest), Some(now)) => check_size(rest, now, MOST_LEARNED, None),
         _ => Ok(()),
     }
 }
@@ -175,4 +208,17 @@ fn squares(triangles: &[[u32; 3]], at: impl Fn(u32) -> Option<Vec3>) -> Option<f
         sum += a.distance_squared(b) + b.distance_squared(c) + c.distance_squared(a);
     }
     Some(sum)
+}
+
+/// The signed volume that closed triangles enclose, and the sum of its terms' sizes; `None` where a position is missing.
+fn volume(triangles: &[[u32; 3]], at: impl Fn(u32) -> Option<Vec3>) -> Option<(f64, f64)> {
+    let near = at(triangles.first()?[0])?.as_dvec3();
+    let (mut sum, mut terms) = (0.0, 0.0);
+    for &[a, b, c] in triangles {
+        let [a, b, c] = [at(a)?, at(b)?, at(c)?].map(|at| at.as_dvec3() - near);
+        let term = a.dot(b.cross(c)) / 6.0;
+        sum += term;
+        terms += term.abs();
+    }
+    Some((sum, terms))
 }

@@ -107,8 +107,8 @@ impl Motion {
         })
     }
 
-    /// Checks that every frame has one position for each of the mesh's vertices, from the mesh's origin, and the mesh's
-    /// triangles where its files have faces.
+    /// Checks that every frame has one position for each of the mesh's vertices, from the mesh's origin, is a quarter to
+    /// eight times its size, and has the mesh's triangles where its files have faces.
     ///
     /// # Errors
     /// [`MotionMismatchError`] for another origin, or the first frame that does not fit.

@@ -180,6 +180,16 @@ fn arrays_are_checked_as_files_are() {
     for by in [0.5, 1.4] {
         assert!(check.to_rows(&scaled(by)).is_ok());
     }
+    // A mirrored axis and two exchanged ones; two mirrored axes turn the surface.
+    let mirrored = |signs: Vec3| mesh.positions.iter().map(|p| *p * signs).collect::<Vec<_>>();
+    let exchanged: Vec<_> = mesh.positions.iter().map(|p| Vec3::new(p.x, p.z, p.y)).collect();
+    for wrong in [mirrored(Vec3::new(-1.0, 1.0, 1.0)), mirrored(Vec3::NEG_ONE), exchanged] {
+        let error = check.to_rows(&wrong).unwrap_err();
+        assert!(matches!(error, FrameError::InsideOut { part } if part < -0.9), "{error}");
+        assert!(order.to_rows(&wrong).is_err());
+    }
+    assert!(check.to_rows(&mirrored(Vec3::new(-1.0, -1.0, 1.0))).is_ok());
+    assert!(check.to_rows(&mirrored(Vec3::new(1.0, 1.0, 0.0))).is_ok(), "it is flat");
     let mut longer = mesh.positions.clone();
     longer.push(Vec3::ZERO);
     for wrong in [&longer[..], &mesh.positions[1..], &[]] {
@@ -189,6 +199,27 @@ fn arrays_are_checked_as_files_are() {
     let small = Motion { frames: vec![mesh.positions.clone(), scaled(1e-3)], ..Motion::default() };
     let error = small.check_fits(&mesh).unwrap_err();
     assert!(matches!(error, MotionMismatchError::Frame { frame: 1, .. }), "{error}");
+    // Limits are not learned from a motion in another unit, which a tree would then admit.
+    for by in [10.0, 25.4, 1e3] {
+        let large = Motion { frames: vec![scaled(by)], ..Motion::default() };
+        assert!(large.check_fits(&mesh).is_err(), "{by}");
+    }
+    let inflated = Motion { frames: vec![scaled(5.0)], ..Motion::default() };
+    assert_eq!(inflated.check_fits(&mesh), Ok(()));
+}
+
+/// An open surface has no inside: mirrored, it is a shape as any other.
+#[test]
+fn an_open_surface_may_be_mirrored() {
+    let mesh = generate::heart(320).unwrap().mesh;
+    let open = Mesh { triangles: mesh.triangles[1..].to_vec(), ..mesh.clone() };
+    let mirrored: Vec<Vec3> =
+        mesh.positions.iter().map(|p| *p * Vec3::new(-1.0, 1.0, 1.0)).collect();
+    for (mesh, is_ok) in [(&mesh, false), (&open, true)] {
+        let built = Builder::new().build(mesh).unwrap();
+        let check = FrameCheck::of(&built.tree::<u16>().unwrap());
+        assert_eq!(check.to_rows(&mirrored).is_ok(), is_ok);
+    }
 }
 
 /// The accuracy covers what was dropped: distances to the file's own triangles are within it.
