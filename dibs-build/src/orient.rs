@@ -7,14 +7,22 @@ use petgraph::unionfind::UnionFind;
 
 use crate::Mesh;
 
+fn more_pairs(others: usize) -> String {
+    match others {
+        0 => String::new(),
+        1 => ", as one more pair is".to_owned(),
+        others => format!(", as {others} more pairs are"),
+    }
+}
+
 /// Why a surface has no outer side, or the wrong one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WindingError {
     /// Two triangles run along their common edge in the same direction.
     #[error(
-        "triangles {triangle} and {other} are wound against each other, as {others} more pairs are, so the surface \
-         has no outer side and distances to it no sign: turn them with --orient"
+        "triangles {triangle} and {other} are wound against each other{}, so the surface has no outer side and distances to \
+         it no sign: turn them with --orient", more_pairs(*others)
     )]
     Inconsistent {
         /// One triangle.

@@ -227,7 +227,7 @@ def by_trimesh(trimesh):
         try:
             mesh.export(name, **options)
         except ImportError as error:
-            line({"absent": "%s (for %s)" % (error.name, name)})
+            line({"absent": "%s (for %s)" % (error.name or error, name)})
             continue
         say(name, version)
     scene = trimesh.Scene()
