@@ -227,7 +227,9 @@ def by_trimesh(trimesh):
         try:
             mesh.export(name, **options)
         except ImportError as error:
-            line({"absent": "%s (for %s)" % (error.name or error, name)})
+            # Raised again without its name.
+            missing = error.name or str(error).removeprefix("No module named ").strip("'")
+            line({"absent": "%s (for %s)" % (missing, name)})
             continue
         say(name, version)
     scene = trimesh.Scene()
