@@ -3,7 +3,9 @@
 use dibs_build::{Builder, Mesh};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Capsule, Options, Query, Side};
+use dibs_tests::deform::unit;
 use dibs_tests::surfaces::ball;
+use fastrand::Rng;
 use glam::Vec3;
 
 /// Two balls of 40 mm beside each other.
@@ -50,6 +52,50 @@ fn an_axis_through_several_walls_is_as_deep_under_any_budget() {
         }
     }
     assert!(cut > 500 && crossing > 500, "{cut} {crossing}");
+}
+
+/// A row of bodies, each of which has leaves of other sizes. Where a search ends between two that the axis passes, few
+/// tests are left, which are enough for an end of the axis: what is between that and the first body was not searched.
+#[test]
+fn a_search_that_ended_knows_not_where_the_axis_meets_the_surface() {
+    let (mut cut, mut rng) = (0, Rng::with_seed(3));
+    for number in 0..if cfg!(debug_assertions) { 250 } else { 1_000 } {
+        let mut row = Mesh::default();
+        for place in 0..2 + number % 3 {
+            let body = ball(rng.u32(..3));
+            let first = row.positions.len() as u32;
+            let (size, aside) = (0.2 + 0.8 * rng.f32(), unit(&mut rng) * 5.0);
+            let aside = aside + Vec3::X * 90.0 * place as f32;
+            let spikes = if rng.bool() { 1.2 } else { 0.0 };
+            let mut move_to = |at: &Vec3| *at * size * (1.0 - 0.6 * spikes * rng.f32()) + aside;
+            row.positions.extend(body.positions.iter().map(&mut move_to));
+            row.triangles.extend(body.triangles.iter().map(|at| at.map(|row| row + first)));
+        }
+        let built = Builder::new().stretch(1.1).build(&row).expect("a valid mesh");
+        let tree = built.tree::<u16>().expect("16-bit indices");
+        let rows = built.to_rows(&row.positions);
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        for _ in 0..20 {
+            let [from, to] = [(); 2].map(|()| {
+                Vec3::X * (500.0 * rng.f32() - 100.0) + unit(&mut rng) * 40.0 * rng.f32()
+            });
+            let tool = Capsule::new(from, to, 0.5).expect("a valid tool");
+            let whole = query.closest(rows.as_slice(), &tool, &Options::cold()).expect("an answer");
+            if whole.side != Side::Crossing {
+                continue;
+            }
+            for triangle_tests in 0..80 {
+                let budget = Budget { node_tests: u32::MAX, triangle_tests };
+                let options = Options::cold().budget(budget);
+                let found = query.closest(rows.as_slice(), &tool, &options).expect("an answer");
+                let (all, part) = (whole.interval(), found.interval());
+                cut += usize::from(found.lower < whole.lower);
+                let holds = part.lower <= all.upper && all.lower <= part.upper;
+                assert!(holds, "{triangle_tests}: {whole:?} {found:?}");
+            }
+        }
+    }
+    assert!(cut > 1_000, "{cut}");
 }
 
 /// Around the middle of a ball all vertices are equally far, so that each point of the axis takes a search of the whole
