@@ -18,7 +18,7 @@ const STATUS: usize = 96;
 const INTERVAL: Millis = Millis(100);
 
 /// Bytes of the tree that an idle slice checks for each unit of its work.
-const SCRUBBED: u32 = 4;
+const SCRUBBED: u32 = 2;
 
 type Receiver<'s, 't, I, M> = Assembler<'s, StretchMonitor<'t, I, 2>, M>;
 
