@@ -85,7 +85,7 @@ type Follower = Tracker<'static, u16, STACK, OPENED, OPENED>;
 /// The sizes that the documentation states.
 #[cfg(target_pointer_width = "32")]
 const _: () = {
-    assert!(size_of::<Contacts<8>>() == 148 * 8 + 20 * 512 + 64);
+    assert!(size_of::<Contacts<8>>() == 148 * 8 + 20 * 512 + 60);
     assert!(size_of::<Follower>() <= 8 * STACK + 56 * OPENED + 1_336);
 };
 
