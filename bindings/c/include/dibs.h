@@ -94,7 +94,7 @@
 /**
  * Bytes of a receiver's storage.
  */
-#define DIBS_RECEIVER_SIZE 2816
+#define DIBS_RECEIVER_SIZE 3072
 
 /**
  * Largest packet of a byte stream: that of an Ethernet frame.

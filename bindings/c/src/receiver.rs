@@ -15,7 +15,7 @@ use crate::tool::dibs_vec3;
 use crate::tree::dibs_tree;
 
 /// Bytes of a receiver's storage.
-pub const DIBS_RECEIVER_SIZE: usize = 2_816;
+pub const DIBS_RECEIVER_SIZE: usize = 3_072;
 
 /// Largest packet of a byte stream: that of an Ethernet frame.
 pub const DIBS_MTU: usize = 1_472;
