@@ -84,6 +84,8 @@ pub use query::{
     Budget, Closest, Contact, Contacts, Cost, Fallback, Interval, NoSide, Options, Proximity,
     Query, Side, Sweep, Swept, Tracked, Tracker, Within,
 };
+#[doc(hidden)]
+pub use stretch::Compared;
 pub use stretch::{
     Arriving, Changed, Gate, StretchError, StretchMonitor, SurfaceLimits, Unchecked, Verdict,
     measure_stretch,

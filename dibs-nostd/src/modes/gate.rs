@@ -84,7 +84,7 @@ impl<G: Gate, const K: usize> Gate for ModalGate<'_, G, K> {
     /// The rows hold the weights of this frame and of the published one, as an assembler stores them.
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
-        Arriving { surface: rows, ready, before }: Arriving<'_, V>,
+        Arriving { surface: rows, ready, before, .. }: Arriving<'_, V>,
         work: u32,
     ) -> Result<Verdict, StretchError> {
         if (ready as usize) < K {
@@ -116,6 +116,6 @@ impl<G: Gate, const K: usize> Gate for ModalGate<'_, G, K> {
         };
         let ready = surface.len() as u32;
         let before = before.as_ref().map(|(before, elapsed)| (before, *elapsed));
-        self.exact.advance(Arriving { surface, ready, before }, work)
+        self.exact.advance(Arriving { before, ..Arriving::new(surface, ready) }, work)
     }
 }

@@ -36,13 +36,25 @@ pub struct Arriving<'a, V: ?Sized> {
     /// The published surface, and the time from its capture to this one's; `None` before the first, and for a
     /// [registration](crate::Assembler::register).
     pub before: Option<(&'a V, Millis)>,
+    /// How far the rows have moved from there, where that was measured already.
+    #[doc(hidden)]
+    pub compared: Option<Compared>,
+}
+
+/// The comparison of a surface's rows with those before.
+#[derive(Clone, Copy, Debug)]
+pub struct Compared {
+    /// The largest squared distance (mm²) of any row compared so far.
+    pub largest: f32,
+    /// First and end of the rows compared last.
+    pub rows: [u32; 2],
 }
 
 impl<'a, V: ?Sized> Arriving<'a, V> {
     /// A first surface, with the rows below `ready`.
     #[must_use]
     pub const fn new(surface: &'a V, ready: u32) -> Self {
-        Self { surface, ready, before: None }
+        Self { surface, ready, before: None, compared: None }
     }
 }
 

@@ -6,7 +6,9 @@ use super::motion::{farthest, largest_step, too_fast};
 use super::pass::{ALL, Pass};
 use super::regions::region_rows;
 use super::volume::Volume;
-use super::{Arriving, Changed, Gate, StretchError, SurfaceLimits, Verdict, check_tables};
+use super::{
+    Arriving, Changed, Compared, Gate, StretchError, SurfaceLimits, Verdict, check_tables,
+};
 use crate::surface::{Between, Millis, REGIONS, TravelUnit, VertexTable};
 use crate::tree::{Index, SurfaceFacts, Tree, TriangleRow};
 
@@ -176,7 +178,7 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
     /// Compares arrived rows with the published ones. Returns the work left, and whether all rows are done.
     fn compare<V: VertexTable + ?Sized>(
         &mut self,
-        Arriving { surface, ready, before }: Arriving<'_, V>,
+        Arriving { surface, ready, before, compared }: Arriving<'_, V>,
         mut work: u32,
     ) -> Result<(u32, bool), StretchError> {
         let Some((before, elapsed)) = before else {
@@ -186,6 +188,11 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
         let limit = farthest(self.speed, self.recovery, elapsed);
         if limit == f32::INFINITY {
             self.blocks_left = 0;
+        } else if let Some(Compared { largest, rows: [first, end] }) = compared {
+            self.blocks_left = 0;
+            if !(largest <= limit * limit) {
+                return Err(too_fast(surface, before, first..end, limit));
+            }
         }
         let (count, shift) = (self.tree.vertex_count(), u32::from(self.block_shift));
         while self.blocks_left != 0 {
@@ -272,7 +279,7 @@ impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
         arriving: Arriving<'_, V>,
         work: u32,
     ) -> Result<Verdict, StretchError> {
-        let Arriving { surface, ready, before } = arriving;
+        let Arriving { surface, ready, before, .. } = arriving;
         let before = before.map(|(before, _)| before);
         check_tables(&self.tree, surface)?;
         let is_complete = ready >= self.tree.vertex_count();

@@ -118,7 +118,7 @@ fn the_limit_on_the_speed_of_modes_is_exact() {
             let mut gate = ModalGate::<_, MODES>::new(&modes, exact).expect("four modes");
             gate.begin(Changed::Whole);
             let before = Some((&before[..], Millis(4)));
-            let verdict = gate.advance(Arriving { surface: &now[..], ready: 4, before }, u32::MAX);
+            let verdict = gate.advance(Arriving { before, ..Arriving::new(&now[..], 4) }, u32::MAX);
             let is_fast = matches!(verdict, Err(StretchError::TooFast { .. }));
             assert_eq!(is_fast, !may_pass, "{share} of {step}: {verdict:?}");
             refused += u32::from(is_fast);

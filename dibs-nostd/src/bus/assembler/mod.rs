@@ -358,7 +358,7 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
         let Some(frame) = &self.collector.frame else { return Ok(Advance::Idle) };
         let (back, front) = (self.writer.back(), self.writer.front());
         let unit = self.gate.travel_unit();
-        let mut work = work;
+        let (mut work, mut compared) = (work, None);
         if let (Some(front), Some(_)) = (&front, &unit) {
             let two = self.writer.last_two();
             let age = front.time_to(frame.captured());
@@ -367,9 +367,10 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
                 Some(Earlier { frame: before, units: step.units(), share: step.ahead(age) })
             });
             work = self.step.compare(&back, front, earlier.as_ref(), ready, work);
-            if frame.is_complete && self.step.compared() < ready {
+            if frame.is_complete && self.step.rows() < ready {
                 return Ok(Advance::Pending);
             }
+            compared = Some(self.step.compared());
         }
         // A registration is compared with nothing. A partial frame is none: the rest of it is the published one's.
         let is_registration = self.collector.is_registration && !frame.is_partial();
@@ -379,7 +380,7 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
             time.unwrap_or_else(|| front.time_to(frame.captured()))
         };
         let before = before.map(|front| (front, time(front)));
-        let verdict = self.gate.advance(Arriving { surface: &back, ready, before }, work);
+        let verdict = self.gate.advance(Arriving { surface: &back, ready, before, compared }, work);
         match verdict {
             Err(error) => {
                 let rejection = ReceiveError::Stretch(error);

@@ -4,7 +4,7 @@
 //! published: so no gate, and no user, can understate it.
 
 use crate::math::sqrt::sqrt;
-use crate::stretch::{largest_change, largest_step};
+use crate::stretch::{Compared, largest_change, largest_step};
 use crate::surface::{Ahead, Travel, TravelUnit, VertexTable};
 
 /// Most units of a step that is extrapolated: more than 32 times the root sphere's radius.
@@ -14,6 +14,8 @@ const MOST: u64 = 1 << 30;
 #[derive(Debug)]
 pub(super) struct Step {
     rows: u32,
+    /// The first of those compared last.
+    last: u32,
     largest: f32,
     off: f32,
     /// Units of the odometer between the two frames before, and the share of them that the extrapolation adds.
@@ -31,7 +33,7 @@ pub(super) struct Earlier<'f, V: ?Sized> {
 
 impl Step {
     pub const fn new() -> Self {
-        Self { rows: 0, largest: 0.0, off: 0.0, units: 0, share: 0.0 }
+        Self { rows: 0, last: 0, largest: 0.0, off: 0.0, units: 0, share: 0.0 }
     }
 
     /// Compares at most `work` of the rows below `ready` with those before, and with the places that these would have if
@@ -55,12 +57,17 @@ impl Step {
             }
             None => (largest_step(now, before, range, self.largest), f32::NAN),
         };
-        self.rows = end;
+        (self.last, self.rows) = (self.rows, end);
         work.saturating_sub(rows)
     }
 
-    pub const fn compared(&self) -> u32 {
+    /// Rows compared so far.
+    pub const fn rows(&self) -> u32 {
         self.rows
+    }
+
+    pub const fn compared(&self) -> Compared {
+        Compared { largest: self.largest, rows: [self.last, self.rows] }
     }
 
     /// The distance of the frame from the extrapolation, where there was one; its stretch is not known here.
