@@ -48,6 +48,7 @@ typedef struct {
     uint32_t epoch_before;
     float share;
     float shown_error;
+    dibs_vec3 surface_velocity;
 } tick_record;
 
 #define TICK_KIND 1u
