@@ -25,7 +25,7 @@ Examples:
   dibs track heart.dibs --motion heart.pc2 --path tools.csv --json
   dibs track heart.dibs --motion heart.pc2 --path tools.csv --surface extrapolated --full
 
-A frame arrives when its time has come; the motion is played over and over. Between frames the surface is that
+A frame arrives when its time has come; the motion is played over and over. SurfaceBlend frames the surface is that
 of the last frame (held), on its way there from the one before (interpolated: late by a frame), or beyond it as
 it moved before (extrapolated). One line a tick on standard output, and what it took on standard error.")]
 pub struct Args {

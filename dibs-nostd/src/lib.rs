@@ -81,25 +81,26 @@ pub use bus::{Advance, Assembler, BusHealth, LastHeartbeat, Progress, ReceiveErr
 pub use control::{constraint, failsafe};
 pub use error::Error;
 pub use query::{
-    Budget, Closest, Contact, Contacts, Cost, Fallback, Interval, NoSide, Options, Proximity,
-    Query, Side, Sweep, Swept, Tracked, Tracker, Within,
+    Budget, Closest, Contact, ContactIter, Contacts, Cost, Fallback, Interval, NoSide, Options,
+    Proximity, Query, Side, Sweep, SweepAnswer, Tracker, TrackerAnswer,
 };
 #[doc(hidden)]
 pub use stretch::Compared;
 pub use stretch::{
-    Arriving, Changed, Gate, StretchError, StretchMonitor, SurfaceLimits, Unchecked, Verdict,
-    measure_stretch,
+    Admission, FrameExtent, Gate, IncomingSurface, NoGate, StretchError, StretchMonitor,
+    SurfaceLimits, measure_stretch,
 };
 #[doc(hidden)]
 pub use surface::REGIONS;
-pub use surface::{
-    Between, Coverage, FrameAge, FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter,
-    Frames, Latest, MeasuredStretch, Millis, Moved, MovingSurface, Odometer, OutOfTableError,
-    PublishError, QuantisedVertices, SplitError, Step, Ticks, Travel, VertexTable,
-};
 /// Surfaces of a size that no type has, for the C interface. They may change with any version.
 #[doc(hidden)]
 pub use surface::{Buffer, Buffers, Head, Position};
+pub use surface::{
+    Coverage, FrameAge, FrameGuard, FrameLabel, FrameReader, FrameView, FrameWriter, Frames,
+    LatestSurface, MeasuredStretch, Millis, MotionReading, MovingSurface, MovingTable, Odometer,
+    OutOfTableError, PublishError, QuantisedVertices, SplitError, Step, SurfaceBlend, Ticks,
+    VertexTable,
+};
 #[doc(hidden)]
 pub use tool::{ACCURACY, MAX_COORDINATE};
 pub use tool::{AxisPair, Capsule, Sphere, Tool, ToolError};

@@ -108,7 +108,7 @@ impl Control {
 
 fn record(answer: &Answer, tool: Option<&Capsule>, bus: &BusStatus) -> Tick {
     let mut record = Tick { kind: Tick::KIND, triangle: u32::MAX, ..Tick::zeroed() };
-    (record.age, record.shown_error) = (u32::MAX, -1.0);
+    (record.age, record.residual) = (u32::MAX, -1.0);
     record.bytes = bus.bytes();
     record.frames_published = bus.published();
     record.rejected = bus.rejected();
@@ -123,7 +123,7 @@ fn record(answer: &Answer, tool: Option<&Capsule>, bus: &BusStatus) -> Tick {
         record.age = searched.frame.age.0;
         record.epoch_before = searched.before;
         record.share = searched.share;
-        record.shown_error = searched.shown_error.unwrap_or(-1.0);
+        record.residual = searched.residual.unwrap_or(-1.0);
         record.position_error = searched.position_error;
         record.surface_velocity = searched.velocity.to_array();
     }

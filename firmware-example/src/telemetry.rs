@@ -84,10 +84,10 @@ pub struct Tick {
     pub fallback: u32,
     /// The frame before the one that was searched, from which the surface moved on; the same where it was held.
     pub epoch_before: u32,
-    /// The surface's place in time: `dibs_nostd::Between::share`.
+    /// The surface's place in time: `dibs_nostd::SurfaceBlend::share`.
     pub share: f32,
-    /// The error of the last extrapolations, in mm: `dibs_nostd::Between::shown_error`; -1 if unknown.
-    pub shown_error: f32,
+    /// The error of the last extrapolations, in mm: `dibs_nostd::SurfaceBlend::residual`; -1 if unknown.
+    pub residual: f32,
     /// The surface's velocity at the pair, in mm/s.
     pub surface_velocity: [f32; 3],
 }

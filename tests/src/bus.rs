@@ -3,7 +3,7 @@
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{CHECKSUM_BYTES, Encoding, FrameEncoder, FrameId, Mac, QuantisedBox};
 use dibs_nostd::{
-    Advance, Assembler, FrameReader, Frames, Gate, Millis, ReceiveError, Unchecked, VertexTable,
+    Advance, Assembler, FrameReader, Frames, Gate, Millis, NoGate, ReceiveError, VertexTable,
 };
 
 /// Mesh id of the packets.
@@ -11,11 +11,11 @@ pub const MESH: u32 = 0xD1B5_0001;
 /// Vertices of the surface.
 pub const N: usize = 40;
 /// An assembler without a gate, and the reader of its frames.
-pub type Bus = (Assembler<'static, Unchecked>, FrameReader<'static>);
+pub type Bus = (Assembler<'static, NoGate>, FrameReader<'static>);
 
 /// A fresh bus without a gate.
 pub fn bus() -> Bus {
-    bus_with(Unchecked)
+    bus_with(NoGate)
 }
 
 /// A fresh bus with a gate.

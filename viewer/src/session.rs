@@ -142,8 +142,8 @@ type Frame = [Vec3];
 
 /// The surface as it is now.
 enum Surface {
-    Held(dibs_nostd::Moved<'static, Frame>),
-    Moving(dibs_nostd::Between<'static, Frame, Frame>),
+    Held(dibs_nostd::MovingTable<'static, Frame>),
+    Moving(dibs_nostd::SurfaceBlend<'static, Frame, Frame>),
 }
 
 impl VertexTable for Surface {

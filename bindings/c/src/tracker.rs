@@ -4,7 +4,9 @@ use core::cell::Cell;
 use core::ffi::c_void;
 
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Fallback, MeasuredStretch, Moved, Odometer, Tracked, Tracker, VertexTable};
+use dibs_nostd::{
+    Fallback, MeasuredStretch, MovingTable, Odometer, Tracker, TrackerAnswer, VertexTable,
+};
 use heapless::Vec;
 
 use crate::border::{DIBS_ALIGNMENT, Handle, Handles, Input, Kind, Output, Storage};
@@ -35,7 +37,7 @@ pub struct dibs_tracker {
     odometer: Odometer,
     /// The copies: the surface's, and the one to be written next.
     copies: [&'static Copied; 2],
-    surface: Option<Moved<'static, Copied>>,
+    surface: Option<MovingTable<'static, Copied>>,
 }
 
 impl Kind for dibs_tracker {
@@ -244,7 +246,7 @@ pub extern "C" fn dibs_tracker_closest(
         let options = dibs_options::of(options)?;
         let dibs_tracker { tracker, surface, .. } = &mut *tracker;
         let surface = surface.as_ref().ok_or(dibs_code::NoSurface)?;
-        let found: Tracked = match &shape {
+        let found: TrackerAnswer = match &shape {
             Shape::Sphere(sphere) => tracker.closest(surface, sphere, &options)?,
             Shape::Capsule(capsule) => tracker.closest(surface, capsule, &options)?,
         };
@@ -295,7 +297,7 @@ pub extern "C" fn dibs_tracker_closest_on(
             Table::Vertices(_) => return Err(dibs_code::Argument),
             Table::Held(held) => held.moving(),
         };
-        let found: Tracked = match &shape {
+        let found: TrackerAnswer = match &shape {
             Shape::Sphere(sphere) => tracker.tracker.closest(surface, sphere, &options)?,
             Shape::Capsule(capsule) => tracker.tracker.closest(surface, capsule, &options)?,
         };
@@ -339,7 +341,7 @@ pub extern "C" fn dibs_tracker_contacts(
     dibs_code::of(|| {
         let (proximity, fallback) = (proximity.check_if_any()?, fallback.check_if_any()?);
         let moved = moved.check_if_any()?;
-        let found: Tracked = contacts.open()?.fill(|list| {
+        let found: TrackerAnswer = contacts.open()?.fill(|list| {
             let (shape, mut tracker) = (Shape::try_from(tool.get()?)?, tracker.open()?);
             let options = dibs_options::of(options)?;
             let dibs_tracker { tracker, surface, .. } = &mut *tracker;

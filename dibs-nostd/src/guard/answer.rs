@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::constraint::{ConstraintForce, ForbiddenRegion, Guidance};
 use crate::failsafe::{Link, Verdict};
-use crate::{FrameAge, Millis, Proximity, Tracked, Unavailable};
+use crate::{FrameAge, Millis, Proximity, TrackerAnswer, Unavailable};
 
 /// The answer of a tick: what a constraint may act on, and how it came about.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +25,7 @@ pub struct Answer {
     /// The surface that was searched; `None` before the first.
     pub searched: Option<Searched>,
     /// The answer on that surface, whatever it is trusted.
-    pub tracked: Result<Tracked, Unavailable>,
+    pub tracked: Result<TrackerAnswer, Unavailable>,
 }
 
 /// The surface that a tick searched.
@@ -42,7 +42,7 @@ pub struct Searched {
     /// Error of each position (mm), that of the extrapolation included.
     pub position_error: f32,
     /// The distance (mm) of the last frames from their extrapolation; `None` for a surface that is held.
-    pub shown_error: Option<f32>,
+    pub residual: Option<f32>,
     /// Its velocity at the pair (mm/s): from one frame to the next, zero for a surface that is held.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub velocity: Vec3,

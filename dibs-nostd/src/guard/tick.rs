@@ -7,7 +7,7 @@ use super::{Answer, GuardLimits, Searched};
 use crate::constraint::LastSide;
 use crate::failsafe::{AcknowledgeError, FailSafe, Observation};
 use crate::{
-    Error, FrameReader, Index, Millis, Options, Tool, Tracked, Tracker, Tree, TreeBytes,
+    Error, FrameReader, Index, Millis, Options, Tool, Tracker, TrackerAnswer, Tree, TreeBytes,
     Unavailable, VertexTable,
 };
 
@@ -92,7 +92,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
                     before: surface.before().epoch().unwrap_or(frame.epoch),
                     share: surface.share(),
                     position_error: surface.position_error(),
-                    shown_error: surface.shown_error(),
+                    residual: surface.residual(),
                     lag: surface.lag(),
                     velocity: tracked.map_or(Vec3::ZERO, |tracked| {
                         surface.velocity(tracked.closest.corners, tracked.closest.barycentric)
@@ -123,7 +123,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
     fn judge(
         &mut self,
         searched: Option<Searched>,
-        tracked: Result<Tracked, Unavailable>,
+        tracked: Result<TrackerAnswer, Unavailable>,
         velocity: Vec3,
         now: Millis,
     ) -> Answer {

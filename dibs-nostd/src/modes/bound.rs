@@ -66,7 +66,7 @@ impl Modes<'_> {
             }
         }
         let sigma = sigma * ROUNDING + self.header.slack;
-        MeasuredStretch::everywhere(sigma, self.travel.tree, triangle)
+        MeasuredStretch::everywhere(sigma, self.motion.tree, triangle)
     }
 
     fn anchor(&self, row: usize) -> Option<Anchor<'_>> {

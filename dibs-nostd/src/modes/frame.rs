@@ -10,8 +10,8 @@ use super::reach::Reach;
 use super::{ModalSurface, Modes};
 use crate::surface::motion::sealed::Sealed;
 use crate::surface::{
-    Ahead, Course, FARTHEST, FrameLabel, MeasuredStretch, Millis, MovingSurface, Travel,
-    VertexTable, clamped, grown,
+    FARTHEST, FrameLabel, MeasuredStretch, Millis, MotionReading, MovingSurface, Prediction,
+    PredictionCheck, VertexTable, clamped, grown,
 };
 
 /// The weights of a surface, and a bound on its stretch.
@@ -52,14 +52,14 @@ pub(super) struct Step<const K: usize> {
     /// Time from the frame before to this one, on the receiver's clock.
     interval: Millis,
     /// The odometer's reading at the frame before.
-    from: Travel,
+    from: MotionReading,
     /// Units of the odometer from the frame before to this one, and from this one to the end.
     pub units: u64,
     units_ahead: u64,
     /// Distances of the frame before and of this one from their extrapolations; NaN if unknown.
     shown: [f32; 2],
     /// The latter in units.
-    ahead: Ahead,
+    ahead: PredictionCheck,
 }
 
 impl<const K: usize> Step<K> {
@@ -70,7 +70,7 @@ impl<const K: usize> Step<K> {
         modes: &Modes<'_>,
         reach: &Reach<K>,
         [before, now]: [&Weights<K>; 2],
-        (from, interval): (Travel, Millis),
+        (from, interval): (MotionReading, Millis),
         last: Option<&Self>,
     ) -> Self {
         let mut end = *now;
@@ -87,10 +87,10 @@ impl<const K: usize> Step<K> {
         end.stretch = Some(modes.bound(&end.values));
         let surface = now.surface(modes);
         let units = |other: &Weights<K>| {
-            modes.travel.units_of(reach.between(&other.surface(modes), &surface))
+            modes.motion.units_of(reach.between(&other.surface(modes), &surface))
         };
         let (step, units_ahead) = (units(before), units(&end));
-        let (mut shown, mut ahead) = ([f32::NAN; 2], Ahead::UNKNOWN);
+        let (mut shown, mut ahead) = ([f32::NAN; 2], PredictionCheck::UNKNOWN);
         if let Some(last) = last {
             let share = last.ahead(interval);
             let expected = before.towards(&last.end, share, modes);
@@ -100,12 +100,12 @@ impl<const K: usize> Step<K> {
             shown = [last.shown[1], reach.between(&expected.surface(modes), &surface) * longer];
             // Weights and shares are rounded by a few parts in 2^24.
             let rounding = (units(&rest) + step + last.units_ahead) / (1 << 20);
-            // At the end, where the error has grown threefold, the surface is off its course by all that was cut.
+            // At the end, where the error has grown threefold, the surface is off its prediction by all that was cut.
             let cut = reach.between(&rest.surface(modes), &cut.surface(modes)) * (4.0 / 3.0);
-            let off = units(&expected) + modes.travel.units_of(cut) + rounding + 2;
+            let off = units(&expected) + modes.motion.units_of(cut) + rounding + 2;
             let passed = (share * last.units_ahead as f32) as u64;
             if let (Ok(passed), Ok(off)) = (passed.try_into(), off.try_into()) {
-                ahead = Ahead { passed, off, ..ahead };
+                ahead = PredictionCheck { passed, off, ..ahead };
             }
         }
         let (before, units) = (*before, step);
@@ -127,7 +127,7 @@ pub struct ModalFrame<'a, const K: usize> {
     surface: ModalSurface<'a, K>,
     label: FrameLabel,
     weights: Weights<K>,
-    travel: Option<Travel>,
+    motion: Option<MotionReading>,
     step: Option<Step<K>>,
     /// Age of the frame when it was read.
     age: Millis,
@@ -144,14 +144,14 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         modes: &Modes<'a>,
         label: FrameLabel,
         weights: &Weights<K>,
-        travel: Option<Travel>,
+        motion: Option<MotionReading>,
         step: Option<Step<K>>,
         age: Millis,
     ) -> Self {
         let surface = weights.surface(modes);
         let (is_frame, shown, own_error) = (true, f32::NAN, 0.0);
         let (weights, lag) = (*weights, age);
-        Self { surface, label, weights, travel, step, age, is_frame, shown, own_error, lag }
+        Self { surface, label, weights, motion, step, age, is_frame, shown, own_error, lag }
     }
 
     /// The facts about this frame; of a surface between frames, those of the later. Its position error is that of the
@@ -170,9 +170,9 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         let Some(step) = &self.step else { return *self };
         let share = clamped(self.age.0 as f32 / step.interval.0 as f32, 1.0);
         let weights = step.before.towards(&self.weights, share, self.surface.modes());
-        let travel = step.from.along((share * step.units as f32) as u64);
+        let motion = step.from.along((share * step.units as f32) as u64);
         let lag = if step.interval > self.age { step.interval } else { self.age };
-        self.moved(weights, Some(travel), (f32::NAN, 0.0), lag)
+        self.moved(weights, Some(motion), (f32::NAN, 0.0), lag)
     }
 
     /// The surface now, if every weight has kept its velocity since the last frame: on time, and wrong by the change of
@@ -184,7 +184,7 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
     /// tree's limit.
     #[must_use]
     pub fn extrapolated(&self) -> Self {
-        let (Some(step), Some(travel)) = (&self.step, self.travel) else { return *self };
+        let (Some(step), Some(motion)) = (&self.step, self.motion) else { return *self };
         let modes = self.surface.modes();
         let is_within = |end: MeasuredStretch| end.sigma() <= modes.stretch_limit();
         // False for NaN: the error is not known before the third frame.
@@ -194,15 +194,15 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         }
         let share = step.ahead(self.age);
         let weights = self.weights.towards(&step.end, share, modes);
-        let course = Course::new(step.units, &step.ahead, share * FARTHEST);
-        let travel = travel.beside((share * step.units_ahead as f32) as u64);
-        let travel = travel.map(|travel| travel.on(course));
+        let prediction = Prediction::new(step.units, &step.ahead, share * FARTHEST);
+        let motion = motion.beside((share * step.units_ahead as f32) as u64);
+        let motion = motion.map(|motion| motion.on(prediction));
         // The change of the motion may have been none by chance. False for NaN.
         let [before, now] = step.shown;
         let shown = if before > now { before } else { now };
         let end = Millis((step.interval.0 as f32 * FARTHEST) as u32);
         let lag = Millis(self.age.0.saturating_sub(end.0));
-        self.moved(weights, travel, (shown, grown(shown, share * FARTHEST)), lag)
+        self.moved(weights, motion, (shown, grown(shown, share * FARTHEST)), lag)
     }
 
     /// A bound (mm) on the distance of the last frame's vertices from its extrapolation by the two frames before, the
@@ -210,11 +210,11 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
     /// [`position_error`](VertexTable::position_error) includes it as far as it has grown. `None` for a surface that is
     /// not extrapolated.
     #[must_use]
-    pub fn shown_error(&self) -> Option<f32> {
+    pub fn residual(&self) -> Option<f32> {
         (self.shown >= 0.0).then_some(self.shown)
     }
 
-    /// The time by which this surface is behind the present: see [`Between::lag`](crate::Between::lag).
+    /// The time by which this surface is behind the present: see [`SurfaceBlend::lag`](crate::SurfaceBlend::lag).
     #[must_use]
     pub const fn lag(&self) -> Option<Millis> {
         Some(self.lag)
@@ -223,13 +223,13 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
     fn moved(
         &self,
         weights: Weights<K>,
-        travel: Option<Travel>,
+        motion: Option<MotionReading>,
         (shown, own_error): (f32, f32),
         lag: Millis,
     ) -> Self {
         let surface = weights.surface(self.surface.modes());
         let (step, is_frame) = (None, false);
-        Self { surface, weights, travel, step, shown, own_error, lag, is_frame, ..*self }
+        Self { surface, weights, motion, step, shown, own_error, lag, is_frame, ..*self }
     }
 }
 
@@ -260,7 +260,7 @@ impl<const K: usize> Sealed for ModalFrame<'_, K> {}
 
 /// Its motion since other frames of one reader is known, between frames too.
 impl<const K: usize> MovingSurface for ModalFrame<'_, K> {
-    fn travel(&self) -> Option<Travel> {
-        self.travel
+    fn motion(&self) -> Option<MotionReading> {
+        self.motion
     }
 }

@@ -2,7 +2,7 @@
 
 use super::reach::Reach;
 use super::{ModalSurface, Modes, WeightsError};
-use crate::stretch::{Arriving, Changed, Gate, StretchError, Verdict};
+use crate::stretch::{Admission, FrameExtent, Gate, IncomingSurface, StretchError};
 use crate::surface::{Millis, VertexTable};
 use crate::tree::SurfaceFacts;
 
@@ -61,7 +61,7 @@ impl<'a, G, const K: usize> ModalGate<'a, G, K> {
 }
 
 impl<G: Gate, const K: usize> Gate for ModalGate<'_, G, K> {
-    fn begin(&mut self, _: Changed) {
+    fn begin(&mut self, _: FrameExtent) {
         self.surface = None;
     }
 
@@ -84,11 +84,11 @@ impl<G: Gate, const K: usize> Gate for ModalGate<'_, G, K> {
     /// The rows hold the weights of this frame and of the published one, as an assembler stores them.
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
-        Arriving { surface: rows, ready, before, .. }: Arriving<'_, V>,
+        IncomingSurface { surface: rows, ready, before, .. }: IncomingSurface<'_, V>,
         work: u32,
-    ) -> Result<Verdict, StretchError> {
+    ) -> Result<Admission, StretchError> {
         if (ready as usize) < K {
-            return Ok(Verdict::Pending);
+            return Ok(Admission::Pending);
         }
         let before = match before {
             Some((rows, elapsed)) => {
@@ -107,15 +107,15 @@ impl<G: Gate, const K: usize> Gate for ModalGate<'_, G, K> {
                 });
                 let bound = self.modes.bound(&weights);
                 if is_slow && bound.sigma() <= self.modes.stretch_limit() {
-                    return Ok(Verdict::Admitted(Some(bound)));
+                    return Ok(Admission::Admitted(Some(bound)));
                 }
                 self.measured = self.measured.saturating_add(1);
-                self.exact.begin(Changed::Whole);
+                self.exact.begin(FrameExtent::Whole);
                 self.surface.insert(surface)
             }
         };
         let ready = surface.len() as u32;
         let before = before.as_ref().map(|(before, elapsed)| (before, *elapsed));
-        self.exact.advance(Arriving { before, ..Arriving::new(surface, ready) }, work)
+        self.exact.advance(IncomingSurface { before, ..IncomingSurface::new(surface, ready) }, work)
     }
 }

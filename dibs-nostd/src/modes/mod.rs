@@ -38,7 +38,7 @@ pub use surface::ModalSurface;
 
 use glam::Vec3;
 
-use crate::surface::TravelUnit;
+use crate::surface::MotionUnit;
 use crate::tree::{Index, Tree, format};
 
 /// Most modes of a surface.
@@ -92,7 +92,7 @@ pub struct Modes<'a> {
     vertices: u32,
     mesh_id: u32,
     /// The unit of the surface's motion, with the tree's checksum.
-    travel: TravelUnit,
+    motion: MotionUnit,
     /// The tree's stretch limit.
     limit: f32,
 }
@@ -122,7 +122,7 @@ impl<'a> Modes<'a> {
                 rest: sections.rest,
                 vertices,
                 mesh_id: tree.mesh_id(),
-                travel: TravelUnit::of(tree),
+                motion: MotionUnit::of(tree),
                 limit: tree.stretch(),
             }),
             Err(error) => Err(error),

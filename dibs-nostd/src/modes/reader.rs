@@ -3,7 +3,9 @@
 use super::frame::{Step, Weights};
 use super::reach::Reach;
 use super::{ModalFrame, Modes, WeightsError};
-use crate::surface::{FrameGuard, FrameLabel, FrameReader, Latest, Millis, Travel, VertexTable};
+use crate::surface::{
+    FrameGuard, FrameLabel, FrameReader, LatestSurface, Millis, MotionReading, VertexTable,
+};
 
 /// Reads published weights as surfaces. The double buffer is [`Frames`](crate::Frames) of `K` rows, with one weight in
 /// each.
@@ -27,7 +29,7 @@ struct Last<const K: usize> {
     epoch: u32,
     received: Millis,
     /// `None` for weights out of range.
-    travel: Option<Travel>,
+    motion: Option<MotionReading>,
     step: Option<Step<K>>,
 }
 
@@ -53,7 +55,7 @@ impl<'f, 'a, const K: usize> ModalReader<'f, 'a, K> {
     ///
     /// The weights are copied, so frames can be published while this one is kept, unlike with [`FrameReader::latest`].
     #[inline]
-    pub fn latest(&mut self, now: Millis) -> Latest<ModalFrame<'a, K>> {
+    pub fn latest(&mut self, now: Millis) -> LatestSurface<ModalFrame<'a, K>> {
         let Self { frames, modes, reach, last } = self;
         frames.latest(now).map(|frame| next(modes, reach, last, &frame))
     }
@@ -83,7 +85,7 @@ fn next<'a, const K: usize>(
         _ => Last::new(modes, reach, last.as_ref(), &label, weights),
     };
     *last = Some(now);
-    ModalFrame::new(modes, label, &now.weights, now.travel, now.step, frame.age())
+    ModalFrame::new(modes, label, &now.weights, now.motion, now.step, frame.age())
 }
 
 impl<const K: usize> Last<K> {
@@ -100,20 +102,20 @@ impl<const K: usize> Last<K> {
         &FrameLabel { epoch, received, .. }: &FrameLabel,
         weights: Weights<K>,
     ) -> Self {
-        let mut now = Self { weights, epoch, received, travel: None, step: None };
+        let mut now = Self { weights, epoch, received, motion: None, step: None };
         // No assembler publishes weights out of range, for which the sums may wrap.
         if modes.check(&weights.values).is_err() {
             return now;
         }
-        let before = before.and_then(|before| Some((before, before.travel?)));
+        let before = before.and_then(|before| Some((before, before.motion?)));
         let Some((before, from)) = before else {
-            now.travel = Some(Travel::start(modes.travel.tree));
+            now.motion = Some(MotionReading::start(modes.motion.tree));
             return now;
         };
         let interval = received.since(before.received);
         let weights = [&before.weights, &weights];
         let step = Step::new(modes, reach, weights, (from, interval), before.step.as_ref());
-        now.travel = Some(from.along(step.units));
+        now.motion = Some(from.along(step.units));
         now.step = (interval > Millis(0) && interval < Millis(1 << 31)).then_some(step);
         now
     }

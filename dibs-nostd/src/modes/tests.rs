@@ -75,7 +75,7 @@ fn no_vertex_moves_farther_than_the_odometer_says() {
             let surfaces = [frame, frame.interpolated(), frame.extrapolated()];
             for ((surface, before), sums) in surfaces.iter().zip(&mut before).zip(&mut sums) {
                 if let Some(before) = before {
-                    let units = surface.travel().unwrap().since(&before.travel().unwrap());
+                    let units = surface.motion().unwrap().since(&before.motion().unwrap());
                     let (stated, found) =
                         (unit.length(units.unwrap() as i32), moved(before, surface));
                     assert!(found <= stated + 1e-4, "{epoch}: {found} {stated}");
@@ -117,7 +117,7 @@ fn a_steady_extrapolation_moves_by_its_error() {
             let surface =
                 reader.latest(Millis(received + age)).of_any_age().unwrap().extrapolated();
             if let Some(before) = &before {
-                let units = surface.travel().unwrap().since(&before.travel().unwrap());
+                let units = surface.motion().unwrap().since(&before.motion().unwrap());
                 let (stated, found) = (unit.length(units.unwrap() as i32), moved(before, &surface));
                 assert!(found <= stated + 1e-4, "{epoch}, {age}: {found} {stated}");
                 if age == 4 {
@@ -165,8 +165,8 @@ fn no_speed_makes_the_odometer_understate() {
             for age in [10, 150, 200] {
                 let at = Millis(received.0 + age);
                 let surface = reader.latest(at).of_any_age().unwrap().extrapolated();
-                let travel = before.as_ref().and_then(MovingSurface::travel);
-                let units = travel.and_then(|before| surface.travel()?.since(&before));
+                let motion = before.as_ref().and_then(MovingSurface::motion);
+                let units = motion.and_then(|before| surface.motion()?.since(&before));
                 if let (Some(before), Some(units)) = (&before, units) {
                     let (stated, found) = (units as f64 * unit, f64::from(moved(before, &surface)));
                     assert!(stated >= found * 0.999_99, "{step}, {epoch}, {age}: {found} {stated}");
@@ -231,7 +231,7 @@ fn a_course_of_weights_is_not_cut_to_the_numbers_that_fit() {
         // Its units nearly do not fit.
         let before = read(third, 3, 20_000, 14_920);
         let after = read(last, 4, 34_860 + 5 * late, 0);
-        let units = after.travel().unwrap().since(&before.travel().unwrap()).unwrap();
+        let units = after.motion().unwrap().since(&before.motion().unwrap()).unwrap();
         let stated = units as f64 / 2f64.powi(32) * f64::from(most);
         let found = f64::from(moved(&before, &after));
         assert!(stated >= found * 0.999_99, "{short} {late}: {found} {stated}");

@@ -24,13 +24,13 @@ mod swept;
 mod tracker;
 
 pub use chain::Closest;
-pub use contacts::{Contact, Contacts, Within};
+pub use contacts::{Contact, ContactIter, Contacts};
 pub use cost::Cost;
 pub use options::{Budget, Options};
 pub use proximity::{Interval, Proximity};
 pub use side::{NoSide, Side};
-pub use swept::{Sweep, Swept};
-pub use tracker::{Fallback, Tracked, Tracker};
+pub use swept::{Sweep, SweepAnswer};
+pub use tracker::{Fallback, Tracker, TrackerAnswer};
 
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, TriangleRow, VertexTable};

@@ -10,7 +10,7 @@ use crate::{Index, Step, Tool, VertexTable};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
-pub struct Swept {
+pub struct SweepAnswer {
     /// Before this time they are certainly not closer than the margin; 1 or more means on the whole way.
     pub clear_until: f32,
     /// The first time at which they were found within the margin, or farther by no more than the
@@ -93,7 +93,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         margin: f32,
         looks: u32,
         options: &Options,
-    ) -> Result<Swept, QueryError> {
+    ) -> Result<SweepAnswer, QueryError> {
         way.check(margin)?;
         let (most, size) = (way.most(), way.size());
         let ([from, to], [first, last]) = (&way.tools, way.shares);
@@ -104,7 +104,8 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             Ok(Look::new(found, margin, ROUNDING * (size + found.axis_distance), tool.radius()))
         };
         let at_end = look(1.0, options)?;
-        let mut swept = Swept { clear_until: 0.0, contact: None, at_end: at_end.found, looks: 1 };
+        let mut swept =
+            SweepAnswer { clear_until: 0.0, contact: None, at_end: at_end.found, looks: 1 };
         // A distance clears a part of the way; any does, where nothing moves.
         let part = |spare: f32| match most {
             _ if !(spare > 0.0) => 0.0,

@@ -3,13 +3,13 @@
 use core::ops::Range;
 
 use super::{StretchError, measure_stretch};
-use crate::surface::{MeasuredStretch, Millis, TravelUnit, VertexTable};
+use crate::surface::{MeasuredStretch, Millis, MotionUnit, VertexTable};
 use crate::tree::{Index, SurfaceFacts, Tree};
 
 /// The part of the published surface that a frame changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Changed {
+pub enum FrameExtent {
     /// Every row.
     Whole,
     /// Some rows; the others are as they were published.
@@ -19,7 +19,7 @@ pub enum Changed {
 /// The state of a check.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Verdict {
+pub enum Admission {
     /// Not finished: more work or rows are needed.
     Pending,
     /// The whole surface may be published; with its stretch, if measured.
@@ -28,7 +28,7 @@ pub enum Verdict {
 
 /// A surface that is being received.
 #[derive(Clone, Copy, Debug)]
-pub struct Arriving<'a, V: ?Sized> {
+pub struct IncomingSurface<'a, V: ?Sized> {
     /// Its rows: those below `ready` have their final values, the others are arbitrary.
     pub surface: &'a V,
     /// Number of final rows. It only grows within a frame, and is the number of all rows once the frame is complete.
@@ -50,7 +50,7 @@ pub struct Compared {
     pub rows: [u32; 2],
 }
 
-impl<'a, V: ?Sized> Arriving<'a, V> {
+impl<'a, V: ?Sized> IncomingSurface<'a, V> {
     /// A first surface, with the rows below `ready`.
     #[must_use]
     pub const fn new(surface: &'a V, ready: u32) -> Self {
@@ -65,7 +65,7 @@ impl<'a, V: ?Sized> Arriving<'a, V> {
 /// at any moment, and another begun. [`published`](Self::published) follows once an admitted frame is published.
 pub trait Gate {
     /// A frame begins, and the one before is forgotten unless it was published. O(1).
-    fn begin(&mut self, changed: Changed);
+    fn begin(&mut self, changed: FrameExtent);
 
     /// These rows of the frame have come: each row at most once, in any order of packets. O(1).
     fn moved(&mut self, rows: Range<u32>) {
@@ -79,9 +79,9 @@ pub trait Gate {
     /// [`StretchError`] when the surface must not be published; it names the triangle or vertex.
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
-        arriving: Arriving<'_, V>,
+        arriving: IncomingSurface<'_, V>,
         work: u32,
-    ) -> Result<Verdict, StretchError>;
+    ) -> Result<Admission, StretchError>;
 
     /// The admitted frame is now the published one.
     fn published(&mut self) {}
@@ -104,7 +104,7 @@ pub trait Gate {
 
     /// The unit in which the motion from one published frame to the next is counted; `None` if it is not measured.
     #[doc(hidden)]
-    fn travel_unit(&self) -> Option<TravelUnit> {
+    fn motion_unit(&self) -> Option<MotionUnit> {
         None
     }
 
@@ -128,38 +128,38 @@ pub trait Gate {
 /// Admits every surface, unmeasured. Answers then rely on the paper's assumption that the tissue keeps within the
 /// tree's stretch limit.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Unchecked;
+pub struct NoGate;
 
-impl Gate for Unchecked {
-    fn begin(&mut self, _: Changed) {}
+impl Gate for NoGate {
+    fn begin(&mut self, _: FrameExtent) {}
 
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
-        _: Arriving<'_, V>,
+        _: IncomingSurface<'_, V>,
         _: u32,
-    ) -> Result<Verdict, StretchError> {
-        Ok(Verdict::Admitted(None))
+    ) -> Result<Admission, StretchError> {
+        Ok(Admission::Admitted(None))
     }
 }
 
 /// A tree admits surfaces within its stretch limit, by one [`measure_stretch`] once the frame is complete. Not sliced:
 /// that call's cost is linear in the triangles, whatever `work` is.
 impl<I: Index> Gate for &Tree<'_, I> {
-    fn begin(&mut self, _: Changed) {}
+    fn begin(&mut self, _: FrameExtent) {}
 
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
-        Arriving { surface, ready, .. }: Arriving<'_, V>,
+        IncomingSurface { surface, ready, .. }: IncomingSurface<'_, V>,
         _: u32,
-    ) -> Result<Verdict, StretchError> {
+    ) -> Result<Admission, StretchError> {
         if (ready as usize) < surface.len() {
-            return Ok(Verdict::Pending);
+            return Ok(Admission::Pending);
         }
-        measure_stretch(self, surface).map(|stretch| Verdict::Admitted(Some(stretch)))
+        measure_stretch(self, surface).map(|stretch| Admission::Admitted(Some(stretch)))
     }
 
-    fn travel_unit(&self) -> Option<TravelUnit> {
-        Some(TravelUnit::of(self))
+    fn motion_unit(&self) -> Option<MotionUnit> {
+        Some(MotionUnit::of(self))
     }
 
     fn surface_facts(&self) -> SurfaceFacts {

@@ -15,7 +15,7 @@ use core::fmt;
 use crate::surface::{MeasuredStretch, REGIONS, VertexTable};
 use crate::tree::{Index, Tree, TriangleRow};
 
-pub use gate::{Arriving, Changed, Compared, Gate, Unchecked, Verdict};
+pub use gate::{Admission, Compared, FrameExtent, Gate, IncomingSurface, NoGate};
 use kernel::Worst;
 pub use limits::SurfaceLimits;
 pub use monitor::StretchMonitor;

@@ -7,9 +7,10 @@ use super::pass::{ALL, Pass};
 use super::regions::region_rows;
 use super::volume::Volume;
 use super::{
-    Arriving, Changed, Compared, Gate, StretchError, SurfaceLimits, Verdict, check_tables,
+    Admission, Compared, FrameExtent, Gate, IncomingSurface, StretchError, SurfaceLimits,
+    check_tables,
 };
-use crate::surface::{Between, Millis, REGIONS, TravelUnit, VertexTable};
+use crate::surface::{Millis, MotionUnit, REGIONS, SurfaceBlend, VertexTable};
 use crate::tree::{Index, SurfaceFacts, Tree, TriangleRow};
 
 /// Blocks of vertex rows, at most: they mark the rows that a partial frame moved.
@@ -70,7 +71,7 @@ pub struct StretchMonitor<'t, I, const SURFACES: usize = 1> {
     /// The regions with corners in each block of `1 << block_shift` vertex rows.
     touched: [u32; BLOCKS],
     block_shift: u8,
-    changed: Changed,
+    changed: FrameExtent,
     /// The measurement of the frame, and that of its extrapolation.
     passes: [Pass; SURFACES],
     /// The stretch of the extrapolation of the frame in work; NaN unless measured, and within the limit.
@@ -138,7 +139,7 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
             tree: *tree,
             touched,
             block_shift: block_shift as u8,
-            changed: Changed::Whole,
+            changed: FrameExtent::Whole,
             passes: [const { Pass::new() }; SURFACES],
             ahead: f32::NAN,
             is_beyond: false,
@@ -178,7 +179,7 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
     /// Compares arrived rows with the published ones. Returns the work left, and whether all rows are done.
     fn compare<V: VertexTable + ?Sized>(
         &mut self,
-        Arriving { surface, ready, before, compared }: Arriving<'_, V>,
+        IncomingSurface { surface, ready, before, compared }: IncomingSurface<'_, V>,
         mut work: u32,
     ) -> Result<(u32, bool), StretchError> {
         let Some((before, elapsed)) = before else {
@@ -235,7 +236,7 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
         if self.is_beyond {
             return true;
         }
-        let surface = Between::ahead(before, surface);
+        let surface = SurfaceBlend::ahead(before, surface);
         // Beyond the limit, or not finite: no extrapolation.
         let measured = ahead.advance(&self.tree, &surface, ready, (0.0, &self.rest), work, |_| ());
         self.is_beyond = measured.is_err();
@@ -246,20 +247,20 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
 }
 
 impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
-    fn begin(&mut self, changed: Changed) {
+    fn begin(&mut self, changed: FrameExtent) {
         self.changed = changed;
         self.next_row = 0;
-        self.blocks_left = if changed == Changed::Whole { ALL } else { 0 };
+        self.blocks_left = if changed == FrameExtent::Whole { ALL } else { 0 };
         (self.ahead, self.is_beyond) = (f32::NAN, false);
-        self.volume.begin(changed == Changed::Whole);
+        self.volume.begin(changed == FrameExtent::Whole);
         for (number, pass) in self.passes.iter_mut().enumerate() {
             // What a partial frame leaves as it was has moved before, so its extrapolation is another one.
-            pass.begin(changed == Changed::Whole || number > 0);
+            pass.begin(changed == FrameExtent::Whole || number > 0);
         }
     }
 
     fn moved(&mut self, rows: Range<u32>) {
-        if self.changed == Changed::Whole || rows.is_empty() {
+        if self.changed == FrameExtent::Whole || rows.is_empty() {
             return;
         }
         let first = (rows.start >> u32::from(self.block_shift)) as usize;
@@ -276,42 +277,42 @@ impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
 
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
-        arriving: Arriving<'_, V>,
+        arriving: IncomingSurface<'_, V>,
         work: u32,
-    ) -> Result<Verdict, StretchError> {
-        let Arriving { surface, ready, before, .. } = arriving;
+    ) -> Result<Admission, StretchError> {
+        let IncomingSurface { surface, ready, before, .. } = arriving;
         let before = before.map(|(before, _)| before);
         check_tables(&self.tree, surface)?;
         let is_complete = ready >= self.tree.vertex_count();
-        if self.changed == Changed::Partial && !is_complete {
-            return Ok(Verdict::Pending);
+        if self.changed == FrameExtent::Partial && !is_complete {
+            return Ok(Admission::Pending);
         }
         let (work, is_compared) = self.compare(arriving, work)?;
         // Half of the work each, so that both keep up with the frame.
         let ahead = if SURFACES > 1 { work / 2 } else { 0 };
         let (tree, size) = (&self.tree, (self.shrinkage, &self.rest));
-        let Some(own) = self.passes.first_mut() else { return Ok(Verdict::Pending) };
+        let Some(own) = self.passes.first_mut() else { return Ok(Admission::Pending) };
         // What a partial frame moved replaces what was there.
-        let replaced = if self.changed == Changed::Partial { before } else { None };
+        let replaced = if self.changed == FrameExtent::Partial { before } else { None };
         let volume = &mut self.volume;
         let sum = |rows| volume.add(tree, surface, replaced, rows);
         let (left, is_measured) = own.advance(tree, surface, ready, size, work - ahead, sum)?;
         let is_ahead =
             SURFACES == 1 || self.look_ahead(before, surface, ready, ahead.saturating_add(left));
         if !is_complete || !is_compared || !is_measured || !is_ahead {
-            return Ok(Verdict::Pending);
+            return Ok(Admission::Pending);
         }
         self.volume.check()?;
-        let Some(own) = self.passes.first() else { return Ok(Verdict::Pending) };
-        Ok(Verdict::Admitted(Some(own.measured(&self.tree, surface.epoch()))))
+        let Some(own) = self.passes.first() else { return Ok(Admission::Pending) };
+        Ok(Admission::Admitted(Some(own.measured(&self.tree, surface.epoch()))))
     }
 
     fn ahead(&self) -> Option<f32> {
         (self.ahead >= 0.0).then_some(self.ahead)
     }
 
-    fn travel_unit(&self) -> Option<TravelUnit> {
-        Some(TravelUnit::of(&self.tree))
+    fn motion_unit(&self) -> Option<MotionUnit> {
+        Some(MotionUnit::of(&self.tree))
     }
 
     fn surface_facts(&self) -> SurfaceFacts {

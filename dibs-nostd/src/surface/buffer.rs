@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::atomic::{AtomicU32, Ordering};
-use super::motion::Travel;
+use super::motion::MotionReading;
 use super::{MeasuredStretch, Millis};
 
 /// The facts about a published frame.
@@ -23,7 +23,7 @@ pub struct FrameLabel {
 
 /// The surface after a frame.
 #[derive(Clone, Copy, Debug)]
-pub struct Ahead {
+pub struct PredictionCheck {
     /// The largest stretch at the end of its extrapolation; NaN unless measured, and within the tree's limit.
     pub sigma: f32,
     /// Largest distance (mm) of a vertex of this frame from its extrapolation by the two frames before; NaN if unknown.
@@ -34,7 +34,7 @@ pub struct Ahead {
     pub off: u32,
 }
 
-impl Ahead {
+impl PredictionCheck {
     pub(crate) const UNKNOWN: Self =
         Self { sigma: f32::NAN, shown: f32::NAN, passed: 0, off: u32::MAX };
 }
@@ -89,8 +89,8 @@ pub struct Head {
     /// Measured stretch; the first word is a NaN if there is none.
     stretch: [AtomicU32; MeasuredStretch::WORDS],
     /// The odometer's reading, all zero if there is none.
-    travel: [AtomicU32; Travel::WORDS],
-    /// The numbers of [`Ahead`].
+    motion: [AtomicU32; MotionReading::WORDS],
+    /// The numbers of [`PredictionCheck`].
     ahead: [AtomicU32; 4],
 }
 
@@ -102,7 +102,7 @@ impl Head {
             received: AtomicU32::new(0),
             position_error: AtomicU32::new(0),
             stretch: [const { AtomicU32::new(0) }; MeasuredStretch::WORDS],
-            travel: [const { AtomicU32::new(0) }; Travel::WORDS],
+            motion: [const { AtomicU32::new(0) }; MotionReading::WORDS],
             ahead: [const { AtomicU32::new(0) }; 4],
         }
     }
@@ -115,12 +115,17 @@ impl Head {
             received: AtomicU32::new(0),
             position_error: AtomicU32::new(0),
             stretch: from_fn(|_| AtomicU32::new(0)),
-            travel: from_fn(|_| AtomicU32::new(0)),
+            motion: from_fn(|_| AtomicU32::new(0)),
             ahead: from_fn(|_| AtomicU32::new(0)),
         }
     }
 
-    pub(super) fn set_label(&self, label: FrameLabel, travel: Option<Travel>, ahead: Ahead) {
+    pub(super) fn set_label(
+        &self,
+        label: FrameLabel,
+        motion: Option<MotionReading>,
+        ahead: PredictionCheck,
+    ) {
         self.epoch.store(label.epoch, Ordering::Relaxed);
         self.received.store(label.received.0, Ordering::Relaxed);
         self.position_error.store(label.position_error.to_bits(), Ordering::Relaxed);
@@ -131,21 +136,21 @@ impl Head {
         for (at, word) in self.stretch.iter().zip(words) {
             at.store(word, Ordering::Relaxed);
         }
-        let words = travel.map_or([0; Travel::WORDS], Travel::to_words);
-        for (at, word) in self.travel.iter().zip(words) {
+        let words = motion.map_or([0; MotionReading::WORDS], MotionReading::to_words);
+        for (at, word) in self.motion.iter().zip(words) {
             at.store(word, Ordering::Relaxed);
         }
-        let Ahead { sigma, shown, passed, off } = ahead;
+        let PredictionCheck { sigma, shown, passed, off } = ahead;
         for (at, word) in self.ahead.iter().zip([sigma.to_bits(), shown.to_bits(), passed, off]) {
             at.store(word, Ordering::Relaxed);
         }
     }
 
     /// That of a labelled frame.
-    pub(super) fn ahead(&self) -> Ahead {
+    pub(super) fn ahead(&self) -> PredictionCheck {
         let [sigma, shown, passed, off] =
             self.ahead.each_ref().map(|word| word.load(Ordering::Relaxed));
-        Ahead { sigma: f32::from_bits(sigma), shown: f32::from_bits(shown), passed, off }
+        PredictionCheck { sigma: f32::from_bits(sigma), shown: f32::from_bits(shown), passed, off }
     }
 
     pub(super) fn epoch(&self) -> u32 {
@@ -165,8 +170,8 @@ impl Head {
         }
     }
 
-    pub(super) fn travel(&self) -> Option<Travel> {
-        Travel::from_words(self.travel.each_ref().map(|word| word.load(Ordering::Relaxed)))
+    pub(super) fn motion(&self) -> Option<MotionReading> {
+        MotionReading::from_words(self.motion.each_ref().map(|word| word.load(Ordering::Relaxed)))
     }
 
     pub(super) fn position_error(&self) -> f32 {

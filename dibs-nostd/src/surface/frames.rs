@@ -34,9 +34,9 @@ use core::ops::Range;
 use glam::Vec3;
 
 use super::atomic::{AtomicBool, AtomicU32, Ordering};
-use super::buffer::{Ahead, Buffer, FrameLabel, Head, Position};
+use super::buffer::{Buffer, FrameLabel, Head, Position, PredictionCheck};
 use super::error::{OutOfTableError, PublishError, SplitError};
-use super::motion::Travel;
+use super::motion::MotionReading;
 use super::reader::{FrameReader, FrameView};
 
 /// State word, bits 0 and 1: number of the front buffer.
@@ -302,13 +302,18 @@ impl<'f> FrameWriter<'f> {
         if self.missing() != 0 {
             return Err(PublishError::Incomplete { missing: self.missing() });
         }
-        self.set_label(label, None, Ahead::UNKNOWN);
+        self.set_label(label, None, PredictionCheck::UNKNOWN);
         self.publish_complete()
     }
 
     /// Labels the frame being written, with its odometer's reading if its motion since the published one is measured.
-    pub(crate) fn set_label(&mut self, label: FrameLabel, travel: Option<Travel>, ahead: Ahead) {
-        self.back.head.set_label(label, travel, ahead);
+    pub(crate) fn set_label(
+        &mut self,
+        label: FrameLabel,
+        motion: Option<MotionReading>,
+        ahead: PredictionCheck,
+    ) {
+        self.back.head.set_label(label, motion, ahead);
     }
 
     /// Publishes a labelled frame that the caller has proven complete.

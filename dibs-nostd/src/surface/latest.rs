@@ -22,18 +22,18 @@ pub struct FrameAge {
 /// [`ModalReader::latest`](crate::modes::ModalReader::latest).
 #[derive(Debug)]
 #[must_use]
-pub struct Latest<S> {
+pub struct LatestSurface<S> {
     surface: Option<(S, FrameAge)>,
 }
 
-impl<S> Latest<S> {
+impl<S> LatestSurface<S> {
     pub(crate) const fn new(surface: Option<(S, FrameAge)>) -> Self {
         Self { surface }
     }
 
     #[cfg(feature = "modes")]
-    pub(crate) fn map<T>(self, of: impl FnOnce(S) -> T) -> Latest<T> {
-        Latest { surface: self.surface.map(|(surface, frame)| (of(surface), frame)) }
+    pub(crate) fn map<T>(self, of: impl FnOnce(S) -> T) -> LatestSurface<T> {
+        LatestSurface { surface: self.surface.map(|(surface, frame)| (of(surface), frame)) }
     }
 
     /// The surface, if it is not older than `limit`.

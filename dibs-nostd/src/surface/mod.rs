@@ -2,13 +2,13 @@
 
 mod atomic;
 mod buffer;
-mod course;
 mod error;
 mod frames;
 mod latest;
 mod measured;
 pub(crate) mod motion;
 mod moving;
+mod prediction;
 mod reader;
 mod vertices;
 
@@ -17,19 +17,19 @@ pub(crate) use crate::time::Ageing;
 pub(crate) use crate::time::{AHEAD, elapsed};
 pub use crate::time::{Millis, Ticks};
 #[cfg(any(feature = "bus", feature = "modes"))]
-pub(crate) use buffer::Ahead;
+pub(crate) use buffer::PredictionCheck;
 pub use buffer::{Buffer, FrameLabel, Head, Position};
-#[cfg(feature = "modes")]
-pub(crate) use course::Course;
 pub use error::{OutOfTableError, PublishError, SplitError};
 pub use frames::{Buffers, FrameWriter, Frames};
-pub use latest::{FrameAge, Latest};
+pub use latest::{FrameAge, LatestSurface};
 pub(crate) use measured::share;
 pub use measured::{Coverage, MeasuredStretch, REGIONS};
-pub use motion::{Moved, MovingSurface, Odometer, Travel, TravelUnit};
-pub use moving::{Between, Step};
+pub use motion::{MotionReading, MotionUnit, MovingSurface, MovingTable, Odometer};
 #[cfg(feature = "modes")]
 pub(crate) use moving::{FARTHEST, clamped, grown};
+pub use moving::{Step, SurfaceBlend};
+#[cfg(feature = "modes")]
+pub(crate) use prediction::Prediction;
 #[cfg(feature = "bus")]
 pub(crate) use reader::LastStep;
 pub use reader::{FrameGuard, FrameReader, FrameView};

@@ -8,8 +8,8 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use glam::Vec3;
 
-use super::course::Course;
 use super::moving::Step;
+use super::prediction::Prediction;
 use crate::math::sqrt::sqrt;
 use crate::{Index, MeasuredStretch, Tree, VertexTable};
 
@@ -18,15 +18,15 @@ use crate::{Index, MeasuredStretch, Tree, VertexTable};
 /// Sealed, so that only a measurement states a motion.
 pub trait MovingSurface: VertexTable + sealed::Sealed {
     /// The odometer's reading at this frame; `None` if the motion is not measured.
-    fn travel(&self) -> Option<Travel>;
+    fn motion(&self) -> Option<MotionReading>;
 }
 
 pub(crate) mod sealed {
     pub trait Sealed {}
-    impl<V: super::VertexTable + ?Sized> Sealed for super::Moved<'_, V> {}
+    impl<V: super::VertexTable + ?Sized> Sealed for super::MovingTable<'_, V> {}
     impl<S: super::MovingSurface + ?Sized> Sealed for &S {}
     impl Sealed for crate::FrameGuard<'_> {}
-    impl<W, V> Sealed for crate::surface::moving::Between<'_, W, V>
+    impl<W, V> Sealed for crate::surface::moving::SurfaceBlend<'_, W, V>
     where
         W: super::VertexTable + ?Sized,
         V: super::VertexTable + ?Sized,
@@ -35,8 +35,8 @@ pub(crate) mod sealed {
 }
 
 impl<S: MovingSurface + ?Sized> MovingSurface for &S {
-    fn travel(&self) -> Option<Travel> {
-        (**self).travel()
+    fn motion(&self) -> Option<MotionReading> {
+        (**self).motion()
     }
 }
 
@@ -45,34 +45,34 @@ impl<S: MovingSurface + ?Sized> MovingSurface for &S {
 /// Two readings of one odometer bound the distance that any vertex moved between them.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Travel {
+pub struct MotionReading {
     tree: u32,
     /// Number of an unbroken run of measurements; no two runs share one.
-    chain: u32,
+    run: u32,
     /// Length along the path through all frames, in the tree's units.
     reading: u64,
     /// Distance from that path, of an extrapolated surface; 0 for a frame.
     aside: u32,
     /// The extrapolated surface's step from the frame before.
-    course: Course,
+    prediction: Prediction,
 }
 
 /// Of one place on the odometer, however the surface came there.
-impl PartialEq for Travel {
+impl PartialEq for MotionReading {
     fn eq(&self, other: &Self) -> bool {
-        let place = |travel: &Self| (travel.tree, travel.chain, travel.reading, travel.aside);
+        let place = |motion: &Self| (motion.tree, motion.run, motion.reading, motion.aside);
         place(self) == place(other)
     }
 }
 
-impl Eq for Travel {}
+impl Eq for MotionReading {}
 
-impl Travel {
+impl MotionReading {
     /// The farthest that a vertex can have moved since an earlier reading, in the tree's [`Unit`]; `None` if the
     /// motion was not measured all the way.
     #[inline]
     pub(crate) fn since(&self, before: &Self) -> Option<u64> {
-        if self.tree != before.tree || self.chain != before.chain {
+        if self.tree != before.tree || self.run != before.run {
             return None;
         }
         let along = self.reading.abs_diff(before.reading);
@@ -81,7 +81,7 @@ impl Travel {
         }
         let asides = u64::from(self.aside) + u64::from(before.aside);
         let farthest = along.saturating_add(asides);
-        match self.course.since(self.reading.wrapping_sub(before.reading), before.aside) {
+        match self.prediction.since(self.reading.wrapping_sub(before.reading), before.aside) {
             Some(units) if units < farthest => Some(units),
             _ => Some(farthest),
         }
@@ -89,25 +89,25 @@ impl Travel {
 
     /// Units from an earlier reading of a frame to this one's; `None` if the motion was not measured all the way.
     pub(super) fn after(&self, before: &Self) -> Option<u64> {
-        let is_one_run = self.tree == before.tree && self.chain == before.chain;
+        let is_one_run = self.tree == before.tree && self.run == before.run;
         if is_one_run { self.reading.checked_sub(before.reading) } else { None }
     }
 
     /// The reading at the start of an unbroken run of measurements.
     pub(crate) fn start(tree: u32) -> Self {
-        Self { tree, chain: next_chain(), reading: 0, aside: 0, course: Course::NONE }
+        Self { tree, run: next_run(), reading: 0, aside: 0, prediction: Prediction::NONE }
     }
 
     /// The reading of a frame as words, for its label.
-    pub(super) fn to_words(self) -> [u32; Travel::WORDS] {
-        [self.tree, self.chain, self.reading as u32, (self.reading >> 32) as u32]
+    pub(super) fn to_words(self) -> [u32; MotionReading::WORDS] {
+        [self.tree, self.run, self.reading as u32, (self.reading >> 32) as u32]
     }
 
     /// The inverse of [`to_words`](Self::to_words). Memory that was never written has no reading.
-    pub(super) fn from_words([tree, chain, low, high]: [u32; Travel::WORDS]) -> Option<Self> {
+    pub(super) fn from_words([tree, run, low, high]: [u32; MotionReading::WORDS]) -> Option<Self> {
         let reading = u64::from(high) << 32 | u64::from(low);
-        let start = Self { tree, chain, reading, aside: 0, course: Course::NONE };
-        (chain != NO_CHAIN).then_some(start)
+        let start = Self { tree, run, reading, aside: 0, prediction: Prediction::NONE };
+        (run != NO_RUN).then_some(start)
     }
 
     /// Words that a frame's reading takes.
@@ -116,7 +116,7 @@ impl Travel {
     /// The reading after a step in which no vertex moved farther than `farthest` (squared, rounded to nearest); `None`
     /// if that is not finite.
     #[cfg(feature = "bus")]
-    pub(crate) fn after_step(self, unit: &TravelUnit, farthest: f32) -> Option<Self> {
+    pub(crate) fn after_step(self, unit: &MotionUnit, farthest: f32) -> Option<Self> {
         let units = unit.unit.units_of_step(farthest)?;
         (self.tree == unit.tree).then(|| self.along(units))
     }
@@ -135,9 +135,9 @@ impl Travel {
         Some(Self { aside, ..self })
     }
 
-    /// This reading, of a surface on a course.
-    pub(crate) const fn on(self, course: Course) -> Self {
-        Self { course, ..self }
+    /// This reading, of a surface on a prediction.
+    pub(crate) const fn on(self, prediction: Prediction) -> Self {
+        Self { prediction, ..self }
     }
 }
 
@@ -204,12 +204,12 @@ impl Unit {
 /// The unit in which the motion of one tree's surfaces is counted. Only a tree makes one.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(not(feature = "bus"), allow(dead_code, reason = "only a receiver counts with it"))]
-pub struct TravelUnit {
+pub struct MotionUnit {
     pub(crate) tree: u32,
     unit: Unit,
 }
 
-impl TravelUnit {
+impl MotionUnit {
     pub(crate) const fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
         Self { tree: tree.checksum(), unit: Unit::of(tree) }
     }
@@ -240,20 +240,20 @@ pub(crate) const FAR: i32 = 1 << 30;
 ///
 /// It borrows the table, so that measured positions cannot change.
 #[derive(Debug)]
-pub struct Moved<'v, V: ?Sized> {
+pub struct MovingTable<'v, V: ?Sized> {
     pub(super) table: &'v V,
-    pub(super) travel: Travel,
+    pub(super) motion: MotionReading,
 }
 
-impl<V: ?Sized> Clone for Moved<'_, V> {
+impl<V: ?Sized> Clone for MovingTable<'_, V> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<V: ?Sized> Copy for Moved<'_, V> {}
+impl<V: ?Sized> Copy for MovingTable<'_, V> {}
 
-impl<V: VertexTable + ?Sized> VertexTable for Moved<'_, V> {
+impl<V: VertexTable + ?Sized> VertexTable for MovingTable<'_, V> {
     fn len(&self) -> usize {
         self.table.len()
     }
@@ -276,15 +276,15 @@ impl<V: VertexTable + ?Sized> VertexTable for Moved<'_, V> {
     }
 }
 
-impl<V: VertexTable + ?Sized> MovingSurface for Moved<'_, V> {
-    fn travel(&self) -> Option<Travel> {
-        Some(self.travel)
+impl<V: VertexTable + ?Sized> MovingSurface for MovingTable<'_, V> {
+    fn motion(&self) -> Option<MotionReading> {
+        Some(self.motion)
     }
 }
 
 /// Measures how far a surface moves from one frame to the next.
 ///
-/// Only a measurement of consecutive frames makes a [`Travel`]. If `before` is not the frame measured last, by a digest
+/// Only a measurement of consecutive frames makes a [`MotionReading`]. If `before` is not the frame measured last, by a digest
 /// of all its positions, the odometer starts anew, and trackers do too.
 ///
 /// ```
@@ -299,7 +299,7 @@ impl<V: VertexTable + ?Sized> MovingSurface for Moved<'_, V> {
 /// let mut odometer = Odometer::new(&tree);
 /// let before = odometer.start(first.as_slice());
 /// let step = odometer.step(first.as_slice(), second.as_slice());
-/// assert!(step.length() > 0.0 && step.after().travel() != before.travel());
+/// assert!(step.length() > 0.0 && step.after().motion() != before.motion());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
@@ -307,7 +307,7 @@ pub struct Odometer {
     unit: Unit,
     tree: u32,
     vertices: usize,
-    travel: Option<Travel>,
+    motion: Option<MotionReading>,
     /// Digest of the frame measured last.
     digest: u64,
 }
@@ -320,7 +320,7 @@ impl Odometer {
             unit: Unit::of(tree),
             tree: tree.checksum(),
             vertices: tree.vertex_count() as usize,
-            travel: None,
+            motion: None,
             digest: 0,
         }
     }
@@ -328,8 +328,8 @@ impl Odometer {
     /// Starts anew with a frame.
     ///
     /// Cost: one pass over the vertices.
-    pub fn start<'v, V: VertexTable + ?Sized>(&mut self, surface: &'v V) -> Moved<'v, V> {
-        self.travel = None;
+    pub fn start<'v, V: VertexTable + ?Sized>(&mut self, surface: &'v V) -> MovingTable<'v, V> {
+        self.motion = None;
         self.step(surface, surface).after()
     }
 
@@ -361,22 +361,22 @@ impl Odometer {
         }
         let length = length_of_step(largest);
         let units = self.unit.units_of_step(largest).unwrap_or(0);
-        let start = || Travel::start(self.tree);
-        let from_last = self.travel.filter(|_| self.digest == from.0).unwrap_or_else(start);
+        let start = || MotionReading::start(self.tree);
+        let from_last = self.motion.filter(|_| self.digest == from.0).unwrap_or_else(start);
         let (from, units) = if is_measured { (from_last, units) } else { (start(), 0) };
-        let travel = from.along(units);
+        let motion = from.along(units);
         self.digest = to.0;
-        self.travel = Some(travel);
-        Step { before, after, from, travel, units, is_measured, length }
+        self.motion = Some(motion);
+        Step { before, after, from, motion, units, is_measured, length }
     }
 }
 
 /// The number of no run.
-const NO_CHAIN: u32 = 0;
+const NO_RUN: u32 = 0;
 
 /// A new number for a run of measurements.
-fn next_chain() -> u32 {
-    static NEXT: AtomicU32 = AtomicU32::new(NO_CHAIN + 1);
+fn next_run() -> u32 {
+    static NEXT: AtomicU32 = AtomicU32::new(NO_RUN + 1);
     NEXT.fetch_add(1, Ordering::Relaxed)
 }
 

@@ -6,9 +6,9 @@
 
 use glam::Vec3;
 
-use super::buffer::Ahead;
-use super::course::Course;
-use super::motion::{Moved, MovingSurface, Travel};
+use super::buffer::PredictionCheck;
+use super::motion::{MotionReading, MovingSurface, MovingTable};
+use super::prediction::Prediction;
 use crate::{MeasuredStretch, Millis, VertexTable};
 
 /// Two frames that follow one another, as [`Odometer::step`](crate::Odometer::step) measured them.
@@ -18,8 +18,8 @@ use crate::{MeasuredStretch, Millis, VertexTable};
 pub struct Step<'v, W: ?Sized, V: ?Sized> {
     pub(super) before: &'v W,
     pub(super) after: &'v V,
-    pub(super) from: Travel,
-    pub(super) travel: Travel,
+    pub(super) from: MotionReading,
+    pub(super) motion: MotionReading,
     pub(super) units: u64,
     pub(super) is_measured: bool,
     pub(super) length: f32,
@@ -28,14 +28,14 @@ pub struct Step<'v, W: ?Sized, V: ?Sized> {
 impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
     /// The earlier frame.
     #[must_use]
-    pub const fn before(&self) -> Moved<'v, W> {
-        Moved { table: self.before, travel: self.from }
+    pub const fn before(&self) -> MovingTable<'v, W> {
+        MovingTable { table: self.before, motion: self.from }
     }
 
     /// The later frame.
     #[must_use]
-    pub const fn after(&self) -> Moved<'v, V> {
-        Moved { table: self.after, travel: self.travel }
+    pub const fn after(&self) -> MovingTable<'v, V> {
+        MovingTable { table: self.after, motion: self.motion }
     }
 
     /// The largest distance that a vertex moved, rounded up (mm). Infinite where a position is not finite.
@@ -47,10 +47,10 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
     /// The surface between the two: `share` 0 is the earlier frame and 1 the later. It is exact, but late by a frame.
     ///
     /// `share` is clamped to 0..=1. If both frames carry their stretch, so does the surface: see
-    /// [`Between::stretch`](VertexTable::stretch).
+    /// [`SurfaceBlend::stretch`](VertexTable::stretch).
     #[must_use]
-    pub fn at(&self, share: f32) -> Between<'v, W, V> {
-        let between = Between::inside(self.before, self.after, share, self.from, self.units);
+    pub fn at(&self, share: f32) -> SurfaceBlend<'v, W, V> {
+        let between = SurfaceBlend::inside(self.before, self.after, share, self.from, self.units);
         self.unless_unmeasured(between)
     }
 
@@ -61,14 +61,15 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
     /// ([`measure_stretch`](crate::measure_stretch)), unless both frames carry theirs. Frames behind a bus do:
     /// [`FrameGuard::extrapolated`](crate::FrameGuard::extrapolated).
     #[must_use]
-    pub fn beyond(&self, share: f32) -> Between<'v, W, V> {
-        let between = Between::outside(self.before, self.after, share, self.travel, self.units);
+    pub fn beyond(&self, share: f32) -> SurfaceBlend<'v, W, V> {
+        let between =
+            SurfaceBlend::outside(self.before, self.after, share, self.motion, self.units);
         self.unless_unmeasured(between)
     }
 
-    fn unless_unmeasured(&self, mut between: Between<'v, W, V>) -> Between<'v, W, V> {
+    fn unless_unmeasured(&self, mut between: SurfaceBlend<'v, W, V>) -> SurfaceBlend<'v, W, V> {
         if !self.is_measured {
-            between.travel = None;
+            between.motion = None;
         }
         between
     }
@@ -94,33 +95,33 @@ pub(crate) fn clamped(share: f32, most: f32) -> f32 {
 ///
 /// A position is within 16 * 2^-24 of the coordinates' size of the exact sum.
 #[derive(Debug)]
-pub struct Between<'v, W: ?Sized, V: ?Sized> {
+pub struct SurfaceBlend<'v, W: ?Sized, V: ?Sized> {
     before: &'v W,
     after: &'v V,
     /// 0 is the earlier frame, 1 the later, 2 as far beyond, and 3 the farthest.
     share: f32,
-    travel: Option<Travel>,
-    ahead: Ahead,
+    motion: Option<MotionReading>,
+    ahead: PredictionCheck,
     /// Steps from the earlier frame to the later a second; 0 where it stands still, or has no clock.
     rate: f32,
     /// The time by which it is behind the present, as far as its error does not cover it; `None` without a clock.
     lag: Option<Millis>,
 }
 
-impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
+impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> SurfaceBlend<'v, W, V> {
     /// The surface between two frames, which are `units` of the odometer apart.
     pub(super) fn inside(
         before: &'v W,
         after: &'v V,
         share: f32,
-        from: Travel,
+        from: MotionReading,
         units: u64,
     ) -> Self {
         let share = clamped(share, 1.0);
         // Off by less than a few units, within a tracker's slack.
         let along = (share * units as f32) as u64;
-        let travel = Some(from.along(along));
-        Self { before, after, share, travel, ahead: Ahead::UNKNOWN, rate: 0.0, lag: None }
+        let motion = Some(from.along(along));
+        Self { before, after, share, motion, ahead: PredictionCheck::UNKNOWN, rate: 0.0, lag: None }
     }
 
     /// The surface after the later frame.
@@ -128,30 +129,30 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
         before: &'v W,
         after: &'v V,
         share: f32,
-        last: Travel,
+        last: MotionReading,
         units: u64,
     ) -> Self {
         let share = clamped(share, FARTHEST);
-        let travel = last.beside((share * units as f32) as u64);
+        let motion = last.beside((share * units as f32) as u64);
         Self {
             before,
             after,
             share: 1.0 + share,
-            travel,
-            ahead: Ahead::UNKNOWN,
+            motion,
+            ahead: PredictionCheck::UNKNOWN,
             rate: 0.0,
             lag: None,
         }
     }
 
-    /// The same on a course.
-    pub(super) fn on(mut self, course: Course) -> Self {
-        self.travel = self.travel.map(|travel| travel.on(course));
+    /// The same on a prediction.
+    pub(super) fn on(mut self, prediction: Prediction) -> Self {
+        self.motion = self.motion.map(|motion| motion.on(prediction));
         self
     }
 
     /// The same with what was measured of the later frame.
-    pub(super) const fn measured(mut self, ahead: Ahead) -> Self {
+    pub(super) const fn measured(mut self, ahead: PredictionCheck) -> Self {
         self.ahead = ahead;
         self
     }
@@ -212,20 +213,20 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Between<'v, W, V> {
     /// [`position_error`](VertexTable::position_error) includes it as far as it has grown. `None` for a surface that is
     /// not extrapolated.
     #[must_use]
-    pub fn shown_error(&self) -> Option<f32> {
+    pub fn residual(&self) -> Option<f32> {
         (self.ahead.shown >= 0.0).then_some(self.ahead.shown)
     }
 }
 
-impl<'v, V: VertexTable + ?Sized> Between<'v, V, V> {
+impl<'v, V: VertexTable + ?Sized> SurfaceBlend<'v, V, V> {
     /// A frame, held.
-    pub(super) const fn held(frame: &'v V, travel: Option<Travel>) -> Self {
+    pub(super) const fn held(frame: &'v V, motion: Option<MotionReading>) -> Self {
         Self {
             before: frame,
             after: frame,
             share: 1.0,
-            travel,
-            ahead: Ahead::UNKNOWN,
+            motion,
+            ahead: PredictionCheck::UNKNOWN,
             rate: 0.0,
             lag: None,
         }
@@ -234,11 +235,19 @@ impl<'v, V: VertexTable + ?Sized> Between<'v, V, V> {
     /// The end of the extrapolation, whose motion is not measured.
     pub(crate) const fn ahead(before: &'v V, after: &'v V) -> Self {
         let share = 1.0 + FARTHEST;
-        Self { before, after, share, travel: None, ahead: Ahead::UNKNOWN, rate: 0.0, lag: None }
+        Self {
+            before,
+            after,
+            share,
+            motion: None,
+            ahead: PredictionCheck::UNKNOWN,
+            rate: 0.0,
+            lag: None,
+        }
     }
 }
 
-impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> VertexTable for Between<'_, W, V> {
+impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> VertexTable for SurfaceBlend<'_, W, V> {
     fn len(&self) -> usize {
         let (before, after) = (self.before.len(), self.after.len());
         if before == after { after } else { 0 }
@@ -270,21 +279,21 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> VertexTable for Between<'
     }
 
     /// The frames' errors, by their part in each position, and of an extrapolated surface the change of the motion: the
-    /// [error that the last frames showed](Between::shown_error), growing as if the velocity changed steadily, three
+    /// [error that the last frames showed](SurfaceBlend::residual), growing as if the velocity changed steadily, three
     /// times as much at the end. That is an estimate: no measurement of the past bounds it.
     fn position_error(&self) -> f32 {
         let (before, after) = (self.before.position_error(), self.after.position_error());
         let frames = (1.0 - self.share).abs() * before + self.share * after;
-        match self.shown_error() {
+        match self.residual() {
             Some(shown) => frames + grown(shown, self.share - 1.0),
             None => frames,
         }
     }
 }
 
-impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> MovingSurface for Between<'_, W, V> {
-    fn travel(&self) -> Option<Travel> {
-        self.travel
+impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> MovingSurface for SurfaceBlend<'_, W, V> {
+    fn motion(&self) -> Option<MotionReading> {
+        self.motion
     }
 }
 

@@ -4,13 +4,13 @@
 use glam::Vec3;
 
 use super::atomic::{AtomicU32, Ordering};
-use super::buffer::{Ahead, Buffer, FrameLabel, Position};
-use super::course::Course;
+use super::buffer::{Buffer, FrameLabel, Position, PredictionCheck};
 use super::frames::{Buffers, READING};
-use super::motion::{MovingSurface, Travel};
-use super::moving::Between;
+use super::motion::{MotionReading, MovingSurface};
+use super::moving::SurfaceBlend;
 use super::moving::{FARTHEST, clamped};
-use super::{Ageing, FrameAge, Latest, MeasuredStretch, Millis, VertexTable};
+use super::prediction::Prediction;
+use super::{Ageing, FrameAge, LatestSurface, MeasuredStretch, Millis, VertexTable};
 use crate::time::elapsed;
 
 /// The end that reads: owned by the control tick.
@@ -32,18 +32,18 @@ impl<'f> FrameReader<'f> {
         self.buffers.rows()
     }
 
-    /// The published frame and its age at `now`, on the receiver's clock. [`Latest::within`] a limit gives the frame,
+    /// The published frame and its age at `now`, on the receiver's clock. [`LatestSurface::within`] a limit gives the frame,
     /// held as by [`read`](Self::read).
     #[inline]
-    pub fn latest(&mut self, now: Millis) -> Latest<FrameGuard<'_>> {
+    pub fn latest(&mut self, now: Millis) -> LatestSurface<FrameGuard<'_>> {
         let (epoch_before, before) = self.ageing;
-        let Some(mut guard) = read(&self.buffers) else { return Latest::new(None) };
+        let Some(mut guard) = read(&self.buffers) else { return LatestSurface::new(None) };
         let FrameLabel { epoch, received, .. } = guard.label();
         let before = if epoch == epoch_before { before } else { Ageing::default() };
         let ageing = before.at(now, received);
         self.ageing = (epoch, ageing);
         guard.age = ageing.oldest;
-        Latest::new(Some((guard, FrameAge { epoch, received, age: ageing.oldest })))
+        LatestSurface::new(Some((guard, FrameAge { epoch, received, age: ageing.oldest })))
     }
 
     /// The published frame, held for as long as the guard lives; `None` before the first.
@@ -100,7 +100,7 @@ impl FrameGuard<'_> {
 impl<'f> FrameGuard<'f> {
     /// The surface as long ago as the time between the last two frames: certain, and late by that time.
     #[must_use]
-    pub fn interpolated(&self) -> Between<'_, FrameView<'f>, FrameView<'f>> {
+    pub fn interpolated(&self) -> SurfaceBlend<'_, FrameView<'f>, FrameView<'f>> {
         match self.last_step() {
             Some(step) => {
                 let lag = if step.interval > self.age { step.interval } else { self.age };
@@ -117,9 +117,9 @@ impl<'f> FrameGuard<'f> {
     /// It goes on for twice the time between the last two frames, and is held then: long enough for frames at a steady
     /// rate whose way to here takes as long as the time between them. It is held at once before the third frame, which
     /// shows the error, and where the surface, moved on for so long, would be stretched beyond the tree's limit. The
-    /// time for which it is held is its [`lag`](Between::lag).
+    /// time for which it is held is its [`lag`](SurfaceBlend::lag).
     #[must_use]
-    pub fn extrapolated(&self) -> Between<'_, FrameView<'f>, FrameView<'f>> {
+    pub fn extrapolated(&self) -> SurfaceBlend<'_, FrameView<'f>, FrameView<'f>> {
         let (ahead, before) = (self.view.buffer.head.ahead(), self.before.buffer.head.ahead());
         match self.last_step() {
             Some(step) if ahead.sigma >= 0.0 && ahead.shown >= 0.0 => {
@@ -127,7 +127,7 @@ impl<'f> FrameGuard<'f> {
                 let is_worse = before.shown > ahead.shown;
                 let shown = if is_worse { before.shown } else { ahead.shown };
                 let lag = Millis(self.age.0.saturating_sub(step.end().0));
-                let ahead = Ahead { shown, ..ahead };
+                let ahead = PredictionCheck { shown, ..ahead };
                 step.outside([&self.before, &self.view], self.age, ahead).lagging(lag)
             }
             _ => self.held(),
@@ -141,8 +141,8 @@ impl<'f> FrameGuard<'f> {
         &self.before
     }
 
-    fn held(&self) -> Between<'_, FrameView<'f>, FrameView<'f>> {
-        Between::held(&self.view, self.view.travel()).lagging(self.age)
+    fn held(&self) -> SurfaceBlend<'_, FrameView<'f>, FrameView<'f>> {
+        SurfaceBlend::held(&self.view, self.view.motion()).lagging(self.age)
     }
 
     fn last_step(&self) -> Option<LastStep> {
@@ -181,8 +181,8 @@ impl VertexTable for FrameGuard<'_> {
 
 /// Its motion since other frames is known if an [`Assembler`](crate::Assembler) with a tree's gate published them all.
 impl MovingSurface for FrameGuard<'_> {
-    fn travel(&self) -> Option<Travel> {
-        self.view.travel()
+    fn motion(&self) -> Option<MotionReading> {
+        self.view.motion()
     }
 }
 
@@ -190,8 +190,8 @@ impl MovingSurface for FrameGuard<'_> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LastStep {
     /// Readings of the odometer.
-    from: Travel,
-    travel: Travel,
+    from: MotionReading,
+    motion: MotionReading,
     units: u64,
     /// Time between the two, on the receiver's clock, above 0.
     interval: Millis,
@@ -200,13 +200,13 @@ pub(crate) struct LastStep {
 impl LastStep {
     /// `None` where the motion between the two was not measured, or they are of one time.
     pub fn between(before: &FrameView<'_>, after: &FrameView<'_>) -> Option<Self> {
-        let (from, travel) = (before.travel()?, after.travel()?);
-        let units = travel.after(&from)?;
+        let (from, motion) = (before.motion()?, after.motion()?);
+        let units = motion.after(&from)?;
         // Of two captures in the wrong order, or of one time, no velocity follows.
         let interval = after.label().received.since(before.label().received);
         (interval > Millis(0) && interval < Millis(1 << 31)).then_some(Self {
             from,
-            travel,
+            motion,
             units,
             interval,
         })
@@ -217,9 +217,9 @@ impl LastStep {
         &self,
         [before, after]: [&'v V; 2],
         age: Millis,
-    ) -> Between<'v, V, V> {
+    ) -> SurfaceBlend<'v, V, V> {
         let share = self.share(age);
-        let between = Between::inside(before, after, share, self.from, self.units);
+        let between = SurfaceBlend::inside(before, after, share, self.from, self.units);
         between.at_rate(self.rate(share, 1.0))
     }
 
@@ -228,12 +228,12 @@ impl LastStep {
         &self,
         [before, after]: [&'v V; 2],
         age: Millis,
-        ahead: Ahead,
-    ) -> Between<'v, V, V> {
+        ahead: PredictionCheck,
+    ) -> SurfaceBlend<'v, V, V> {
         let share = clamped(self.share(age), FARTHEST);
-        let course = Course::new(self.units, &ahead, share);
-        let between = Between::outside(before, after, share, self.travel, self.units);
-        between.on(course).measured(ahead).at_rate(self.rate(share, FARTHEST))
+        let prediction = Prediction::new(self.units, &ahead, share);
+        let between = SurfaceBlend::outside(before, after, share, self.motion, self.units);
+        between.on(prediction).measured(ahead).at_rate(self.rate(share, FARTHEST))
     }
 
     /// The share of the step that an extrapolation adds to the later frame after this time.
@@ -283,8 +283,8 @@ impl<'f> FrameView<'f> {
     }
 
     /// Its odometer's reading.
-    pub(crate) fn travel(&self) -> Option<Travel> {
-        self.buffer.head.travel()
+    pub(crate) fn motion(&self) -> Option<MotionReading> {
+        self.buffer.head.motion()
     }
 
     /// Time from this frame to one with the stamp `received`.

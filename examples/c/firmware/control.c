@@ -85,7 +85,7 @@ static dibs_code ask(const dibs_tool *tool, dibs_observation *seen, dibs_proximi
     record->epoch = seen->age.epoch;
     record->epoch_before = seen->age.epoch;
     record->share = 1.0f;
-    record->shown_error = -1.0f;
+    record->residual = -1.0f;
     record->age = seen->age.age;
     record->position_error = facts.position_error;
 

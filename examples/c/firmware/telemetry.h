@@ -47,7 +47,7 @@ typedef struct {
     /* The C interface holds the surface from frame to frame. */
     uint32_t epoch_before;
     float share;
-    float shown_error;
+    float residual;
     dibs_vec3 surface_velocity;
 } tick_record;
 

@@ -9,8 +9,8 @@ use dibs_nostd::wire::{
     Rows, StreamError, enframe, framed_bytes,
 };
 use dibs_nostd::{
-    Advance, Arriving, Changed, Gate, Millis, Progress, ReceiveError, StretchError, Verdict,
-    VertexTable,
+    Admission, Advance, FrameExtent, Gate, IncomingSurface, Millis, Progress, ReceiveError,
+    StretchError, VertexTable,
 };
 use dibs_tests::bus::*;
 
@@ -146,20 +146,20 @@ fn two_frames_of_one_epoch_are_never_mixed() {
 struct Refuse(Rc<Cell<bool>>);
 
 impl Gate for Refuse {
-    fn begin(&mut self, _: Changed) {}
+    fn begin(&mut self, _: FrameExtent) {}
 
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
-        Arriving { surface, ready, .. }: Arriving<'_, V>,
+        IncomingSurface { surface, ready, .. }: IncomingSurface<'_, V>,
         _: u32,
-    ) -> Result<Verdict, StretchError> {
+    ) -> Result<Admission, StretchError> {
         assert_eq!(surface.len(), N);
         if ready < N as u32 {
-            Ok(Verdict::Pending)
+            Ok(Admission::Pending)
         } else if self.0.get() {
             Err(StretchError::NoMetric)
         } else {
-            Ok(Verdict::Admitted(None))
+            Ok(Admission::Admitted(None))
         }
     }
 }
@@ -203,7 +203,7 @@ struct Slow {
 }
 
 impl Gate for Slow {
-    fn begin(&mut self, _: Changed) {
+    fn begin(&mut self, _: FrameExtent) {
         self.left = 100;
         self.began.set(self.began.get() + 1);
         self.moved.set(0);
@@ -215,13 +215,13 @@ impl Gate for Slow {
 
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
-        Arriving { ready, .. }: Arriving<'_, V>,
+        IncomingSurface { ready, .. }: IncomingSurface<'_, V>,
         work: u32,
-    ) -> Result<Verdict, StretchError> {
+    ) -> Result<Admission, StretchError> {
         assert!(ready <= self.moved.get());
         self.left = self.left.saturating_sub(work);
         let is_done = self.left == 0 && ready == N as u32;
-        Ok(if is_done { Verdict::Admitted(None) } else { Verdict::Pending })
+        Ok(if is_done { Admission::Admitted(None) } else { Admission::Pending })
     }
 
     fn published(&mut self) {

@@ -5,8 +5,8 @@ use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 use dibs_nostd::{
-    Advance, Assembler, FrameLabel, FrameReader, Frames, Gate, Millis, MovingSurface, Options,
-    Query, Sphere, SurfaceLimits, Tracker, Tree, Unchecked, VertexTable,
+    Advance, Assembler, FrameLabel, FrameReader, Frames, Gate, Millis, MovingSurface, NoGate,
+    Options, Query, Sphere, SurfaceLimits, Tracker, Tree, VertexTable,
 };
 use dibs_tests::bus::collect;
 use dibs_tests::deform::unit;
@@ -164,7 +164,7 @@ fn the_surface_between_frames_is_where_the_frames_put_it() {
         }
         if send(&mut bus, tree.mesh_id(), epoch, &rows, base, now, &mut rng) {
             let shown = reader.latest(Millis(now)).of_any_age().expect("published");
-            let shown = shown.extrapolated().shown_error();
+            let shown = shown.extrapolated().residual();
             let mut exact = errors;
             if let [.., (_, t0, a), (_, t1, b)] = known.as_slice() {
                 let share = now.wrapping_sub(*t1) as f32 / t1.wrapping_sub(*t0) as f32;
@@ -228,7 +228,7 @@ fn a_surface_of_unknown_motion_is_held() {
     let is_held = |reader: &mut Reader, now| {
         let frame = reader.latest(Millis(now)).of_any_age().expect("published");
         let surfaces = [frame.interpolated(), frame.extrapolated()];
-        surfaces.map(|surface| surface.share() == 1.0 && surface.shown_error().is_none())
+        surfaces.map(|surface| surface.share() == 1.0 && surface.residual().is_none())
     };
     // By hand.
     let frames: &'static Continuous = Box::leak(Box::new(Frames::new()));
@@ -242,7 +242,7 @@ fn a_surface_of_unknown_motion_is_held() {
         assert_eq!(is_held(&mut reader, 20 * epoch + 5), [true; 2]);
     }
     // With a gate that measures nothing.
-    let mut bus = Assembler::new(writer, Unchecked, tree.mesh_id(), 1_000.0);
+    let mut bus = Assembler::new(writer, NoGate, tree.mesh_id(), 1_000.0);
     for epoch in 10..14 {
         let rows = &motion[epoch as usize];
         assert!(send(&mut bus, tree.mesh_id(), epoch, rows, None, 20 * epoch, &mut rng));
@@ -281,7 +281,7 @@ fn without_the_time_nothing_moves_on() {
     let frame = reader.read().expect("published");
     let surface = frame.extrapolated();
     assert!(off(&positions(&surface), &motion[3], &motion[3], 1.0) < 1e-4);
-    assert_eq!(surface.travel(), frame.travel());
+    assert_eq!(surface.motion(), frame.motion());
     assert_eq!(frame.interpolated().share(), 0.0);
     drop(frame);
     // Two frames of one time have no velocity.

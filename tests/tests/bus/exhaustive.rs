@@ -4,15 +4,15 @@ use std::collections::BTreeMap;
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder};
-use dibs_nostd::{Advance, Assembler, FrameReader, Frames, Millis, Unchecked, VertexTable};
+use dibs_nostd::{Advance, Assembler, FrameReader, Frames, Millis, NoGate, VertexTable};
 use dibs_tests::bus::*;
 
 /// Rows of the surface: three packets.
 const ROWS: usize = 9;
 
-fn receiver<const R: usize>(frames: &Frames<R>) -> (Assembler<'_, Unchecked>, FrameReader<'_>) {
+fn receiver<const R: usize>(frames: &Frames<R>) -> (Assembler<'_, NoGate>, FrameReader<'_>) {
     let (writer, reader) = frames.split().unwrap();
-    (Assembler::new(writer, Unchecked, MESH, 1e3), reader)
+    (Assembler::new(writer, NoGate, MESH, 1e3), reader)
 }
 
 /// A model of the specification for a line without damage: it keeps the set of packets that have come.

@@ -6,8 +6,7 @@ use dibs_nostd::wire::{
     encode_heartbeat, encode_status,
 };
 use dibs_nostd::{
-    Advance, Assembler, Frames, LastHeartbeat, Millis, Progress, ReceiveError, Unchecked,
-    VertexTable,
+    Advance, Assembler, Frames, LastHeartbeat, Millis, NoGate, Progress, ReceiveError, VertexTable,
 };
 use dibs_tests::bus::*;
 
@@ -152,7 +151,7 @@ fn the_sequence_is_used_up_to_its_end() {
     const ROWS: usize = 3 * 65_534;
     static FRAMES: Frames<ROWS> = Frames::new();
     let (writer, mut reader) = FRAMES.split().unwrap();
-    let mut assembler = Assembler::new(writer, Unchecked, MESH, 1e6);
+    let mut assembler = Assembler::new(writer, NoGate, MESH, 1e6);
     let positions: Vec<_> = (0..ROWS).map(|i| Vec3::splat(i as f32)).collect();
     let mut encoder = FrameEncoder::<_, 64>::new(id(1), Encoding::Float, &positions[..]).unwrap();
     let mut buffer = [0; 64];

@@ -3,7 +3,7 @@
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{EncodeError, Encoding, Event, FrameEncoder, FrameId, QuantisedBox};
 use dibs_nostd::{
-    Advance, Assembler, FrameReader, Frames, Millis, ReceiveError, StretchMonitor, Unchecked,
+    Advance, Assembler, FrameReader, Frames, Millis, NoGate, ReceiveError, StretchMonitor,
     VertexTable,
 };
 use dibs_tests::bus::*;
@@ -12,10 +12,10 @@ use fastrand::Rng;
 /// Rows of the larger surface, which takes several packets and several slices of copying.
 const ROWS: usize = 300;
 
-fn large() -> (Assembler<'static, Unchecked>, FrameReader<'static>) {
+fn large() -> (Assembler<'static, NoGate>, FrameReader<'static>) {
     let frames: &'static Frames<ROWS> = Box::leak(Box::new(Frames::new()));
     let (writer, reader) = frames.split().unwrap();
-    (Assembler::new(writer, Unchecked, MESH, 1e4), reader)
+    (Assembler::new(writer, NoGate, MESH, 1e4), reader)
 }
 
 fn read(reader: &mut FrameReader<'_>) -> Vec<Vec3> {
@@ -222,7 +222,7 @@ fn copying_is_bounded_and_rows_wait_for_it() {
 #[test]
 fn memory_does_not_grow_with_marks() {
     fn besides<const N: usize>() -> (usize, usize) {
-        (size_of::<Frames<N>>() - 24 * N, size_of::<Assembler<'static, Unchecked>>())
+        (size_of::<Frames<N>>() - 24 * N, size_of::<Assembler<'static, NoGate>>())
     }
     let one = besides::<1>();
     assert_eq!(one, besides::<42>());

@@ -4,15 +4,15 @@ use dibs_nostd::failsafe::{FailSafe, Limits, LinkStatus, Observation, State, Wat
 use dibs_nostd::wire::{
     AesCmac, Encoding, Event, FrameEncoder, FrameId, Mac, NoMac, encode_heartbeat,
 };
-use dibs_nostd::{Assembler, BusHealth, FrameReader, Frames, Millis, Unchecked};
+use dibs_nostd::{Assembler, BusHealth, FrameReader, Frames, Millis, NoGate};
 use dibs_tests::bus::*;
 
-type Line<M> = (Assembler<'static, Unchecked, M>, FrameReader<'static>);
+type Line<M> = (Assembler<'static, NoGate, M>, FrameReader<'static>);
 
 fn line<M: Mac>(mac: M) -> Line<M> {
     let frames: &'static Frames<N> = Box::leak(Box::new(Frames::new()));
     let (writer, reader) = frames.split().unwrap();
-    (Assembler::with_mac(writer, Unchecked, MESH, 100.0, mac), reader)
+    (Assembler::with_mac(writer, NoGate, MESH, 100.0, mac), reader)
 }
 
 fn mac() -> AesCmac {

@@ -5,8 +5,8 @@ use dibs_build::modes::ModalFit;
 use dibs_nostd::modes::{Memo, ModalGate, ModalReader, Modes};
 use dibs_nostd::wire::{self, Encoding, Event, FrameEncoder, FrameId, WeightsEncoder};
 use dibs_nostd::{
-    Advance, Arriving, Assembler, Changed, Frames, Gate, Millis, Options, Query, ReceiveError,
-    Sphere, StretchError, Tree, Verdict, measure_stretch,
+    Admission, Advance, Assembler, FrameExtent, Frames, Gate, IncomingSurface, Millis, Options,
+    Query, ReceiveError, Sphere, StretchError, Tree, measure_stretch,
 };
 use dibs_tests::bus::reseal;
 use dibs_tests::modal::{anywhere, positions, small};
@@ -173,10 +173,10 @@ fn the_gate_is_exact_whatever_the_bound() {
         let surface = modes.surface::<4>(&weights).expect("in range");
         let exact = measure_stretch(&tree, &surface);
         let before = gate.measured();
-        gate.begin(Changed::Whole);
-        assert_eq!(gate.advance(Arriving::new(&rows[..], 3), 1), Ok(Verdict::Pending));
-        match (gate.advance(Arriving::new(&rows[..], 4), u32::MAX), exact) {
-            (Ok(Verdict::Admitted(Some(found))), Ok(exact)) => {
+        gate.begin(FrameExtent::Whole);
+        assert_eq!(gate.advance(IncomingSurface::new(&rows[..], 3), 1), Ok(Admission::Pending));
+        match (gate.advance(IncomingSurface::new(&rows[..], 4), u32::MAX), exact) {
+            (Ok(Admission::Admitted(Some(found))), Ok(exact)) => {
                 assert!(found.sigma() >= exact.sigma() * 0.9999);
                 if gate.measured() == before { bounded += 1 } else { measured += 1 }
             }

@@ -8,9 +8,9 @@ use dibs_nostd::glam::Vec3;
 use dibs_nostd::modes::{ModalFrame, ModalGate, ModalReader, Modes};
 use dibs_nostd::wire::{FrameId, WeightsEncoder};
 use dibs_nostd::{
-    Advance, Arriving, Assembler, Changed, Fallback, FrameLabel, FrameWriter, Frames, Gate, Millis,
-    MovingSurface, Options, Query, Sphere, StretchError, Tracker, Tree, Unchecked, Verdict,
-    VertexTable, measure_stretch,
+    Admission, Advance, Assembler, Fallback, FrameExtent, FrameLabel, FrameWriter, Frames, Gate,
+    IncomingSurface, Millis, MovingSurface, NoGate, Options, Query, Sphere, StretchError, Tracker,
+    Tree, VertexTable, measure_stretch,
 };
 use dibs_tests::deform::unit;
 use dibs_tests::modal::{anywhere, positions};
@@ -184,14 +184,14 @@ fn the_surface_between_frames_of_weights_is_where_they_put_it() {
                 assert!(apart <= found.closest.accuracy + whole.accuracy, "{epoch}: {found:?}");
                 kept += u32::from(found.fallback.is_none());
             }
-            if let Some(shown) = surfaces[2].shown_error() {
+            if let Some(shown) = surfaces[2].residual() {
                 let exact = errors[0].max(errors[1]);
                 let shown = f64::from(shown);
                 assert!(shown >= exact - 1e-4, "{epoch}: {shown} for {exact}");
                 loosest[1] = loosest[1].max(shown - 4.0 * exact);
                 told += 1;
             }
-            assert!(surfaces[..2].iter().all(|surface| surface.shown_error().is_none()));
+            assert!(surfaces[..2].iter().all(|surface| surface.residual().is_none()));
         }
     }
     println!(
@@ -240,7 +240,7 @@ fn weights_out_of_range_have_no_motion() {
             publish(&mut writer, weights, label(epoch, 20 * epoch));
             let frame = reader.latest(Millis(20 * epoch + 10)).of_any_age().expect("published");
             for surface in [frame, frame.interpolated(), frame.extrapolated()] {
-                assert_eq!(surface.travel().is_some(), !std::ptr::eq(weights, &raw const bad));
+                assert_eq!(surface.motion().is_some(), !std::ptr::eq(weights, &raw const bad));
             }
             let found = tracker.closest(&frame, &tool, &Options::cold().unsigned()).expect("sound");
             assert_eq!(found.fallback, expected, "{epoch}: {hostile}");
@@ -281,7 +281,7 @@ fn without_a_time_between_frames_nothing_moves() {
     let (writer, mut reader) = buffers(&modes);
     let mut bus = Assembler::new(writer, WithinRange(&modes), tree.mesh_id(), 1e4);
     let same = |frame: &ModalFrame<'_, MODES>, moved: ModalFrame<'_, MODES>| {
-        positions(frame) == positions(&moved) && moved.shown_error().is_none()
+        positions(frame) == positions(&moved) && moved.residual().is_none()
     };
     // Extrapolated once a third frame has shown the error.
     let frames = [(20, [true; 2]), (40, [false, true]), (40, [true; 2]), (60, [false, true])];
@@ -332,8 +332,8 @@ fn an_extrapolation_ends_at_the_ends_of_the_ranges() {
 struct WithinRange<'a>(&'a Modes<'a>);
 
 impl Gate for WithinRange<'_> {
-    fn begin(&mut self, changed: Changed) {
-        Unchecked.begin(changed);
+    fn begin(&mut self, changed: FrameExtent) {
+        NoGate.begin(changed);
     }
 
     fn weight_range(&self, mode: u32) -> Option<[f32; 2]> {
@@ -342,9 +342,9 @@ impl Gate for WithinRange<'_> {
 
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
-        arriving: Arriving<'_, V>,
+        arriving: IncomingSurface<'_, V>,
         work: u32,
-    ) -> Result<Verdict, StretchError> {
-        Unchecked.advance(arriving, work)
+    ) -> Result<Admission, StretchError> {
+        NoGate.advance(arriving, work)
     }
 }

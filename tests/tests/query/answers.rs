@@ -10,8 +10,8 @@ use dibs_nostd::constraint::{Proxy, SpringDamper, VelocityRow};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::modes::Modes;
 use dibs_nostd::{
-    Between, Budget, Capsule, Contacts, Odometer, Options, Proximity, Query, Step, Sweep, Tracker,
-    measure_stretch,
+    Budget, Capsule, Contacts, Odometer, Options, Proximity, Query, Step, SurfaceBlend, Sweep,
+    Tracker, measure_stretch,
 };
 use dibs_tests::modal::{anywhere, small};
 use dibs_tests::poses::pose;
@@ -129,7 +129,7 @@ fn walk(
     built: &BuiltTree,
     frames: &[Vec<Vec3>],
     is_ahead: bool,
-    mut ask: impl FnMut(usize, &Between<'_, [Vec3], [Vec3]>, &[Capsule; 8]),
+    mut ask: impl FnMut(usize, &SurfaceBlend<'_, [Vec3], [Vec3]>, &[Capsule; 8]),
 ) {
     let tree = built.tree::<u16>().expect("16-bit indices");
     let mut odometer = Odometer::new(&tree);

@@ -5,8 +5,8 @@ use std::env;
 use dibs_build::{Builder, Mesh};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
-    Budget, Capsule, Odometer, Options, QueryError, Sphere, Step, Sweep, Swept, Tool, Tracker,
-    measure_stretch,
+    Budget, Capsule, Odometer, Options, QueryError, Sphere, Step, Sweep, SweepAnswer, Tool,
+    Tracker, measure_stretch,
 };
 use dibs_tests::deform::unit;
 use dibs_tests::oracle::{Instrument, closest_pair};
@@ -72,14 +72,14 @@ impl Way<'_> {
         tracker: &mut Follower<'_>,
         step: &Step<'_, [Vec3], [Vec3]>,
         options: &Options,
-    ) -> Result<Swept, QueryError> {
+    ) -> Result<SweepAnswer, QueryError> {
         fn ask<T: Tool>(
             tracker: &mut Follower<'_>,
             step: &Step<'_, [Vec3], [Vec3]>,
             (shares, tools): ([f32; 2], [T; 2]),
             margin: f32,
             options: &Options,
-        ) -> Result<Swept, QueryError> {
+        ) -> Result<SweepAnswer, QueryError> {
             tracker.sweep(&Sweep { step, shares, tools }, margin, LOOKS, options)
         }
         if self.ends[0].start == self.ends[0].end {
@@ -103,7 +103,7 @@ struct Tally {
 
 impl Tally {
     /// Compares a sweep with the truth at many times.
-    fn check(&mut self, way: &Way<'_>, found: &Swept) {
+    fn check(&mut self, way: &Way<'_>, found: &SweepAnswer) {
         let margin = f64::from(way.margin);
         // The accuracy, and room for the rounding of f32 coordinates of this size.
         let points = way.ends.iter().flat_map(|end| [end.start, end.end]);

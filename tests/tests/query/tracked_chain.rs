@@ -2,7 +2,9 @@
 
 use dibs_build::{Builder, generate};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Budget, Capsule, Moved, NoSide, Odometer, Options, Query, Side, Sphere, Tracker};
+use dibs_nostd::{
+    Budget, Capsule, MovingTable, NoSide, Odometer, Options, Query, Side, Sphere, Tracker,
+};
 use dibs_tests::surfaces::{ball, sheet};
 use glam::Vec3;
 
@@ -137,9 +139,9 @@ fn no_tick_pays_for_a_long_rest() {
 
 /// The tracked answer for two pairs, and the separations of whole queries.
 fn closest_of_two(
-    pairs: &mut [(&mut Tracked<'_>, &Moved<'_, [Vec3]>, &Sphere); 2],
+    pairs: &mut [(&mut Tracked<'_>, &MovingTable<'_, [Vec3]>, &Sphere); 2],
     single: &mut Query<'_, u16, MAX_STACK>,
-) -> (dibs_nostd::Tracked, [f32; 2]) {
+) -> (dibs_nostd::TrackerAnswer, [f32; 2]) {
     let options = Options::new();
     let whole = [0, 1].map(|at| {
         let (_, surface, tool) = &pairs[at];
@@ -213,7 +215,7 @@ fn a_resting_link_that_sinks_in_is_inside() {
 
 #[test]
 fn no_pairs_have_no_closest() {
-    let none = Tracked::closest_of::<Moved<'_, [Vec3]>, Capsule>(&mut [], &Options::new());
+    let none = Tracked::closest_of::<MovingTable<'_, [Vec3]>, Capsule>(&mut [], &Options::new());
     assert_eq!(none, Ok(None));
 }
 

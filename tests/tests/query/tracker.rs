@@ -6,7 +6,7 @@ use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
     Budget, Capsule, Fallback, MeasuredStretch, MovingSurface, Odometer, Options, Query, Sphere,
-    Tool, Tracked, Tracker, Tree, measure_stretch,
+    Tool, Tracker, TrackerAnswer, Tree, measure_stretch,
 };
 use dibs_tests::deform::{Deformation, unit};
 use dibs_tests::method::Probe;
@@ -35,7 +35,7 @@ struct Tally {
 }
 
 impl Tally {
-    fn note(&mut self, found: &Tracked, whole_nodes: u32) {
+    fn note(&mut self, found: &TrackerAnswer, whole_nodes: u32) {
         self.ticks += 1;
         let cause = match found.fallback {
             Some(Fallback::Start) => 0,

@@ -5,7 +5,8 @@ use dibs_build::modes::ModalFit;
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, Motion, MotionStretch, Paths, generate};
 use dibs_nostd::modes::Modes;
 use dibs_nostd::{
-    Arriving, Changed, Gate, StretchError, StretchMonitor, SurfaceLimits, Verdict, measure_stretch,
+    Admission, FrameExtent, Gate, IncomingSurface, StretchError, StretchMonitor, SurfaceLimits,
+    measure_stretch,
 };
 use fastrand::Rng;
 use glam::{Mat3, Vec3};
@@ -27,9 +28,9 @@ fn admitted(built: &BuiltTree, rows: &[Vec3], shrinkage: f32) -> Result<(), Stre
     let tree = built.tree::<u16>().expect("small");
     let limits = SurfaceLimits::reach_mm(1e4).shrinkage(shrinkage);
     let mut gate = StretchMonitor::new(&tree).expect("has a metric").limits(limits);
-    gate.begin(Changed::Whole);
-    match gate.advance(Arriving::new(rows, rows.len() as u32), u32::MAX)? {
-        Verdict::Admitted(_) => Ok(()),
+    gate.begin(FrameExtent::Whole);
+    match gate.advance(IncomingSurface::new(rows, rows.len() as u32), u32::MAX)? {
+        Admission::Admitted(_) => Ok(()),
         other => panic!("{other:?}"),
     }
 }

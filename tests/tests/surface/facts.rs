@@ -162,7 +162,7 @@ fn a_surface_between_two_frames_and_beyond_them_has_a_stretch_of_both() {
     let step = odometer.step(&before, &after);
     for share in [0.0, 0.25, 0.5, 1.0] {
         let surface = step.at(share);
-        assert!(surface.travel().is_some());
+        assert!(surface.motion().is_some());
         let stated = surface.stretch().expect("both are known").sigma();
         let mean = (1.0 - share) * less.sigma() + share * more.sigma();
         assert!((stated - mean).abs() < 1e-6, "{share}: {stated} for {mean}");

@@ -5,8 +5,8 @@ use dibs_build::{Builder, BuiltTree};
 use dibs_nostd::modes::{ModalGate, ModalReader, Modes};
 use dibs_nostd::wire::{Event, FrameId, WeightsEncoder};
 use dibs_nostd::{
-    Advance, Arriving, Assembler, Changed, Frames, Gate, Millis, ReceiveError, StretchError,
-    StretchMonitor, SurfaceLimits, Tree, VertexTable,
+    Advance, Assembler, FrameExtent, Frames, Gate, IncomingSurface, Millis, ReceiveError,
+    StretchError, StretchMonitor, SurfaceLimits, Tree, VertexTable,
 };
 use dibs_tests::motions::trembling;
 use fastrand::Rng;
@@ -116,9 +116,10 @@ fn the_limit_on_the_speed_of_modes_is_exact() {
             let limits = SurfaceLimits::reach_mm(1e4).speed(step * share / 5.0);
             let exact = monitor.clone().limits(limits);
             let mut gate = ModalGate::<_, MODES>::new(&modes, exact).expect("four modes");
-            gate.begin(Changed::Whole);
+            gate.begin(FrameExtent::Whole);
             let before = Some((&before[..], Millis(4)));
-            let verdict = gate.advance(Arriving { before, ..Arriving::new(&now[..], 4) }, u32::MAX);
+            let verdict = gate
+                .advance(IncomingSurface { before, ..IncomingSurface::new(&now[..], 4) }, u32::MAX);
             let is_fast = matches!(verdict, Err(StretchError::TooFast { .. }));
             assert_eq!(is_fast, !may_pass, "{share} of {step}: {verdict:?}");
             refused += u32::from(is_fast);

@@ -7,8 +7,8 @@ use dibs_build::{Builder, BuiltTree, Motion, generate};
 use dibs_nostd::glam::{Quat, Vec3};
 use dibs_nostd::wire::{Encoding, Event, FrameEncoder, FrameId};
 use dibs_nostd::{
-    Advance, Arriving, Assembler, Changed, FrameReader, Frames, Gate, Millis, ReceiveError,
-    StretchError, StretchMonitor, SurfaceLimits, Tree, Verdict, VertexTable,
+    Admission, Advance, Assembler, FrameExtent, FrameReader, Frames, Gate, IncomingSurface, Millis,
+    ReceiveError, StretchError, StretchMonitor, SurfaceLimits, Tree, VertexTable,
 };
 use dibs_tests::bus::collect;
 
@@ -287,10 +287,10 @@ fn a_recorded_heart_shrinks_far_less_than_the_limit() {
             .limits(SurfaceLimits::reach_mm(1e3).shrinkage(part));
         for (number, frame) in motion.frames.iter().enumerate() {
             let rows = built.to_rows(frame);
-            monitor.begin(Changed::Whole);
-            let arriving = Arriving::new(rows.as_slice(), rows.len() as u32);
+            monitor.begin(FrameExtent::Whole);
+            let arriving = IncomingSurface::new(rows.as_slice(), rows.len() as u32);
             let verdict = monitor.advance(arriving, u32::MAX);
-            assert!(matches!(verdict, Ok(Verdict::Admitted(_))), "{number}: {verdict:?}");
+            assert!(matches!(verdict, Ok(Admission::Admitted(_))), "{number}: {verdict:?}");
         }
     }
 }

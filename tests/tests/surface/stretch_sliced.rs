@@ -1,8 +1,8 @@
 //! The stretch check in slices has the result of a measurement of the whole frame.
 
 use dibs_nostd::{
-    Arriving, Changed, Gate, MeasuredStretch, REGIONS, StretchError, StretchMonitor, SurfaceLimits,
-    Tree, Verdict, VertexTable, measure_stretch,
+    Admission, FrameExtent, Gate, IncomingSurface, MeasuredStretch, REGIONS, StretchError,
+    StretchMonitor, SurfaceLimits, Tree, VertexTable, measure_stretch,
 };
 use dibs_tests::deform::{deformed, unit};
 use fastrand::Rng;
@@ -11,12 +11,12 @@ use fastrand::Rng;
 fn feed<V: VertexTable + ?Sized>(
     gate: &mut impl Gate,
     surface: &V,
-    changed: Changed,
+    changed: FrameExtent,
     packets: &[std::ops::Range<u32>],
     rng: &mut Rng,
 ) -> Result<MeasuredStretch, StretchError> {
     let rows = surface.len() as u32;
-    let mut come = vec![changed == Changed::Partial; rows as usize];
+    let mut come = vec![changed == FrameExtent::Partial; rows as usize];
     packets.iter().cloned().flatten().for_each(|row| come[row as usize] = false);
     gate.begin(changed);
     let most = 1 + rng.u32(..400);
@@ -37,12 +37,12 @@ fn feed<V: VertexTable + ?Sized>(
             ready += 1;
         }
         let ready =
-            if changed == Changed::Partial && !is_last { ready.min(rows - 1) } else { ready };
+            if changed == FrameExtent::Partial && !is_last { ready.min(rows - 1) } else { ready };
         calls += 1;
         assert!(calls < 10_000, "the gate does not come to an end");
-        match gate.advance(Arriving::new(surface, ready), rng.u32(..=most))? {
-            Verdict::Pending => (),
-            Verdict::Admitted(measured) => {
+        match gate.advance(IncomingSurface::new(surface, ready), rng.u32(..=most))? {
+            Admission::Pending => (),
+            Admission::Admitted(measured) => {
                 assert!(ready == rows, "admitted before it was complete");
                 return Ok(measured.expect("a monitor measures"));
             }
@@ -88,13 +88,13 @@ fn sliced_is_whole_whatever_the_slices_and_the_packets() {
             rows[at] += unit(&mut rng) * 30.0;
         }
         let whole = measure_stretch(&tree, rows.as_slice());
-        let sliced = feed(&mut monitor, rows.as_slice(), Changed::Whole, &packets, &mut rng);
+        let sliced = feed(&mut monitor, rows.as_slice(), FrameExtent::Whole, &packets, &mut rng);
         assert_same(sliced, whole);
         assert_eq!(whole.is_err(), round % 3 == 2);
         let mut new = StretchMonitor::new(&tree)
             .expect("a metric")
             .limits(SurfaceLimits::reach_mm(1e3).shrinkage(0.0));
-        assert_eq!(feed(&mut new, rows.as_slice(), Changed::Whole, &packets, &mut rng), whole);
+        assert_eq!(feed(&mut new, rows.as_slice(), FrameExtent::Whole, &packets, &mut rng), whole);
     }
 }
 
@@ -110,7 +110,7 @@ fn partial_is_whole_and_measures_only_what_moved() {
     let vertices = tree.vertex_count();
     // Before the first publication, a partial frame is measured whole.
     let first =
-        feed(&mut monitor, surface.as_slice(), Changed::Partial, &in_packets(1, 1), &mut rng);
+        feed(&mut monitor, surface.as_slice(), FrameExtent::Partial, &in_packets(1, 1), &mut rng);
     assert_eq!(first, measure_stretch(&tree, surface.as_slice()));
     monitor.published();
     let (mut refused, mut abandoned) = (0, 0);
@@ -124,13 +124,13 @@ fn partial_is_whole_and_measures_only_what_moved() {
         let packets: Vec<_> = moved.clone().map(|row| row..row + 1).collect();
         if rng.u32(..5) == 0 {
             // A frame that is abandoned half-way.
-            monitor.begin(Changed::Partial);
+            monitor.begin(FrameExtent::Partial);
             monitor.moved(moved);
-            let _ = monitor.advance(Arriving::new(next.as_slice(), vertices), 20);
+            let _ = monitor.advance(IncomingSurface::new(next.as_slice(), vertices), 20);
             abandoned += 1;
             continue;
         }
-        let partial = feed(&mut monitor, next.as_slice(), Changed::Partial, &packets, &mut rng);
+        let partial = feed(&mut monitor, next.as_slice(), FrameExtent::Partial, &packets, &mut rng);
         assert_same(partial, whole);
         match partial {
             Ok(_) => {
@@ -143,10 +143,12 @@ fn partial_is_whole_and_measures_only_what_moved() {
     assert!(refused > 10 && abandoned > 10, "{refused} refused, {abandoned} abandoned");
 
     // For one vertex, only the triangles of its regions are measured.
-    monitor.begin(Changed::Partial);
+    monitor.begin(FrameExtent::Partial);
     monitor.moved(7..8);
     let mut work = 0;
-    while monitor.advance(Arriving::new(surface.as_slice(), vertices), 1) == Ok(Verdict::Pending) {
+    while monitor.advance(IncomingSurface::new(surface.as_slice(), vertices), 1)
+        == Ok(Admission::Pending)
+    {
         work += 1;
     }
     assert!(work > 0 && work < tree.triangle_count() / 4, "{work} triangles for one vertex");
@@ -163,10 +165,10 @@ fn a_slice_is_no_longer_than_it_may_be() {
         .expect("a metric")
         .limits(SurfaceLimits::reach_mm(1e3).shrinkage(0.0));
     for again in [0, REGIONS as u32] {
-        monitor.begin(Changed::Whole);
+        monitor.begin(FrameExtent::Whole);
         let mut calls = 1;
-        while monitor.advance(Arriving::new(rows.as_slice(), tree.vertex_count()), 1)
-            == Ok(Verdict::Pending)
+        while monitor.advance(IncomingSurface::new(rows.as_slice(), tree.vertex_count()), 1)
+            == Ok(Admission::Pending)
         {
             calls += 1;
         }

@@ -2,8 +2,8 @@
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
-    Capsule, Contacts, Fallback, MeasuredStretch, Moved, Odometer, Options, Sphere, Tool, Tracked,
-    Tracker, Tree, VertexTable,
+    Capsule, Contacts, Fallback, MeasuredStretch, MovingTable, Odometer, Options, Sphere, Tool,
+    Tracker, TrackerAnswer, Tree, VertexTable,
 };
 
 use super::MARGIN;
@@ -16,7 +16,7 @@ pub struct Track<'t> {
     chain: [Tracker<'t, u16, 512, 256>; 2],
     contacts: Contacts<16>,
     odometer: Odometer,
-    surface: Option<(&'static Copied, Moved<'static, Copied>)>,
+    surface: Option<(&'static Copied, MovingTable<'static, Copied>)>,
     ticks: u32,
 }
 
@@ -67,7 +67,7 @@ impl<'t> Track<'t> {
     }
 
     /// Contacts of the tool, and at times of a sphere.
-    fn touch(&mut self, surface: &Moved<'_, Copied>, tool: &Capsule) -> String {
+    fn touch(&mut self, surface: &MovingTable<'_, Copied>, tool: &Capsule) -> String {
         let (options, contacts) = (&Options::new(), &mut self.contacts);
         let found = if self.ticks / 8 % 2 == 1 {
             let tool = Sphere::new(tool.start(), tool.radius()).expect("a tool");
@@ -83,7 +83,7 @@ impl<'t> Track<'t> {
     }
 
     /// The closest pair of the tool and of the one before it in a chain.
-    fn chain(&mut self, surface: &Moved<'_, Copied>, tool: &Capsule) -> String {
+    fn chain(&mut self, surface: &MovingTable<'_, Copied>, tool: &Capsule) -> String {
         let end = tool.end();
         let far = Vec3::new(end.x + 20.0, end.y - 30.0, end.z + 10.0);
         let before = Capsule::new(far, end, tool.radius()).expect("a tool");
@@ -91,7 +91,7 @@ impl<'t> Track<'t> {
         let mut pairs = [(first, surface, &before), (second, surface, tool)];
         let found = Tracker::closest_of(&mut pairs, &Options::new()).expect("an answer");
         let found = found.expect("two pairs");
-        let Tracked { pair, searched, .. } = found;
+        let TrackerAnswer { pair, searched, .. } = found;
         let mut line = Line::new(&format!("chain {pair} {searched} {}", fallback(found.fallback)));
         line.proximity(&found.closest);
         line.end()

@@ -11,8 +11,12 @@ use crate::MAX_COORDINATE;
 use crate::bus::wire::{
     Body, Content, Counters, Event, FrameId, Mac, NoMac, Packet, Status, StreamError,
 };
-use crate::stretch::{Arriving, Gate, StretchError, StretchMonitor, SurfaceLimits, Verdict};
-use crate::surface::{Ahead, FrameLabel, FrameView, FrameWriter, LastStep, Millis, PublishError};
+use crate::stretch::{
+    Admission, Gate, IncomingSurface, StretchError, StretchMonitor, SurfaceLimits,
+};
+use crate::surface::{
+    FrameLabel, FrameView, FrameWriter, LastStep, Millis, PredictionCheck, PublishError,
+};
 use crate::tree::{Index, SurfaceFacts, Tree};
 
 use collector::Collector;
@@ -43,11 +47,11 @@ use step::{Earlier, Step};
 ///
 /// ```
 /// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
-/// use dibs_nostd::{Advance, Assembler, Frames, Millis, Unchecked, VertexTable, glam::Vec3};
+/// use dibs_nostd::{Advance, Assembler, Frames, Millis, NoGate, VertexTable, glam::Vec3};
 ///
 /// static FRAMES: Frames<3> = Frames::new();
 /// let (writer, mut reader) = FRAMES.split().unwrap();
-/// let mut assembler = Assembler::new(writer, Unchecked, 0xB0D1, 1000.0);
+/// let mut assembler = Assembler::new(writer, NoGate, 0xB0D1, 1000.0);
 ///
 /// let positions = [Vec3::X, Vec3::Y, Vec3::Z];
 /// let id = FrameId { mesh_id: 0xB0D1, session: 1, epoch: 1 };
@@ -357,7 +361,7 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
     fn check(&mut self, ready: u32, work: u32) -> Result<Advance, ReceiveError> {
         let Some(frame) = &self.collector.frame else { return Ok(Advance::Idle) };
         let (back, front) = (self.writer.back(), self.writer.front());
-        let unit = self.gate.travel_unit();
+        let unit = self.gate.motion_unit();
         let (mut work, mut compared) = (work, None);
         if let (Some(front), Some(_)) = (&front, &unit) {
             let two = self.writer.last_two();
@@ -380,7 +384,8 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
             time.unwrap_or_else(|| front.time_to(frame.captured()))
         };
         let before = before.map(|front| (front, time(front)));
-        let verdict = self.gate.advance(Arriving { surface: &back, ready, before, compared }, work);
+        let verdict =
+            self.gate.advance(IncomingSurface { surface: &back, ready, before, compared }, work);
         match verdict {
             Err(error) => {
                 let rejection = ReceiveError::Stretch(error);
@@ -390,19 +395,19 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
                 Err(rejection)
             }
             Ok(_) if !frame.is_complete => Ok(Advance::Idle),
-            Ok(Verdict::Pending) => Ok(Advance::Pending),
-            Ok(Verdict::Admitted(stretch)) => {
+            Ok(Admission::Pending) => Ok(Advance::Pending),
+            Ok(Admission::Admitted(stretch)) => {
                 let label = FrameLabel {
                     epoch: frame.id.epoch,
                     received: frame.captured(),
                     position_error: frame.begin.encoding.error() + self.gate.position_error(),
                     stretch,
                 };
-                let before = front.and_then(|front| front.travel());
-                let travel = unit.map(|unit| self.step.travel(&unit, before));
+                let before = front.and_then(|front| front.motion());
+                let motion = unit.map(|unit| self.step.motion(&unit, before));
                 let sigma = self.gate.ahead().unwrap_or(f32::NAN);
-                let ahead = Ahead { sigma, ..self.step.ahead(unit.as_ref()) };
-                self.writer.set_label(label, travel, ahead);
+                let ahead = PredictionCheck { sigma, ..self.step.ahead(unit.as_ref()) };
+                self.writer.set_label(label, motion, ahead);
                 self.is_admitted = true;
                 Ok(self.publish())
             }

@@ -10,7 +10,7 @@ use crate::bus::wire::{
     Begin, Body, Content, Encoding, Mac, Packet, Rows, Vertices, Weights, float_position,
     quantised_row,
 };
-use crate::stretch::{Changed, Gate};
+use crate::stretch::{FrameExtent, Gate};
 use crate::surface::Position;
 
 impl<G: Gate, M: Mac> Assembler<'_, G, M> {
@@ -74,7 +74,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
             }
         };
         self.step = Step::new();
-        self.gate.begin(if is_partial { Changed::Partial } else { Changed::Whole });
+        self.gate.begin(if is_partial { FrameExtent::Partial } else { FrameExtent::Whole });
         Ok(Progress::Begun { epoch: frame.id.epoch })
     }
 

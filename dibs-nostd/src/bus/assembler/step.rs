@@ -5,7 +5,7 @@
 
 use crate::math::sqrt::sqrt;
 use crate::stretch::{Compared, largest_change, largest_step};
-use crate::surface::{Ahead, Travel, TravelUnit, VertexTable};
+use crate::surface::{MotionReading, MotionUnit, PredictionCheck, VertexTable};
 
 /// Most units of a step that is extrapolated: more than 32 times the root sphere's radius.
 const MOST: u64 = 1 << 30;
@@ -71,7 +71,7 @@ impl Step {
     }
 
     /// The distance of the frame from the extrapolation, where there was one; its stretch is not known here.
-    pub fn ahead(&self, unit: Option<&TravelUnit>) -> Ahead {
+    pub fn ahead(&self, unit: Option<&MotionUnit>) -> PredictionCheck {
         let units = |squared| unit?.units_of_step(squared);
         let known = match (units(self.largest), units(self.off)) {
             (Some(step), Some(off)) if self.units < MOST && step < MOST && off < MOST => {
@@ -81,18 +81,18 @@ impl Step {
             }
             _ => None,
         };
-        let (passed, off) = known.unwrap_or((0, Ahead::UNKNOWN.off));
+        let (passed, off) = known.unwrap_or((0, PredictionCheck::UNKNOWN.off));
         // Of a velocity that changes steadily, after as long a time again as the last step took: more than was seen, if
         // the step took longer than the one before.
         let growth = 2.0 * self.share / (1.0 + self.share);
         let growth = if growth > 1.0 { growth } else { 1.0 };
-        Ahead { shown: sqrt(self.off) * growth, passed, off, ..Ahead::UNKNOWN }
+        PredictionCheck { shown: sqrt(self.off) * growth, passed, off, ..PredictionCheck::UNKNOWN }
     }
 
     /// The odometer's reading after the step from a frame with the reading `before`; a start where that is unknown, or
     /// the step is not finite.
-    pub fn travel(&self, unit: &TravelUnit, before: Option<Travel>) -> Travel {
+    pub fn motion(&self, unit: &MotionUnit, before: Option<MotionReading>) -> MotionReading {
         let after = before.and_then(|before| before.after_step(unit, self.largest));
-        after.unwrap_or_else(|| Travel::start(unit.tree))
+        after.unwrap_or_else(|| MotionReading::start(unit.tree))
     }
 }

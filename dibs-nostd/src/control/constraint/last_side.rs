@@ -59,7 +59,7 @@ impl LastSide {
     /// The answer to act on at this tick, from the query's.
     ///
     /// `moved` (mm) is the most that tool and surface together have moved since the last call, as
-    /// [`Tracked::moved`](crate::Tracked::moved); `None` if it is not known, which ends the past. An answer without a side
+    /// [`TrackerAnswer::moved`](crate::TrackerAnswer::moved); `None` if it is not known, which ends the past. An answer without a side
     /// that it cannot settle comes back as it is. An error does, too, and the past goes on.
     ///
     /// Cost: some tens of f32 operations.

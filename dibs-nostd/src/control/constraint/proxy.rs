@@ -54,7 +54,7 @@ impl defmt::Format for Wrench {
 /// Steps remain where two walls are less than 15 degrees apart, which may be one contact: up to a quarter of the force,
 /// a twelfth in size. Nearer to an edge than some 16 accuracies the direction is not known. Where places, list or budget
 /// end, shares are whole. The torque steps with a contact's point, where that slides along a wall. From a list that is not
-/// [complete](crate::Within::is_complete) the force is at least that of the closest pair.
+/// [complete](crate::ContactIter::is_complete) the force is at least that of the closest pair.
 ///
 /// The damper acts against the tool's speed into the surface, relative to the surface's velocity.
 ///

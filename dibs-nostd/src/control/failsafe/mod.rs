@@ -66,10 +66,10 @@ pub use status::LinkStatus;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Observation {
-    /// The published frame and its age: [`Latest::frame`](crate::Latest::frame); `None` before the first.
+    /// The published frame and its age: [`LatestSurface::frame`](crate::LatestSurface::frame); `None` before the first.
     pub frame: Option<FrameAge>,
     /// The time by which the surface that was searched is behind the present, as far as its own error does not cover
-    /// it: [`Between::lag`](crate::Between::lag). `None` for the frame as it was published, whose lag is its age.
+    /// it: [`SurfaceBlend::lag`](crate::SurfaceBlend::lag). `None` for the frame as it was published, whose lag is its age.
     pub lag: Option<Millis>,
     /// The bus's health.
     pub link: Link,
@@ -134,7 +134,7 @@ impl Verdict {
 /// let link = Link::CLEAR;
 /// let mut state = |now: u32, epoch, received: u32| {
 ///     let (age, received) = (Millis(now - received), Millis(received));
-///     let frame = Some(FrameAge { epoch, received, age }); // from `Latest::frame`
+///     let frame = Some(FrameAge { epoch, received, age }); // from `LatestSurface::frame`
 ///     let seen = Observation { frame, lag: None, link, query_error: None, is_tree_corrupt: false };
 ///     machine.step(&seen).state
 /// };

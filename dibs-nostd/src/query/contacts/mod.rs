@@ -105,13 +105,13 @@ pub struct Contacts<const N: usize, const NEAR: usize = 512> {
 
 /// The contacts of a list that a constraint acts on, deepest first: see [`Contacts::within`].
 #[derive(Clone, Debug)]
-pub struct Within<'c> {
+pub struct ContactIter<'c> {
     contacts: core::slice::Iter<'c, Contact>,
     bound: f32,
     is_complete: bool,
 }
 
-impl Within<'_> {
+impl ContactIter<'_> {
     /// Whether all contacts within the margin are among them. If not, the list or its places were too few, or the budget
     /// ended: walls may be missing beyond [`bound`](Self::bound).
     #[must_use]
@@ -126,7 +126,7 @@ impl Within<'_> {
     }
 }
 
-impl<'c> Iterator for Within<'c> {
+impl<'c> Iterator for ContactIter<'c> {
     type Item = &'c Contact;
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -169,13 +169,13 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     }
 
     /// The contacts, deepest first, for a constraint that acts within `margin` (mm). The deepest is among them for
-    /// certain; others may be missing where [`Within::is_complete`] says so.
+    /// certain; others may be missing where [`ContactIter::is_complete`] says so.
     ///
     /// # Errors
     /// [`Unavailable::CutShort`] if the budget ended before the deepest contact was known, or no query filled the list;
     /// [`Unavailable::NoSide`] if the tool may be inside and no contact is within the margin; [`QueryError::Margin`] if the
     /// query's margin was less.
-    pub fn within(&self, margin: f32) -> Result<Within<'_>, Unavailable> {
+    pub fn within(&self, margin: f32) -> Result<ContactIter<'_>, Unavailable> {
         let List { bound, is_open, has_no_side, accuracy, .. } = self.found;
         let is_complete = bound >= margin;
         if is_open && !is_complete {
@@ -189,7 +189,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             return Err(Unavailable::NoSide);
         }
         let contacts = self.found.list.get(..self.found.count).unwrap_or_default().iter();
-        Ok(Within { contacts, bound, is_complete })
+        Ok(ContactIter { contacts, bound, is_complete })
     }
 
     /// Gives a list whose tool may be inside, because the closest pair has no side, that of `closest`: a pair whose side

@@ -17,7 +17,7 @@ pub mod leaves;
 pub mod range;
 
 use crate::surface::motion::Unit;
-use crate::{Tool, Travel};
+use crate::{MotionReading, Tool};
 use axis::Axis;
 use clock::{MotionClock, Reading};
 use depth::KnownDepth;
@@ -32,7 +32,7 @@ const FARTHEST: u32 = 1 << 29;
 pub(super) struct Memory<const OPENED: usize, const RANGE: usize> {
     pub clock: MotionClock,
     /// Tool and surface at the last tick; none if its motion was not measured, or it ended in an error.
-    last: Option<(Axis, Travel)>,
+    last: Option<(Axis, MotionReading)>,
     /// When all due bounds of the front had last been tested.
     complete: Reading,
     pub front: Front<OPENED>,
@@ -66,9 +66,9 @@ impl<const OPENED: usize, const RANGE: usize> Memory<OPENED, RANGE> {
 
     /// The motion of tool and surface since the last tick, in units.
     #[inline(always)]
-    pub fn moved(&self, tool: &impl Tool, travel: Option<Travel>) -> Result<u32, Lost> {
+    pub fn moved(&self, tool: &impl Tool, motion: Option<MotionReading>) -> Result<u32, Lost> {
         let (axis, before) = self.last.ok_or(Lost::Start)?;
-        let surface = travel.and_then(|travel| travel.since(&before)).ok_or(Lost::Surface)?;
+        let surface = motion.and_then(|motion| motion.since(&before)).ok_or(Lost::Surface)?;
         let moved = surface.saturating_add(u64::from(axis.step(tool, self.clock.unit())));
         if moved > u64::from(FARTHEST.saturating_sub(self.clock.since(self.complete))) {
             return Err(Lost::Jump);
@@ -92,8 +92,8 @@ impl<const OPENED: usize, const RANGE: usize> Memory<OPENED, RANGE> {
     }
 
     /// Ends a tick, in which all due bounds of the front were tested if it is complete.
-    pub fn keep(&mut self, tool: &impl Tool, travel: Option<Travel>, is_complete: bool) {
-        self.last = travel.map(|travel| (Axis::of(tool), travel));
+    pub fn keep(&mut self, tool: &impl Tool, motion: Option<MotionReading>, is_complete: bool) {
+        self.last = motion.map(|motion| (Axis::of(tool), motion));
         if is_complete {
             self.complete = self.clock.now();
         }

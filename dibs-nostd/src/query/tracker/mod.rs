@@ -22,7 +22,7 @@ use crate::{Index, MovingSurface, Tool, Tree, TriangleRow};
 /// (Fronts of bounding volume trees: Klosowski et al. 1998, Tang et al. 2010. Bounds that expire: kinetic data
 /// structures; Barbič & James 2010.)
 ///
-/// The surface carries its motion, as [`MovingSurface::travel`]; where it was not measured, the tick is a whole query. An
+/// The surface carries its motion, as [`MovingSurface::motion`]; where it was not measured, the tick is a whole query. An
 /// [`Assembler`](crate::Assembler) with a tree's gate measures it for the frames that it publishes, and an
 /// [`Odometer`](crate::Odometer) for other tables.
 /// Another tool counts as a step to its position. The stretch in the options may change from tick to tick: remembered
@@ -83,7 +83,7 @@ struct Last {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
-pub struct Tracked {
+pub struct TrackerAnswer {
     /// The closest pair; its counts of tests are this tick's.
     pub closest: Proximity,
     /// The reason, if this tick was a whole query.
@@ -188,7 +188,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         surface: &S,
         tool: &T,
         options: &Options,
-    ) -> Result<Tracked, QueryError> {
+    ) -> Result<TrackerAnswer, QueryError> {
         self.within(surface, tool, options, f32::INFINITY)
     }
 
@@ -199,10 +199,10 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         tool: &T,
         options: &Options,
         separation: f32,
-    ) -> Result<Tracked, QueryError> {
-        let travel = surface.travel();
+    ) -> Result<TrackerAnswer, QueryError> {
+        let motion = surface.motion();
         let memory = &mut self.memory;
-        let moved = memory.moved(tool, travel);
+        let moved = memory.moved(tool, motion);
         memory.begin(moved);
         self.last = None;
         // Rounded to nearest from whole units.
@@ -237,11 +237,11 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let memory = &mut self.memory;
         let known = (&mut self.ties, Some(memory.depth.at(memory.clock)));
         signed(&self.tree, &mut self.stack, surface, tool, options, &mut closest, known)?;
-        memory.keep(tool, travel, is_complete);
+        memory.keep(tool, motion, is_complete);
         let (is_closed, now) = (self.tree.is_closed(), memory.clock.now());
-        self.last = travel.map(|_| Last::new(tool, &closest, is_closed, now));
+        self.last = motion.map(|_| Last::new(tool, &closest, is_closed, now));
         let opened = memory.front.borrow().used() as u32;
-        Ok(Tracked { closest, fallback, moved: moved_by, opened, pair: 0, searched: 1 })
+        Ok(TrackerAnswer { closest, fallback, moved: moved_by, opened, pair: 0, searched: 1 })
     }
 
     /// The closest pair, and all contacts within `margin` (mm): those of [`Query::contacts`](crate::Query::contacts).
@@ -263,7 +263,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         margin: f32,
         options: &Options,
         contacts: &mut Contacts<N, NEAR>,
-    ) -> Result<Tracked, QueryError> {
+    ) -> Result<TrackerAnswer, QueryError> {
         contacts.begin(margin, self.tree.has_adjacency())?;
         let found = self.add_contacts(surface, tool, options, contacts);
         contacts.unless_failed(found)
@@ -275,14 +275,14 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         tool: &T,
         options: &Options,
         contacts: &mut Contacts<N, NEAR>,
-    ) -> Result<Tracked, QueryError> {
+    ) -> Result<TrackerAnswer, QueryError> {
         let tracked = self.closest(surface, tool, options)?;
         let closest = &tracked.closest;
         let options =
             options.budget(options.budget.less(closest.node_tests, closest.triangle_tests));
         let pair =
             Pair { tree: &self.tree, vertices: surface, tool, closest, surface: 0, number: 0 };
-        match surface.travel() {
+        match surface.motion() {
             Some(_) => {
                 let front = self.memory.range.now(self.memory.clock, options.part);
                 contacts.add_tracked(&pair, &mut self.stack, &options, front)?

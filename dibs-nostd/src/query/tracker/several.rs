@@ -1,6 +1,6 @@
 //! Several trackers: the closest of all pairs. A pair that is certain to be farther is not looked at.
 
-use super::{Last, Tracked, Tracker};
+use super::{Last, Tracker, TrackerAnswer};
 use crate::query::{Budget, NoSide, Options, Proximity, Side};
 use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Tool};
@@ -68,9 +68,9 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     pub fn closest_of<S: MovingSurface + ?Sized, T: Tool>(
         pairs: &mut [(&mut Self, &S, &T)],
         options: &Options,
-    ) -> Result<Option<Tracked>, QueryError> {
+    ) -> Result<Option<TrackerAnswer>, QueryError> {
         let Some(first) = Self::nearest(pairs, options) else { return Ok(None) };
-        let mut found: Option<Tracked> = None;
+        let mut found: Option<TrackerAnswer> = None;
         // The pair with the least lead for each motion since it was searched; none if all have four times as much.
         let (mut ahead, mut lead_ahead, mut stale_ahead) = (None, 4.0, 1.0);
         let mut rest = *options;
@@ -92,7 +92,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             let own = &tracked.closest;
             rest = rest.budget(rest.budget.less(own.node_tests, own.triangle_tests));
             let moved = if pairs.len() > 1 { None } else { tracked.moved };
-            let own = Tracked { pair: at, moved, ..tracked };
+            let own = TrackerAnswer { pair: at, moved, ..tracked };
             found = Some(found.map_or(own, |found| found.and(own)));
         }
         if let (Some(found), Some(at)) = (&mut found, ahead)
@@ -117,7 +117,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         closest: f32,
         options: &Options,
     ) -> Result<Budget, QueryError> {
-        let moved = self.memory.moved(tool, surface.travel());
+        let moved = self.memory.moved(tool, surface.motion());
         let (Some(before), Ok(moved)) = (self.last, moved) else {
             return Ok(Budget { node_tests: 0, triangle_tests: 0 });
         };
@@ -169,7 +169,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         const NONE: Bound = Bound { apart: f32::NEG_INFINITY, stale: 0.0 };
         let last = self.last.filter(|last| last.is_signed || !options.is_signed);
         let Some(last) = last else { return NONE };
-        let Ok(moved) = self.memory.moved(tool, surface.travel()) else { return NONE };
+        let Ok(moved) = self.memory.moved(tool, surface.motion()) else { return NONE };
         let clock = &self.memory.clock;
         let clear = last.clear_after(clock.length(moved));
         let apart = clear - surface.position_error() - tool.radius();
@@ -179,7 +179,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     }
 }
 
-impl Tracked {
+impl TrackerAnswer {
     /// The closer of two pairs, with what was found out of both.
     fn and(self, other: Self) -> Self {
         let (one, two) = (self.closest, other.closest);

@@ -51,15 +51,15 @@ fn an_odometer_starts_anew_with_any_other_frame() {
     let mut rng = Rng::with_seed(1);
     for trial in 0..200 {
         let mut odometer = Odometer::new(&tree);
-        let first = odometer.start(rows.as_slice()).travel().unwrap();
+        let first = odometer.start(rows.as_slice()).motion().unwrap();
         let mut other = rows.clone();
         CHANGES[trial % CHANGES.len()](&mut other, &mut rng);
         let step = odometer.step(other.as_slice(), next.as_slice());
-        assert_eq!(step.after().travel().unwrap().since(&first), None, "change {trial}");
+        assert_eq!(step.after().motion().unwrap().since(&first), None, "change {trial}");
         // And it goes on with the frame that it measured last, wherever that lies.
-        let before = step.after().travel().unwrap();
+        let before = step.after().motion().unwrap();
         let copy = next.clone();
         let step = odometer.step(copy.as_slice(), rows.as_slice());
-        assert!(step.after().travel().unwrap().since(&before).is_some_and(|units| units > 0));
+        assert!(step.after().motion().unwrap().since(&before).is_some_and(|units| units > 0));
     }
 }

@@ -10,8 +10,8 @@ use dibs_nostd::wire::{
     Encoding, FrameEncoder, FrameId, Freshness, NoMac, encode_heartbeat, enframe, framed_bytes,
 };
 use dibs_nostd::{
-    Arriving, Budget, Changed, Cost, Gate, MeasuredStretch, Options, Query, StretchMonitor,
-    SurfaceLimits, Verdict,
+    Admission, Budget, Cost, FrameExtent, Gate, IncomingSurface, MeasuredStretch, Options, Query,
+    StretchMonitor, SurfaceLimits,
 };
 use dibs_tests::deform::{Deformation, unit};
 use fastrand::Rng;
@@ -131,9 +131,9 @@ fn dearest(mesh: &Mesh, built: &BuiltTree, number: usize, rng: &mut Rng) -> Resu
     let monitor = StretchMonitor::new(&tree)?.limits(SurfaceLimits::reach_mm(f32::INFINITY));
     let admitted = |rows: &[Vec3]| -> Option<MeasuredStretch> {
         let mut monitor = monitor.clone();
-        monitor.begin(Changed::Whole);
-        match monitor.advance(Arriving::new(rows, rows.len() as u32), u32::MAX) {
-            Ok(Verdict::Admitted(stretch)) => stretch,
+        monitor.begin(FrameExtent::Whole);
+        match monitor.advance(IncomingSurface::new(rows, rows.len() as u32), u32::MAX) {
+            Ok(Admission::Admitted(stretch)) => stretch,
             _ => None,
         }
     };

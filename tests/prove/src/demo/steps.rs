@@ -88,7 +88,7 @@ impl Steps {
         let answered = || ticks.iter().filter(|tick| tick.is_answered());
         let moved = answered().filter(|tick| tick.share > 1.0).count();
         steps.moved_on = moved as f64 / answered().count().max(1) as f64;
-        let errors = ticks.iter().map(|tick| tick.shown_error);
+        let errors = ticks.iter().map(|tick| tick.residual);
         steps.extrapolation_error_max_mm = errors.fold(0.0, f32::max);
         Ok(steps)
     }

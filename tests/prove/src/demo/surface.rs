@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::sender::Link;
 
-/// The vertices' positions at a tick, with the sums of `dibs_nostd::Between`.
+/// The vertices' positions at a tick, with the sums of `dibs_nostd::SurfaceBlend`.
 pub fn positions(link: &Link, tick: &Tick) -> Result<Vec<Vec3>> {
     let frame = |epoch| {
         link.frame(epoch)

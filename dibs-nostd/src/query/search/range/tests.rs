@@ -90,10 +90,10 @@ fn no_bound_of_a_range_exceeds_the_distance() {
             let tool = Capsule::new(tip, tip + span, 2.0).expect("a valid capsule");
             let share = tick as f32 / 8.0;
             let surface = step.at(share);
-            let travel = surface.travel().expect("measured");
-            let moved = memory.moved(&tool, Some(travel));
+            let motion = surface.motion().expect("measured");
+            let moved = memory.moved(&tool, Some(motion));
             memory.begin(moved);
-            memory.keep(&tool, Some(travel), true);
+            memory.keep(&tool, Some(motion), true);
             let mut search = |options: &Options| {
                 let search = Search::start(&tree, &mut stack, &surface, &tool, options, None, None);
                 let mut moved = memory.range.now(memory.clock, None);

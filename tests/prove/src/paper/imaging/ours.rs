@@ -3,8 +3,8 @@
 use dibs_build::BuiltTree;
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
-    Arriving, Changed, Gate, Index, MeasuredStretch, MovingSurface, Odometer, Options, Proximity,
-    Query, StretchMonitor, Tracked, Tracker, Tree, Verdict, VertexTable,
+    Admission, FrameExtent, Gate, IncomingSurface, Index, MeasuredStretch, MovingSurface, Odometer,
+    Options, Proximity, Query, StretchMonitor, Tracker, TrackerAnswer, Tree, VertexTable,
 };
 use dibs_tests::method::{Found, Probe};
 use glam::Vec3;
@@ -72,10 +72,10 @@ impl<'t, I: Index> Frames<'t, I> {
     fn measure(&mut self) {
         let Some(monitor) = &mut self.monitor else { return };
         let count = self.after.rows.len() as u32;
-        monitor.begin(Changed::Whole);
+        monitor.begin(FrameExtent::Whole);
         monitor.moved(0..count);
-        let verdict = monitor.advance(Arriving::new(&self.after, count), u32::MAX);
-        let Ok(Verdict::Admitted(stretch)) = verdict else { panic!("{verdict:?}") };
+        let verdict = monitor.advance(IncomingSurface::new(&self.after, count), u32::MAX);
+        let Ok(Admission::Admitted(stretch)) = verdict else { panic!("{verdict:?}") };
         monitor.published();
         self.after.stretch = stretch;
     }
@@ -133,7 +133,7 @@ fn track<I: Index, S: MovingSurface>(
     tracker: &mut Tracker<'_, I, MAX_STACK, OPENED>,
     surface: &S,
     tool: &Probe,
-) -> Tracked {
+) -> TrackerAnswer {
     let options = Options::new().unsigned();
     let tracked = match tool {
         Probe::Sphere(sphere) => tracker.closest(surface, sphere, &options),

@@ -123,7 +123,7 @@ fn a_large_step_after_a_small_one_is_not_understated() {
 
 /// The reading of a surface's odometer, which only its text tells.
 fn reading(surface: &impl MovingSurface) -> u64 {
-    let text = format!("{:?}", surface.travel().expect("measured"));
+    let text = format!("{:?}", surface.motion().expect("measured"));
     let number = text.split("reading: ").nth(1).and_then(|rest| rest.split(',').next());
     number.expect("a reading").parse().expect("a number")
 }
@@ -176,7 +176,7 @@ fn a_frame_published_by_hand_has_no_known_motion() {
     rows.iter().for_each(|&row| writer.push(row).expect("in the table"));
     let label = FrameLabel { epoch: 1, received: Millis(0), position_error: 0.0, stretch: None };
     writer.publish(label).expect("complete");
-    assert_eq!(reader.read().expect("published").travel(), None);
+    assert_eq!(reader.read().expect("published").motion(), None);
     let limits = SurfaceLimits::reach_mm(1_000.0);
     let mut assembler = Assembler::for_tree(writer, &tree, limits).expect("a metric");
     let mut readings = Vec::new();
@@ -189,7 +189,7 @@ fn a_frame_published_by_hand_has_no_known_motion() {
         while assembler.advance(100).expect("within the limits") == Advance::Pending {}
         let frame = reader.read().expect("published");
         assert_eq!(frame.epoch(), Some(epoch));
-        readings.push(frame.travel().expect("measured"));
+        readings.push(frame.motion().expect("measured"));
     }
     // At rest a step is counted as the least possible one.
     assert!(readings[0] != readings[1] && readings[1] != readings[2], "{readings:?}");

@@ -1,31 +1,31 @@
 //! The step of an extrapolated surface at a new frame: the extrapolation's error, not the way between the frames.
 //!
 //! Of the frames `a`, `b` and `c`, let `c = b + r (b - a) + e`: `r` is the place in time at which `c` was expected on the
-//! course of `a` and `b`, and `e` its distance from there. Before `c`, the surface was `b + s (b - a)`; after it, it is
-//! `c + t (c - b)`. The difference is `((1 + t) r - s) (b - a) + (1 + t) e`: the time that went by on the old course, and
+//! prediction of `a` and `b`, and `e` its distance from there. Before `c`, the surface was `b + s (b - a)`; after it, it is
+//! `c + t (c - b)`. The difference is `((1 + t) r - s) (b - a) + (1 + t) e`: the time that went by on the old prediction, and
 //! an error that grows with the new one.
 
-use super::buffer::Ahead;
+use super::buffer::PredictionCheck;
 
-/// The course of the frames one earlier, as far as an extrapolated surface is along it.
+/// The prediction of the frames one earlier, as far as an extrapolated surface is along it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub(crate) struct Course {
-    /// Units of the odometer from the frame before to the surface's; 0 if there is no course.
+pub(crate) struct Prediction {
+    /// Units of the odometer from the frame before to the surface's; 0 if there is no prediction.
     units: u32,
-    /// Units from the frame before on the earlier course: `(1 + t) r` times the length of `b - a`.
+    /// Units from the frame before on the earlier prediction: `(1 + t) r` times the length of `b - a`.
     passed: u32,
     /// Units from that place to the surface, at most.
     off: u32,
 }
 
-impl Course {
+impl Prediction {
     /// Of a surface that is not extrapolated.
     pub const NONE: Self = Self { units: 0, passed: 0, off: 0 };
 
-    /// The course of a surface extrapolated by a `share` of the step, `units` long, to a frame whose label has `ahead`.
-    pub fn new(units: u64, ahead: &Ahead, share: f32) -> Self {
-        if ahead.off == Ahead::UNKNOWN.off {
+    /// The prediction of a surface extrapolated by a `share` of the step, `units` long, to a frame whose label has `ahead`.
+    pub fn new(units: u64, ahead: &PredictionCheck, share: f32) -> Self {
+        if ahead.off == PredictionCheck::UNKNOWN.off {
             return Self::NONE;
         }
         // `1 + share` times as much. No sum overflows: `share` is at most 2.
@@ -40,7 +40,7 @@ impl Course {
         }
     }
 
-    /// The farthest that a vertex can be from its place `aside` units beyond the frame before, on the course of that;
+    /// The farthest that a vertex can be from its place `aside` units beyond the frame before, on the prediction of that;
     /// `None` if the frame before is not `along` units away.
     #[inline(always)]
     pub fn since(&self, along: u64, aside: u32) -> Option<u64> {

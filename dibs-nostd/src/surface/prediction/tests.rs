@@ -9,8 +9,8 @@ use dibs_build::{Builder, generate};
 use fastrand::Rng;
 use glam::Vec3;
 
-use super::{Ahead, Course};
-use crate::surface::motion::{Travel, Unit};
+use super::{Prediction, PredictionCheck};
+use crate::surface::motion::{MotionReading, Unit};
 use crate::wire::{Encoding, FrameEncoder, FrameId};
 use crate::{
     Advance, Assembler, Frames, Millis, MovingSurface, StretchMonitor, SurfaceLimits, Tree,
@@ -83,7 +83,7 @@ fn follow(motion: Motion) {
     let mut velocity = Vec3::ZERO;
     let mut now = 40_u32.wrapping_neg();
     // The last tick, and the motion stated since an earlier one.
-    let mut last: Option<(Travel, Vec<Vec3>, u32)> = None;
+    let mut last: Option<(MotionReading, Vec<Vec3>, u32)> = None;
     let mut earlier: Option<(Vec<Vec3>, f64)> = None;
     let (mut new, mut sums) = (0, [0.0; 2]);
     for epoch in 1..1_500_u32 {
@@ -106,10 +106,10 @@ fn follow(motion: Motion) {
             tick = tick.wrapping_add(if is_steady { 1 } else { rng.u32(..8) });
             let frame = reader.latest(Millis(tick)).of_any_age().unwrap();
             let surface = frame.extrapolated();
-            let travel = surface.travel().unwrap();
+            let motion = surface.motion().unwrap();
             let found = positions(&surface);
             if let Some((before, positions, seen)) = &last {
-                let units = travel.since(before).unwrap();
+                let units = motion.since(before).unwrap();
                 let stated = f64::from(unit.length(units as i32));
                 let moved = apart(positions, &found);
                 assert!(moved <= stated + rounding, "{epoch}: {moved} {stated}");
@@ -126,7 +126,7 @@ fn follow(motion: Motion) {
             if earlier.is_none() || rng.u32(..500) == 0 {
                 earlier = Some((found.clone(), 0.0));
             }
-            last = Some((travel, found, epoch));
+            last = Some((motion, found, epoch));
         }
         // A tick may come up to its own time late, and so after the next frame was.
         now = if is_steady || rng.bool() { now } else { tick };
@@ -158,12 +158,12 @@ fn the_order_of_two_readings_does_not_matter() {
         for age in [0, 8, 24] {
             let frame = reader.latest(Millis(now + age)).of_any_age().unwrap();
             let surface = frame.extrapolated();
-            seen.push((surface.travel().unwrap(), positions(&surface)));
+            seen.push((surface.motion().unwrap(), positions(&surface)));
         }
     }
-    for (travel, rows) in &seen {
+    for (motion, rows) in &seen {
         for (other, others) in &seen {
-            let Some(units) = travel.since(other) else { continue };
+            let Some(units) = motion.since(other) else { continue };
             let stated = f64::from(Unit::of(&tree).length(units as i32));
             let moved = apart(others, rows);
             assert!(moved <= stated + 1e-4, "{moved} {stated}");
@@ -171,7 +171,7 @@ fn the_order_of_two_readings_does_not_matter() {
     }
 }
 
-/// Of any numbers, however large, a course says nothing or no less than the motion.
+/// Of any numbers, however large, a prediction says nothing or no less than the motion.
 #[test]
 fn a_course_is_not_cut_to_the_numbers_that_fit() {
     let mut rng = Rng::with_seed(8);
@@ -181,16 +181,16 @@ fn a_course_is_not_cut_to_the_numbers_that_fit() {
         let (passed, off, units) = (any(&mut rng), any(&mut rng), any(&mut rng).max(1));
         // Of all shares alike: a small one hardly ever makes a number that does not fit.
         let share = rng.u32(..2_000) as f32 / 999.5;
-        let ahead = Ahead { passed, off, ..Ahead::UNKNOWN };
-        let course = Course::new(units.into(), &ahead, share);
-        if course == Course::NONE {
+        let ahead = PredictionCheck { passed, off, ..PredictionCheck::UNKNOWN };
+        let prediction = Prediction::new(units.into(), &ahead, share);
+        if prediction == Prediction::NONE {
             let most = f64::from(passed.max(off)) * f64::from(1.0 + share);
             assert!(most > f64::from(u32::MAX) / 2.0, "{passed} {off} {share}");
             unknown += 1;
             continue;
         }
         let place = any(&mut rng);
-        let stated = course.since(units.into(), place).unwrap();
+        let stated = prediction.since(units.into(), place).unwrap();
         let grown = f64::from(1.0 + share);
         let farthest =
             (f64::from(passed) * grown - f64::from(place)).abs() + f64::from(off) * grown;
@@ -201,15 +201,15 @@ fn a_course_is_not_cut_to_the_numbers_that_fit() {
         known += 1;
     }
     assert!(known > 10_000 && unknown > 1_000, "{known} {unknown}");
-    let ahead = Ahead { passed: 5, off: 5, ..Ahead::UNKNOWN };
-    assert_eq!(Course::new(1 << 32, &ahead, 1.0), Course::NONE);
-    assert_ne!(Course::new((1 << 32) - 1, &ahead, 1.0), Course::NONE);
+    let ahead = PredictionCheck { passed: 5, off: 5, ..PredictionCheck::UNKNOWN };
+    assert_eq!(Prediction::new(1 << 32, &ahead, 1.0), Prediction::NONE);
+    assert_ne!(Prediction::new((1 << 32) - 1, &ahead, 1.0), Prediction::NONE);
 }
 
 /// An odometer that cannot count on starts anew.
 #[test]
 fn a_reading_that_does_not_fit_is_a_start() {
-    let start = Travel::start(7);
+    let start = MotionReading::start(7);
     let far = start.along(u64::MAX - 5);
     assert_eq!(far.since(&start), Some(u64::MAX - 5));
     assert_eq!(far.along(5).since(&far), Some(5));
