@@ -123,9 +123,9 @@ impl fmt::Display for Event {
 /// let mut counters = dibs_nostd::wire::Counters::new();
 /// assert_eq!(counters.to_string(), "no events");
 /// assert_eq!(format!("{counters:?}"), "{}");
-/// # use dibs_nostd::{Assembler, Frames, Millis, Unchecked};
+/// # use dibs_nostd::{Assembler, Frames, Millis, NoGate};
 /// # let frames = Frames::<3>::new();
-/// # let mut assembler = Assembler::new(frames.split().unwrap().0, Unchecked, 7, 1e3);
+/// # let mut assembler = Assembler::new(frames.split().unwrap().0, NoGate, 7, 1e3);
 /// assembler.accept(&[1, 2, 3], Millis(0)).unwrap_err();
 /// assert_eq!(assembler.counters().to_string(), "damaged 1");
 /// assert_eq!(format!("{:?}", assembler.counters()), r#"{"damaged": 1}"#);
