@@ -22,6 +22,12 @@
 /** Bytes of the storage of a surface of so many vertices. */
 #define DIBS_SURFACE_SIZE(vertices) (DIBS_SURFACE_BASE + (size_t)DIBS_SURFACE_VERTEX * (vertices))
 
+/** Bytes of the storage of a guarded surface of so many vertices. */
+#define DIBS_GUARDED_SIZE(vertices) (DIBS_SURFACE_BASE + (size_t)DIBS_GUARDED_VERTEX * (vertices))
+
+/** Bytes of the memory of a loop's objects, on a tree of so many vertices. */
+#define DIBS_START_SIZE(vertices) (DIBS_START_BASE + DIBS_GUARDED_SIZE(vertices))
+
 /** Bytes of the storage of a tracker on a tree of so many vertices. */
 #define DIBS_TRACKER_SIZE(vertices) (DIBS_TRACKER_BASE + (size_t)DIBS_TRACKER_VERTEX * (vertices))
 
@@ -30,6 +36,11 @@
  * Alignment, in bytes, of the storage of every object.
  */
 #define DIBS_ALIGNMENT 8
+
+/**
+ * Bytes of a bus's storage.
+ */
+#define DIBS_BUS_SIZE 3072
 
 /**
  * Bytes of a list's storage.
@@ -55,6 +66,16 @@
  * Bytes of a frame's storage.
  */
 #define DIBS_FRAME_SIZE 192
+
+/**
+ * Bytes of a guard's storage.
+ */
+#define DIBS_GUARD_SIZE 17664
+
+/**
+ * Bytes of the memory of a loop's objects, besides the surface.
+ */
+#define DIBS_START_BASE ((DIBS_TREE_SIZE + DIBS_BUS_SIZE) + DIBS_GUARD_SIZE)
 
 /**
  * Bytes of a query's storage.
@@ -119,12 +140,17 @@
 /**
  * Bytes of a surface's storage besides its vertices.
  */
-#define DIBS_SURFACE_BASE 384
+#define DIBS_SURFACE_BASE 448
 
 /**
  * Bytes of a surface's storage for each vertex: two positions.
  */
 #define DIBS_SURFACE_VERTEX 24
+
+/**
+ * Bytes of a guarded surface's storage for each vertex: three positions.
+ */
+#define DIBS_GUARDED_VERTEX 36
 
 /**
  * Most tools of a chain.
@@ -155,6 +181,11 @@
  * Bytes of a scrub's storage.
  */
 #define DIBS_SCRUB_SIZE 128
+
+/**
+ * Bytes of a writer's storage.
+ */
+#define DIBS_WRITER_SIZE 256
 
 /**
  * The outcome of a call. Numbers do not change from version to version; those from 1 to 99 are misuses.
@@ -478,39 +509,6 @@ typedef uint32_t dibs_code;
 #endif // __cplusplus
 
 /**
- * The origin of a force.
- */
-enum dibs_force_state
-#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
-  : uint32_t
-#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
- {
-  /**
-   * The tool is outside the margin: no force.
-   */
-  DIBS_FORCE_STATE_INACTIVE = 0,
-  /**
-   * The wall acts.
-   */
-  DIBS_FORCE_STATE_ACTIVE = 1,
-  /**
-   * The wall acts with its largest force.
-   */
-  DIBS_FORCE_STATE_SATURATED = 2,
-  /**
-   * The answer cannot be used: the force is the hold.
-   */
-  DIBS_FORCE_STATE_SAFE = 3,
-};
-#ifndef __cplusplus
-#if __STDC_VERSION__ >= 202311L
-typedef enum dibs_force_state dibs_force_state;
-#else
-typedef uint32_t dibs_force_state;
-#endif // __STDC_VERSION__ >= 202311L
-#endif // __cplusplus
-
-/**
  * The outcome of a packet.
  */
 enum dibs_progress
@@ -585,6 +583,39 @@ enum dibs_advance
 typedef enum dibs_advance dibs_advance;
 #else
 typedef uint32_t dibs_advance;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * The origin of a force.
+ */
+enum dibs_force_state
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * The tool is outside the margin: no force.
+   */
+  DIBS_FORCE_STATE_INACTIVE = 0,
+  /**
+   * The wall acts.
+   */
+  DIBS_FORCE_STATE_ACTIVE = 1,
+  /**
+   * The wall acts with its largest force.
+   */
+  DIBS_FORCE_STATE_SATURATED = 2,
+  /**
+   * The answer cannot be used: the force is the hold.
+   */
+  DIBS_FORCE_STATE_SAFE = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_force_state dibs_force_state;
+#else
+typedef uint32_t dibs_force_state;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -713,6 +744,78 @@ typedef uint32_t dibs_coverage;
 #endif // __cplusplus
 
 /**
+ * Trust in the surface.
+ */
+enum dibs_state
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * Every input is within its limits.
+   */
+  DIBS_STATE_NOMINAL = 0,
+  /**
+   * The surface is acted on, with a growing margin.
+   */
+  DIBS_STATE_DEGRADED = 1,
+  /**
+   * The surface is not acted on.
+   */
+  DIBS_STATE_SAFE = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_state dibs_state;
+#else
+typedef uint32_t dibs_state;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * A processor and a tool whose tests were counted.
+ */
+enum dibs_cost
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * A sphere on a Cortex-M7.
+   */
+  DIBS_COST_M7_SPHERE = 0,
+  /**
+   * A capsule on a Cortex-M7.
+   */
+  DIBS_COST_M7_CAPSULE = 1,
+  /**
+   * A sphere on x86-64.
+   */
+  DIBS_COST_X86_SPHERE = 2,
+  /**
+   * A capsule on x86-64.
+   */
+  DIBS_COST_X86_CAPSULE = 3,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_cost dibs_cost;
+#else
+typedef uint32_t dibs_cost;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * The bus's end of a guarded surface: it takes packets, checks complete frames in slices, publishes them, watches the tree's
+ * bytes, and makes the statuses that go back.
+ *
+ * Two contexts may use it, one at a time: an interrupt that takes bytes, and an idle loop that works. Both are below the
+ * control tick's priority. The interrupt gets `DIBS_CODE_IN_USE` where it meets the loop at work: it keeps its bytes for
+ * later, or the loop works with the interrupt masked.
+ */
+typedef struct dibs_bus dibs_bus;
+
+/**
  * A list of contacts.
  *
  * One context at a time.
@@ -732,6 +835,14 @@ typedef struct dibs_failsafe dibs_failsafe;
  * One context at a time.
  */
 typedef struct dibs_frame dibs_frame;
+
+/**
+ * The control tick's end of a guarded surface: the closest pair of one tool on the surface as it is now, and the trust in
+ * it.
+ *
+ * One context at a time: the control interrupt, of higher priority than the bus's.
+ */
+typedef struct dibs_guard dibs_guard;
 
 /**
  * A query on one tree. It starts from its last answer.
@@ -762,7 +873,8 @@ typedef struct dibs_receiver dibs_receiver;
 typedef struct dibs_scrub dibs_scrub;
 
 /**
- * Two buffers of vertices: the receiver fills one, the reader holds the other, and neither waits.
+ * Two buffers of vertices: one end fills one, the other end holds the other, and neither waits. A third keeps the frame
+ * before, from which a guard knows the motion.
  *
  * Any number of contexts may use it at once.
  */
@@ -782,6 +894,184 @@ typedef struct dibs_tracker dibs_tracker;
  * Any number of contexts may use it at once.
  */
 typedef struct dibs_tree dibs_tree;
+
+/**
+ * Publishes frames whose positions the caller has, for a reader of the same surface.
+ *
+ * A frame is one `dibs_writer_begin`, any number of `dibs_writer_push`, and one `dibs_writer_publish`. Only the stretch is
+ * checked: frames that come over a line belong to a receiver. One context at a time.
+ */
+typedef struct dibs_writer dibs_writer;
+
+/**
+ * The most work that a query may do.
+ */
+typedef struct {
+  /**
+   * Most sphere bounds evaluated.
+   */
+  uint32_t node_tests;
+  /**
+   * Most exact tests of a tool and a triangle.
+   */
+  uint32_t triangle_tests;
+} dibs_budget;
+
+/**
+ * Options of a query. Null for none: no budget, a warm start, signed.
+ */
+typedef struct {
+  /**
+   * The most work. Zeros ask for next to nothing: set both.
+   */
+  dibs_budget budget;
+  /**
+   * Largest length (mm) of the interval of a depth where the tool's axis crosses the surface; 0 for a 512th of the
+   * axis' length.
+   */
+  float depth_tolerance;
+  /**
+   * The sum of any of `DIBS_COLD`, `DIBS_UNSIGNED` and `DIBS_CONTACTS_OF`.
+   */
+  uint32_t flags;
+  /**
+   * A triangle's label, for `DIBS_CONTACTS_OF`: at most 255.
+   */
+  uint32_t label;
+} dibs_options;
+
+/**
+ * Two limits on one input: beyond the first the state is degraded, beyond the second safe. Both `DIBS_UNLIMITED` where
+ * the input is not watched; otherwise below 2^31.
+ */
+typedef struct {
+  /**
+   * The first limit.
+   */
+  uint32_t degraded;
+  /**
+   * The second limit, not below the first.
+   */
+  uint32_t safe;
+} dibs_watch;
+
+/**
+ * The machine's limits. Times are in ms.
+ */
+typedef struct {
+  /**
+   * Age of the surface; must be watched.
+   */
+  dibs_watch age;
+  /**
+   * Time since any good packet.
+   */
+  dibs_watch silence;
+  /**
+   * Time since the last heartbeat.
+   */
+  dibs_watch heartbeat;
+  /**
+   * Frames refused or abandoned since the last one was published.
+   */
+  dibs_watch rejections;
+  /**
+   * Time that the published frame was on its way. With `DIBS_UNLIMITED` it has no limit, and is in the margin.
+   */
+  dibs_watch transit;
+  /**
+   * Age of the published frame when it was sent; a safe limit is below 65,534.
+   */
+  dibs_watch source_age;
+  /**
+   * Forged packets, of which 10 are forgotten each second; the limits are below 1,000.
+   */
+  dibs_watch forgeries;
+  /**
+   * Largest speed of any point of the tissue, in mm per ms (m/s); at least 0.
+   */
+  float tissue_speed;
+  /**
+   * Frames in a row that recover: 1 to 65,535.
+   */
+  uint32_t recovery_frames;
+  /**
+   * Steps in a row with every input within its first limit, before the one that recovers.
+   */
+  uint32_t dwell;
+  /**
+   * Other than 0 to leave the time on the way out of the margin and the limits: a delay is then not detected.
+   */
+  uint32_t without_transit;
+  /**
+   * 0 to leave the safe state by an acknowledgement alone; otherwise without one.
+   */
+  uint32_t automatic;
+} dibs_limits;
+
+/**
+ * Limits of a surface besides the tree's stretch limit. A limit that is not a number refuses every frame.
+ */
+typedef struct {
+  /**
+   * No coordinate is beyond this (mm) on any axis. The smaller, the more damage it tells from a surface.
+   */
+  float reach;
+  /**
+   * Largest speed of a vertex, in mm per ms (m/s); `INFINITY` for no limit.
+   */
+  float speed;
+  /**
+   * Least size of a region as a part of its size at rest, 0.25 for example; 0 for no limit.
+   */
+  float shrinkage;
+  /**
+   * Farthest (mm) that a vertex may be from its place in the published frame, however long ago that was; 0 for a
+   * tenth of the reach, `INFINITY` for no limit.
+   */
+  float recovery;
+} dibs_surface_limits;
+
+/**
+ * How far a surface is trusted, and how a tick asks. `dibs_guard_limits_of` makes one of two numbers.
+ */
+typedef struct {
+  /**
+   * Largest speed (mm/s) of any point of the tissue, at least 0.
+   */
+  float speed;
+  /**
+   * Largest age (ms) of a surface: about two periods of the source and the time on the way. From three quarters of it on
+   * the state is degraded, beyond it safe.
+   */
+  uint32_t age;
+  /**
+   * Ticks of the control loop a second, above 0: velocities count from it.
+   */
+  uint32_t ticks_a_second;
+  /**
+   * Options of every tick's query; its budget is the most work of a tick.
+   */
+  dibs_options options;
+  /**
+   * 0 to leave the safe state by an acknowledgement alone; otherwise without one.
+   */
+  uint32_t automatic;
+  /**
+   * Other than 0 for a line on which no status goes back: a delayed frame is then taken for a new one, and no margin
+   * covers the delay.
+   */
+  uint32_t without_transit;
+  /**
+   * The fail-safe machine's limits; or null for those that follow from the four numbers above.
+   */
+  const dibs_limits *trust;
+  /**
+   * The published surfaces' limits; or null for those that follow from the speed and the tree's rest shape: no vertex is
+   * farther than four sizes of it.
+   */
+  const dibs_surface_limits *surfaces;
+} dibs_guard_limits;
 
 /**
  * A point, a direction, a force or a velocity.
@@ -953,43 +1243,6 @@ typedef struct {
 } dibs_tool;
 
 /**
- * The most work that a query may do.
- */
-typedef struct {
-  /**
-   * Most sphere bounds evaluated.
-   */
-  uint32_t node_tests;
-  /**
-   * Most exact tests of a tool and a triangle.
-   */
-  uint32_t triangle_tests;
-} dibs_budget;
-
-/**
- * Options of a query. Null for none: no budget, a warm start, signed.
- */
-typedef struct {
-  /**
-   * The most work. Zeros ask for next to nothing: set both.
-   */
-  dibs_budget budget;
-  /**
-   * Largest length (mm) of the interval of a depth where the tool's axis crosses the surface; 0 for a 512th of the
-   * axis' length.
-   */
-  float depth_tolerance;
-  /**
-   * The sum of any of `DIBS_COLD`, `DIBS_UNSIGNED` and `DIBS_CONTACTS_OF`.
-   */
-  uint32_t flags;
-  /**
-   * A triangle's label, for `DIBS_CONTACTS_OF`: at most 255.
-   */
-  uint32_t label;
-} dibs_options;
-
-/**
  * Facts that hold for a list.
  */
 typedef struct {
@@ -1080,75 +1333,6 @@ typedef struct {
    */
   float least;
 } dibs_row;
-
-/**
- * Two limits on one input: beyond the first the state is degraded, beyond the second safe. Both `DIBS_UNLIMITED` where
- * the input is not watched; otherwise below 2^31.
- */
-typedef struct {
-  /**
-   * The first limit.
-   */
-  uint32_t degraded;
-  /**
-   * The second limit, not below the first.
-   */
-  uint32_t safe;
-} dibs_watch;
-
-/**
- * The machine's limits. Times are in ms.
- */
-typedef struct {
-  /**
-   * Age of the surface; must be watched.
-   */
-  dibs_watch age;
-  /**
-   * Time since any good packet.
-   */
-  dibs_watch silence;
-  /**
-   * Time since the last heartbeat.
-   */
-  dibs_watch heartbeat;
-  /**
-   * Frames refused or abandoned since the last one was published.
-   */
-  dibs_watch rejections;
-  /**
-   * Time that the published frame was on its way. With `DIBS_UNLIMITED` it has no limit, and is in the margin.
-   */
-  dibs_watch transit;
-  /**
-   * Age of the published frame when it was sent; a safe limit is below 65,534.
-   */
-  dibs_watch source_age;
-  /**
-   * Forged packets, of which 10 are forgotten each second; the limits are below 1,000.
-   */
-  dibs_watch forgeries;
-  /**
-   * Largest speed of any point of the tissue, in mm per ms (m/s); at least 0.
-   */
-  float tissue_speed;
-  /**
-   * Frames in a row that recover: 1 to 65,535.
-   */
-  uint32_t recovery_frames;
-  /**
-   * Steps in a row with every input within its first limit, before the one that recovers.
-   */
-  uint32_t dwell;
-  /**
-   * Other than 0 to leave the time on the way out of the margin and the limits: a delay is then not detected.
-   */
-  uint32_t without_transit;
-  /**
-   * 0 to leave the safe state by an acknowledgement alone; otherwise without one.
-   */
-  uint32_t automatic;
-} dibs_limits;
 
 /**
  * The frame that was published last, and its age.
@@ -1279,27 +1463,46 @@ typedef struct {
 } dibs_interval;
 
 /**
- * Limits of a surface besides the tree's stretch limit. A limit that is not a number refuses every frame.
+ * The answer of a tick: what a wall may act on, and how it came about.
  */
 typedef struct {
   /**
-   * No coordinate is beyond this (mm) on any axis. The smaller, the more damage it tells from a surface.
+   * A `dibs_code`: `DIBS_CODE_OK` where there is a pair to act on; otherwise why there is none.
    */
-  float reach;
+  uint32_t outcome;
   /**
-   * Largest speed of a vertex, in mm per ms (m/s); `INFINITY` for no limit.
+   * The closest pair to act on; no numbers where there is none. Its accuracy covers the frame's error, the
+   * extrapolation's, and the tissue's motion where the surface lags; where its side is not known it is the last one whose
+   * side was.
    */
-  float speed;
+  dibs_proximity closest;
   /**
-   * Least size of a region as a part of its size at rest, 0.25 for example; 0 for no limit.
+   * Its certified interval: act on the lower end. From minus to plus infinity where there is no pair.
    */
-  float shrinkage;
+  dibs_interval interval;
   /**
-   * Farthest (mm) that a vertex may be from its place in the published frame, however long ago that was; 0 for a
-   * tenth of the reach, `INFINITY` for no limit.
+   * Velocity (mm/s) of the tool's point of the pair relative to the surface's; without a pair that of the middle of the
+   * axis. Zero at the first tick, and no number without a tool.
    */
-  float recovery;
-} dibs_surface_limits;
+  dibs_vec3 velocity;
+  /**
+   * The trust in the surface: state, cause, margin.
+   */
+  dibs_verdict trust;
+  /**
+   * The frame that was searched, and its age.
+   */
+  dibs_age age;
+  /**
+   * Time (ms) by which the surface that was searched is behind the present, as far as its error does not cover it;
+   * `UINT32_MAX` where that is not known.
+   */
+  uint32_t lag;
+  /**
+   * The health of the bus.
+   */
+  dibs_link link;
+} dibs_answer;
 
 /**
  * A chain of tools, whose axes touch each other, and the surfaces around it. A chain and one surface are a scene too.
@@ -1436,6 +1639,110 @@ typedef struct {
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
+
+/**
+ * Makes the bus's end of a surface, once. `dibs_start` makes it with all that it needs.
+ *
+ * @param storage  `DIBS_BUS_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+ * @param size     Bytes of the storage.
+ * @param surface  The surface, in `DIBS_GUARDED_SIZE(vertices)` bytes.
+ * @param tree     Its tree.
+ * @param limits   The guard's limits: the same as for `dibs_guard_init`.
+ * @param bus      Receives the bus's address.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many vertices; `DIBS_CODE_STORAGE_SIZE`
+ *         also where the surface has room for two buffers alone; `DIBS_CODE_TAKEN` where its end was taken;
+ *         `DIBS_CODE_TREE_NO_METRIC`; `DIBS_CODE_TREE_NO_REST_SHAPE` where the limits need one; or a misuse.
+ */
+dibs_code dibs_bus_init(void *storage,
+                        size_t size,
+                        dibs_surface *surface,
+                        dibs_tree *tree,
+                        const dibs_guard_limits *limits,
+                        dibs_bus **bus);
+
+/**
+ * Takes bytes of a serial line or another stream. `dibs_bus_counters` says what became of them, by cause.
+ *
+ * Cost: linear in the bytes. `dibs_bus_work` must keep up: a complete frame is dropped where the next one begins before it
+ * was checked.
+ *
+ * @param bus     The bus.
+ * @param bytes   The bytes, read during the call.
+ * @param length  Their number.
+ * @param now     The receiver's clock, in ms; wraps.
+ * @return `DIBS_CODE_OK`, or a misuse.
+ */
+dibs_code dibs_bus_receive(dibs_bus *bus,
+                           const uint8_t *bytes,
+                           size_t length,
+                           uint32_t now);
+
+/**
+ * Takes one packet, from a bus that keeps packets apart.
+ *
+ * Cost: linear in the bytes.
+ *
+ * @param bus       The bus.
+ * @param packet    The packet, read during the call.
+ * @param length    Its bytes.
+ * @param now       The receiver's clock, in ms; wraps.
+ * @param progress  Receives its outcome, or null.
+ * @return As `dibs_receiver_accept`.
+ */
+dibs_code dibs_bus_packet(dibs_bus *bus,
+                          const uint8_t *packet,
+                          size_t length,
+                          uint32_t now,
+                          dibs_progress *progress);
+
+/**
+ * Does a slice of the checks: looks at some rows and triangles of the frame that arrives, and publishes it once it is
+ * complete and admitted. Without a frame it checks the tree's bytes.
+ *
+ * Cost: linear in `work`.
+ *
+ * @param bus      The bus.
+ * @param work     Most rows and triangles that are looked at.
+ * @param advance  Receives the outcome, `DIBS_ADVANCE_PENDING` if more is due at once; or null.
+ * @return As `dibs_receiver_advance`.
+ */
+dibs_code dibs_bus_work(dibs_bus *bus,
+                        uint32_t work,
+                        dibs_advance *advance);
+
+/**
+ * Writes the status that is due for the sender, whose next frame echoes it, which shows how long frames are on their way.
+ * Call it after each slice of work: none is due unless there is news, or 100 ms went by.
+ *
+ * @param bus       The bus.
+ * @param now       The receiver's clock, in ms.
+ * @param framed    0 for a packet; otherwise a COBS frame with the zero that ends it, for a stream.
+ * @param out       Receives it.
+ * @param capacity  Bytes that there is room for: `DIBS_STATUS` at least.
+ * @param length    Receives its length; 0 where none is due.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY`, or a misuse.
+ */
+dibs_code dibs_bus_status(dibs_bus *bus,
+                          uint32_t now,
+                          uint32_t framed,
+                          uint8_t *out,
+                          size_t capacity,
+                          size_t *length);
+
+/**
+ * The count of each event since the start, in the order of `dibs_event_name`.
+ *
+ * @param bus       The bus.
+ * @param counters  Room for `DIBS_EVENTS` numbers.
+ */
+dibs_code dibs_bus_counters(dibs_bus *bus, uint32_t *counters);
+
+/**
+ * Registers the surface anew, as `dibs_receiver_register` does: only an operator decides that.
+ *
+ * @return `DIBS_CODE_OK`, or a misuse.
+ */
+dibs_code dibs_bus_register(dibs_bus *bus);
 
 /**
  * One sentence about a code, in English, without a full stop.
@@ -1680,6 +1987,94 @@ dibs_code dibs_frame_get_facts(dibs_frame *frame, dibs_frame_facts *facts);
  * Lets go of the vertices, or of the frame that a reader holds: the next one can then be published.
  */
 dibs_code dibs_frame_release(dibs_frame *frame);
+
+/**
+ * Makes the control tick's end of a surface, once. `dibs_start` makes it with all that it needs.
+ *
+ * @param storage  `DIBS_GUARD_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+ * @param size     Bytes of the storage.
+ * @param surface  The surface, in `DIBS_GUARDED_SIZE(vertices)` bytes.
+ * @param tree     Its tree.
+ * @param limits   The guard's limits: the same as for `dibs_bus_init`.
+ * @param guard    Receives the guard's address.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many vertices; `DIBS_CODE_STORAGE_SIZE`
+ *         also where the surface has room for two buffers alone; `DIBS_CODE_TAKEN` where its end was taken;
+ *         `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`; or a misuse.
+ */
+dibs_code dibs_guard_init(void *storage,
+                          size_t size,
+                          dibs_surface *surface,
+                          dibs_tree *tree,
+                          const dibs_guard_limits *limits,
+                          dibs_guard **guard);
+
+/**
+ * The answer of this tick: the closest pair on the surface published last, moved on to now, and whether it may be trusted.
+ *
+ * Call it at every tick. Errors of the query are in the answer, and lead to the safe state.
+ *
+ * Cost: the budget at most, and about a thousand instructions.
+ *
+ * @param guard   The guard.
+ * @param tool    The tool; null where it has no pose: the answer is then the hold, and the next velocity starts anew.
+ * @param now     The receiver's clock, in ms; wraps.
+ * @param answer  Receives the answer.
+ * @return `DIBS_CODE_OK`, whatever the state; `DIBS_CODE_TOOL_COORDINATE` or `DIBS_CODE_TOOL_RADIUS`, with the answer of a
+ *         tool without a pose; or a misuse.
+ */
+dibs_code dibs_guard_closest(dibs_guard *guard,
+                             const dibs_tool *tool,
+                             uint32_t now,
+                             dibs_answer *answer);
+
+/**
+ * An operator's acknowledgement, which ends the safe state once every input is good again.
+ *
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_ACKNOWLEDGE` unless the last tick waited for it, or a misuse.
+ */
+dibs_code dibs_guard_acknowledge(dibs_guard *guard);
+
+/**
+ * The force of a wall on the tool, from a tick's answer.
+ *
+ * @param answer  The answer of this tick.
+ * @param wall    The wall.
+ * @param force   Receives the force.
+ * @return As `dibs_wall_force`.
+ */
+dibs_code dibs_answer_force(const dibs_answer *answer, const dibs_wall *wall, dibs_force *force);
+
+/**
+ * Makes all that a control loop needs in one piece of memory: validates the tree, and makes the surface and its two ends. For
+ * pieces apart, each in memory of its own: `dibs_tree_init`, `dibs_surface_init`, `dibs_bus_init`, `dibs_guard_init`.
+ *
+ * Cost: linear in the bytes; once, at start-up.
+ *
+ * @param memory  `DIBS_START_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`, for as long as an end is used. Needs no
+ *                initial value.
+ * @param size    Bytes of the memory.
+ * @param bytes   The tree, in flash or in memory. Not copied: as for `dibs_tree_init`.
+ * @param length  Bytes of the tree.
+ * @param limits  The guard's limits.
+ * @param bus     Receives the bus's address.
+ * @param guard   Receives the guard's address.
+ * @return As of the four functions; `DIBS_CODE_STORAGE_SIZE` where the tree has more vertices than there is room for.
+ */
+dibs_code dibs_start(void *memory,
+                     size_t size,
+                     const uint8_t *bytes,
+                     size_t length,
+                     const dibs_guard_limits *limits,
+                     dibs_bus **bus,
+                     dibs_guard **guard);
+
+/**
+ * The limits that follow from two numbers: 1,000 ticks a second, no budget, and an operator who acknowledges.
+ *
+ * @param speed  Largest speed (mm/s) of any point of the tissue.
+ * @param age    Largest age (ms) of a surface.
+ */
+dibs_guard_limits dibs_guard_limits_of(float speed, uint32_t age);
 
 /**
  * The certified interval of a pair's separation: both ends include the accuracy, rounded outwards. Act on its lower end.
@@ -1933,8 +2328,8 @@ dibs_code dibs_scene_contacts(const dibs_scene *scene,
 /**
  * Makes a surface without a frame.
  *
- * @param storage   `DIBS_SURFACE_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`. Needs no initial value. For as long as
- *                  its receiver, its reader and their frames are used.
+ * @param storage   `DIBS_SURFACE_SIZE(vertices)` bytes, or `DIBS_GUARDED_SIZE(vertices)` for a guard, aligned to
+ *                  `DIBS_ALIGNMENT`. Needs no initial value. For as long as its two ends and their frames are used.
  * @param size      Bytes of the storage.
  * @param vertices  Vertices of the surface: those of the tree.
  * @param surface   Receives the surface's address.
@@ -2136,6 +2531,60 @@ dibs_code dibs_scrub_step(dibs_scrub *scrub,
  */
 dibs_code dibs_tree_origin(dibs_tree *tree,
                            dibs_point *origin);
+
+/**
+ * Makes the writer of a surface, once.
+ *
+ * @param storage  `DIBS_WRITER_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+ * @param size     Bytes of the storage.
+ * @param surface  The surface.
+ * @param writer   Receives the writer's address.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_TAKEN` where the surface has a receiver or a writer, or a misuse.
+ */
+dibs_code dibs_writer_init(void *storage, size_t size, dibs_surface *surface, dibs_writer **writer);
+
+/**
+ * Starts a frame, and forgets an unfinished one.
+ *
+ * @return `DIBS_CODE_OK`, or a misuse.
+ */
+dibs_code dibs_writer_begin(dibs_writer *writer);
+
+/**
+ * Stores the positions of the next rows.
+ *
+ * Cost: linear in the positions.
+ *
+ * @param writer     The writer.
+ * @param positions  x, y and z (mm) of each vertex, in the tree's order of rows. Copied.
+ * @param count      Their number.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` where the frame lacks fewer: nothing is stored; or a misuse.
+ */
+dibs_code dibs_writer_push(dibs_writer *writer,
+                           const float *positions,
+                           uint32_t count);
+
+/**
+ * Publishes the frame.
+ *
+ * Cost: with a tree linear in its triangles, otherwise a few instructions.
+ *
+ * @param writer          The writer.
+ * @param tree            The surface's tree, to measure the stretch, which makes queries cheaper; or null, and queries take
+ *                        the tree's limit to hold.
+ * @param epoch           Number of the frame.
+ * @param received        Its time on the reader's clock, in ms; wraps.
+ * @param position_error  No vertex is farther (mm, at least 0) than this from where it is here.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` while vertices are missing; `DIBS_CODE_HELD` while the published frame is
+ *         read: nothing is lost, call again; `DIBS_CODE_STRETCH_EXCEEDED` where distances on this frame would be wrong, and
+ *         the other codes of `dibs_frame_measure`; `DIBS_CODE_ARGUMENT` for an error that is negative or not finite; or a
+ *         misuse.
+ */
+dibs_code dibs_writer_publish(dibs_writer *writer,
+                              dibs_tree *tree,
+                              uint32_t epoch,
+                              uint32_t received,
+                              float position_error);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -130,6 +130,20 @@ impl<T> Places<T> {
         }
         Ok(())
     }
+
+    /// Writes all the values, or none where there are fewer places. Returns their number.
+    pub fn fill(mut self, values: &[T]) -> Result<usize, dibs_code>
+    where
+        T: Copy,
+    {
+        if values.len() > self.left {
+            return Err(dibs_code::Capacity);
+        }
+        for &value in values {
+            self.push(value)?;
+        }
+        Ok(values.len())
+    }
 }
 
 /// Memory of the caller's, in which an object is made.

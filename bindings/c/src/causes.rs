@@ -4,7 +4,8 @@ use dibs_nostd::constraint::GainError;
 use dibs_nostd::failsafe::{AcknowledgeError, LimitError};
 use dibs_nostd::wire::{Event, PacketError, StreamError};
 use dibs_nostd::{
-    CorruptTreeError, FormatError, QueryError, ReceiveError, StretchError, ToolError, Unavailable,
+    CorruptTreeError, Error, FormatError, QueryError, ReceiveError, StretchError, ToolError,
+    Unavailable,
 };
 
 use crate::code::dibs_code;
@@ -162,7 +163,23 @@ impl From<LimitError> for dibs_code {
             LimitError::Speed { .. } => Self::LimitSpeed,
             LimitError::Recovery { .. } => Self::LimitRecovery,
             LimitError::Untrippable { .. } => Self::LimitUntrippable,
+            LimitError::NoReach => Self::TreeNoRestShape,
             _ => Self::LimitTooLong,
+        }
+    }
+}
+
+/// The errors of a guard's start.
+impl From<Error> for dibs_code {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Format(error) => error.into(),
+            Error::CorruptTree(error) => error.into(),
+            Error::Split(_) => Self::Taken,
+            Error::Stretch(error) => error.into(),
+            Error::Query(error) => error.into(),
+            Error::Limit(error) => error.into(),
+            _ => Self::Argument,
         }
     }
 }

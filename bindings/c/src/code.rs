@@ -169,6 +169,11 @@ impl dibs_code {
         }
     }
 
+    /// A call's error, for a call that makes others.
+    pub fn done(self) -> Result<(), Self> {
+        if self == Self::Ok { Ok(()) } else { Err(self) }
+    }
+
     /// Every code.
     const ALL: &'static [Self] = &[
         Self::Ok,

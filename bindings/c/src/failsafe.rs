@@ -3,7 +3,7 @@
 use core::ffi::c_void;
 
 use bytemuck::AnyBitPattern;
-use dibs_nostd::failsafe::{FailSafe, LimitError, Limits, Observation, State, Watch};
+use dibs_nostd::failsafe::{FailSafe, LimitError, Limits, Observation, State, Verdict, Watch};
 use dibs_nostd::{Millis, Proximity, QueryError, Unavailable};
 
 use crate::border::{Handle, Input, Kind, Output, Storage};
@@ -177,6 +177,17 @@ pub struct dibs_verdict {
     pub waits_for_acknowledgement: u32,
 }
 
+impl From<Verdict> for dibs_verdict {
+    fn from(found: Verdict) -> Self {
+        Self {
+            state: found.state as u32,
+            cause: found.cause.map_or(dibs_code::Ok, dibs_code::from) as u32,
+            margin: found.margin,
+            waits_for_acknowledgement: found.waits_for_acknowledgement.into(),
+        }
+    }
+}
+
 /// One control tick of the machine.
 ///
 /// Cost: a comparison of two limits for each input.
@@ -203,17 +214,11 @@ pub extern "C" fn dibs_failsafe_step(
             query_error: (query != dibs_code::Ok).then_some(QueryError::NoAdjacency),
             is_tree_corrupt: seen.is_tree_corrupt != 0,
         });
-        let cause = match found.cause {
-            None => dibs_code::Ok,
-            Some(Unavailable::Query(_)) => failsafe.query,
-            Some(cause) => cause.into(),
-        };
-        verdict.set(dibs_verdict {
-            state: found.state as u32,
-            cause: cause as u32,
-            margin: found.margin,
-            waits_for_acknowledgement: found.waits_for_acknowledgement.into(),
-        });
+        let mut given = dibs_verdict::from(found);
+        if let Some(Unavailable::Query(_)) = found.cause {
+            given.cause = failsafe.query as u32;
+        }
+        verdict.set(given);
         Ok(())
     })
 }

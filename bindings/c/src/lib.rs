@@ -4,8 +4,8 @@
 //! Nothing is allocated and nothing panics. On a board the second is proved by the linker: the panic handler calls a
 //! function that does not exist.
 //!
-//! Names are those of the header. `unsafe` stands in `border`, which trusts the caller's pointers, and in
-//! `surface`, whose buffers have a size that no type has.
+//! Names are those of the header. `unsafe` stands in `border`, which trusts the caller's pointers, in `surface`, whose
+//! buffers have a size that no type has, and where a struct of the header has pointers.
 #![no_std]
 #![allow(non_camel_case_types)]
 // Parameters are named in Doxygen's way.
@@ -16,12 +16,15 @@
 extern crate std;
 
 mod border;
+mod bus;
 mod causes;
 mod code;
 mod constraint;
 mod contacts;
 mod failsafe;
 mod frame;
+mod guard;
+mod limits;
 #[cfg(target_os = "none")]
 mod panic;
 mod query;
@@ -32,3 +35,4 @@ mod surface;
 mod tool;
 mod tracker;
 mod tree;
+mod writer;

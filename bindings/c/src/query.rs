@@ -72,13 +72,20 @@ pub struct dibs_options {
 impl dibs_options {
     /// The core's options.
     pub(crate) fn of(options: *const Self) -> Result<Options, dibs_code> {
-        let Some(given) = options.get_if_any()? else { return Ok(Options::new()) };
+        options.get_if_any()?.map_or(Ok(Options::new()), Options::try_from)
+    }
+}
+
+impl TryFrom<dibs_options> for Options {
+    type Error = dibs_code;
+
+    fn try_from(given: dibs_options) -> Result<Self, dibs_code> {
         let known = DIBS_COLD | DIBS_UNSIGNED | DIBS_CONTACTS_OF;
         if given.flags & !known != 0 || !(given.depth_tolerance >= 0.0) {
             return Err(dibs_code::Argument);
         }
         let dibs_budget { node_tests, triangle_tests } = given.budget;
-        let mut options = Options::new().budget(Budget { node_tests, triangle_tests });
+        let mut options = Self::new().budget(Budget { node_tests, triangle_tests });
         if given.flags & DIBS_COLD != 0 {
             options = options.warm_start(None);
         }
@@ -248,7 +255,7 @@ impl TryFrom<dibs_proximity> for Proximity {
 }
 
 /// An interval of separations (mm).
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_interval {
     /// No true separation is less.

@@ -48,7 +48,7 @@ impl Kind for dibs_receiver {
 impl dibs_receiver {
     /// Tells the reader how the bus is.
     fn note(&self) {
-        self.surface.link.set(&self.assembler.health());
+        self.surface.notes.link.set(&self.assembler.health());
     }
 }
 
@@ -65,6 +65,13 @@ pub struct dibs_surface_limits {
     /// Farthest (mm) that a vertex may be from its place in the published frame, however long ago that was; 0 for a
     /// tenth of the reach, `INFINITY` for no limit.
     pub recovery: f32,
+}
+
+impl From<dibs_surface_limits> for SurfaceLimits {
+    fn from(given: dibs_surface_limits) -> Self {
+        let limits = Self::reach_mm(given.reach).speed(given.speed).shrinkage(given.shrinkage);
+        if given.recovery == 0.0 { limits } else { limits.recovery_mm(given.recovery) }
+    }
 }
 
 /// Makes the receiver of a surface, once.
@@ -92,11 +99,7 @@ pub extern "C" fn dibs_receiver_init(
             if surface.vertices() != tree.vertex_count() as usize {
                 return Err(dibs_code::OtherTree);
             }
-            let limits = SurfaceLimits::reach_mm(given.reach);
-            let limits = limits.speed(given.speed).shrinkage(given.shrinkage);
-            let limits =
-                if given.recovery == 0.0 { limits } else { limits.recovery_mm(given.recovery) };
-            let monitor = StretchMonitor::new(tree)?.limits(limits);
+            let monitor = StretchMonitor::new(tree)?.limits(given.into());
             let (writer, mesh_id) = (surface.take_writer()?, tree.mesh_id());
             let assembler = Assembler::new(writer, monitor, mesh_id, given.reach);
             let (deframer, published) = (Deframer::new(), None);
@@ -234,6 +237,17 @@ pub enum dibs_advance {
     Published = 3,
 }
 
+impl From<Advance> for dibs_advance {
+    fn from(advance: Advance) -> Self {
+        match advance {
+            Advance::Pending => Self::Pending,
+            Advance::Held { .. } => Self::Held,
+            Advance::Published { .. } => Self::Published,
+            _ => Self::Idle,
+        }
+    }
+}
+
 /// Does some of the work that is due: checks rows and triangles, and publishes a frame that keeps to its limits.
 ///
 /// Worth calling after each packet, and from time to time when the bus is quiet. Cost: linear in `work`.
@@ -253,17 +267,12 @@ pub extern "C" fn dibs_receiver_advance(
         let (advance, mut receiver) = (advance.check_if_any()?, receiver.open()?);
         let outcome = receiver.assembler.advance(work);
         receiver.note();
-        let outcome = match outcome? {
-            Advance::Pending => dibs_advance::Pending,
-            Advance::Held { .. } => dibs_advance::Held,
-            Advance::Published { epoch } => {
-                receiver.published = Some(epoch);
-                dibs_advance::Published
-            }
-            _ => dibs_advance::Idle,
-        };
+        let outcome = outcome?;
+        if let Advance::Published { epoch } = outcome {
+            receiver.published = Some(epoch);
+        }
         if let Some(advance) = advance {
-            advance.set(outcome);
+            advance.set(outcome.into());
         }
         Ok(())
     })
@@ -290,7 +299,7 @@ pub extern "C" fn dibs_receiver_status(
     length: *mut usize,
 ) -> dibs_code {
     dibs_code::of(|| {
-        let (length, mut out) = (length.check()?, out.places(capacity)?);
+        let (length, out) = (length.check()?, out.places(capacity)?);
         let mut receiver = receiver.open()?;
         let status = receiver.assembler.status(Millis(now), safety);
         let (counters, mac) = (receiver.assembler.counters(), receiver.assembler.mac());
@@ -301,13 +310,7 @@ pub extern "C" fn dibs_receiver_status(
         } else {
             enframe(packet, &mut line).ok_or(dibs_code::Capacity)?
         };
-        if bytes.len() > capacity {
-            return Err(dibs_code::Capacity);
-        }
-        for &byte in bytes {
-            out.push(byte)?;
-        }
-        length.set(bytes.len());
+        length.set(out.fill(bytes)?);
         Ok(())
     })
 }
@@ -367,10 +370,8 @@ pub extern "C" fn dibs_receiver_counters(
     counters: *mut u32,
 ) -> dibs_code {
     dibs_code::of(|| {
-        let (mut out, receiver) = (counters.places(DIBS_EVENTS)?, receiver.open()?);
-        for event in Event::ALL {
-            out.push(receiver.assembler.counters().of(event))?;
-        }
-        Ok(())
+        let (out, receiver) = (counters.places(DIBS_EVENTS)?, receiver.open()?);
+        let all = receiver.assembler.counters();
+        out.fill(&Event::ALL.map(|event| all.of(event))).map(|_| ())
     })
 }

@@ -1,12 +1,12 @@
-//! The surface's buffers: two of them, for as many vertices as the caller says.
+//! The surface's buffers: two of them or three, for as many vertices as the caller says.
 
 use core::ffi::c_void;
 use core::mem;
 use core::slice;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-use dibs_nostd::failsafe::LinkStatus;
 use dibs_nostd::glam::Vec3;
+use dibs_nostd::guard::Notes;
 use dibs_nostd::{
     Buffer, Buffers, FrameGuard, FrameReader, FrameWriter, Head, MeasuredStretch, Position,
     VertexTable,
@@ -16,22 +16,28 @@ use crate::border::{DIBS_ALIGNMENT, Kind, Storage};
 use crate::code::dibs_code;
 
 /// Bytes of a surface's storage besides its vertices.
-pub const DIBS_SURFACE_BASE: usize = 384;
+pub const DIBS_SURFACE_BASE: usize = 448;
 
 /// Bytes of a surface's storage for each vertex: two positions.
 pub const DIBS_SURFACE_VERTEX: usize = 24;
 
-/// Two buffers of vertices: the receiver fills one, the reader holds the other, and neither waits.
+/// Bytes of a guarded surface's storage for each vertex: three positions.
+pub const DIBS_GUARDED_VERTEX: usize = 36;
+
+/// Two buffers of vertices: one end fills one, the other end holds the other, and neither waits. A third keeps the frame
+/// before, from which a guard knows the motion.
 ///
 /// Any number of contexts may use it at once.
 pub struct dibs_surface {
     buffers: Buffers<'static>,
-    /// Ends that were taken: the receiver's and the reader's.
+    /// Ends that were taken: of a receiver, a bus or a writer, and of a reader or a guard.
     taken: [AtomicBool; 2],
+    /// It keeps the frame before the published one.
+    has_third: bool,
     /// A reader holds a frame.
     is_held: AtomicBool,
-    /// The receiver's notes for the reader.
-    pub(crate) link: LinkStatus,
+    /// The notes of the two ends for one another.
+    pub(crate) notes: Notes,
 }
 
 impl Kind for dibs_surface {
@@ -41,21 +47,21 @@ impl Kind for dibs_surface {
 
 pub(crate) type Writer = FrameWriter<'static>;
 pub(crate) type Reader = FrameReader<'static>;
-type Guard<'f> = FrameGuard<'f>;
 
 /// Offset of the buffers, after the object and the word of their state.
 const BUFFERS: usize = 256;
 const HEAD: usize = size_of::<Head>();
 
-const _: () = assert!(BUFFERS + 4 + 2 * HEAD <= DIBS_SURFACE_BASE);
+const _: () = assert!(BUFFERS + 4 + 3 * HEAD <= DIBS_SURFACE_BASE);
 const _: () = assert!(size_of::<dibs_surface>() + DIBS_ALIGNMENT <= BUFFERS);
 const _: () = assert!(2 * size_of::<Position>() == DIBS_SURFACE_VERTEX);
+const _: () = assert!(3 * size_of::<Position>() == DIBS_GUARDED_VERTEX);
 const _: () = assert!(align_of::<Head>() == 4 && align_of::<Position>() == 4);
 
 /// Makes a surface without a frame.
 ///
-/// @param storage   `DIBS_SURFACE_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`. Needs no initial value. For as long as
-///                  its receiver, its reader and their frames are used.
+/// @param storage   `DIBS_SURFACE_SIZE(vertices)` bytes, or `DIBS_GUARDED_SIZE(vertices)` for a guard, aligned to
+///                  `DIBS_ALIGNMENT`. Needs no initial value. For as long as its two ends and their frames are used.
 /// @param size      Bytes of the storage.
 /// @param vertices  Vertices of the surface: those of the tree.
 /// @param surface   Receives the surface's address.
@@ -69,28 +75,34 @@ pub extern "C" fn dibs_surface_init(
     dibs_code::of(|| {
         storage.make(size, surface, || {
             let (vertices, head) = (vertices as usize, HEAD / 4);
-            let needed = vertices.checked_mul(DIBS_SURFACE_VERTEX);
-            let needed = needed.and_then(|bytes| bytes.checked_add(DIBS_SURFACE_BASE));
-            if needed.is_none_or(|needed| size < needed) {
+            let has_room = |bytes: usize| {
+                let needed = vertices.checked_mul(bytes);
+                let needed = needed.and_then(|bytes| bytes.checked_add(DIBS_SURFACE_BASE));
+                needed.is_some_and(|needed| needed <= size)
+            };
+            if !has_room(DIBS_SURFACE_VERTEX) {
                 return Err(dibs_code::StorageSize);
             }
+            let buffers = if has_room(DIBS_GUARDED_VERTEX) { 3 } else { 2 };
             let rows = vertices.checked_mul(3).and_then(|rows| rows.checked_add(head));
             let each = rows.ok_or(dibs_code::Argument)?;
-            let both = each.checked_mul(2).and_then(|both| both.checked_add(1));
-            let words = storage.words(size, BUFFERS, both.ok_or(dibs_code::Argument)?)?;
-            let (first, rest) = words.split_at_mut_checked(each).ok_or(dibs_code::Argument)?;
+            let all = each.checked_mul(buffers).and_then(|all| all.checked_add(1));
+            let words = storage.words(size, BUFFERS, all.ok_or(dibs_code::Argument)?)?;
+            let (state, rest) = words.split_first_mut().ok_or(dibs_code::Argument)?;
+            let (first, rest) = rest.split_at_mut_checked(each).ok_or(dibs_code::Argument)?;
             let (second, rest) = rest.split_at_mut_checked(each).ok_or(dibs_code::Argument)?;
-            let state = rest.first_mut().ok_or(dibs_code::Argument)?;
+            let third = (buffers == 3).then(|| buffer(rest, vertices));
             Ok(dibs_surface {
                 buffers: Buffers::new(
                     // SAFETY: a word of this surface's own, aligned, and from here on never used but as an atomic.
                     unsafe { AtomicU32::from_ptr(state) },
                     [buffer(first, vertices), buffer(second, vertices)],
-                    None,
+                    third,
                 ),
                 taken: [AtomicBool::new(false), AtomicBool::new(false)],
                 is_held: AtomicBool::new(false),
-                link: LinkStatus::new(),
+                notes: Notes::new(),
+                has_third: buffers == 3,
             })
         })
     })
@@ -115,16 +127,49 @@ impl dibs_surface {
         writer.back().len()
     }
 
-    /// The receiver's end, once.
+    /// Whether a guard can use it, with a tree of so many vertices.
+    pub(crate) fn check_guarded(&self, vertices: u32) -> Result<(), dibs_code> {
+        if self.vertices() != vertices as usize {
+            Err(dibs_code::OtherTree)
+        } else if !self.has_third {
+            Err(dibs_code::StorageSize)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// The end that fills buffers, once.
     pub(crate) fn take_writer(&'static self) -> Result<Writer, dibs_code> {
         self.take(0)?;
         Ok(self.buffers.ends().0)
     }
 
-    /// The reader's end, once.
+    /// The end that holds them, once.
     pub(crate) fn take_reader(&'static self) -> Result<Reader, dibs_code> {
         self.take(1)?;
         Ok(self.buffers.ends().1)
+    }
+
+    /// Makes an object of the end that fills buffers, once. After an error the end is not taken.
+    pub(crate) fn with_writer<T>(
+        &'static self,
+        make: impl FnOnce(Writer) -> Result<T, dibs_code>,
+    ) -> Result<T, dibs_code> {
+        make(self.take_writer()?).inspect_err(|_| self.give_back(0))
+    }
+
+    /// The same of the end that holds them.
+    pub(crate) fn with_reader<T>(
+        &'static self,
+        make: impl FnOnce(Reader) -> Result<T, dibs_code>,
+    ) -> Result<T, dibs_code> {
+        make(self.take_reader()?).inspect_err(|_| self.give_back(1))
+    }
+
+    fn give_back(&self, end: usize) {
+        if let Some(taken) = self.taken.get(end) {
+            taken.store(false, Ordering::Release);
+        }
     }
 
     fn take(&self, end: usize) -> Result<(), dibs_code> {
@@ -153,20 +198,20 @@ impl Drop for Hold {
 /// The frame that a reader holds.
 pub(crate) struct Held {
     // First, so that it is dropped before the right to it is given back.
-    guard: Guard<'static>,
+    guard: FrameGuard<'static>,
     _hold: Hold,
 }
 
 impl Held {
-    pub(crate) fn new(guard: Guard<'_>, hold: Hold) -> Self {
+    pub(crate) fn new(guard: FrameGuard<'_>, hold: Hold) -> Self {
         // SAFETY: a guard refers to the surface's memory, which the caller keeps, and not to its reader. That no second
         // one is made while it lives, which its lifetime would see to, is what the hold is for.
-        let guard = unsafe { mem::transmute::<Guard<'_>, Guard<'static>>(guard) };
+        let guard = unsafe { mem::transmute::<FrameGuard<'_>, FrameGuard<'static>>(guard) };
         Self { guard, _hold: hold }
     }
 
     /// The frame with its motion since others.
-    pub(crate) const fn moving(&self) -> &Guard<'static> {
+    pub(crate) const fn moving(&self) -> &FrameGuard<'static> {
         &self.guard
     }
 }

@@ -18,7 +18,7 @@ pub const DIBS_TREE_SIZE: usize = 384;
 pub struct dibs_tree {
     /// The view of the bytes.
     pub(crate) tree: Tree<'static, u16>,
-    bytes: &'static [u8],
+    pub(crate) bytes: &'static [u8],
 }
 
 impl Kind for dibs_tree {

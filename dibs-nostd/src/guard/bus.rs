@@ -1,11 +1,12 @@
 //! The bus's end: bytes in, published frames and statuses out.
 
+use super::GuardLimits;
 use super::surface::Notes;
 use crate::surface::FrameView;
 use crate::wire::{Counters, Deframer, Mac, NoMac, encode_status, enframe, framed_bytes};
 use crate::{
-    Advance, Assembler, FrameWriter, Index, Millis, Progress, ReceiveError, Scrub, StretchError,
-    StretchMonitor, SurfaceLimits, Tree, TreeBytes,
+    Advance, Assembler, Error, FrameWriter, Index, Millis, Progress, ReceiveError, Scrub,
+    StretchMonitor, Tree, TreeBytes,
 };
 
 /// Largest packet on a byte stream; a network's packets can be larger.
@@ -46,14 +47,20 @@ impl<'s, 't, I: Index, M: Mac> Bus<'s, 't, I, M> {
     /// Bytes of the longest status on a byte stream.
     pub const STATUS_FRAMED: usize = framed_bytes(STATUS);
 
+    /// The bus's end of buffers in anybody's memory.
+    ///
+    /// # Errors
+    /// [`Error`]: the tree measures no stretch, or a limit is out of range.
+    #[doc(hidden)]
     #[inline(always)]
-    pub(super) fn new(
+    pub fn new(
         notes: &'s Notes,
         writer: FrameWriter<'s>,
         (tree, bytes): (&Tree<'t, I>, TreeBytes<'t, I>),
-        limits: SurfaceLimits,
+        limits: &GuardLimits,
         mac: M,
-    ) -> Result<Self, StretchError> {
+    ) -> Result<Self, Error> {
+        let limits = limits.surface(tree)?;
         let monitor = StretchMonitor::continuous(tree)?.limits(limits);
         Ok(Self {
             notes,

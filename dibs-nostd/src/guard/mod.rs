@@ -40,5 +40,8 @@ mod tick;
 pub use answer::{Answer, Searched};
 pub use bus::Bus;
 pub use limits::GuardLimits;
+/// For the C interface. They may change with any version.
+#[doc(hidden)]
+pub use surface::Notes;
 pub use surface::Surface;
 pub use tick::Guard;

@@ -55,15 +55,18 @@ impl<const N: usize> Surface<N> {
     ) -> Result<(Bus<'_, 't, I, M>, Guard<'_, 't, I, STACK, OPENED>), Error> {
         let tree = bytes.validate()?;
         let (writer, reader) = self.frames.split()?;
-        let bus = Bus::new(&self.notes, writer, (&tree, bytes), limits.surface(&tree)?, mac)?;
-        let guard = Guard::new(&self.notes, reader, (&tree, bytes), limits)?;
+        let bus = Bus::new(&self.notes, writer, (&tree, bytes), &limits, mac)?;
+        let guard = Guard::new(&self.notes, reader, (&tree, bytes), &limits)?;
         Ok((bus, guard))
     }
 }
 
-/// The notes of the two ends for one another.
+/// The notes of the two ends for one another. Public for surfaces of a size that no type has: see
+/// [`Buffers`](crate::Buffers).
+#[doc(hidden)]
 #[derive(Debug)]
-pub(super) struct Notes {
+pub struct Notes {
+    /// The health of the bus.
     pub link: LinkStatus,
     /// As [`Status::safety`](crate::wire::Status::safety).
     safety: AtomicU32,
@@ -72,7 +75,10 @@ pub(super) struct Notes {
 }
 
 impl Notes {
-    const fn new() -> Self {
+    /// Nothing is known yet.
+    #[expect(clippy::new_without_default, reason = "as its surface")]
+    #[must_use]
+    pub const fn new() -> Self {
         Self {
             link: LinkStatus::new(),
             safety: AtomicU32::new(0),
@@ -80,19 +86,19 @@ impl Notes {
         }
     }
 
-    pub fn safety(&self) -> u8 {
+    pub(super) fn safety(&self) -> u8 {
         self.safety.load(Ordering::Relaxed) as u8
     }
 
-    pub fn set_state(&self, state: State) {
+    pub(super) fn set_state(&self, state: State) {
         self.safety.store(state as u32 + 1, Ordering::Relaxed);
     }
 
-    pub fn is_tree_corrupt(&self) -> bool {
+    pub(super) fn is_tree_corrupt(&self) -> bool {
         self.is_tree_corrupt.load(Ordering::Relaxed)
     }
 
-    pub fn set_tree_corrupt(&self) {
+    pub(super) fn set_tree_corrupt(&self) {
         self.is_tree_corrupt.store(true, Ordering::Relaxed);
     }
 }

@@ -53,12 +53,17 @@ impl Pose {
 }
 
 impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I, STACK, OPENED> {
+    /// The control tick's end of buffers in anybody's memory, of which there are three.
+    ///
+    /// # Errors
+    /// [`Error`]: the stack is too small for the tree, or a limit is out of range.
+    #[doc(hidden)]
     #[inline(always)]
-    pub(super) fn new(
+    pub fn new(
         notes: &'s Notes,
         reader: FrameReader<'s>,
         (tree, bytes): (&Tree<'t, I>, TreeBytes<'t, I>),
-        limits: GuardLimits,
+        limits: &GuardLimits,
     ) -> Result<Self, Error> {
         Ok(Self {
             notes,

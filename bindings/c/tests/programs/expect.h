@@ -11,7 +11,7 @@
 static unsigned failures;
 static unsigned checks;
 
-static void expect(dibs_code expected, dibs_code found, const char *call, int line) {
+static inline void expect(dibs_code expected, dibs_code found, const char *call, int line) {
     checks++;
     if (expected != found) {
         failures++;
@@ -40,7 +40,7 @@ static unsigned char *read_file(const char *path, size_t *length) {
 }
 
 /* Positions of a tree's rest shape. */
-static float *rest_shape(dibs_tree *tree, uint32_t vertices) {
+static inline float *rest_shape(dibs_tree *tree, uint32_t vertices) {
     float *positions = malloc(vertices * 3 * sizeof(float));
     for (uint32_t row = 0; row < vertices; row++) {
         dibs_vec3 at = {0};
@@ -53,7 +53,7 @@ static float *rest_shape(dibs_tree *tree, uint32_t vertices) {
 }
 
 /* Prints the counts. Returns the program's exit code. */
-static int summary(void) {
+static inline int summary(void) {
     printf("%u checks, %u failures\n", checks, failures);
     return failures == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
 }

@@ -1,0 +1,204 @@
+//! The bus's end of a guarded surface.
+
+use core::ffi::c_void;
+
+use dibs_nostd::guard::Bus;
+use dibs_nostd::wire::{Event, NoMac};
+use dibs_nostd::{Millis, TreeBytes};
+
+use crate::border::{Handle, Input, Kind, Output, Storage};
+use crate::code::dibs_code;
+use crate::limits::dibs_guard_limits;
+use crate::receiver::{DIBS_EVENTS, DIBS_STATUS, dibs_advance, dibs_progress};
+use crate::surface::dibs_surface;
+use crate::tree::dibs_tree;
+
+/// Bytes of a bus's storage.
+pub const DIBS_BUS_SIZE: usize = 3_072;
+
+/// The bus's end of a guarded surface: it takes packets, checks complete frames in slices, publishes them, watches the tree's
+/// bytes, and makes the statuses that go back.
+///
+/// Two contexts may use it, one at a time: an interrupt that takes bytes, and an idle loop that works. Both are below the
+/// control tick's priority. The interrupt gets `DIBS_CODE_IN_USE` where it meets the loop at work: it keeps its bytes for
+/// later, or the loop works with the interrupt masked.
+pub struct dibs_bus(TheBus);
+
+type TheBus = Bus<'static, 'static, u16>;
+
+const _: () = assert!(TheBus::STATUS_FRAMED == DIBS_STATUS);
+
+impl Kind for dibs_bus {
+    const MARK: u32 = 0x6462_6216;
+    const SIZE: usize = DIBS_BUS_SIZE;
+}
+
+/// Makes the bus's end of a surface, once. `dibs_start` makes it with all that it needs.
+///
+/// @param storage  `DIBS_BUS_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+/// @param size     Bytes of the storage.
+/// @param surface  The surface, in `DIBS_GUARDED_SIZE(vertices)` bytes.
+/// @param tree     Its tree.
+/// @param limits   The guard's limits: the same as for `dibs_guard_init`.
+/// @param bus      Receives the bus's address.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many vertices; `DIBS_CODE_STORAGE_SIZE`
+///         also where the surface has room for two buffers alone; `DIBS_CODE_TAKEN` where its end was taken;
+///         `DIBS_CODE_TREE_NO_METRIC`; `DIBS_CODE_TREE_NO_REST_SHAPE` where the limits need one; or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_bus_init(
+    storage: *mut c_void,
+    size: usize,
+    surface: *mut dibs_surface,
+    tree: *mut dibs_tree,
+    limits: *const dibs_guard_limits,
+    bus: *mut *mut dibs_bus,
+) -> dibs_code {
+    dibs_code::of(|| {
+        storage.make(size, bus, || {
+            let (surface, tree, limits) = (surface.share()?, tree.share()?, limits.get()?.read()?);
+            surface.check_guarded(tree.tree.vertex_count())?;
+            let tree = (&tree.tree, TreeBytes::new(tree.bytes));
+            let bus = surface.with_writer(|writer| {
+                Ok(TheBus::new(&surface.notes, writer, tree, &limits, NoMac)?)
+            });
+            Ok(dibs_bus(bus?))
+        })
+    })
+}
+
+/// Takes bytes of a serial line or another stream. `dibs_bus_counters` says what became of them, by cause.
+///
+/// Cost: linear in the bytes. `dibs_bus_work` must keep up: a complete frame is dropped where the next one begins before it
+/// was checked.
+///
+/// @param bus     The bus.
+/// @param bytes   The bytes, read during the call.
+/// @param length  Their number.
+/// @param now     The receiver's clock, in ms; wraps.
+/// @return `DIBS_CODE_OK`, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_bus_receive(
+    bus: *mut dibs_bus,
+    bytes: *const u8,
+    length: usize,
+    now: u32,
+) -> dibs_code {
+    dibs_code::of(|| {
+        bus.open()?.0.receive(bytes.slice(length)?, Millis(now));
+        Ok(())
+    })
+}
+
+/// Takes one packet, from a bus that keeps packets apart.
+///
+/// Cost: linear in the bytes.
+///
+/// @param bus       The bus.
+/// @param packet    The packet, read during the call.
+/// @param length    Its bytes.
+/// @param now       The receiver's clock, in ms; wraps.
+/// @param progress  Receives its outcome, or null.
+/// @return As `dibs_receiver_accept`.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_bus_packet(
+    bus: *mut dibs_bus,
+    packet: *const u8,
+    length: usize,
+    now: u32,
+    progress: *mut dibs_progress,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (progress, mut bus) = (progress.check_if_any()?, bus.open()?);
+        let outcome = bus.0.packet(packet.slice(length)?, Millis(now))?;
+        if let Some(progress) = progress {
+            progress.set(outcome.into());
+        }
+        Ok(())
+    })
+}
+
+/// Does a slice of the checks: looks at some rows and triangles of the frame that arrives, and publishes it once it is
+/// complete and admitted. Without a frame it checks the tree's bytes.
+///
+/// Cost: linear in `work`.
+///
+/// @param bus      The bus.
+/// @param work     Most rows and triangles that are looked at.
+/// @param advance  Receives the outcome, `DIBS_ADVANCE_PENDING` if more is due at once; or null.
+/// @return As `dibs_receiver_advance`.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_bus_work(
+    bus: *mut dibs_bus,
+    work: u32,
+    advance: *mut dibs_advance,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (advance, mut bus) = (advance.check_if_any()?, bus.open()?);
+        let outcome = bus.0.work(work)?;
+        if let Some(advance) = advance {
+            advance.set(outcome.into());
+        }
+        Ok(())
+    })
+}
+
+/// Writes the status that is due for the sender, whose next frame echoes it, which shows how long frames are on their way.
+/// Call it after each slice of work: none is due unless there is news, or 100 ms went by.
+///
+/// @param bus       The bus.
+/// @param now       The receiver's clock, in ms.
+/// @param framed    0 for a packet; otherwise a COBS frame with the zero that ends it, for a stream.
+/// @param out       Receives it.
+/// @param capacity  Bytes that there is room for: `DIBS_STATUS` at least.
+/// @param length    Receives its length; 0 where none is due.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY`, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_bus_status(
+    bus: *mut dibs_bus,
+    now: u32,
+    framed: u32,
+    out: *mut u8,
+    capacity: usize,
+    length: *mut usize,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (length, out) = (length.check()?, out.places(capacity)?);
+        // Before the status is made: one that has no room would be lost.
+        if capacity < DIBS_STATUS {
+            return Err(dibs_code::Capacity);
+        }
+        let (mut bus, mut packet) = (bus.open()?, [0; TheBus::STATUS_BYTES]);
+        let mut line = [0; DIBS_STATUS];
+        let status = if framed == 0 {
+            bus.0.status(Millis(now), &mut packet)
+        } else {
+            bus.0.status_framed(Millis(now), &mut line)
+        };
+        length.set(out.fill(status.unwrap_or_default())?);
+        Ok(())
+    })
+}
+
+/// The count of each event since the start, in the order of `dibs_event_name`.
+///
+/// @param bus       The bus.
+/// @param counters  Room for `DIBS_EVENTS` numbers.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_bus_counters(bus: *mut dibs_bus, counters: *mut u32) -> dibs_code {
+    dibs_code::of(|| {
+        let (out, bus) = (counters.places(DIBS_EVENTS)?, bus.open()?);
+        let all = bus.0.counters();
+        out.fill(&Event::ALL.map(|event| all.of(event))).map(|_| ())
+    })
+}
+
+/// Registers the surface anew, as `dibs_receiver_register` does: only an operator decides that.
+///
+/// @return `DIBS_CODE_OK`, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_bus_register(bus: *mut dibs_bus) -> dibs_code {
+    dibs_code::of(|| {
+        bus.open()?.0.register();
+        Ok(())
+    })
+}

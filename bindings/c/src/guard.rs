@@ -1,0 +1,226 @@
+//! The control tick's end of a guarded surface: pose in, answer out.
+
+use core::ffi::c_void;
+use core::ptr;
+
+use bytemuck::AnyBitPattern;
+use dibs_nostd::guard::{Answer, Guard};
+use dibs_nostd::{Interval, Millis, Proximity, TreeBytes};
+
+use crate::border::{Handle, Input, Kind, Output, Storage};
+use crate::bus::{DIBS_BUS_SIZE, dibs_bus, dibs_bus_init};
+use crate::code::dibs_code;
+use crate::constraint::{dibs_force, dibs_wall, dibs_wall_force};
+use crate::failsafe::dibs_verdict;
+use crate::limits::dibs_guard_limits;
+use crate::query::{STACK, dibs_interval, dibs_proximity};
+use crate::reader::{dibs_age, dibs_link};
+use crate::surface::{dibs_surface, dibs_surface_init};
+use crate::tool::{Shape, dibs_tool, dibs_vec3};
+use crate::tracker::DIBS_OPENED;
+use crate::tree::{DIBS_TREE_SIZE, dibs_tree, dibs_tree_init};
+
+/// Bytes of a guard's storage.
+pub const DIBS_GUARD_SIZE: usize = 17_664;
+
+/// The control tick's end of a guarded surface: the closest pair of one tool on the surface as it is now, and the trust in
+/// it.
+///
+/// One context at a time: the control interrupt, of higher priority than the bus's.
+pub struct dibs_guard(TheGuard);
+
+type TheGuard = Guard<'static, 'static, u16, STACK, DIBS_OPENED>;
+
+impl Kind for dibs_guard {
+    const MARK: u32 = 0x6462_6718;
+    const SIZE: usize = DIBS_GUARD_SIZE;
+}
+
+/// Makes the control tick's end of a surface, once. `dibs_start` makes it with all that it needs.
+///
+/// @param storage  `DIBS_GUARD_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+/// @param size     Bytes of the storage.
+/// @param surface  The surface, in `DIBS_GUARDED_SIZE(vertices)` bytes.
+/// @param tree     Its tree.
+/// @param limits   The guard's limits: the same as for `dibs_bus_init`.
+/// @param guard    Receives the guard's address.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many vertices; `DIBS_CODE_STORAGE_SIZE`
+///         also where the surface has room for two buffers alone; `DIBS_CODE_TAKEN` where its end was taken;
+///         `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`; or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_guard_init(
+    storage: *mut c_void,
+    size: usize,
+    surface: *mut dibs_surface,
+    tree: *mut dibs_tree,
+    limits: *const dibs_guard_limits,
+    guard: *mut *mut dibs_guard,
+) -> dibs_code {
+    dibs_code::of(|| {
+        storage.make(size, guard, || {
+            let (surface, tree, limits) = (surface.share()?, tree.share()?, limits.get()?.read()?);
+            surface.check_guarded(tree.tree.vertex_count())?;
+            let tree = (&tree.tree, TreeBytes::new(tree.bytes));
+            let guard = surface
+                .with_reader(|reader| Ok(TheGuard::new(&surface.notes, reader, tree, &limits)?));
+            Ok(dibs_guard(guard?))
+        })
+    })
+}
+
+/// The answer of a tick: what a wall may act on, and how it came about.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_answer {
+    /// A `dibs_code`: `DIBS_CODE_OK` where there is a pair to act on; otherwise why there is none.
+    pub outcome: u32,
+    /// The closest pair to act on; no numbers where there is none. Its accuracy covers the frame's error, the
+    /// extrapolation's, and the tissue's motion where the surface lags; where its side is not known it is the last one whose
+    /// side was.
+    pub closest: dibs_proximity,
+    /// Its certified interval: act on the lower end. From minus to plus infinity where there is no pair.
+    pub interval: dibs_interval,
+    /// Velocity (mm/s) of the tool's point of the pair relative to the surface's; without a pair that of the middle of the
+    /// axis. Zero at the first tick, and no number without a tool.
+    pub velocity: dibs_vec3,
+    /// The trust in the surface: state, cause, margin.
+    pub trust: dibs_verdict,
+    /// The frame that was searched, and its age.
+    pub age: dibs_age,
+    /// Time (ms) by which the surface that was searched is behind the present, as far as its error does not cover it;
+    /// `UINT32_MAX` where that is not known.
+    pub lag: u32,
+    /// The health of the bus.
+    pub link: dibs_link,
+}
+
+impl From<Answer> for dibs_answer {
+    fn from(answer: Answer) -> Self {
+        let interval = answer.closest.map(|pair| pair.interval());
+        let Interval { lower, upper } =
+            interval.unwrap_or(Interval { lower: f32::NEG_INFINITY, upper: f32::INFINITY });
+        let lag = answer.searched.and_then(|searched| searched.lag);
+        Self {
+            outcome: answer.closest.err().map_or(dibs_code::Ok, dibs_code::from) as u32,
+            closest: answer.closest.unwrap_or(Proximity::NOWHERE).into(),
+            interval: dibs_interval { lower, upper },
+            velocity: answer.velocity.into(),
+            trust: answer.trust.into(),
+            age: answer.searched.map(|searched| searched.frame).into(),
+            lag: lag.map_or(u32::MAX, |lag| lag.0),
+            link: answer.link.into(),
+        }
+    }
+}
+
+/// The answer of this tick: the closest pair on the surface published last, moved on to now, and whether it may be trusted.
+///
+/// Call it at every tick. Errors of the query are in the answer, and lead to the safe state.
+///
+/// Cost: the budget at most, and about a thousand instructions.
+///
+/// @param guard   The guard.
+/// @param tool    The tool; null where it has no pose: the answer is then the hold, and the next velocity starts anew.
+/// @param now     The receiver's clock, in ms; wraps.
+/// @param answer  Receives the answer.
+/// @return `DIBS_CODE_OK`, whatever the state; `DIBS_CODE_TOOL_COORDINATE` or `DIBS_CODE_TOOL_RADIUS`, with the answer of a
+///         tool without a pose; or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_guard_closest(
+    guard: *mut dibs_guard,
+    tool: *const dibs_tool,
+    now: u32,
+    answer: *mut dibs_answer,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (answer, mut guard, now) = (answer.check()?, guard.open()?, Millis(now));
+        let shape = tool.get_if_any()?.map(Shape::try_from).transpose();
+        // Without a pose the machine takes its step all the same.
+        let found = match &shape {
+            Ok(Some(Shape::Sphere(sphere))) => guard.0.closest(sphere, now),
+            Ok(Some(Shape::Capsule(capsule))) => guard.0.closest(capsule, now),
+            Ok(None) | Err(_) => guard.0.without_pose(now),
+        };
+        let mut found = dibs_answer::from(found);
+        if let Err(code) = shape {
+            found.outcome = code as u32;
+        }
+        answer.set(found);
+        shape.map(|_| ())
+    })
+}
+
+/// An operator's acknowledgement, which ends the safe state once every input is good again.
+///
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_ACKNOWLEDGE` unless the last tick waited for it, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_guard_acknowledge(guard: *mut dibs_guard) -> dibs_code {
+    dibs_code::of(|| Ok(guard.open()?.0.acknowledge()?))
+}
+
+/// The force of a wall on the tool, from a tick's answer.
+///
+/// @param answer  The answer of this tick.
+/// @param wall    The wall.
+/// @param force   Receives the force.
+/// @return As `dibs_wall_force`.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_answer_force(
+    answer: *const dibs_answer,
+    wall: *const dibs_wall,
+    force: *mut dibs_force,
+) -> dibs_code {
+    match answer.get() {
+        Ok(dibs_answer { outcome, closest, velocity, .. }) => {
+            dibs_wall_force(wall, outcome, &raw const closest, velocity, force)
+        }
+        Err(misuse) => misuse,
+    }
+}
+
+/// Bytes of the memory of a loop's objects, besides the surface.
+pub const DIBS_START_BASE: usize = DIBS_TREE_SIZE + DIBS_BUS_SIZE + DIBS_GUARD_SIZE;
+
+/// Makes all that a control loop needs in one piece of memory: validates the tree, and makes the surface and its two ends. For
+/// pieces apart, each in memory of its own: `dibs_tree_init`, `dibs_surface_init`, `dibs_bus_init`, `dibs_guard_init`.
+///
+/// Cost: linear in the bytes; once, at start-up.
+///
+/// @param memory  `DIBS_START_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`, for as long as an end is used. Needs no
+///                initial value.
+/// @param size    Bytes of the memory.
+/// @param bytes   The tree, in flash or in memory. Not copied: as for `dibs_tree_init`.
+/// @param length  Bytes of the tree.
+/// @param limits  The guard's limits.
+/// @param bus     Receives the bus's address.
+/// @param guard   Receives the guard's address.
+/// @return As of the four functions; `DIBS_CODE_STORAGE_SIZE` where the tree has more vertices than there is room for.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_start(
+    memory: *mut c_void,
+    size: usize,
+    bytes: *const u8,
+    length: usize,
+    limits: *const dibs_guard_limits,
+    bus: *mut *mut dibs_bus,
+    guard: *mut *mut dibs_guard,
+) -> dibs_code {
+    const BUS: usize = DIBS_TREE_SIZE;
+    const GUARD: usize = BUS + DIBS_BUS_SIZE;
+    dibs_code::of(|| {
+        let (bus_place, guard_place) = (bus.check()?, guard.check()?);
+        let (mut tree, mut surface) = (ptr::null_mut(), ptr::null_mut());
+        let (mut bus, mut guard) = (ptr::null_mut(), ptr::null_mut());
+        dibs_tree_init(memory, size, bytes, length, &raw mut tree).done()?;
+        let room = size.checked_sub(DIBS_START_BASE).ok_or(dibs_code::StorageSize)?;
+        let vertices = tree.share()?.tree.vertex_count();
+        let at = |offset| memory.wrapping_byte_add(offset);
+        dibs_surface_init(at(DIBS_START_BASE), room, vertices, &raw mut surface).done()?;
+        dibs_bus_init(at(BUS), DIBS_BUS_SIZE, surface, tree, limits, &raw mut bus).done()?;
+        dibs_guard_init(at(GUARD), DIBS_GUARD_SIZE, surface, tree, limits, &raw mut guard)
+            .done()?;
+        bus_place.set(bus);
+        guard_place.set(guard);
+        Ok(())
+    })
+}

@@ -1,0 +1,356 @@
+//! The loop of bus and guard in C: the same bits as in Rust, its misuses, and the README's loop.
+
+mod programs;
+
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use dibs_build::{Builder, BuiltTree, generate};
+use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
+use dibs_nostd::failsafe::State;
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Surface};
+use dibs_nostd::wire::{Encoding, Event, FrameEncoder, FrameId, Freshness, enframe, framed_bytes};
+use dibs_nostd::{
+    Advance, Capsule, Coverage, Interval, Millis, NoSide, Progress, Proximity, QueryError,
+    ReceiveError, Side, Sphere, StretchError, TreeBytes, Unavailable,
+};
+use programs::{include, library, run, tool, tree_and_stream};
+
+/// Vertices of the generated heart of 1,000 triangles.
+const VERTICES: usize = 502;
+
+/// ms between two frames.
+const PERIOD: u32 = 30;
+
+/// What happens at a time in ms.
+enum Step {
+    Packet(u32, Vec<u8>),
+    Receive(u32, Vec<u8>),
+    Work(u32),
+    Status(u32, bool),
+    /// Both ends of the axis, and the radius.
+    Tick(u32, [f32; 7]),
+    Blind(u32),
+    Acknowledge,
+    Counters,
+}
+
+/// Frames that come as packets and over a line in turn. One is lost, one is damaged, one is stretched too far.
+/// Then the line falls silent, and comes back.
+fn script() -> (BuiltTree, Vec<Step>) {
+    let generate::MovingMesh { mesh, motion } = generate::heart(1_000).expect("a size");
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a tree");
+    let (mesh_id, mut steps) = (built.summary().mesh_id, Vec::new());
+    for now in 1_000..3_600 {
+        let number = (now - 1_000) / PERIOD;
+        let is_silent = (3_300..3_450).contains(&now) || number == 9;
+        if (now - 1_000) % PERIOD == 0 && !is_silent {
+            let mut rows = built.to_rows(&motion.frames[number as usize % motion.frames.len()]);
+            if number == 15 {
+                rows[100] += Vec3::new(0.0, 0.0, 15.0);
+            }
+            let id = FrameId { mesh_id, session: 5, epoch: number };
+            let fresh = Freshness { age_ms: number as u16 % 5, echo: Some(now - 1) };
+            let frame = FrameEncoder::<_, 512>::new(id, Encoding::Float, &rows[..]);
+            let mut frame = frame.expect("a frame").with_freshness(fresh);
+            let (mut buffer, mut place) = ([0; 512], 0);
+            while let Some(packet) = frame.next_packet(&mut buffer) {
+                place += 1;
+                let mut packet = packet.to_vec();
+                packet[9] ^= u8::from((number, place) == (12, 3));
+                steps.push(if number % 2 == 0 {
+                    Step::Packet(now, packet)
+                } else {
+                    let mut line = [0; framed_bytes(512)];
+                    Step::Receive(now, enframe(&packet, &mut line).expect("room").to_vec())
+                });
+            }
+        }
+        steps.extend((0..4).map(|_| Step::Work(250)));
+        steps.push(Step::Status(now, now % 2 == 0));
+        // In and out.
+        let start = Vec3::new(80.0 + 50.0 * (now as f32 * 0.01).sin(), 5.0, 20.0);
+        // A sphere now and then.
+        let end = if now % 7 == 0 { start } else { start + Vec3::new(40.0, 0.0, 30.0) };
+        let [a, b] = [start, end].map(|point| point.to_array());
+        steps.push(match now {
+            1_333 => Step::Blind(now),
+            // No tool at all, and one without a radius.
+            1_334 => Step::Tick(now, [f32::NAN, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
+            1_335 => Step::Tick(now, [a[0], a[1], a[2], b[0], b[1], b[2], -1.0]),
+            _ => Step::Tick(now, [a[0], a[1], a[2], b[0], b[1], b[2], 2.5]),
+        });
+        if now % 100 == 99 {
+            steps.extend([Step::Acknowledge, Step::Counters]);
+        }
+    }
+    (built, steps)
+}
+
+fn lines(steps: &[Step]) -> String {
+    let mut text = String::new();
+    let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+    for step in steps {
+        match step {
+            Step::Packet(now, bytes) => writeln!(text, "packet {now} {}", hex(bytes)),
+            Step::Receive(now, bytes) => writeln!(text, "receive {now} {}", hex(bytes)),
+            Step::Work(most) => writeln!(text, "work {most}"),
+            Step::Status(now, is_framed) => writeln!(text, "status {now} {}", u8::from(*is_framed)),
+            Step::Tick(now, tool) => {
+                writeln!(text, "tick {now} {}", tool.map(|number| number.to_string()).join(" "))
+            }
+            Step::Blind(now) => writeln!(text, "blind {now}"),
+            Step::Acknowledge => writeln!(text, "acknowledge 0"),
+            Step::Counters => writeln!(text, "counters 0"),
+        }
+        .expect("a string");
+    }
+    text
+}
+
+type Ends<'t> = (Bus<'static, 't, u16>, Guard<'static, 't, u16, 512, 256>);
+
+/// The Rust library's answer, in the program's words.
+fn answer((bus, guard): &mut Ends<'_>, step: &Step) -> String {
+    match step {
+        Step::Packet(now, bytes) => match bus.packet(bytes, Millis(*now)) {
+            Ok(progress) => format!("packet 0 {}", number(progress)),
+            Err(error) => format!("packet {} 0", refusal(&error)),
+        },
+        Step::Receive(now, bytes) => {
+            bus.receive(bytes, Millis(*now));
+            "receive 0".to_owned()
+        }
+        Step::Work(most) => match bus.work(*most) {
+            Ok(advance) => format!("work 0 {}", outcome(advance)),
+            Err(error) => format!("work {} 0", refusal(&error)),
+        },
+        Step::Status(now, is_framed) => {
+            let (mut packet, mut line) = ([0; 96], [0; 98]);
+            let status = if *is_framed {
+                bus.status_framed(Millis(*now), &mut line)
+            } else {
+                bus.status(Millis(*now), &mut packet)
+            };
+            let hex = status.unwrap_or_default().iter().map(|byte| format!("{byte:02x}"));
+            format!("status {}", hex.collect::<String>())
+        }
+        Step::Tick(now, [a, b, c, d, e, f, radius]) => {
+            let (start, end) = (Vec3::new(*a, *b, *c), Vec3::new(*d, *e, *f));
+            let now = Millis(*now);
+            if start == end {
+                match Sphere::new(start, *radius) {
+                    Ok(tool) => tick(0, &guard.closest(&tool, now)),
+                    Err(_) => tick(201, &guard.without_pose(now)),
+                }
+            } else {
+                match Capsule::new(start, end, *radius) {
+                    Ok(tool) => tick(0, &guard.closest(&tool, now)),
+                    Err(_) => {
+                        let code = if start.is_finite() { 201 } else { 200 };
+                        tick(code, &guard.without_pose(now))
+                    }
+                }
+            }
+        }
+        Step::Blind(now) => tick(0, &guard.without_pose(Millis(*now))),
+        Step::Acknowledge => {
+            format!("acknowledge {}", if guard.acknowledge().is_ok() { 0 } else { 505 })
+        }
+        Step::Counters => {
+            let counters = Event::ALL.map(|event| bus.counters().of(event).to_string());
+            format!("counters {}", counters.join(" "))
+        }
+    }
+}
+
+fn tick(code: u32, answer: &Answer) -> String {
+    let spring = SpringDamper::stiffness(1.0).damping(0.002).hold_damping(0.001).max_force(5.0);
+    let force = answer.force(&ForbiddenRegion::new(spring, 5.0).expect("a margin"));
+    let pair = answer.closest.unwrap_or(Proximity::NOWHERE);
+    let unknown = Interval { lower: f32::NEG_INFINITY, upper: f32::INFINITY };
+    let interval = answer.closest.map_or(unknown, |pair| pair.interval());
+    let outcome = if code == 0 { answer.closest.err().map_or(0, cause) } else { code };
+    let mut line = format!("tick {code} {outcome}");
+    let floats = |line: &mut String, values: &[f32]| {
+        values.iter().for_each(|value| write!(line, " {:08x}", value.to_bits()).expect("a string"));
+    };
+    let words = |line: &mut String, values: &[u32]| {
+        values.iter().for_each(|value| write!(line, " {value}").expect("a string"));
+    };
+    floats(&mut line, &[pair.separation, pair.lower, pair.accuracy]);
+    let coverage = match pair.coverage {
+        Coverage::Measured => 0,
+        Coverage::Proven => 1,
+        _ => 2,
+    };
+    words(&mut line, &[side(pair.side), coverage]);
+    floats(&mut line, &[pair.axis_distance]);
+    for point in [pair.point_on_surface, pair.point_on_tool, pair.direction] {
+        floats(&mut line, &point.to_array());
+    }
+    floats(&mut line, &[pair.axis_parameter]);
+    words(&mut line, &[pair.triangle.map_or(u32::MAX, |row| row.0)]);
+    words(&mut line, &pair.corners);
+    floats(&mut line, &pair.barycentric);
+    words(&mut line, &[pair.node_tests, pair.triangle_tests]);
+    floats(&mut line, &[interval.lower, interval.upper]);
+    floats(&mut line, &answer.velocity.to_array());
+    let trust = &answer.trust;
+    let state = match trust.state {
+        State::Nominal => 0,
+        State::Degraded => 1,
+        State::Safe => 2,
+    };
+    words(&mut line, &[state, trust.cause.map_or(0, cause)]);
+    floats(&mut line, &[trust.margin]);
+    words(&mut line, &[trust.waits_for_acknowledgement.into()]);
+    let age = answer.searched.map(|searched| searched.frame);
+    words(&mut line, &age.map_or([0; 4], |age| [1, age.epoch, age.received.0, age.age.0]));
+    let lag = answer.searched.and_then(|searched| searched.lag);
+    let link = answer.link;
+    words(&mut line, &[lag.map_or(u32::MAX, |lag| lag.0), link.silence.0, link.heartbeat.0]);
+    words(&mut line, &[link.rejections, link.forgeries, link.transit.0, link.source_age.0]);
+    let state = match force.state {
+        ConstraintState::Inactive => 0,
+        ConstraintState::Active => 1,
+        ConstraintState::Saturated => 2,
+        _ => 3,
+    };
+    words(&mut line, &[state]);
+    floats(&mut line, &force.force.to_array());
+    line
+}
+
+fn number(progress: Progress) -> u32 {
+    match progress {
+        Progress::Begun { .. } => 1,
+        Progress::Stored => 2,
+        Progress::Complete { .. } => 4,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn outcome(advance: Advance) -> u32 {
+    match advance {
+        Advance::Idle => 0,
+        Advance::Pending => 1,
+        Advance::Held { .. } => 2,
+        Advance::Published { .. } => 3,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn refusal(error: &ReceiveError) -> u32 {
+    match error {
+        ReceiveError::Packet(_) => 400,
+        ReceiveError::Unexpected { .. } => 406,
+        ReceiveError::Stretch(StretchError::Exceeded { .. }) => 311,
+        ReceiveError::Stretch(StretchError::TooFast { .. }) => 313,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn cause(cause: Unavailable) -> u32 {
+    match cause {
+        Unavailable::NoSurface => 300,
+        Unavailable::Stale { .. } => 301,
+        Unavailable::Delayed { .. } => 305,
+        Unavailable::NotFinite => 310,
+        Unavailable::Query(QueryError::Uncovered { .. }) => 206,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn side(side: Side) -> u32 {
+    match side {
+        Side::Outside => 0,
+        Side::Inside => 1,
+        Side::Crossing => 2,
+        Side::Undefined(NoSide::NotAsked) => 3,
+        Side::Undefined(NoSide::BelowAccuracy) => 6,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Compiles a program of `tests/programs` with the library.
+fn compile(name: &str, folder: &Path) -> PathBuf {
+    let program = folder.join(name);
+    let mut gcc = tool("gcc", "gcc");
+    gcc.args(["-std=c11", "-g", "-Wall", "-Wextra", "-Werror"]);
+    gcc.args(["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-I"]).arg(include());
+    let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs");
+    gcc.arg(sources.join(name).with_extension("c"));
+    run(gcc.arg(library()).args(["-lpthread", "-ldl", "-lm", "-o"]).arg(&program));
+    program
+}
+
+#[test]
+fn the_loop_in_c_answers_with_the_same_bits() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (built, steps) = script();
+    let surface: &Surface<VERTICES> = Box::leak(Box::new(Surface::new()));
+    let limits = GuardLimits::new(300.0, Millis(80));
+    let mut ends: Ends<'_> = surface.start(TreeBytes::new(built.blob()), limits).expect("valid");
+    let expected: Vec<_> = steps.iter().map(|step| answer(&mut ends, step)).collect();
+
+    let [tree, script] = ["tree", "script"].map(|name| folder.path().join(name));
+    fs::write(&tree, built.blob()).expect("writable");
+    fs::write(&script, lines(&steps)).expect("writable");
+    let said = run(Command::new(compile("loop", folder.path())).arg(tree).arg(script));
+    for (number, (c, rust)) in said.lines().zip(&expected).enumerate() {
+        assert_eq!(c, rust, "answer {number}");
+    }
+    assert_eq!(said.lines().count(), expected.len());
+
+    let ticks: Vec<Vec<&str>> = expected
+        .iter()
+        .filter(|line| line.starts_with("tick"))
+        .map(|line| line.split(' ').collect())
+        .collect();
+    // Code, outcome, state, side and force, as they stand in a line.
+    let count = |place: usize, word: &str| ticks.iter().filter(|tick| tick[place] == word).count();
+    assert!(ticks.len() == 2_600 && count(2, "0") > 700, "{} answers to act on", count(2, "0"));
+    for (place, word) in [(1, "200"), (1, "201"), (2, "300"), (2, "301"), (2, "310")] {
+        assert!(count(place, word) > 0, "no {word} at {place}");
+    }
+    for (place, word) in
+        [(6, "0"), (6, "2"), (33, "0"), (33, "1"), (33, "2"), (48, "0"), (48, "2"), (48, "3")]
+    {
+        assert!(count(place, word) > 10, "{} of {word} at {place}", count(place, word));
+    }
+    assert!(ticks.iter().any(|tick| tick[30] != tick[31] && tick[2] == "0"), "no velocity");
+    for start in ["work 0 3", "work 313", "packet 400", "acknowledge 0", "acknowledge 505"] {
+        assert!(expected.iter().any(|line| line.starts_with(start)), "nothing is {start}");
+    }
+    assert!(
+        expected.iter().filter(|line| line.len() > 50 && line.starts_with("status")).count() > 20
+    );
+}
+
+#[test]
+fn misuse_of_the_loop_is_a_code() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let files = tree_and_stream(folder.path());
+    let said = run(Command::new(compile("misuse_loop", folder.path())).args(files));
+    assert!(said.contains(" checks, 0 failures"), "{said}");
+}
+
+/// The README's programs compile, one after the other, without a warning.
+#[test]
+fn the_readme_compiles() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
+    let readme = fs::read_to_string(readme).expect("the README");
+    let blocks = readme.split("```c\n").skip(1).filter_map(|block| block.split("```").next());
+    let blocks: Vec<_> = blocks.collect();
+    assert!(blocks.len() >= 3, "{} programs", blocks.len());
+    let source = folder.path().join("readme.c");
+    fs::write(&source, blocks.concat()).expect("writable");
+    let mut gcc = tool("gcc", "gcc");
+    gcc.args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "-I"]).arg(include());
+    run(gcc.arg(source));
+}
