@@ -85,6 +85,36 @@ inline Code closest_of(std::span<dibs_tracker *const> trackers, Tools tools, dib
 }
 /** Buffers for so many vertices. */
 template <uint32_t Vertices> using Surface = Object<dibs_surface, DIBS_SURFACE_SIZE(Vertices), dibs_surface_init, Vertices>;
+/** Buffers for so many vertices, with the frame before, for a bus and a guard. */
+template <uint32_t Vertices>
+using GuardedSurface = Object<dibs_surface, DIBS_GUARDED_SIZE(Vertices), dibs_surface_init, Vertices>;
+/** The bus's end of a guarded surface. */
+struct Bus : Object<dibs_bus, DIBS_BUS_SIZE, dibs_bus_init> {
+    Code receive(std::span<const uint8_t> bytes, uint32_t now) {
+        return dibs_bus_receive(*this, bytes.data(), bytes.size(), now);
+    }
+    Code packet(std::span<const uint8_t> packet, uint32_t now, dibs_progress *progress = nullptr) {
+        return dibs_bus_packet(*this, packet.data(), packet.size(), now, progress);
+    }
+    Code work(uint32_t work, dibs_advance *outcome = nullptr) { return dibs_bus_work(*this, work, outcome); }
+};
+/** The control tick's end of a guarded surface. */
+struct Guard : Object<dibs_guard, DIBS_GUARD_SIZE, dibs_guard_init> {
+    Code closest(const dibs_tool &tool, uint32_t now, dibs_answer &answer) {
+        return dibs_guard_closest(*this, &tool, now, &answer);
+    }
+    Code acknowledge() { return dibs_guard_acknowledge(*this); }
+};
+/** Frames of positions that the caller has. */
+struct Writer : Object<dibs_writer, DIBS_WRITER_SIZE, dibs_writer_init> {
+    Code begin() { return dibs_writer_begin(*this); }
+    Code push(std::span<const float> positions) {
+        return dibs_writer_push(*this, positions.data(), uint32_t(positions.size() / 3));
+    }
+    Code publish(dibs_tree *tree, uint32_t epoch, uint32_t received, float error = 0.0f) {
+        return dibs_writer_publish(*this, tree, epoch, received, error);
+    }
+};
 /** The bus's end of a surface. */
 struct Receiver : Object<dibs_receiver, DIBS_RECEIVER_SIZE, dibs_receiver_init> {
     Code accept(std::span<const uint8_t> packet, uint32_t now, dibs_progress *progress = nullptr) {

@@ -175,6 +175,41 @@ int main(int argc, char **argv) {
     EXPECT(true, of_chain.proximity.separation <= at_rest.separation);
     EXPECT(DIBS_CODE_ARGUMENT, dibs::closest_of(both, std::span(chain, 1), of_chain));
 
+    /* The loop: the same frames, and an answer on the last of them. */
+    static dibs::GuardedSurface<502> guarded;
+    static dibs::Bus bus;
+    static dibs::Guard guard;
+    static dibs::Writer writer;
+    const dibs_guard_limits guard_limits = dibs_guard_limits_of(300.0f, 80);
+    dibs_answer answer;
+    EXPECT(DIBS_CODE_STORAGE_SIZE, bus.init(surface, tree, &guard_limits));
+    MUST(guarded.init());
+    MUST(bus.init(guarded, tree, &guard_limits));
+    MUST(guard.init(guarded, tree, &guard_limits));
+    EXPECT(DIBS_CODE_TAKEN, writer.init(guarded));
+    for (std::size_t at = 0; at < packets.size(); at++) {
+        MUST(bus.receive(std::span(packets).subspan(at, 1), 0));
+        MUST(bus.work(10'000));
+    }
+    EXPECT(DIBS_CODE_PACKET_DAMAGED, bus.packet(std::span(packets).first(8), 0));
+    MUST(guard.closest(tool, 1, answer));
+    EXPECT(true, answer.age.is_published == 1 && answer.age.epoch == 2);
+    EXPECT(true, answer.trust.state == DIBS_STATE_SAFE && answer.outcome != DIBS_CODE_OK);
+    EXPECT(DIBS_CODE_ACKNOWLEDGE, guard.acknowledge());
+
+    /* Positions of the caller's, published. */
+    static dibs::Surface<502> written;
+    MUST(written.init());
+    MUST(writer.init(written));
+    MUST(writer.begin());
+    MUST(writer.push(positions));
+    MUST(writer.publish(tree, 1, 0));
+    static dibs::Reader of_writer;
+    MUST(of_writer.init(written));
+    MUST(of_writer.latest(1, 50, frame));
+    MUST(query.closest(frame, tool, at_rest));
+    EXPECT(true, on_bus.separation == at_rest.separation && at_rest.coverage == DIBS_COVERAGE_MEASURED);
+
     const dibs_watch off = {DIBS_UNLIMITED, DIBS_UNLIMITED};
     const dibs_limits limits = {{20, 60}, off, off, off, off, off, off, 0.1f, 1, 0, 0, 0};
     dibs_verdict verdict;
