@@ -61,7 +61,7 @@ fn script() -> (BuiltTree, Vec<Step>) {
                 place += 1;
                 let mut packet = packet.to_vec();
                 packet[9] ^= u8::from((number, place) == (12, 3));
-                steps.push(if number % 2 == 0 {
+                steps.push(if number.is_multiple_of(2) {
                     Step::Packet(now, packet)
                 } else {
                     let mut line = [0; framed_bytes(512)];
@@ -248,8 +248,10 @@ fn refusal(error: &ReceiveError) -> u32 {
     match error {
         ReceiveError::Packet(_) => 400,
         ReceiveError::Unexpected { .. } => 406,
-        ReceiveError::Stretch(StretchError::Exceeded { .. }) => 311,
-        ReceiveError::Stretch(StretchError::TooFast { .. }) => 313,
+        ReceiveError::Stretch(StretchError::Exceeded { .. })
+        | ReceiveError::Refused { cause: Event::Stretch, .. } => 311,
+        ReceiveError::Stretch(StretchError::TooFast { .. })
+        | ReceiveError::Refused { cause: Event::TooFast, .. } => 313,
         other => panic!("{other:?}"),
     }
 }

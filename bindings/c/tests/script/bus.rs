@@ -9,7 +9,7 @@ use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, QuantisedBox};
 use dibs_nostd::{
     Advance, Assembler, Capsule, Frames, Millis, Options, Progress, Query, ReceiveError,
-    StretchError, SurfaceLimits, Tree, Unavailable,
+    StretchError, SurfaceLimits, Tree, Unavailable, wire,
 };
 
 use super::print::Line;
@@ -178,7 +178,8 @@ fn code(error: &ReceiveError) -> u32 {
         ReceiveError::Unexpected { .. } => 406,
         ReceiveError::Order { .. } => 412,
         ReceiveError::Digest { .. } => 415,
-        ReceiveError::Stretch(StretchError::Exceeded { .. }) => 311,
+        ReceiveError::Stretch(StretchError::Exceeded { .. })
+        | ReceiveError::Refused { cause: wire::Event::Stretch, .. } => 311,
         other => panic!("{other:?}"),
     }
 }
