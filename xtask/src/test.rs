@@ -26,19 +26,78 @@ pub struct Options {
     /// WebAssembly, and a few mutants of the lines that changed.
     #[arg(long)]
     pub whole: bool,
+    /// Only these steps, for machines that run side by side; by default all.
+    #[arg(long)]
+    pub job: Option<Job>,
 }
 
-/// Runs all steps, even after a failure, and lists them at the end.
+/// Steps that belong together.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Job {
+    /// Format and lints.
+    Lints,
+    /// Tests on this computer.
+    Host,
+    /// Documentation, packages, and the oldest compiler.
+    Docs,
+    /// Builds for the board and for WebAssembly.
+    Board,
+    /// The checks of every promise: emulated boards, bindings, demo, sanitizers.
+    Promises,
+}
+
+/// Runs all steps of the job, even after a failure, and lists them at the end.
 pub fn test(options: &Options) -> Result<()> {
     let mut steps = Steps::default();
+    let is_due = |job| options.job.is_none_or(|only| only == job);
+    if is_due(Job::Lints) {
+        lints(&mut steps);
+    }
+    if is_due(Job::Host) {
+        // This also runs the examples in the documentation.
+        steps.cargo("tests", &["test", "--release", "--workspace", "--no-fail-fast"], &[]);
+        steps.run("files of other programs", other_programs);
+    }
+    if is_due(Job::Docs) {
+        documents(&mut steps);
+    }
+    // A thread, because the board's builds take one core.
+    let (seconds, is_whole) = (options.demo_seconds, options.whole);
+    let found = (is_due(Job::Board) || is_due(Job::Promises)).then(|| {
+        // Found first, since both sides would install them.
+        (Cross::find(), qemu::find())
+    });
+    let checks = is_due(Job::Promises).then(|| thread::spawn(move || checks(seconds, is_whole)));
+    if let Some((cross, emulator)) = found.filter(|_| is_due(Job::Board)) {
+        match cross.and_then(|cross| emulator.map(|_| cross)) {
+            Ok(cross) => board(&mut steps, &cross, is_whole),
+            Err(error) => steps.run("toolchain for the board", || Err(error)),
+        }
+        steps.run("viewer for WebAssembly", viewer::compiles);
+        if is_whole {
+            steps.run("viewer in WebAssembly", viewer::same_bits);
+        }
+    }
+    if let Some(checks) = checks {
+        let list = checks.join().unwrap_or_else(|_| Err(anyhow!("the thread panicked")));
+        if let Err(error) = list.and_then(|list| steps.read(&list)) {
+            steps.run("checks of tests/prove", || Err(error));
+        }
+    }
+    steps.finish();
+    Ok(())
+}
+
+fn lints(steps: &mut Steps) {
     steps.cargo("format", &["fmt", "--all", "--check"], &[]);
     let board = ["fmt", "--check", "--manifest-path", "examples/stm32h743/Cargo.toml"];
     steps.cargo("format of the board apart", &board, &[]);
     // Lints and documentation take the tests' profile, so that common dependencies are built once.
     let lints = ["clippy", "--release", "--workspace", "--all-targets", "--", "-D", "warnings"];
     steps.cargo("lints", &lints, &[]);
-    // This also runs the examples in the documentation.
-    steps.cargo("tests", &["test", "--release", "--workspace", "--no-fail-fast"], &[]);
+}
+
+fn documents(steps: &mut Steps) {
     let strict = [("RUSTDOCFLAGS", "-D warnings")];
     let doc = ["doc", "--release", "--no-deps", "-p"];
     let libraries = ["dibs-nostd", "-p", "dibs-build", "-p", "dibs-stream", "--all-features"];
@@ -48,40 +107,22 @@ pub fn test(options: &Options) -> Result<()> {
         &[&doc[..], &["firmware-example"]].concat(),
         &strict,
     );
-    steps.run("files of other programs", other_programs);
     let published = ["dibs-nostd", "dibs-build", "dibs-stream", "dibs-cli"];
     let published = published.iter().flat_map(|name| ["-p", name]);
     let package = ["package", "--no-verify", "--allow-dirty"].into_iter().chain(published);
     steps.cargo("packages", &package.collect::<Vec<_>>(), &[]);
     steps.run("oldest compiler", oldest_compiler);
+}
 
-    // Found first, since both sides would install them. Then a thread, because the board's builds take one core.
-    let (cross, emulator) = (Cross::find(), qemu::find());
-    let (seconds, is_whole) = (options.demo_seconds, options.whole);
-    let checks = thread::spawn(move || checks(seconds, is_whole));
-    match cross.and_then(|cross| emulator.map(|_| cross)) {
-        Ok(cross) => {
-            println!("\nboard: {}", cross.describe());
-            steps.run("core crate for the board", || core_crate(&cross));
-            steps.run("lints of the firmware", || firmware_lints(&cross, is_whole));
-            steps.run("C interface for the board", || c_interface::has_no_panic_path(&cross));
-            if options.whole {
-                steps.run("a new user", || new_user(&cross));
-            }
-            steps.run("cycles, as far as an emulator has them", || cycles(&cross));
-        }
-        Err(error) => steps.run("toolchain for the board", || Err(error)),
+fn board(steps: &mut Steps, cross: &Cross, is_whole: bool) {
+    println!("\nboard: {}", cross.describe());
+    steps.run("core crate for the board", || core_crate(cross));
+    steps.run("lints of the firmware", || firmware_lints(cross, is_whole));
+    steps.run("C interface for the board", || c_interface::has_no_panic_path(cross));
+    if is_whole {
+        steps.run("a new user", || new_user(cross));
     }
-    steps.run("viewer for WebAssembly", viewer::compiles);
-    if options.whole {
-        steps.run("viewer in WebAssembly", viewer::same_bits);
-    }
-    let list = checks.join().unwrap_or_else(|_| Err(anyhow!("the thread panicked")));
-    if let Err(error) = list.and_then(|list| steps.read(&list)) {
-        steps.run("checks of tests/prove", || Err(error));
-    }
-    steps.finish();
-    Ok(())
+    steps.run("cycles, as far as an emulator has them", || cycles(cross));
 }
 
 /// Runs the checks of `tests/prove`. Returns the file with the list of its steps.

@@ -259,7 +259,7 @@ fn no_force_jumps_where_a_wall_begins_or_ends() {
             };
             let found = found.expect("an answer");
             let (within, accuracy) = (list.within(MARGIN), list.accuracy());
-            let is_complete = within.as_ref().is_ok_and(|all| all.is_complete());
+            let is_complete = within.as_ref().is_ok_and(dibs_nostd::ContactIter::is_complete);
             let wrench = proxy.wrench(within, accuracy, start, Vec3::ZERO, Vec3::ZERO);
             let contacts = list.iter().map(|at| (at.separation, at.normal)).collect();
             let held = Held { force: wrench.force, depth: MARGIN - found.lower, contacts };
