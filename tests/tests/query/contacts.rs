@@ -14,8 +14,11 @@ use fastrand::Rng;
 use glam::{DVec3, Vec3};
 
 const MARGIN: f32 = 6.0;
-/// The library's least height of a ridge between two contacts, without its accuracy.
-const RIDGE: f64 = MARGIN as f64 / 64.0;
+/// The library's least height of a ridge beside a contact at this distance, without its accuracy.
+fn least_ridge(distance: f64) -> f64 {
+    distance.min(f64::from(MARGIN)) / 128.0
+}
+
 /// Distance of two directions that are certain to be much the same: the library's is 0.125, with its rounding.
 const LIKE: f32 = 0.11;
 
@@ -29,7 +32,7 @@ struct Valley {
     up: f64,
 }
 
-/// Every valley in f64, and the valley of every triangle. Ridges up to [`RIDGE`] part no valleys.
+/// Every valley in f64, and the valley of every triangle. Ridges up to [`least_ridge`] part no valleys.
 fn valleys(rows: &[Vec3], triangles: &[[u32; 3]], tool: [Vec3; 2]) -> (Vec<Valley>, Vec<usize>) {
     let mut across = HashMap::new();
     for (row, &[a, b, c]) in triangles.iter().enumerate() {
@@ -67,7 +70,7 @@ fn valleys(rows: &[Vec3], triangles: &[[u32; 3]], tool: [Vec3; 2]) -> (Vec<Valle
             let ridge = pairs[row].distance - pairs[valley].distance;
             ridges.insert(valley, ridge);
             all[valley] = lowest;
-            if ridge <= RIDGE {
+            if ridge <= least_ridge(pairs[valley].distance) {
                 let into = bottom(&one, row);
                 one[valley] = into;
             }
@@ -91,6 +94,8 @@ fn valleys(rows: &[Vec3], triangles: &[[u32; 3]], tool: [Vec3; 2]) -> (Vec<Valle
 struct Surroundings {
     neighbours: Vec<[Option<usize>; 3]>,
     distances: Vec<f64>,
+    /// Of each triangle's edges.
+    edges: Vec<[f64; 3]>,
     directions: Vec<DVec3>,
 }
 
@@ -109,24 +114,30 @@ impl Surroundings {
         let [start, end] = tool.map(Vec3::as_dvec3);
         let at = |&corners: &[u32; 3]| corners.map(|v| rows[v as usize].as_dvec3());
         let pairs = triangles.iter().map(|corners| closest_pair(start, end, at(corners)));
+        let edges = triangles.iter().map(at).map(|[a, b, c]| {
+            [[a, b, b], [b, c, c], [c, a, a]].map(|ends| closest_pair(start, end, ends).distance)
+        });
+        let edges = edges.collect();
         let (distances, directions) = pairs
             .map(|pair| (pair.distance, (pair.on_axis - pair.on_surface).normalize_or_zero()))
             .unzip();
-        Self { neighbours, distances, directions }
+        Self { neighbours, distances, edges, directions }
     }
 
     /// Whether a way leads from one triangle to another over no ridge above the higher one, and over none that sees the tool
     /// in another direction than either.
     fn connect(&self, [one, other]: [usize; 2]) -> bool {
         let most = self.distances[one].max(self.distances[other]);
+        let top = most + least_ridge(most);
         let is_like = |row: usize| {
             let to = |end: usize| self.directions[row].distance(self.directions[end]);
             to(one) < f64::from(LIKE) && to(other) < f64::from(LIKE)
         };
         let (mut reached, mut next) = (HashSet::from([one]), vec![one]);
         while let Some(row) = next.pop() {
-            for at in self.neighbours[row].into_iter().flatten() {
-                if self.distances[at] <= most + RIDGE && is_like(at) && reached.insert(at) {
+            for (at, over) in self.neighbours[row].into_iter().zip(self.edges[row]) {
+                let Some(at) = at.filter(|_| over <= top) else { continue };
+                if is_like(at) && reached.insert(at) {
                     next.push(at);
                 }
             }
@@ -216,7 +227,7 @@ fn no_contact_is_missing_and_none_is_doubled() {
                 let reach = f64::from(MARGIN + radius);
                 let is_apart = !is_crossing || valley.distance > accuracy;
                 let is_clear = is_apart && valley.distance < reach - slack && valley.up > 0.05;
-                let is_parted = valley.ridge > RIDGE + slack;
+                let is_parted = valley.ridge > least_ridge(valley.distance) + slack;
                 assert!(!is_clear || !is_parted || !listed.is_empty(), "{name}: no {valley:?}");
             }
             several += usize::from(contacts.len() > 1);

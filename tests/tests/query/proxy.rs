@@ -224,6 +224,29 @@ struct Held {
     contacts: Vec<(f32, Vec3)>,
 }
 
+/// A capsule's ends, and their steps (mm), across which a contact of a brain ended with its whole share. There two low triangles
+/// in much the same direction lie beside each other, with a high edge between.
+const ENDED: [[Vec3; 4]; 3] = [
+    [
+        Vec3::new(0.638_053_36, 59.497_116, 19.683_912),
+        Vec3::new(-25.352_804, 28.686_636, 88.786_66),
+        Vec3::new(-0.194_020_2, -0.047_921_18, -0.223_740_34),
+        Vec3::new(0.020_231_986, -0.186_831_44, 0.233_847_56),
+    ],
+    [
+        Vec3::new(23.646_627, -62.219_353, 16.624_096),
+        Vec3::new(-12.034_849, -122.536_545, -21.959_179),
+        Vec3::new(0.032_920_3, 0.290_359, 0.067_881_69),
+        Vec3::new(-0.091_922_134, -0.261_625, 0.114_467_03),
+    ],
+    [
+        Vec3::new(15.373_539, -69.311_13, 9.917_008),
+        Vec3::new(80.908_6, -113.061_8, -3.904_564_9),
+        Vec3::new(0.258_738_46, -0.003_200_652_5, 0.151_803_1),
+        Vec3::new(0.282_318_53, 0.091_354_54, 0.044_165_563),
+    ],
+];
+
 /// Outside a surface, steps between whose ends the force differs are halved down to some nanometres: no contact that
 /// begins or ends takes the force with it. What is left are directions of walls that are hardly apart.
 #[test]
@@ -273,6 +296,11 @@ fn no_force_jumps_where_a_wall_begins_or_ends() {
             let long = if number % 4 == 0 { unit(&mut rng) * 60.0 } else { Vec3::ZERO };
             let step = [(); 2].map(|()| unit(&mut rng) * 0.3);
             let step = if number % 4 == 0 { step } else { [step[0]; 2] };
+            let known = ENDED.get(number).filter(|_| name == "brain");
+            let (from, long, step) = match known {
+                Some(&[from, to, at_from, at_to]) => (from, to - from, [at_from, at_to]),
+                None => (from, long, step),
+            };
             let tool = |share: f32| [from + step[0] * share, from + long + step[1] * share];
             let (mut low, mut high) = (0.0_f32, 1.0_f32);
             let (Some(mut one), Some(mut other)) = (hold(tool(low)), hold(tool(high))) else {

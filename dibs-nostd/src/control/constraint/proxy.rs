@@ -41,9 +41,9 @@ impl defmt::Format for Wrench {
 /// [`ForbiddenRegion`](super::ForbiddenRegion); in a corner it holds against both walls, and two contacts with one wall
 /// count as one, up to 6 %. The force of each contact acts at its point of the tool, which gives the torque.
 ///
-/// The displacement `t` has the least `|t|^2` under `n . t >= margin - d` for each of the eight deepest contacts, each
-/// of which yields by a 16th. An active set finds it exactly but for rounding. If no two contacts face each other, `t`
-/// clears each contact that has its whole share by at least its depth.
+/// The displacement `t` has the least `|t|^2` under `n . t >= margin - d` for each of the eight deepest contacts with a
+/// share, each of which yields by a 16th. An active set finds it exactly but for rounding. If no two contacts face each
+/// other, `t` clears each contact that has its whole share by at least its depth.
 ///
 /// `t` is continuous in depths, normals and *shares*. A contact's share is what it would move the proxy by alone, of its
 /// depth. The deepest has all. Another has less where it is less than a 16th as deep, and 0 at the margin's edge, wherever
@@ -52,8 +52,10 @@ impl defmt::Format for Wrench {
 /// both have all. Beside a wall's edge the force changes by up to 45 K depth / distance of the axis a mm, for a stiffness K.
 ///
 /// Steps remain where two walls are less than 15 degrees apart, which may be one contact: up to a quarter of the force,
-/// a twelfth in size. Nearer to an edge than some 16 accuracies the direction is not known. Where places, list or budget
-/// end, shares are whole. The torque steps with a contact's point, where that slides along a wall. From a list that is not
+/// a twelfth in size, as measured outside hearts and brains with the axis at least 0.02 mm from the surface. Nearer than
+/// some 16 accuracies the direction is not known: there the force turned by up to 75 degrees, of the same size. Where
+/// places, list or budget end, shares are whole, and a ninth contact with a share does not act: there steps have no bound.
+/// The torque steps with a contact's point, where that slides along a wall. From a list that is not
 /// [complete](crate::ContactIter::is_complete) the force is at least that of the closest pair.
 ///
 /// The damper acts against the tool's speed into the surface, relative to the surface's velocity.
@@ -131,6 +133,10 @@ impl Proxy {
             }
             if !is_in {
                 (is_in, deepest) = (true, depth);
+            }
+            // A contact without a share takes no place from one that has one.
+            if contact.share <= 0.0 {
+                continue;
             }
             let Some(place) = free.next() else { break };
             let part = SHALLOW * depth / deepest;

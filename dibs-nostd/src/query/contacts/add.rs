@@ -14,7 +14,7 @@ use crate::tool::AxisPair;
 use crate::unavailable::QueryError;
 use crate::{Budget, Coverage, Index, Tool, Tree, TriangleRow, VertexTable};
 
-/// Ridges of this part of the margin do not part two contacts.
+/// Ridges up to this part of the margin above a contact are looked at: the largest for a whole share.
 const RIDGE: f32 = 1.0 / 64.0;
 
 /// Accuracies within which two points are too close to give a direction.
@@ -118,9 +118,9 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         let left = options.budget.triangle_tests.saturating_sub(made.triangle_tests);
         let mut look = Looking { pair, limit: limit + ridge, accuracy, left };
         let (mut least, mut meets) = (f32::INFINITY, 0_u32);
-        let (ridges, is_left_out) = ((ridge, 2.0 * accuracy), |row| !is_of(TriangleRow(row)));
-        let look_at = |row| look.triangle(row);
-        let missing = basins.each_valley(tree, ridges, is_left_out, look_at, |near| {
+        let is_left_out = |row| !is_of(TriangleRow(row));
+        let ridges = (0.5 * RIDGE * margin, 2.0 * accuracy);
+        let missing = basins.each_valley(tree, ridges, is_left_out, &mut look, |near| {
             let is_on = sqrt(near.square) <= accuracy;
             meets += u32::from(is_on);
             // The crossing pair, inserted above, stands for these triangles.
@@ -148,7 +148,6 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         for contact in found.list.iter_mut().take(found.count) {
             let is_own = (contact.surface, contact.tool) == (pair.surface, pair.number);
             if is_own && contact.separation > deepest {
-                let ridges = (0.5 * RIDGE * margin, 2.0 * accuracy);
                 let row = contact.triangle.0;
                 contact.share = basins.share(tree, row, ridges, is_left_out, &mut look)?;
             }

@@ -1,10 +1,10 @@
 //! Selects the triangles near a tool that are closer than their surroundings.
 //!
 //! The distance from the tool is a height over the surface, and each valley of it is a contact. A flood from each low
-//! triangle, the lowest first, goes down to a place with nothing lower next to it. Then it rises by the height of a ridge,
-//! over triangles in much the same direction. If it runs into the flood of a lower one in much the same direction, both
-//! are one valley: a flat wall along a capsule is one, however many triangles are equally far, and two walls are two,
-//! however low the ridge between.
+//! triangle, the lowest first, goes down to a place with nothing lower next to it. Then it rises over triangles in much the
+//! same direction by a ridge, as high as one beside which a contact has no share of a wall. So none ends while it has one.
+//! If it runs into the flood of a lower one in much the same direction, both are one valley: a flat wall along a capsule
+//! is one, however many triangles are equally far, and two walls are two, however low the ridge between.
 //!
 //! Over a triangle the height is convex. So the way from its lowest point to a neighbour leads over no ridge exactly if
 //! that point is on the edge between.
@@ -14,10 +14,11 @@
 
 use glam::Vec3;
 
+use super::share::{self, Looking};
 use crate::math::sqrt::sqrt;
 use crate::tool::AxisPair;
 use crate::unavailable::QueryError;
-use crate::{Index, Tree};
+use crate::{Index, Tool, Tree, VertexTable};
 
 /// A triangle, the square of its distance, and its closest point.
 #[derive(Clone, Copy, Debug)]
@@ -161,17 +162,17 @@ impl<const N: usize> Basins<N> {
         low.first().map(|farthest| farthest.square())
     }
 
-    /// Finds the valleys: between those in much the same direction, ridges of at most `ridge` above the higher one do not
-    /// count. Calls back with the lowest triangle of each, nearest first. `look` finds a triangle's closest point, or `None`
-    /// without budget; points that differ by `error` may be equally far. Triangles that `is_left_out` are not looked at.
+    /// Finds the valleys: between those in much the same direction, ridges that give the higher one no share do not count
+    /// (`ridges`: see [`share::least_ridge`]). Calls back with the lowest triangle of each, nearest first. Points that differ by
+    /// the ridges' error may be equally far. Triangles that `is_left_out` are not looked at.
     ///
     /// Returns the square of the distance from which on valleys may be missing, if any.
-    pub fn each_valley<I: Index>(
+    pub fn each_valley<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         tree: &Tree<'_, I>,
         ridges: (f32, f32),
         is_left_out: impl Fn(u32) -> bool,
-        mut look: impl FnMut(u32) -> Result<Option<Near>, QueryError>,
+        look: &mut Looking<'_, '_, I, V, T>,
         mut visit: impl FnMut(Near) -> Result<(), QueryError>,
     ) -> Result<Option<f32>, QueryError> {
         sort(self.near.get_mut(..self.count).unwrap_or_default(), self.is_heap);
@@ -183,7 +184,7 @@ impl<const N: usize> Basins<N> {
         }
         let mut missing = None;
         for entry in 0..low {
-            match self.flood(tree, entry as u16, ridges, &is_left_out, &mut look)? {
+            match self.flood(tree, entry as u16, ridges, &is_left_out, look)? {
                 Flood::Ended(lowest, beside) => {
                     visit(lowest)?;
                     if let Some(beside) = beside {
@@ -200,18 +201,19 @@ impl<const N: usize> Basins<N> {
     }
 
     /// Floods the surroundings of a low triangle up to the height of a ridge above the lowest place.
-    fn flood<I: Index>(
+    fn flood<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         tree: &Tree<'_, I>,
         low: u16,
-        (ridge, error): (f32, f32),
+        ridges: (f32, f32),
         is_left_out: &impl Fn(u32) -> bool,
-        look: &mut impl FnMut(u32) -> Result<Option<Near>, QueryError>,
+        look: &mut Looking<'_, '_, I, V, T>,
     ) -> Result<Flood, QueryError> {
         let Some(&(mut lowest)) = self.near.get(usize::from(low)) else {
             return Ok(Flood::Joined);
         };
         let mut height = sqrt(lowest.square());
+        let (ridge, error) = (share::least_ridge(height, ridges), ridges.1);
         // The lowest before any ridge; the entry of the lowest; whether that is beyond a ridge, and leads to another flood.
         let (mut own, mut at_lowest, mut has_crossed, mut leads_away) = (lowest, low, false, false);
         let mut count = 0;
@@ -227,7 +229,7 @@ impl<const N: usize> Basins<N> {
                     continue;
                 }
                 let is_level = from.place.is_on(edge) && sqrt(from.square()) <= height + error;
-                let Some(next) = self.entry(across, look)? else {
+                let Some(next) = self.entry(across, &mut |row| look.triangle(row))? else {
                     if is_level {
                         return Ok(Flood::CutShort);
                     }
@@ -237,8 +239,14 @@ impl<const N: usize> Basins<N> {
                 let (Some(&key), Some(&by)) = (self.near.get(at), self.reached_by.get(at)) else {
                     continue;
                 };
-                let is_within = sqrt(key.square()) <= height + ridge;
+                let top = height + ridge;
+                let is_within = sqrt(key.square()) <= top;
                 if by == low || !is_within || !(is_level || key.place.is_like(own.place)) {
+                    continue;
+                }
+                // Both may be low with a high edge between them. Without budget the flood does not rise.
+                let is_over = from.place.is_on(edge);
+                if !is_over && !look.edge(from.row, edge)?.is_some_and(|over| over <= top) {
                     continue;
                 }
                 if !self.reach(next, low, &mut count) {

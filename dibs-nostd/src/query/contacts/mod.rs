@@ -263,11 +263,11 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// that pair is the first. An axis that meets the surface in several places may be inside in several parts: only the
     /// deepest is a contact, and its separation is the list's [bound](Contacts::bound).
     ///
-    /// Two valleys of the distance in much the same direction, within 7 degrees, are one contact unless a ridge of more than
-    /// a 64th of the margin parts them, so a flat wall along a capsule is one; so may be two within 15 degrees. Walls in
-    /// other directions are contacts of their own. Pairs with the inner side of a sheet, say the far side of an organ, are not
-    /// contacts. Where the side is undefined the tool is taken to be outside. If that is because the budget ended,
-    /// contacts may be missing at any distance: see [`Contacts::within`].
+    /// Two valleys of the distance in much the same direction, within 7 degrees, are one contact unless a ridge parts
+    /// them of more than a 128th of the axis' distance there, at most of the margin. So a flat wall along a capsule is one;
+    /// so may be two within 15 degrees. Walls in other directions are contacts of their own. Pairs with the inner side of a
+    /// sheet, say the far side of an organ, are not contacts. Where the side is undefined the tool is taken to be outside.
+    /// If that is because the budget ended, contacts may be missing at any distance: see [`Contacts::within`].
     ///
     /// Where the list has too few places, or the budget ends, the closest pair is in it all the same, and its
     /// [bound](Contacts::bound) says how far it is complete. One wall may then be several contacts.

@@ -24,6 +24,12 @@ const WAYS: usize = 48;
 /// Most triangles passed.
 const STEPS: usize = 128;
 
+/// The ridge (mm) up to which a place at this distance has no share.
+pub(super) fn least_ridge(distance: f32, (most, error): (f32, f32)) -> f32 {
+    let ridge = distance * RIDGE;
+    (if ridge < most { ridge } else { most }) + error
+}
+
 /// A way to a triangle.
 #[derive(Clone, Copy)]
 struct Way {
@@ -55,7 +61,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Looking<'_, '_, I, V, T> {
     }
 
     /// The distance of an edge; `None` without budget.
-    fn edge(&mut self, row: u32, edge: u32) -> Result<Option<f32>, QueryError> {
+    pub fn edge(&mut self, row: u32, edge: u32) -> Result<Option<f32>, QueryError> {
         let Some(()) = self.pay() else { return Ok(None) };
         self.pair.edge_distance(row, edge, self.limit).map(Some)
     }
@@ -70,7 +76,7 @@ impl<const N: usize> Basins<N> {
         &mut self,
         tree: &Tree<'_, I>,
         row: u32,
-        (most, error): (f32, f32),
+        ridges: (f32, f32),
         is_left_out: impl Fn(u32) -> bool,
         look: &mut Looking<'_, '_, I, V, T>,
     ) -> Result<f32, QueryError> {
@@ -80,8 +86,7 @@ impl<const N: usize> Basins<N> {
         else {
             return Ok(1.0);
         };
-        let none = own * RIDGE;
-        let none = if none < most { none } else { most } + error;
+        let none = least_ridge(own, ridges);
         let full = 2.0 * none;
         let mut least = full;
         let mut ways = [Way { height: own, entry }; WAYS];
