@@ -11,7 +11,7 @@
 /// | `Frames` | a double buffer for its vertices, a [`Frames`](crate::Frames), for a loop of your own |
 /// | `Receiver` | the bus's end of it (feature `bus`), an [`Assembler`](crate::Assembler) that measures stretch in slices; `receiver` makes one |
 /// | `Reader` | the control loop's end of it |
-/// | `Query` | a [`Query`](crate::Query) with the stack that the tree needs; `WideQuery` for large processors |
+/// | `Query` | a [`Query`](crate::Query) with the stack that the tree needs; with the feature `wide`, `WideQuery` for large processors |
 /// | `Tracker` | a [`Tracker`](crate::Tracker) with that stack; its front is yours to choose |
 /// | `VERTICES`, `STACK`, `Index` | the sizes, for types of your own |
 /// | `CENTRE`, `REACH` | the rest shape's bounding box, where the tree carries its rest shape |
@@ -56,6 +56,22 @@ macro_rules! if_guard {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! if_guard {
+    ($($item:item)*) => {};
+}
+
+/// Items of the generated module that need the feature `wide`.
+#[cfg(feature = "wide")]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! if_wide {
+    ($($item:item)*) => { $($item)* };
+}
+
+/// Nothing: the feature is off.
+#[cfg(not(feature = "wide"))]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! if_wide {
     ($($item:item)*) => {};
 }
 

@@ -47,6 +47,7 @@
 //! # Features
 //!
 //! - `bus`, `control`, `modes`, on by default: packets and the [`Assembler`]; [`constraint`] and [`failsafe`]; [`modes`].
+//! - `wide`: `Query::closest_wide`, which tests several subtrees at once, for large processors.
 //! - `defmt`: `defmt::Format` for every public value and error.
 //! - `authenticity`: [`wire`]'s `AesCmac`, with which a receiver takes only packets with a genuine tag.
 #![no_std]
@@ -54,8 +55,6 @@
 
 pub use glam;
 
-#[cfg(feature = "bus")]
-mod bus;
 #[cfg(feature = "control")]
 mod control;
 mod error;
@@ -66,17 +65,17 @@ mod math;
 #[cfg(feature = "modes")]
 pub mod modes;
 mod query;
+#[cfg(feature = "bus")]
+mod receive;
 mod stretch;
 mod surface;
 mod time;
 mod tool;
 mod tree;
 mod unavailable;
+#[cfg(feature = "bus")]
+pub mod wire;
 
-#[cfg(feature = "bus")]
-pub use bus::wire;
-#[cfg(feature = "bus")]
-pub use bus::{Advance, Assembler, BusHealth, LastHeartbeat, Progress, ReceiveError};
 #[cfg(feature = "control")]
 pub use control::{constraint, failsafe};
 pub use error::Error;
@@ -84,6 +83,8 @@ pub use query::{
     Budget, Closest, Contact, ContactIter, Contacts, Cost, Fallback, Interval, NoSide, Options,
     Proximity, Query, Side, Sweep, SweepAnswer, Tracker, TrackerAnswer,
 };
+#[cfg(feature = "bus")]
+pub use receive::{Advance, Assembler, BusHealth, LastHeartbeat, Progress, ReceiveError};
 #[doc(hidden)]
 pub use stretch::Compared;
 pub use stretch::{

@@ -2,6 +2,7 @@
 
 use glam::{Mat4, Vec3, Vec4};
 
+#[cfg(feature = "wide")]
 use crate::math::sqrt::sqrt;
 
 /// Four points or vectors. Each operation rounds as that of [`Vec3`] does.
@@ -53,6 +54,7 @@ impl Vec3x4 {
 }
 
 /// Four square roots, correctly rounded.
+#[cfg(feature = "wide")]
 #[inline(always)]
 pub fn roots(squares: Vec4) -> Vec4 {
     Vec4::from_array(squares.to_array().map(sqrt))

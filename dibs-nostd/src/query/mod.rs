@@ -34,7 +34,9 @@ pub use tracker::{Fallback, Tracker, TrackerAnswer};
 
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
-use search::{Search, Ties, WHOLE, Waiting, WideSearch};
+#[cfg(feature = "wide")]
+use search::WideSearch;
+use search::{Search, Ties, WHOLE, Waiting};
 use separation::signed;
 
 /// A query on one tree, with the fixed stack that its traversal needs: 8 bytes an entry.
@@ -111,6 +113,7 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     ///
     /// # Errors
     /// Those of [`closest`](Self::closest).
+    #[cfg(feature = "wide")]
     pub fn closest_wide<V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         vertices: &V,

@@ -10,12 +10,14 @@ mod roots;
 mod slack;
 mod tick;
 mod ties;
+#[cfg(feature = "wide")]
 mod wide;
 
 use glam::Vec3;
 
 pub(super) use tick::{Outcome, Tick};
 pub(super) use ties::Ties;
+#[cfg(feature = "wide")]
 pub(super) use wide::WideSearch;
 
 use roots::Roots;

@@ -11,6 +11,7 @@ use super::moving::SurfaceBlend;
 use super::moving::{FARTHEST, clamped};
 use super::prediction::Prediction;
 use super::{Ageing, FrameAge, LatestSurface, MeasuredStretch, Millis, VertexTable};
+#[cfg(feature = "bus")]
 use crate::time::elapsed;
 
 /// The end that reads: owned by the control tick.

@@ -26,8 +26,9 @@ const AREAS: [(&str, &[&str], &[&str]); 6] = [
     ("dibs-nostd/src/tree", &["tree", "query"], &["format", "refusals"]),
     ("dibs-nostd/src/stretch", &["surface"], &["stretch", "plausible"]),
     ("dibs-nostd/src/modes", &["surface"], &["modes_bound", "modes"]),
+    ("dibs-nostd/src/wire", &["bus"], &["specification", "line", "authenticity"]),
     (
-        "dibs-nostd/src/bus",
+        "dibs-nostd/src/receive",
         &["bus"],
         &["complete", "order", "partial", "causes", "attacks", "authenticity"],
     ),

@@ -3,7 +3,7 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use super::Link;
-use crate::bus::BusHealth;
+use crate::receive::BusHealth;
 use crate::surface::{Ageing, Millis};
 
 /// The bus interrupt's notes for the control tick. Meant for a `static`.

@@ -7,7 +7,7 @@ use std::vec::Vec;
 use proptest::prelude::*;
 
 use super::{FailSafe, LimitError, Limits, Link, LinkStatus, Observation, State, Verdict, Watch};
-use crate::bus::BusHealth;
+use crate::receive::BusHealth;
 use crate::surface::{Ageing, FrameAge, Millis};
 use crate::unavailable::{QueryError, Unavailable};
 

@@ -4,6 +4,7 @@
 //! functions are `const`, so that a tree may be validated in a constant; a generated one is validated at start-up.
 
 mod metric;
+#[cfg(feature = "wide")]
 pub(crate) mod several;
 
 pub use super::unit::Unit;

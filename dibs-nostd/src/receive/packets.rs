@@ -6,12 +6,12 @@ use glam::Vec3;
 
 use super::step::Step;
 use super::{Assembler, Progress, ReceiveError, arrivals};
-use crate::bus::wire::{
+use crate::stretch::{FrameExtent, Gate};
+use crate::surface::Position;
+use crate::wire::{
     Begin, Body, Content, Encoding, Mac, Packet, Rows, Vertices, Weights, float_position,
     quantised_row,
 };
-use crate::stretch::{FrameExtent, Gate};
-use crate::surface::Position;
 
 impl<G: Gate, M: Mac> Assembler<'_, G, M> {
     #[inline]

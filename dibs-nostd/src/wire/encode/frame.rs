@@ -2,11 +2,11 @@
 
 use super::{PacketWriter, begin_packet, capacity};
 use crate::VertexTable;
-use crate::bus::wire::{
+use crate::tree::SurfaceFacts;
+use crate::wire::{
     Begin, Content, EncodeError, Encoding, FrameId, Freshness, HEADER_BYTES, MAX_CONTENT_PACKETS,
     MAX_ROWS, Mac, NoMac, kind,
 };
-use crate::tree::SurfaceFacts;
 
 /// Cuts one frame into packets of at most `MTU` bytes: begin, vertices, commit.
 ///

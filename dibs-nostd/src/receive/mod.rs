@@ -8,9 +8,6 @@ mod packets;
 mod step;
 
 use crate::MAX_COORDINATE;
-use crate::bus::wire::{
-    Body, Content, Counters, Event, FrameId, Mac, NoMac, Packet, Status, StreamError,
-};
 use crate::stretch::{
     Admission, Gate, IncomingSurface, StretchError, StretchMonitor, SurfaceLimits,
 };
@@ -18,6 +15,9 @@ use crate::surface::{
     FrameLabel, FrameView, FrameWriter, LastStep, Millis, PredictionCheck, PublishError,
 };
 use crate::tree::{Index, SurfaceFacts, Tree};
+use crate::wire::{
+    Body, Content, Counters, Event, FrameId, Mac, NoMac, Packet, Status, StreamError,
+};
 
 use collector::Collector;
 pub use collector::LastHeartbeat;

@@ -3,9 +3,9 @@
 use core::fmt;
 
 use crate::StretchError;
-use crate::bus::wire::{Event, PacketError};
 use crate::surface::Millis;
 use crate::tree::SurfaceFacts;
+use crate::wire::{Event, PacketError};
 
 /// Why a packet, or the frame that it would have finished, was rejected. The frame published last
 /// stays.

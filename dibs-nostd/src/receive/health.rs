@@ -1,8 +1,8 @@
 //! The bus's health, in numbers that a fail-safe machine watches.
 
 use super::ReceiveError;
-use crate::bus::wire::{FrameId, Packet, is_newer};
 use crate::surface::Millis;
+use crate::wire::{FrameId, Packet, is_newer};
 
 /// The health of the bus, as the receiver sees it, for [`LinkStatus::set`](crate::failsafe::LinkStatus::set). Times are
 /// on the receiver's clock.

@@ -1,11 +1,11 @@
 //! A modal frame as packets.
 
 use super::{PacketWriter, begin_packet, capacity};
-use crate::bus::wire::{
+use crate::tree::SurfaceFacts;
+use crate::wire::{
     Begin, Content, EncodeError, Encoding, FrameId, Freshness, HEADER_BYTES, MAX_WEIGHTS, Mac,
     NoMac, kind,
 };
-use crate::tree::SurfaceFacts;
 
 /// Cuts the weights of one modal frame into packets of at most `MTU` bytes: begin, weights, commit.
 ///

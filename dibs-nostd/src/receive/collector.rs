@@ -5,12 +5,12 @@
 use super::ReceiveError;
 use super::arrivals::{Arrivals, Misplaced, Place};
 use super::health::{BusHealth, FrameName, Trouble};
-use crate::bus::wire::{
+use crate::surface::{AHEAD, Millis, elapsed};
+use crate::tree::SurfaceFacts;
+use crate::wire::{
     Answer, Begin, Commit, Content, Counters, Event, FrameId, Heartbeat, Hello, Mac, Packet,
     PublishedStatus, Status, is_newer,
 };
-use crate::surface::{AHEAD, Millis, elapsed};
-use crate::tree::SurfaceFacts;
 
 /// The frame in work.
 #[derive(Clone, Copy, Debug)]
