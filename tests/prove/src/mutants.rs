@@ -16,7 +16,7 @@ const VERSION: &str = "27.1.0";
 
 /// Folders of the core, each with the test programs and tests that try its mutants. The tests are few, so that a trial
 /// takes seconds besides its build.
-const AREAS: [(&str, &[&str], &[&str]); 6] = [
+const AREAS: [(&str, &[&str], &[&str]); 7] = [
     ("dibs-nostd/src/tool", &["query"], &["kernels", "refusals"]),
     (
         "dibs-nostd/src/query",
