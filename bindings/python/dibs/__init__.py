@@ -11,6 +11,7 @@ Lengths are in millimetres, in the coordinates of the mesh's file. Wrong values 
 `TypeError`, each with one sentence; files and lines that fail raise `OSError`.
 """
 
+from ._guard import Answer, ForbiddenRegion, Force, ForceState, Guard, State
 from ._mesh import Mesh, MeshWarning, build, generate, read
 from ._motion import Motion, MotionStretch, read_motion
 from ._stream import Sender, Sent, Totals
@@ -21,9 +22,14 @@ __all__ = [
     "ANSWER",
     "CONTACT",
     "SIDE_REASONS",
+    "Answer",
     "Budget",
     "Contacts",
     "Coverage",
+    "ForbiddenRegion",
+    "Force",
+    "ForceState",
+    "Guard",
     "Mesh",
     "MeshWarning",
     "Motion",
@@ -32,6 +38,7 @@ __all__ = [
     "Sender",
     "Sent",
     "Side",
+    "State",
     "Surface",
     "Totals",
     "Tree",

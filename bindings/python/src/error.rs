@@ -5,10 +5,12 @@ use dibs_stream::SendError;
 use dibs_stream::transport::TargetError;
 use pyo3::PyErr;
 use pyo3::exceptions::{PyConnectionError, PyFileNotFoundError, PyOSError, PyValueError};
+use std::fmt::Display;
 use std::io::ErrorKind;
 
 /// Options of the command line that its sentences advise, and their names here.
-const OPTIONS: [(&str, &str); 5] = [
+const OPTIONS: [(&str, &str); 6] = [
+    ("`dibs build --orient` turns them", "orient=True turns them"),
     ("without --strict", "with strict=False"),
     ("--largest-component", "largest_component=True"),
     ("--weld 0", "weld=0"),
@@ -16,13 +18,18 @@ const OPTIONS: [(&str, &str); 5] = [
     ("--limits", "limits"),
 ];
 
-/// A `ValueError`.
-pub fn value(sentence: &str) -> PyErr {
-    let mut sentence = sentence.to_owned();
+/// A sentence of the library with the names that things have here.
+pub fn sentence(of_library: impl Display) -> String {
+    let mut sentence = of_library.to_string();
     for (option, here) in OPTIONS {
         sentence = sentence.replace(option, here);
     }
-    PyValueError::new_err(sentence)
+    sentence
+}
+
+/// A `ValueError`.
+pub fn value(sentence: &str) -> PyErr {
+    PyValueError::new_err(self::sentence(sentence))
 }
 
 /// A file that cannot be read is an `OSError`; one that is wrong is a `ValueError`.

@@ -3,6 +3,7 @@
 
 mod bytes;
 mod error;
+mod guard;
 mod mesh;
 mod motion;
 mod record;
@@ -19,6 +20,8 @@ use pyo3::prelude::*;
 mod _dibs {
     use pyo3::prelude::*;
 
+    #[pymodule_export]
+    use crate::guard::{Answer, ForbiddenRegion, Guard};
     #[pymodule_export]
     use crate::mesh::Mesh;
     #[pymodule_export]

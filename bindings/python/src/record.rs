@@ -3,6 +3,7 @@
 use dibs_build::glam::{DVec3, Vec3};
 use dibs_nostd::{Contact, Coverage, Interval, NoSide, Proximity, Side};
 
+use crate::error;
 use crate::tree::Owned;
 
 /// The name, type and numbers of a record's fields, in their order.
@@ -63,7 +64,7 @@ const REASONS: [NoSide; 7] = [
 
 /// A sentence for each value of `side_reason`: none for 0.
 pub fn reasons() -> Vec<String> {
-    [String::new()].into_iter().chain(REASONS.map(|reason| reason.to_string())).collect()
+    [String::new()].into_iter().chain(REASONS.map(error::sentence)).collect()
 }
 
 /// Appends an answer, of a pair of these numbers: the surface's and the tool's.

@@ -50,6 +50,11 @@ impl Owned {
         self.validated.borrow_dependent()
     }
 
+    /// The tree's bytes.
+    pub fn bytes(&self) -> &[u8] {
+        self.validated.borrow_owner()
+    }
+
     /// Vertices of the tree's mesh.
     pub fn vertices(&self) -> usize {
         of_any_width!(self.view(), tree => tree.file_vertex_count() as usize)
@@ -72,7 +77,7 @@ impl Tree {
     }
 
     fn blob<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
-        PyBytes::new(py, self.0.validated.borrow_owner())
+        PyBytes::new(py, self.0.bytes())
     }
 
     fn origin(&self) -> [f64; 3] {
@@ -85,14 +90,14 @@ impl Tree {
 
     /// Size and cost in JSON.
     fn summary(&self) -> PyResult<String> {
-        let bytes = self.0.validated.borrow_owner().len();
+        let bytes = self.0.bytes().len();
         let summary = of_any_width!(self.0.view(), tree => summarise(tree, bytes));
         // By way of f64, as `dibs inspect` prints it.
         serde_json::to_value(summary).map(|summary| summary.to_string()).map_err(invalid)
     }
 
     fn warnings(&self) -> Vec<String> {
-        let bytes = self.0.validated.borrow_owner().len();
+        let bytes = self.0.bytes().len();
         of_any_width!(self.0.view(), tree => summarise(tree, bytes)).warnings().collect()
     }
 

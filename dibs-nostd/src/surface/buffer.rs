@@ -44,9 +44,12 @@ impl PredictionCheck {
 #[repr(transparent)]
 pub struct Position([AtomicU32; 3]);
 
+#[cfg_attr(not(loom), expect(clippy::new_without_default, reason = "as its buffers"))]
 impl Position {
+    /// Zeros.
     #[cfg(not(loom))]
-    pub(super) const fn new() -> Self {
+    #[must_use]
+    pub const fn new() -> Self {
         Self([const { AtomicU32::new(0) }; 3])
     }
 
@@ -94,9 +97,12 @@ pub struct Head {
     ahead: [AtomicU32; 4],
 }
 
+#[cfg_attr(not(loom), expect(clippy::new_without_default, reason = "as its buffers"))]
 impl Head {
+    /// Of no frame.
     #[cfg(not(loom))]
-    pub(super) const fn new() -> Self {
+    #[must_use]
+    pub const fn new() -> Self {
         Self {
             epoch: AtomicU32::new(0),
             received: AtomicU32::new(0),

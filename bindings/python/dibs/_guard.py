@@ -1,0 +1,222 @@
+"""The controller's side: packets in, the closest pair and its trust out."""
+
+from __future__ import annotations
+
+import operator
+from enum import IntEnum
+from typing import Any, Literal, NamedTuple, Optional
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _arrays, _dibs
+from ._tree import ANSWER, Budget, Tree, _tests
+
+_WRAP = 1 << 32
+
+Progress = Literal["begun", "stored", "duplicate", "complete", "heartbeat", "hello"]
+"""The outcome of a packet that was taken."""
+Advance = Literal["idle", "pending", "held", "published"]
+"""The outcome of a slice of work."""
+
+
+class State(IntEnum):
+    """The trust in a surface."""
+
+    NOMINAL = 0
+    """Every input is within its limits."""
+    DEGRADED = 1
+    """The surface is acted on, with a growing margin."""
+    SAFE = 2
+    """The surface is not acted on."""
+
+
+class ForceState(IntEnum):
+    """The origin of a force."""
+
+    INACTIVE = 0
+    """The tool is outside the margin."""
+    ACTIVE = 1
+    """The wall acts."""
+    SATURATED = 2
+    """The wall acts with its largest force."""
+    SAFE = 3
+    """There is no pair to act on: the force is the hold."""
+
+
+class Answer:
+    """The answer of a tick: what a wall may act on, and how it came about."""
+
+    closest: Optional[np.void]
+    """The pair to act on, a record of `ANSWER`: act on the first of its `interval`. `None` where there is none."""
+    reason: Optional[str]
+    """Why there is no pair to act on."""
+    velocity: npt.NDArray[np.float32]
+    """Velocity (mm/s) of the tool's point of the pair relative to the surface's; zero at the first tick, and not a number
+    without a tool."""
+    state: State
+    """The trust in the surface."""
+    cause: Optional[str]
+    """The cause of a state that is not nominal."""
+    margin: float
+    """Largest way (mm) of the tissue in the surface's age and the time that it was on its way. Part of the pair's accuracy."""
+    waits_for_acknowledgement: bool
+    """Whether only `Guard.acknowledge` is missing to leave the safe state."""
+    epoch: Optional[int]
+    """Number of the frame that was searched; `None` before the first."""
+    age: Optional[int]
+    """Its age in ms."""
+    lag: Optional[int]
+    """Time in ms by which the surface that was searched is behind the present, as far as its error does not cover it."""
+
+    def __init__(self, native: _dibs.Answer) -> None:
+        self._native = native
+        record = native.closest()
+        self.closest = None if record is None else np.frombuffer(record, ANSWER)[0]
+        self.reason = native.reason()
+        self.velocity = np.array(native.velocity(), dtype=np.float32)
+        state, self.cause, self.margin, self.waits_for_acknowledgement = native.trust()
+        self.state = State(state)
+        self.epoch, self.age, self.lag = native.searched() or (None, None, None)
+
+    def __repr__(self) -> str:
+        what = self.reason if self.closest is None else f"{self.closest['separation']} mm"
+        return f"Answer({self.state.name}, {what})"
+
+
+class Force(NamedTuple):
+    """A force on the tool."""
+
+    force: npt.NDArray[np.float32]
+    """In N. Always finite."""
+    state: ForceState
+    cause: Optional[str]
+    """The cause of a hold."""
+
+
+class ForbiddenRegion:
+    """A wall: a margin around the surface, with a spring and a damper.
+
+    `stiffness` in N/mm, `damping` and `hold_damping`, where there is no pair to act on, in N s/mm, `max_force` in N, `margin`
+    in mm. A sampled wall is passive only if the device's own damping is above `stiffness * tick / 2 + damping`.
+    """
+
+    def __init__(
+        self, stiffness: float, damping: float, max_force: float, margin: float, *, hold_damping: float = 0.0
+    ) -> None:
+        names = ["stiffness", "damping", "hold_damping", "max_force", "margin"]
+        values = [stiffness, damping, hold_damping, max_force, margin]
+        self._native = _dibs.ForbiddenRegion(*map(_arrays.number, names, values))
+
+    def force(self, answer: Answer) -> Force:
+        """The force on the tool, at every tick."""
+        if not isinstance(answer, Answer):
+            raise TypeError(f"answer: an Answer of Guard.closest is needed, not {type(answer).__name__}")
+        force, state, cause = self._native.force(answer._native)
+        return Force(np.array(force, dtype=np.float32), ForceState(state), cause)
+
+
+class Guard:
+    """A controller's two ends of a moving surface: frames come in, in packets of a `Sender`, and each tick asks.
+
+    `speed_mm_per_s` is the largest speed of the tissue; `age_ms` the largest age of a surface, about two periods of the
+    source and the time on the way. From three quarters of it on the state is degraded, beyond it safe. The state is safe at
+    first, and leaves that once frames come in time and `acknowledge` was called; with `automatic` by itself.
+    `without_transit` is for a line on which no `status` goes back: a delayed frame is then taken for a new one.
+    `ticks_a_second` is the rate of the calls of `closest`. `budget` bounds the tests of a tick.
+
+    Times `now` are whole milliseconds of one clock, which may wrap at 2**32. Any thread may call; calls wait for each
+    other.
+    """
+
+    def __init__(
+        self,
+        tree: Tree,
+        speed_mm_per_s: float,
+        age_ms: int,
+        *,
+        ticks_a_second: int = 1_000,
+        automatic: bool = False,
+        without_transit: bool = False,
+        budget: Optional[tuple[int, int]] = None,
+    ) -> None:
+        if not isinstance(tree, Tree):
+            raise TypeError(f"tree: a Tree is needed, not {type(tree).__name__}")
+        speed = _arrays.number("speed_mm_per_s", speed_mm_per_s)
+        age = _whole("age_ms", age_ms, 1, (1 << 31) - 1)
+        ticks = _whole("ticks_a_second", ticks_a_second, 1, _WRAP - 1)
+        choices = (bool(automatic), bool(without_transit))
+        tests = _tests(Budget() if budget is None else budget)
+        self._native = _dibs.Guard(tree._native, speed, age, ticks, choices, tests)
+
+    def receive(self, data: bytes, now: int) -> None:
+        """Takes bytes of a serial line or another stream. `counters` says what became of them, by cause."""
+        self._native.receive(_bytes("data", data), _now(now))
+
+    def packet(self, packet: bytes, now: int) -> Progress:
+        """Takes one packet, whole, of a network. Raises `ValueError` with the reason where it is not taken; it was counted."""
+        return self._native.packet(_bytes("packet", packet), _now(now))
+
+    def work(self, most: int = 1_000) -> Advance:
+        """Looks at most at so many rows and triangles of the frame that arrives, and publishes it once it is complete and
+        admitted. "pending" if more is due at once. Raises `ValueError` with the reason where a frame is refused."""
+        return self._native.work(_whole("most", most, 1, _WRAP - 1))
+
+    def status(self, now: int, *, framed: bool = False) -> Optional[bytes]:
+        """The status that is due for the sender, a packet, or `framed` for a byte stream; `None` unless there is news, or
+        100 ms went by. The sender's next frame echoes it, which shows how long frames are on their way."""
+        return self._native.status(_now(now), bool(framed))
+
+    def closest(self, tool: Optional[npt.ArrayLike], now: int) -> Answer:
+        """The answer of this tick, on the surface moved on to now.
+
+        `tool` is x, y, z, radius of a sphere, or x1, y1, z1, x2, y2, z2, radius of a capsule; `None` where it has no pose.
+        """
+        if tool is None:
+            return Answer(self._native.closest(None, _now(now)))
+        array = _arrays.numbers("tool", tool)
+        if array.shape not in ((4,), (7,)):
+            raise ValueError(
+                f"tool: the shape is {array.shape}; give 4 numbers of a sphere (x, y, z, radius), or 7 of a capsule "
+                "(x1, y1, z1, x2, y2, z2, radius)"
+            )
+        return Answer(self._native.closest(_arrays.finite("tool", array).tobytes(), _now(now)))
+
+    def acknowledge(self) -> None:
+        """An operator's acknowledgement, which ends the safe state once every input is good again. Raises `ValueError`
+        unless the last tick waited for it."""
+        self._native.acknowledge()
+
+    def register(self) -> None:
+        """Registers the surface anew: the next whole frame may be far from the published one. Only an operator decides
+        that."""
+        self._native.register()
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """The count of each event since the start, by name: published frames, and rejections by cause."""
+        return dict(self._native.counters())
+
+
+def _whole(name: str, value: Any, least: int, most: int) -> int:
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name}: a whole number is needed, not {value!r}") from None
+    if not least <= number <= most:
+        raise ValueError(f"{name}: {number} is not from {least} to {most}")
+    return number
+
+
+def _now(value: Any) -> int:
+    """A reading of the clock, wrapped."""
+    try:
+        return operator.index(value) % _WRAP
+    except TypeError:
+        raise TypeError(f"now: whole milliseconds are needed, not {value!r}") from None
+
+
+def _bytes(name: str, value: Any) -> bytes:
+    if not isinstance(value, (bytes, bytearray, memoryview)):
+        raise TypeError(f"{name}: bytes are needed, not {type(value).__name__}")
+    return bytes(value)

@@ -1,0 +1,292 @@
+//! A controller's loop: packets in, answers out.
+
+use std::sync::atomic::AtomicU32;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use dibs_nostd::constraint::{ConstraintState, SpringDamper};
+use dibs_nostd::failsafe::LimitError;
+use dibs_nostd::guard::{Bus, GuardLimits, Notes};
+use dibs_nostd::wire::{Event, NoMac};
+use dibs_nostd::{
+    Advance, Budget, Buffer, Buffers, Error, Head, Index, Millis, Position, Progress, TreeBytes,
+    constraint, guard,
+};
+use pyo3::prelude::*;
+use pyo3::types::{PyByteArray, PyBytes};
+
+use crate::record::push_answer;
+use crate::tool::AnyTool;
+use crate::tree::{Owned, Tree, View};
+use crate::{bytes, error, invalid};
+
+/// As much as any tree needs.
+const STACK: usize = dibs_nostd::format::MAX_STACK;
+
+/// Places for opened nodes.
+const OPENED: usize = 256;
+
+/// What the two ends of a loop refer to.
+struct Memory {
+    tree: Arc<Owned>,
+    state: AtomicU32,
+    heads: [Head; 3],
+    rows: [Vec<Position>; 3],
+    notes: Notes,
+}
+
+impl Memory {
+    fn new(tree: Arc<Owned>) -> Self {
+        let rows = tree.order.len();
+        let positions = || (0..rows).map(|_| Position::new()).collect();
+        Self {
+            tree,
+            state: AtomicU32::new(0),
+            heads: [const { Head::new() }; 3],
+            rows: [positions(), positions(), positions()],
+            notes: Notes::new(),
+        }
+    }
+}
+
+/// The bus's end and the control tick's.
+struct Pair<'m, I> {
+    bus: Bus<'m, 'm, I>,
+    guard: guard::Guard<'m, 'm, I, STACK, OPENED>,
+}
+
+impl<'m, I: Index> Pair<'m, I> {
+    fn new(
+        memory: &'m Memory,
+        tree: &dibs_nostd::Tree<'m, I>,
+        limits: &GuardLimits,
+    ) -> Result<Box<Self>, Error> {
+        let buffer =
+            |number: usize| Buffer { head: &memory.heads[number], rows: &memory.rows[number] };
+        let buffers = Buffers::new(&memory.state, [buffer(0), buffer(1)], Some(buffer(2)));
+        let (writer, reader) = buffers.ends();
+        let tree = (tree, TreeBytes::new(memory.tree.bytes()));
+        let bus = Bus::new(&memory.notes, writer, tree, limits, NoMac)?;
+        let guard = guard::Guard::new(&memory.notes, reader, tree, limits)?;
+        Ok(Box::new(Self { bus, guard }))
+    }
+}
+
+/// A pair of either width.
+enum Ends<'m> {
+    Narrow(Box<Pair<'m, u16>>),
+    Wide(Box<Pair<'m, u32>>),
+}
+
+self_cell::self_cell!(
+    struct Loop {
+        owner: Memory,
+        #[not_covariant]
+        dependent: Ends,
+    }
+);
+
+/// `$body` with the ends of either width.
+macro_rules! with_ends {
+    ($guard:expr, $pair:ident => $body:expr) => {
+        $guard.lock().with_dependent_mut(|_, ends| match ends {
+            Ends::Narrow($pair) => $body,
+            Ends::Wide($pair) => $body,
+        })
+    };
+}
+
+/// A loop's two ends.
+#[pyclass(frozen, module = "dibs._dibs")]
+pub struct Guard {
+    both: Mutex<Loop>,
+    tree: Arc<Owned>,
+}
+
+impl Guard {
+    fn lock(&self) -> MutexGuard<'_, Loop> {
+        self.both.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[pymethods]
+impl Guard {
+    /// `choices`: `automatic`, `without_transit`.
+    #[new]
+    fn new(
+        tree: &Tree,
+        speed: f32,
+        age: u32,
+        ticks: u32,
+        choices: (bool, bool),
+        budget: (u32, u32),
+    ) -> PyResult<Self> {
+        let (node_tests, triangle_tests) = budget;
+        let (is_automatic, is_without_transit) = choices;
+        let limits = GuardLimits::new(speed, Millis(age))
+            .ticks_a_second(ticks)
+            .budget(Budget { node_tests, triangle_tests });
+        let limits = if is_automatic { limits.automatic() } else { limits };
+        let limits = if is_without_transit { limits.without_transit() } else { limits };
+        let both = Loop::try_new(Memory::new(Arc::clone(&tree.0)), |memory| {
+            Ok(match memory.tree.view() {
+                View::Narrow(tree) => Ends::Narrow(Pair::new(memory, tree, &limits)?),
+                View::Wide(tree) => Ends::Wide(Pair::new(memory, tree, &limits)?),
+            })
+        });
+        Ok(Self { both: Mutex::new(both.map_err(start_error)?), tree: Arc::clone(&tree.0) })
+    }
+
+    fn receive(&self, py: Python<'_>, bytes: &[u8], now: u32) {
+        py.detach(|| with_ends!(self, pair => pair.bus.receive(bytes, Millis(now))));
+    }
+
+    fn packet(&self, py: Python<'_>, packet: &[u8], now: u32) -> PyResult<&'static str> {
+        let outcome = py.detach(|| with_ends!(self, pair => pair.bus.packet(packet, Millis(now))));
+        Ok(match outcome.map_err(invalid)? {
+            Progress::Begun { .. } => "begun",
+            Progress::Duplicate => "duplicate",
+            Progress::Complete { .. } => "complete",
+            Progress::Heartbeat => "heartbeat",
+            Progress::Hello => "hello",
+            _ => "stored",
+        })
+    }
+
+    fn work(&self, py: Python<'_>, most: u32) -> PyResult<&'static str> {
+        let outcome = py.detach(|| with_ends!(self, pair => pair.bus.work(most)));
+        Ok(match outcome.map_err(invalid)? {
+            Advance::Pending => "pending",
+            Advance::Held { .. } => "held",
+            Advance::Published { .. } => "published",
+            _ => "idle",
+        })
+    }
+
+    fn status<'py>(
+        &self,
+        py: Python<'py>,
+        now: u32,
+        is_framed: bool,
+    ) -> Option<Bound<'py, PyBytes>> {
+        const PACKET: usize = Bus::<'_, '_, u16>::STATUS_BYTES;
+        const LINE: usize = Bus::<'_, '_, u16>::STATUS_FRAMED;
+        let (mut packet, mut line) = ([0; PACKET], [0; LINE]);
+        let (now, packet, line) = (Millis(now), &mut packet, &mut line);
+        let status = with_ends!(self, pair => if is_framed {
+            pair.bus.status_framed(now, line)
+        } else {
+            pair.bus.status(now, packet)
+        });
+        status.map(|status| PyBytes::new(py, status))
+    }
+
+    /// Each event, with its count since the start.
+    fn counters(&self) -> Vec<(&'static str, u32)> {
+        let counters = with_ends!(self, pair => *pair.bus.counters());
+        Event::ALL.into_iter().map(|event| (event.name(), counters.of(event))).collect()
+    }
+
+    fn register(&self) {
+        with_ends!(self, pair => pair.bus.register());
+    }
+
+    /// The answer for a tool's numbers; without them that of a tool without a pose.
+    fn closest(&self, py: Python<'_>, tool: Option<&[u8]>, now: u32) -> PyResult<Answer> {
+        let (origin, now) = (self.tree.origin, Millis(now));
+        let tool = tool.map(|tool| AnyTool::of(&bytes::doubles(tool), origin)).transpose();
+        let tool = tool.map_err(|error| invalid(format!("tool: {error}")))?;
+        let answer = py.detach(|| {
+            with_ends!(self, pair => match &tool {
+                Some(AnyTool::Sphere(sphere)) => pair.guard.closest(sphere, now),
+                Some(AnyTool::Capsule(capsule)) => pair.guard.closest(capsule, now),
+                None => pair.guard.without_pose(now),
+            })
+        });
+        Ok(Answer { answer, tree: Arc::clone(&self.tree) })
+    }
+
+    fn acknowledge(&self) -> PyResult<()> {
+        with_ends!(self, pair => pair.guard.acknowledge()).map_err(invalid)
+    }
+}
+
+/// A sentence with the names of Python's arguments.
+fn start_error(error: Error) -> PyErr {
+    match error {
+        Error::Limit(LimitError::NoReach) => {
+            invalid("tree: it has no rest shape, from which its reach follows; build it again")
+        }
+        Error::Limit(LimitError::Speed { .. }) => {
+            invalid(format!("speed_mm_per_s: {error}; give a number of at least 0"))
+        }
+        Error::Limit(_) => invalid(format!("age_ms: {error}")),
+        _ => invalid(format!("tree: {error}")),
+    }
+}
+
+/// A tick's answer.
+#[pyclass(frozen, module = "dibs._dibs")]
+pub struct Answer {
+    answer: guard::Answer,
+    tree: Arc<Owned>,
+}
+
+#[pymethods]
+impl Answer {
+    /// The record of the pair to act on.
+    fn closest<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyByteArray>> {
+        let pair = self.answer.closest.ok()?;
+        let mut record = Vec::new();
+        push_answer(&mut record, &pair, &self.tree, [0, 0]);
+        Some(PyByteArray::new(py, &record))
+    }
+
+    /// Why there is no pair to act on.
+    fn reason(&self) -> Option<String> {
+        self.answer.closest.err().map(error::sentence)
+    }
+
+    fn velocity(&self) -> [f32; 3] {
+        self.answer.velocity.to_array()
+    }
+
+    /// State, cause, margin, and whether only an acknowledgement is missing.
+    fn trust(&self) -> (u8, Option<String>, f32, bool) {
+        let trust = &self.answer.trust;
+        let cause = trust.cause.map(error::sentence);
+        (trust.state as u8, cause, trust.margin, trust.waits_for_acknowledgement)
+    }
+
+    /// Number, age (ms) and lag (ms) of the surface that was searched.
+    fn searched(&self) -> Option<(u32, u32, Option<u32>)> {
+        let searched = self.answer.searched?;
+        Some((searched.frame.epoch, searched.frame.age.0, searched.lag.map(|lag| lag.0)))
+    }
+}
+
+/// A wall around the surface.
+#[pyclass(frozen, module = "dibs._dibs")]
+pub struct ForbiddenRegion(constraint::ForbiddenRegion);
+
+#[pymethods]
+impl ForbiddenRegion {
+    #[new]
+    fn new(stiffness: f32, damping: f32, hold: f32, most: f32, margin: f32) -> PyResult<Self> {
+        let spring = SpringDamper::stiffness(stiffness).damping(damping);
+        let spring = spring.hold_damping(hold).max_force(most);
+        constraint::ForbiddenRegion::new(spring, margin).map(Self).map_err(invalid)
+    }
+
+    /// Force (N), state, and the cause of a hold.
+    fn force(&self, answer: &Answer) -> ([f32; 3], u8, Option<String>) {
+        let force = answer.answer.force(&self.0);
+        let (state, cause) = match force.state {
+            ConstraintState::Inactive => (0, None),
+            ConstraintState::Active => (1, None),
+            ConstraintState::Saturated => (2, None),
+            ConstraintState::Safe(cause) => (3, Some(error::sentence(cause))),
+            _ => (3, None),
+        };
+        (force.force.to_array(), state, cause)
+    }
+}

@@ -1,0 +1,206 @@
+"""The loop of a controller: packets in, answers and forces out."""
+
+import pathlib
+import re
+import unittest
+
+import numpy as np
+
+import dibs
+from subjects import ASIDE, BEAT, HEART, OTHER, TREE
+
+PERIOD = 30
+WALL = dibs.ForbiddenRegion(stiffness=1.0, damping=0.002, max_force=5.0, margin=5.0)
+SPHERE = [100.0, 0.0, 30.0, 2.5]
+
+
+def cobs(packet):
+    """A packet between zeros, as docs/wire.md has it for byte streams."""
+    out = bytearray()
+    for block in packet.split(b"\0"):
+        while len(block) >= 254:
+            out += b"\xff" + block[:254]
+            block = block[254:]
+        out += bytes([len(block) + 1]) + block
+    return bytes(out) + b"\0"
+
+
+class Loop:
+    """A sender, a guard, and their clock."""
+
+    def __init__(self, tree=TREE, frame=BEAT.frames[0], is_serial=False, **choices):
+        choices = {"automatic": True, "without_transit": True, **choices}
+        self.sender = dibs.Sender(tree, heartbeat=None, quantised=False)
+        self.guard = dibs.Guard(tree, 300.0, 80, **choices)
+        self.frame, self.is_serial, self.now = frame, is_serial, 1_000
+
+    def send(self, frame=None):
+        self.sender.send(self.frame if frame is None else frame, age=0)
+        for packet in self.sender.packets():
+            if self.is_serial:
+                self.guard.receive(cobs(packet), self.now)
+            else:
+                self.guard.packet(packet, self.now)
+        while True:
+            outcome = self.guard.work(500)
+            if outcome != "pending":
+                return outcome
+
+    def tick(self, tool=SPHERE):
+        self.now += 1
+        return self.guard.closest(tool, self.now)
+
+    def run(self, ticks, tool=SPHERE):
+        for tick in range(ticks):
+            if tick % PERIOD == 0:
+                self.send()
+            answer = self.tick(tool)
+        return answer
+
+
+class Guards(unittest.TestCase):
+    def test_the_answer_is_that_of_the_frame(self):
+        for tree, frame, shift, is_serial in [
+            (TREE, BEAT.frames[0], 0, False),
+            (TREE, BEAT.frames[4], 0, True),
+            (OTHER, HEART.vertices + ASIDE, ASIDE, False),
+        ]:
+            for tool in [SPHERE, [100.0, 0.0, 30.0, 140.0, 10.0, 60.0, 2.5]]:
+                tool = np.array(tool)
+                for corner in range(0, len(tool) - 3, 3):
+                    tool[corner : corner + 3] += shift
+                loop = Loop(tree, frame, is_serial)
+                answer = loop.run(1_200, tool)
+                self.assertEqual((answer.state, answer.cause, answer.reason), (dibs.State.NOMINAL, None, None))
+                truth = tree.query(tool, surface=frame)
+                low, high = answer.closest["interval"]
+                self.assertTrue(low <= truth["separation"] <= high)
+                self.assertAlmostEqual(float(answer.closest["separation"]), float(truth["separation"]), places=3)
+                np.testing.assert_allclose(answer.closest["point_on_surface"], truth["point_on_surface"], atol=1e-3)
+                self.assertEqual(answer.age, loop.now - 1_000 - 39 * PERIOD)
+                self.assertEqual((answer.epoch, answer.waits_for_acknowledgement), (40, False))
+                self.assertTrue(0 <= answer.margin < 30 and answer.lag is not None)
+                self.assertEqual(loop.guard.counters["published"], 40)
+                # The same pose ten times: no velocity; then 0.1 mm in a tick.
+                np.testing.assert_allclose(answer.velocity, 0, atol=1e-3)
+                moved = loop.tick(tool + np.array([0.1, 0, 0] * (len(tool) // 3) + [0]))
+                np.testing.assert_allclose(moved.velocity, [100, 0, 0], atol=0.1)
+
+    def test_the_state_is_safe_until_acknowledged_and_after_the_age(self):
+        loop = Loop(automatic=False)
+        first = loop.tick()
+        self.assertEqual((first.closest, first.epoch, first.age, first.lag), (None, None, None, None))
+        self.assertIn("no surface", first.reason)
+        with self.assertRaisesRegex(ValueError, "acknowledg"):
+            loop.guard.acknowledge()
+        answer = loop.run(1_200)
+        self.assertEqual((answer.state, answer.waits_for_acknowledgement), (dibs.State.SAFE, True))
+        self.assertIsNone(answer.closest)
+        loop.guard.acknowledge()
+        self.assertEqual(loop.tick().state, dibs.State.NOMINAL)
+        states = [loop.tick() for _ in range(100)]
+        for answer in states:
+            expected = 0 if answer.age <= 60 else 1 if answer.age <= 80 else 2
+            self.assertEqual(answer.state, expected, answer.age)
+        self.assertIn("old", states[-1].cause)
+
+    def test_a_wall_pushes_out_and_holds(self):
+        loop = Loop()
+        held = WALL.force(loop.tick())
+        self.assertEqual((held.state, held.force.tolist()), (dibs.ForceState.SAFE, [0, 0, 0]))
+        self.assertIn("no surface", held.cause)
+        loop.run(1_200)
+        far = WALL.force(loop.tick([200.0, 0.0, 30.0, 2.5]))
+        self.assertEqual((far.state, far.cause), (dibs.ForceState.INACTIVE, None))
+        # 2 mm from the surface.
+        touch = TREE.query(SPHERE, surface=loop.frame)
+        beside = touch["point_on_surface"] + touch["direction"] * 4.5
+        for _ in range(3):
+            answer = loop.tick([*beside, 2.5])
+        near = WALL.force(answer)
+        self.assertIn(near.state, (dibs.ForceState.ACTIVE, dibs.ForceState.SATURATED))
+        self.assertGreater(np.dot(near.force, answer.closest["direction"]), 0)
+        self.assertLessEqual(np.linalg.norm(near.force), 5.0001)
+        blind = loop.tick(None)
+        self.assertTrue(np.isnan(blind.velocity).all())
+        self.assertEqual(WALL.force(blind).state, dibs.ForceState.SAFE)
+
+    def test_a_status_goes_back_when_it_is_due(self):
+        loop = Loop()
+        loop.run(1)
+        status = loop.guard.status(loop.now)
+        self.assertEqual(status[0], 4)
+        self.assertIsNone(loop.guard.status(loop.now))
+        framed = loop.guard.status(loop.now + 100, framed=True)
+        self.assertTrue(framed.endswith(b"\0") and framed.count(b"\0") == 1)
+
+    def test_refusals_are_named_and_counted(self):
+        loop = Loop()
+        loop.run(1)
+        with self.assertRaisesRegex(ValueError, "checksum|short"):
+            loop.guard.packet(bytes(40), loop.now)
+        loop.now += 30
+        far = BEAT.frames[0].copy()
+        far[100] += [0, 0, 25]
+        with self.assertRaises(ValueError):
+            loop.send(far)
+        counters = loop.guard.counters
+        self.assertEqual((counters["published"], sum(counters.values())), (1, 3), counters)
+        loop.guard.receive(b"\x05no\0", loop.now)
+        self.assertEqual(sum(loop.guard.counters.values()), 4)
+        loop.guard.register()
+
+    def test_a_clock_may_wrap(self):
+        loop = Loop()
+        loop.now = (1 << 32) - 600
+        self.assertEqual(loop.run(1_200).state, dibs.State.NOMINAL)
+
+    def test_wrong_arguments_are_named(self):
+        guard = dibs.Guard(TREE, 300, 80)
+        answer = guard.closest(SPHERE, 0)
+        for name, error, call in [
+            ("tree", TypeError, lambda: dibs.Guard(HEART, 300, 80)),
+            ("speed_mm_per_s", ValueError, lambda: dibs.Guard(TREE, -1, 80)),
+            ("speed_mm_per_s", ValueError, lambda: dibs.Guard(TREE, float("nan"), 80)),
+            ("speed_mm_per_s", ValueError, lambda: dibs.Guard(TREE, 1e300, 80)),
+            ("speed_mm_per_s", TypeError, lambda: dibs.Guard(TREE, "fast", 80)),
+            ("age_ms", ValueError, lambda: dibs.Guard(TREE, 300, 0)),
+            ("age_ms", ValueError, lambda: dibs.Guard(TREE, 300, 1 << 31)),
+            ("age_ms", TypeError, lambda: dibs.Guard(TREE, 300, 80.5)),
+            ("ticks_a_second", ValueError, lambda: dibs.Guard(TREE, 300, 80, ticks_a_second=0)),
+            ("budget", TypeError, lambda: dibs.Guard(TREE, 300, 80, budget=5)),
+            ("budget", ValueError, lambda: dibs.Guard(TREE, 300, 80, budget=(-1, 5))),
+            ("data", TypeError, lambda: guard.receive("text", 0)),
+            ("packet", TypeError, lambda: guard.packet([1, 2], 0)),
+            ("now", TypeError, lambda: guard.closest(SPHERE, 0.5)),
+            ("most", ValueError, lambda: guard.work(0)),
+            ("tool", ValueError, lambda: guard.closest([SPHERE], 0)),
+            ("tool", ValueError, lambda: guard.closest([1, 2, 3], 0)),
+            ("tool", ValueError, lambda: guard.closest([0, 0, 0, -1], 0)),
+            ("tool", ValueError, lambda: guard.closest([0, 0, float("nan"), 1], 0)),
+            ("answer", TypeError, lambda: WALL.force(None)),
+            ("stiffness", ValueError, lambda: dibs.ForbiddenRegion(float("inf"), 0, 5, 5)),
+            ("", ValueError, lambda: dibs.ForbiddenRegion(0, 0, 5, 5)),
+            ("", ValueError, lambda: dibs.ForbiddenRegion(1, 0, 5, -5)),
+        ]:
+            with self.subTest(name), self.assertRaises(error) as raised:
+                call()
+            sentence = str(raised.exception)
+            self.assertTrue(sentence.startswith(name + ":" if name else ""), sentence)
+            self.assertNotRegex(sentence, "--|`dibs")
+        self.assertIn("SAFE", repr(answer))
+        self.assertFalse(any("--" in reason for reason in dibs.SIDE_REASONS))
+
+    def test_the_readme_has_the_loop(self):
+        readme = (pathlib.Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+        block = next(block for block in re.findall(r"```python\n(.*?)```", readme, re.DOTALL) if "Guard(" in block)
+        sender = dibs.Sender(TREE, heartbeat=None)
+        sender.send(BEAT.frames[0], age=0)
+        here = {"dibs": dibs, "tree": TREE, "packets": sender.packets(), "now": 7, "tool": SPHERE}
+        exec(compile(block, "README.md", "exec"), here)
+        self.assertEqual(here["guard"].counters["published"], 1)
+        self.assertEqual(here["force"].state, dibs.ForceState.SAFE)
+
+
+if __name__ == "__main__":
+    unittest.main()
