@@ -200,7 +200,9 @@ fn oldest_compiler() -> Result<Outcome> {
 fn core_crate(cross: &Cross) -> Result<Outcome> {
     let mut check = cross.cargo("check");
     run(check.args(["--quiet", "--package", "dibs-nostd", "--features", "defmt"]))?;
-    for layer in ["", "wide", "bus", "control", "modes", "control,bus", "control,modes", "bus,modes"] {
+    for layer in
+        ["", "wide", "bus", "control", "modes", "control,bus", "control,modes", "bus,modes"]
+    {
         let mut check = cross.cargo("check");
         check.args(["--quiet", "--package", "dibs-nostd", "--no-default-features"]);
         run(check.args(["--features", layer]))
