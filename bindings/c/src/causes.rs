@@ -164,6 +164,7 @@ impl From<LimitError> for dibs_code {
             LimitError::Recovery { .. } => Self::LimitRecovery,
             LimitError::Untrippable { .. } => Self::LimitUntrippable,
             LimitError::NoReach => Self::TreeNoRestShape,
+            LimitError::Rate => Self::Argument,
             _ => Self::LimitTooLong,
         }
     }

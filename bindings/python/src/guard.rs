@@ -216,6 +216,7 @@ fn start_error(error: Error) -> PyErr {
         Error::Limit(LimitError::NoReach) => {
             invalid("tree: it has no rest shape, from which its reach follows; build it again")
         }
+        Error::Limit(LimitError::Rate) => invalid(format!("ticks_a_second: {error}")),
         Error::Limit(LimitError::Speed { .. }) => {
             invalid(format!("speed_mm_per_s: {error}; give a number of at least 0"))
         }

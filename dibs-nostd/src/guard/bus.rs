@@ -72,8 +72,8 @@ impl<'s, 't, I: Index, M: Mac> Bus<'s, 't, I, M> {
         })
     }
 
-    /// Takes bytes of a serial line or another stream, at the time `now`. [`counters`](Self::counters) says what became of
-    /// them, by cause.
+    /// Takes bytes of a serial line or another stream, at the time `now`. [`counters`](Self::counters) has their
+    /// outcomes, by cause.
     ///
     /// Cost: O(bytes). [`work`](Self::work) must keep up: a complete frame is dropped where the next one begins before it
     /// was checked.
@@ -104,7 +104,7 @@ impl<'s, 't, I: Index, M: Mac> Bus<'s, 't, I, M> {
         outcome
     }
 
-    /// Does a slice of the checks: looks at most at `work` rows and triangles of the frame that arrives, and publishes it
+    /// Does a slice of the checks: at most `work` rows and triangles of the frame that arrives, and publishes it
     /// once it is complete and admitted. Without a frame it checks the tree's bytes. `Ok(Advance::Pending)` if more is due
     /// at once.
     ///

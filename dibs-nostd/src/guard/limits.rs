@@ -25,9 +25,9 @@ const ROOM: f32 = 4.0;
 
 impl GuardLimits {
     /// Limits for tissue of at most this speed (mm/s), and surfaces of at most this age: about two periods of the source and
-    /// the time on the way. From three quarters of the age on the state is degraded, beyond it safe.
+    /// the transit time. From three quarters of the age on the state is degraded, beyond it safe.
     ///
-    /// By default the control loop runs at 1 kHz, an operator acknowledges the end of a safe state, the time on the way is
+    /// By default the control loop runs at 1 kHz, an operator acknowledges the end of a safe state, the transit time is
     /// watched by the status that each frame echoes ([`Bus::status`](super::Bus::status)), vertices keep within four sizes
     /// of the rest shape, and a tick's budget is not limited.
     #[must_use]
@@ -44,7 +44,7 @@ impl GuardLimits {
         }
     }
 
-    /// Ticks of the control loop a second: velocities count from it.
+    /// Ticks of the control loop a second, above 0: velocities count from it.
     #[must_use]
     pub const fn ticks_a_second(mut self, rate: u32) -> Self {
         self.rate = rate as f32;
@@ -72,7 +72,7 @@ impl GuardLimits {
         self
     }
 
-    /// Does without the time on the way, for a line on which no status goes back: a delayed frame is then taken for a new
+    /// Leaves out the transit time, for a line on which no status goes back: a delayed frame is then taken for a new
     /// one, and no margin covers the delay.
     #[must_use]
     pub const fn without_transit(mut self) -> Self {
@@ -80,7 +80,8 @@ impl GuardLimits {
         self
     }
 
-    /// The fail-safe machine's limits, instead of those that follow from speed and age.
+    /// The fail-safe machine's limits, instead of those that follow from speed and age. [`automatic`](Self::automatic) and
+    /// [`without_transit`](Self::without_transit) change these, too.
     #[must_use]
     pub const fn trust(mut self, limits: Limits) -> Self {
         self.trust = Some(limits);
@@ -96,10 +97,13 @@ impl GuardLimits {
 
     /// The fail-safe machine's limits.
     pub(super) fn failsafe(&self) -> Result<Limits, LimitError> {
-        if let Some(limits) = self.trust {
-            return Ok(limits);
+        if self.rate == 0.0 {
+            return Err(LimitError::Rate);
         }
-        let limits = Limits::new(Watch::new(Millis(self.age.0 / 4 * 3), self.age)?, self.speed)?;
+        let limits = match self.trust {
+            Some(limits) => limits,
+            None => Limits::new(Watch::new(Millis(self.age.0 / 4 * 3), self.age)?, self.speed)?,
+        };
         let limits = if self.has_transit { limits } else { limits.without_transit() };
         Ok(if self.is_automatic { limits.automatic() } else { limits })
     }

@@ -1,6 +1,6 @@
-//! A controller's two ends of a moving surface: [`Bus`] takes what the line brings, [`Guard`] answers the control tick.
+//! A controller's two ends of a moving surface: [`Bus`] takes packets, [`Guard`] answers the control tick.
 //!
-//! They join the layers of this crate in the way that most controllers need, and carry what the library knows itself: the
+//! They join the layers of this crate as most controllers need them, and carry what the library knows itself: the
 //! reach, the stretch, the age, the extrapolation and its error, the fail-safe state, the last side, the velocities. Every
 //! layer stays public, for another arrangement.
 //!

@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use super::{Bus, Guard, GuardLimits};
 use crate::failsafe::{LinkStatus, State};
 use crate::wire::{Mac, NoMac};
-use crate::{Error, Frames, Index, TreeBytes};
+use crate::{Error, Frames, Index, QueryError, TreeBytes};
 
 /// The vertices of a surface as they are now, and the notes of its two ends for one another. Meant for a `static`; the
 /// module that [`include_tree!`](crate::include_tree) includes has its type as `Surface`.
@@ -32,7 +32,8 @@ impl<const N: usize> Surface<N> {
     /// Cost: linear in the tree, for start-up.
     ///
     /// # Errors
-    /// [`Error`], with the damage of the tree, the limit that is out of range, or that the ends were taken before.
+    /// [`Error`], with the damage of the tree, its number of vertices where that is not `N`, the limit that is out of range,
+    /// or that the ends were taken before.
     #[inline(always)]
     pub fn start<'t, I: Index, const STACK: usize, const OPENED: usize>(
         &self,
@@ -54,6 +55,12 @@ impl<const N: usize> Surface<N> {
         mac: M,
     ) -> Result<(Bus<'_, 't, I, M>, Guard<'_, 't, I, STACK, OPENED>), Error> {
         let tree = bytes.validate()?;
+        let (expected, found) = (tree.vertex_count(), N as u32);
+        if expected != found {
+            return Err(QueryError::VertexCount { expected, found }.into());
+        }
+        // A start that fails on a limit takes no end.
+        limits.failsafe()?;
         let (writer, reader) = self.frames.split()?;
         let bus = Bus::new(&self.notes, writer, (&tree, bytes), &limits, mac)?;
         let guard = Guard::new(&self.notes, reader, (&tree, bytes), &limits)?;

@@ -13,7 +13,7 @@ use crate::{
 
 /// The control tick's end of a [`Surface`](super::Surface): the closest pair of one tool on the surface as it is now, and the trust in it.
 ///
-/// Keep it in a `static` or in a task's memory. RAM: that of a [`Tracker`] with `OPENED` places, and 400 bytes.
+/// Keep it in a `static` or in a task's memory. RAM: that of a [`Tracker`] with `OPENED` places, and less than 500 bytes.
 #[derive(Debug)]
 pub struct Guard<'s, 't, I, const STACK: usize, const OPENED: usize> {
     notes: &'s Notes,

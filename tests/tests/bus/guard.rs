@@ -2,11 +2,13 @@
 
 use dibs_build::{Builder, generate};
 use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
-use dibs_nostd::failsafe::{LimitError, State};
+use dibs_nostd::failsafe::{LimitError, Limits, State, Watch};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Surface};
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, Freshness, enframe};
-use dibs_nostd::{Advance, Capsule, Error, Millis, SurfaceLimits, TreeBytes, Unavailable};
+use dibs_nostd::{
+    Advance, Capsule, Error, Millis, QueryError, SurfaceLimits, TreeBytes, Unavailable,
+};
 use dibs_tests::bus::collect;
 
 const ROWS: usize = 162;
@@ -160,8 +162,14 @@ fn the_state_is_safe_until_acknowledged_and_after_the_age() {
 fn a_line_without_statuses_is_a_written_choice() {
     let heart = generate::heart(320).expect("a valid size").mesh;
     let built = Builder::new().build(&heart).expect("a valid mesh");
-    for (is_left_out, expected) in [(false, State::Safe), (true, State::Nominal)] {
+    let age = Watch::new(Millis(2_250), Millis(3_000)).expect("in order");
+    let own = Limits::new(age, 0.02).expect("a speed");
+    let cases = [(false, State::Safe), (true, State::Nominal)];
+    for (has_own, (is_left_out, expected)) in
+        [false, true].into_iter().flat_map(|own| cases.map(|case| (own, case)))
+    {
         let limits = GuardLimits::new(20.0, Millis(3_000)).automatic();
+        let limits = if has_own { limits.trust(own) } else { limits };
         let limits = if is_left_out { limits.without_transit() } else { limits };
         let mut world = World::new(&built, &heart.positions, limits);
         let rows = world.rest.clone();
@@ -191,7 +199,15 @@ fn a_start_names_what_is_wrong() {
     assert!(matches!(start(&built.blob()[1..], limits), Some(Error::Format(_))));
     let shallow = surface().start::<u16, 1, 96>(TreeBytes::new(built.blob()), limits).err();
     assert!(matches!(shallow, Some(Error::Query(_))), "{shallow:?}");
+    let standing = start(built.blob(), limits.ticks_a_second(0));
+    assert_eq!(standing, Some(Error::Limit(LimitError::Rate)));
+    let other: &Surface<161> = Box::leak(Box::new(Surface::new()));
+    let other = other.start::<u16, 64, 96>(TreeBytes::new(built.blob()), limits).err();
+    let expected = QueryError::VertexCount { expected: 162, found: 161 };
+    assert_eq!(other, Some(Error::Query(expected)));
     let once = surface();
+    let refused = once.start::<u16, 64, 96>(TreeBytes::new(built.blob()), limits.ticks_a_second(0));
+    assert!(refused.is_err(), "and takes no end");
     let twice = || once.start::<u16, 64, 96>(TreeBytes::new(built.blob()), limits).err();
     assert_eq!(twice(), None);
     assert!(matches!(twice(), Some(Error::Split(_))));

@@ -1,7 +1,8 @@
 //! A surface's share of a controller's memory: two or three buffers of positions, and some bytes for both of their ends,
 //! the assembler, and the stretch of every region.
 
-use dibs_nostd::{Assembler, FrameReader, Frames, StretchMonitor};
+use dibs_nostd::guard::{Bus, Guard, Surface};
+use dibs_nostd::{Assembler, FrameReader, Frames, StretchMonitor, Tracker};
 
 /// Bytes besides the positions, of a surface of `N` vertices.
 const fn besides<const N: usize>() -> usize {
@@ -17,6 +18,17 @@ fn a_surface_takes_1750_bytes_besides_its_positions() {
     let all = [besides::<162>(), besides::<5_138>(), besides::<65_536>()];
     println!("{all:?} bytes besides 24 a vertex");
     assert!(all.iter().all(|&bytes| bytes == all[0] && bytes <= 1_750), "{all:?}");
+}
+
+/// The two ends of a guarded surface, and what they share.
+#[test]
+fn a_guard_takes_as_much_as_its_pages_say() {
+    type Ends = (Bus<'static, 'static, u16>, Guard<'static, 'static, u16, 64, 256>);
+    let notes = size_of::<Surface<5_138>>() - 36 * 5_138;
+    let bus = size_of::<Bus<'static, 'static, u16>>();
+    let guard = size_of::<Ends>() - bus - size_of::<Tracker<'static, u16, 64, 256>>();
+    println!("{notes} bytes shared, {bus} of the bus, {guard} of the guard besides its tracker");
+    assert!(notes < 400 && bus < 3_000 && guard < 500, "{notes} {bus} {guard}");
 }
 
 /// Besides its gate and the ends of the buffers.

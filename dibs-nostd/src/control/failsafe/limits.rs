@@ -253,6 +253,8 @@ pub enum LimitError {
         /// The speed.
         tissue_speed: f32,
     },
+    /// A control loop of 0 ticks a second.
+    Rate,
     /// No limit on the reach follows from a tree without its rest shape.
     NoReach,
     /// Recovery with 0 new frames.
@@ -272,7 +274,8 @@ impl fmt::Display for LimitError {
             Self::Untrippable { safe } => {
                 write!(f, "a limit of {safe} can never be exceeded")
             }
-            Self::Speed { tissue_speed } => write!(f, "tissue cannot move at {tissue_speed}"),
+            Self::Speed { tissue_speed } => write!(f, "tissue cannot move at {tissue_speed} mm/ms"),
+            Self::Rate => write!(f, "a control loop cannot have 0 ticks a second"),
             Self::NoReach => {
                 write!(f, "the tree has no rest shape: give the surface's limits, with their reach")
             }
