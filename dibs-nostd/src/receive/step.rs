@@ -14,8 +14,8 @@ const MOST: u64 = 1 << 30;
 #[derive(Debug)]
 pub(super) struct Step {
     rows: u32,
-    /// The first of those compared last.
-    last: u32,
+    /// First and end of the slice with the largest step.
+    fastest: [u32; 2],
     largest: f32,
     off: f32,
     /// Units of the odometer between the two frames before, and the share of them that the extrapolation adds.
@@ -33,7 +33,7 @@ pub(super) struct Earlier<'f, V: ?Sized> {
 
 impl Step {
     pub const fn new() -> Self {
-        Self { rows: 0, last: 0, largest: 0.0, off: 0.0, units: 0, share: 0.0 }
+        Self { rows: 0, fastest: [0; 2], largest: 0.0, off: 0.0, units: 0, share: 0.0 }
     }
 
     /// Compares at most `work` of the rows below `ready` with those before, and with the places that these would have if
@@ -49,7 +49,7 @@ impl Step {
         let waiting = ready.saturating_sub(self.rows);
         let rows = if waiting < work { waiting } else { work };
         let end = self.rows.saturating_add(rows);
-        let range = self.rows..end;
+        let (range, largest) = (self.rows..end, self.largest);
         (self.largest, self.off) = match earlier {
             Some(&Earlier { frame, units, share }) => {
                 (self.units, self.share) = (units, share);
@@ -57,7 +57,10 @@ impl Step {
             }
             None => (largest_step(now, before, range, self.largest), f32::NAN),
         };
-        (self.last, self.rows) = (self.rows, end);
+        if !(self.largest <= largest) {
+            self.fastest = [self.rows, end];
+        }
+        self.rows = end;
         work.saturating_sub(rows)
     }
 
@@ -67,7 +70,7 @@ impl Step {
     }
 
     pub const fn compared(&self) -> Compared {
-        Compared { largest: self.largest, rows: [self.last, self.rows] }
+        Compared { largest: self.largest, rows: self.fastest }
     }
 
     /// The distance of the frame from the extrapolation, where there was one; its stretch is not known here.

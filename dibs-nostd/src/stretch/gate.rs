@@ -46,7 +46,7 @@ pub struct IncomingSurface<'a, V: ?Sized> {
 pub struct Compared {
     /// The largest squared distance (mm²) of any row compared so far.
     pub largest: f32,
-    /// First and end of the rows compared last.
+    /// First and end of the rows that have it among them.
     pub rows: [u32; 2],
 }
 

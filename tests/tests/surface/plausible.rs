@@ -167,6 +167,38 @@ const fn is_inside_out(outcome: &Result<(), ReceiveError>) -> bool {
     matches!(outcome, Err(ReceiveError::Stretch(StretchError::InsideOut { .. })))
 }
 
+/// Also where all packets come before the checks: the refusal names a vertex that moved too far, and how far.
+#[test]
+fn a_refusal_names_the_vertex_that_was_too_fast() {
+    let (built, motion) = heart();
+    let rest = built.to_rows(&motion.frames[0]);
+    for work in [1, 7, 50, 100, 10_000] {
+        for row in [0, 99, 100, 333, N - 1] {
+            let mut bus = Bus::new(built, SurfaceLimits::reach_mm(1e3).speed(0.1));
+            bus.send(&rest, 0, work).unwrap();
+            let mut rows = rest.clone();
+            rows[row] += Vec3::new(0.0, 0.0, 4.0);
+            let id = FrameId { mesh_id: bus.tree.mesh_id(), session: 1, epoch: 2 };
+            let encoder = FrameEncoder::<_, 256>::new(id, Encoding::Float, &rows[..]).unwrap();
+            for packet in collect(encoder) {
+                bus.assembler.accept(&packet, Millis(30)).unwrap();
+            }
+            let refused = loop {
+                match bus.assembler.advance(work) {
+                    Ok(Advance::Pending) => {}
+                    other => break other,
+                }
+            };
+            let Err(ReceiveError::Stretch(StretchError::TooFast { vertex, step, .. })) = refused
+            else {
+                panic!("{work}, {row}: {refused:?}");
+            };
+            assert_eq!(vertex as usize, row, "{work}");
+            assert!((step - 4.0).abs() < 1e-3, "{work}, {row}: {step}");
+        }
+    }
+}
+
 /// After any silence a surface comes back near its last trusted pose, or somebody registers it anew.
 #[test]
 fn a_silence_admits_no_other_surface() {
