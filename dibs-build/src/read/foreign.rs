@@ -19,6 +19,7 @@ enum Remedy {
 /// Where in a file its mark stands, the mark, the file's kind, and the remedy.
 const MARKS: &[(usize, &[u8], &str, Remedy)] = &[
     (0, b"ISO-10303-21", "a STEP file", Remedy::Gmsh),
+    (72, b"S      1", "an IGES file", Remedy::Gmsh),
     (0, b"DBRep_DrawableShape", "an Open CASCADE model", Remedy::Gmsh),
     (0, b"MeshVersionFormatted", "a Medit mesh", Remedy::Meshio),
     (0, b"*heading", "an Abaqus input file", Remedy::Meshio),

@@ -47,7 +47,14 @@ pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
         has_nodes |= matches!(name, "Nodes" | "ParametricNodes" | "NOD");
         has_elements |= matches!(name, "Elements" | "ELM");
         let end = if version == Version::One { "$END" } else { "$End" };
-        file.skip_to(&format!("{end}{name}"))?;
+        let end = format!("{end}{name}");
+        let mut after = file.clone();
+        after.skip_to(&end)?;
+        let is_counted = matches!(name, "Nodes" | "ParametricNodes" | "NOD" | "Elements" | "ELM");
+        if is_counted && file.word() != Some(&end) {
+            return Err(file.malformed(format!("more in ${name} than it counts")));
+        }
+        file = after;
     }
     if !(has_nodes && has_elements) {
         return Err(file.truncated("no '$Nodes' or no '$Elements'".to_owned()));

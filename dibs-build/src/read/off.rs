@@ -19,7 +19,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
     let (number, header) = lines.next().ok_or(ReadErrorKind::Empty)?;
     let (keyword, rest) = header.split_once(char::is_whitespace).unwrap_or((header.as_str(), ""));
     if rest.to_ascii_lowercase().contains("binary") {
-        return Err(malformed(number, "binary OFF is not supported".to_owned()));
+        return Err(ReadErrorKind::Foreign {
+            what: "a binary OFF".to_owned(),
+            remedy: "save it as text, or as PLY".to_owned(),
+        });
     }
     if !is_header(keyword) {
         let what = format!("'{}' is no header of an OFF in three dimensions", excerpt(keyword));
@@ -59,6 +62,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
         }
         raw.end_face();
     }
+    raw.remark(
+        lines.count(),
+        "line was left out: it follows the faces that the file counts",
+        "lines were left out: they follow the faces that the file counts",
+    );
     Ok(raw)
 }
 

@@ -1,6 +1,7 @@
 //! PLY through `ply-rs-bw`: ASCII, little- and big-endian, any scalar types.
 
 use super::raw::{Raw, excerpt};
+use super::text::trimmed;
 use super::{Format, ReadErrorKind};
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
@@ -11,6 +12,7 @@ use std::io::{BufRead, ErrorKind};
 
 pub(super) fn read(mut bytes: Vec<u8>) -> Result<Raw, ReadErrorKind> {
     make_header_ascii(&mut bytes);
+    end_lines(&mut bytes);
     let mut reader = Reader::new(bytes.as_slice());
     let header =
         Parser::<Other>::new().read_header(&mut reader).map_err(|error| malformed(&error))?;
@@ -51,10 +53,42 @@ pub(super) fn read(mut bytes: Vec<u8>) -> Result<Raw, ReadErrorKind> {
             }
         }
     }
+    let rest = reader.get_ref();
+    if header.encoding == Encoding::Ascii {
+        let lines =
+            trimmed(rest).split(|&byte| byte == b'\n').filter(|line| !line.trim_ascii().is_empty());
+        raw.remark(
+            lines.count(),
+            "line was left out: it follows the elements that the header counts",
+            "lines were left out: they follow the elements that the header counts",
+        );
+    } else {
+        raw.remark(
+            if trimmed(rest).is_empty() { 0 } else { rest.len() },
+            "byte was left out: it follows the elements that the header counts",
+            "bytes were left out: they follow the elements that the header counts",
+        );
+    }
     Ok(raw)
 }
 
 /// The lists of vertex numbers of an element, under whatever name.
+/// Old programs end lines with a carriage return alone.
+fn end_lines(bytes: &mut [u8]) {
+    let end = bytes.windows(END.len()).position(|window| window == END);
+    let Some(after) = end.map(|end| end + END.len()) else { return };
+    let is_text = bytes[..after].windows(5).any(|window| window == b"ascii");
+    if bytes[..after].contains(&b'\n') || bytes.get(after) != Some(&b'\r') {
+        return;
+    }
+    let end = if is_text { bytes.len() } else { after + 1 };
+    for byte in &mut bytes[..end] {
+        if *byte == b'\r' {
+            *byte = b'\n';
+        }
+    }
+}
+
 fn corners<T: BufRead>(
     reader: &mut Reader<T>,
     element: &ElementDef,
@@ -100,11 +134,12 @@ fn corners<T: BufRead>(
 }
 
 /// The usual names of a face's list of vertex numbers.
+const END: &[u8] = b"end_header";
+
 const NAMES: [&str; 2] = ["vertex_indices", "vertex_index"];
 
 /// Comments come in any encoding, but the parser requires UTF-8.
 fn make_header_ascii(bytes: &mut [u8]) {
-    const END: &[u8] = b"end_header";
     let end = bytes.windows(END.len()).position(|window| window == END).unwrap_or(0);
     for byte in &mut bytes[..end] {
         if !byte.is_ascii() {

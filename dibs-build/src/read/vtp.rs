@@ -33,6 +33,10 @@ pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
                 file.leave(tag.name().0)?;
             }
             Event::Text(text) => file.text(&text.xml10_content()),
+            Event::CData(text) => file.text(&text.xml10_content()),
+            Event::GeneralRef(entity) if file.array.is_some() => {
+                return Err(malformed(format!("the entity '{}' among numbers", excerpt(&entity))));
+            }
             Event::End(tag) => file.leave(tag.name().0)?,
             Event::Eof => break,
             _ => {}
@@ -90,6 +94,8 @@ struct File<'a> {
     strips: Vec<Vec<u32>>,
     grid: Vec<(u64, Vec<u32>)>,
     others: usize,
+    /// The number of its points, as stated.
+    points: Option<usize>,
     labels: Option<Vec<f64>>,
     surface: Labelled,
     is_complete: bool,
@@ -129,6 +135,7 @@ impl File<'_> {
             "Piece" => {
                 self.first = self.surface.raw.positions.len() as u32;
                 self.others = 0;
+                self.points = attribute("NumberOfPoints")?.and_then(|n| n.trim().parse().ok());
                 for name in ["NumberOfVerts", "NumberOfLines"] {
                     let count = attribute(name)?.and_then(|count| count.trim().parse().ok());
                     self.others = self.others.saturating_add(count.unwrap_or(0));
@@ -139,6 +146,11 @@ impl File<'_> {
                 // Labels that are no numbers are none.
                 if self.section == "CellData" && scalar(&kind).is_err() {
                     return Ok(());
+                }
+                let width = attribute("NumberOfComponents")?;
+                if self.section == "Points" && width.as_ref().is_some_and(|n| n.trim() != "3") {
+                    let width = width.unwrap_or_default();
+                    return Err(malformed(format!("points of {} coordinates", excerpt(&width))));
                 }
                 let offset = attribute("offset")?.and_then(|offset| offset.trim().parse().ok());
                 self.array = Some(Array {
@@ -174,6 +186,12 @@ impl File<'_> {
     fn end_piece(&mut self) -> Result<()> {
         let (polygons, bands) = (take(&mut self.polygons), take(&mut self.strips));
         let labels = self.labels.take();
+        let points = self.surface.raw.positions.len() - self.first as usize;
+        if let Some(stated) = self.points.filter(|&stated| stated != points) {
+            return Err(malformed(format!(
+                "a piece of {stated} points, with the arrays of {points}"
+            )));
+        }
         if labels.is_some() && !polygons.is_empty() && !bands.is_empty() {
             return Err(ReadErrorKind::Foreign {
                 what: "VTK data with labels of polygons and strips together".to_owned(),

@@ -58,9 +58,14 @@ impl<'a> Buffers<'a> {
         match self.data.entry(number) {
             Entry::Occupied(read) => Ok(read.into_mut()),
             Entry::Vacant(place) => {
-                let encoded = data.split_once(";base64,").map(|(_, encoded)| encoded);
-                let bytes = encoded.and_then(|encoded| base64::decode(encoded.as_bytes()));
-                Ok(place.insert(bytes.ok_or_else(|| malformed("a buffer that is no base64"))?))
+                let (kind, encoded) = data.split_once(',').unwrap_or((data, ""));
+                let bytes = if kind.ends_with(";base64") {
+                    base64::decode(encoded.as_bytes())
+                        .ok_or_else(|| malformed("a buffer that is no base64"))?
+                } else {
+                    unescaped(encoded)
+                };
+                Ok(place.insert(bytes))
             }
         }
     }
@@ -97,11 +102,17 @@ fn file_beside(name: &str) -> Option<&Path> {
     (is_beside && !name.is_empty()).then_some(path)
 }
 
-/// A URI's name of a file: `%20` is a space.
+/// A URI's name of a file.
 fn decoded(uri: &str) -> Cow<'_, str> {
     if !uri.contains('%') {
         return uri.into();
     }
+    // Names that are no UTF-8 stay as they are.
+    String::from_utf8(unescaped(uri)).map_or(uri.into(), Into::into)
+}
+
+/// The bytes of a URI's part: `%20` is a space.
+fn unescaped(uri: &str) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();
     while let Some((&byte, after)) = rest.split_first() {
@@ -119,8 +130,7 @@ fn decoded(uri: &str) -> Cow<'_, str> {
             }
         }
     }
-    // Names that are no UTF-8 stay as they are.
-    String::from_utf8(bytes).map_or(uri.into(), Into::into)
+    bytes
 }
 
 #[cfg(test)]

@@ -21,8 +21,8 @@ use std::path::Path;
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
-/// More copies than this are no organ: a scene may place one mesh often.
-const MOST_COPIES: usize = 16;
+/// Positions and corners for each byte: ten times as many as a mesh has that a scene places once.
+const MOST_A_BYTE: usize = 3;
 
 /// Extensions that change no position: surfaces look the same without them.
 const HARMLESS: [&str; 7] = [
@@ -44,10 +44,13 @@ pub(super) fn read(bytes: &[u8], folder: &Path) -> Result<Raw> {
     }
     check_required(&head.extensions_required)?;
     let document: Document = parse(json)?;
+    for (number, node) in document.nodes.iter().enumerate() {
+        node.check().map_err(|what| malformed(format!("node {number} has {what}")))?;
+    }
     let buffers = Buffers::new(folder, binary, &document.buffers);
     let mut surface = Surface {
         document: &document,
-        most: MOST_COPIES.saturating_mul(bytes.len().saturating_add(buffers.room())),
+        most: MOST_A_BYTE.saturating_mul(bytes.len().saturating_add(buffers.room())),
         buffers,
         worlds: skin::worlds(&document),
         raw: Raw::new(0),
@@ -161,13 +164,29 @@ fn roots(document: &Document) -> Result<Vec<usize>> {
     }
 }
 
+/// Lengths of a rotation's quaternion, which should be 1: as far off as it is rounded to a few digits.
+const UNIT: std::ops::RangeInclusive<f64> = 0.99..=1.01;
+
 impl Node {
+    /// Fails for a placement that other readers would understand differently.
+    fn check(&self) -> std::result::Result<(), &'static str> {
+        let is_unit = |rotation| UNIT.contains(&DQuat::from_array(rotation).length());
+        if !self.rotation.is_none_or(is_unit) {
+            return Err("a rotation that is no unit quaternion");
+        }
+        let is_affine = |m: [f64; 16]| [m[3], m[7], m[11], m[15]] == [0.0, 0.0, 0.0, 1.0];
+        if !self.matrix.is_none_or(is_affine) {
+            return Err("a matrix whose last row is not 0, 0, 0, 1");
+        }
+        Ok(())
+    }
+
     fn place(&self) -> DMat4 {
         match self.matrix {
             Some(columns) => DMat4::from_cols_array(&columns),
             None => DMat4::from_scale_rotation_translation(
                 self.scale.map_or(DVec3::ONE, DVec3::from),
-                self.rotation.map_or(DQuat::IDENTITY, DQuat::from_array),
+                self.rotation.map_or(DQuat::IDENTITY, |q| DQuat::from_array(q).normalize()),
                 self.translation.map_or(DVec3::ZERO, DVec3::from),
             ),
         }
@@ -181,6 +200,10 @@ struct LeftOut {
     nodes: usize,
     /// Parts of meshes that are points and lines.
     lines: usize,
+    /// Parts of meshes without positions.
+    unplaced: usize,
+    /// Corners after the last whole triangle.
+    corners: usize,
     morphed: usize,
     skinned: usize,
     instanced: usize,
@@ -232,7 +255,7 @@ impl Surface<'_> {
         for primitive in &mesh.primitives {
             self.add(primitive, node, placed, weights)?;
             if self.raw.positions.len() + self.raw.corners.len() > self.most {
-                return Err(malformed(format!("more than {MOST_COPIES} copies of its meshes")));
+                return Err(malformed("too many copies of its meshes"));
             }
         }
         Ok(())
@@ -246,7 +269,10 @@ impl Surface<'_> {
         weights: &[f64],
     ) -> Result<()> {
         let mode = primitive.mode.unwrap_or(4);
-        let Some(&positions) = primitive.attributes.get("POSITION") else { return Ok(()) };
+        let Some(&positions) = primitive.attributes.get("POSITION") else {
+            self.left_out.unplaced += 1;
+            return Ok(());
+        };
         if !matches!(mode, 4..=6) {
             self.left_out.lines += 1;
             return Ok(());
@@ -305,6 +331,11 @@ impl Surface<'_> {
             Placed::At(place) => place.determinant() < 0.0,
             Placed::Posed(joints) => joints.first().is_some_and(|joint| joint.determinant() < 0.0),
         };
+        self.left_out.corners += match (mode, corners.len()) {
+            (4, count) => count % 3,
+            (_, count @ 0..3) => count,
+            _ => 0,
+        };
         for number in 0..if mode == 4 { corners.len() / 3 } else { corners.len().max(2) - 2 } {
             let triangle = match mode {
                 4 => [3 * number, 3 * number + 1, 3 * number + 2],
@@ -362,6 +393,16 @@ impl Surface<'_> {
             self.left_out.lines,
             "part of a mesh was left out: points and lines are no surface",
             "parts of meshes were left out: points and lines are no surface",
+        );
+        raw.remark(
+            self.left_out.unplaced,
+            "part of a mesh was left out: it has no positions, or an extension's",
+            "parts of meshes were left out: they have no positions, or an extension's",
+        );
+        raw.remark(
+            self.left_out.corners,
+            "corner was left out: it makes no whole triangle",
+            "corners were left out: they make no whole triangle",
         );
         raw.remark(
             self.left_out.morphed,

@@ -15,8 +15,8 @@ use std::collections::{HashMap, HashSet};
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
-/// More copies of its vertices than this are no organ.
-const MOST_COPIES: usize = 16;
+/// More copies of its vertices than this are no organ, unless they are few.
+const MOST_COPIES: usize = 10;
 
 /// Parts of the namespaces of extensions that are read, or change no position.
 const KNOWN: [&str; 3] = ["/production/", "/material/", "/trianglesets/"];
@@ -45,7 +45,33 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
             }
         }
     }
-    model.assemble()
+    model.modifiers = modifiers(&mut package)?;
+    model.assemble(bytes.len())
+}
+
+/// Parts that slicers note, in files of their own, as taken away from an object, or as a place of other settings.
+fn modifiers(package: &mut Package<'_>) -> Result<usize> {
+    let mut modifiers = 0;
+    // Of Bambu Studio and OrcaSlicer; of PrusaSlicer.
+    for path in ["Metadata/model_settings.config", "Metadata/Slic3r_PE_model.config"] {
+        if !package.has(path) {
+            continue;
+        }
+        tags(&package.text(path)?, |tag| {
+            let value = |name| tag.try_get_attribute(name).ok().flatten().map(|found| found.value);
+            let kind = match tag.local_name().as_ref() {
+                "part" => value("subtype"),
+                "metadata" if value("key").is_some_and(|key| key == "volume_type") => {
+                    value("value")
+                }
+                _ => None,
+            };
+            let is_other = |kind: &str| !matches!(kind, "normal_part" | "ModelPart");
+            modifiers += usize::from(kind.is_some_and(|kind| is_other(&kind)));
+            Ok(())
+        })?;
+    }
+    Ok(modifiers)
 }
 
 fn malformed(what: impl Into<String>) -> ReadErrorKind {
@@ -82,6 +108,8 @@ struct Model {
     items: Vec<(Key, DMat4)>,
     /// Elements that are left out.
     unread: usize,
+    /// Parts that are no part of the surface, and are read as if they were.
+    modifiers: usize,
 }
 
 impl Model {
@@ -163,11 +191,13 @@ impl Model {
     }
 
     /// Places every item, and the parts of which it is made.
-    fn assemble(self) -> Result<Raw> {
+    fn assemble(self, bytes: usize) -> Result<Raw> {
         if self.items.is_empty() {
             return Err(malformed("its build names no object"));
         }
         let vertices: usize = self.objects.iter().map(|object| object.positions.len()).sum();
+        // Many copies of a small object are as much as an honest file of so many bytes may have.
+        let most = bytes.max(MOST_COPIES * vertices);
         let mut raw = Raw::new(0);
         let items = self.items.iter().rev().map(|(key, place)| Ok((self.find(key)?, *place)));
         let mut waiting = items.collect::<Result<Vec<_>>>()?;
@@ -177,12 +207,8 @@ impl Model {
             let object = &self.objects[number];
             is_placed[number] = true;
             placed += 1;
-            if raw.positions.len() + object.positions.len() > MOST_COPIES * vertices
-                || placed > MOST_COPIES * self.objects.len()
-            {
-                let what =
-                    format!("more than {MOST_COPIES} copies of its objects, or one in itself");
-                return Err(malformed(what));
+            if raw.positions.len() + object.positions.len() > most || placed > most {
+                return Err(malformed("too many copies of its objects, or one in itself"));
             }
             if object.is_support {
                 supports += 1;
@@ -206,6 +232,11 @@ impl Model {
             supports,
             "object was left out: it is of a type for supports",
             "objects were left out: they are of a type for supports",
+        );
+        raw.remark(
+            self.modifiers,
+            "part was read as surface, although a slicer takes it away, or for its settings alone: delete it there",
+            "parts were read as surface, although a slicer takes them away, or for their settings alone: delete them there",
         );
         raw.remark(
             self.unread,

@@ -52,6 +52,10 @@ impl<'a> Package<'a> {
         })
     }
 
+    pub fn has(&self, path: &str) -> bool {
+        self.paths().any(|(_, other)| other.eq_ignore_ascii_case(path))
+    }
+
     /// The text of a file in the package.
     pub fn text(&mut self, path: &str) -> Result<String> {
         let number = self.paths().find(|(_, other)| other.eq_ignore_ascii_case(path));

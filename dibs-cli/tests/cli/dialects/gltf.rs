@@ -228,10 +228,18 @@ fn what_is_left_out_is_named() {
     others.json["nodes"].as_array_mut().unwrap().push(json!({"mesh": 0}));
     let lines = json!([{"attributes": {"POSITION": 0}, "indices": 1},
         {"attributes": {"POSITION": 0}, "mode": 1}]);
+    let unplaced = json!([{"attributes": {"POSITION": 0}, "indices": 1},
+        {"attributes": {"NORMAL": 0}, "indices": 1}]);
+    let mut cut = Document::new();
+    let corners: Vec<u8> = [0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3, 0, 1].map(|c| [c, 0]).concat();
+    let corners = cut.accessor(&corners, 14, 5123, "SCALAR");
+    let cut = cut.with("/meshes/0/primitives/0/indices", json!(corners));
     let instanced = json!({"EXT_mesh_gpu_instancing": {"attributes": {}}});
     for (document, says) in [
         (others, "1 mesh was left out: it is not in the default scene"),
         (Document::new().with("/meshes/0/primitives", lines), "1 part of a mesh was left out"),
+        (Document::new().with("/meshes/0/primitives", unplaced), "it has no positions"),
+        (cut, "2 corners were left out: they make no whole triangle"),
         (Document::new().with("/animations", json!([{}, {}])), "2 animations were left out"),
         (Document::new().with("/nodes/0/extensions", instanced), "placed several times"),
     ] {
@@ -240,6 +248,42 @@ fn what_is_left_out_is_named() {
         let found = warnings(&import);
         assert!(found.len() == 1 && found[0].contains(says), "{found:?}");
     }
+}
+
+/// Readers differ on quaternions of another length and on matrices with a perspective, by the size of the surface.
+#[test]
+fn placements_that_are_none_are_refused() {
+    let folder = Folder::new();
+    let place = |key: &str, value: Value| Document::new().with(&format!("/nodes/0/{key}"), value);
+    for rotation in [json!([0, 0, 1, 1]), json!([0, 0, 0, 0]), json!([0, 0, 0.5, 0.5])] {
+        let message = folder.says("a.gltf", place("rotation", rotation).text());
+        assert!(message.contains("node 0 has a rotation that is no unit quaternion"), "{message}");
+    }
+    let matrix = json!([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 0, 0, 2]);
+    let message = folder.says("a.gltf", place("matrix", matrix).text());
+    assert!(message.contains("node 0 has a matrix whose last row is not"), "{message}");
+    // A quaternion of a few digits turns, and does not scale.
+    let turned = folder.read("a.gltf", place("rotation", json!([0, 0, 0.71, 0.71])).text());
+    let [x, y] = [turned.mesh.positions[1], turned.mesh.positions[2]];
+    assert!(x.distance(Vec3::new(0.0, 4000.0, 0.0)) < 1e-3, "{x}");
+    assert!(y.distance(Vec3::new(-5000.0, 0.0, 0.0)) < 1e-3, "{y}");
+}
+
+/// A file may place a mesh often, but no file becomes more than ten of its size.
+#[test]
+fn copies_are_bounded_by_the_size_of_the_file() {
+    let folder = Folder::new();
+    let copies = |count: usize| {
+        let nodes: Vec<Value> =
+            (0..count).map(|n| json!({"mesh": 0, "translation": [9 * n, 0, 0]})).collect();
+        let top: Vec<usize> = (0..count).collect();
+        Document::new().with("/nodes", json!(nodes)).with("/scenes/0/nodes", json!(top))
+    };
+    assert_eq!(folder.read("a.gltf", copies(40).text()).mesh.triangles.len(), 160);
+    let many = copies(40);
+    let primitive = many.json["meshes"][0]["primitives"][0].clone();
+    let many = many.with("/meshes/0/primitives", json!(vec![primitive; 100]));
+    assert!(folder.says("a.gltf", many.text()).contains("too many copies of its meshes"));
 }
 
 #[test]

@@ -147,3 +147,53 @@ fn units_are_stated_and_what_is_left_out_is_named() {
     is_tetrahedron(&import, 1.0, "support");
     assert!(warnings(&import)[0].contains("type for supports"));
 }
+
+/// Slicers note in files of their own which parts are no surface.
+#[test]
+fn parts_for_a_slicer_are_named() {
+    let folder = Folder::new();
+    let resources = format!("<object id=\"1\">{MESH}</object>");
+    let model = model("", &resources, "<item objectid=\"1\"/>");
+    let noted = |path: &str, config: &str| {
+        let bytes = archive(&[("3D/3dmodel.model", &model), (path, config)]);
+        let import = folder.read("a.3mf", bytes);
+        is_tetrahedron(&import, 1.0, path);
+        warnings(&import)
+    };
+    let bambu = "Metadata/model_settings.config";
+    let part = |kind: &str| {
+        format!(
+            "<config><object id=\"1\"><part id=\"1\" subtype=\"{kind}\"></part></object></config>"
+        )
+    };
+    assert_eq!(noted(bambu, &part("normal_part")), [""; 0]);
+    for kind in ["negative_part", "modifier_part", "support_blocker"] {
+        assert!(noted(bambu, &part(kind))[0].starts_with("1 part was read as surface"), "{kind}");
+    }
+    let prusa = "Metadata/Slic3r_PE_model.config";
+    let volume =
+        |kind: &str| format!("<config><metadata key=\"volume_type\" value=\"{kind}\"/></config>");
+    assert_eq!(noted(prusa, &volume("ModelPart")), [""; 0]);
+    assert!(noted(prusa, &volume("NegativeVolume"))[0].contains("a slicer takes it away"));
+}
+
+/// A build may place an object often, but no file becomes more than ten of its size.
+#[test]
+fn copies_are_bounded_by_the_size_of_the_file() {
+    let folder = Folder::new();
+    let copies = |count: usize, object: &str| {
+        let item =
+            |n| format!("<item objectid=\"{object}\" transform=\"1 0 0 0 1 0 0 0 1 {n} 0 0\"/>");
+        let items: String = (0..count).map(|n| item(9 * n)).collect();
+        let parts = |of: &str| format!("<component objectid=\"{of}\"/>").repeat(10);
+        let resources = format!(
+            "<object id=\"1\">{MESH}</object><object id=\"2\"><components>{}</components></object>\
+             <object id=\"3\"><components>{}</components></object>",
+            parts("1"),
+            parts("2")
+        );
+        archive(&[("3D/a.model", &model("", &resources, &items))])
+    };
+    assert_eq!(folder.read("a.3mf", copies(20, "1")).mesh.triangles.len(), 80);
+    assert!(folder.says("a.3mf", copies(40, "3")).contains("too many copies of its objects"));
+}

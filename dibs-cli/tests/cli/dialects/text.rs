@@ -51,6 +51,46 @@ fn text_may_have_any_encoding_line_and_end() {
             assert_eq!(warnings(&import), [""; 0], "{name}, {how}");
         }
     }
+    for (name, text) in [("a.obj", OBJ), ("a.ply", PLY)] {
+        is_tetrahedron(&folder.read(name, text.replace('\n', "\r")), 1.0, name);
+    }
+}
+
+/// A count below what the file has drops no face without a word.
+#[test]
+fn more_than_a_file_counts_is_named() {
+    let folder = Folder::new();
+    let binary = |more: &[u8]| {
+        let mut bytes = PLY
+            .split("0 0 0\n")
+            .next()
+            .unwrap()
+            .replace("ascii", "binary_little_endian")
+            .into_bytes();
+        bytes.extend(super::POINTS.iter().flatten().flat_map(|x| x.to_le_bytes()));
+        for face in super::FACES {
+            bytes.push(3);
+            bytes.extend(face.iter().flat_map(|corner| corner.to_le_bytes()));
+        }
+        [&bytes, more].concat()
+    };
+    is_tetrahedron(&folder.read("a.ply", binary(&[])), 1.0, "binary");
+    for (name, bytes, says) in [
+        ("a.off", format!("{OFF}# more\n3 0 1 2\n\n").into_bytes(), "1 line was left out"),
+        ("a.ply", format!("{PLY}\n3 0 1 2\n3 0 1 3\n").into_bytes(), "2 lines were left out"),
+        ("a.ply", binary(&[3, 0, 0, 0, 0]), "5 bytes were left out"),
+    ] {
+        let import = folder.read(name, bytes);
+        is_tetrahedron(&import, 1.0, says);
+        let found = warnings(&import);
+        assert!(found.len() == 1 && found[0].contains(says), "{name}: {found:?}");
+    }
+    for (from, to) in [("$Elements\n4", "$Elements\n3"), ("$Nodes\n4", "$Nodes\n3")] {
+        let message = folder.says("a.msh", MSH.replace(from, to));
+        assert!(message.contains("than it counts"), "{message}");
+    }
+    let message = folder.says("a.off", b"OFF BINARY\n\0\0\0\x04\0\0\0\x04\0\0\0\0");
+    assert!(message.contains("this is a binary OFF"), "{message}");
 }
 
 #[test]

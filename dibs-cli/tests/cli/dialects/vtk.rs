@@ -186,6 +186,21 @@ fn grids_in_xml_are_read_as_in_the_legacy_format() {
     ] {
         assert!(folder.says("a.vtu", &text).contains(says), "{}", folder.says("a.vtu", &text));
     }
+    // Points of other numbers, and several times, would move the surface.
+    let points = "NumberOfComponents=\"3\" format=\"ascii\">0 0 0 4 0 0 0 5 0 0 0 6</DataArray>";
+    let again = points.replace("0 0 0 4", "1 1 1 4");
+    let twice = format!("{points}<DataArray type=\"Float64\" TimeStep=\"1\" {again}");
+    for (new, says) in [
+        (&twice[..], "a piece of 4 points, with the arrays of 8"),
+        (&points.replace("\"3\"", "\"2\""), "points of 2 coordinates"),
+        (&points.replace("0 0 6", "0 0 6 9 9 9"), "a piece of 4 points, with the arrays of 5"),
+        (&points.replace("0 0 6", "0 &z; 6"), "the entity 'z' among numbers"),
+    ] {
+        let message = folder.says("a.vtu", faces.replace(points, new));
+        assert!(message.contains(says), "{message}");
+    }
+    let quoted = points.replace("0 0 0 4", "<![CDATA[0 0 0 4").replace("0 6<", "0 6]]><");
+    is_tetrahedron(&folder.read("a.vtu", faces.replace(points, &quoted)), 1.0, "CDATA");
     // Labels that are no numbers are none, and no reason to refuse the surface.
     let text = "<DataArray type=\"String\" Name=\"label\" format=\"ascii\">x</DataArray>";
     let named = vtu(kind, "0 1 2 3", "4", "10", text);
