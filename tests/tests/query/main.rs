@@ -1,6 +1,7 @@
 //! Queries, contacts and forces against exhaustive search.
 
 mod answers;
+mod at_surface;
 mod chain;
 mod contacts;
 mod cut_short;

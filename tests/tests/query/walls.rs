@@ -417,7 +417,11 @@ fn a_label_keeps_its_margin_beside_a_nearer_part() {
                 assert!(all.is_complete());
                 assert!(found.iter().all(|one| tree.label(one.triangle) == Some(ARTERY)));
                 let deepest = found.iter().next().map_or(f32::INFINITY, |one| one.separation);
-                let is_right = (deepest - least).abs() <= found.accuracy();
+                // At the surface it is that of an axis as far inside.
+                let distance = least + RADIUS;
+                let is_at = distance <= 3.0 * found.accuracy();
+                let under = found.accuracy() + if is_at { 2.0 * distance } else { 0.0 };
+                let is_right = (-under..=found.accuracy()).contains(&(deepest - least));
                 assert!(is_right || least.min(deepest) > WIDE - 1e-3, "{deepest} {least} at {at}");
                 near += usize::from(least < WIDE);
             }

@@ -129,7 +129,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             }
             let mut other = pair_at(tree, vertices, tool, near, accuracy)?;
             // Of a part, what counts is the distance: at its border the surface goes on.
-            if options.part.is_none() || closest.side != Side::Outside {
+            let is_outside = closest.side == Side::Outside || closest.is_at_surface();
+            if options.part.is_none() || !is_outside {
                 other.add_side(tree, vertices, tool)?;
             }
             if other.side != Side::Inside
@@ -153,7 +154,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             }
         }
         made.triangle_tests = made.triangle_tests.saturating_add(left - look.left);
-        let is_known = has_side && (is_crossing || !closest.is_cut_short());
+        let is_met = is_crossing || closest.is_at_surface();
+        let is_known = has_side && (is_met || !closest.is_cut_short());
         // The closest pair is certain then, whatever became of the search.
         if is_known
             && !is_crossing
@@ -225,8 +227,10 @@ impl<I, V: ?Sized, T> Pair<'_, I, V, T> {
 pub(super) fn contact(at: &Proximity) -> Option<Contact> {
     let is_unit = (at.direction.length_squared() - 1.0).abs() < 1e-3;
     let triangle = at.triangle.filter(|_| is_unit)?;
+    // At the surface the axis may be as far inside as it seems outside.
+    let separation = if at.is_at_surface() { at.lower - 2.0 * at.axis_distance } else { at.lower };
     Some(Contact {
-        separation: at.lower,
+        separation,
         normal: at.direction,
         point_on_surface: at.point_on_surface,
         point_on_tool: at.point_on_tool,

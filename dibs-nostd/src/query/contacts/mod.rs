@@ -23,7 +23,8 @@ use list::List;
 #[non_exhaustive]
 pub struct Contact {
     /// Signed separation (mm): the lower end of the pair's interval, as [`Proximity::lower`]. Of a tool that crosses or is inside
-    /// it may be too low by the depth's tolerance, or by more where the budget ended.
+    /// it may be too low by the depth's tolerance, or by more where the budget ended. Where the axis is at the surface and its
+    /// side below the accuracy, it is that of an axis as far inside: too low by some four accuracies at most.
     pub separation: f32,
     /// Unit vector that leads out of the surface; never zero.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
