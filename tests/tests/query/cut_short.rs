@@ -2,7 +2,7 @@
 
 use dibs_build::{Builder, Mesh};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Budget, Capsule, Options, Query, Side};
+use dibs_nostd::{Budget, Capsule, Odometer, Options, Proximity, Query, Side, Tracker};
 use dibs_tests::deform::unit;
 use dibs_tests::surfaces::ball;
 use fastrand::Rng;
@@ -54,32 +54,48 @@ fn an_axis_through_several_walls_is_as_deep_under_any_budget() {
     assert!(cut > 500 && crossing > 500, "{cut} {crossing}");
 }
 
-/// A row of bodies, each of which has leaves of other sizes. Where a search ends between two that the axis passes, few
-/// tests are left, which are enough for an end of the axis: what is between that and the first body was not searched.
+/// A row of bodies, each of which has leaves of other sizes.
+fn row_of_bodies(count: usize, rng: &mut Rng) -> Mesh {
+    let mut row = Mesh::default();
+    for place in 0..count {
+        let body = ball(rng.u32(..3));
+        let first = row.positions.len() as u32;
+        let (size, aside) = (0.2 + 0.8 * rng.f32(), unit(rng) * 5.0);
+        let aside = aside + Vec3::X * 90.0 * place as f32;
+        let spikes = if rng.bool() { 1.2 } else { 0.0 };
+        let mut move_to = |at: &Vec3| *at * size * (1.0 - 0.6 * spikes * rng.f32()) + aside;
+        row.positions.extend(body.positions.iter().map(&mut move_to));
+        row.triangles.extend(body.triangles.iter().map(|at| at.map(|row| row + first)));
+    }
+    row
+}
+
+/// A capsule somewhere along such a row.
+fn along_a_row(rng: &mut Rng) -> Capsule {
+    let [from, to] =
+        [(); 2].map(|()| Vec3::X * (500.0 * rng.f32() - 100.0) + unit(rng) * 40.0 * rng.f32());
+    Capsule::new(from, to, 0.5).expect("a valid tool")
+}
+
+/// Whether the answer that a budget ended holds the whole one.
+fn holds(part: &Proximity, whole: &Proximity) -> bool {
+    let (all, part) = (whole.interval(), part.interval());
+    part.lower <= all.upper && all.lower <= part.upper
+}
+
+/// Where a search ends between two bodies that the axis passes, few tests are left, which are enough for an end of the axis:
+/// what is between that and the first body was not searched.
 #[test]
 fn a_search_that_ended_knows_not_where_the_axis_meets_the_surface() {
     let (mut cut, mut rng) = (0, Rng::with_seed(3));
     for number in 0..if cfg!(debug_assertions) { 250 } else { 1_000 } {
-        let mut row = Mesh::default();
-        for place in 0..2 + number % 3 {
-            let body = ball(rng.u32(..3));
-            let first = row.positions.len() as u32;
-            let (size, aside) = (0.2 + 0.8 * rng.f32(), unit(&mut rng) * 5.0);
-            let aside = aside + Vec3::X * 90.0 * place as f32;
-            let spikes = if rng.bool() { 1.2 } else { 0.0 };
-            let mut move_to = |at: &Vec3| *at * size * (1.0 - 0.6 * spikes * rng.f32()) + aside;
-            row.positions.extend(body.positions.iter().map(&mut move_to));
-            row.triangles.extend(body.triangles.iter().map(|at| at.map(|row| row + first)));
-        }
+        let row = row_of_bodies(2 + number % 3, &mut rng);
         let built = Builder::new().stretch(1.1).build(&row).expect("a valid mesh");
         let tree = built.tree::<u16>().expect("16-bit indices");
         let rows = built.to_rows(&row.positions);
         let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
         for _ in 0..20 {
-            let [from, to] = [(); 2].map(|()| {
-                Vec3::X * (500.0 * rng.f32() - 100.0) + unit(&mut rng) * 40.0 * rng.f32()
-            });
-            let tool = Capsule::new(from, to, 0.5).expect("a valid tool");
+            let tool = along_a_row(&mut rng);
             let whole = query.closest(rows.as_slice(), &tool, &Options::cold()).expect("an answer");
             if whole.side != Side::Crossing {
                 continue;
@@ -88,10 +104,62 @@ fn a_search_that_ended_knows_not_where_the_axis_meets_the_surface() {
                 let budget = Budget { node_tests: u32::MAX, triangle_tests };
                 let options = Options::cold().budget(budget);
                 let found = query.closest(rows.as_slice(), &tool, &options).expect("an answer");
-                let (all, part) = (whole.interval(), found.interval());
                 cut += usize::from(found.lower < whole.lower);
-                let holds = part.lower <= all.upper && all.lower <= part.upper;
-                assert!(holds, "{triangle_tests}: {whole:?} {found:?}");
+                assert!(holds(&found, &whole), "{triangle_tests}: {whole:?} {found:?}");
+            }
+        }
+    }
+    assert!(cut > 1_000, "{cut}");
+}
+
+/// A flat body along x, bent to waves: an axis along it enters and leaves it several times.
+fn waves(splits: u32, rng: &mut Rng) -> Mesh {
+    let mut mesh = ball(splits);
+    let (thin, high) = (2.0 + 8.0 * rng.f32(), 15.0 + 20.0 * rng.f32());
+    let (often, first) = (0.05 + 0.1 * rng.f32(), std::f32::consts::TAU * rng.f32());
+    for at in &mut mesh.positions {
+        let Vec3 { x, y, z } = *at / 40.0;
+        let x = 120.0 * x;
+        let thick = thin * (1.0 + 0.8 * (0.03 * x + first).sin());
+        *at = Vec3::new(x, 30.0 * y, z * thick + high * (often * x + first).sin());
+    }
+    mesh
+}
+
+/// The same of a tracker's tick, where its triangles run out: beyond the one place that it knows, the axis would be outside.
+#[test]
+fn a_tick_that_ended_knows_not_where_the_axis_meets_the_surface() {
+    let (mut cut, mut rng) = (0, Rng::with_seed(5));
+    for number in 0..if cfg!(debug_assertions) { 16 } else { 60 } {
+        let mesh = waves(2 + number % 2, &mut rng);
+        let leaf = 1 + number as usize / 2 % 8;
+        let built = Builder::new().stretch(1.1).leaf_triangles(leaf).build(&mesh);
+        let built = built.expect("a valid mesh");
+        let tree = built.tree::<u16>().expect("16-bit indices");
+        let rows = built.to_rows(&mesh.positions);
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        let mut odometer = Odometer::new(&tree);
+        let surface = odometer.start(rows.as_slice());
+        for _ in 0..20 {
+            let [from, to] = [-140.0, 140.0]
+                .map(|x| Vec3::new(x * rng.f32(), 10.0 * rng.f32(), 20.0 * (rng.f32() - 0.5)));
+            let tool = Capsule::new(from, to, 0.5).expect("a valid tool");
+            let whole = query.closest(rows.as_slice(), &tool, &Options::cold()).expect("an answer");
+            if whole.side != Side::Crossing {
+                continue;
+            }
+            for triangle_tests in 0..60 {
+                let mut tracker = Tracker::<u16, MAX_STACK, 256>::new(&tree).expect("deep enough");
+                if triangle_tests % 2 == 0 {
+                    let aside = unit(&mut rng) * 3.0;
+                    let beside = Capsule::new(from + aside, to + aside, 0.5).expect("a valid tool");
+                    tracker.closest(&surface, &beside, &Options::new()).expect("an answer");
+                }
+                let budget = Budget { node_tests: u32::MAX, triangle_tests };
+                let options = Options::new().budget(budget);
+                let found = tracker.closest(&surface, &tool, &options).expect("an answer").closest;
+                cut += usize::from(found.lower < whole.lower);
+                assert!(holds(&found, &whole), "{triangle_tests}: {whole:?} {found:?}");
             }
         }
     }
