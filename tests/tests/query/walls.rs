@@ -359,6 +359,7 @@ fn the_force_between_two_walls_is_continuous() {
             }
             steepest = steepest.max(largest / STEP);
             let nearest = (at.y * angle.cos() - at.x.abs() * angle.sin()).max(0.1);
+            // `share` states 45 of the depth, over the distance, for flat walls. Shares are whole only outside their edges.
             let by_shares = 45.0 * (RADIUS + MARGIN - nearest) / nearest;
             let most = (20.0 + by_shares) * STEP;
             assert!(largest < most, "{angle}: {largest} N of {most} at {at} within {STEP} mm");

@@ -52,9 +52,12 @@ impl defmt::Format for Wrench {
 /// both have all. Beside a wall's edge the force changes by up to 45 K depth / distance of the axis a mm, for a stiffness K.
 ///
 /// Steps remain where two walls are less than 15 degrees apart, which may be one contact: up to a quarter of the force,
-/// a twelfth in size, as measured outside hearts and brains with the axis at least 0.02 mm from the surface. Nearer than
-/// some 16 accuracies the direction is not known: there the force turned by up to 75 degrees, of the same size. Where
-/// places, list or budget end, shares are whole, and a ninth contact with a share does not act: there steps have no bound.
+/// a twelfth in size, as measured outside hearts and brains with the axis at least 0.02 mm from the surface. Between walls
+/// that face each other they are larger, since both together hold the proxy sideways: up to 0.8 of the force in narrow
+/// gaps. So they are at an open rim, where a contact's side may end: up to half of it. Where the tool crosses or is inside,
+/// the deepest contact's direction jumps on the medial axis, and with it the force. Nearer than some 16 accuracies the
+/// direction is not known: there the force turned by up to 75 degrees, of the same size. Where places, list or budget end,
+/// shares are whole, and a ninth contact with a share does not act: there steps have no bound.
 /// The torque steps with a contact's point, where that slides along a wall. From a list that is not
 /// [complete](crate::ContactIter::is_complete) the force is at least that of the closest pair.
 ///
