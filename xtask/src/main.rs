@@ -50,9 +50,9 @@ enum Task {
 
 fn main() -> ExitCode {
     let result = match Arguments::parse().task {
-        Task::Demo(passed) => prove::demo(&passed),
+        Task::Demo(passed) => prove::run("demo", &passed),
         Task::Test(options) => test::test(&options),
-        Task::Bench(passed) => prove::run("bench", &passed),
+        Task::Bench(passed) => prove::bench(&passed),
         Task::Guarantees(passed) => prove::run("guarantees", &passed),
         Task::Profile(passed) => prove::run("profile", &passed),
         Task::Viewer(options) => viewer::viewer(&options),

@@ -1,9 +1,12 @@
-//! Runs `tests/prove`, the program that measures and proves.
+//! Runs `tests/prove`, the program that measures and proves, and `tests/bench`, which has the paper's experiments.
 
 use std::process::Command;
 
 use anyhow::Result;
 use xtask::{process, workspace};
+
+/// The crate that has other libraries beside ours, which a test compiles only with `--whole`.
+pub const BENCH: &str = "dibs-bench";
 
 /// Arguments that are passed on as they are.
 #[derive(clap::Args)]
@@ -12,11 +15,11 @@ pub struct Passed {
     arguments: Vec<String>,
 }
 
-/// `cargo run` of the program, without its arguments. It runs in the user's folder, because arguments may be paths.
-pub fn command(features: &[&str]) -> Command {
+/// `cargo run` of a program, without its arguments. It runs in the user's folder, because arguments may be paths.
+fn command(package: &str) -> Command {
     let mut cargo = Command::new("cargo");
-    cargo.args(["run", "--release", "--package", "dibs-prove", "--manifest-path"]);
-    cargo.arg(workspace::root().join("Cargo.toml")).args(features).arg("--");
+    cargo.args(["run", "--release", "--package", package, "--manifest-path"]);
+    cargo.arg(workspace::root().join("Cargo.toml")).arg("--");
     cargo
 }
 
@@ -24,19 +27,28 @@ pub fn command(features: &[&str]) -> Command {
 /// dependencies again, with fewer features.
 pub fn with_workspace() -> Result<Command> {
     let mut cargo = Command::new("cargo");
-    cargo.args(["build", "--quiet", "--release", "--workspace", "--bins", "--tests"]);
+    cargo.args([
+        "build",
+        "--quiet",
+        "--release",
+        "--workspace",
+        "--exclude",
+        BENCH,
+        "--bins",
+        "--tests",
+    ]);
     process::run(cargo.current_dir(workspace::root()))?;
     Ok(Command::new(workspace::target().join("release/prove")))
 }
 
 /// Runs a task of the program.
 pub fn run(task: &str, passed: &Passed) -> Result<()> {
-    end(command(&[]).arg(task).args(&passed.arguments))
+    end(command("dibs-prove").arg(task).args(&passed.arguments))
 }
 
-/// Runs the demo, which needs none of the peers of the benchmark.
-pub fn demo(passed: &Passed) -> Result<()> {
-    end(command(&["--no-default-features"]).arg("demo").args(&passed.arguments))
+/// Runs the paper's experiments.
+pub fn bench(passed: &Passed) -> Result<()> {
+    end(command(BENCH).args(&passed.arguments))
 }
 
 /// Runs a program that prints its error, and exits with its code.

@@ -23,7 +23,7 @@ pub struct Options {
     #[arg(long, default_value_t = 5)]
     pub demo_seconds: u32,
     /// Also the slow tests: an empty crate brought to an answer on the board by the guide alone, the viewer's query in
-    /// WebAssembly, and a few mutants of the lines that changed.
+    /// WebAssembly, the paper's experiments in small, and a few mutants of the lines that changed.
     #[arg(long)]
     pub whole: bool,
     /// Only these steps, for machines that run side by side; by default all.
@@ -51,11 +51,12 @@ pub fn test(options: &Options) -> Result<()> {
     let mut steps = Steps::default();
     let is_due = |job| options.job.is_none_or(|only| only == job);
     if is_due(Job::Lints) {
-        lints(&mut steps);
+        lints(&mut steps, options.whole);
     }
     if is_due(Job::Host) {
         // This also runs the examples in the documentation.
-        steps.cargo("tests", &["test", "--release", "--workspace", "--no-fail-fast"], &[]);
+        let tests = ["test", "--release", "--no-fail-fast", "--workspace"];
+        steps.cargo("tests", &[&tests, without_bench(options.whole)].concat(), &[]);
         steps.run("files of other programs", other_programs);
     }
     if is_due(Job::Docs) {
@@ -88,12 +89,18 @@ pub fn test(options: &Options) -> Result<()> {
     Ok(())
 }
 
-fn lints(steps: &mut Steps) {
+/// The paper's experiments are compiled and run only with `--whole`.
+const fn without_bench(is_whole: bool) -> &'static [&'static str] {
+    if is_whole { &[] } else { &["--exclude", prove::BENCH] }
+}
+
+fn lints(steps: &mut Steps, is_whole: bool) {
     steps.cargo("format", &["fmt", "--all", "--check"], &[]);
     let board = ["fmt", "--check", "--manifest-path", "examples/stm32h743/Cargo.toml"];
     steps.cargo("format of the board apart", &board, &[]);
     // Lints and documentation take the tests' profile, so that common dependencies are built once.
-    let lints = ["clippy", "--release", "--workspace", "--all-targets", "--", "-D", "warnings"];
+    let lints = ["clippy", "--release", "--workspace", "--all-targets"];
+    let lints = [&lints, without_bench(is_whole), &["--", "-D", "warnings"]].concat();
     steps.cargo("lints", &lints, &[]);
 }
 

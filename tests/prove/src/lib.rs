@@ -10,8 +10,6 @@ pub mod faults;
 pub mod footprint;
 pub mod harness;
 pub mod mutants;
-#[cfg(feature = "peers")]
-pub mod paper;
 pub mod probe;
 pub mod processors;
 pub mod profile;

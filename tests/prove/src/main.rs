@@ -1,5 +1,4 @@
-//! Measures and proves: `cargo xtask demo | guarantees | profile | bench | mutants | processors` run this, and `test` its
-//! checks.
+//! Measures and proves: `cargo xtask demo | guarantees | profile | mutants | processors` run this, and `test` its checks.
 //! docs/proofs.md lists the file for each promise.
 
 use std::path::PathBuf;
@@ -24,8 +23,6 @@ enum Task {
     Guarantees(harness::Options),
     /// Writes docs/evidence/performance.md: where a query's instructions go on the emulated board.
     Profile,
-    #[cfg(feature = "peers")]
-    Bench(dibs_prove::paper::Options),
     Mutants(mutants::Options),
     /// Builds the core crate for every row of docs/processors.md.
     Processors,
@@ -55,8 +52,6 @@ fn main() -> ExitCode {
         Task::Demo(options) => demo::run(&options),
         Task::Guarantees(options) => harness::guarantees(&options),
         Task::Profile => profile::run(),
-        #[cfg(feature = "peers")]
-        Task::Bench(options) => dibs_prove::paper::bench(&options),
         Task::Mutants(options) => mutants::mutants(&options),
         Task::Processors => processors::check().map(|outcome| {
             if let Outcome::Skipped(reason) = outcome {

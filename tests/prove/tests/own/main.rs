@@ -1,9 +1,7 @@
 //! The program's own tests: it is compiled once, for them and for its user.
 
-mod benchmark;
 mod boards;
 mod path;
 mod processors;
 mod proofs;
 mod records;
-mod statistics;

@@ -23,6 +23,7 @@ fn the_page_of_proofs_names_every_check_and_files_that_exist() {
     }
     let folders = [
         "tests/tests",
+        "tests/bench/tests",
         "tests/prove/tests",
         "dibs-build/tests",
         "dibs-stream/tests",

@@ -9,8 +9,8 @@ use super::measure::clock;
 use super::names::DIBS;
 use super::plan::{Only, Options, Plan};
 use super::record::{Cell, Record, Records};
-use crate::data::real;
-use crate::harness::run::Run;
+use dibs_prove::data::real;
+use dibs_prove::harness::run::Run;
 
 pub fn run(plan: &Plan, options: &Options, records: &mut Records) {
     of("run", plan, options, records);

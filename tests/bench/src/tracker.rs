@@ -18,8 +18,8 @@ use super::plan::{self, Plan, Progress};
 use super::record::{Cell, Record, Records};
 use super::statistics::Summary;
 use super::subjects::{self, Heart};
-use crate::probe::ticks::{Tick, read, script};
-use crate::probe::{COUNTING, board, build_for_board, run_on_board};
+use dibs_prove::probe::ticks::{Tick, read, script};
+use dibs_prove::probe::{COUNTING, board, build_for_board, run_on_board};
 
 pub const EXPERIMENT: &str = "tracker";
 /// The facts about its run.

@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
+use dibs_bench::imaging::controller::{Controller, Tick, Times};
+use dibs_bench::imaging::ours::Surface;
+use dibs_bench::imaging::race::{Contender, Period, Race};
+use dibs_bench::plan::{Options, Plan};
+use dibs_bench::record::{Record, Records};
+use dibs_bench::{contacts, documents, imaging, run, write};
 use dibs_nostd::Sphere;
 use dibs_nostd::glam::Vec3;
-use dibs_prove::paper::imaging::controller::{Controller, Tick, Times};
-use dibs_prove::paper::imaging::ours::Surface;
-use dibs_prove::paper::imaging::race::{Contender, Period, Race};
-use dibs_prove::paper::plan::{Options, Plan};
-use dibs_prove::paper::record::{Record, Records};
-use dibs_prove::paper::{contacts, documents, imaging, run, write};
 use dibs_tests::method::{Found, Probe};
 use xtask::workspace;
 

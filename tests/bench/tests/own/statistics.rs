@@ -1,6 +1,6 @@
 //! The benchmark's statistics, against textbooks.
 
-use dibs_prove::paper::statistics::{Paired, Summary, crossover, holm, repeatable_worst};
+use dibs_bench::statistics::{Paired, Summary, crossover, holm, repeatable_worst};
 
 #[test]
 fn a_summary_is_that_of_a_textbook() {

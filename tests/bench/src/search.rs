@@ -17,7 +17,7 @@ use super::plan::{Plan, Progress};
 use super::record::{Cell, Record, Records};
 use super::statistics::Summary;
 use super::subjects::{self, Subject};
-use crate::harness::run::Run;
+use dibs_prove::harness::run::Run;
 
 /// The experiment's name in the records.
 pub const EXPERIMENT: &str = "paper-search";

@@ -1,5 +1,7 @@
 //! `cargo xtask bench`: the paper's experiments, run and reported.
 
+#![allow(missing_docs, reason = "a library of one program")]
+
 mod ablation;
 mod brain;
 mod claims;
@@ -29,7 +31,7 @@ use plan::{Only, Plan};
 use record::Records;
 use xtask::workspace;
 
-use crate::demo;
+use dibs_prove::demo;
 
 /// Runs the benchmark, or makes its documents anew.
 pub fn bench(options: &Options) -> Result<()> {

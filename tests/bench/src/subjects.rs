@@ -3,7 +3,7 @@
 use anyhow::{Context, Result};
 use dibs_build::{Mesh, Motion, generate};
 
-use crate::data::real;
+use dibs_prove::data::real;
 
 /// A surface and its source.
 pub struct Subject {
