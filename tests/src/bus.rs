@@ -178,13 +178,13 @@ pub fn published(reader: &mut FrameReader<'_>) -> Option<(u32, Vec<[u32; 3]>)> {
     Some((frame.label().epoch, positions.collect()))
 }
 
-/// A packet's share of its frame's digest, computed by the specification alone.
-pub fn share(packet: &[u8]) -> u32 {
-    let mut share = checksum(packet);
+/// A packet's contribution to its frame's digest, computed by the specification alone.
+pub fn contribution(packet: &[u8]) -> u32 {
+    let mut contribution = checksum(packet);
     for (shift, factor) in [(16, 0x85EB_CA6B_u32), (13, 0xC2B2_AE35)] {
-        share = (share ^ (share >> shift)).wrapping_mul(factor);
+        contribution = (contribution ^ (contribution >> shift)).wrapping_mul(factor);
     }
-    share ^ (share >> 16)
+    contribution ^ (contribution >> 16)
 }
 
 /// CRC-32 by its definition, one bit at a time: it shares no code with the core's checksum.

@@ -23,7 +23,7 @@ pub(super) struct Frame {
     touched: Millis,
     /// Checksum of the begin packet: tells a repeated begin from a restarted sender's.
     begin_checksum: u32,
-    /// Sum of the packets' shares so far.
+    /// Sum of the packets' contributions so far.
     sum: u32,
     pub arrivals: Arrivals,
     /// The commit's sequence number and digest, once it has come.
@@ -201,7 +201,7 @@ impl Collector {
         &mut self,
         packet: &Packet<'_>,
         begin: Begin,
-        share: u32,
+        contribution: u32,
         is_acceptable: impl FnOnce(&Begin) -> Result<(), ReceiveError>,
     ) -> Result<Option<Frame>, ReceiveError> {
         let epoch = packet.epoch;
@@ -247,7 +247,7 @@ impl Collector {
             received: self.now,
             touched: self.now,
             begin_checksum: packet.checksum,
-            sum: share,
+            sum: contribution,
             arrivals: Arrivals::new(!matches!(begin.content, Content::Partial { .. })),
             commit: None,
             is_complete: false,
@@ -256,7 +256,7 @@ impl Collector {
         Ok(Some(frame))
     }
 
-    /// The frame in work and the packet's share of its digest, if the packet belongs to it.
+    /// The frame in work and the packet's contribution to its digest, if the packet belongs to it.
     #[inline]
     pub fn frame_of<M: Mac>(
         &self,
@@ -268,8 +268,10 @@ impl Collector {
             Some(frame)
                 if frame.id.epoch == epoch && frame.id.session as u16 == packet.session_low =>
             {
-                let share = packet.verify(mac, frame.id.session);
-                share.map(|share| (frame, share)).ok_or(ReceiveError::Forged { epoch })
+                let contribution = packet.verify(mac, frame.id.session);
+                contribution
+                    .map(|contribution| (frame, contribution))
+                    .ok_or(ReceiveError::Forged { epoch })
             }
             _ => {
                 let is_stale = self.published.is_some_and(|published| {
@@ -307,10 +309,10 @@ impl Collector {
 
     /// Notes stored rows. `Ok(true)` once the frame is complete.
     #[inline]
-    pub fn take_rows(&mut self, share: u32, place: Place) -> Result<bool, ReceiveError> {
+    pub fn take_rows(&mut self, contribution: u32, place: Place) -> Result<bool, ReceiveError> {
         let Some(frame) = &mut self.frame else { return Ok(false) };
         frame.arrivals.insert(place);
-        frame.sum = frame.sum.wrapping_add(share);
+        frame.sum = frame.sum.wrapping_add(contribution);
         frame.touched = self.now;
         self.finish()
     }

@@ -58,11 +58,11 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
             }
         };
         let is_partial = matches!(begin.content, Content::Partial { .. });
-        let share = packet.verify(&self.mac, begin.session);
-        let share = share.ok_or(ReceiveError::Forged { epoch: packet.epoch })?;
+        let contribution = packet.verify(&self.mac, begin.session);
+        let contribution = contribution.ok_or(ReceiveError::Forged { epoch: packet.epoch })?;
         // Even if this frame is refused, the next one must find the published rows copied.
         self.takes_partial |= is_partial;
-        let begun = self.collector.begin::<M>(packet, begin, share, is_acceptable)?;
+        let begun = self.collector.begin::<M>(packet, begin, contribution, is_acceptable)?;
         let Some(frame) = begun else { return Ok(Progress::Duplicate) };
         self.is_admitted = false;
         self.clean();
@@ -84,7 +84,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         packet: &Packet<'_>,
         Vertices { first, rows }: Vertices<'_>,
     ) -> Result<Progress, ReceiveError> {
-        let (frame, share) = self.collector.frame_of(packet, &self.mac)?;
+        let (frame, contribution) = self.collector.frame_of(packet, &self.mac)?;
         let count = rows.len() as u32;
         let out_of_range = ReceiveError::OutOfRange { first, count };
         let range = first..first.checked_add(count).ok_or(out_of_range)?;
@@ -120,7 +120,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
             }
             _ => return Err(ReceiveError::Encoding),
         }
-        self.stored(packet.epoch, share, place, range)
+        self.stored(packet.epoch, contribution, place, range)
     }
 
     fn weights(
@@ -128,7 +128,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         packet: &Packet<'_>,
         Weights { first, values }: Weights<'_>,
     ) -> Result<Progress, ReceiveError> {
-        let (frame, share) = self.collector.frame_of(packet, &self.mac)?;
+        let (frame, contribution) = self.collector.frame_of(packet, &self.mac)?;
         let count = values.len() as u32;
         let out_of_range = ReceiveError::OutOfRange { first, count };
         let range = first..first.checked_add(count).ok_or(out_of_range)?;
@@ -152,7 +152,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         for (place, value) in places.iter().zip(values) {
             place.set(Vec3::new(f32::from_le_bytes(*value), 0.0, 0.0));
         }
-        self.stored(packet.epoch, share, place, range)
+        self.stored(packet.epoch, contribution, place, range)
     }
 
     /// Notes rows that have been stored.
@@ -160,13 +160,13 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
     fn stored(
         &mut self,
         epoch: u32,
-        share: u32,
+        contribution: u32,
         place: arrivals::Place,
         rows: Range<u32>,
     ) -> Result<Progress, ReceiveError> {
         self.is_dirty = true;
         self.gate.moved(rows);
-        Ok(stored(self.collector.take_rows(share, place)?, epoch))
+        Ok(stored(self.collector.take_rows(contribution, place)?, epoch))
     }
 }
 

@@ -159,8 +159,8 @@ pub struct Weights<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Commit {
     /// Wrapping sum over the frame's begin packet and all its packets of content: of their
-    /// [`Code::share`](super::Code::share) if tagged, else of their scrambled checksums. It detects a mix of two frames
-    /// that happen to share session and epoch.
+    /// [`Code::contribution`](super::Code::contribution) if tagged, else of their scrambled checksums. It detects a mix
+    /// of two frames that happen to share session and epoch.
     pub digest: u32,
 }
 

@@ -43,7 +43,7 @@ pub(super) fn checksum(bytes: &[u8]) -> u32 {
     !remainder
 }
 
-/// An untagged packet's share of its frame's digest: its checksum through a bijection that breaks the checksum's
+/// An untagged packet's contribution to its frame's digest: its checksum through a bijection that breaks the checksum's
 /// linearity (the last step of `MurmurHash3`).
 #[inline]
 pub(super) const fn scrambled(checksum: u32) -> u32 {

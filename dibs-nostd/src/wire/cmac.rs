@@ -104,7 +104,7 @@ impl Mac for AesCmac {
         };
         let code = code(mac, &[&challenge.to_le_bytes(), &session.to_le_bytes(), packet]);
         let [t0, t1, t2, t3, t4, t5, h0, h1, h2, h3, ..] = code;
-        Code { tag: [t0, t1, t2, t3, t4, t5], share: u32::from_le_bytes([h0, h1, h2, h3]) }
+        Code { tag: [t0, t1, t2, t3, t4, t5], contribution: u32::from_le_bytes([h0, h1, h2, h3]) }
     }
 
     fn challenge(&self) -> u64 {

@@ -42,7 +42,7 @@ pub struct Code {
     pub tag: [u8; TAG_BYTES],
     /// A part that never travels: [`Commit::digest`](super::Commit::digest) sums it over the frame, so that only a
     /// holder of the key can tell which packets of two frames add up.
-    pub share: u32,
+    pub contribution: u32,
 }
 
 /// No authentication: a receiver believes everyone who can write to the bus.
@@ -53,7 +53,7 @@ impl Mac for NoMac {
     const TAGGED: bool = false;
 
     fn code(&self, _: Direction, _: u32, _: &[u8]) -> Code {
-        Code { tag: [0; TAG_BYTES], share: 0 }
+        Code { tag: [0; TAG_BYTES], contribution: 0 }
     }
 }
 

@@ -135,8 +135,8 @@ impl<'a> Packet<'a> {
         Ok(Self { mesh_id, session_low, epoch, sequence, checksum: stated, body, tag })
     }
 
-    /// The packet's share of its frame's digest, if the packet is genuine in this session: its tag is that of `mac`, or
-    /// it carries none and `mac` requires none. Compares in constant time.
+    /// The packet's contribution to its frame's digest, if the packet is genuine in this session: its tag is that of
+    /// `mac`, or it carries none and `mac` requires none. Compares in constant time.
     #[must_use]
     #[inline]
     pub fn verify<M: Mac>(&self, mac: &M, session: u32) -> Option<u32> {
@@ -150,7 +150,7 @@ impl<'a> Packet<'a> {
                 let code = mac.code(direction, session, signed);
                 let difference =
                     code.tag.iter().zip(tag).fold(0, |difference, (a, b)| difference | (a ^ b));
-                (difference == 0).then_some(code.share)
+                (difference == 0).then_some(code.contribution)
             }
             None if !M::TAGGED => Some(scrambled(self.checksum)),
             _ => None,

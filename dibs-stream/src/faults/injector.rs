@@ -236,7 +236,7 @@ impl Injector {
         }
         seal(&mut altered);
         if fault == Fault::Stretch {
-            let change = share(&altered).wrapping_sub(share(packet));
+            let change = contribution(&altered).wrapping_sub(contribution(packet));
             self.digest = self.digest.wrapping_add(change);
         }
         Some(altered)
@@ -263,7 +263,7 @@ fn seal(packet: &mut [u8]) {
     }
 }
 
-/// The share of an untagged packet in its frame's digest.
-fn share(packet: &[u8]) -> u32 {
+/// The contribution of an untagged packet to its frame's digest.
+fn contribution(packet: &[u8]) -> u32 {
     Packet::decode(packet).ok().and_then(|packet| packet.verify(&NoMac, 0)).unwrap_or(0)
 }

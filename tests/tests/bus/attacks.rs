@@ -184,7 +184,7 @@ fn a_frozen_source_grows_old() {
 }
 
 /// Two frames of one session and epoch, both with genuine tags, are mixed. The mixture is refused: the digest sums
-/// shares that nobody without the key can compute.
+/// contributions that nobody without the key can compute.
 #[test]
 fn two_frames_of_one_name_are_not_spliced() {
     let rows: [Vec<Vec3>; 2] = [surface(1), surface(500)];
@@ -201,13 +201,13 @@ fn two_frames_of_one_name_are_not_spliced() {
         assert!(matches!(outcome, Err(ReceiveError::Digest { .. })), "{outcome:?}");
         assert!(published(&mut reader).is_none());
     }
-    // The digest sums the shares, which are in no packet.
+    // The digest sums the contributions, which are in no packet.
     let code = |i: usize| mac().code(Direction::ToReceiver, 1, &a[i][..a[i].len() - 10]);
-    let sum = (0..last).fold(0_u32, |sum, i| sum.wrapping_add(code(i).share));
+    let sum = (0..last).fold(0_u32, |sum, i| sum.wrapping_add(code(i).contribution));
     assert_eq!(a[last][18..22], sum.to_le_bytes());
     for (i, packet) in a.iter().enumerate() {
         assert_eq!(packet[packet.len() - 10..packet.len() - 4], code(i).tag);
-        assert!(!packet.windows(4).any(|four| four == code(i).share.to_le_bytes()));
+        assert!(!packet.windows(4).any(|four| four == code(i).contribution.to_le_bytes()));
     }
 }
 
@@ -223,7 +223,11 @@ fn keys_differ_by_receiver_and_direction() {
         })
         .collect();
     for (i, one) in codes.iter().enumerate() {
-        assert!(codes[..i].iter().all(|other| other.tag != one.tag && other.share != one.share));
+        assert!(
+            codes[..i]
+                .iter()
+                .all(|other| other.tag != one.tag && other.contribution != one.contribution)
+        );
     }
 }
 

@@ -238,7 +238,7 @@ fn a_frame_without_its_last_rows_is_not_published() {
     let mut digest = 0_u32;
     for packet in short {
         give(&mut assembler, packet).unwrap();
-        digest = digest.wrapping_add(share(packet));
+        digest = digest.wrapping_add(contribution(packet));
     }
     let mut commit = edit(commit, 12, &(short.len() as u16).to_le_bytes());
     commit = edit(&commit, 18, &digest.to_le_bytes());

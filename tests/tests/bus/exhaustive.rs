@@ -122,13 +122,13 @@ fn no_row_that_was_not_sent_is_published() {
                 let buffers = Frames::<SMALL>::new();
                 let (mut assembler, mut reader) = receiver(&buffers);
                 assembler.accept(&begin, Millis(0)).unwrap();
-                let mut digest = share(&begin);
+                let mut digest = contribution(&begin);
                 let mut sent = [const { Vec::new() }; SMALL];
                 for place in 0..length {
                     let letter = case / (letters.len() as u32).pow(place) % letters.len() as u32;
                     let packet = &letters[letter as usize];
                     if assembler.accept(packet, Millis(0)) == Ok(dibs_nostd::Progress::Stored) {
-                        digest = digest.wrapping_add(share(packet));
+                        digest = digest.wrapping_add(contribution(packet));
                         for row in 0..usize::from(packet[14]) {
                             let at = 18 + 12 * row;
                             let x = f32::from_le_bytes(packet[at..at + 4].try_into().unwrap());

@@ -163,8 +163,8 @@ impl<T: VertexTable + ?Sized, M: Mac, const MTU: usize> FrameEncoder<'_, T, MTU,
         let first = match self.next {
             Next::Begin => {
                 let packet = begin_packet::<M>(buffer, &self.id, &self.begin);
-                let (packet, share) = packet.finish(&self.mac, self.id.session);
-                self.digest = share;
+                let (packet, contribution) = packet.finish(&self.mac, self.id.session);
+                self.digest = contribution;
                 self.next = self.vertices_from(0);
                 return Some(packet);
             }
@@ -201,8 +201,8 @@ impl<T: VertexTable + ?Sized, M: Mac, const MTU: usize> FrameEncoder<'_, T, MTU,
                 }
             }
         }
-        let (packet, share) = packet.finish(&self.mac, self.id.session);
-        self.digest = self.digest.wrapping_add(share);
+        let (packet, contribution) = packet.finish(&self.mac, self.id.session);
+        self.digest = self.digest.wrapping_add(contribution);
         self.next = self.vertices_from(end);
         Some(packet)
     }

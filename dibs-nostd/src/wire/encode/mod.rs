@@ -212,7 +212,7 @@ impl<'b, M: Mac> PacketWriter<'b, M> {
         }
     }
 
-    /// Adds padding, tag and checksum. Returns the packet, and its share of the frame's digest.
+    /// Adds padding, tag and checksum. Returns the packet, and its contribution to the frame's digest.
     fn finish(mut self, mac: &M, session: u32) -> (&'b [u8], u32) {
         let tag_bytes = if M::TAGGED { TAG_BYTES } else { 0 };
         let end = padded(self.bytes.used + tag_bytes + CHECKSUM_BYTES) - tag_bytes - CHECKSUM_BYTES;
@@ -225,8 +225,8 @@ impl<'b, M: Mac> PacketWriter<'b, M> {
         }
         let checksum = checksum(self.bytes.written());
         self.put(&checksum.to_le_bytes());
-        let share = code.map_or(scrambled(checksum), |code| code.share);
-        (self.bytes.into_written().unwrap_or_default(), share)
+        let contribution = code.map_or(scrambled(checksum), |code| code.contribution);
+        (self.bytes.into_written().unwrap_or_default(), contribution)
     }
 }
 

@@ -98,8 +98,8 @@ impl<M: Mac, const MTU: usize> WeightsEncoder<'_, MTU, M> {
                 freshness: self.freshness,
             };
             let packet = begin_packet::<M>(buffer, &self.id, &begin);
-            let (packet, share) = packet.finish(&self.mac, self.id.session);
-            self.digest = share;
+            let (packet, contribution) = packet.finish(&self.mac, self.id.session);
+            self.digest = contribution;
             self.sent = Some(0);
             return Some(packet);
         };
@@ -119,8 +119,8 @@ impl<M: Mac, const MTU: usize> WeightsEncoder<'_, MTU, M> {
         for weight in run {
             packet.put(&weight.to_le_bytes());
         }
-        let (packet, share) = packet.finish(&self.mac, self.id.session);
-        self.digest = self.digest.wrapping_add(share);
+        let (packet, contribution) = packet.finish(&self.mac, self.id.session);
+        self.digest = self.digest.wrapping_add(contribution);
         self.sent = Some(first + u32::from(count));
         Some(packet)
     }
