@@ -2,6 +2,7 @@
 //! its margin.
 
 use dibs_build::{Builder, BuiltTree, Mesh};
+use dibs_nostd::constraint::{ConstraintState, Proxy, SpringDamper};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
     Capsule, Contact, Contacts, NoSide, Odometer, Options, Query, Side, Tracker, TriangleRow,
@@ -132,4 +133,46 @@ fn a_part_keeps_its_margin_beside_a_tool_at_the_surface() {
     });
     println!("{undefined} below the accuracy, {near} beside the part");
     assert!(undefined > 300 && near > 300, "{undefined} {near}");
+}
+
+/// Walls of a plate as thin as coordinates are rounded have no clear normal at their rim: an axis that crosses there is
+/// held, though no contact has a direction.
+#[test]
+fn a_tool_without_a_direction_is_held() {
+    let plate =
+        |thickness: f32| cuboid(Vec3::new(-30.0, -20.0, 0.0), Vec3::new(30.0, 20.0, thickness));
+    let (positions, triangles) = plate(1.0);
+    let rest = Mesh { positions: positions.into(), triangles: triangles.into(), ..Mesh::default() };
+    let built = Builder::new().build(&rest).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let spring = SpringDamper::stiffness(1.0).max_force(50.0);
+    let proxy = Proxy::new(spring, MARGIN).expect("a valid margin");
+    let mut list = Contacts::<32>::new();
+    let (mut rng, mut without) = (Rng::with_seed(7), 0);
+    for _ in 0..if cfg!(debug_assertions) { 4_000 } else { 40_000 } {
+        let turn =
+            glam::Quat::from_rotation_y(6.0 * rng.f32()) * glam::Quat::from_rotation_x(rng.f32());
+        let (positions, _) = plate(1e-6 * rng.f32());
+        let rows = built.to_rows(&positions.map(|at| turn * at));
+        let [a, b] = [rng.usize(..8), rng.usize(..8)].map(|row| rows[row]);
+        let on = a.lerp(b, rng.f32());
+        let along = unit(&mut rng) * 4.0;
+        let tool = Capsule::new(on - along * rng.f32(), on + along, 0.5).expect("a valid tool");
+        let found = query.contacts(rows.as_slice(), &tool, MARGIN, &Options::cold(), &mut list);
+        let found = found.expect("an answer");
+        if !matches!(found.side, Side::Crossing | Side::Inside) {
+            continue;
+        }
+        without += usize::from(found.direction == Vec3::ZERO);
+        let force = |list: &Contacts<32>| {
+            let accuracy = list.accuracy();
+            proxy.wrench(list.within(MARGIN), accuracy, on, Vec3::ZERO, Vec3::ZERO).state
+        };
+        assert_ne!(force(&list), ConstraintState::Inactive, "{found:?}");
+        list.settle(&found);
+        assert_ne!(force(&list), ConstraintState::Inactive, "{found:?}");
+    }
+    println!("{without} without a direction");
+    assert!(without > 3, "{without}");
 }

@@ -242,14 +242,15 @@ pub(super) fn contact(at: &Proximity) -> Option<Contact> {
     })
 }
 
-/// Whether a pair has no side, though one was asked for. The list's bound says so itself where the budget ended.
+/// Whether the tool may be inside where no contact says so: the pair has no side, though one was asked for, or no direction
+/// out. The list's bound says so itself where the budget ended.
 fn may_be_inside(closest: &Proximity) -> bool {
-    let has_none = match closest.side {
-        Side::Undefined(NoSide::NotAsked | NoSide::NoAdjacency | NoSide::CutShort) => false,
-        Side::Undefined(_) => true,
-        _ => false,
-    };
-    has_none && !closest.is_at_surface()
+    match closest.side {
+        Side::Undefined(NoSide::NotAsked | NoSide::NoAdjacency | NoSide::CutShort)
+        | Side::Outside => false,
+        Side::Undefined(_) if !closest.is_at_surface() => true,
+        _ => contact(closest).is_none(),
+    }
 }
 
 /// A triangle at this pair. Within some accuracies its direction is none.

@@ -195,11 +195,13 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
 
     /// Gives a list whose tool may be inside, because the closest pair has no side, that of `closest`: a pair whose side
     /// is certain from the tool's past, as [`LastSide`](crate::constraint::LastSide) makes it. That pair is a contact
-    /// then, and the only one unless the tool is outside. Other lists stay as they are.
+    /// then, and the only one unless the tool is outside. Other lists stay as they are, and so does one whose `closest` has
+    /// no direction.
     pub fn settle(&mut self, closest: &Proximity) {
         if !self.found.has_no_side || matches!(closest.side, Side::Undefined(_)) {
             return;
         }
+        let Some(contact) = add::contact(closest) else { return };
         self.found.has_no_side = false;
         if closest.side != Side::Outside {
             self.found.count = 0;
@@ -207,8 +209,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         if closest.accuracy > self.found.accuracy {
             self.found.accuracy = closest.accuracy;
         }
-        if let Some(contact) = add::contact(closest).filter(|at| at.separation <= self.found.margin)
-        {
+        if contact.separation <= self.found.margin {
             self.found.insert(contact);
         }
     }
