@@ -8,7 +8,7 @@ use crate::construct::{Cluster, Construction, Constructor, Surface, widen};
 use crate::error::BuildError;
 use crate::geodesic::{Graph, Topology};
 use crate::mesh::{Mesh, RestSurface};
-use crate::rest::{Paths, SHARED, Shares, has_area, least_limits};
+use crate::rest::{LimitRatios, Paths, SHARED, has_area, least_limits};
 use crate::rounding::round_up;
 
 /// Width of the vertex indices in the tree.
@@ -226,27 +226,27 @@ impl<'p> Builder<'p> {
             Construction::Paper => Paths::Edges,
             _ => Paths::default(),
         });
-        let (stretch, shares) = match &self.limits {
+        let (stretch, ratios) = match &self.limits {
             Some(limits) => {
                 let least = least_limits(mesh, paths.kind()).map(round_up);
                 let limits: Vec<f32> =
                     limits.iter().zip(least).map(|(&l, least)| l.max(least)).collect();
-                Shares::of(&limits)
+                LimitRatios::of(&limits)
             }
-            None => (self.stretch, Shares::default()),
+            None => (self.stretch, LimitRatios::default()),
         };
         // Beyond this no rest shape needs more.
-        let stretch = if shares.is_uniform() && stretch < 1.02 {
+        let stretch = if ratios.is_uniform() && stretch < 1.02 {
             let least = least_limits(mesh, paths.kind()).fold(1.0, f64::max) * SHARED;
             stretch.max(round_up(least))
         } else {
             stretch
         };
-        let roots = self.construct(mesh, paths, &shares)?;
+        let roots = self.construct(mesh, paths, &ratios)?;
         let facts = Facts {
             paths: paths.kind(),
             stretch,
-            shares: &shares,
+            ratios: &ratios,
             position_error: surface.position_error(),
             unit: self.unit.or(surface.unit()),
             file_triangles: surface.file_triangles(),
@@ -264,14 +264,14 @@ impl<'p> Builder<'p> {
         &self,
         mesh: &Mesh,
         paths: Paths,
-        shares: &Shares,
+        ratios: &LimitRatios,
     ) -> Result<Vec<Cluster>, BuildError> {
         let leaf_triangles = self.leaf_triangles.unwrap_or(match self.construction {
             Construction::Paper => 1,
             _ => DEFAULT_LEAF,
         });
         let topology = Topology::new(mesh);
-        let graph = Graph::new(mesh, &topology, paths, shares);
+        let graph = Graph::new(mesh, &topology, paths, ratios);
         let restricted = self.construction == Construction::Paper;
         let surface = Surface { mesh, graph: &graph, restricted };
         let constructor =

@@ -14,7 +14,7 @@ use crate::Mesh;
 use crate::construct::{Cluster, Content};
 use crate::error::BuildError;
 use crate::leaf::{self, StoredTriangle};
-use crate::rest::Shares;
+use crate::rest::LimitRatios;
 
 /// A tree in the order of its array.
 #[derive(Debug)]
@@ -77,7 +77,7 @@ impl Flat {
 pub(crate) struct Facts<'a> {
     pub paths: PathKind,
     pub stretch: f32,
-    pub shares: &'a Shares,
+    pub ratios: &'a LimitRatios,
     pub position_error: f32,
     pub unit: Option<Unit>,
     pub file_triangles: usize,
@@ -141,8 +141,8 @@ pub(crate) fn flatten<I: Index>(
     if facts.with_metric {
         sections.push((section::METRIC, metrics(mesh, &flat.triangles, facts)));
     }
-    if !facts.shares.is_uniform() {
-        let codes = flat.triangles.iter().map(|placed| facts.shares.code(placed.triangle));
+    if !facts.ratios.is_uniform() {
+        let codes = flat.triangles.iter().map(|placed| facts.ratios.code(placed.triangle));
         sections.push((section::LIMITS, codes.flat_map(u16::to_le_bytes).collect()));
     }
     if facts.with_adjacency
@@ -201,15 +201,15 @@ fn vertex_order(mesh: &Mesh, triangles: &[StoredTriangle]) -> Vec<u32> {
 fn metrics(mesh: &Mesh, triangles: &[StoredTriangle], facts: Facts<'_>) -> Vec<u8> {
     let of = |placed: StoredTriangle| {
         let corners = mesh.corners(placed.centre_first());
-        let share = facts.shares.share(placed.triangle);
-        metric(corners, placed.is_reversed, share, f64::from(facts.stretch), facts.paths)
+        let ratio = facts.ratios.ratio(placed.triangle);
+        metric(corners, placed.is_reversed, ratio, f64::from(facts.stretch), facts.paths)
     };
     let mut rows: Vec<[f32; 3]> = Vec::with_capacity(triangles.len());
     let mut before: Option<StoredTriangle> = None;
     for &placed in triangles {
         let (mut placed, mut row) = (placed, of(placed));
         let join = placed.join(before).filter(|&join| match rows.last_mut() {
-            Some(before) if join != Join::Start => share_edge(before, &mut row, join, facts.shares),
+            Some(before) if join != Join::Start => share_edge(before, &mut row, join, facts.ratios),
             _ => false,
         });
         match join {
@@ -229,12 +229,12 @@ fn metrics(mesh: &Mesh, triangles: &[StoredTriangle], facts: Facts<'_>) -> Vec<u
 
 /// Whether a triangle can join the previous one. The shared edge takes the lower of its two roundings, which is safe
 /// for both. If that makes the stretch of a nearly flat triangle too large, the join is refused.
-fn share_edge(before: &mut [f32; 3], row: &mut [f32; 3], join: Join, shares: &Shares) -> bool {
+fn share_edge(before: &mut [f32; 3], row: &mut [f32; 3], join: Join, ratios: &LimitRatios) -> bool {
     if row[0] == 0.0 || before[2] == 0.0 {
         return false;
     }
     let marked = |edge: f32| if join == Join::Flip { with_lowest_bit(edge, true) } else { edge };
-    if !shares.is_uniform() {
+    if !ratios.is_uniform() {
         row[0] = marked(row[0]);
         return true;
     }

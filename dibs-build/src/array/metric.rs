@@ -21,12 +21,12 @@ const LARGEST_SQUARED: f64 = 1e18;
 /// The metric of one triangle with these corners at rest, the centre first. The lowest bit of its second number is
 /// `is_reversed`.
 ///
-/// `share` is its stretch limit as a part of the tree's, which is `stretch`. Roundings are downwards, so the metric is
+/// `ratio` is its stretch limit as a part of the tree's, which is `stretch`. Roundings are downwards, so the metric is
 /// never too large. It is zeros, which no triangle passes, if f32 arithmetic cannot measure the triangle.
 pub(crate) fn metric(
     corners: [Vec3; 3],
     is_reversed: bool,
-    share: f64,
+    ratio: f64,
     stretch: f64,
     paths: PathKind,
 ) -> [f32; 3] {
@@ -37,15 +37,15 @@ pub(crate) fn metric(
     if !edges.iter().all(|squared| possible.contains(squared)) {
         return [0.0; 3];
     }
-    let share = share * share;
+    let ratio = ratio * ratio;
     match paths {
         PathKind::EdgePath => {
             let [first, between, second] =
-                edges.map(|squared| round_down(squared * share / (1.0 + EDGE_ROUNDING * U)));
+                edges.map(|squared| round_down(squared * ratio / (1.0 + EDGE_ROUNDING * U)));
             [first, with_lowest_bit(between, is_reversed), second]
         }
         _ => {
-            let scale = share / (1.0 + SURFACE_ROUNDING * U / openness(e1, e2));
+            let scale = ratio / (1.0 + SURFACE_ROUNDING * U / openness(e1, e2));
             let [first, _, second] = edges.map(|squared| round_down(squared * scale));
             [first, near(e1.dot(e2) * scale, is_reversed), second]
         }

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::{Construction, Constructor, Surface};
 use crate::error::BuildError;
 use crate::geodesic::{Graph, Topology};
-use crate::rest::{Paths, Shares};
+use crate::rest::{LimitRatios, Paths};
 use crate::{Mesh, generate};
 
 /// Arcs seen for each triangle, by searches and in the graph; and whether the mesh was refused for them.
@@ -13,7 +13,7 @@ fn work(mesh: &Mesh, construction: Construction) -> (usize, bool) {
     let topology = Topology::new(mesh);
     let is_paper = construction == Construction::Paper;
     let (paths, leaf) = if is_paper { (Paths::Edges, 1) } else { (Paths::default(), 8) };
-    let graph = Graph::new(mesh, &topology, paths, &Shares::default());
+    let graph = Graph::new(mesh, &topology, paths, &LimitRatios::default());
     let arcs: usize = (0..mesh.positions.len() as u32).map(|vertex| graph.arcs(vertex).len()).sum();
     let surface = Surface { mesh, graph: &graph, restricted: is_paper };
     let constructor = Constructor::new(surface, construction, leaf, &|_| ());

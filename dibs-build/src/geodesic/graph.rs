@@ -3,7 +3,7 @@
 //! Its arcs are the mesh's edges and, for [`Paths::Surface`], *chords*: straight lines across a strip of triangles that
 //! is unfolded into a plane. Both are paths on the surface, so no distance is under-estimated.
 //!
-//! If triangles have their own stretch limits, lengths are weighted by each limit's share of the largest, so a path
+//! If triangles have their own stretch limits, lengths are weighted by the ratio of each limit to the largest, so a path
 //! grows to at most the largest limit times its weighted length. An edge stretches no more than any of its triangles,
 //! so its weighted length is the least in any of them; a chord's is the sum of its parts in each triangle. Lengths are
 //! those of the triangles' [rest shapes](RestShape), which the stretch check measures too; no chord crosses a flat
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::Topology;
 use crate::Mesh;
-use crate::rest::{Paths, RestShape, Shares};
+use crate::rest::{LimitRatios, Paths, RestShape};
 use crate::rounding::round_up;
 
 /// Arcs from each vertex, in compressed rows. Lengths are weighted, at rest, and rounded up.
@@ -31,7 +31,7 @@ pub(crate) struct Arc {
 }
 
 impl Graph {
-    pub fn new(mesh: &Mesh, topology: &Topology, paths: Paths, shares: &Shares) -> Self {
+    pub fn new(mesh: &Mesh, topology: &Topology, paths: Paths, ratios: &LimitRatios) -> Self {
         let is_flat =
             |&corners: &[u32; 3]| RestShape::new(mesh.corners(corners), paths.kind()).is_flat;
         let flat: Vec<bool> = mesh.triangles.par_iter().map(is_flat).collect();
@@ -41,7 +41,7 @@ impl Graph {
             .map_init(Vec::new, |found, vertex| {
                 found.clear();
                 let crossed = Vec::new();
-                Unfolding { mesh, topology, paths, shares, flat, source: vertex, crossed, found }
+                Unfolding { mesh, topology, paths, ratios, flat, source: vertex, crossed, found }
                     .run();
                 found.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
                 found.dedup_by_key(|&mut (to, _)| to);
@@ -86,11 +86,11 @@ struct Unfolding<'a> {
     mesh: &'a Mesh,
     topology: &'a Topology,
     paths: Paths,
-    shares: &'a Shares,
+    ratios: &'a LimitRatios,
     /// Whether each triangle's rest shape does not fit its neighbours'.
     flat: &'a [bool],
     source: u32,
-    /// The edges between the source and the last unfolded triangle, each with the share of the triangle before it.
+    /// The edges between the source and the last unfolded triangle, each with the ratio of the triangle before it.
     crossed: Vec<([DVec2; 2], f64)>,
     found: &'a mut Vec<(u32, f64)>,
 }
@@ -109,12 +109,12 @@ impl Unfolding<'_> {
         let topology = self.topology;
         for &triangle in topology.triangles_at(self.source) {
             let [a, b] = topology.others(self.mesh, triangle, self.source);
-            let share = self.shares.share(triangle);
+            let ratio = self.ratios.ratio(triangle);
             let corners = self.mesh.corners([self.source, a, b]);
             let shape = RestShape::new(corners, self.paths.kind());
             let [source, at_a, at_b] = shape.corners;
             let (to_a, to_b) = (at_a - source, at_b - source);
-            self.found.extend([(a, to_a.length() * share), (b, to_b.length() * share)]);
+            self.found.extend([(a, to_a.length() * ratio), (b, to_b.length() * ratio)]);
             let Paths::Surface { crossings } = self.paths else { continue };
             if shape.is_flat {
                 continue;
@@ -130,24 +130,24 @@ impl Unfolding<'_> {
     /// The weighted length of the chord to `end`, a corner of `last`.
     fn chord(&self, end: DVec2, last: u32) -> f64 {
         let length = end.length();
-        if self.shares.is_uniform() {
+        if self.ratios.is_uniform() {
             return length;
         }
-        let last = self.shares.share(last);
-        let mut share = last;
+        let last = self.ratios.ratio(last);
+        let mut ratio = last;
         // From the end to the source, as parts of the chord.
         let (mut weighted, mut from) = (0.0, 1.0);
         for &([a, b], before) in self.crossed.iter().rev() {
             let across = end.perp_dot(b - a);
             if across.abs() <= GRAZING * length * (b - a).length() {
-                // The crossing point is uncertain, so count all of the chord at the largest share.
-                return length * self.crossed.iter().map(|&(_, share)| share).fold(last, f64::max);
+                // The crossing point is uncertain, so count all of the chord at the largest ratio.
+                return length * self.crossed.iter().map(|&(_, ratio)| ratio).fold(last, f64::max);
             }
             let at = (a.perp_dot(b - a) / across).clamp(0.0, from);
-            weighted += share * (from - at);
-            (share, from) = (before, at);
+            weighted += ratio * (from - at);
+            (ratio, from) = (before, at);
         }
-        length * (weighted + share * from + CROSSING)
+        length * (weighted + ratio * from + CROSSING)
     }
 
     fn edge(&self, from: u32, to: u32) -> DVec3 {
@@ -162,7 +162,7 @@ impl Unfolding<'_> {
         }
         let [(a, at_a), (b, at_b)] = window.edge;
         let topology = self.topology;
-        self.crossed.push(([at_a, at_b], self.shares.share(window.triangle)));
+        self.crossed.push(([at_a, at_b], self.ratios.ratio(window.triangle)));
         let next = topology.across(self.mesh, window.triangle, a, b);
         if let Some(next) = next.filter(|&next| !self.flat[next as usize]) {
             let apex = topology.apex(self.mesh, next, a, b);

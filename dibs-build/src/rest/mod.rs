@@ -3,10 +3,10 @@
 
 mod floor;
 mod paths;
+mod ratios;
 mod shape;
-mod shares;
 
 pub(crate) use floor::{SHARED, least_limits, openness};
 pub use paths::Paths;
+pub(crate) use ratios::LimitRatios;
 pub(crate) use shape::{RestShape, has_area};
-pub(crate) use shares::Shares;

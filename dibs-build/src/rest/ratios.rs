@@ -5,12 +5,12 @@ use dibs_nostd::format::MAX_LIMIT_CODE;
 /// Each triangle's limit as a part of the largest, rounded up to a 16-bit code. The whole build uses these codes, so
 /// that the controller enforces the limits that the radii are made for.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Shares {
+pub(crate) struct LimitRatios {
     /// One for each triangle; empty if all have the same limit.
     codes: Vec<u16>,
 }
 
-impl Shares {
+impl LimitRatios {
     /// The largest of these limits, which becomes the tree's, and each triangle's part of it.
     pub fn of(limits: &[f32]) -> (f32, Self) {
         let largest = limits.iter().copied().fold(1.0, f32::max);
@@ -35,7 +35,7 @@ impl Shares {
     }
 
     /// The same as a number, at most 1.
-    pub fn share(&self, triangle: u32) -> f64 {
+    pub fn ratio(&self, triangle: u32) -> f64 {
         f64::from(self.code(triangle)) / f64::from(MAX_LIMIT_CODE)
     }
 }
