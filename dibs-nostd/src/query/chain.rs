@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::contacts::Pair;
 use super::passed::{self, Passed};
-use super::search::{Search, WITHIN};
+use super::search::WITHIN;
 use super::{Contacts, NoSide, Options, Proximity, Query, Side};
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, TriangleRow, VertexTable};
@@ -56,9 +56,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         let first =
             first.filter(|(_, corner)| !(tool.axis_distance_squared(*corner) > limit * limit));
         let first = first.map(|(first, _)| first);
-        let ties = Some(&mut self.ties);
-        let mut search =
-            Search::start(&self.tree, &mut self.stack, vertices, tool, options, first, ties)?;
+        let mut search = self.search(vertices, tool, options, first)?;
         let limit = search.limit_to(separation);
         let found = search.run::<WITHIN>(limit)?;
         // A search that its budget ended has a lower bound below the limit.

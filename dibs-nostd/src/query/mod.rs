@@ -32,6 +32,7 @@ pub use side::{NoSide, Side};
 pub use swept::{Sweep, SweepAnswer};
 pub use tracker::{Fallback, Tracker, TrackerAnswer};
 
+use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
 #[cfg(feature = "wide")]
@@ -97,10 +98,7 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         options: &Options,
     ) -> Result<Proximity, QueryError> {
         let first = options.first(self.triangle);
-        let ties = Some(&mut self.ties);
-        let search =
-            Search::start(&self.tree, &mut self.stack, vertices, tool, options, first, ties)?;
-        let found = search.run::<WHOLE>(f32::INFINITY)?;
+        let found = self.search(vertices, tool, options, first)?.run::<WHOLE>(f32::INFINITY)?;
         self.sided(vertices, tool, options, found)
     }
 
@@ -121,15 +119,25 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         options: &Options,
     ) -> Result<Proximity, QueryError> {
         let first = options.first(self.triangle);
-        let ties = Some(&mut self.ties);
-        let search =
-            Search::start(&self.tree, &mut self.stack, vertices, tool, options, first, ties)?;
-        let found = WideSearch::new(search).run()?;
+        let found = WideSearch::new(self.search(vertices, tool, options, first)?).run()?;
         self.sided(vertices, tool, options, found)
     }
 }
 
-impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
+impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
+    /// The search of the closest pair.
+    #[inline(always)]
+    fn search<'s, V: VertexTable + ?Sized, T: Tool>(
+        &'s mut self,
+        vertices: &'s V,
+        tool: &'s T,
+        options: &Options,
+        first: Option<TriangleRow>,
+    ) -> Result<Search<'s, 't, I, V, T>, QueryError> {
+        let (roots, ties) = (RootSet::ALL, Some(&mut self.ties));
+        Search::start(roots, &self.tree, &mut self.stack, vertices, tool, options, first, ties)
+    }
+
     /// The answer with the side, for a search's closest pair.
     #[inline(always)]
     fn sided<V: VertexTable + ?Sized, T: Tool>(

@@ -50,6 +50,31 @@ pub(super) trait Precision:
     fn root(self) -> Self;
 }
 
+/// The operations that have the same names for both.
+macro_rules! operations {
+    () => {
+        fn cross(one: Self::Vector, other: Self::Vector) -> Self::Vector {
+            one.cross(other)
+        }
+
+        fn dot(one: Self::Vector, other: Self::Vector) -> Self {
+            one.dot(other)
+        }
+
+        fn size(vector: Self::Vector) -> Self {
+            vector.abs().element_sum()
+        }
+
+        fn absolute(self) -> Self {
+            self.abs()
+        }
+
+        fn is_not_a_number(self) -> bool {
+            self.is_nan()
+        }
+    };
+}
+
 impl Precision for f32 {
     type Vector = Vec3;
     const ROUNDING: Self = 5e-7;
@@ -65,25 +90,7 @@ impl Precision for f32 {
         vector
     }
 
-    fn cross(one: Vec3, other: Vec3) -> Vec3 {
-        one.cross(other)
-    }
-
-    fn dot(one: Vec3, other: Vec3) -> Self {
-        one.dot(other)
-    }
-
-    fn size(vector: Vec3) -> Self {
-        vector.abs().element_sum()
-    }
-
-    fn absolute(self) -> Self {
-        self.abs()
-    }
-
-    fn is_not_a_number(self) -> bool {
-        self.is_nan()
-    }
+    operations!();
 
     fn root(self) -> Self {
         sqrt(self)
@@ -106,25 +113,7 @@ impl Precision for f64 {
         vector.as_dvec3()
     }
 
-    fn cross(one: DVec3, other: DVec3) -> DVec3 {
-        one.cross(other)
-    }
-
-    fn dot(one: DVec3, other: DVec3) -> Self {
-        one.dot(other)
-    }
-
-    fn size(vector: DVec3) -> Self {
-        vector.abs().element_sum()
-    }
-
-    fn absolute(self) -> Self {
-        self.abs()
-    }
-
-    fn is_not_a_number(self) -> bool {
-        self.is_nan()
-    }
+    operations!();
 
     fn root(self) -> Self {
         Self::from(sqrt(self as f32))

@@ -1,10 +1,13 @@
-//! One search: the tests of nodes, leaves and triangles, and the best pair so far.
+//! One search: its start, its loop, and the best pair so far.
 
 mod finish;
 mod heights;
+mod leaf;
 mod leaves;
 mod low;
+mod meter;
 mod near;
+mod node;
 mod range;
 mod roots;
 mod slack;
@@ -13,18 +16,17 @@ mod ties;
 #[cfg(feature = "wide")]
 mod wide;
 
-use glam::Vec3;
-
 pub(super) use tick::{Outcome, Tick};
 pub(super) use ties::Ties;
 #[cfg(feature = "wide")]
 pub(super) use wide::WideSearch;
 
+use meter::Meter;
+use node::CLOSEST;
 use roots::Roots;
 use slack::{COORDINATES, FLOOR, SLACK, TILT};
 
-use super::plane::Plane;
-use super::{Budget, Options};
+use super::Options;
 use crate::math::sqrt::sqrt;
 use crate::tool::{AxisPair, Tool};
 use crate::tree::RootSet;
@@ -40,9 +42,6 @@ pub(super) struct Waiting {
     /// Link of its node.
     pub link: u32,
 }
-
-/// Weight of each corner in the mean that a triangle's plane faces.
-const THIRD: f32 = 1.0 / 3.0;
 
 /// A search with its limit at infinity.
 pub(super) const WHOLE: u8 = 0;
@@ -75,7 +74,7 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     tool: &'s T,
     stack: &'s mut [Waiting],
     waiting: usize,
-    budget: Budget,
+    meter: Meter,
     /// Turns a radius code into the sphere's radius under the stretch in use.
     radius_scale: f32,
     scale: f32,
@@ -91,8 +90,6 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     best: Option<AxisPair>,
     best_squared: f32,
     best_triangle: u32,
-    /// The rest of the budget.
-    left: Budget,
     /// A triangle no farther from the axis is collected. Not a number if nobody asks.
     tie_squared: f32,
     /// The triangles that may be the closest, once the search has ended.
@@ -100,25 +97,11 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T> {
-    /// A search that tests the triangle `first` before anything else. If the side is asked for, `ties` will have
-    /// the triangles that may be the closest, once the search has ended.
-    #[inline(always)]
-    pub fn start(
-        tree: &'s Tree<'t, I>,
-        stack: &'s mut [Waiting],
-        vertices: &'s V,
-        tool: &'s T,
-        options: &Options,
-        first: Option<TriangleRow>,
-        ties: Option<&'s mut Ties>,
-    ) -> Result<Self, QueryError> {
-        Self::start_in(RootSet::ALL, tree, stack, vertices, tool, options, first, ties)
-    }
-
-    /// A search below some roots; the triangle `first` must be below one of them.
+    /// A search below some roots that tests the triangle `first`, which must be below one of them, before anything else.
+    /// If the side is asked for, `ties` will have the triangles that may be the closest, once the search has ended.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
-    pub fn start_in(
+    pub fn start(
         roots: RootSet,
         tree: &'s Tree<'t, I>,
         stack: &'s mut [Waiting],
@@ -175,7 +158,6 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         // The closest pair in a sound tree takes one test of each node's sphere, two of each leaf's plane and one of each
         // triangle. If corrupt bytes form a loop, this bound ends the search. Other kinds have bounds of their own.
         let most = header.nodes.saturating_mul(3).saturating_add(header.triangles);
-        let budget = options.budget.nodes_at_most(most);
         ties = ties.filter(|_| options.is_signed && tree.has_adjacency());
         if let Some(ties) = &mut ties {
             ties.reset(scale, tree.is_closed() && tool.axis_length() > 0.0);
@@ -186,8 +168,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             tool,
             stack,
             waiting: all.waiting,
-            budget,
-            left: budget,
+            meter: Meter::new(options.budget.nodes_at_most(most)),
             radius_scale,
             scale,
             slack: SLACK * scale + FLOOR,
@@ -205,9 +186,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         search.lower_cutoff_to_pin(all.nearest.row, all.nearest.distance);
         if let Some(TriangleRow(triangle)) = first
             && triangle < header.triangles
-            && let Some(left) = search.left.triangle_tests.checked_sub(1)
+            && search.meter.triangle().is_some()
         {
-            search.left.triangle_tests = left;
             let corners = search.corners(triangle)?;
             search.test_triangle(triangle, &corners);
         }
@@ -221,10 +201,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     /// Each kind is a function with one caller, into which it is inlined: this keeps the plain query's loop in
     /// registers.
     pub fn run<const KIND: u8>(mut self, limit: f32) -> Result<Proximity, QueryError> {
-        while let Some(top) = self.waiting.checked_sub(1) {
-            self.waiting = top;
-            let &Waiting { lower, link } =
-                self.stack.get(top).ok_or(QueryError::Corrupt { row: top as u32 })?;
+        while let Some(Waiting { lower, link }) = self.pop() {
             if lower > self.cutoff {
                 continue;
             }
@@ -232,7 +209,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
                 return self.finish(0.0);
             }
             let step = match Link::decode(link) {
-                Link::Children { first, count } => self.expand(lower, first, count)?,
+                Link::Children { first, count } => match self.meter.nodes(count) {
+                    Some(()) => {
+                        self.expand::<CLOSEST>(lower, first, count, 0.0)?;
+                        Step::Done
+                    }
+                    None => Step::OutOfBudget,
+                },
                 Link::Leaf { first, count } => self.leaf(first, count)?,
             };
             if matches!(step, Step::OutOfBudget) {
@@ -263,16 +246,6 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         self.best.is_none_or(|pair| pair.distance_squared > limit * limit)
     }
 
-    /// The least lower bound of the waiting subtrees and of one that was not finished.
-    #[inline(always)]
-    fn least_waiting(&self, lower: f32) -> f32 {
-        let waiting = self.stack.iter().take(self.waiting).map(|left| left.lower);
-        // The distance of a pin that is not a number gives no bound.
-        let known = |lower: f32| if lower.is_nan() { 0.0 } else { lower };
-        let least = |least, lower| if known(lower) < least { known(lower) } else { least };
-        waiting.fold(known(lower), least)
-    }
-
     /// Lowers the cutoff to a pin's distance: a pin is a point of the surface.
     #[inline(always)]
     fn lower_cutoff_to_pin(&mut self, row: u32, distance: f32) {
@@ -291,184 +264,10 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         }
     }
 
-    /// Inserts a subtree into the part of the stack from `base` on, nearest on top; `None` if the stack is full.
-    #[inline(always)]
-    fn push(&mut self, base: usize, subtree: Waiting) -> Option<()> {
-        let mut at = self.waiting;
-        while at > base
-            && let Some(&below) = self.stack.get(at - 1)
-            && below.lower < subtree.lower
-        {
-            *self.stack.get_mut(at)? = below;
-            at -= 1;
-        }
-        *self.stack.get_mut(at)? = subtree;
-        self.waiting += 1;
-        Some(())
-    }
-
-    /// Tests the spheres of a node's children, and the planes of those that are leaves; pushes the rest. Each child's
-    /// bound is at least its parent's, so the certified bound never falls.
-    #[inline(always)]
-    fn expand(&mut self, parent: f32, first: u32, count: u32) -> Result<Step, QueryError> {
-        let corrupt = QueryError::Corrupt { row: first };
-        let Some(left) = self.left.node_tests.checked_sub(count) else {
-            return Ok(Step::OutOfBudget);
-        };
-        self.left.node_tests = left;
-        let base = self.waiting;
-        let tree = self.tree;
-        for node in tree.records(first, count).ok_or(corrupt)? {
-            let position = self.position(node.pin)?;
-            let radius = node.radius_code as f32 * self.radius_scale;
-            let normal = self.tool.axis_to(position);
-            let squared = normal.dot(normal);
-            let far = self.cutoff + radius;
-            // A NaN counts as near: the leaves below name the vertex that it comes from.
-            if squared > far * far {
-                continue;
-            }
-            let distance = sqrt(squared);
-            self.lower_cutoff_to_pin(node.pin, distance);
-            // The plane test needs the vector to the leaf's pin, which is at hand here.
-            if let Link::Leaf { first, count } = Link::decode(node.link)
-                && let Some(left) = self.left.node_tests.checked_sub(1)
-            {
-                self.left.node_tests = left;
-                let plane = self.plane_across(normal, position, distance);
-                let beyond = plane.beyond(tree, self.vertices, first, count).ok_or(corrupt)?;
-                if beyond == count {
-                    continue;
-                }
-            }
-            let own = distance - radius;
-            let lower = if own > parent { own } else { parent };
-            self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;
-        }
-        Ok(Step::Done)
-    }
-
-    /// Tests a leaf that no waiting subtree is nearer than: its vertices against one plane; then each triangle, from
-    /// the first that the plane does not reject, against the same plane and a plane of its own.
-    #[inline(always)]
-    fn leaf(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
-        let Some(left) = self.left.node_tests.checked_sub(1) else {
-            return Ok(Step::OutOfBudget);
-        };
-        self.left.node_tests = left;
-        let corrupt = QueryError::Corrupt { row: first };
-        let [corner, ..] = self.tree.triangle(first).ok_or(corrupt)?;
-        let position = self.position(corner)?;
-        let normal = self.tool.axis_to(position);
-        let length = sqrt(normal.dot(normal));
-        let patch_plane = self.plane_across(normal, position, length);
-        let beyond = patch_plane.beyond(self.tree, self.vertices, first, count).ok_or(corrupt)?;
-        if beyond == count {
-            return Ok(Step::Done);
-        }
-        let tree = self.tree;
-        let (first, count) = (first + beyond, count - beyond);
-        let triangles = tree.triangles(first, count).ok_or(corrupt)?;
-        for (triangle, corners) in (first..).zip(triangles) {
-            if triangle == self.best_triangle {
-                continue;
-            }
-            let (Some(left), Some(triangles_left)) =
-                (self.left.node_tests.checked_sub(1), self.left.triangle_tests.checked_sub(1))
-            else {
-                return Ok(Step::OutOfBudget);
-            };
-            self.left.node_tests = left;
-            let [a, b, c] = corners;
-            let [a, b, c] = [self.position(a)?, self.position(b)?, self.position(c)?];
-            if patch_plane.has_beyond(a) && patch_plane.has_beyond(b) && patch_plane.has_beyond(c) {
-                continue;
-            }
-            let plane = self.plane_towards((a + b + c) * THIRD);
-            if plane.has_beyond(a) && plane.has_beyond(b) && plane.has_beyond(c) {
-                continue;
-            }
-            // A corner that is not finite makes the limit NaN.
-            if plane.limit.is_nan() {
-                return Err(QueryError::Position { vertex: self.not_finite(triangle) });
-            }
-            self.left.triangle_tests = triangles_left;
-            self.test_triangle(triangle, &[a, b, c]);
-        }
-        Ok(Step::Done)
-    }
-
-    #[inline(always)]
-    fn plane_towards(&self, point: Vec3) -> Plane {
-        let normal = self.tool.axis_to(point);
-        self.plane_across(normal, point, sqrt(normal.dot(normal)))
-    }
-
-    /// The plane perpendicular to the shortest vector from the axis to a point, of this length.
-    #[inline(always)]
-    fn plane_across(&self, normal: Vec3, point: Vec3, length: f32) -> Plane {
-        let on_axis = point - normal;
-        let beyond = (self.cutoff + self.coordinate_slack) * length;
-        Plane { normal, limit: normal.dot(on_axis) + beyond + self.tilt_slack }
-    }
-
-    #[inline(always)]
-    fn position(&self, row: u32) -> Result<Vec3, QueryError> {
-        self.vertices.position(row).ok_or(QueryError::Corrupt { row })
-    }
-
-    #[inline(always)]
-    fn corners(&self, triangle: u32) -> Result<[Vec3; 3], QueryError> {
-        let rows = self.tree.triangle(triangle).ok_or(QueryError::Corrupt { row: triangle })?;
-        let [a, b, c] = rows;
-        Ok([self.position(a)?, self.position(b)?, self.position(c)?])
-    }
-
-    /// The exact test; the caller has counted it.
-    #[inline(always)]
-    fn test_triangle(&mut self, triangle: u32, corners: &[Vec3; 3]) {
-        if let Some(pair) = self.tool.closest_on_triangle(corners, self.cutoff_squared) {
-            if pair.distance_squared < self.best_squared {
-                self.improve(triangle, pair, sqrt(pair.distance_squared));
-            }
-            self.add_tie(triangle, pair.distance_squared);
-        }
-    }
-
-    /// A triangle is the closest so far.
-    #[inline(always)]
-    fn improve(&mut self, triangle: u32, pair: AxisPair, distance: f32) {
-        self.best_squared = pair.distance_squared;
-        self.best_triangle = triangle;
-        self.best = Some(pair);
-        self.lower_cutoff(distance);
-        if self.ties.is_some() {
-            self.tie_squared = ties::limit_of(distance, self.scale);
-        }
-    }
-
-    /// Collects a triangle if it may be the closest; `square` bounds the square of its distance.
-    #[inline(always)]
-    fn add_tie(&mut self, triangle: u32, square: f32) {
-        if square <= self.tie_squared
-            && let Some(ties) = &mut self.ties
-        {
-            ties.push(triangle, square, self.tie_squared);
-        }
-    }
-
     /// Where it was not searched, the surface may be as close as the closest triangle.
     fn leave_unfinished(&mut self) {
         if let Some(ties) = &mut self.ties {
             ties.lose();
         }
-    }
-
-    /// The corner of a triangle that is not finite; the first where all are finite.
-    #[cold]
-    fn not_finite(&self, triangle: u32) -> u32 {
-        let rows = self.tree.triangle(triangle).unwrap_or_default();
-        let is_finite = |row| self.vertices.position(row).is_some_and(Vec3::is_finite);
-        rows.into_iter().find(|&row| !is_finite(row)).unwrap_or(rows[0])
     }
 }

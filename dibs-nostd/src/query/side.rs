@@ -214,8 +214,7 @@ pub(super) fn of_many<I: Index, V: VertexTable + ?Sized>(
     };
     let rough = Exact::<_, _, f32>::new(tree, vertices, &at, 0);
     if tree.is_closed() {
-        let search =
-            Search::start_in(roots, tree, stack, vertices, &tool, &rest(pair), first, None)?;
+        let search = Search::start(roots, tree, stack, vertices, &tool, &rest(pair), first, None)?;
         let mut side = None;
         let (is_clear, made) = search.each_tie(|row| {
             let this = rough.is_above_plane(row)?;
@@ -232,7 +231,7 @@ pub(super) fn of_many<I: Index, V: VertexTable + ?Sized>(
     let left = options.budget.node_tests / 2;
     let mut exact = Exact::<_, _, f64>::new(tree, vertices, &at, left);
     let options = options.budget(options.budget.less(left, 0));
-    let search = Search::start_in(roots, tree, stack, vertices, &tool, &options, first, None)?;
+    let search = Search::start(roots, tree, stack, vertices, &tool, &options, first, None)?;
     let (is_complete, made) = search.each_tie(|row| exact.add(row))?;
     add(pair, made);
     pair.node_tests = pair.node_tests.saturating_add(exact.work);

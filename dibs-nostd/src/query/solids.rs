@@ -65,7 +65,7 @@ fn of_solid<I: Index, V: VertexTable + ?Sized, T: Tool>(
     let asked = Asked { options: &rest, ..*asked };
     let mut ties = Ties::new();
     let memory = Some(&mut ties);
-    let search = Search::start_in(roots, tree, stack, vertices, tool, &rest, None, memory)?;
+    let search = Search::start(roots, tree, stack, vertices, tool, &rest, None, memory)?;
     let mut found = search.run::<WHOLE>(f32::INFINITY)?;
     asked.signed(stack, &mut found, (&mut ties, None), roots)?;
     Ok(found)

@@ -103,8 +103,7 @@ impl<I: Index, V: VertexTable + ?Sized> Look<'_, '_, I, V> {
         let Some(node_tests) = node_tests.checked_sub(1 + LOOK_COST) else { return Ok(None) };
         let options = options.budget(Budget { node_tests, triangle_tests });
         let (point, first) = (AxisPoint(point), options.first(None));
-        let search =
-            Search::start_in(*roots, tree, stack, *vertices, &point, &options, first, None)?;
+        let search = Search::start(*roots, tree, stack, *vertices, &point, &options, first, None)?;
         let found = search.run::<WHOLE>(f32::INFINITY)?;
         spent.node_tests = spent.node_tests.saturating_add(found.node_tests + LOOK_COST);
         spent.triangle_tests = spent.triangle_tests.saturating_add(found.triangle_tests);

@@ -8,6 +8,7 @@ use crate::query::Options;
 use crate::query::memory::range::RangeFrontMut;
 use crate::query::search::{Search, Waiting};
 use crate::tool::AxisPair;
+use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Budget, Index, Tool, VertexTable};
 
@@ -30,9 +31,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     ) -> Result<Budget, QueryError> {
         self.add_from(pair, stack, options, |basins, stack, options, limit, ridge| {
             let mut low = Low::new(basins, limit, pair);
-            let &Pair { tree, vertices, tool, .. } = pair;
-            let search = Search::start(tree, stack, vertices, tool, options, None, None)?;
-            let search = search.over_range(options);
+            let search = over_range(pair, stack, options)?;
             let visit = |row, at: &AxisPair| low.add(row, at);
             let (beyond, tests) = search.each_low(limit, (ridge, options.part), visit)?;
             Ok(Found { complete: low.complete, beyond, tests })
@@ -49,9 +48,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     ) -> Result<Budget, QueryError> {
         self.add_from(pair, stack, options, |basins, stack, options, limit, ridge| {
             let mut low = Low::new(basins, limit, pair);
-            let &Pair { tree, vertices, tool, .. } = pair;
-            let search = Search::start(tree, stack, vertices, tool, options, None, None)?;
-            let search = search.over_range(options);
+            let search = over_range(pair, stack, options)?;
             let visit = |row, at: &AxisPair| low.add(row, at);
             let (beyond, tests) =
                 search.each_low_from(&mut front, limit, (ridge, options.part), visit)?;
@@ -59,6 +56,17 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             Ok(Found { complete: low.complete, beyond, tests })
         })
     }
+}
+
+/// The search of a pair's contacts.
+#[inline(always)]
+fn over_range<'s, I: Index, V: VertexTable + ?Sized, T: Tool>(
+    &Pair { tree, vertices, tool, .. }: &Pair<'s, I, V, T>,
+    stack: &'s mut [Waiting],
+    options: &Options,
+) -> Result<Search<'s, 's, I, V, T>, QueryError> {
+    let search = Search::start(RootSet::ALL, tree, stack, vertices, tool, options, None, None)?;
+    Ok(search.over_range(options))
 }
 
 /// The low triangles, as they are found.

@@ -282,7 +282,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         let Some(node_tests) = node_tests.checked_sub(1) else { return Ok(sample) };
         let options = self.options.budget(Budget { node_tests, triangle_tests });
         let (point, first) = (AxisPoint(on_axis), sample.triangle);
-        let search = Search::start_in(
+        let search = Search::start(
             self.roots,
             self.tree,
             self.stack,

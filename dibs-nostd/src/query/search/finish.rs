@@ -28,7 +28,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             _ => return Err(QueryError::Uncovered { pin }),
         };
         let axis_distance = sqrt(pair.distance_squared);
-        let used = u32::saturating_sub;
+        let made = self.meter.made();
         let above_zero = |x: f32| if x > 0.0 { x } else { 0.0 };
         let separation = axis_distance - radius;
         let left = above_zero(lower) - radius;
@@ -51,8 +51,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             triangle,
             corners,
             barycentric: pair.barycentric,
-            node_tests: used(self.budget.node_tests, self.left.node_tests).saturating_add(1),
-            triangle_tests: used(self.budget.triangle_tests, self.left.triangle_tests),
+            node_tests: made.node_tests.saturating_add(1),
+            triangle_tests: made.triangle_tests,
         })
     }
 }

@@ -117,8 +117,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         triangle: u32,
         visit: &mut impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<bool, QueryError> {
-        let Some(left) = self.left.triangle_tests.checked_sub(1) else { return Ok(false) };
-        self.left.triangle_tests = left;
+        if self.meter.triangle().is_none() {
+            return Ok(false);
+        }
         let corners = self.corners(triangle)?;
         if let Some(pair) = self.tool.closest_on_triangle(&corners, self.cutoff_squared) {
             let limit = visit(triangle, &pair);
@@ -174,8 +175,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         if !self.tree.is_closed() || heights.is_of_part() {
             return Ok(Some(true));
         }
-        let Some(left) = self.left.node_tests.checked_sub(1) else { return Ok(None) };
-        self.left.node_tests = left;
+        if self.meter.node().is_none() {
+            return Ok(None);
+        }
         Ok(Some(!self.is_inside(&self.corners(triangle)?)))
     }
 
@@ -231,8 +233,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             if next == triangle {
                 break;
             }
-            let Some(left) = self.left.node_tests.checked_sub(1) else { return Ok(None) };
-            self.left.node_tests = left;
+            if self.meter.node().is_none() {
+                return Ok(None);
+            }
             (row, corner) = (next, if is_back { other } else { after(other) });
             // Its corners may be seen again with a triangle that is not left out; if not, one more triangle is low.
             if heights.leaves_out(tree, row) {
@@ -258,8 +261,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         if let Some((row, other)) = self.tree.across(triangle, edge)
             && !heights.leaves_out(self.tree, row)
         {
-            let Some(left) = self.left.node_tests.checked_sub(1) else { return Ok(None) };
-            self.left.node_tests = left;
+            if self.meter.node().is_none() {
+                return Ok(None);
+            }
             let (_, beyond) = self.corner(row, before(other), heights)?;
             if beyond < low {
                 return Ok(Some(false));

@@ -2,6 +2,8 @@
 
 use super::heights::{Heights, Place};
 use super::low::MAX_RING;
+use super::meter::Meter;
+use super::node::RANGE;
 use super::{Search, Waiting};
 use crate::math::sqrt::sqrt;
 use crate::tool::{AxisPair, Tool};
@@ -18,8 +20,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     pub fn over_range(mut self, options: &Options) -> Self {
         let header = self.tree.header();
         let most = header.triangles.saturating_mul(3 + MAX_RING).saturating_add(header.nodes);
-        self.budget = options.budget.nodes_at_most(most);
-        self.left = self.budget;
+        self.meter = Meter::new(options.budget.nodes_at_most(most));
         self
     }
 
@@ -42,7 +43,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             None if self.visit_rest(&heights, &mut visit)? => f32::INFINITY,
             None => least_standing(&heights, ridge),
         };
-        Ok((least, self.made()))
+        Ok((least, self.meter.made()))
     }
 
     /// Visits the triangles of the waiting subtrees. Returns a lower bound on the distance of the rest if the budget was not
@@ -54,27 +55,22 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         heights: &mut Heights,
         visit: &mut impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<Option<f32>, QueryError> {
-        while let Some(top) = self.waiting.checked_sub(1) {
-            self.waiting = top;
-            let &Waiting { lower, link } =
-                self.stack.get(top).ok_or(QueryError::Corrupt { row: top as u32 })?;
+        while let Some(Waiting { lower, link }) = self.pop() {
             if lower > self.cutoff {
                 continue;
             }
-            let (first, count, is_leaf) = match Link::decode(link) {
-                Link::Children { first, count } => (first, count, false),
-                Link::Leaf { first, count } => (first, count, true),
-            };
-            let mut is_done = false;
-            if let Some(left) = self.left.node_tests.checked_sub(count) {
-                self.left.node_tests = left;
-                is_done = if is_leaf {
-                    self.visit_low(first, count, ridge, heights, visit)?.is_some()
-                } else {
-                    self.wait_for_children(lower, first, count)?;
-                    true
+            let link = Link::decode(link);
+            let (Link::Children { count, .. } | Link::Leaf { count, .. }) = link;
+            let is_done = self.meter.nodes(count).is_some()
+                && match link {
+                    Link::Children { first, count } => {
+                        self.expand::<RANGE>(lower, first, count, 0.0)?;
+                        true
+                    }
+                    Link::Leaf { first, count } => {
+                        self.visit_low(first, count, ridge, heights, visit)?.is_some()
+                    }
                 };
-            }
             if !is_done {
                 return Ok(Some(self.least_waiting(lower)));
             }
@@ -98,50 +94,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(true)
     }
 
-    /// The tests made so far.
-    pub(super) fn made(&self) -> Budget {
-        self.budget.less(self.left.node_tests, self.left.triangle_tests)
-    }
-
     pub(super) fn set_limit(&mut self, limit: f32) {
         self.cutoff = limit + self.slack;
         self.cutoff_squared = self.cutoff * self.cutoff;
-    }
-
-    pub(super) fn wait_for_children(
-        &mut self,
-        parent: f32,
-        first: u32,
-        count: u32,
-    ) -> Result<(), QueryError> {
-        let corrupt = QueryError::Corrupt { row: first };
-        let tree = self.tree;
-        let base = self.waiting;
-        for node in tree.records(first, count).ok_or(corrupt)? {
-            let position = self.position(node.pin)?;
-            let radius = node.radius_code as f32 * self.radius_scale;
-            let normal = self.tool.axis_to(position);
-            let squared = normal.dot(normal);
-            let far = self.cutoff + radius;
-            // A NaN counts as near: the leaves below name the vertex that it comes from.
-            if squared > far * far {
-                continue;
-            }
-            let distance = sqrt(squared);
-            // The plane goes through the pin: it rejects no leaf whose pin is within the cutoff.
-            if squared > self.cutoff_squared
-                && let Link::Leaf { first, count } = Link::decode(node.link)
-            {
-                let plane = self.plane_across(normal, position, distance);
-                if plane.beyond(tree, self.vertices, first, count).ok_or(corrupt)? == count {
-                    continue;
-                }
-            }
-            let own = distance - radius;
-            let lower = if own > parent { own } else { parent };
-            self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;
-        }
-        Ok(())
     }
 }
 

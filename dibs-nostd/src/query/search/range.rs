@@ -50,9 +50,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         if front.node(at).is_some() || !self.visit_rest(&heights, &mut visit)? {
             let (beyond, standing) = (self.least_from(front, at)?, least_standing(&heights, ridge));
             let least = if standing < beyond { standing } else { beyond };
-            return Ok((least, self.made()));
+            return Ok((least, self.meter.made()));
         }
-        Ok((f32::INFINITY, self.made()))
+        Ok((f32::INFINITY, self.meter.made()))
     }
 
     /// Tests the children that were farther. Those for which there is no place wait on the stack. Returns whether the budget
@@ -78,13 +78,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             if (opened | near) & bit != 0 {
                 continue;
             }
-            let Some(left) = self.left.node_tests.checked_sub(1) else {
+            if self.meter.node().is_none() {
                 // The rest stays due.
                 let deadline = node.deadline;
                 *front.node_mut(at).ok_or(corrupt)? = Opened { link, deadline, opened, near };
                 return Ok(false);
-            };
-            self.left.node_tests = left;
+            }
             let position = self.position(child.pin)?;
             let normal = self.tool.axis_to(position);
             let distance = sqrt(normal.dot(normal));
@@ -145,8 +144,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             let Link::Leaf { first, count } = Link::decode(child.link) else {
                 return Err(corrupt);
             };
-            let Some(left) = self.left.node_tests.checked_sub(count) else { return Ok(false) };
-            self.left.node_tests = left;
+            if self.meter.nodes(count).is_none() {
+                return Ok(false);
+            }
             let Some(low) = self.visit_low(first, count, ridge, heights, visit)? else {
                 return Ok(false);
             };

@@ -13,12 +13,11 @@ use glam::Vec3;
 
 use facing::Facing;
 
-use super::{Search, Step, THIRD, Waiting};
+use super::{Search, Step, Waiting};
 use crate::math::sqrt::sqrt;
 use crate::query::Budget;
 use crate::query::memory::clock::{Deadline, MotionClock};
 use crate::query::memory::front::{FrontMut, NOWHERE, Place, UNUSED};
-use crate::query::plane::least;
 use crate::surface::motion::FAR;
 use crate::tree::format::{Link, Node};
 use crate::unavailable::QueryError;
@@ -61,8 +60,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         // A tick tests each node's sphere, each leaf's plane and each triangle's plane twice at most.
         let header = search.tree.header();
         let most = header.nodes.saturating_add(header.triangles).saturating_mul(4);
-        search.budget.node_tests = if budget.node_tests < most { budget.node_tests } else { most };
-        search.left.node_tests = search.budget.node_tests;
+        search.meter = search.meter.with_nodes(budget.nodes_at_most(most).node_tests);
         let margin = search.slack + search.coordinate_slack;
         let limit =
             if separation < f32::INFINITY { search.limit_to(separation) } else { f32::INFINITY };
@@ -113,12 +111,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 Visit::Full => {
                     // What is due beyond this node would stay due, and the front full.
                     self.front.clear();
-                    let (all, left) = (self.search.budget, self.search.left);
-                    let tests = Budget {
-                        node_tests: all.node_tests.saturating_sub(left.node_tests),
-                        triangle_tests: all.triangle_tests.saturating_sub(left.triangle_tests),
-                    };
-                    return Ok(Outcome::Full { tests });
+                    return Ok(Outcome::Full { tests: self.search.meter.made() });
                 }
             }
         }
@@ -241,10 +234,9 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         while let Some(slot) = next(&mut due) {
             let node = tree.whole_record(first + u32::from(slot)).ok_or(corrupt)?;
             let due = opened.deadlines.get_mut(usize::from(slot)).ok_or(corrupt)?;
-            let Some(left) = search.left.node_tests.checked_sub(1) else {
+            if search.meter.node().is_none() {
                 return Ok(Step::OutOfBudget);
-            };
-            search.left.node_tests = left;
+            }
             let position = search.position(node.pin)?;
             let normal = search.tool.axis_to(position);
             let distance = sqrt(normal.dot(normal));
@@ -255,9 +247,8 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 continue;
             }
             if let Link::Leaf { first, count } = Link::decode(node.link)
-                && let Some(left) = search.left.node_tests.checked_sub(1)
+                && search.meter.node().is_some()
             {
-                search.left.node_tests = left;
                 let plane = search.plane_across(normal, position, distance);
                 let excess = plane.excess(tree, search.vertices, first, count).ok_or(corrupt)?;
                 if excess > 0.0 {
@@ -283,12 +274,9 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 continue;
             }
             let search = &mut self.search;
-            let (Some(left), Some(triangles_left)) =
-                (search.left.node_tests.checked_sub(1), search.left.triangle_tests.checked_sub(1))
-            else {
+            if search.meter.triangle_plane().is_none() {
                 return Ok(Step::OutOfBudget);
-            };
-            search.left.node_tests = left;
+            }
             let corners = search.corners(triangle)?;
             let facing = self.facing.lowest(&corners);
             let bound = if facing > self.facing.within {
@@ -298,7 +286,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 }
                 facing
             } else {
-                match self.test_closely(triangle, &corners, place, triangles_left)? {
+                match self.test_closely(triangle, &corners, place)? {
                     Some(bound) => bound,
                     None => continue,
                 }
@@ -309,47 +297,18 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         Ok(Step::Done)
     }
 
-    /// Tests a triangle against its own plane, then exactly, after which `left` triangle tests remain. Returns a bound,
-    /// unless it is the closest so far.
+    /// Tests a triangle against its own plane, then exactly. Returns a bound, unless it is the closest so far, which has
+    /// none.
     fn test_closely(
         &mut self,
         triangle: u32,
         corners: &[Vec3; 3],
         place: Place,
-        left: u32,
     ) -> Result<Option<f32>, QueryError> {
-        let search = &self.search;
-        let (excess, distance) = search.excess(corners);
-        if excess.is_nan() {
-            return Err(QueryError::Position { vertex: search.not_finite(triangle) });
+        let (bound, is_closest) = self.search.bound_triangle(triangle, corners)?;
+        if !is_closest {
+            return Ok(Some(bound));
         }
-        if excess > 0.0 {
-            return Ok(Some(search.cutoff + excess / distance));
-        }
-        self.search.left.triangle_tests = left;
-        self.test_exactly(triangle, corners, place)
-    }
-
-    /// The exact test; the caller has counted it. Returns the triangle's distance, unless it is the closest so far,
-    /// which has no bound.
-    #[inline(always)]
-    fn test_exactly(
-        &mut self,
-        triangle: u32,
-        corners: &[Vec3; 3],
-        place: Place,
-    ) -> Result<Option<f32>, QueryError> {
-        let search = &mut self.search;
-        let Some(pair) = search.tool.closest_on_triangle(corners, f32::INFINITY) else {
-            return Err(QueryError::Position { vertex: search.not_finite(triangle) });
-        };
-        let distance = sqrt(pair.distance_squared);
-        if !(pair.distance_squared < search.best_squared) {
-            search.add_tie(triangle, pair.distance_squared);
-            return Ok(Some(distance));
-        }
-        search.improve(triangle, pair, distance);
-        search.add_tie(triangle, pair.distance_squared);
         self.facing = Facing::new(&self.search);
         let corrupt = QueryError::Corrupt { row: triangle };
         if let Some(place) = self.front.best.replace(place) {
@@ -369,8 +328,9 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             if left <= 0 {
                 continue;
             }
-            let Some(tests) = self.search.left.node_tests.checked_sub(1) else { return Ok(()) };
-            self.search.left.node_tests = tests;
+            if self.search.meter.node().is_none() {
+                return Ok(());
+            }
             let opened = self.front.node(at).ok_or(corrupt)?;
             let place = Place { node: opened.parent, slot: opened.slot };
             let node = self.record(place).ok_or(corrupt)?;
@@ -382,19 +342,6 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             }
         }
         Ok(())
-    }
-}
-
-impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// A triangle's excess over the plane of its own that bounds those beyond the cutoff, and the length of the plane's
-    /// normal. Not a number where a corner is none.
-    #[inline(always)]
-    fn excess(&self, &[a, b, c]: &[Vec3; 3]) -> (f32, f32) {
-        let middle = (a + b + c) * THIRD;
-        let normal = self.tool.axis_to(middle);
-        let length = sqrt(normal.dot(normal));
-        let plane = self.plane_across(normal, middle, length);
-        (least([a, b, c].map(|corner| plane.normal.dot(corner))) - plane.limit, length)
     }
 }
 

@@ -4,6 +4,7 @@
 //! close within [`TIE`], and no bound rejects them: the slack of the cutoff is larger. So a search collects every
 //! triangle that it tests within that window, and a tracker those that it passes over, too. They decide the side.
 
+use super::node::RANGE;
 use super::slack::{ACCURACY, FLOOR, TIE};
 use super::{Search, Waiting};
 use crate::math::sqrt::sqrt;
@@ -171,38 +172,31 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         mut visit: impl FnMut(u32) -> Result<bool, QueryError>,
     ) -> Result<(bool, Budget), QueryError> {
         let limit = limit_of(sqrt(self.best_squared), self.scale);
-        while let Some(top) = self.waiting.checked_sub(1) {
-            self.waiting = top;
-            let &Waiting { lower, link } =
-                self.stack.get(top).ok_or(QueryError::Corrupt { row: top as u32 })?;
+        while let Some(Waiting { lower, link }) = self.pop() {
             if lower > self.cutoff {
                 continue;
             }
-            let (first, count, is_leaf) = match Link::decode(link) {
-                Link::Children { first, count } => (first, count, false),
-                Link::Leaf { first, count } => (first, count, true),
-            };
-            let Some(left) = self.left.node_tests.checked_sub(count) else {
-                return Ok((false, self.made()));
-            };
-            self.left.node_tests = left;
-            if !is_leaf {
-                self.wait_for_children(lower, first, count)?;
+            let link = Link::decode(link);
+            let (Link::Children { first, count } | Link::Leaf { first, count }) = link;
+            if self.meter.nodes(count).is_none() {
+                return Ok((false, self.meter.made()));
+            }
+            if let Link::Children { .. } = link {
+                self.expand::<RANGE>(lower, first, count, 0.0)?;
                 continue;
             }
             for triangle in first..first.saturating_add(count) {
-                let Some(left) = self.left.triangle_tests.checked_sub(1) else {
-                    return Ok((false, self.made()));
-                };
-                self.left.triangle_tests = left;
+                if self.meter.triangle().is_none() {
+                    return Ok((false, self.meter.made()));
+                }
                 let corners = self.corners(triangle)?;
                 let pair = self.tool.closest_on_triangle(&corners, self.cutoff_squared);
                 if pair.is_some_and(|pair| pair.distance_squared <= limit) && !visit(triangle)? {
-                    return Ok((false, self.made()));
+                    return Ok((false, self.meter.made()));
                 }
             }
         }
-        Ok((true, self.made()))
+        Ok((true, self.meter.made()))
     }
 }
 

@@ -93,10 +93,9 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
         let corrupt = QueryError::Corrupt { row: self.search.waiting as u32 };
         let (subtrees, children) = self.take().ok_or(corrupt)?;
         // A batch is never split, so that a query with more budget takes the same steps, then more.
-        let Some(left) = self.search.left.node_tests.checked_sub(children as u32) else {
+        if self.search.meter.nodes(children as u32).is_none() {
             return Ok(Step::OutOfBudget);
-        };
-        self.search.left.node_tests = left;
+        }
         self.search.waiting -= subtrees;
         self.measure(children).ok_or(corrupt)?;
         let (near, leaves) = self.judge(children).ok_or(corrupt)?;

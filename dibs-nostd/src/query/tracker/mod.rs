@@ -10,6 +10,7 @@ use super::memory::{Lost, Memory};
 use super::search::{Outcome, Search, Tick, Ties, WHOLE, Waiting};
 use super::{Budget, Contacts, NoSide, Options, Proximity, Side, signed};
 use crate::surface::motion::Unit;
+use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Tool, Tree, TriangleRow};
 
@@ -214,9 +215,9 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         };
         let moved = moved.unwrap_or(0);
         let first = self.triangle.or(options.first(None));
-        let ties = Some(&mut self.ties);
-        let search =
-            Search::start(&self.tree, &mut self.stack, surface, tool, options, first, ties)?;
+        let (stack, ties) = (&mut self.stack, Some(&mut self.ties));
+        let all = RootSet::ALL;
+        let search = Search::start(all, &self.tree, stack, surface, tool, options, first, ties)?;
         let front = memory.front.borrow();
         let mut tick = Tick::new(search, front, memory.clock, options.budget, separation);
         let outcome = tick.run(moved)?;
@@ -303,9 +304,9 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         tests: Budget,
     ) -> Result<Proximity, QueryError> {
         let options = options.budget(options.budget.less(tests.node_tests, tests.triangle_tests));
-        let ties = Some(&mut self.ties);
-        let search =
-            Search::start(&self.tree, &mut self.stack, surface, tool, &options, first, ties)?;
+        let (stack, ties) = (&mut self.stack, Some(&mut self.ties));
+        let all = RootSet::ALL;
+        let search = Search::start(all, &self.tree, stack, surface, tool, &options, first, ties)?;
         let mut closest = search.run::<WHOLE>(f32::INFINITY)?;
         closest.node_tests = closest.node_tests.saturating_add(tests.node_tests);
         closest.triangle_tests = closest.triangle_tests.saturating_add(tests.triangle_tests);

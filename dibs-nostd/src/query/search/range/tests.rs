@@ -14,6 +14,7 @@ use crate::query::memory::Memory;
 use crate::query::memory::clock::MotionClock;
 use crate::query::search::Waiting;
 use crate::surface::motion::Unit;
+use crate::tree::RootSet;
 use crate::tree::format::Link;
 use crate::unavailable::QueryError;
 use crate::{Budget, Capsule, MovingSurface, Odometer, Options, Tree};
@@ -95,7 +96,16 @@ fn no_bound_of_a_range_exceeds_the_distance() {
             memory.begin(moved);
             memory.keep(&tool, Some(motion), true);
             let mut search = |options: &Options| {
-                let search = Search::start(&tree, &mut stack, &surface, &tool, options, None, None);
+                let search = Search::start(
+                    RootSet::ALL,
+                    &tree,
+                    &mut stack,
+                    &surface,
+                    &tool,
+                    options,
+                    None,
+                    None,
+                );
                 let mut moved = memory.range.now(memory.clock, None);
                 kept += usize::from(!moved.is_empty());
                 let visit = |_, _: &_| LIMIT;
@@ -145,7 +155,16 @@ fn a_node_that_no_search_reaches_stays_due() {
             node_tests: if tick == 0 || tick == 6_000 { u32::MAX } else { 0 },
             triangle_tests: u32::MAX,
         });
-        let search = Search::start(&tree, &mut stack, rows.as_slice(), &tool, &options, None, None);
+        let search = Search::start(
+            RootSet::ALL,
+            &tree,
+            &mut stack,
+            rows.as_slice(),
+            &tool,
+            &options,
+            None,
+            None,
+        );
         let mut front = memory.range.now(memory.clock, None);
         visited = 0;
         let visit = |_, _: &_| {

@@ -5,7 +5,8 @@ use glam::Vec4;
 use super::{WideSearch, next};
 use crate::math::vec3x4::{Vec3x4, roots};
 use crate::query::plane::Plane;
-use crate::query::search::{Search, Step, THIRD};
+use crate::query::search::leaf::THIRD;
+use crate::query::search::{Search, Step};
 use crate::tree::format::{Link, Node, whole_node};
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
@@ -19,9 +20,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
         while let Some(at) = next(&mut leaves) {
             let Node { pin, link, .. } = whole_node::<I>(&self.records, at as u32)?;
             if let Link::Leaf { first, count } = Link::decode(link)
-                && let Some(tests) = self.search.left.node_tests.checked_sub(1)
+                && self.search.meter.node().is_some()
             {
-                self.search.left.node_tests = tests;
                 let plane = self.search.plane_towards(vertices.position(pin)?);
                 let within = plane.vertices_within(tree, vertices, first, count)?;
                 left &= !(u64::from(within == 0) << at);
@@ -36,10 +36,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// each against its own plane only.
     #[inline(always)]
     pub(super) fn leaf_at_once(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
-        let Some(left) = self.left.node_tests.checked_sub(1) else {
+        if self.meter.node().is_none() {
             return Ok(Step::OutOfBudget);
-        };
-        self.left.node_tests = left;
+        }
         let corrupt = QueryError::Corrupt { row: first };
         let (tree, vertices) = (self.tree, self.vertices);
         let [corner, ..] = tree.triangle(first).ok_or(corrupt)?;
@@ -52,10 +51,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         // plane.
         let beyond = within.trailing_zeros().saturating_sub(2);
         let (mut first, mut count) = (first + beyond, count.saturating_sub(beyond));
-        let Some(left) = self.left.node_tests.checked_sub(count) else {
+        if self.meter.nodes(count).is_none() {
             return Ok(Step::OutOfBudget);
-        };
-        self.left.node_tests = left;
+        }
         while count > 0 {
             let [a, b, c] = tree.four_triangles(first, count).ok_or(corrupt)?;
             let corners = |rows| Vec3x4::of(|row| vertices.position(row), rows).ok_or(corrupt);
@@ -78,16 +76,15 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         if triangle == self.best_triangle {
             return Ok(Step::Done);
         }
-        let Some(left) = self.left.triangle_tests.checked_sub(1) else {
+        if self.meter.triangle().is_none() {
             return Ok(Step::OutOfBudget);
-        };
+        }
         let corners = self.corners(triangle)?;
         let [a, b, c] = corners;
         // A corner that is not finite makes the sum not finite.
         if !(a + b + c).is_finite() {
             return Err(QueryError::Position { vertex: self.not_finite(triangle) });
         }
-        self.left.triangle_tests = left;
         self.test_triangle(triangle, &corners);
         Ok(Step::Done)
     }
