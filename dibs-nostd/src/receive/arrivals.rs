@@ -32,7 +32,7 @@ impl Contig {
 pub(super) struct Arrivals {
     /// From the frame's first packet on.
     prefix: Contig,
-    /// The others, in no order.
+    /// The others, in no order. No vector: a range keeps its place while others come and go.
     others: [Contig; GAPS],
     /// Number of these in use.
     used: u8,

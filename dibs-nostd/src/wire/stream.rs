@@ -42,6 +42,7 @@ pub fn enframe<'b>(packet: &[u8], out: &'b mut [u8]) -> Option<&'b [u8]> {
 /// ```
 #[derive(Debug)]
 pub struct Deframer<const MTU: usize> {
+    /// No vector: a finished packet is lent out until the next byte, which is the first of another.
     packet: [u8; MTU],
     /// Bytes decoded so far; one more than `MTU` for a packet that does not fit.
     bytes: usize,

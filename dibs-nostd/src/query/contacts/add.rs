@@ -146,7 +146,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         })?;
         let deepest =
             own.map_or(least, |own| if own.separation < least { own.separation } else { least });
-        for contact in found.list.iter_mut().take(found.count) {
+        for contact in &mut found.list {
             let is_own = (contact.surface, contact.tool) == (pair.surface, pair.number);
             if is_own && contact.separation > deepest {
                 let row = contact.triangle.0;

@@ -1,12 +1,13 @@
 //! The contacts found so far, deepest first, and a bound on the others.
 
+use heapless::Vec;
+
 use super::Contact;
 
 /// Up to `N` contacts.
 #[derive(Clone, Debug)]
 pub(super) struct List<const N: usize> {
-    pub list: [Contact; N],
-    pub count: usize,
+    pub list: Vec<Contact, N>,
     pub bound: f32,
     pub accuracy: f32,
     pub is_full: bool,
@@ -21,8 +22,7 @@ pub(super) struct List<const N: usize> {
 impl<const N: usize> List<N> {
     pub const fn new() -> Self {
         Self {
-            list: [Contact::NONE; N],
-            count: 0,
+            list: Vec::new(),
             bound: f32::NEG_INFINITY,
             accuracy: 0.0,
             is_full: false,
@@ -34,7 +34,7 @@ impl<const N: usize> List<N> {
 
     /// Empties the list, of which nothing is known then.
     pub fn clear(&mut self) {
-        self.count = 0;
+        self.list.clear();
         self.bound = f32::NEG_INFINITY;
         self.accuracy = 0.0;
         self.is_full = false;
@@ -58,10 +58,7 @@ impl<const N: usize> List<N> {
 
     /// Inserts a contact in order, and drops the farthest if there is no room.
     pub fn insert(&mut self, contact: Contact) {
-        let mut at = self.count;
-        if at < N {
-            self.count += 1;
-        } else {
+        if self.list.is_full() {
             self.is_full = true;
             let farthest = self.list.last().map_or(f32::NEG_INFINITY, |last| last.separation);
             let dropped = if contact.separation > farthest { contact.separation } else { farthest };
@@ -69,19 +66,14 @@ impl<const N: usize> List<N> {
             if !(contact.separation < farthest) {
                 return;
             }
-            at = at.saturating_sub(1);
+            self.list.pop();
         }
-        while let Some(before) = at.checked_sub(1)
-            && let Some(&other) = self.list.get(before)
-            && other.separation > contact.separation
-        {
-            if let Some(place) = self.list.get_mut(at) {
-                *place = other;
-            }
-            at = before;
+        let before = self.list.iter().take_while(|other| !(other.separation > contact.separation));
+        let at = before.count();
+        let mut last = contact;
+        for other in self.list.iter_mut().skip(at) {
+            core::mem::swap(other, &mut last);
         }
-        if let Some(place) = self.list.get_mut(at) {
-            *place = contact;
-        }
+        let _ = self.list.push(last);
     }
 }

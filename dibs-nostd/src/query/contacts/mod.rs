@@ -154,19 +154,19 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
 
     /// The contacts, deepest first.
     pub fn iter(&self) -> impl Iterator<Item = &Contact> + Clone {
-        self.found.list.iter().take(self.found.count)
+        self.found.list.iter()
     }
 
     /// Number of contacts.
     #[must_use]
-    pub const fn len(&self) -> usize {
-        self.found.count
+    pub fn len(&self) -> usize {
+        self.found.list.len()
     }
 
     /// Whether there are no contacts.
     #[must_use]
-    pub const fn is_empty(&self) -> bool {
-        self.found.count == 0
+    pub fn is_empty(&self) -> bool {
+        self.found.list.is_empty()
     }
 
     /// The contacts, deepest first, for a constraint that acts within `margin` (mm). The deepest is among them for
@@ -189,7 +189,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         if has_no_side && !self.iter().next().is_some_and(acts) {
             return Err(Unavailable::NoSide);
         }
-        let contacts = self.found.list.get(..self.found.count).unwrap_or_default().iter();
+        let contacts = self.found.list.iter();
         Ok(ContactIter { contacts, bound, is_complete })
     }
 
@@ -204,7 +204,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         let Some(contact) = add::contact(closest) else { return };
         self.found.has_no_side = false;
         if closest.side != Side::Outside {
-            self.found.count = 0;
+            self.found.list.clear();
         }
         if closest.accuracy > self.found.accuracy {
             self.found.accuracy = closest.accuracy;
@@ -248,7 +248,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             }
             Ok(velocity)
         };
-        for contact in self.found.list.iter_mut().take(self.found.count) {
+        for contact in &mut self.found.list {
             contact.velocity = velocity(contact.corners, contact.barycentric)?;
             let across = &mut contact.across;
             if across.share > 0.0 {

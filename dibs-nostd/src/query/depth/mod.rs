@@ -119,7 +119,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             options,
             closest,
             is_inside,
-            touches: Touches::ANYWHERE,
+            touches: Touches::anywhere(),
             answer: *closest,
             deepest,
             deepest_at,

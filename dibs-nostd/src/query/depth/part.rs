@@ -189,6 +189,7 @@ impl Bound {
 
 /// The parts of the axis in a list from its start, in row 0, to its end.
 pub(super) struct Parts {
+    /// No vector: parts name each other by their rows.
     rows: [Part; POINTS],
     /// Rows from here on are unused.
     end: usize,

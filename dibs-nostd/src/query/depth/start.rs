@@ -35,7 +35,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
                 _ => return Ok(()),
             };
             if self.is_spent() {
-                self.touches = Touches::ANYWHERE;
+                self.touches = Touches::anywhere();
                 return Ok(());
             }
             let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;

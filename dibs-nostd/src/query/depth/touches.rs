@@ -1,6 +1,7 @@
 //! Where an axis meets the surface. Between two such places it stays on one side of a closed surface.
 
 use glam::Vec3;
+use heapless::Vec;
 
 use super::part::{larger, smaller};
 use crate::TriangleRow;
@@ -18,10 +19,9 @@ const INCLINED: f32 = 1.0 / 256.0;
 const HALVINGS: u32 = 8;
 
 /// The places where an axis may meet the surface. No two overlap.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Touches {
-    places: [Place; PLACES],
-    count: usize,
+    places: Vec<Place, PLACES>,
 }
 
 /// A place where the axis may meet the surface, in lengths from its start.
@@ -55,9 +55,14 @@ impl Place {
 
 impl Touches {
     /// No place.
-    pub const NONE: Self = Self { places: [Place::unknown(0.0); PLACES], count: 0 };
+    pub const NONE: Self = Self { places: Vec::new() };
+
     /// The whole axis.
-    pub const ANYWHERE: Self = Self { places: [Place::unknown(f32::INFINITY); PLACES], count: 1 };
+    pub fn anywhere() -> Self {
+        let mut touches = Self::NONE;
+        touches.push(Place::unknown(f32::INFINITY));
+        touches
+    }
 
     /// Adds a triangle whose distance from the axis is within the accuracy. Returns the distances to it that this took.
     ///
@@ -114,20 +119,14 @@ impl Touches {
 
     /// Adds a place, joined with those that it overlaps.
     fn insert(&mut self, mut place: Place) {
-        let mut apart = 0;
-        for at in 0..self.count {
-            let Some(&other) = self.places.get(at) else { break };
-            if other.last < place.first || other.first > place.last {
-                if let Some(kept) = self.places.get_mut(apart) {
-                    *kept = other;
-                }
-                apart += 1;
-            } else {
-                place = place.joined(&other);
+        self.places.retain(|other| {
+            let is_apart = other.last < place.first || other.first > place.last;
+            if !is_apart {
+                place = place.joined(other);
             }
-        }
-        self.count = apart;
-        for other in self.places.iter_mut().take(apart) {
+            is_apart
+        });
+        for other in &mut self.places {
             if other.first > place.first {
                 core::mem::swap(other, &mut place);
             }
@@ -137,24 +136,22 @@ impl Touches {
 
     /// Adds a place behind the others; if there is no room, to the last one.
     fn push(&mut self, place: Place) {
-        if let Some(free) = self.places.get_mut(self.count) {
-            *free = place;
-            self.count += 1;
-        } else {
-            let [.., last] = &mut self.places;
+        if let Err(place) = self.places.push(place)
+            && let Some(last) = self.places.last_mut()
+        {
             *last = Place { before: None, after: None, ..last.joined(&place) };
         }
     }
 
     /// The places, unless they are unknown.
     pub fn places(&self) -> impl Iterator<Item = &Place> {
-        self.places.iter().take(self.count).filter(|place| place.last < f32::INFINITY)
+        self.places.iter().filter(|place| place.last < f32::INFINITY)
     }
 
     /// The axis is outside at this length.
     pub fn add_outside(&mut self, along: f32) {
         let mut previous: Option<&mut Place> = None;
-        for place in self.places.iter_mut().take(self.count) {
+        for place in &mut self.places {
             if place.first > along {
                 place.before.get_or_insert(true);
                 break;
@@ -174,7 +171,7 @@ impl Touches {
     pub fn ahead(&self, along: f32) -> Free {
         let mut free = Free { from: along, to: f32::INFINITY, is_outside: false };
         let mut previous = None;
-        for place in self.places.iter().take(self.count) {
+        for place in &self.places {
             if place.first > free.from {
                 return Free { to: place.first, ..free.between(previous, place.before) };
             }
@@ -191,7 +188,7 @@ impl Touches {
     pub fn behind(&self, along: f32) -> Free {
         let mut free = Free { from: along, to: f32::NEG_INFINITY, is_outside: false };
         let mut next = None;
-        for place in self.places.iter().take(self.count).rev() {
+        for place in self.places.iter().rev() {
             if place.last < free.from {
                 return Free { to: place.last, ..free.between(place.after, next) };
             }

@@ -3,6 +3,8 @@
 //! A depth changes by at most the motion of tool and surface. So every bound of the last tick still holds, plus that
 //! motion: only parts of the axis whose bounds have come above the deepest point are looked at again.
 
+use heapless::Vec;
+
 use super::clock::{MotionClock, Reading};
 use super::leaves::Leaves;
 use crate::TriangleRow;
@@ -44,8 +46,7 @@ pub(in crate::query) struct KnownDepthMut<'m> {
 /// The points of the last depth.
 #[derive(Clone, Debug)]
 pub(in crate::query) struct Points {
-    points: [Point; KEPT],
-    count: usize,
+    points: Vec<Point, KEPT>,
     /// The deepest point's parameter; not a number if no point was inside.
     deepest: f32,
 }
@@ -53,8 +54,7 @@ pub(in crate::query) struct Points {
 impl KnownDepth {
     #[inline(always)]
     pub const fn new() -> Self {
-        let none = Point { parameter: 0.0, depth: 0.0, bound: 0.0, triangle: TriangleRow(0) };
-        let points = Points { points: [none; KEPT], count: 0, deepest: f32::NAN };
+        let points = Points { points: Vec::new(), deepest: f32::NAN };
         let shells = RootSet::ALL.key();
         Self { points, leaves: Leaves::new(), shells, at: Reading::START }
     }
@@ -97,12 +97,12 @@ impl<'m> KnownDepthMut<'m> {
 
 impl Points {
     pub fn forget(&mut self) {
-        self.count = 0;
+        self.points.clear();
     }
 
     /// The points from the axis' start to its end, and the deepest one's parameter, if a bound is still below `reach`.
     pub fn below(&self, reach: f32) -> Option<(&[Point], f32)> {
-        let points = self.points.get(..self.count)?;
+        let points = self.points.as_slice();
         let (_end, parts) = points.split_last()?;
         let is_known = parts.iter().any(|part| part.bound < reach);
         is_known.then_some((points, self.deepest))
@@ -114,11 +114,11 @@ impl Points {
     /// Remembers the points of a search in order, and the parameter of the deepest one. A point without a triangle near it
     /// leaves nothing to remember.
     pub fn keep(&mut self, points: impl Iterator<Item = Option<Point>>, deepest: f32) {
-        (self.count, self.deepest) = (0, deepest);
-        for (place, point) in self.points.iter_mut().zip(points) {
+        self.forget();
+        self.deepest = deepest;
+        for point in points.take(KEPT) {
             let Some(point) = point else { return self.forget() };
-            *place = point;
-            self.count += 1;
+            let _ = self.points.push(point);
         }
     }
 }

@@ -2,15 +2,17 @@
 //!
 //! Until tool and surface have moved too far, the closest triangle to the point is in one of them.
 
+use heapless::Vec;
+
 /// Most leaves.
 pub(in crate::query) const MOST: usize = 48;
 
 /// The leaves around a point.
 #[derive(Clone, Debug)]
 pub(in crate::query) struct Leaves {
-    leaves: [Leaf; MOST],
-    /// More than there are places if some were lost.
-    count: usize,
+    leaves: Vec<Leaf, MOST>,
+    /// There were more.
+    is_over: bool,
     /// Motion (mm) of tool and surface, and of the point along its axis, since they were gathered.
     moved: f32,
     /// All other leaves were at least as far (mm) as this; 0 if that is not known.
@@ -32,12 +34,13 @@ pub(in crate::query) struct Leaf {
 impl Leaves {
     #[inline(always)]
     pub const fn new() -> Self {
-        let leaves = [Leaf { link: 0, bound: 0.0 }; MOST];
-        Self { leaves, count: 0, moved: 0.0, beyond: 0.0, parameter: 0.0, step: 0.0 }
+        let leaves = Vec::new();
+        Self { leaves, is_over: false, moved: 0.0, beyond: 0.0, parameter: 0.0, step: 0.0 }
     }
 
     pub fn forget(&mut self) {
-        (self.count, self.moved, self.beyond) = (0, 0.0, 0.0);
+        self.leaves.clear();
+        (self.is_over, self.moved, self.beyond) = (false, 0.0, 0.0);
     }
 
     /// Tool and surface have moved.
@@ -69,8 +72,7 @@ impl Leaves {
 
     /// The leaves, and the motion since they were gathered.
     pub fn each(&mut self) -> (&mut [Leaf], f32) {
-        let count = if self.count < MOST { self.count } else { MOST };
-        (self.leaves.get_mut(..count).unwrap_or_default(), self.moved)
+        (&mut self.leaves, self.moved)
     }
 
     /// Whether all leaves within `distance` of a point that has moved by so much are among these.
@@ -78,37 +80,24 @@ impl Leaves {
         distance + moved <= self.beyond
     }
 
-    pub const fn is_full(&self) -> bool {
-        self.count == MOST
+    pub fn is_full(&self) -> bool {
+        self.leaves.is_full()
     }
 
-    /// All other leaves are at least as far as this, unless some were lost.
+    /// All other leaves are at least as far as this, unless there was no room for one.
     pub fn close(&mut self, beyond: f32) {
-        if self.count <= MOST {
+        if !self.is_over {
             self.beyond = beyond;
         }
     }
 
     pub fn push(&mut self, leaf: Leaf) {
-        if let Some(place) = self.leaves.get_mut(self.count) {
-            *place = leaf;
-        }
-        self.count = self.count.saturating_add(1);
+        self.is_over |= self.leaves.push(leaf).is_err();
     }
 
     /// Keeps the leaves that may be within `distance`.
     pub fn keep_within(&mut self, distance: f32) {
-        let mut kept = 0;
-        for at in 0..self.count {
-            if let Some(&leaf) = self.leaves.get(at)
-                && !(leaf.bound > distance)
-                && let Some(place) = self.leaves.get_mut(kept)
-            {
-                *place = leaf;
-                kept += 1;
-            }
-        }
-        self.count = kept;
+        self.leaves.retain(|leaf| !(leaf.bound > distance));
     }
 }
 

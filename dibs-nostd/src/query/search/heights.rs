@@ -4,6 +4,7 @@
 //! seen last, each until another takes its place.
 
 use glam::Vec3;
+use heapless::Vec;
 
 use super::Search;
 use crate::unavailable::QueryError;
@@ -90,13 +91,12 @@ pub(super) struct Heights {
     part: Option<u8>,
     places: [Vertex; PLACES],
     /// Those that have lost their place while a triangle stood for them: at most one for each corner of a triangle.
-    lost: [Vertex; 3],
-    losses: usize,
+    lost: Vec<Vertex, 3>,
 }
 
 impl Heights {
     pub const fn new(part: Option<u8>) -> Self {
-        Self { part, places: [Vertex::UNSEEN; PLACES], lost: [Vertex::UNSEEN; 3], losses: 0 }
+        Self { part, places: [Vertex::UNSEEN; PLACES], lost: Vec::new() }
     }
 
     /// Whether triangles are left out.
@@ -134,18 +134,18 @@ impl Heights {
     /// The last vertex that has lost its place.
     #[inline(always)]
     pub fn lost(&self) -> Option<&Vertex> {
-        self.lost.get(self.losses.checked_sub(1)?)
+        self.lost.last()
     }
 
     /// The last vertex that has lost its place is done with.
     pub fn found(&mut self) {
-        self.losses = self.losses.saturating_sub(1);
+        self.lost.pop();
     }
 
     /// The least square of a vertex that a triangle stands for.
     pub fn least_standing(&self) -> f32 {
-        let lost = self.lost.iter().take(self.losses);
-        let standing = self.places.iter().chain(lost).filter(|vertex| vertex.standing().is_some());
+        let standing =
+            self.places.iter().chain(&self.lost).filter(|vertex| vertex.standing().is_some());
         standing.fold(
             f32::INFINITY,
             |least, vertex| {
@@ -177,11 +177,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         if vertex.row == row {
             return Ok(());
         }
-        if vertex.standing().is_some()
-            && let Some(place) = heights.lost.get_mut(heights.losses)
-        {
-            *place = *vertex;
-            heights.losses += 1;
+        if vertex.standing().is_some() {
+            let _ = heights.lost.push(*vertex);
         }
         let position = self.position(row)?;
         let towards = self.tool.axis_to(position);

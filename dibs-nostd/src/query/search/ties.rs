@@ -4,6 +4,8 @@
 //! close within [`TIE`], and no bound rejects them: the slack of the cutoff is larger. So a search collects every
 //! triangle that it tests within that window, and a tracker those that it passes over, too. They decide the side.
 
+use heapless::Vec;
+
 use super::node::RANGE;
 use super::slack::{ACCURACY, FLOOR, TIE};
 use super::{Search, Waiting};
@@ -16,13 +18,18 @@ use crate::{Budget, Index, VertexTable};
 /// Most of them. Six or so share a vertex.
 const MOST: usize = 32;
 
-/// Triangles about as close as the closest.
+/// A triangle about as close as the closest.
 #[derive(Clone, Copy, Debug)]
+struct Tie {
+    row: u32,
+    /// Square of its distance, or of a lower bound.
+    square: f32,
+}
+
+/// Triangles about as close as the closest.
+#[derive(Clone, Debug)]
 pub(in crate::query) struct Ties {
-    rows: [u32; MOST],
-    /// Squares of their distances, or of lower bounds.
-    squares: [f32; MOST],
-    count: usize,
+    rows: Vec<Tie, MOST>,
     /// Square of the distance up to which a triangle counts.
     limit: f32,
     /// Square of the distance up to which the axis may meet it; negative if nobody asks.
@@ -35,21 +42,14 @@ pub(in crate::query) struct Ties {
 
 impl Ties {
     pub const fn new() -> Self {
-        let (rows, squares) = ([0; MOST], [0.0; MOST]);
-        Self {
-            rows,
-            squares,
-            count: 0,
-            limit: -1.0,
-            touching: -1.0,
-            are_lost: true,
-            are_star: false,
-        }
+        let rows = Vec::new();
+        Self { rows, limit: -1.0, touching: -1.0, are_lost: true, are_star: false }
     }
 
     /// The triangles that meet in a feature, to which they are added.
     pub const fn star() -> Self {
-        Self { are_lost: false, are_star: true, ..Self::new() }
+        let rows = Vec::new();
+        Self { rows, limit: -1.0, touching: -1.0, are_lost: false, are_star: true }
     }
 
     /// Adds a triangle of a star.
@@ -62,15 +62,16 @@ impl Ties {
     pub(super) fn reset(&mut self, scale: f32, is_crossable: bool) {
         let accuracy = ACCURACY * scale + FLOOR;
         self.touching = if is_crossable { accuracy * accuracy } else { -1.0 };
-        (self.count, self.limit) = (0, -1.0);
+        self.rows.clear();
+        self.limit = -1.0;
         (self.are_lost, self.are_star) = (false, false);
     }
 
     /// Keeps those that are asked for.
     pub fn keep(&mut self, is_kept: impl Fn(u32) -> bool) {
-        for (row, square) in self.rows.iter().zip(&mut self.squares) {
-            if !is_kept(*row) {
-                *square = f32::INFINITY;
+        for tie in &mut self.rows {
+            if !is_kept(tie.row) {
+                tie.square = f32::INFINITY;
             }
         }
     }
@@ -94,40 +95,21 @@ impl Ties {
         if self.are_lost {
             return;
         }
-        if self.count == MOST {
+        if self.rows.is_full() {
             self.drop_farther();
         }
-        let place = self.rows.get_mut(self.count).zip(self.squares.get_mut(self.count));
-        let Some(place) = place else {
-            self.are_lost = true;
-            return;
-        };
-        (*place.0, *place.1) = (row, square);
-        self.count += 1;
+        self.are_lost = self.rows.push(Tie { row, square }).is_err();
     }
 
     /// Makes room.
     #[cold]
     #[inline(never)]
     fn drop_farther(&mut self) {
-        let mut kept = 0;
-        for at in 0..self.count {
-            let (Some(&row), Some(&square)) = (self.rows.get(at), self.squares.get(at)) else {
-                break;
-            };
-            if square <= self.limit
-                && let (Some(to), Some(its)) = (self.rows.get_mut(kept), self.squares.get_mut(kept))
-            {
-                (*to, *its) = (row, square);
-                kept += 1;
-            }
-        }
-        self.count = kept;
+        self.rows.retain(|tie| tie.square <= self.limit);
     }
 
     fn within(&self, limit: f32) -> impl Iterator<Item = u32> {
-        let pairs = self.rows.iter().zip(&self.squares).take(self.count);
-        pairs.filter(move |&(_, &square)| square <= limit).map(|(&row, _)| row)
+        self.rows.iter().filter(move |tie| tie.square <= limit).map(|tie| tie.row)
     }
 
     /// All triangles that may be the closest, or share its closest point. `None` if they are not known.
@@ -149,9 +131,8 @@ impl Ties {
     /// The first triangle that the axis may meet, from a place on, and its place. A loop over an iterator of them takes
     /// three times the code.
     pub fn touched_from(&self, place: usize) -> Option<(usize, u32)> {
-        let pairs = self.rows.iter().zip(&self.squares).take(self.count).enumerate();
-        let mut rest = pairs.skip(place);
-        rest.find(|&(_, (_, &square))| square <= self.touching).map(|(at, (&row, _))| (at, row))
+        let mut rest = self.rows.iter().enumerate().skip(place);
+        rest.find(|(_, tie)| tie.square <= self.touching).map(|(at, tie)| (at, tie.row))
     }
 }
 

@@ -36,7 +36,7 @@ use crate::{Index, MovingSurface, Tool, Tree, TriangleRow};
 /// Where the axis crosses the surface, it remembers which parts of the axis cannot be deepest, and searches those points
 /// that may have become so.
 ///
-/// RAM: 8 bytes for each entry of the stack, 44 for each of the `OPENED`, 12 for each of the `RANGE`, and 1,336.
+/// RAM: 8 bytes for each entry of the stack, 44 for each of the `OPENED`, 12 for each of the `RANGE`, and 1,344.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
