@@ -1074,6 +1074,34 @@ typedef struct {
 } dibs_guard_limits;
 
 /**
+ * A wall: a margin around the surface, with a spring and a damper.
+ *
+ * A sampled wall is passive only if the device's own damping is above `stiffness * tick / 2 + damping`.
+ */
+typedef struct {
+  /**
+   * In N/mm, above 0.
+   */
+  float stiffness;
+  /**
+   * In N s/mm, at least 0.
+   */
+  float damping;
+  /**
+   * Damping (N s/mm, at least 0) where there is no answer to act on; 0 lets go of the tool.
+   */
+  float hold_damping;
+  /**
+   * In N, above 0.
+   */
+  float max_force;
+  /**
+   * Reach of the wall from the surface (mm, above 0).
+   */
+  float margin;
+} dibs_wall;
+
+/**
  * A point, a direction, a force or a velocity.
  */
 typedef struct {
@@ -1158,48 +1186,6 @@ typedef struct {
    */
   uint32_t triangle_tests;
 } dibs_proximity;
-
-/**
- * The last answer whose side was certain, widened by the motion since. All zeros are no past. Keep one for each tool.
- */
-typedef struct {
-  /**
-   * The answer.
-   */
-  dibs_proximity proximity;
-  /**
-   * 1 where there is one; else 0.
-   */
-  uint32_t has_past;
-} dibs_last_side;
-
-/**
- * A wall: a margin around the surface, with a spring and a damper.
- *
- * A sampled wall is passive only if the device's own damping is above `stiffness * tick / 2 + damping`.
- */
-typedef struct {
-  /**
-   * In N/mm, above 0.
-   */
-  float stiffness;
-  /**
-   * In N s/mm, at least 0.
-   */
-  float damping;
-  /**
-   * Damping (N s/mm, at least 0) where there is no answer to act on; 0 lets go of the tool.
-   */
-  float hold_damping;
-  /**
-   * In N, above 0.
-   */
-  float max_force;
-  /**
-   * Reach of the wall from the surface (mm, above 0).
-   */
-  float margin;
-} dibs_wall;
 
 /**
  * A force and a torque on the tool.
@@ -1752,24 +1738,6 @@ dibs_code dibs_bus_register(dibs_bus *bus);
 const char *dibs_code_text(uint32_t code);
 
 /**
- * Gives a wall an answer to act on where a tick's own has no side: the last one with a side and its force, by the motion
- * since. Call it at every tick, before `dibs_wall_force`; a wall on its own has no past, and damps without a side.
- *
- * @param last       The tool's past, which goes on.
- * @param outcome    As for `dibs_wall_force`.
- * @param proximity  The closest pair, in place of which the pair to act on is written; not read, and may be null, where the
- *                   outcome is an error.
- * @param moved      The most (mm) that tool and surface together have moved since the last call, as of
- *                   `dibs_tracker_closest`; negative where it is not known, which ends the past.
- * @return `DIBS_CODE_OK`, also for an outcome that is an error; `DIBS_CODE_ARGUMENT` for a side or coverage that is none; or
- *         a misuse.
- */
-dibs_code dibs_last_side_settle(dibs_last_side *last,
-                                uint32_t outcome,
-                                dibs_proximity *proximity,
-                                float moved);
-
-/**
  * The force of a wall on the tool, from its closest pair.
  *
  * Call it at every tick, with the code of whatever the pair came from: with an error the force is the hold, pure damping.
@@ -1838,16 +1806,6 @@ dibs_code dibs_query_contacts(dibs_query *query,
                               const dibs_options *options,
                               dibs_contacts *contacts,
                               dibs_proximity *proximity);
-
-/**
- * Gives a list whose tool may be inside, because the closest pair has no side, that of `closest`: a pair whose side is
- * certain from the tool's past, of `dibs_last_side_settle`. That pair is a contact then, and the only one unless the tool is
- * outside. Other lists stay as they are.
- *
- * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a side or coverage that is none, or a misuse.
- */
-dibs_code dibs_contacts_settle(dibs_contacts *contacts,
-                               const dibs_proximity *closest);
 
 /**
  * Facts that hold for the list.

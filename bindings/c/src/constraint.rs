@@ -1,9 +1,7 @@
 //! Constraints: the force that keeps a tool out of a margin around the surface.
 
 use bytemuck::AnyBitPattern;
-use dibs_nostd::constraint::{
-    ConstraintState, ForbiddenRegion, LastSide, Proxy, SpringDamper, Wrench,
-};
+use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, Proxy, SpringDamper, Wrench};
 use dibs_nostd::{Proximity, Unavailable};
 
 use crate::border::{Handle, Input, Output};
@@ -88,57 +86,6 @@ fn failure(outcome: u32) -> Option<dibs_code> {
         Some(code) => Some(code),
         None => Some(dibs_code::Argument),
     }
-}
-
-/// The last answer whose side was certain, widened by the motion since. All zeros are no past. Keep one for each tool.
-#[derive(Clone, Copy, AnyBitPattern)]
-#[repr(C)]
-pub struct dibs_last_side {
-    /// The answer.
-    pub proximity: dibs_proximity,
-    /// 1 where there is one; else 0.
-    pub has_past: u32,
-}
-
-/// Gives a wall an answer to act on where a tick's own has no side: the last one with a side and its force, by the motion
-/// since. Call it at every tick, before `dibs_wall_force`; a wall on its own has no past, and damps without a side.
-///
-/// @param last       The tool's past, which goes on.
-/// @param outcome    As for `dibs_wall_force`.
-/// @param proximity  The closest pair, in place of which the pair to act on is written; not read, and may be null, where the
-///                   outcome is an error.
-/// @param moved      The most (mm) that tool and surface together have moved since the last call, as of
-///                   `dibs_tracker_closest`; negative where it is not known, which ends the past.
-/// @return `DIBS_CODE_OK`, also for an outcome that is an error; `DIBS_CODE_ARGUMENT` for a side or coverage that is none; or
-///         a misuse.
-#[unsafe(no_mangle)]
-pub extern "C" fn dibs_last_side_settle(
-    last: *mut dibs_last_side,
-    outcome: u32,
-    proximity: *mut dibs_proximity,
-    moved: f32,
-) -> dibs_code {
-    dibs_code::of(|| {
-        let place = last.check()?;
-        let dibs_last_side { proximity: before, has_past } = place.get();
-        let before = if has_past == 0 { None } else { Some(Proximity::try_from(before)?) };
-        let mut last = LastSide::from(before);
-        let settled = match failure(outcome) {
-            Some(_) => last.settle(Err(Unavailable::NoSurface), Some(moved)).ok(),
-            None => {
-                let answer = Proximity::try_from(proximity.check()?.get())?;
-                last.settle(Ok(answer), Some(moved)).ok()
-            }
-        };
-        if let Some(settled) = settled {
-            proximity.check()?.set(settled.into());
-        }
-        place.set(dibs_last_side {
-            proximity: last.last().copied().unwrap_or(Proximity::NOWHERE).into(),
-            has_past: last.last().is_some().into(),
-        });
-        Ok(())
-    })
 }
 
 /// The force of a wall on the tool, from its closest pair.

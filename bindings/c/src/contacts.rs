@@ -158,23 +158,6 @@ pub extern "C" fn dibs_query_contacts(
     })
 }
 
-/// Gives a list whose tool may be inside, because the closest pair has no side, that of `closest`: a pair whose side is
-/// certain from the tool's past, of `dibs_last_side_settle`. That pair is a contact then, and the only one unless the tool is
-/// outside. Other lists stay as they are.
-///
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a side or coverage that is none, or a misuse.
-#[unsafe(no_mangle)]
-pub extern "C" fn dibs_contacts_settle(
-    contacts: *mut dibs_contacts,
-    closest: *const dibs_proximity,
-) -> dibs_code {
-    dibs_code::of(|| {
-        let closest = Proximity::try_from(closest.get()?)?;
-        contacts.open()?.0.settle(&closest);
-        Ok(())
-    })
-}
-
 /// Facts that hold for the list.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_contacts_get_facts(

@@ -4,7 +4,6 @@ use glam::Vec3;
 
 use super::surface::Notes;
 use super::{Answer, GuardLimits, Searched};
-use crate::constraint::LastSide;
 use crate::failsafe::{AcknowledgeError, FailSafe, Observation};
 use crate::{
     Error, FrameReader, Index, Millis, Options, Tool, Tracker, TrackerAnswer, Tree, TreeBytes,
@@ -21,7 +20,6 @@ pub struct Guard<'s, 't, I, const STACK: usize, const OPENED: usize> {
     tree: TreeBytes<'t, I>,
     tracker: Tracker<'t, I, STACK, OPENED>,
     failsafe: FailSafe,
-    last_side: LastSide,
     options: Options,
     /// Ticks a second.
     rate: f32,
@@ -71,7 +69,6 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
             tree: bytes,
             tracker: Tracker::new(tree)?,
             failsafe: FailSafe::new(limits.failsafe()?),
-            last_side: LastSide::new(),
             options: limits.options,
             rate: limits.rate,
             before: None,
@@ -145,9 +142,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
                 || self.tracker.tree().check(self.tree.bytes()).is_err(),
         });
         self.notes.set_state(trust.state);
-        let admitted = tracked.and_then(|tracked| trust.admit(tracked.closest));
-        let moved = tracked.ok().and_then(|tracked| tracked.moved);
-        let closest = self.last_side.settle(admitted, moved);
+        let closest = tracked.and_then(|tracked| trust.admit(tracked.closest));
         Answer { closest, velocity, trust, link, searched, tracked }
     }
 

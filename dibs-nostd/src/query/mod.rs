@@ -150,6 +150,7 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         self.triangle = found.triangle.or(self.triangle);
         let memory = (&mut self.ties, None);
         signed(&self.tree, &mut self.stack, vertices, tool, options, &mut found, memory)?;
+        found.add_position_error(vertices);
         Ok(found)
     }
 }

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::{NoSide, Side};
 use crate::math::round::{sum_down, sum_up};
-use crate::{Coverage, TriangleRow};
+use crate::{Coverage, TriangleRow, VertexTable};
 
 /// The closest pair between a tool and a surface, with a certified interval for its separation.
 ///
@@ -123,6 +123,11 @@ impl Proximity {
             triangle_tests: self.triangle_tests.saturating_add(other.triangle_tests),
             ..nearer
         }
+    }
+
+    /// The answer on positions that are off by the table's position error.
+    pub(super) fn add_position_error<V: VertexTable + ?Sized>(&mut self, vertices: &V) {
+        self.accuracy = sum_up(self.accuracy, vertices.position_error());
     }
 
     /// Whether the budget ran out before the closest point was certain.

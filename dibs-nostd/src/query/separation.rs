@@ -10,7 +10,6 @@ use super::memory::depth::KnownDepthMut;
 use super::search::{Ties, Waiting};
 use super::side::{self, NoSide, OnAxis, Side};
 use super::{Options, Proximity, solids};
-use crate::math::round::sum_up;
 use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
@@ -23,8 +22,7 @@ pub(super) struct Asked<'a, 't, I, V: ?Sized, T> {
     pub options: &'a Options,
 }
 
-/// Adds the side, and the signed separation that follows from it. Both take the table's positions as exact; their
-/// position error is added to the accuracy last. `ties` are the triangles that may be
+/// Adds the side, and the signed separation that follows from it, for positions that are exact. `ties` are the triangles that may be
 /// the closest, `known` a tracker's memory of the last tick's depth.
 #[inline(never)]
 pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
@@ -47,7 +45,6 @@ pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
         asked.signed(stack, found, memory, RootSet::ALL)?;
     }
     found.coverage = options.coverage(vertices);
-    found.accuracy = sum_up(found.accuracy, vertices.position_error());
     Ok(())
 }
 

@@ -1,6 +1,6 @@
 //! Between ticks: the first time at which a moving tool and surface come closer than a margin.
 
-use super::tracker::Tracker;
+use super::tracker::{Tracker, TrackerAnswer};
 use super::{Options, Proximity, Side};
 use crate::math::sqrt::sqrt;
 use crate::unavailable::QueryError;
@@ -100,8 +100,10 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let mut look = |time: f32, options: &Options| {
             let tool = from.towards(to, time);
             let surface = way.step.at(first + time * (last - first));
-            let found = self.closest(&surface, &tool, options)?.closest;
-            Ok(Look::new(found, margin, ROUNDING * (size + found.axis_distance), tool.radius()))
+            let TrackerAnswer { closest: found, is_kept, .. } =
+                self.closest(&surface, &tool, options)?;
+            let rounding = ROUNDING * (size + found.axis_distance);
+            Ok(Look::new(found, is_kept, margin, rounding, tool.radius()))
         };
         let at_end = look(1.0, options)?;
         let mut swept =
@@ -148,11 +150,12 @@ struct Look {
 }
 
 impl Look {
-    fn new(found: Proximity, margin: f32, rounding: f32, radius: f32) -> Self {
+    fn new(found: Proximity, is_kept: bool, margin: f32, rounding: f32, radius: f32) -> Self {
         let separation = found.axis_distance - radius;
         // Signed answers are exact; others bound the distance to the surface.
         let lower = match found.side {
             Side::Undefined(_) => found.lower,
+            _ if is_kept => found.lower,
             _ => separation,
         };
         let error = found.accuracy + rounding;
@@ -183,7 +186,7 @@ mod tests {
             side: Side::Outside,
             ..Proximity::NOWHERE
         };
-        let spare = |margin| Look::new(found, margin, 0.125, 1.0).spare;
+        let spare = |margin| Look::new(found, false, margin, 0.125, 1.0).spare;
         assert_eq!([spare(1.0), spare(1.625), spare(1.75), spare(2.0)], [0.625, 0.0, 0.0, 0.0]);
     }
 }

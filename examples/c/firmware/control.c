@@ -50,8 +50,6 @@ static dibs_failsafe *failsafe;
 static uint32_t tick;
 /* The last tick's instrument, for its velocity. */
 static dibs_tool before;
-/* For ticks whose answer has no side. */
-static dibs_last_side last_side;
 
 void control_init(void) {
     must(dibs_tracker_init(tracker_memory, sizeof tracker_memory, surface_tree(), &tracker));
@@ -73,7 +71,7 @@ static void write(const dibs_proximity *found, tick_record *record) {
 }
 
 /* The closest pair on the frame published last. What the fail-safe machine has to know goes to `seen`. */
-static dibs_code ask(const dibs_tool *tool, dibs_observation *seen, dibs_proximity *found, float *moved,
+static dibs_code ask(const dibs_tool *tool, dibs_observation *seen, dibs_proximity *found,
                      tick_record *record) {
     /* The fail-safe machine decides how old a surface may be. */
     const dibs_code held = dibs_reader_latest(reader, tick, DIBS_UNLIMITED, frame, &seen->age);
@@ -90,7 +88,7 @@ static dibs_code ask(const dibs_tool *tool, dibs_observation *seen, dibs_proximi
     record->position_error = facts.position_error;
 
     const uint32_t start = clock_now();
-    seen->query = dibs_tracker_closest_on(tracker, frame, tool, &options, found, &record->fallback, moved);
+    seen->query = dibs_tracker_closest_on(tracker, frame, tool, &options, found, &record->fallback, NULL);
     record->query_counts = clock_now() - start;
     /* Until then no frame is published. */
     must(dibs_frame_release(frame));
@@ -132,8 +130,7 @@ void control_tick(tick_record *record) {
 
     dibs_observation seen = {.query = DIBS_CODE_OK};
     dibs_proximity found;
-    float moved = -1.0f;
-    dibs_code code = ask(&tool, &seen, &found, &moved, record);
+    dibs_code code = ask(&tool, &seen, &found, record);
     const float share = code == DIBS_CODE_OK ? found.axis_parameter : 0.5f;
 
     must(dibs_reader_link(reader, tick, &seen.link));
@@ -145,7 +142,6 @@ void control_tick(tick_record *record) {
     if (code == DIBS_CODE_OK) {
         code = dibs_verdict_admit(&verdict, &found);
     }
-    must(dibs_last_side_settle(&last_side, code, &found, moved));
     dibs_force force;
     must(dibs_wall_force(&wall, code, &found, velocity(&tool, share), &force));
 

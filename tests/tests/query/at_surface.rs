@@ -165,13 +165,8 @@ fn a_tool_without_a_direction_is_held() {
             continue;
         }
         without += usize::from(found.direction == Vec3::ZERO);
-        let force = |list: &Contacts<32>| {
-            let accuracy = list.accuracy();
-            proxy.wrench(list.within(MARGIN), accuracy, on, Vec3::ZERO, Vec3::ZERO).state
-        };
-        assert_ne!(force(&list), ConstraintState::Inactive, "{found:?}");
-        list.settle(&found);
-        assert_ne!(force(&list), ConstraintState::Inactive, "{found:?}");
+        let force = proxy.wrench(list.within(MARGIN), list.accuracy(), on, Vec3::ZERO, Vec3::ZERO);
+        assert_ne!(force.state, ConstraintState::Inactive, "{found:?}");
     }
     println!("{without} without a direction");
     assert!(without > 3, "{without}");

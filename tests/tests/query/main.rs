@@ -22,6 +22,7 @@ mod slack;
 mod solids;
 mod swept;
 mod ties;
+mod tracked_budget;
 mod tracked_chain;
 mod tracked_contacts;
 mod tracked_depth;

@@ -91,7 +91,8 @@ fn the_closest_of_tracked_pairs_is_that_of_whole_queries() {
         );
         if !cfg!(debug_assertions) {
             assert!(mean < 8.0 && cut_short + undefined > 100, "{mean} {cut_short}");
-            assert!(!is_signed || (inside > 500 && undefined > 100), "{inside} {undefined}");
+            // A tick that is cut short has the last one's side.
+            assert!(!is_signed || (inside > 500 && undefined < 10), "{inside} {undefined}");
         }
     }
 }

@@ -96,24 +96,6 @@ int main(int argc, char **argv) {
         EXPECT(true, tracked.node_tests < on_bus.node_tests);
         EXPECT(true, tracked.coverage == DIBS_COVERAGE_MEASURED);
 
-        /* An answer without a side: the last one's stays, by the motion since. */
-        dibs_last_side last = {};
-        dibs_proximity settled = tracked;
-        MUST(dibs_last_side_settle(&last, DIBS_CODE_OK, &settled, -1.0f));
-        EXPECT(true, last.has_past == 1 && settled.separation == tracked.separation);
-        settled.side = DIBS_SIDE_DEGENERATE;
-        dibs_interval interval;
-        MUST(dibs_proximity_interval(&settled, &interval));
-        EXPECT(true, interval.lower < -1e30f && interval.upper >= tracked.separation);
-        MUST(dibs_last_side_settle(&last, DIBS_CODE_OK, &settled, 0.5f));
-        EXPECT(true, settled.side == tracked.side);
-        MUST(dibs_last_side_settle(&last, DIBS_CODE_STALE, nullptr, 0.0f));
-        EXPECT(true, last.has_past == 1);
-        MUST(dibs_proximity_interval(&settled, &interval));
-        EXPECT(true, interval.lower < tracked.lower && interval.upper > tracked.separation);
-        MUST(dibs_contacts_settle(contacts, &settled));
-        settled.coverage = 9;
-        EXPECT(DIBS_CODE_ARGUMENT, dibs_proximity_interval(&settled, &interval));
     }
     dibs::Frame frame;
     MUST(frame.init());

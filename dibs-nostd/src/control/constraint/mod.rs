@@ -14,9 +14,9 @@
 //!   contact to any depth, and its size is continuous through contact and through the surface. Where it has none, or
 //!   the query was [`unsigned`](crate::Options::unsigned), the tool is taken to be outside, and a query that its budget
 //!   cut short never weakens the force.
-//! - Where the side is undefined, [`LastSide`] keeps the last certain one and its force, by the motion since. Without a
-//!   past the output is the hold, never [`Inactive`](ConstraintState::Inactive): the tool may be inside. Within the
-//!   accuracy of the surface both sides give the same force, and it acts.
+//! - Where the side is undefined, the output is the hold, never [`Inactive`](ConstraintState::Inactive): the tool may be inside. A
+//!   [`Tracker`](crate::Tracker) has a side at every tick after a first certain one. Within the accuracy of the surface
+//!   both sides give the same force, and it acts.
 //! - If the proximity is unknown, the surface stale, or a number not finite, the output is the *hold*: pure damping
 //!   against the tool's velocity, saturated the same way, and the state gives the reason. For a velocity that is not
 //!   finite it is zero.
@@ -48,7 +48,6 @@ macro_rules! tri {
 
 mod forbidden;
 mod guidance;
-mod last_side;
 mod proxy;
 mod rows;
 #[cfg(test)]
@@ -66,7 +65,6 @@ use crate::unavailable::Unavailable;
 
 pub use forbidden::ForbiddenRegion;
 pub use guidance::Guidance;
-pub use last_side::LastSide;
 pub use proxy::{Proxy, Wrench};
 pub use rows::VelocityRow;
 

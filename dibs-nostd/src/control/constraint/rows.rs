@@ -18,7 +18,7 @@ use crate::query::Contact;
 /// ([`Options::depth_tolerance`](crate::Options::depth_tolerance)); of triangles that tie within it, the row has two.
 /// Between opposite walls its factors are small, and 0 between parallel ones: no small motion makes the tool less deep, so a
 /// row below its stand-off has no solution unless the solver may relax it. Where the budget ended before the second triangle
-/// was found, and for a contact of [`Contacts::settle`](crate::Contacts::settle), the row is that of the closest triangle.
+/// was found, the row is that of the closest triangle.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};

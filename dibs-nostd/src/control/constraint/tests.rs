@@ -175,69 +175,6 @@ fn a_tool_at_the_surface_is_pushed_out() {
     );
 }
 
-/// The tool deep inside moves on where no side is known: the force stays, and grows by the motion.
-#[test]
-fn the_last_side_holds_as_long_as_it_is_not_known() {
-    let soft = SpringDamper::stiffness(0.1).max_force(5.0);
-    let wall = ForbiddenRegion::new(soft, 3.0).unwrap();
-    let inside = Proximity { side: Side::Inside, accuracy: 1e-4, ..pair(-10.0 - RADIUS, Vec3::Y) };
-    for (reason, held) in NO_SIDES {
-        let mut last_side = LastSide::new();
-        let now = without_side(reason, 10.0 - RADIUS);
-        // Without a past it comes back as it is.
-        assert_eq!(last_side.settle(Ok(now), Some(0.0)), Ok(now));
-        assert_eq!(last_side.settle(Ok(inside), None), Ok(inside));
-        for tick in 1..100_u16 {
-            let kept = last_side.settle(Ok(now), Some(0.05)).unwrap();
-            let Some(_) = held else {
-                assert_eq!(kept, now);
-                continue;
-            };
-            let deeper = 0.05 * f32::from(tick);
-            let force = wall.force(&Ok(kept), Vec3::ZERO).force;
-            assert!((force - Vec3::Y * 0.1 * (15.5 + deeper)).length() < 1e-3, "{tick}: {force}");
-            let interval = kept.interval();
-            assert!(interval.lower <= -12.5 - deeper && interval.upper >= -12.5 + deeper);
-        }
-        // Once the motion is not known there is no past.
-        for moved in [None, Some(f32::NAN), Some(-1.0)] {
-            let mut last_side = last_side;
-            assert_eq!(last_side.settle(Ok(now), moved), Ok(now));
-            assert_eq!(last_side.settle(Ok(now), Some(0.0)), Ok(now));
-        }
-        // An answer that is missing ends nothing.
-        let gone = last_side.settle(Err(Unavailable::NoSurface), Some(1.0));
-        assert_eq!(gone, Err(Unavailable::NoSurface));
-        let kept = last_side.settle(Ok(now), Some(0.0)).unwrap();
-        assert_eq!(held.is_some(), kept.side == Side::Inside);
-    }
-}
-
-/// From outside, a motion too short to lead inside keeps the tool outside; a longer one is not trusted.
-#[test]
-fn the_last_side_is_outside_while_the_motion_cannot_have_led_in() {
-    let far = Proximity { accuracy: 1e-4, ..pair(20.0, Vec3::Y) };
-    let now = without_side(NoSide::OpenBoundary, 18.0);
-    let settle = |moved| {
-        let mut last_side = LastSide::new();
-        last_side.settle(Ok(far), None).unwrap();
-        last_side.settle(Ok(now), Some(moved)).unwrap()
-    };
-    // Seen from the pair at hand.
-    let outside = settle(2.5);
-    assert_eq!((outside.side, outside.separation), (Side::Outside, 18.0));
-    assert!(close(outside.direction, Vec3::X), "{outside:?}");
-    assert_eq!(wall().force(&Ok(outside), Vec3::ZERO), ConstraintForce::NONE);
-    // 42.9 mm of motion could lead to 20.5 mm inside.
-    assert_eq!(settle(42.9).side, Side::Outside);
-    let doubtful = settle(43.1);
-    assert!(wall().force(&Ok(doubtful), Vec3::ZERO).force.y > 4.9, "{doubtful:?}");
-    // Neither side is that near: what was said of the motion is wrong.
-    let wrong = settle(1.0);
-    assert_eq!(wrong, now);
-    assert!(matches!(wall().force(&Ok(wrong), Vec3::ZERO).state, ConstraintState::Safe(_)));
-}
-
 /// A contact `gap` from a tool.
 fn contact(gap: f32) -> Contact {
     Contact { separation: gap, normal: Vec3::X, ..Contact::NONE }

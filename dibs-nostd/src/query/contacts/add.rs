@@ -54,6 +54,11 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         Ok(())
     }
 
+    /// Contacts beyond `bound` may be missing.
+    pub(in crate::query) fn lower_bound(&mut self, bound: f32) {
+        self.found.lower_bound(bound);
+    }
+
     /// The result, with an empty list if it is an error.
     pub(in crate::query) fn unless_failed<R>(
         &mut self,

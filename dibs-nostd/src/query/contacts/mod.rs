@@ -194,10 +194,10 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     }
 
     /// Gives a list whose tool may be inside, because the closest pair has no side, that of `closest`: a pair whose side
-    /// is certain from the tool's past, as [`LastSide`](crate::constraint::LastSide) makes it. That pair is a contact
+    /// is certain from a tracker's last tick. That pair is a contact
     /// then, and the only one unless the tool is outside. Other lists stay as they are, and so does one whose `closest` has
     /// no direction.
-    pub fn settle(&mut self, closest: &Proximity) {
+    pub(super) fn settle(&mut self, closest: &Proximity) {
         if !self.found.has_no_side || matches!(closest.side, Side::Undefined(_)) {
             return;
         }

@@ -6,6 +6,7 @@
 //! | [`range`] | the children of opened nodes that are farther than a range search went |
 //! | [`leaves`] | the leaves around the deepest point of an axis |
 //! | [`depth`] | the depth of an axis' parts |
+//! | [`separation`] | the signed separation |
 //!
 //! One clock counts the motion for all.
 
@@ -15,6 +16,7 @@ pub mod depth;
 pub mod front;
 pub mod leaves;
 pub mod range;
+pub mod separation;
 
 use crate::surface::motion::Unit;
 use crate::{MotionReading, Tool};
@@ -23,6 +25,7 @@ use clock::{MotionClock, Reading};
 use depth::KnownDepth;
 use front::Front;
 use range::RangeFront;
+use separation::KnownSeparation;
 
 /// Most units that the clock may count between two tests of a bound: half of the range that deadlines can tell apart.
 const FARTHEST: u32 = 1 << 29;
@@ -38,6 +41,7 @@ pub(super) struct Memory<const OPENED: usize, const RANGE: usize> {
     pub front: Front<OPENED>,
     pub range: RangeFront<RANGE>,
     pub depth: KnownDepth,
+    pub separation: KnownSeparation,
 }
 
 /// Why a motion is of no use to the bounds.
@@ -61,6 +65,7 @@ impl<const OPENED: usize, const RANGE: usize> Memory<OPENED, RANGE> {
             front: Front::EMPTY,
             range: RangeFront::EMPTY,
             depth: KnownDepth::new(),
+            separation: KnownSeparation::NONE,
         }
     }
 
@@ -86,6 +91,7 @@ impl<const OPENED: usize, const RANGE: usize> Memory<OPENED, RANGE> {
                 self.front.borrow().clear();
                 self.range.forget();
                 self.depth.forget();
+                self.separation.forget();
                 self.complete = self.clock.now();
             }
         }

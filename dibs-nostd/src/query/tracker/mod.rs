@@ -1,5 +1,6 @@
 //! The closest pair from tick to tick: a tick costs in proportion to the change.
 
+mod kept;
 mod several;
 #[cfg(test)]
 mod tests;
@@ -87,6 +88,9 @@ struct Last {
 pub struct TrackerAnswer {
     /// The closest pair; its counts of tests are this tick's.
     pub closest: Proximity,
+    /// The side is the last tick's, as far as the motion since leaves it possible, because this tick's search found none: its
+    /// budget ended, or the side is undefined. The pair may not be the closest one then; the certified interval holds.
+    pub is_kept: bool,
     /// The reason, if this tick was a whole query.
     pub fallback: Option<Fallback>,
     /// Most (mm) that tool and surface together have moved since the last tick; `None` where it is not known, and of
@@ -177,8 +181,9 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
 
     /// The closest pair between `tool` and the surface as it is now.
     ///
-    /// As [`Query::closest`](crate::Query::closest), warm start included. A budget widens the interval as there, and
-    /// the next tick continues where this one ended.
+    /// As [`Query::closest`](crate::Query::closest), warm start included. A budget widens the interval as there, but not
+    /// beyond that of the last tick and the motion since ([`TrackerAnswer::is_kept`]), and the next tick continues where this
+    /// one ended.
     ///
     /// Cost: the budget at most, and one number for each opened node.
     ///
@@ -190,10 +195,14 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         tool: &T,
         options: &Options,
     ) -> Result<TrackerAnswer, QueryError> {
-        self.within(surface, tool, options, f32::INFINITY)
+        let mut tracked = self.within(surface, tool, options, f32::INFINITY)?;
+        self.keep_certain(surface, tool, options, &mut tracked)?;
+        tracked.closest.add_position_error(surface);
+        Ok(tracked)
     }
 
-    /// The closest pair; of pairs that are farther than `separation` (mm), only that they are.
+    /// The closest pair that a search finds, on positions that are exact; of pairs that are farther than `separation` (mm),
+    /// only that they are.
     fn within<S: MovingSurface + ?Sized, T: Tool>(
         &mut self,
         surface: &S,
@@ -238,11 +247,14 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let memory = &mut self.memory;
         let known = (&mut self.ties, Some(memory.depth.at(memory.clock)));
         signed(&self.tree, &mut self.stack, surface, tool, options, &mut closest, known)?;
+        let memory = &mut self.memory;
         memory.keep(tool, motion, is_complete);
         let (is_closed, now) = (self.tree.is_closed(), memory.clock.now());
         self.last = motion.map(|_| Last::new(tool, &closest, is_closed, now));
         let opened = memory.front.borrow().used() as u32;
-        Ok(TrackerAnswer { closest, fallback, moved: moved_by, opened, pair: 0, searched: 1 })
+        let moved = moved_by;
+        let (is_kept, pair, searched) = (false, 0, 1);
+        Ok(TrackerAnswer { closest, is_kept, fallback, moved, opened, pair, searched })
     }
 
     /// The closest pair, and all contacts within `margin` (mm): those of [`Query::contacts`](crate::Query::contacts).
@@ -277,19 +289,34 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         options: &Options,
         contacts: &mut Contacts<N, NEAR>,
     ) -> Result<TrackerAnswer, QueryError> {
-        let tracked = self.closest(surface, tool, options)?;
-        let closest = &tracked.closest;
-        let options =
-            options.budget(options.budget.less(closest.node_tests, closest.triangle_tests));
-        let pair =
-            Pair { tree: &self.tree, vertices: surface, tool, closest, surface: 0, number: 0 };
+        let mut tracked = self.within(surface, tool, options, f32::INFINITY)?;
+        // Where the search found all but the side, it has all contacts: the last tick's side comes after them.
+        let is_cut = tracked.closest.side == Side::Undefined(NoSide::CutShort);
+        if is_cut {
+            self.keep_certain(surface, tool, options, &mut tracked)?;
+        }
+        let mut closest = tracked.closest;
+        closest.add_position_error(surface);
+        let rest = options.budget(options.budget.less(closest.node_tests, closest.triangle_tests));
+        let (tree, closest) = (&self.tree, &closest);
+        let pair = Pair { tree, vertices: surface, tool, closest, surface: 0, number: 0 };
+        if tracked.is_kept {
+            contacts.lower_bound(closest.lower);
+        }
         match surface.motion() {
             Some(_) => {
                 let front = self.memory.range.now(self.memory.clock, options.part);
-                contacts.add_tracked(&pair, &mut self.stack, &options, front)?
+                contacts.add_tracked(&pair, &mut self.stack, &rest, front)?
             }
-            None => contacts.add(&pair, &mut self.stack, &options)?,
+            None => contacts.add(&pair, &mut self.stack, &rest)?,
         };
+        if !is_cut {
+            self.keep_certain(surface, tool, options, &mut tracked)?;
+        }
+        tracked.closest.add_position_error(surface);
+        if tracked.is_kept && !is_cut {
+            contacts.settle(&tracked.closest);
+        }
         Ok(tracked)
     }
 

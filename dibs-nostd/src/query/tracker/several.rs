@@ -193,6 +193,7 @@ impl TrackerAnswer {
         }
         Self {
             closest,
+            is_kept: self.is_kept || other.is_kept,
             fallback: self.fallback.or(other.fallback),
             searched: self.searched.saturating_add(other.searched),
             ..closer

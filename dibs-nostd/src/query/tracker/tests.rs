@@ -15,7 +15,8 @@ use crate::query::memory::clock::Deadline;
 use crate::query::memory::front::{NOWHERE, UNUSED};
 use crate::tree::format::Link;
 use crate::{
-    Budget, Capsule, Coverage, Odometer, Options, Sphere, Tree, VertexTable, measure_stretch,
+    Budget, Capsule, Coverage, MotionReading, MovingSurface, Odometer, Options, Sphere, Tree,
+    VertexTable, measure_stretch,
 };
 
 /// A bound in the front.
@@ -235,5 +236,63 @@ fn bounds_are_used_up_as_fast_as_tool_and_surface_move() {
         let spare = approach(&built, moves_tool);
         std::println!("{spare:.1e} of the way to spare");
         assert!(spare < 3e-4, "{spare}");
+    }
+}
+
+/// A surface whose positions are off by so much.
+struct Off<'a> {
+    rows: &'a [Vec3],
+    motion: Option<MotionReading>,
+    error: f32,
+}
+
+impl VertexTable for Off<'_> {
+    fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.rows.position(vertex)
+    }
+
+    fn position_error(&self) -> f32 {
+        self.error
+    }
+}
+
+impl crate::surface::motion::sealed::Sealed for Off<'_> {}
+
+impl MovingSurface for Off<'_> {
+    fn motion(&self) -> Option<MotionReading> {
+        self.motion
+    }
+}
+
+/// What a tick keeps of the last one is certain of the positions. Their error is this tick's.
+#[test]
+fn an_error_that_grows_widens_what_is_kept() {
+    let mesh = generate::heart(320).unwrap().mesh;
+    let built = Builder::new().build(&mesh).unwrap();
+    let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
+    let rows = built.to_rows(&mesh.positions);
+    let motion = Odometer::new(&tree).start(rows.as_slice()).motion();
+    let tool = Sphere::new(Vec3::new(80.0, 0.0, 20.0), 2.5).unwrap();
+    let mut tracker = Tracker::<_, 64, 64>::new(&tree).unwrap();
+    let mut tick = |error: f32, budget: Budget| {
+        let surface = Off { rows: &rows, motion, error };
+        let options = Options::cold().budget(budget);
+        tracker.closest(&surface, &tool, &options).unwrap().closest
+    };
+    let known = tick(0.5, Budget::UNLIMITED);
+    let none = Budget { node_tests: 0, triangle_tests: 0 };
+    for error in [2.0, 0.25, 0.0] {
+        let kept = tick(error, none);
+        assert_eq!(kept.side, known.side);
+        let (first, now) = (known.interval(), kept.interval());
+        let expected = [first.lower + 0.5 - error, first.upper - 0.5 + error];
+        for (end, expected) in [now.lower, now.upper].into_iter().zip(expected) {
+            assert!((end - expected).abs() < 0.05, "{error}: {now:?} {expected}");
+        }
+        assert!(now.lower <= expected[0] + 1e-3 && now.upper >= expected[1] - 1e-3, "{now:?}");
     }
 }

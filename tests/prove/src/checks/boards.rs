@@ -94,7 +94,7 @@ const FOLDER: &str = "examples/stm32h743";
 const PROGRAM: &str = "stm32h743";
 
 /// Functions below the tick that few ticks call. They and what they alone call are in flash.
-const RARE: [&str; 15] = [
+const RARE: [&str; 18] = [
     "query::exact::",
     "query::side::decided",
     "query::side::of_many",
@@ -105,11 +105,14 @@ const RARE: [&str; 15] = [
     "query::solids::signed",
     "query::search::roots::Roots::with_others",
     "query::search::ties::Ties::drop_farther",
-    "query::search::Search<I,V,T>::not_finite",
+    "query::search::Search<I,V,T>>::not_finite",
     "query::tracker::Tracker<I,_,_,_>::whole",
+    "query::tracker::kept::face_surface",
+    "query::tracker::Tracker<I,_,_,_>>::narrow",
+    "query::tracker::Tracker<I,_,_,_>>::without_side",
+    "query::tracker::Tracker<I,_,_,_>>::take_pair",
     "tool::triangle::closest_of_all",
     "tool::edge::nearly_parallel",
-    "constraint::last_side::LastSide::without_side",
 ];
 
 /// A memory of the part: RM0433, table 7.

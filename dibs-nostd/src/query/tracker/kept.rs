@@ -1,0 +1,254 @@
+//! What a tick's search left open, from the ticks before.
+//!
+//! Two intervals hold the signed distance: that of the search, and the last tick's, widened by the motion. So does what they
+//! have in common. It decides most sides that a search leaves open, and where it does not, a constraint acts on its lower
+//! end, along the direction of the last pair.
+//!
+//! The side of an open surface is that of its closest sheet, which can change without contact: there the past stands in
+//! only where a search finds no side.
+
+use glam::Vec3;
+
+use super::{Last, Tracker, TrackerAnswer};
+use crate::math::round::{sum_down, sum_up};
+use crate::math::sqrt::sqrt;
+use crate::query::memory::separation::Certain;
+use crate::query::{NoSide, Options, Proximity, Side};
+use crate::tool::AxisPoint;
+use crate::unavailable::QueryError;
+use crate::{Index, Tool, TriangleRow, VertexTable};
+
+/// A pair closer than so many accuracies has no direction of its own.
+const DIRECTED: f32 = 8.0;
+
+impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
+    Tracker<'_, I, STACK, OPENED, RANGE>
+{
+    /// Narrows an answer to what the last tick leaves possible, and remembers it for the next one. Its accuracy is without
+    /// the table's position error, which says nothing of the motion.
+    #[inline(never)]
+    pub(super) fn keep_certain<V: VertexTable + ?Sized, T: Tool>(
+        &mut self,
+        vertices: &V,
+        tool: &T,
+        options: &Options,
+        tracked: &mut TrackerAnswer,
+    ) -> Result<(), QueryError> {
+        let (clock, found) = (self.memory.clock, &mut tracked.closest);
+        let last = self.memory.separation.now(clock);
+        let own = match found.side {
+            Side::Undefined(NoSide::NotAsked | NoSide::NoAdjacency) => return Ok(()),
+            Side::Undefined(_) => match last {
+                Some(last) => {
+                    let own = self.without_side(vertices, tool, options, found, last)?;
+                    tracked.is_kept = !matches!(found.side, Side::Undefined(_));
+                    own
+                }
+                None => None,
+            },
+            _ => {
+                if found.direction == Vec3::ZERO
+                    && let Some(last) = last
+                {
+                    found.direction = last.direction;
+                    found.point_on_tool -= last.direction * tool.radius();
+                }
+                let own = Certain::of(found, tool.radius());
+                // Less is the rounding of two answers.
+                let gain = 2.0 * found.accuracy;
+                let is_narrower =
+                    |last: &Certain| last.lower > own.lower + gain || last.upper < own.upper - gain;
+                match last.filter(|last| self.tree.is_closed() && is_narrower(last)) {
+                    Some(last) => Some(self.narrow(vertices, tool, options, found, own, last)?),
+                    None => Some(own),
+                }
+            }
+        };
+        match own {
+            Some(certain) => self.memory.separation.keep(certain, clock),
+            None => self.memory.separation.forget(),
+        }
+        if tracked.is_kept
+            && let Some(last) = self.last
+        {
+            self.last =
+                Some(Last::new(tool, &tracked.closest, self.tree.is_closed(), last.searched));
+        }
+        Ok(())
+    }
+
+    /// The answer with a side, within the last tick's interval.
+    #[cold]
+    fn narrow<V: VertexTable + ?Sized, T: Tool>(
+        &self,
+        vertices: &V,
+        tool: &T,
+        options: &Options,
+        found: &mut Proximity,
+        own: Certain,
+        last: Certain,
+    ) -> Result<Certain, QueryError> {
+        let mut both = own;
+        if last.lower > own.lower {
+            both.lower = last.lower;
+        }
+        if last.upper < own.upper {
+            both.upper = last.upper;
+        }
+        // Impossible: the motion was more than was said.
+        if both.lower > both.upper {
+            return Ok(own);
+        }
+        if last.upper < own.upper {
+            // The last pair is deeper than any that this search found.
+            self.take_pair(vertices, tool, options, found, &last)?;
+        }
+        both.set_ends(found, tool.radius());
+        Ok(both.with_pair_of(found))
+    }
+
+    /// The answer without a side, with the one that the last tick leaves.
+    #[cold]
+    fn without_side<V: VertexTable + ?Sized, T: Tool>(
+        &self,
+        vertices: &V,
+        tool: &T,
+        options: &Options,
+        found: &mut Proximity,
+        last: Certain,
+    ) -> Result<Option<Certain>, QueryError> {
+        let unsigned = Certain::of(found, tool.radius());
+        let nearest = if unsigned.lower > 0.0 { unsigned.lower } else { 0.0 };
+        let mut both = last;
+        if unsigned.upper < both.upper {
+            both.upper = unsigned.upper;
+        }
+        // No point of the axis is deeper than its way to the pair.
+        let deepest = -(unsigned.upper + tool.axis_length()) * (1.0 + SUMS);
+        if deepest > both.lower {
+            both.lower = deepest;
+        }
+        if found.is_at_surface() {
+            // The search knows the separation, which is the same on both sides.
+            found.direction = last.direction;
+            return Ok(Some(both));
+        }
+        if both.lower > -nearest {
+            // The motion cannot have led inside.
+            if nearest > both.lower {
+                both.lower = nearest;
+            }
+            if both.lower > both.upper {
+                return Ok(None);
+            }
+            found.side = Side::Outside;
+            if !face_surface(found, tool) {
+                self.take_pair(vertices, tool, options, found, &last)?;
+            }
+        } else {
+            if both.upper < nearest {
+                // It cannot have led outside.
+                if -nearest < both.upper {
+                    both.upper = -nearest;
+                }
+                if both.lower > both.upper {
+                    return Ok(None);
+                }
+                found.side = if nearest > 0.0 { Side::Inside } else { Side::Crossing };
+            } else {
+                found.side = Side::Crossing;
+            }
+            self.take_pair(vertices, tool, options, found, &last)?;
+        }
+        both.set_ends(found, tool.radius());
+        Ok(Some(both.with_pair_of(found)))
+    }
+
+    /// Makes the last tick's pair, as it is now, that of the answer.
+    #[cold]
+    fn take_pair<V: VertexTable + ?Sized, T: Tool>(
+        &self,
+        vertices: &V,
+        tool: &T,
+        options: &Options,
+        found: &mut Proximity,
+        last: &Certain,
+    ) -> Result<(), QueryError> {
+        let on_axis = tool.axis_point(last.axis_parameter);
+        found.axis_parameter = last.axis_parameter;
+        found.direction = last.direction;
+        if let Some(TriangleRow(row)) = last.triangle
+            && found.triangle_tests < options.budget.triangle_tests
+        {
+            found.triangle_tests += 1;
+            let rows = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
+            let position = |row| vertices.position(row).ok_or(QueryError::Corrupt { row });
+            let [a, b, c] = rows;
+            let corners = [position(a)?, position(b)?, position(c)?];
+            let pair = AxisPoint(on_axis).closest_on_triangle(&corners, f32::INFINITY);
+            let pair = pair.ok_or(QueryError::Position { vertex: a })?;
+            let towards = on_axis - pair.on_surface;
+            let outward = if last.side == Side::Outside { towards } else { -towards };
+            let length = sqrt(towards.length_squared());
+            if length > DIRECTED * found.accuracy && outward.dot(last.direction) > 0.0 {
+                found.direction = outward / length;
+            }
+            found.point_on_surface = pair.on_surface;
+            found.barycentric = pair.barycentric;
+            (found.triangle, found.corners) = (last.triangle, rows);
+        }
+        found.point_on_tool = on_axis - found.direction * tool.radius();
+        Ok(())
+    }
+}
+
+/// Rounding of the two sums that lead from a separation to the axis and back, with room for that of the bound itself.
+const SUMS: f32 = 4.0 / 16_777_216.0;
+
+impl Certain {
+    /// What an answer says of the axis.
+    #[inline(always)]
+    fn of(found: &Proximity, radius: f32) -> Self {
+        let accuracy = found.accuracy;
+        let lower = found.lower + radius - accuracy;
+        let upper = found.separation + radius + accuracy;
+        let (side, direction) = (found.side, found.direction);
+        let Proximity { axis_parameter, triangle, .. } = *found;
+        Self {
+            lower: lower - (lower.abs() + accuracy) * SUMS,
+            upper: upper + (upper.abs() + accuracy) * SUMS,
+            side,
+            axis_parameter,
+            triangle,
+            direction,
+        }
+    }
+
+    fn with_pair_of(self, found: &Proximity) -> Self {
+        Self { lower: self.lower, upper: self.upper, ..Self::of(found, 0.0) }
+    }
+
+    /// Makes these the ends of an answer.
+    #[inline(always)]
+    fn set_ends(&self, found: &mut Proximity, radius: f32) {
+        found.lower = sum_down(sum_down(self.lower, -radius), found.accuracy);
+        found.separation = sum_up(sum_up(self.upper, -radius), -found.accuracy);
+        if found.lower > found.separation {
+            found.lower = found.separation;
+        }
+    }
+}
+
+/// Makes an answer's direction that of a tool outside. Returns whether its points are far enough from each other.
+#[cold]
+fn face_surface(found: &mut Proximity, tool: &impl Tool) -> bool {
+    let on_axis = tool.axis_point(found.axis_parameter);
+    let towards = on_axis - found.point_on_surface;
+    let length = sqrt(towards.length_squared());
+    if !(length > DIRECTED * found.accuracy) {
+        return false;
+    }
+    found.direction = towards / length;
+    found.point_on_tool = on_axis - found.direction * tool.radius();
+    true
+}

@@ -1,0 +1,120 @@
+//! Ticks whose budget ends: what the last tick left certain, less the motion since, is still an answer.
+
+use dibs_build::{Builder, Mesh, generate};
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{
+    Budget, Capsule, Interval, NoSide, Odometer, Options, Query, Side, Tool, Tracker,
+};
+use dibs_tests::deform::unit;
+use dibs_tests::surfaces::cuboid;
+use fastrand::Rng;
+use glam::Vec3;
+
+/// A tool that goes to and fro through a surface of this size, and turns on the way.
+struct Path {
+    tip: Vec3,
+    along: Vec3,
+    goal: Vec3,
+    length: f32,
+    size: f32,
+    rng: Rng,
+}
+
+impl Path {
+    fn step(&mut self) -> Capsule {
+        let rng = &mut self.rng;
+        if self.tip.distance(self.goal) < 1.0 {
+            self.goal = unit(rng) * self.size * rng.f32();
+        }
+        let far = self.size * [0.0, 0.001, 0.004, 0.02][rng.usize(..4)];
+        self.tip += (self.goal - self.tip).normalize_or_zero() * far;
+        self.along = (self.along + unit(rng) * 0.01).normalize();
+        Capsule::new(self.tip, self.tip + self.along * self.length, 1.0).expect("finite")
+    }
+}
+
+/// Any budget, from none to nearly enough.
+fn any_budget(rng: &mut Rng) -> Budget {
+    let up_to = |most: u32, rng: &mut Rng| (most as f32 * rng.f32().powi(3)) as u32;
+    Budget { node_tests: up_to(4_000, rng), triangle_tests: up_to(300, rng) }
+}
+
+fn meet(one: Interval, other: Interval) -> bool {
+    one.lower <= other.upper && other.lower <= one.upper
+}
+
+/// A tracker's ticks with budgets that change, beside whole queries.
+fn ticks_hold(mesh: &Mesh, frames: &[Vec<Vec3>], size: f32, ticks: u32, seed: u64) -> [u32; 3] {
+    let built = Builder::new().stretch(1.5).build(mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let frames: Vec<_> = frames.iter().map(|frame| built.to_rows(frame)).collect();
+    let mut tracker = Tracker::<u16, MAX_STACK, 512>::new(&tree).expect("deep enough");
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut odometer = Odometer::new(&tree);
+    let mut rng = Rng::with_seed(seed);
+    let (mut settled, mut narrowed, mut wide) = (0, 0, 0);
+    let mut has_past = false;
+    let mut step = None;
+    for length in [0.0, 0.1 * size, size] {
+        let (tip, along) = (Vec3::X * 2.0 * size, Vec3::Y);
+        let mut path =
+            Path { tip, along, goal: Vec3::ZERO, length, size, rng: Rng::with_seed(seed) };
+        for tick in 0..ticks {
+            let (frame, next) =
+                (tick as usize / 10 % frames.len(), (tick as usize / 10 + 1) % frames.len());
+            if tick % 10 == 0 {
+                step = Some(odometer.step(frames[frame].as_slice(), frames[next].as_slice()));
+            }
+            let surface = step.as_ref().expect("a step").at((tick % 10) as f32 / 10.0);
+            let tool = path.step();
+            let budget = if tick == 0 { Budget::UNLIMITED } else { any_budget(&mut rng) };
+            let options = Options::new().budget(budget);
+            let tracked = tracker.closest(&surface, &tool, &options).expect("an answer");
+            let closest = tracked.closest;
+            let whole = Options::cold().depth_tolerance(0.001 * size);
+            let whole = query.closest(&surface, &tool, &whole).expect("an answer");
+            let found = query.closest(&surface, &tool, &options).expect("an answer");
+            has_past &= tracked.moved.is_some();
+            if matches!(whole.side, Side::Undefined(_)) {
+                continue;
+            }
+            let interval = closest.interval();
+            assert!(meet(interval, whole.interval()), "{tick}: {closest:?} {whole:?}");
+            assert!(closest.lower <= closest.separation, "{closest:?}");
+            if has_past {
+                // At the surface both sides have the same separation.
+                let has_side = match closest.side {
+                    Side::Undefined(NoSide::BelowAccuracy) => {
+                        closest.axis_distance < 3.0 * closest.accuracy
+                    }
+                    Side::Undefined(_) => false,
+                    _ => true,
+                };
+                assert!(has_side, "{tick}: {closest:?}");
+                assert!((closest.direction.length() - 1.0).abs() < 1e-3, "{tick}: {closest:?}");
+                settled += u32::from(found.side == Side::Undefined(NoSide::CutShort));
+                narrowed += u32::from(
+                    interval.lower > found.interval().lower + 2.0 * found.accuracy
+                        && found.interval().lower.is_finite(),
+                );
+                wide += u32::from(interval.upper - interval.lower > tool.axis_length() + size);
+            }
+            has_past |= !matches!(closest.side, Side::Undefined(_));
+        }
+    }
+    [settled, narrowed, wide]
+}
+
+#[test]
+fn what_was_certain_a_tick_ago_stays_an_answer_under_any_budget() {
+    let generate::MovingMesh { mesh, motion } = generate::heart(2_000).expect("a valid size");
+    let ticks = if cfg!(debug_assertions) { 600 } else { 6_000 };
+    let heart = ticks_hold(&mesh, &motion.frames, 60.0, ticks, 1);
+    let (positions, triangles) = cuboid(Vec3::new(-30.0, -30.0, -0.5), Vec3::new(30.0, 30.0, 0.5));
+    let plate =
+        Mesh { positions: positions.to_vec(), triangles: triangles.to_vec(), ..Mesh::default() };
+    let frames = [positions.to_vec(), positions.map(|at| at * 1.02).to_vec()];
+    let plate = ticks_hold(&plate, &frames, 40.0, ticks, 2);
+    println!("{heart:?} {plate:?} sides, narrower, wide");
+    assert!(heart[0] > ticks / 10 && heart[1] > ticks / 100, "{heart:?}");
+}
