@@ -9,7 +9,7 @@
 
 use glam::Vec3;
 
-use super::{Last, Tracker, TrackerAnswer};
+use super::Tracker;
 use crate::math::round::{sum_down, sum_up};
 use crate::math::sqrt::sqrt;
 use crate::query::memory::separation::Certain;
@@ -26,24 +26,22 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
 {
     /// Narrows an answer to what the last tick leaves possible, and remembers it for the next one. Its accuracy is without
     /// the table's position error, which says nothing of the motion.
+    /// Returns whether the side is the last tick's.
     #[inline(never)]
     pub(super) fn keep_certain<V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         vertices: &V,
         tool: &T,
         options: &Options,
-        tracked: &mut TrackerAnswer,
-    ) -> Result<(), QueryError> {
-        let (clock, found) = (self.memory.clock, &mut tracked.closest);
+        found: &mut Proximity,
+    ) -> Result<bool, QueryError> {
+        let clock = self.memory.clock;
         let last = self.memory.separation.now(clock);
+        let was_open = matches!(found.side, Side::Undefined(_));
         let own = match found.side {
-            Side::Undefined(NoSide::NotAsked | NoSide::NoAdjacency) => return Ok(()),
+            Side::Undefined(NoSide::NotAsked | NoSide::NoAdjacency) => return Ok(false),
             Side::Undefined(_) => match last {
-                Some(last) => {
-                    let own = self.without_side(vertices, tool, options, found, last)?;
-                    tracked.is_kept = !matches!(found.side, Side::Undefined(_));
-                    own
-                }
+                Some(last) => self.without_side(vertices, tool, options, found, last)?,
                 None => None,
             },
             _ => {
@@ -68,13 +66,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             Some(certain) => self.memory.separation.keep(certain, clock),
             None => self.memory.separation.forget(),
         }
-        if tracked.is_kept
-            && let Some(last) = self.last
-        {
-            self.last =
-                Some(Last::new(tool, &tracked.closest, self.tree.is_closed(), last.searched));
-        }
-        Ok(())
+        Ok(was_open && !matches!(found.side, Side::Undefined(_)))
     }
 
     /// The answer with a side, within the last tick's interval.

@@ -37,7 +37,7 @@ use crate::{Index, MovingSurface, Tool, Tree, TriangleRow};
 /// Where the axis crosses the surface, it remembers which parts of the axis cannot be deepest, and searches those points
 /// that may have become so.
 ///
-/// RAM: 8 bytes for each entry of the stack, 44 for each of the `OPENED`, 12 for each of the `RANGE`, and 1,344.
+/// RAM: 8 bytes for each entry of the stack, 44 for each of the `OPENED`, 12 for each of the `RANGE`, and 1,392.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -195,20 +195,18 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         tool: &T,
         options: &Options,
     ) -> Result<TrackerAnswer, QueryError> {
-        let mut tracked = self.within(surface, tool, options, f32::INFINITY)?;
-        self.keep_certain(surface, tool, options, &mut tracked)?;
-        tracked.closest.add_position_error(surface);
-        Ok(tracked)
+        self.within(surface, tool, options, f32::INFINITY, true)
     }
 
-    /// The closest pair that a search finds, on positions that are exact; of pairs that are farther than `separation` (mm),
-    /// only that they are.
+    /// The closest pair; of pairs that are farther than `separation` (mm), only that they are. Unless it is the tick's answer,
+    /// the last tick's is in it only where the budget ended, and no position error.
     fn within<S: MovingSurface + ?Sized, T: Tool>(
         &mut self,
         surface: &S,
         tool: &T,
         options: &Options,
         separation: f32,
+        is_answer: bool,
     ) -> Result<TrackerAnswer, QueryError> {
         let motion = surface.motion();
         let memory = &mut self.memory;
@@ -247,13 +245,20 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let memory = &mut self.memory;
         let known = (&mut self.ties, Some(memory.depth.at(memory.clock)));
         signed(&self.tree, &mut self.stack, surface, tool, options, &mut closest, known)?;
+        let is_cut = closest.side == Side::Undefined(NoSide::CutShort);
+        let is_kept = separation == f32::INFINITY
+            && (is_answer || is_cut)
+            && self.keep_certain(surface, tool, options, &mut closest)?;
+        if is_answer {
+            closest.add_position_error(surface);
+        }
         let memory = &mut self.memory;
         memory.keep(tool, motion, is_complete);
         let (is_closed, now) = (self.tree.is_closed(), memory.clock.now());
         self.last = motion.map(|_| Last::new(tool, &closest, is_closed, now));
         let opened = memory.front.borrow().used() as u32;
         let moved = moved_by;
-        let (is_kept, pair, searched) = (false, 0, 1);
+        let (pair, searched) = (0, 1);
         Ok(TrackerAnswer { closest, is_kept, fallback, moved, opened, pair, searched })
     }
 
@@ -289,12 +294,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         options: &Options,
         contacts: &mut Contacts<N, NEAR>,
     ) -> Result<TrackerAnswer, QueryError> {
-        let mut tracked = self.within(surface, tool, options, f32::INFINITY)?;
-        // Where the search found all but the side, it has all contacts: the last tick's side comes after them.
-        let is_cut = tracked.closest.side == Side::Undefined(NoSide::CutShort);
-        if is_cut {
-            self.keep_certain(surface, tool, options, &mut tracked)?;
-        }
+        let mut tracked = self.within(surface, tool, options, f32::INFINITY, false)?;
+        let is_cut = tracked.is_kept || tracked.closest.side == Side::Undefined(NoSide::CutShort);
         let mut closest = tracked.closest;
         closest.add_position_error(surface);
         let rest = options.budget(options.budget.less(closest.node_tests, closest.triangle_tests));
@@ -310,8 +311,10 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             }
             None => contacts.add(&pair, &mut self.stack, &rest)?,
         };
+        // A search that found all but the side has found all contacts: the last tick's side comes after them.
         if !is_cut {
-            self.keep_certain(surface, tool, options, &mut tracked)?;
+            let TrackerAnswer { closest, is_kept, .. } = &mut tracked;
+            *is_kept = self.keep_certain(surface, tool, options, closest)?;
         }
         tracked.closest.add_position_error(surface);
         if tracked.is_kept && !is_cut {

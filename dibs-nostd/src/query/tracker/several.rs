@@ -134,7 +134,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             node_tests: node_tests.min(AHEAD.node_tests),
             triangle_tests: triangle_tests.min(AHEAD.triangle_tests),
         });
-        let found = self.within(surface, tool, &options, separation)?.closest;
+        let found = self.within(surface, tool, &options, separation, true)?.closest;
         if let Some(last) = &mut self.last {
             last.is_signed |= keeps_side;
             if last.clear < clear {
