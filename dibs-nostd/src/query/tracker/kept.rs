@@ -91,7 +91,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         if both.lower > both.upper {
             return Ok(own);
         }
-        if last.upper < own.upper {
+        if last.upper + 2.0 * found.accuracy < own.upper {
             // The last pair is deeper than any that this search found.
             self.take_pair(vertices, tool, options, found, &last)?;
         }
