@@ -38,8 +38,8 @@ bool uart_has_overrun(uart *port) {
 
 void uart_write(uart *port, const uint8_t *bytes, size_t length) {
     for (size_t at = 0; at < length; at++) {
+        port->data = bytes[at];
         while ((port->state & TRANSMIT_FULL) != 0) {
         }
-        port->data = bytes[at];
     }
 }

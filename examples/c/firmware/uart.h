@@ -34,7 +34,7 @@ bool uart_read(uart *port, uint8_t *byte);
 /* Whether a byte was ever lost because the one before was not read in time. */
 bool uart_has_overrun(uart *port);
 
-/* Sends bytes, waiting for each to leave. */
+/* Sends bytes, and waits until each has left: an emulator that ends would take a waiting byte along. */
 void uart_write(uart *port, const uint8_t *bytes, size_t length);
 
 #endif

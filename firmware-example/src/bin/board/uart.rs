@@ -70,9 +70,9 @@ impl Uart {
         self.state.read() & RECEIVE_OVERRUN != 0
     }
 
-    /// Sends one byte, after the previous one has left.
+    /// Sends one byte, and waits until it has left: an emulator that ends would take a waiting byte along.
     pub fn write(&self, byte: u8) {
-        while self.state.read() & TRANSMIT_FULL != 0 {}
         self.data.write(u32::from(byte));
+        while self.state.read() & TRANSMIT_FULL != 0 {}
     }
 }

@@ -138,7 +138,11 @@ pub fn run(
         let flooded = flood.map_or(Ok(0), |flood| joined(flood.join()));
         (listened, joined(sender.join()), joined(checker.join()), flooded)
     });
-    let Heard { ticks, network, summary, flipped_at } = listened?;
+    let ended = |error: anyhow::Error| match child.0.try_wait() {
+        Ok(Some(status)) => error.context(format!("the controller ended: {status}")),
+        _ => error,
+    };
+    let Heard { ticks, network, summary, flipped_at } = listened.map_err(ended)?;
     let injected = sent?;
     let mut compared = Vec::new();
     for tick in &ticks {
@@ -230,7 +234,8 @@ fn listen(
     let mut buffer = [0; 4096];
     loop {
         let bytes = telemetry.read(&mut buffer).context("the controller fell silent")?;
-        ensure!(bytes > 0, "the controller ended without a summary");
+        let last = ticks.last().map_or(0, |tick: &Tick| tick.tick);
+        ensure!(bytes > 0, "no summary after tick {last} of {ticks_asked}");
         for &byte in &buffer[..bytes] {
             let Some(packet) = deframer.push(byte) else { continue };
             let record = packet.ok().and_then(Record::decode).context("damaged telemetry")?;
