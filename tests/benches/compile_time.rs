@@ -2,7 +2,7 @@
 //!
 //! `cargo bench -p dibs-tests --bench compile_time -- --write` writes `docs/evidence/compile-time.md`. The times are those of
 //! the machine that runs it; nothing asserts them. `DIBS_FOLDER` keeps the compiled dependencies for the next run,
-//! `DIBS_TRIANGLES` takes other sizes. The program `dibs` comes from `cargo build --release --workspace`.
+//! `DIBS_TRIANGLES` takes other sizes. The program `dibs` comes from `cargo build --release`.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -5,8 +5,8 @@ use std::process::Command;
 use anyhow::Result;
 use xtask::{process, workspace};
 
-/// The crate that has other libraries beside ours, which a test compiles only with `--whole`.
-pub const BENCH: &str = "dibs-bench";
+/// The crate that has other libraries beside ours.
+const BENCH: &str = "dibs-bench";
 
 /// Arguments that are passed on as they are.
 #[derive(clap::Args)]
@@ -27,16 +27,7 @@ fn command(package: &str) -> Command {
 /// dependencies again, with fewer features.
 pub fn with_workspace() -> Result<Command> {
     let mut cargo = Command::new("cargo");
-    cargo.args([
-        "build",
-        "--quiet",
-        "--release",
-        "--workspace",
-        "--exclude",
-        BENCH,
-        "--bins",
-        "--tests",
-    ]);
+    cargo.args(["build", "--quiet", "--release", "--bins", "--tests"]);
     process::run(cargo.current_dir(workspace::root()))?;
     Ok(Command::new(workspace::target().join("release/prove")))
 }

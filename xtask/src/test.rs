@@ -55,8 +55,8 @@ pub fn test(options: &Options) -> Result<()> {
     }
     if is_due(Job::Host) {
         // This also runs the examples in the documentation.
-        let tests = ["test", "--release", "--no-fail-fast", "--workspace"];
-        steps.cargo("tests", &[&tests, without_bench(options.whole)].concat(), &[]);
+        let tests = ["test", "--release", "--no-fail-fast"];
+        steps.cargo("tests", &[&tests, bench_too(options.whole)].concat(), &[]);
         steps.run("files of other programs", other_programs);
     }
     if is_due(Job::Docs) {
@@ -89,9 +89,9 @@ pub fn test(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// The paper's experiments are compiled and run only with `--whole`.
-const fn without_bench(is_whole: bool) -> &'static [&'static str] {
-    if is_whole { &[] } else { &["--exclude", prove::BENCH] }
+/// The paper's experiments, which are no default member of the workspace, are compiled and run only with `--whole`.
+const fn bench_too(is_whole: bool) -> &'static [&'static str] {
+    if is_whole { &["--workspace"] } else { &[] }
 }
 
 fn lints(steps: &mut Steps, is_whole: bool) {
@@ -99,8 +99,8 @@ fn lints(steps: &mut Steps, is_whole: bool) {
     let board = ["fmt", "--check", "--manifest-path", "examples/stm32h743/Cargo.toml"];
     steps.cargo("format of the board apart", &board, &[]);
     // Lints and documentation take the tests' profile, so that common dependencies are built once.
-    let lints = ["clippy", "--release", "--workspace", "--all-targets"];
-    let lints = [&lints, without_bench(is_whole), &["--", "-D", "warnings"]].concat();
+    let lints = ["clippy", "--release", "--all-targets"];
+    let lints = [&lints, bench_too(is_whole), &["--", "-D", "warnings"]].concat();
     steps.cargo("lints", &lints, &[]);
 }
 
@@ -196,7 +196,7 @@ fn oldest_compiler() -> Result<Outcome> {
         )));
     };
     let mut command = Command::new("rustup");
-    command.args(["run", name, "cargo", "check", "--quiet", "--workspace", "--target-dir"]);
+    command.args(["run", name, "cargo", "check", "--quiet", "--target-dir"]);
     command.arg(workspace::target().join("oldest"));
     command.env_remove("CARGO").env_remove("RUSTC").env_remove("RUSTUP_TOOLCHAIN");
     run(command.current_dir(workspace::root())).map(|()| Outcome::Passed)

@@ -101,7 +101,7 @@ fn subject() -> Result<PathBuf> {
     fs::create_dir_all(&folder)?;
     let mut cargo = Command::new("cargo");
     // The features of the whole workspace are those of the tests' build, so cargo rebuilds nothing.
-    cargo.args(["build", "--quiet", "--release", "--workspace", "--bin", "dibs"]);
+    cargo.args(["build", "--quiet", "--release", "--bin", "dibs"]);
     run(cargo.current_dir(workspace::root()))?;
     let dibs = workspace::target().join("release/dibs");
     let tasks = [

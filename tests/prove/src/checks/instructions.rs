@@ -41,7 +41,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     valgrind::install_runner()?;
     let mut cargo = Command::new("cargo");
     // The whole workspace, so that cargo reuses the tests' build.
-    cargo.args(["bench", "--quiet", "--workspace", "--bench", "instructions"]);
+    cargo.args(["bench", "--quiet", "--bench", "instructions"]);
     cargo.args(["--", "--output-format=json"]).current_dir(workspace::root());
     let output = cargo.stderr(Stdio::inherit()).output()?;
     ensure!(output.status.success(), "`{}` failed", shown(&cargo));

@@ -66,7 +66,7 @@ fn environment(folder: &Path, packages: &[&str]) -> Result<PathBuf> {
 /// wheel would compile its dependencies again, with fewer features.
 fn package(folder: &Path, source: &Path) -> Result<PathBuf> {
     let mut cargo = Command::new("cargo");
-    cargo.args(["build", "--quiet", "--release", "--workspace", "--lib", "--bins", "--tests"]);
+    cargo.args(["build", "--quiet", "--release", "--lib", "--bins", "--tests"]);
     run(cargo.current_dir(workspace::root()))?;
     let package = folder.join("dibs");
     fs::create_dir_all(&package)?;
