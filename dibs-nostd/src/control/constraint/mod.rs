@@ -14,9 +14,10 @@
 //!   contact to any depth, and its size is continuous through contact and through the surface. Where it has none, or
 //!   the query was [`unsigned`](crate::Options::unsigned), the tool is taken to be outside, and a query that its budget
 //!   cut short never weakens the force.
-//! - Where the side is undefined, the output is the hold, never [`Inactive`](ConstraintState::Inactive): the tool may be inside. A
-//!   [`Tracker`](crate::Tracker) has a side at every tick after a first certain one. Within the accuracy of the surface
-//!   both sides give the same force, and it acts.
+//! - Where the side is undefined, the output is the hold, never [`Inactive`](ConstraintState::Inactive): the tool may be inside.
+//!   At the surface alone, both sides have much the same separation, and the constraint acts on it. A [`Tracker`](crate::Tracker)
+//!   has a side or is at the surface, whatever its budget, after a first certain tick and as long as the surface's motion is
+//!   measured and not more than was stated.
 //! - If the proximity is unknown, the surface stale, or a number not finite, the output is the *hold*: pure damping
 //!   against the tool's velocity, saturated the same way, and the state gives the reason. For a velocity that is not
 //!   finite it is zero.
