@@ -3,7 +3,7 @@
 use std::process::Command;
 
 use anyhow::Result;
-use xtask::{process, workspace};
+use xtask::workspace;
 
 /// The crate that has other libraries beside ours.
 const BENCH: &str = "dibs-bench";
@@ -23,12 +23,9 @@ fn command(package: &str) -> Command {
     cargo
 }
 
-/// The program, built together with the whole workspace and its tests: a build of it alone would compile its
-/// dependencies again, with fewer features.
+/// The program, built together with everything else.
 pub fn with_workspace() -> Result<Command> {
-    let mut cargo = Command::new("cargo");
-    cargo.args(["build", "--quiet", "--release", "--bins", "--tests"]);
-    process::run(cargo.current_dir(workspace::root()))?;
+    workspace::build()?;
     Ok(Command::new(workspace::target().join("release/prove")))
 }
 

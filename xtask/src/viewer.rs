@@ -99,10 +99,7 @@ fn session() -> Result<PathBuf> {
 fn subject() -> Result<PathBuf> {
     let folder = workspace::target().join("viewer/heart");
     fs::create_dir_all(&folder)?;
-    let mut cargo = Command::new("cargo");
-    // The features of the whole workspace are those of the tests' build, so cargo rebuilds nothing.
-    cargo.args(["build", "--quiet", "--release", "--bin", "dibs"]);
-    run(cargo.current_dir(workspace::root()))?;
+    workspace::build()?;
     let dibs = workspace::target().join("release/dibs");
     let tasks = [
         "generate heart --triangles 10272 -o heart.ply --motion heart.pc2",

@@ -2,6 +2,11 @@
 
 use std::env;
 use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::Result;
+
+use crate::process::run;
 
 /// The repository's top folder: of the package that cargo runs, of this program, or the current folder's. It is looked for
 /// at each start, so that a copy of the checkout, target folder included, works on itself.
@@ -19,6 +24,16 @@ pub fn root() -> PathBuf {
 fn root_above(start: &Path) -> Option<&Path> {
     let holds = |folder: &Path, package: &str| folder.join(package).join("Cargo.toml").is_file();
     start.ancestors().find(|folder| holds(folder, "xtask") && holds(folder, "dibs-nostd"))
+}
+
+/// Builds every program and library, as the tests do: alone, each would compile its dependencies anew, with fewer features.
+///
+/// # Errors
+/// If something does not compile.
+pub fn build() -> Result<()> {
+    let mut cargo = Command::new("cargo");
+    cargo.args(["build", "--quiet", "--release", "--lib", "--bins", "--tests"]);
+    run(cargo.current_dir(root()))
 }
 
 /// Cargo's target folder.

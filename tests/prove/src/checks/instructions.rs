@@ -40,7 +40,7 @@ pub const CHECK: Check = Check {
 fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     valgrind::install_runner()?;
     let mut cargo = Command::new("cargo");
-    // The whole workspace, so that cargo reuses the tests' build.
+    // All packages, so that cargo reuses the tests' build.
     cargo.args(["bench", "--quiet", "--bench", "instructions"]);
     cargo.args(["--", "--output-format=json"]).current_dir(workspace::root());
     let output = cargo.stderr(Stdio::inherit()).output()?;

@@ -63,11 +63,9 @@ fn environment(folder: &Path, packages: &[&str]) -> Result<PathBuf> {
 }
 
 /// Puts the package together from its Python half and the library of the workspace's build, which is there already: a
-/// wheel would compile its dependencies again, with fewer features.
+/// wheel would compile its dependencies anew.
 fn package(folder: &Path, source: &Path) -> Result<PathBuf> {
-    let mut cargo = Command::new("cargo");
-    cargo.args(["build", "--quiet", "--release", "--lib", "--bins", "--tests"]);
-    run(cargo.current_dir(workspace::root()))?;
+    workspace::build()?;
     let package = folder.join("dibs");
     fs::create_dir_all(&package)?;
     for file in fs::read_dir(source.join("dibs"))? {
