@@ -122,7 +122,7 @@ fn record(answer: &Answer, tool: Option<&Capsule>, bus: &BusStatus) -> Tick {
         record.epoch = searched.frame.epoch;
         record.age = searched.frame.age.0;
         record.epoch_before = searched.before;
-        record.share = searched.share;
+        record.blend = searched.t;
         record.residual = searched.residual.unwrap_or(-1.0);
         record.position_error = searched.position_error;
         record.surface_velocity = searched.velocity.to_array();

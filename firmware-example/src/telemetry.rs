@@ -84,8 +84,8 @@ pub struct Tick {
     pub fallback: u32,
     /// The frame before the one that was searched, from which the surface moved on; the same where it was held.
     pub epoch_before: u32,
-    /// The surface's place in time: `dibs_nostd::SurfaceBlend::share`.
-    pub share: f32,
+    /// The surface's time in steps: `dibs_nostd::SurfaceBlend::t`.
+    pub blend: f32,
     /// The error of the last extrapolations, in mm: `dibs_nostd::SurfaceBlend::residual`; -1 if unknown.
     pub residual: f32,
     /// The surface's velocity at the pair, in mm/s.

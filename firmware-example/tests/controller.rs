@@ -94,7 +94,7 @@ impl Sender {
         let (start, end) = (Vec3::from(tick.tool_start), Vec3::from(tick.tool_end));
         let tool = Instrument::capsule(start, end, tick.tool_radius);
         let frames = self.decoded[&tick.epoch_before].iter().zip(&self.decoded[&tick.epoch]);
-        let rows: Vec<Vec3> = frames.map(|(&a, &b)| a + (b - a) * tick.share).collect();
+        let rows: Vec<Vec3> = frames.map(|(&a, &b)| a + (b - a) * tick.blend).collect();
         let truth = exhaustive(&rows, &self.triangles, &tool).unwrap();
         // Both sides have the vertices as they were decoded: no error of their positions.
         let accuracy = f64::from(tick.accuracy) - f64::from(tick.position_error);
@@ -137,7 +137,7 @@ fn every_answer_is_that_of_whole_frames() {
                     checked += 1;
                 }
                 (last_epoch, answers) = (tick.epoch, answers + 1);
-                moving += u32::from(tick.share > 1.0 && tick.share < 3.0 && tick.margin < 0.1);
+                moving += u32::from(tick.blend > 1.0 && tick.blend < 3.0 && tick.margin < 0.1);
                 if force(&tick) > 0.0 { acting += 1 } else { free += 1 }
             }
         }

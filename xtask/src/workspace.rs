@@ -8,8 +8,8 @@ use anyhow::Result;
 
 use crate::process::run;
 
-/// The repository's top folder: of the package that cargo runs, of this program, or the current folder's. It is looked for
-/// at each start, so that a copy of the checkout, target folder included, works on itself.
+/// The repository's top folder: of the package that cargo runs, of this program, or the current folder's. It is looked
+/// for at each start, so that a copy of the checkout, target folder included, works on itself.
 pub fn root() -> PathBuf {
     let starts = [
         env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from),
@@ -26,7 +26,8 @@ fn root_above(start: &Path) -> Option<&Path> {
     start.ancestors().find(|folder| holds(folder, "xtask") && holds(folder, "dibs-nostd"))
 }
 
-/// Builds every program and library, as the tests do: alone, each would compile its dependencies anew, with fewer features.
+/// Builds every program and library, as the tests do: alone, each would compile its dependencies anew, with fewer
+/// features.
 ///
 /// # Errors
 /// If something does not compile.

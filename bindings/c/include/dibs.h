@@ -340,7 +340,7 @@ enum dibs_code
    */
   DIBS_CODE_REJECTIONS = 304,
   /**
-   * The surface was longer on its way than allowed.
+   * The transit of the surface was longer than allowed.
    */
   DIBS_CODE_DELAYED = 305,
   /**
@@ -387,6 +387,10 @@ enum dibs_code
    * A closed surface is mirrored or inside out.
    */
   DIBS_CODE_INSIDE_OUT = 316,
+  /**
+   * The tool has no pose at this tick.
+   */
+  DIBS_CODE_NO_POSE = 317,
   /**
    * The packet's checksum does not match, or it is too short for one.
    */
@@ -806,8 +810,8 @@ typedef uint32_t dibs_cost;
 #endif // __cplusplus
 
 /**
- * The bus's end of a guarded surface: it takes packets, checks complete frames in slices, publishes them, watches the tree's
- * bytes, and makes the statuses that go back.
+ * The bus's end of a guarded surface: it takes packets, checks complete frames in slices, publishes them, watches the
+ * tree's bytes, and makes the statuses that go back.
  *
  * Two contexts may use it, one at a time: an interrupt that takes bytes, and an idle loop that works. Both are below the
  * control tick's priority. The interrupt gets `DIBS_CODE_IN_USE` where it meets the loop at work: it keeps its bytes for
@@ -976,7 +980,7 @@ typedef struct {
    */
   dibs_watch rejections;
   /**
-   * Time that the published frame was on its way. With `DIBS_UNLIMITED` it has no limit, and is in the margin.
+   * Transit of the published frame. With `DIBS_UNLIMITED` it has no limit, and is in the margin.
    */
   dibs_watch transit;
   /**
@@ -1363,7 +1367,7 @@ typedef struct {
    */
   uint32_t forgeries;
   /**
-   * Time that the published frame was on its way, at most.
+   * Transit of the published frame, at most.
    */
   uint32_t transit;
   /**
@@ -1407,7 +1411,7 @@ typedef struct {
    */
   uint32_t cause;
   /**
-   * Largest way (mm) of the tissue in the surface's age and the time that it was on its way.
+   * Most that the tissue moves (mm) in the surface's age and transit.
    */
   float margin;
   /**
@@ -1649,8 +1653,8 @@ dibs_code dibs_bus_init(void *storage,
 /**
  * Takes bytes of a serial line or another stream. `dibs_bus_counters` says what became of them, by cause.
  *
- * Cost: linear in the bytes. `dibs_bus_work` must keep up: a complete frame is dropped where the next one begins before it
- * was checked.
+ * Cost: linear in the bytes. `dibs_bus_work` must keep up: a complete frame is dropped where the next one begins
+ * before it was checked.
  *
  * @param bus     The bus.
  * @param bytes   The bytes, read during the call.
@@ -1697,7 +1701,7 @@ dibs_code dibs_bus_work(dibs_bus *bus,
                         dibs_advance *advance);
 
 /**
- * Writes the status that is due for the sender, whose next frame echoes it, which shows how long frames are on their way.
+ * Writes the status that is due for the sender, whose next frame echoes it, which measures the transit of frames.
  * Call it after each slice of work: none is due unless there is news, or 100 ms went by.
  *
  * @param bus       The bus.
@@ -2097,8 +2101,8 @@ dibs_code dibs_budget_for_instructions(uint32_t instructions, uint32_t cost, dib
 dibs_code dibs_reader_init(void *storage, size_t size, dibs_surface *surface, dibs_reader **reader);
 
 /**
- * Holds the frame that was published last, if it is not too old. Until it is released no frame is published, so release it
- * after the tick's queries.
+ * Holds the frame that was published last, if it is not too old. Until it is released no frame is published, so
+ * release it after the tick's queries.
  *
  * @param reader  The reader.
  * @param now     The receiver's clock, in ms; wraps.

@@ -16,8 +16,8 @@ use crate::tree::dibs_tree;
 /// Bytes of a bus's storage.
 pub const DIBS_BUS_SIZE: usize = 3_072;
 
-/// The bus's end of a guarded surface: it takes packets, checks complete frames in slices, publishes them, watches the tree's
-/// bytes, and makes the statuses that go back.
+/// The bus's end of a guarded surface: it takes packets, checks complete frames in slices, publishes them, watches the
+/// tree's bytes, and makes the statuses that go back.
 ///
 /// Two contexts may use it, one at a time: an interrupt that takes bytes, and an idle loop that works. Both are below the
 /// control tick's priority. The interrupt gets `DIBS_CODE_IN_USE` where it meets the loop at work: it keeps its bytes for
@@ -68,8 +68,8 @@ pub extern "C" fn dibs_bus_init(
 
 /// Takes bytes of a serial line or another stream. `dibs_bus_counters` says what became of them, by cause.
 ///
-/// Cost: linear in the bytes. `dibs_bus_work` must keep up: a complete frame is dropped where the next one begins before it
-/// was checked.
+/// Cost: linear in the bytes. `dibs_bus_work` must keep up: a complete frame is dropped where the next one begins
+/// before it was checked.
 ///
 /// @param bus     The bus.
 /// @param bytes   The bytes, read during the call.
@@ -142,7 +142,7 @@ pub extern "C" fn dibs_bus_work(
     })
 }
 
-/// Writes the status that is due for the sender, whose next frame echoes it, which shows how long frames are on their way.
+/// Writes the status that is due for the sender, whose next frame echoes it, which measures the transit of frames.
 /// Call it after each slice of work: none is due unless there is news, or 100 ms went by.
 ///
 /// @param bus       The bus.

@@ -67,6 +67,7 @@ impl From<Unavailable> for dibs_code {
             Unavailable::Delayed { .. } => Self::Delayed,
             Unavailable::SourceStale { .. } => Self::SourceStale,
             Unavailable::Forgeries { .. } => Self::Forgeries,
+            Unavailable::NoPose => Self::NoPose,
             Unavailable::NoDirection => Self::NoDirection,
             Unavailable::NoSide => Self::NoSide,
             Unavailable::CutShort => Self::CutShort,

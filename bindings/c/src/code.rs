@@ -78,7 +78,7 @@ pub enum dibs_code {
     HeartbeatLost = 303,
     /// More frames were refused or abandoned than allowed.
     Rejections = 304,
-    /// The surface was longer on its way than allowed.
+    /// The transit of the surface was longer than allowed.
     Delayed = 305,
     /// The surface was older than allowed when it was sent.
     SourceStale = 306,
@@ -102,6 +102,8 @@ pub enum dibs_code {
     NoSide = 315,
     /// A closed surface is mirrored or inside out.
     InsideOut = 316,
+    /// The tool has no pose at this tick.
+    NoPose = 317,
     /// The packet's checksum does not match, or it is too short for one.
     PacketDamaged = 400,
     /// The packet is of another protocol version.
@@ -224,6 +226,7 @@ impl dibs_code {
         Self::Unavailable,
         Self::NoSide,
         Self::InsideOut,
+        Self::NoPose,
         Self::PacketDamaged,
         Self::PacketVersion,
         Self::PacketForm,
@@ -297,7 +300,7 @@ impl dibs_code {
             Self::LinkLost => c"no good packet came for longer than allowed",
             Self::HeartbeatLost => c"no heartbeat came for longer than allowed",
             Self::Rejections => c"more frames were refused or abandoned than allowed",
-            Self::Delayed => c"the surface was longer on its way than allowed",
+            Self::Delayed => c"the surface was longer in transit than allowed",
             Self::SourceStale => c"the surface was older than allowed when it was sent",
             Self::Forgeries => c"more packets were forged than allowed",
             Self::NoDirection => c"no direction leads out",
@@ -309,6 +312,7 @@ impl dibs_code {
             Self::Unavailable => c"the surface is not available",
             Self::NoSide => c"the tool's side is not known",
             Self::InsideOut => c"the surface is mirrored or inside out",
+            Self::NoPose => c"the tool has no pose",
             Self::PacketDamaged => c"the packet is damaged",
             Self::PacketVersion => c"the packet is of another protocol version",
             Self::PacketForm => c"the packet is malformed",

@@ -14,6 +14,9 @@ use crate::reader::{dibs_age, dibs_link};
 /// Bytes of a machine's storage.
 pub const DIBS_FAILSAFE_SIZE: usize = 192;
 
+/// Stands for any code of [`dibs_observation::query`]: the machine needs only the fact, the code is kept beside it.
+const NO_ANSWER: Unavailable = Unavailable::Query(QueryError::NoAdjacency);
+
 /// The machine. It begins in the safe state.
 ///
 /// One context at a time.
@@ -77,7 +80,7 @@ pub struct dibs_limits {
     pub heartbeat: dibs_watch,
     /// Frames refused or abandoned since the last one was published.
     pub rejections: dibs_watch,
-    /// Time that the published frame was on its way. With `DIBS_UNLIMITED` it has no limit, and is in the margin.
+    /// Transit of the published frame. With `DIBS_UNLIMITED` it has no limit, and is in the margin.
     pub transit: dibs_watch,
     /// Age of the published frame when it was sent; a safe limit is below 65,534.
     pub source_age: dibs_watch,
@@ -171,7 +174,7 @@ pub struct dibs_verdict {
     pub state: u32,
     /// Cause of a state that is not nominal: a `dibs_code`.
     pub cause: u32,
-    /// Largest way (mm) of the tissue in the surface's age and the time that it was on its way.
+    /// Most that the tissue moves (mm) in the surface's age and transit.
     pub margin: f32,
     /// 1 where only an acknowledgement is missing to leave the safe state; else 0.
     pub waits_for_acknowledgement: u32,
@@ -210,12 +213,11 @@ pub extern "C" fn dibs_failsafe_step(
             frame: seen.age.into(),
             lag: None,
             link: seen.link.into(),
-            // The machine needs only the fact; the code is kept here.
-            query_error: (query != dibs_code::Ok).then_some(QueryError::NoAdjacency),
+            no_answer: (query != dibs_code::Ok).then_some(NO_ANSWER),
             is_tree_corrupt: seen.is_tree_corrupt != 0,
         });
         let mut given = dibs_verdict::from(found);
-        if let Some(Unavailable::Query(_)) = found.cause {
+        if found.cause == Some(NO_ANSWER) {
             given.cause = failsafe.query as u32;
         }
         verdict.set(given);

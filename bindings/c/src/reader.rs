@@ -74,7 +74,7 @@ pub struct dibs_link {
     pub rejections: u32,
     /// Packets without a genuine tag, less 10 for each second.
     pub forgeries: u32,
-    /// Time that the published frame was on its way, at most.
+    /// Transit of the published frame, at most.
     pub transit: u32,
     /// Age of the published frame when it was sent.
     pub source_age: u32,
@@ -130,8 +130,8 @@ pub extern "C" fn dibs_reader_init(
     })
 }
 
-/// Holds the frame that was published last, if it is not too old. Until it is released no frame is published, so release it
-/// after the tick's queries.
+/// Holds the frame that was published last, if it is not too old. Until it is released no frame is published, so
+/// release it after the tick's queries.
 ///
 /// @param reader  The reader.
 /// @param now     The receiver's clock, in ms; wraps.

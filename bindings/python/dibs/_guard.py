@@ -59,7 +59,7 @@ class Answer:
     cause: Optional[str]
     """The cause of a state that is not nominal."""
     margin: float
-    """Largest way (mm) of the tissue in the surface's age and the time that it was on its way. Part of the pair's accuracy."""
+    """Most that the tissue moves (mm) in the surface's age and transit. Part of the pair's accuracy."""
     waits_for_acknowledgement: bool
     """Whether only `Guard.acknowledge` is missing to leave the safe state."""
     epoch: Optional[int]
@@ -164,7 +164,7 @@ class Guard:
 
     def status(self, now: int, *, framed: bool = False) -> Optional[bytes]:
         """The status that is due for the sender, a packet, or `framed` for a byte stream; `None` unless there is news, or
-        100 ms went by. The sender's next frame echoes it, which shows how long frames are on their way."""
+        100 ms went by. The sender's next frame echoes it, which measures the transit of frames."""
         return self._native.status(_now(now), bool(framed))
 
     def closest(self, tool: Optional[npt.ArrayLike], now: int) -> Answer:

@@ -203,8 +203,8 @@ fn largest([low, high]: &[f32; 2]) -> f64 {
     f64::from(high.max(-low))
 }
 
-/// Largest error of a computed position on one axis: gains are rounded and truncated to integers, each mode's share is
-/// truncated to the unit of the sum, and the sum is converted and added to the rest position.
+/// Largest error of a computed position on one axis: gains are rounded and truncated to integers, each mode's
+/// displacement is truncated to the unit of the sum, and the sum is converted and added to the rest position.
 fn evaluation_error(
     rest: &[Vec3],
     modes: &[QuantisedMode],

@@ -8,15 +8,15 @@ use rayon::prelude::*;
 use super::{MAX_FRAMES, ModalError, ModesError};
 use crate::{Mesh, Motion};
 
-/// A direction with less than this share of the motion's energy counts as rounding: one millionth of the motion's size,
+/// A direction with less than this part of the motion's energy counts as rounding: one millionth of the motion's size,
 /// squared.
 const NOISE: f64 = 1e-12;
 
-/// The displacement modes of a recorded motion, largest share first.
+/// The displacement modes of a recorded motion, by energy, the largest first.
 ///
 /// The displacements of all frames from the rest shape are decomposed (proper orthogonal decomposition, by the
 /// snapshots' small Gram matrix: Sirovich, Quart. Appl. Math. 45, 1987), with equal weight for each vertex: no other
-/// `k` fields leave a smaller RMS error. A weight of 1 is a mode's largest share of any frame. The same input gives the
+/// `k` fields leave a smaller RMS error. A mode's largest weight in any frame is 1. The same input gives the
 /// same modes.
 ///
 /// ```
@@ -115,9 +115,9 @@ fn decompose(displacements: &[Vec<DVec3>]) -> Vec<Vec<DVec3>> {
             let peak =
                 u.iter().fold(0.0, |peak: f64, w| if w.abs() > peak.abs() { *w } else { peak });
             let mut mode = vec![DVec3::ZERO; displacements[0].len()];
-            for (share, displacement) in u.iter().zip(displacements) {
+            for (weight, displacement) in u.iter().zip(displacements) {
                 for (sum, d) in mode.iter_mut().zip(displacement) {
-                    *sum += *d * (share * peak);
+                    *sum += *d * (weight * peak);
                 }
             }
             mode

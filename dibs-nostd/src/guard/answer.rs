@@ -11,11 +11,11 @@ use crate::{FrameAge, Millis, Proximity, TrackerAnswer, Unavailable};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct Answer {
-    /// The closest pair to act on, or why there is none. Its accuracy covers the frame's error, the extrapolation's, and the
-    /// tissue's motion where the surface lags; where its side is not known it is the last one whose side was.
+    /// The closest pair to act on, or why there is none. Its accuracy covers the frame's error, the extrapolation's,
+    /// and the tissue's motion where the surface lags; where its side is not known it is the last one whose side was.
     pub closest: Result<Proximity, Unavailable>,
-    /// Velocity of the tool's point of the pair relative to the surface's (mm/s); without a pair that of the middle of the
-    /// axis. Zero at the first tick, and not a number without a tool.
+    /// Velocity of the tool's point of the pair relative to the surface's (mm/s); without a pair that of the middle of
+    /// the axis. Zero at the first tick, and not a number without a tool.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub velocity: Vec3,
     /// The trust in the surface.
@@ -37,8 +37,8 @@ pub struct Searched {
     pub frame: FrameAge,
     /// Epoch of the frame before; the same for a surface that is held.
     pub before: u32,
-    /// Its place in time: 0 is the frame before, 1 the last frame, 3 the end of the extrapolation.
-    pub share: f32,
+    /// Its time in steps: 0 is the frame before, 1 the last frame, 3 the end of the extrapolation.
+    pub t: f32,
     /// Error of each position (mm), that of the extrapolation included.
     pub position_error: f32,
     /// The distance (mm) of the last frames from their extrapolation; `None` for a surface that is held.

@@ -23,8 +23,8 @@ const SCRUBBED: u32 = 2;
 
 type Receiver<'s, 't, I, M> = Assembler<'s, StretchMonitor<'t, I, 2>, M>;
 
-/// The bus's end of a [`Surface`](super::Surface): it takes packets, checks complete frames in slices, publishes them, watches the tree's
-/// bytes, and makes the statuses that go back.
+/// The bus's end of a [`Surface`](super::Surface): it takes packets, checks complete frames in slices, publishes them,
+/// watches the tree's bytes, and makes the statuses that go back.
 ///
 /// Two contexts may use it, one at a time: an interrupt that takes bytes, and an idle loop that works. Both are below the
 /// control tick's priority. RAM: less than 3 kB.
@@ -104,16 +104,16 @@ impl<'s, 't, I: Index, M: Mac> Bus<'s, 't, I, M> {
         outcome
     }
 
-    /// Does a slice of the checks: at most `work` rows and triangles of the frame that arrives, and publishes it
-    /// once it is complete and admitted. Without a frame it checks the tree's bytes. `Ok(Advance::Pending)` if more is due
+    /// Does a slice of the checks: at most `work` rows and triangles of the frame that arrives, and publishes it once
+    /// it is complete and admitted. Without a frame it checks the tree's bytes. `Ok(Advance::Pending)` if more is due
     /// at once.
     ///
     /// Cost: O(`work`).
     ///
     /// # Errors
     /// [`ReceiveError::Stretch`] when a surface is refused; it has been counted.
-    // Not inlined: in a large loop its branches would become jumps through a register, whose targets no check of the binary
-    // can see.
+    // Not inlined: in a large loop its branches would become jumps through a register, whose targets no check of the
+    // binary can see.
     #[inline(never)]
     pub fn work(&mut self, work: u32) -> Result<Advance, ReceiveError> {
         let outcome = self.assembler.advance(work);
@@ -133,8 +133,8 @@ impl<'s, 't, I: Index, M: Mac> Bus<'s, 't, I, M> {
         }
     }
 
-    /// The status that is due for the sender, of at most `BYTES`; `None` unless there is news, or 100 ms went by. The sender's next frame echoes
-    /// it, which shows how long frames are on their way.
+    /// The status that is due for the sender, of at most `BYTES`; `None` unless there is news, or 100 ms went by. The
+    /// sender's next frame echoes it, which measures the transit of frames.
     pub fn status<'b, const BYTES: usize>(
         &mut self,
         now: Millis,

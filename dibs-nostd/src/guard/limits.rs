@@ -24,12 +24,12 @@ pub struct GuardLimits {
 const ROOM: f32 = 4.0;
 
 impl GuardLimits {
-    /// Limits for tissue of at most this speed (mm/s), and surfaces of at most this age: about two periods of the source and
-    /// the transit time. From three quarters of the age on the state is degraded, beyond it safe.
+    /// Limits for tissue of at most this speed (mm/s), and surfaces of at most this age: about two periods of the
+    /// source and the transit time. From three quarters of the age on the state is degraded, beyond it safe.
     ///
     /// By default the control loop runs at 1 kHz, an operator acknowledges the end of a safe state, the transit time is
-    /// watched by the status that each frame echoes ([`Bus::status`](super::Bus::status)), vertices keep within four sizes
-    /// of the rest shape, and a tick's budget is not limited.
+    /// watched by the status that each frame echoes ([`Bus::status`](super::Bus::status)), vertices keep within four
+    /// sizes of the rest shape, and a tick's budget is not limited.
     #[must_use]
     pub const fn new(speed_mm_per_s: f32, age: Millis) -> Self {
         Self {
@@ -80,8 +80,8 @@ impl GuardLimits {
         self
     }
 
-    /// The fail-safe machine's limits, instead of those that follow from speed and age. [`automatic`](Self::automatic) and
-    /// [`without_transit`](Self::without_transit) change these, too.
+    /// The fail-safe machine's limits, instead of those that follow from speed and age. [`automatic`](Self::automatic)
+    /// and [`without_transit`](Self::without_transit) change these, too.
     #[must_use]
     pub const fn trust(mut self, limits: Limits) -> Self {
         self.trust = Some(limits);

@@ -26,14 +26,14 @@ impl<const N: usize> Surface<N> {
         Self { frames: Frames::new(), notes: Notes::new() }
     }
 
-    /// Validates the tree, and makes the two ends, once. `STACK` is the tree's [`TreeBytes::stack`] at least, and the guard
-    /// has places for `OPENED` opened nodes: see [`Tracker`](crate::Tracker).
+    /// Validates the tree, and makes the two ends, once. `STACK` is the tree's [`TreeBytes::stack`] at least, and the
+    /// guard has slots for `OPENED` opened nodes: see [`Tracker`](crate::Tracker).
     ///
     /// Cost: linear in the tree, for start-up.
     ///
     /// # Errors
-    /// [`Error`], with the damage of the tree, its number of vertices where that is not `N`, the limit that is out of range,
-    /// or that the ends were taken before.
+    /// [`Error`], with the damage of the tree, its number of vertices where that is not `N`, the limit that is out of
+    /// range, or that the ends were taken before.
     #[inline(always)]
     pub fn start<'t, I: Index, const STACK: usize, const OPENED: usize>(
         &self,

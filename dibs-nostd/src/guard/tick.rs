@@ -6,13 +6,14 @@ use super::surface::Notes;
 use super::{Answer, GuardLimits, Searched};
 use crate::failsafe::{AcknowledgeError, FailSafe, Observation};
 use crate::{
-    Error, FrameReader, Index, Millis, Options, Tool, Tracker, TrackerAnswer, Tree, TreeBytes,
-    Unavailable, VertexTable,
+    Error, FrameAge, FrameReader, Index, Millis, Options, Tool, Tracker, TrackerAnswer, Tree,
+    TreeBytes, Unavailable, VertexTable,
 };
 
-/// The control tick's end of a [`Surface`](super::Surface): the closest pair of one tool on the surface as it is now, and the trust in it.
+/// The control tick's end of a [`Surface`](super::Surface): the closest pair of one tool on the surface as it is now,
+/// and the trust in it.
 ///
-/// Keep it in a `static` or in a task's memory. RAM: that of a [`Tracker`] with `OPENED` places, and less than 500 bytes.
+/// Keep it in a `static` or in a task's memory. RAM: that of a [`Tracker`] with `OPENED` slots, and less than 500 bytes.
 #[derive(Debug)]
 pub struct Guard<'s, 't, I, const STACK: usize, const OPENED: usize> {
     notes: &'s Notes,
@@ -39,8 +40,8 @@ impl Pose {
         Self { start: tool.axis_start(), end: tool.axis_point(1.0), at }
     }
 
-    /// Velocity (mm/s) of the axis' point at a parameter since an earlier pose. Where the clock shows that ticks were left
-    /// out, as slow as they make it.
+    /// Velocity (mm/s) of the axis' point at a parameter since an earlier pose. Where the clock shows that ticks were
+    /// left out, as slow as they make it.
     fn velocity(&self, before: &Self, rate: f32, parameter: f32) -> Vec3 {
         let (start, end) = (self.start - before.start, self.end - before.end);
         // Two readings of a clock in milliseconds are up to one less apart than they seem.
@@ -77,8 +78,9 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
 
     /// The answer of this tick. `now` is the receiver's clock.
     ///
-    /// The surface is the one published last, moved on to now ([`FrameGuard::extrapolated`](crate::FrameGuard::extrapolated)). Errors of the query are in the
-    /// answer, and lead to the safe state.
+    /// The surface is the one published last, moved on to now
+    /// ([`FrameGuard::extrapolated`](crate::FrameGuard::extrapolated)). Errors of the query are in the answer, and lead
+    /// to the safe state.
     ///
     /// Cost: the budget at most, and about a thousand instructions.
     pub fn closest<T: Tool>(&mut self, tool: &T, now: Millis) -> Answer {
@@ -92,7 +94,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
                 let searched = Searched {
                     frame,
                     before: surface.before().epoch().unwrap_or(frame.epoch),
-                    share: surface.share(),
+                    t: surface.t(),
                     position_error: surface.position_error(),
                     residual: surface.residual(),
                     lag: surface.lag(),
@@ -112,18 +114,21 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
             Some(before) => pose.velocity(&before, self.rate, along) - surface,
             None => Vec3::ZERO,
         };
-        self.judge(searched, tracked, velocity, now)
+        self.judge(frame, searched, tracked, velocity, now)
     }
 
-    /// The answer of a tick whose tool has no pose: the constraint's output is the hold, without a force where nothing is
-    /// known to damp. The next tick's velocity starts anew.
+    /// The answer of a tick whose tool has no pose: the state is safe, with [`Unavailable::NoPose`] as its cause while
+    /// there is a surface, and the constraint's output is the hold, without a force where nothing is known to damp. The
+    /// next tick's velocity starts anew.
     pub fn without_pose(&mut self, now: Millis) -> Answer {
         self.before = None;
-        self.judge(None, Err(Unavailable::NotFinite), Vec3::NAN, now)
+        let frame = self.reader.latest(now).frame();
+        self.judge(frame, None, Err(Unavailable::NoPose), Vec3::NAN, now)
     }
 
     fn judge(
         &mut self,
+        frame: Option<FrameAge>,
         searched: Option<Searched>,
         tracked: Result<TrackerAnswer, Unavailable>,
         velocity: Vec3,
@@ -131,13 +136,10 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
     ) -> Answer {
         let link = self.notes.link.read(now);
         let trust = self.failsafe.step(&Observation {
-            frame: searched.map(|searched| searched.frame),
+            frame,
             lag: searched.and_then(|searched| searched.lag),
             link,
-            query_error: match tracked {
-                Err(Unavailable::Query(error)) => Some(error),
-                _ => None,
-            },
+            no_answer: tracked.err(),
             is_tree_corrupt: self.notes.is_tree_corrupt()
                 || self.tracker.tree().check(self.tree.bytes()).is_err(),
         });

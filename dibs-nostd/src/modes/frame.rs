@@ -26,15 +26,15 @@ impl<const K: usize> Weights<K> {
         ModalSurface::new(modes, self.values.iter().copied())
     }
 
-    /// The surface on the straight way to another: `share` 0 is this one, 1 the other.
-    fn towards(&self, other: &Self, share: f32, modes: &Modes<'_>) -> Self {
+    /// The blend with another surface: `t` 0 is this one, 1 the other.
+    fn towards(&self, other: &Self, t: f32, modes: &Modes<'_>) -> Self {
         let mut values = self.values;
         for (value, other) in values.iter_mut().zip(&other.values) {
-            *value += (other - *value) * share;
+            *value += (other - *value) * t;
         }
         let stretch = match (self.stretch, other.stretch) {
             (Some(old), Some(new)) => {
-                let sigma = (1.0 - share) * old.sigma() + share * new.sigma();
+                let sigma = (1.0 - t) * old.sigma() + t * new.sigma();
                 old.of_both(new, sigma * ROUNDING + modes.header.slack)
             }
             _ => None,
@@ -43,7 +43,7 @@ impl<const K: usize> Weights<K> {
     }
 }
 
-/// The way from the frame before to this one, and on.
+/// The step from the frame before to this one, and its extrapolation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Step<const K: usize> {
     before: Weights<K>,
@@ -92,18 +92,18 @@ impl<const K: usize> Step<K> {
         let (step, units_ahead) = (units(before), units(&end));
         let (mut shown, mut ahead) = ([f32::NAN; 2], PredictionCheck::UNKNOWN);
         if let Some(last) = last {
-            let share = last.ahead(interval);
-            let expected = before.towards(&last.end, share, modes);
+            let t = last.ahead(interval);
+            let expected = before.towards(&last.end, t, modes);
             // Of a velocity that changes steadily, after as long a time again as this step took.
             let longer = 2.0 * interval.0 as f32 / (interval.0 as f32 + last.interval.0 as f32);
             let longer = if longer > 1.0 { longer } else { 1.0 };
             shown = [last.shown[1], reach.between(&expected.surface(modes), &surface) * longer];
-            // Weights and shares are rounded by a few parts in 2^24.
+            // Weights and `t` are rounded by a few parts in 2^24.
             let rounding = (units(&rest) + step + last.units_ahead) / (1 << 20);
             // At the end, where the error has grown threefold, the surface is off its prediction by all that was cut.
             let cut = reach.between(&rest.surface(modes), &cut.surface(modes)) * (4.0 / 3.0);
             let off = units(&expected) + modes.motion.units_of(cut) + rounding + 2;
-            let passed = (share * last.units_ahead as f32) as u64;
+            let passed = (t * last.units_ahead as f32) as u64;
             if let (Ok(passed), Ok(off)) = (passed.try_into(), off.try_into()) {
                 ahead = PredictionCheck { passed, off, ..ahead };
             }
@@ -112,7 +112,7 @@ impl<const K: usize> Step<K> {
         Self { before, end, interval, from, units, units_ahead, shown, ahead }
     }
 
-    /// Part of the way to the end after so long.
+    /// `t` of the blend with the end after so long.
     fn ahead(&self, age: Millis) -> f32 {
         clamped(age.0 as f32 / self.interval.0 as f32, FARTHEST) / FARTHEST
     }
@@ -168,9 +168,9 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
     #[must_use]
     pub fn interpolated(&self) -> Self {
         let Some(step) = &self.step else { return *self };
-        let share = clamped(self.age.0 as f32 / step.interval.0 as f32, 1.0);
-        let weights = step.before.towards(&self.weights, share, self.surface.modes());
-        let motion = step.from.along((share * step.units as f32) as u64);
+        let t = clamped(self.age.0 as f32 / step.interval.0 as f32, 1.0);
+        let weights = step.before.towards(&self.weights, t, self.surface.modes());
+        let motion = step.from.along((t * step.units as f32) as u64);
         let lag = if step.interval > self.age { step.interval } else { self.age };
         self.moved(weights, Some(motion), (f32::NAN, 0.0), lag)
     }
@@ -192,17 +192,17 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         if !is_known || !step.end.stretch.is_some_and(is_within) {
             return *self;
         }
-        let share = step.ahead(self.age);
-        let weights = self.weights.towards(&step.end, share, modes);
-        let prediction = Prediction::new(step.units, &step.ahead, share * FARTHEST);
-        let motion = motion.beside((share * step.units_ahead as f32) as u64);
+        let t = step.ahead(self.age);
+        let weights = self.weights.towards(&step.end, t, modes);
+        let prediction = Prediction::new(step.units, &step.ahead, t * FARTHEST);
+        let motion = motion.beside((t * step.units_ahead as f32) as u64);
         let motion = motion.map(|motion| motion.on(prediction));
         // The change of the motion may have been none by chance. False for NaN.
         let [before, now] = step.shown;
         let shown = if before > now { before } else { now };
         let end = Millis((step.interval.0 as f32 * FARTHEST) as u32);
         let lag = Millis(self.age.0.saturating_sub(end.0));
-        self.moved(weights, motion, (shown, grown(shown, share * FARTHEST)), lag)
+        self.moved(weights, motion, (shown, grown(shown, t * FARTHEST)), lag)
     }
 
     /// A bound (mm) on the distance of the last frame's vertices from its extrapolation by the two frames before, the

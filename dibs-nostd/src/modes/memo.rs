@@ -51,8 +51,8 @@ impl<T: VertexTable + ?Sized, const N: usize> VertexTable for Memo<'_, T, N> {
 
     #[inline(always)]
     fn position(&self, vertex: u32) -> Option<Vec3> {
-        let place = (vertex as usize).checked_rem(N).and_then(|place| self.slots.get(place));
-        let Some(slot) = place else { return self.table.position(vertex) };
+        let slot = (vertex as usize).checked_rem(N).and_then(|at| self.slots.get(at));
+        let Some(slot) = slot else { return self.table.position(vertex) };
         let known = slot.get();
         if known.vertex == vertex && vertex != NO_VERTEX {
             return Some(known.position);

@@ -15,12 +15,12 @@ const ROUNDING: f32 = 1.0 + 1.0 / 65_536.0;
 ///
 /// A vertex moves by the sum, over the modes, of its displacement times the gain's change. That is no longer than the
 /// sum of the modes' largest displacements, each times its gain's change; nor than the root of the sum of their squares,
-/// times the largest norm of a vertex's displacements, each mode's as a share of its largest.
+/// times the largest norm of a vertex's displacements, each mode's divided by its largest.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reach<const K: usize> {
     /// The length of each mode's largest displacement, in units of a sum for a gain of 1.
     largest: [f32; K],
-    /// The largest norm of a vertex's matrix of 3 x `K` shares.
+    /// The largest norm of a vertex's matrix of 3 x `K` such quotients.
     norm: f32,
 }
 
@@ -38,9 +38,10 @@ impl<const K: usize> Reach<K> {
         let largest = largest.map(sqrt);
         let mut norm = 0.0_f32;
         for row in rows() {
-            let shares = row.iter().zip(&largest).filter(|(_, largest)| **largest > 0.0);
-            let shares = shares.map(|(displacement, largest)| vector(displacement) / *largest);
-            let found = fourth_power_of_norm(shares);
+            let quotients = row.iter().zip(&largest).filter(|(_, largest)| **largest > 0.0);
+            let quotients =
+                quotients.map(|(displacement, largest)| vector(displacement) / *largest);
+            let found = fourth_power_of_norm(quotients);
             norm = if found > norm { found } else { norm };
         }
         let scale = (1_u32 << FRACTION_BITS) as f32;
@@ -122,15 +123,15 @@ mod tests {
                 }
             });
             // As far as the ranges allow.
-            let shares = change.iter().zip(&ranges).map(|(change, [low, high])| {
+            let scales = change.iter().zip(&ranges).map(|(change, [low, high])| {
                 let room = 0.5 * (high - low);
                 if *change == 0.0 { f32::INFINITY } else { room / change.abs() }
             });
-            let share = shares.fold(f32::INFINITY, f32::min) * rng.f32();
+            let scale = scales.fold(f32::INFINITY, f32::min) * rng.f32();
             let middle = ranges.map(|[low, high]| 0.5 * (low + high));
             let at = |sign: f32| {
                 let weights: [f32; MODES] =
-                    core::array::from_fn(|mode| middle[mode] + sign * 0.999 * share * change[mode]);
+                    core::array::from_fn(|mode| middle[mode] + sign * 0.999 * scale * change[mode]);
                 modes.surface::<MODES>(&weights).unwrap()
             };
             let (before, after) = (at(-1.0), at(1.0));

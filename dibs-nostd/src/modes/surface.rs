@@ -66,7 +66,7 @@ impl<const K: usize> VertexTable for ModalSurface<'_, K> {
     }
 }
 
-/// One mode's share of one axis, in units. With the addition it is `smlawb` or `smlawt` on ARM.
+/// One mode's displacement on one axis, in units. With the addition it is `smlawb` or `smlawt` on ARM.
 #[inline(always)]
 const fn scaled(gain: i32, displacement: i16) -> i32 {
     ((gain as i64 * displacement as i64) >> FRACTION_BITS) as i32

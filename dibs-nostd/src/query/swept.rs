@@ -6,32 +6,32 @@ use crate::math::sqrt::sqrt;
 use crate::unavailable::QueryError;
 use crate::{Index, Step, Tool, VertexTable};
 
-/// The result of a sweep. Times are shares of the way: 0 at its start, 1 at its end.
+/// The result of a sweep. Times count in sweeps: 0 is its start, 1 its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct SweepAnswer {
-    /// Before this time they are certainly not closer than the margin; 1 or more means on the whole way.
+    /// Before this time they are certainly not closer than the margin; 1 or more: at no time.
     pub clear_until: f32,
     /// The first time at which they were found within the margin, or farther by no more than the
-    /// [accuracy](Proximity::accuracy) and the rounding of positions on the way. If this is `None` and `clear_until` is
-    /// less than 1, the looks were too few to decide.
+    /// [accuracy](Proximity::accuracy) and the rounding of positions between. If this is `None` and `clear_until` is
+    /// less than 1, the samples were too few to decide.
     pub contact: Option<f32>,
-    /// The closest pair at the end of the way.
+    /// The closest pair at the end.
     pub at_end: Proximity,
     /// Queries made.
-    pub looks: u32,
+    pub samples: u32,
 }
 
-/// The way of tool and surface from one tick to the next: the ends of the tool's axis and the surface's vertices each
-/// go straight and evenly.
+/// The motion of tool and surface from one tick to the next: the ends of the tool's axis and the surface's vertices each
+/// move straight and evenly.
 #[derive(Debug)]
 pub struct Sweep<'s, 'v, W: ?Sized, V: ?Sized, T> {
     /// The surface's frames.
     pub step: &'s Step<'v, W, V>,
-    /// The surface's start and end between the frames, each in 0..=1.
-    pub shares: [f32; 2],
-    /// The tool at the start and at the end. On its way it has the larger of their radii.
+    /// The surface at the start and at the end: `t` of [`Step::at`](crate::Step::at), in 0..=1.
+    pub t: [f32; 2],
+    /// The tool at the start and at the end. Between them it has the larger of their radii.
     pub tools: [T; 2],
 }
 
@@ -41,13 +41,13 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized, T: Tool> Sweep<'_, '_, W,
         if !(0.0..f32::INFINITY).contains(&margin) {
             return Err(QueryError::Margin { bits: margin.to_bits() });
         }
-        match self.shares.into_iter().find(|share| !(0.0..=1.0).contains(share)) {
-            Some(share) => Err(QueryError::Share { bits: share.to_bits() }),
+        match self.t.into_iter().find(|t| !(0.0..=1.0).contains(t)) {
+            Some(t) => Err(QueryError::BlendTime { bits: t.to_bits() }),
             None => Ok(()),
         }
     }
 
-    /// Most by which a distance can change on the whole way, rounded up.
+    /// Most by which a distance can change from start to end, rounded up.
     fn most(&self) -> f32 {
         const U: f32 = 1.0 / 16_777_216.0;
         let [from, to] = &self.tools;
@@ -55,12 +55,12 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized, T: Tool> Sweep<'_, '_, W,
         let end = start + (to.axis_span() - from.axis_span());
         let (start, end) = (start.length_squared(), end.length_squared());
         let tool = sqrt(if start > end { start } else { end });
-        let [first, last] = self.shares;
+        let [first, last] = self.t;
         let lengths = from.axis_length() + to.axis_length();
         (tool + (last - first).abs() * self.step.length()) * (1.0 + 16.0 * U) + 8.0 * U * lengths
     }
 
-    /// The size of the coordinates that an instant of the way is computed from.
+    /// The size of the coordinates that an instant is computed from.
     fn size(&self) -> f32 {
         let of = |tool: &T| tool.axis_start().abs().max_element() + tool.axis_length();
         let [from, to] = &self.tools;
@@ -71,59 +71,59 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized, T: Tool> Sweep<'_, '_, W,
 impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     Tracker<'_, I, STACK, OPENED, RANGE>
 {
-    /// Whether tool and surface come closer than `margin` (mm, not negative) on their way, and when first.
+    /// Whether tool and surface come closer than `margin` (mm, not negative) in a sweep, and when first.
     ///
     /// By conservative advancement (Mirtich 1996): a distance changes by no more than tool and surface move, so a pair
     /// at one instant clears the time before and after in which the motion cannot use up its distance. As a rule the
-    /// pair at the end, which a tick needs anyway, clears the whole way. If not, the sweep advances from the start,
-    /// with at most `looks` queries in all. No time is skipped at any speed: `clear_until` ends where the proof does.
+    /// pair at the end, which a tick needs anyway, clears all of it. If not, the sweep advances from the start,
+    /// with at most `samples` queries in all. No time is skipped at any speed: `clear_until` ends where the proof does.
     /// The distance is that to the surface itself, from either side.
     ///
-    /// The stretch in the options must hold on the whole way: that of both frames, by
-    /// [`MeasuredStretch::or_larger`](crate::MeasuredStretch::or_larger). Their budget is for each look.
+    /// The stretch in the options must hold all the time: that of both frames, by
+    /// [`MeasuredStretch::or_larger`](crate::MeasuredStretch::or_larger). Their budget is for each sample.
     ///
-    /// Cost: `looks` times that of [`closest`](Self::closest), and once at least.
+    /// Cost: `samples` times that of [`closest`](Self::closest), and once at least.
     ///
     /// # Errors
-    /// [`QueryError::Margin`] and [`QueryError::Share`] for arguments out of range, and those of
+    /// [`QueryError::Margin`] and [`QueryError::BlendTime`] for arguments out of range, and those of
     /// [`closest`](Self::closest).
     pub fn sweep<W: VertexTable + ?Sized, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
-        way: &Sweep<'_, '_, W, V, T>,
+        sweep: &Sweep<'_, '_, W, V, T>,
         margin: f32,
-        looks: u32,
+        samples: u32,
         options: &Options,
     ) -> Result<SweepAnswer, QueryError> {
-        way.check(margin)?;
-        let (most, size) = (way.most(), way.size());
-        let ([from, to], [first, last]) = (&way.tools, way.shares);
-        let mut look = |time: f32, options: &Options| {
+        sweep.check(margin)?;
+        let (most, size) = (sweep.most(), sweep.size());
+        let ([from, to], [first, last]) = (&sweep.tools, sweep.t);
+        let mut sample = |time: f32, options: &Options| {
             let tool = from.towards(to, time);
-            let surface = way.step.at(first + time * (last - first));
+            let surface = sweep.step.at(first + time * (last - first));
             let TrackerAnswer { closest: found, is_kept, .. } =
                 self.closest(&surface, &tool, options)?;
             let rounding = ROUNDING * (size + found.axis_distance);
-            Ok(Look::new(found, is_kept, margin, rounding, tool.radius()))
+            Ok(Sample::new(found, is_kept, margin, rounding, tool.radius()))
         };
-        let at_end = look(1.0, options)?;
+        let at_end = sample(1.0, options)?;
         let mut swept =
-            SweepAnswer { clear_until: 0.0, contact: None, at_end: at_end.found, looks: 1 };
-        // A distance clears a part of the way; any does, where nothing moves.
+            SweepAnswer { clear_until: 0.0, contact: None, at_end: at_end.found, samples: 1 };
+        // A distance clears a part of the sweep; any does, where nothing moves.
         let part = |spare: f32| match most {
             _ if !(spare > 0.0) => 0.0,
             0.0 => ALWAYS,
             most => spare / most * ROUND_DOWN,
         };
-        // The pair at the end clears the way from here on.
+        // The pair at the end clears the rest from here on.
         let end = 1.0 - part(at_end.spare);
         if at_end.touches {
             swept.contact = Some(1.0);
         }
         let unsigned = options.unsigned();
         let mut time = 0.0;
-        while swept.looks < looks && !(time > end) && time <= 1.0 {
-            let now = look(time, &unsigned)?;
-            swept.looks += 1;
+        while swept.samples < samples && !(time > end) && time <= 1.0 {
+            let now = sample(time, &unsigned)?;
+            swept.samples += 1;
             if now.touches {
                 swept.contact = Some(time);
                 break;
@@ -140,8 +140,8 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     }
 }
 
-/// An instant of the way.
-struct Look {
+/// The pair at an instant.
+struct Sample {
     found: Proximity,
     /// Certified distance left above the margin; 0 if there is none.
     spare: f32,
@@ -149,7 +149,7 @@ struct Look {
     touches: bool,
 }
 
-impl Look {
+impl Sample {
     fn new(found: Proximity, is_kept: bool, margin: f32, rounding: f32, radius: f32) -> Self {
         let separation = found.axis_distance - radius;
         // Signed answers are exact; others bound the distance to the surface.
@@ -165,7 +165,7 @@ impl Look {
     }
 }
 
-/// After the end of the way.
+/// After the end.
 const ALWAYS: f32 = 2.0;
 /// Factor on a time, for the rounding of its quotient.
 const ROUND_DOWN: f32 = 1.0 - 8.0 / 16_777_216.0;
@@ -186,7 +186,7 @@ mod tests {
             side: Side::Outside,
             ..Proximity::NOWHERE
         };
-        let spare = |margin| Look::new(found, false, margin, 0.125, 1.0).spare;
+        let spare = |margin| Sample::new(found, false, margin, 0.125, 1.0).spare;
         assert_eq!([spare(1.0), spare(1.625), spare(1.75), spare(2.0)], [0.625, 0.0, 0.0, 0.0]);
     }
 }

@@ -8,7 +8,7 @@ pub(super) const GAPS: usize = 7;
 /// Packets of consecutive sequence numbers, and their rows.
 #[derive(Clone, Copy, Debug)]
 struct Contig {
-    /// Sequence numbers, `from..to`; empty where the place is free.
+    /// Sequence numbers, `from..to`; empty where the slot is free.
     from: u16,
     to: u16,
     /// Rows, `first..end`.
@@ -32,7 +32,7 @@ impl Contig {
 pub(super) struct Arrivals {
     /// From the frame's first packet on.
     prefix: Contig,
-    /// The others, in no order. No vector: a range keeps its place while others come and go.
+    /// The others, in no order. No vector: a range keeps its slot while others come and go.
     others: [Contig; GAPS],
     /// Number of these in use.
     used: u8,
@@ -51,12 +51,12 @@ pub(super) enum Misplaced {
     Gaps,
 }
 
-/// The place of a packet among the ranges.
+/// The position of a packet among the ranges.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     sequence: u16,
     rows: Range32,
-    /// Places of the ranges that end before it and begin after it.
+    /// Slots of the ranges that end before it and begin after it.
     before: Option<usize>,
     after: Option<usize>,
     free: usize,
@@ -69,7 +69,7 @@ struct Range32 {
     end: u32,
 }
 
-/// The first range's place: after the others'.
+/// The first range's slot: after the others'.
 const PREFIX: usize = GAPS;
 
 impl Arrivals {
@@ -94,7 +94,7 @@ impl Arrivals {
         self.prefix.to > sequence || self.others.iter().any(|range| range.to > sequence)
     }
 
-    /// The place of a packet. O(1) in order, O([`GAPS`]) otherwise.
+    /// The position of a packet. O(1) in order, O([`GAPS`]) otherwise.
     #[inline]
     pub fn locate(&self, sequence: u16, rows: Range<u32>) -> Result<Place, Misplaced> {
         let rows = Range32 { first: rows.start, end: rows.end };
@@ -140,7 +140,7 @@ impl Arrivals {
         if fits { Ok(()) } else { Err(Misplaced::Order) }
     }
 
-    /// Notes a packet at its place.
+    /// Notes a packet at its position.
     #[inline]
     pub fn insert(&mut self, place: Place) {
         let Place { sequence, rows, before, after, free } = place;

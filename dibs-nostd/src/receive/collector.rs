@@ -513,12 +513,12 @@ impl Frame {
         matches!(self.begin.content, Content::Partial { .. })
     }
 
-    /// The receiver's clock at the surface's capture, if the begin took no time on its way.
+    /// The receiver's clock at the surface's capture, if the begin had no transit.
     pub fn captured(&self) -> Millis {
         self.received.before(Millis(self.begin.freshness.age_ms.into()))
     }
 
-    /// The place of rows; `None` for a repeated packet.
+    /// The position of rows; `None` for a repeated packet.
     #[inline]
     pub fn locate(
         &self,

@@ -25,7 +25,7 @@ pub struct BusHealth {
     /// then the sender did not know the receiver's challenge.
     pub forgeries: u32,
     /// Time from the status that the published frame echoes to the arrival of its begin packet: an upper bound on the
-    /// way of each. [`Millis::MAX`] where it echoes none.
+    /// latency of each. [`Millis::MAX`] where it echoes none.
     pub transit: Millis,
     /// Age of the published frame when it was sent, as the sender stated it.
     pub source_age: Millis,

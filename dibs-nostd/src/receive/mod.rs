@@ -41,9 +41,9 @@ use step::{Earlier, Step};
 /// With a gate of modes the buffers have a row for each, and frames hold weights instead: see
 /// [`Gate::weight_range`].
 ///
-/// RAM: less than 700 bytes besides [`Frames`](crate::Frames) and gate, for any number of vertices. A surface's buffers with
-/// both ends, the assembler and the [`StretchMonitor`](crate::StretchMonitor) together take 24 bytes a vertex and at
-/// most 1,750 bytes.
+/// RAM: less than 700 bytes besides [`Frames`](crate::Frames) and gate, for any number of vertices. A surface's buffers
+/// with both ends, the assembler and the [`StretchMonitor`](crate::StretchMonitor) together take 24 bytes a vertex and
+/// at most 1,750 bytes.
 ///
 /// ```
 /// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
@@ -271,8 +271,8 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
     }
 
     /// The receiver's status for the sender, or its answer to a hello that came:
-    /// [`encode_status`](crate::wire::encode_status) makes a packet of it. Make one as soon as a hello has come. `safety` as
-    /// in [`Status::safety`].
+    /// [`encode_status`](crate::wire::encode_status) makes a packet of it. Make one as soon as a hello has come.
+    /// `safety` as in [`Status::safety`].
     pub fn status(&mut self, now: Millis, safety: u8) -> Status {
         let stretch = self.writer.front().and_then(|front| front.label().stretch);
         let stretch = stretch.map(|stretch| stretch.sigma());
@@ -368,7 +368,7 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
             let age = front.time_to(frame.captured());
             let earlier = two.as_ref().and_then(|[before, last]| {
                 let step = LastStep::between(before, last)?;
-                Some(Earlier { frame: before, units: step.units(), share: step.ahead(age) })
+                Some(Earlier { frame: before, units: step.units(), t: step.ahead(age) })
             });
             work = self.step.compare(&back, front, earlier.as_ref(), ready, work);
             if frame.is_complete && self.step.rows() < ready {

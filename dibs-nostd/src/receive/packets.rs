@@ -95,8 +95,8 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
             (Rows::Quantised(_), Encoding::Quantised(grid), _) => Some(grid),
             _ => return Err(ReceiveError::Encoding),
         };
-        let places = self.writer.rows(range.clone()).ok_or(out_of_range)?;
-        let Some(place) = frame.locate(packet.sequence, range.clone())? else {
+        let slots = self.writer.rows(range.clone()).ok_or(out_of_range)?;
+        let Some(at) = frame.locate(packet.sequence, range.clone())? else {
             return Ok(Progress::Duplicate);
         };
         let is_partial = matches!(frame.begin.content, Content::Partial { .. });
@@ -110,17 +110,17 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
                 if !self.is_box_inside {
                     check(rows.iter().map(decode), first, limit)?;
                 }
-                store(places, rows, decode);
+                store(slots, rows, decode);
             }
             (Rows::Float(rows), _) => {
                 check(rows.iter().map(float_position), first, limit)?;
-                for (place, row) in places.iter().zip(rows) {
-                    place.set(float_position(row));
+                for (slot, row) in slots.iter().zip(rows) {
+                    slot.set(float_position(row));
                 }
             }
             _ => return Err(ReceiveError::Encoding),
         }
-        self.stored(packet.epoch, contribution, place, range)
+        self.stored(packet.epoch, contribution, at, range)
     }
 
     fn weights(
@@ -135,8 +135,8 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         if frame.begin.content != Content::Modal {
             return Err(ReceiveError::Encoding);
         }
-        let places = self.writer.rows(range.clone()).ok_or(out_of_range)?;
-        let Some(place) = frame.locate(packet.sequence, range.clone())? else {
+        let slots = self.writer.rows(range.clone()).ok_or(out_of_range)?;
+        let Some(at) = frame.locate(packet.sequence, range.clone())? else {
             return Ok(Progress::Duplicate);
         };
         for (row, value) in range.clone().zip(values) {
@@ -149,10 +149,10 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
                 return Err(ReceiveError::TooFar { row });
             }
         }
-        for (place, value) in places.iter().zip(values) {
-            place.set(Vec3::new(f32::from_le_bytes(*value), 0.0, 0.0));
+        for (slot, value) in slots.iter().zip(values) {
+            slot.set(Vec3::new(f32::from_le_bytes(*value), 0.0, 0.0));
         }
-        self.stored(packet.epoch, contribution, place, range)
+        self.stored(packet.epoch, contribution, at, range)
     }
 
     /// Notes rows that have been stored.
@@ -161,21 +161,21 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         &mut self,
         epoch: u32,
         contribution: u32,
-        place: arrivals::Place,
+        at: arrivals::Place,
         rows: Range<u32>,
     ) -> Result<Progress, ReceiveError> {
         self.is_dirty = true;
         self.gate.moved(rows);
-        Ok(stored(self.collector.take_rows(contribution, place)?, epoch))
+        Ok(stored(self.collector.take_rows(contribution, at)?, epoch))
     }
 }
 
-/// Stores rows in their places. (On the board a function of its own, so that the loop has the registers.)
+/// Stores rows in their slots. (On the board a function of its own, so that the loop has the registers.)
 #[cfg_attr(target_arch = "arm", inline(never))]
 #[cfg_attr(not(target_arch = "arm"), inline(always))]
-fn store<R>(places: &[Position], rows: &[R], decode: impl Fn(&R) -> Vec3) {
-    for (place, row) in places.iter().zip(rows) {
-        place.set(decode(row));
+fn store<R>(slots: &[Position], rows: &[R], decode: impl Fn(&R) -> Vec3) {
+    for (slot, row) in slots.iter().zip(rows) {
+        slot.set(decode(row));
     }
 }
 

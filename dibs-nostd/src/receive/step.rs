@@ -18,26 +18,26 @@ pub(super) struct Step {
     fastest: [u32; 2],
     largest: f32,
     off: f32,
-    /// Units of the odometer between the two frames before, and the share of them that the extrapolation adds.
+    /// Units of the odometer between the two frames before, and the part of them that the extrapolation adds.
     units: u64,
-    share: f32,
+    t: f32,
 }
 
 /// The frame before the published one, from which the frame in work is extrapolated.
 pub(super) struct Earlier<'f, V: ?Sized> {
     pub frame: &'f V,
-    /// Units from it to the published frame, and the share of the way that is added.
+    /// Units from it to the published frame, and the part of that step that is added.
     pub units: u64,
-    pub share: f32,
+    pub t: f32,
 }
 
 impl Step {
     pub const fn new() -> Self {
-        Self { rows: 0, fastest: [0; 2], largest: 0.0, off: 0.0, units: 0, share: 0.0 }
+        Self { rows: 0, fastest: [0; 2], largest: 0.0, off: 0.0, units: 0, t: 0.0 }
     }
 
-    /// Compares at most `work` of the rows below `ready` with those before, and with the places that these would have if
-    /// they had gone on as from an earlier frame, if there is one. Returns the work left.
+    /// Compares at most `work` of the rows below `ready` with those before, and with the extrapolation of these from an
+    /// earlier frame, if there is one. Returns the work left.
     pub fn compare<V: VertexTable + ?Sized>(
         &mut self,
         now: &V,
@@ -51,9 +51,9 @@ impl Step {
         let end = self.rows.saturating_add(rows);
         let (range, largest) = (self.rows..end, self.largest);
         (self.largest, self.off) = match earlier {
-            Some(&Earlier { frame, units, share }) => {
-                (self.units, self.share) = (units, share);
-                largest_change((now, before, frame), share, range, (self.largest, self.off))
+            Some(&Earlier { frame, units, t }) => {
+                (self.units, self.t) = (units, t);
+                largest_change((now, before, frame), t, range, (self.largest, self.off))
             }
             None => (largest_step(now, before, range, self.largest), f32::NAN),
         };
@@ -80,14 +80,14 @@ impl Step {
             (Some(step), Some(off)) if self.units < MOST && step < MOST && off < MOST => {
                 // The distance is the difference of two steps, each rounded by a few parts in 2^24.
                 let rounding = (2 * self.units + step) / (1 << 18) + 2;
-                Some(((self.share * self.units as f32) as u32, (off + rounding) as u32))
+                Some(((self.t * self.units as f32) as u32, (off + rounding) as u32))
             }
             _ => None,
         };
         let (passed, off) = known.unwrap_or((0, PredictionCheck::UNKNOWN.off));
         // Of a velocity that changes steadily, after as long a time again as the last step took: more than was seen, if
         // the step took longer than the one before.
-        let growth = 2.0 * self.share / (1.0 + self.share);
+        let growth = 2.0 * self.t / (1.0 + self.t);
         let growth = if growth > 1.0 { growth } else { 1.0 };
         PredictionCheck { shown: sqrt(self.off) * growth, passed, off, ..PredictionCheck::UNKNOWN }
     }

@@ -94,7 +94,7 @@ pub trait Gate {
         None
     }
 
-    /// The farthest (mm) that any vertex may be from its place in a surface captured so long before: see
+    /// The farthest (mm) that any vertex may be from its position in a surface captured so long before: see
     /// [`SurfaceLimits::speed`](crate::SurfaceLimits::speed) and
     /// [`recovery_mm`](crate::SurfaceLimits::recovery_mm). Infinite for a gate that compares no frames.
     fn farthest(&self, elapsed: Millis) -> f32 {
@@ -108,7 +108,8 @@ pub trait Gate {
         None
     }
 
-    /// The stretch at the end of the frame's extrapolation, once it is admitted. `None` where the gate measures none, or it is beyond the limit.
+    /// The stretch at the end of the frame's extrapolation, once it is admitted. `None` where the gate measures none,
+    /// or it is beyond the limit.
     #[doc(hidden)]
     fn ahead(&self) -> Option<f32> {
         None

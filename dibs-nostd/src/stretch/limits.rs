@@ -2,7 +2,7 @@
 
 /// Limits for a surface to be published, besides the tree's stretch limit.
 ///
-/// They refuse surfaces in impossible places or shapes. A closed surface must enclose a volume of the sign that its
+/// They refuse surfaces of impossible position or shape. A closed surface must enclose a volume of the sign that its
 /// rest shape encloses: a mirrored one is refused, and one turned inside out, however slowly. They do not detect a
 /// first frame that is turned or moved as a whole (the next correct frame would be too far away), a part of a closed
 /// surface that is inside out while the rest encloses more, or a part of a region that shrinks while the rest grows.
@@ -46,9 +46,9 @@ impl SurfaceLimits {
         self
     }
 
-    /// The farthest (mm) that a vertex may be from its place in the published frame, however long ago that was: after a
-    /// silence, a surface that is mirrored, turned or moved as a whole is not the one that was trusted. A tenth of the
-    /// reach by default; infinite for no limit.
+    /// The farthest (mm) that a vertex may be from its position in the published frame, however long ago that was:
+    /// after a silence, a surface that is mirrored, turned or moved as a whole is not the one that was trusted. A tenth
+    /// of the reach by default; infinite for no limit.
     ///
     /// A surface that was really moved farther, say with the patient, is refused until somebody registers it anew:
     /// [`Assembler::register`](crate::Assembler::register).

@@ -38,7 +38,7 @@ pub(crate) fn largest_step<V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
     largest
 }
 
-/// The largest squares of the last step of these rows, and of its difference from a `share` of the step before; or
+/// The largest squares of the last step of these rows, and of its difference from `t` of the step before; or
 /// `largest` and `off` if those are larger. NaN where a position is NaN.
 ///
 /// The difference is that of two steps, not of two positions, because a step far from the origin is rounded less than a
@@ -47,7 +47,7 @@ pub(crate) fn largest_step<V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
 #[inline(never)]
 pub(crate) fn largest_change<V: VertexTable + ?Sized>(
     (now, before, earlier): (&V, &V, &V),
-    share: f32,
+    t: f32,
     rows: Range<u32>,
     (mut largest, mut off): (f32, f32),
 ) -> (f32, f32) {
@@ -55,7 +55,7 @@ pub(crate) fn largest_change<V: VertexTable + ?Sized>(
         let (Some(now), Some(before)) = (now.position(row), before.position(row)) else { break };
         let Some(earlier) = earlier.position(row) else { break };
         let step = now - before;
-        let change = step - (before - earlier) * share;
+        let change = step - (before - earlier) * t;
         let [step, change] = [step, change].map(Vec3::length_squared);
         // Written so that a NaN is kept.
         if !(step <= largest) {

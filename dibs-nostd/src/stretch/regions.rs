@@ -1,7 +1,7 @@
 //! Regions: equal runs of triangle rows, each measured by itself.
 
 use super::kernel::{Worst, root_up};
-use crate::surface::{MeasuredStretch, REGIONS, share};
+use crate::surface::{MeasuredStretch, REGIONS, region_sigma};
 use crate::tree::{Index, Tree};
 
 /// Triangle rows of each region (the last may have fewer).
@@ -30,10 +30,10 @@ pub(super) fn of_regions<I: Index>(
     let mut codes = [0; REGIONS];
     for (code, region) in codes.iter_mut().zip(regions) {
         let own = within(region.squared);
-        // The least code whose share is at least `own`, whichever way the division rounds.
+        // The least code whose stretch is at least `own`, whichever way the division rounds.
         let mut part = ((own / sigma * 256.0) as u8).saturating_sub(1);
         for _ in 0..2 {
-            if share(sigma, part) < own {
+            if region_sigma(sigma, part) < own {
                 part = part.saturating_add(1);
             }
         }

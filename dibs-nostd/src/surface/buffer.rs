@@ -28,7 +28,7 @@ pub struct PredictionCheck {
     pub sigma: f32,
     /// Largest distance (mm) of a vertex of this frame from its extrapolation by the two frames before; NaN if unknown.
     pub shown: f32,
-    /// Units of the odometer from the frame before to that place, along the way of those two.
+    /// Units of the odometer from the frame before to that extrapolation, along the step of those two.
     pub passed: u32,
     /// Units from there to this frame, at most; the largest number if unknown.
     pub off: u32,

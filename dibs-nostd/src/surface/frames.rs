@@ -18,8 +18,8 @@
 //!
 //! Ordering: the compare-exchange releases the writer's stores, and the `fetch_or` acquires them, so a read sees the
 //! whole frame. The `fetch_and` releases the reader's loads, and the next compare-exchange acquires them, so the
-//! writer's next stores, which go to a buffer that was readable before, come after every load of the last read. Both hold on any
-//! number of cores.
+//! writer's next stores, which go to a buffer that was readable before, come after every load of the last read. Both
+//! hold on any number of cores.
 //!
 //! # Who waits
 //!
@@ -46,8 +46,8 @@ pub(super) const READING: u32 = 4;
 /// State word, bit 3: the front buffer holds a frame.
 const PUBLISHED: u32 = 8;
 
-/// A double buffer of `N` vertex positions, meant for a `static`. With 3 `BUFFERS` it keeps the frame before the published
-/// one, too, so that a frame that is read has [`interpolated`](crate::FrameGuard::interpolated) and
+/// A double buffer of `N` vertex positions, meant for a `static`. With 3 `BUFFERS` it keeps the frame before the
+/// published one, too, so that a frame that is read has [`interpolated`](crate::FrameGuard::interpolated) and
 /// [`extrapolated`](crate::FrameGuard::extrapolated) surfaces.
 ///
 /// RAM: 12 bytes a vertex and buffer, plus some 50 a buffer. All zero at start, so it lies in `.bss`.
@@ -123,8 +123,8 @@ impl<const N: usize, const BUFFERS: usize> Frames<N, BUFFERS> {
     }
 }
 
-/// The buffers of a surface in anybody's memory, and their state: those of [`Frames`], or of the C interface. All of it must
-/// be zero at first, and the buffers of one size.
+/// The buffers of a surface in anybody's memory, and their state: those of [`Frames`], or of the C interface. All of it
+/// must be zero at first, and the buffers of one size.
 #[derive(Clone, Copy, Debug)]
 pub struct Buffers<'m> {
     state: &'m AtomicU32,
@@ -150,7 +150,7 @@ impl<'m> Buffers<'m> {
     /// The two ends. Whoever calls it sees to it that each is used once.
     #[must_use]
     pub fn ends(self) -> (FrameWriter<'m>, FrameReader<'m>) {
-        let back = self.buffer(self.places(0).back);
+        let back = self.buffer(self.roles(0).back);
         (FrameWriter { buffers: self, back, state: 0, filled: 0 }, FrameReader::new(self))
     }
 
@@ -175,24 +175,25 @@ impl<'m> Buffers<'m> {
     }
 
     #[inline(always)]
-    const fn places(&self, state: u32) -> Places {
+    const fn roles(&self, state: u32) -> Roles {
         let front = state & FRONT;
         let back = if front + 1 < self.count { front + 1 } else { 0 };
         let before = if back + 1 < self.count { back + 1 } else { 0 };
-        Places { front, back, before }
+        Roles { front, back, before }
     }
 
-    /// The published buffer and the one before it; of two buffers, the published one twice. `None` before the first frame.
+    /// The published buffer and the one before it; of two buffers, the published one twice. `None` before the first
+    /// frame.
     #[inline(always)]
     pub(super) fn published(&self, state: u32) -> Option<[Buffer<'m>; 2]> {
-        let Places { front, before, .. } = self.places(state);
+        let Roles { front, before, .. } = self.roles(state);
         (state & PUBLISHED != 0).then_some([self.buffer(front), self.buffer(before)])
     }
 }
 
 /// Numbers of the front buffer, of the one to be written next, and of the one that held the front before.
 #[derive(Clone, Copy, Debug)]
-struct Places {
+struct Roles {
     front: u32,
     back: u32,
     before: u32,
@@ -237,10 +238,10 @@ impl<'f> FrameWriter<'f> {
     #[inline]
     pub fn push(&mut self, position: Vec3) -> Result<(), OutOfTableError> {
         let row = self.filled;
-        let Some([place]) = self.rows(row..row.saturating_add(1)).and_then(<[_]>::as_array) else {
+        let Some([slot]) = self.rows(row..row.saturating_add(1)).and_then(<[_]>::as_array) else {
             return Err(OutOfTableError { vertex: row, vertices: self.len() });
         };
-        place.set(position);
+        slot.set(position);
         self.filled = row.saturating_add(1);
         Ok(())
     }
@@ -290,7 +291,7 @@ impl<'f> FrameWriter<'f> {
 
     #[cfg(feature = "bus")]
     fn front_buffer(&self) -> Buffer<'f> {
-        self.buffers.buffer(self.buffers.places(self.state).front)
+        self.buffers.buffer(self.buffers.roles(self.state).front)
     }
 
     /// Publishes the frame, by one compare-exchange. The next frame begins with [`begin`](Self::begin).
@@ -318,12 +319,12 @@ impl<'f> FrameWriter<'f> {
 
     /// Publishes a labelled frame that the caller has proven complete.
     pub(crate) fn publish_complete(&mut self) -> Result<(), PublishError> {
-        let next = self.buffers.places(self.state).back | PUBLISHED;
+        let next = self.buffers.roles(self.state).back | PUBLISHED;
         self.buffers
             .state
             .compare_exchange(self.state, next, Ordering::AcqRel, Ordering::Relaxed)
             .map_err(|_| PublishError::Busy)?;
-        self.back = self.buffers.buffer(self.buffers.places(next).back);
+        self.back = self.buffers.buffer(self.buffers.roles(next).back);
         self.state = next;
         // The back buffer now holds an old frame: it must be begun before it is published.
         self.filled = 0;

@@ -15,8 +15,8 @@ pub enum Coverage {
     Measured,
     /// A bound on the stretch follows from measured frames: between two of them, or from a modal surface's weights.
     Proven,
-    /// Nothing was measured: the tree's stretch limit is taken to hold. If it does not, a nearer part of the surface can be
-    /// missed. [`measure_stretch`](crate::measure_stretch) checks a frame.
+    /// Nothing was measured: the tree's stretch limit is taken to hold. If it does not, a nearer part of the surface
+    /// can be missed. [`measure_stretch`](crate::measure_stretch) checks a frame.
     Assumed,
 }
 
@@ -47,12 +47,13 @@ pub struct MeasuredStretch {
     /// The triangle that is stretched most, and [`PROVEN`].
     triangle: u32,
     epoch: Option<u32>,
-    /// Each region's share of `sigma`, less one, in parts of 256.
+    /// Each region's stretch, less one, in parts of 256 of `sigma`.
     regions: [u8; REGIONS],
 }
 
 impl MeasuredStretch {
-    /// A measurement of the frame `epoch` with the tree of this checksum: with the code of each region's [`share`].
+    /// A measurement of the frame `epoch` with the tree of this checksum: with the code of each [region's
+    /// stretch](region_sigma).
     pub(crate) const fn new(
         sigma: f32,
         tree: u32,
@@ -98,7 +99,7 @@ impl MeasuredStretch {
     /// whole's alone.
     #[must_use]
     pub fn regions(&self) -> [f32; REGIONS] {
-        self.regions.map(|code| share(self.sigma, code))
+        self.regions.map(|code| region_sigma(self.sigma, code))
     }
 
     /// The triangle that is stretched most.
@@ -146,6 +147,6 @@ impl MeasuredStretch {
 const PROVEN: u32 = 1 << 31;
 
 /// Stretch that a region's code stands for.
-pub(crate) fn share(sigma: f32, code: u8) -> f32 {
+pub(crate) fn region_sigma(sigma: f32, code: u8) -> f32 {
     sigma * ((f32::from(code) + 1.0) * (1.0 / 256.0))
 }

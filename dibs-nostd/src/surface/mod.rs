@@ -22,7 +22,7 @@ pub use buffer::{Buffer, FrameLabel, Head, Position};
 pub use error::{OutOfTableError, PublishError, SplitError};
 pub use frames::{Buffers, FrameWriter, Frames};
 pub use latest::{FrameAge, LatestSurface};
-pub(crate) use measured::share;
+pub(crate) use measured::region_sigma;
 pub use measured::{Coverage, MeasuredStretch, REGIONS};
 pub use motion::{MotionReading, MotionUnit, MovingSurface, MovingTable, Odometer};
 #[cfg(feature = "modes")]

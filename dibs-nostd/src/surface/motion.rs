@@ -57,11 +57,11 @@ pub struct MotionReading {
     prediction: Prediction,
 }
 
-/// Of one place on the odometer, however the surface came there.
+/// Equal readings are one, whatever the prediction.
 impl PartialEq for MotionReading {
     fn eq(&self, other: &Self) -> bool {
-        let place = |motion: &Self| (motion.tree, motion.run, motion.reading, motion.aside);
-        place(self) == place(other)
+        let reading = |motion: &Self| (motion.tree, motion.run, motion.reading, motion.aside);
+        reading(self) == reading(other)
     }
 }
 
@@ -284,8 +284,8 @@ impl<V: VertexTable + ?Sized> MovingSurface for MovingTable<'_, V> {
 
 /// Measures how far a surface moves from one frame to the next.
 ///
-/// Only a measurement of consecutive frames makes a [`MotionReading`]. If `before` is not the frame measured last, by a digest
-/// of all its positions, the odometer starts anew, and trackers do too.
+/// Only a measurement of consecutive frames makes a [`MotionReading`]. If `before` is not the frame measured last, by a
+/// digest of all its positions, the odometer starts anew, and trackers do too.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};

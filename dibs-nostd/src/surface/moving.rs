@@ -44,26 +44,25 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
         if self.is_measured { self.length } else { f32::INFINITY }
     }
 
-    /// The surface between the two: `share` 0 is the earlier frame and 1 the later. It is exact, but late by a frame.
+    /// The surface between the two: `t` 0 is the earlier frame and 1 the later. It is exact, but late by a frame.
     ///
-    /// `share` is clamped to 0..=1. If both frames carry their stretch, so does the surface: see
+    /// `t` is clamped to 0..=1. If both frames carry their stretch, so does the surface: see
     /// [`SurfaceBlend::stretch`](VertexTable::stretch).
     #[must_use]
-    pub fn at(&self, share: f32) -> SurfaceBlend<'v, W, V> {
-        let between = SurfaceBlend::inside(self.before, self.after, share, self.from, self.units);
+    pub fn at(&self, t: f32) -> SurfaceBlend<'v, W, V> {
+        let between = SurfaceBlend::inside(self.before, self.after, t, self.from, self.units);
         self.unless_unmeasured(between)
     }
 
-    /// The surface after the later frame, if every vertex keeps its velocity between the two: `share` 0 is the later
+    /// The surface after the later frame, if every vertex keeps its velocity between the two: `t` 0 is the later
     /// frame, 1 as long after it as the earlier frame was before. It is on time, and wrong by the change of the motion.
     ///
-    /// `share` is clamped to 0..=2. Beyond the frames no frame's measurement bounds the stretch: measure it
+    /// `t` is clamped to 0..=2. Beyond the frames no frame's measurement bounds the stretch: measure it
     /// ([`measure_stretch`](crate::measure_stretch)), unless both frames carry theirs. Frames behind a bus do:
     /// [`FrameGuard::extrapolated`](crate::FrameGuard::extrapolated).
     #[must_use]
-    pub fn beyond(&self, share: f32) -> SurfaceBlend<'v, W, V> {
-        let between =
-            SurfaceBlend::outside(self.before, self.after, share, self.motion, self.units);
+    pub fn beyond(&self, t: f32) -> SurfaceBlend<'v, W, V> {
+        let between = SurfaceBlend::outside(self.before, self.after, t, self.motion, self.units);
         self.unless_unmeasured(between)
     }
 
@@ -86,12 +85,12 @@ pub(crate) fn grown(shown: f32, beyond: f32) -> f32 {
 }
 
 /// A number within 0 and `most`: 0 for NaN.
-pub(crate) fn clamped(share: f32, most: f32) -> f32 {
-    let share = if share > 0.0 { share } else { 0.0 };
-    if share < most { share } else { most }
+pub(crate) fn clamped(t: f32, most: f32) -> f32 {
+    let t = if t > 0.0 { t } else { 0.0 };
+    if t < most { t } else { most }
 }
 
-/// A surface on its way from one frame to another, or beyond: `before + share * (after - before)`.
+/// A surface between two frames or beyond the second: `before + t * (after - before)`.
 ///
 /// A position is within 16 * 2^-24 of the coordinates' size of the exact sum.
 #[derive(Debug)]
@@ -99,7 +98,7 @@ pub struct SurfaceBlend<'v, W: ?Sized, V: ?Sized> {
     before: &'v W,
     after: &'v V,
     /// 0 is the earlier frame, 1 the later, 2 as far beyond, and 3 the farthest.
-    share: f32,
+    t: f32,
     motion: Option<MotionReading>,
     ahead: PredictionCheck,
     /// Steps from the earlier frame to the later a second; 0 where it stands still, or has no clock.
@@ -113,31 +112,31 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> SurfaceBlend<'v, W, V
     pub(super) fn inside(
         before: &'v W,
         after: &'v V,
-        share: f32,
+        t: f32,
         from: MotionReading,
         units: u64,
     ) -> Self {
-        let share = clamped(share, 1.0);
+        let t = clamped(t, 1.0);
         // Off by less than a few units, within a tracker's slack.
-        let along = (share * units as f32) as u64;
+        let along = (t * units as f32) as u64;
         let motion = Some(from.along(along));
-        Self { before, after, share, motion, ahead: PredictionCheck::UNKNOWN, rate: 0.0, lag: None }
+        Self { before, after, t, motion, ahead: PredictionCheck::UNKNOWN, rate: 0.0, lag: None }
     }
 
     /// The surface after the later frame.
     pub(super) fn outside(
         before: &'v W,
         after: &'v V,
-        share: f32,
+        t: f32,
         last: MotionReading,
         units: u64,
     ) -> Self {
-        let share = clamped(share, FARTHEST);
-        let motion = last.beside((share * units as f32) as u64);
+        let t = clamped(t, FARTHEST);
+        let motion = last.beside((t * units as f32) as u64);
         Self {
             before,
             after,
-            share: 1.0 + share,
+            t: 1.0 + t,
             motion,
             ahead: PredictionCheck::UNKNOWN,
             rate: 0.0,
@@ -170,7 +169,7 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> SurfaceBlend<'v, W, V
     }
 
     /// The time by which this surface is behind the present: the tissue may have moved on for so long, and for the time
-    /// that the frame was on its way. For [`Observation::lag`](crate::failsafe::Observation::lag).
+    /// of its transit. For [`Observation::lag`](crate::failsafe::Observation::lag).
     ///
     /// 0 for one that is extrapolated, whose error is in its [`position_error`](VertexTable::position_error); the time
     /// since the end for one that has come to the end of its extrapolation. The time between the frames for one between
@@ -180,10 +179,10 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> SurfaceBlend<'v, W, V
         self.lag
     }
 
-    /// The surface's place in time: 0 is the earlier frame, 1 the later, 2 as long after it, and 3 the end.
+    /// The surface's time in steps: 0 is the earlier frame, 1 the later, 2 as long after it, and 3 the end.
     #[must_use]
-    pub const fn share(&self) -> f32 {
-        self.share
+    pub const fn t(&self) -> f32 {
+        self.t
     }
 
     /// The earlier frame; the later one for a surface that is held.
@@ -192,8 +191,8 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> SurfaceBlend<'v, W, V
         self.before
     }
 
-    /// The velocity (mm/s) of a point of a triangle, by its corners and their weights: that from one frame to the other; zero
-    /// for a surface that is held, one of a [`Step`], and corners outside of the table.
+    /// The velocity (mm/s) of a point of a triangle, by its corners and their weights: that from one frame to the
+    /// other; zero for a surface that is held, one of a [`Step`], and corners outside of the table.
     #[must_use]
     pub fn velocity(&self, corners: [u32; 3], weights: [f32; 3]) -> Vec3 {
         let mut step = Vec3::ZERO;
@@ -224,7 +223,7 @@ impl<'v, V: VertexTable + ?Sized> SurfaceBlend<'v, V, V> {
         Self {
             before: frame,
             after: frame,
-            share: 1.0,
+            t: 1.0,
             motion,
             ahead: PredictionCheck::UNKNOWN,
             rate: 0.0,
@@ -234,11 +233,11 @@ impl<'v, V: VertexTable + ?Sized> SurfaceBlend<'v, V, V> {
 
     /// The end of the extrapolation, whose motion is not measured.
     pub(crate) const fn ahead(before: &'v V, after: &'v V) -> Self {
-        let share = 1.0 + FARTHEST;
+        let t = 1.0 + FARTHEST;
         Self {
             before,
             after,
-            share,
+            t,
             motion: None,
             ahead: PredictionCheck::UNKNOWN,
             rate: 0.0,
@@ -256,23 +255,24 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> VertexTable for SurfaceBl
     #[inline(always)]
     fn position(&self, vertex: u32) -> Option<Vec3> {
         let (before, after) = (self.before.position(vertex)?, self.after.position(vertex)?);
-        Some(before + (after - before) * self.share)
+        Some(before + (after - before) * self.t)
     }
 
     /// A bound by those of the frames: gradients are linear in the positions, and the largest singular value (or edge)
-    /// is convex. Between the frames that is the mean of theirs by `share`. Beyond, it is the mean of the later frame's
-    /// and that of the end of the extrapolation if that was measured, and else their sum by the triangle inequality. `None` where a frame was not measured.
+    /// is convex. Between the frames that is the mean of theirs by `t`. Beyond, it is the mean of the later frame's and
+    /// that of the end of the extrapolation if that was measured, and else their sum by the triangle inequality. `None`
+    /// where a frame was not measured.
     fn stretch(&self) -> Option<MeasuredStretch> {
         let (before, after) = (self.before.stretch()?, self.after.stretch()?);
-        let (share, beyond) = (self.share, self.share - 1.0);
+        let (t, beyond) = (self.t, self.t - 1.0);
         let (old, new) = (before.sigma(), after.sigma());
-        let sigma = if share <= 1.0 {
-            (1.0 - share) * old + share * new
+        let sigma = if t <= 1.0 {
+            (1.0 - t) * old + t * new
         } else if self.ahead.sigma >= 0.0 {
             let part = beyond / FARTHEST;
             (1.0 - part) * new + part * self.ahead.sigma
         } else {
-            share * new + beyond * old
+            t * new + beyond * old
         };
         // The sum is rounded by three halves of a unit in its last place at most.
         before.of_both(after, sigma * (1.0 + 2.0 * f32::EPSILON))
@@ -283,9 +283,9 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> VertexTable for SurfaceBl
     /// times as much at the end. That is an estimate: no measurement of the past bounds it.
     fn position_error(&self) -> f32 {
         let (before, after) = (self.before.position_error(), self.after.position_error());
-        let frames = (1.0 - self.share).abs() * before + self.share * after;
+        let frames = (1.0 - self.t).abs() * before + self.t * after;
         match self.residual() {
-            Some(shown) => frames + grown(shown, self.share - 1.0),
+            Some(shown) => frames + grown(shown, self.t - 1.0),
             None => frames,
         }
     }

@@ -33,8 +33,8 @@ impl<'f> FrameReader<'f> {
         self.buffers.rows()
     }
 
-    /// The published frame and its age at `now`, on the receiver's clock. [`LatestSurface::within`] a limit gives the frame,
-    /// held as by [`read`](Self::read).
+    /// The published frame and its age at `now`, on the receiver's clock. [`LatestSurface::within`] a limit gives the
+    /// frame, held as by [`read`](Self::read).
     #[inline]
     pub fn latest(&mut self, now: Millis) -> LatestSurface<FrameGuard<'_>> {
         let (epoch_before, before) = self.ageing;
@@ -219,9 +219,9 @@ impl LastStep {
         [before, after]: [&'v V; 2],
         age: Millis,
     ) -> SurfaceBlend<'v, V, V> {
-        let share = self.share(age);
-        let between = SurfaceBlend::inside(before, after, share, self.from, self.units);
-        between.at_rate(self.rate(share, 1.0))
+        let t = self.elapsed(age);
+        let between = SurfaceBlend::inside(before, after, t, self.from, self.units);
+        between.at_rate(self.rate(t, 1.0))
     }
 
     /// The surface `age` after the later frame, if every vertex keeps its velocity. `ahead` was measured of that.
@@ -231,16 +231,16 @@ impl LastStep {
         age: Millis,
         ahead: PredictionCheck,
     ) -> SurfaceBlend<'v, V, V> {
-        let share = clamped(self.share(age), FARTHEST);
-        let prediction = Prediction::new(self.units, &ahead, share);
-        let between = SurfaceBlend::outside(before, after, share, self.motion, self.units);
-        between.on(prediction).measured(ahead).at_rate(self.rate(share, FARTHEST))
+        let t = clamped(self.elapsed(age), FARTHEST);
+        let prediction = Prediction::new(self.units, &ahead, t);
+        let between = SurfaceBlend::outside(before, after, t, self.motion, self.units);
+        between.on(prediction).measured(ahead).at_rate(self.rate(t, FARTHEST))
     }
 
-    /// The share of the step that an extrapolation adds to the later frame after this time.
+    /// The part of the step that an extrapolation adds to the later frame after this time.
     #[cfg(feature = "bus")]
     pub fn ahead(&self, age: Millis) -> f32 {
-        clamped(self.share(age), FARTHEST)
+        clamped(self.elapsed(age), FARTHEST)
     }
 
     /// Units of the odometer from the earlier frame to the later.
@@ -254,12 +254,12 @@ impl LastStep {
         Millis((self.interval.0 as f32 * FARTHEST) as u32)
     }
 
-    /// Steps a second of a surface that stands still from a share on.
-    fn rate(&self, share: f32, most: f32) -> f32 {
-        if share < most { 1_000.0 / self.interval.0 as f32 } else { 0.0 }
+    /// Steps a second of a surface that is held from `most` on.
+    fn rate(&self, t: f32, most: f32) -> f32 {
+        if t < most { 1_000.0 / self.interval.0 as f32 } else { 0.0 }
     }
 
-    fn share(&self, age: Millis) -> f32 {
+    fn elapsed(&self, age: Millis) -> f32 {
         age.0 as f32 / self.interval.0 as f32
     }
 }

@@ -24,8 +24,8 @@ impl sealed::Sealed for AxisPoint {
     }
 
     #[inline(always)]
-    fn towards(&self, to: &Self, share: f32) -> Self {
-        Self(self.0 + (to.0 - self.0) * share)
+    fn towards(&self, to: &Self, t: f32) -> Self {
+        Self(self.0 + (to.0 - self.0) * t)
     }
 }
 

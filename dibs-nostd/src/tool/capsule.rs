@@ -104,8 +104,8 @@ impl sealed::Sealed for Capsule {
     }
 
     #[inline(always)]
-    fn towards(&self, to: &Self, share: f32) -> Self {
-        let between = |from: Vec3, to: Vec3| from + (to - from) * share;
+    fn towards(&self, to: &Self, t: f32) -> Self {
+        let between = |from: Vec3, to: Vec3| from + (to - from) * t;
         let (start, end) = (between(self.start(), to.start()), between(self.end(), to.end()));
         Self { axis: Axis::new(start, end), radius: larger(self.radius, to.radius) }
     }

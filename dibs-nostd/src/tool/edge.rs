@@ -5,7 +5,7 @@ use super::clamp;
 use super::triangle::{Candidate, SLIVER, TINY};
 use glam::Vec3;
 
-/// A pair of an edge and an axis: the length along the axis, and the share of the edge (0 to 1).
+/// A pair of an edge and an axis: the length along the axis, and the position on the edge (0 to 1).
 #[derive(Clone, Copy)]
 pub(super) struct OnEdge {
     pub distance_squared: f32,

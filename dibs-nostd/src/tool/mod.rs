@@ -126,8 +126,8 @@ mod sealed {
         /// From the axis' start to its end, each component within 2^-23 of the axis' length.
         fn axis_span(&self) -> Vec3;
 
-        /// The tool after a share of its way to `to`, with the larger radius.
-        fn towards(&self, to: &Self, share: f32) -> Self;
+        /// The tool between this one (`t` = 0) and `to` (1), with the larger radius.
+        fn towards(&self, to: &Self, t: f32) -> Self;
     }
 }
 

@@ -51,8 +51,8 @@ impl sealed::Sealed for Sphere {
     }
 
     #[inline(always)]
-    fn towards(&self, to: &Self, share: f32) -> Self {
-        let center = self.center + (to.center - self.center) * share;
+    fn towards(&self, to: &Self, t: f32) -> Self {
+        let center = self.center + (to.center - self.center) * t;
         Self { center, radius: larger(self.radius, to.radius) }
     }
 }

@@ -39,7 +39,7 @@ pub enum Unavailable {
         /// Their number.
         streak: u32,
     },
-    /// The surface was on its way for longer than allowed, or for an unknown time.
+    /// The transit of the surface was longer than allowed, or is unknown.
     Delayed {
         /// From the status that it echoes to its arrival; [`Millis::MAX`] if it echoes none.
         transit: Millis,
@@ -54,6 +54,8 @@ pub enum Unavailable {
         /// Packets without a genuine tag.
         count: u32,
     },
+    /// The tool has no pose at this tick.
+    NoPose,
     /// The tool's axis touches the surface: no direction leads out.
     NoDirection,
     /// The tool's side is not known, so it may be inside; [`Proximity::side`](crate::Proximity::side) has the reason.
@@ -77,10 +79,11 @@ impl fmt::Display for Unavailable {
                 write!(f, "{streak} frames were refused or damaged in a row")
             }
             Self::Delayed { transit } => {
-                write!(f, "the surface may have been {transit} on its way")
+                write!(f, "the surface may have been {transit} in transit")
             }
             Self::SourceStale { age } => write!(f, "the surface was {age} old when it was sent"),
             Self::Forgeries { count } => write!(f, "{count} packets were forged"),
+            Self::NoPose => write!(f, "the tool has no pose"),
             Self::NoDirection => write!(f, "the tool's axis touches the surface"),
             Self::NoSide => write!(f, "the tool's side is not known"),
             Self::CutShort => {

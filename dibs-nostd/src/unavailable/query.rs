@@ -60,8 +60,8 @@ pub enum QueryError {
         /// Its bits.
         bits: u32,
     },
-    /// A share of the way between two frames that is not in 0..=1.
-    Share {
+    /// A time between two frames that is not in 0..=1.
+    BlendTime {
         /// Its bits.
         bits: u32,
     },
@@ -104,8 +104,8 @@ impl fmt::Display for QueryError {
                 write!(f, "a list cannot hold {capacity} contacts and look at {near} triangles")
             }
             Self::Margin { bits } => write!(f, "a margin cannot be {}", f32::from_bits(bits)),
-            Self::Share { bits } => {
-                write!(f, "a share of the way between frames cannot be {}", f32::from_bits(bits))
+            Self::BlendTime { bits } => {
+                write!(f, "the time between two frames, from 0 to 1, cannot be {}", f32::from_bits(bits))
             }
             Self::Corrupt { row } => write!(f, "row {row} is missing: the tree's bytes changed"),
         }

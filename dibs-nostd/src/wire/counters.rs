@@ -156,9 +156,9 @@ impl Counters {
     /// Copies the counters in a status: a sender's copy is complete after a few statuses. Counters of later protocol
     /// versions are skipped.
     pub fn update(&mut self, report: &StatusReport<'_>) {
-        let places = self.0.iter_mut().skip(usize::from(report.first_counter));
-        for (place, counter) in places.zip(report.counters) {
-            *place = u32::from_le_bytes(*counter);
+        let slots = self.0.iter_mut().skip(usize::from(report.first_counter));
+        for (slot, counter) in slots.zip(report.counters) {
+            *slot = u32::from_le_bytes(*counter);
         }
     }
 

@@ -35,7 +35,7 @@ pub enum PacketError {
         /// Offset of the field's first byte.
         offset: usize,
     },
-    /// A packet of a frame without a place in it, a partial frame that changes itself, or another packet with a place.
+    /// A packet outside its frame, a partial frame that changes itself, or another kind of packet in a frame.
     Sequence {
         /// In the packet.
         sequence: u16,

@@ -132,8 +132,8 @@ impl<const MTU: usize> Deframer<MTU> {
     #[inline]
     fn store(&mut self, byte: u8) {
         match self.packet.get_mut(self.bytes) {
-            Some(place) => {
-                *place = byte;
+            Some(slot) => {
+                *slot = byte;
                 self.bytes = self.bytes.wrapping_add(1);
             }
             None => self.bytes = MTU.saturating_add(1),

@@ -82,7 +82,7 @@ static dibs_code ask(const dibs_tool *tool, dibs_observation *seen, dibs_proximi
     must(dibs_frame_get_facts(frame, &facts));
     record->epoch = seen->age.epoch;
     record->epoch_before = seen->age.epoch;
-    record->share = 1.0f;
+    record->blend = 1.0f;
     record->residual = -1.0f;
     record->age = seen->age.age;
     record->position_error = facts.position_error;
@@ -98,16 +98,16 @@ static dibs_code ask(const dibs_tool *tool, dibs_observation *seen, dibs_proximi
     return seen->query;
 }
 
-static float along(float start, float end, float share) {
-    return (start + (end - start) * share) * (float)TICK_RATE;
+static float along(float start, float end, float t) {
+    return (start + (end - start) * t) * (float)TICK_RATE;
 }
 
-/* Velocity (mm/s) of the point at `share` of the instrument's axis, 0 at its start and 1 at its end. */
-static dibs_vec3 velocity(const dibs_tool *tool, float share) {
+/* Velocity (mm/s) of the point at `t` of the instrument's axis, 0 at its start and 1 at its end. */
+static dibs_vec3 velocity(const dibs_tool *tool, float t) {
     return (dibs_vec3){
-        along(tool->start.x - before.start.x, tool->end.x - before.end.x, share),
-        along(tool->start.y - before.start.y, tool->end.y - before.end.y, share),
-        along(tool->start.z - before.start.z, tool->end.z - before.end.z, share),
+        along(tool->start.x - before.start.x, tool->end.x - before.end.x, t),
+        along(tool->start.y - before.start.y, tool->end.y - before.end.y, t),
+        along(tool->start.z - before.start.z, tool->end.z - before.end.z, t),
     };
 }
 
@@ -131,7 +131,7 @@ void control_tick(tick_record *record) {
     dibs_observation seen = {.query = DIBS_CODE_OK};
     dibs_proximity found;
     dibs_code code = ask(&tool, &seen, &found, record);
-    const float share = code == DIBS_CODE_OK ? found.axis_parameter : 0.5f;
+    const float t = code == DIBS_CODE_OK ? found.axis_parameter : 0.5f;
 
     must(dibs_reader_link(reader, tick, &seen.link));
     seen.is_tree_corrupt = upkeep_is_tree_corrupt() || dibs_tree_check(surface_tree()) != DIBS_CODE_OK;
@@ -143,7 +143,7 @@ void control_tick(tick_record *record) {
         code = dibs_verdict_admit(&verdict, &found);
     }
     dibs_force force;
-    must(dibs_wall_force(&wall, code, &found, velocity(&tool, share), &force));
+    must(dibs_wall_force(&wall, code, &found, velocity(&tool, t), &force));
 
     record->state = verdict.state;
     record->cause = telemetry_cause(verdict.cause, seen.is_tree_corrupt != 0);

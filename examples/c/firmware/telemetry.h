@@ -46,7 +46,7 @@ typedef struct {
     uint32_t fallback;
     /* The C interface holds the surface from frame to frame. */
     uint32_t epoch_before;
-    float share;
+    float blend;
     float residual;
     dibs_vec3 surface_velocity;
 } tick_record;

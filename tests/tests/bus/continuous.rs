@@ -81,8 +81,9 @@ fn truth(mesh: &Mesh, built: &BuiltTree, tree: &Tree<'_, u16>, rows: &[Vec3]) ->
     stretch::largest(mesh, &moved, tree.paths())
 }
 
-/// Frames of a beating, drifting heart, some of them partial, refused or skipped. At every tick both surfaces are where two
-/// frames put them, no triangle is stretched more than they state, and the tracker's answer is that of a whole query.
+/// Frames of a beating, drifting heart, some of them partial, refused or skipped. At every tick both surfaces are where
+/// two frames put them, no triangle is stretched more than they state, and the tracker's answer is that of a whole
+/// query.
 #[test]
 fn the_surface_between_frames_is_where_the_frames_put_it() {
     let mut rng = Rng::with_seed(7);
@@ -120,12 +121,12 @@ fn the_surface_between_frames_is_where_the_frames_put_it() {
             for (number, (surface, tracker)) in surfaces.iter().zip(&mut trackers).enumerate() {
                 let rows = positions(surface);
                 let two = known.len().checked_sub(2).map(|at| &known[at]);
-                let is_held = surface.share() == 1.0;
+                let is_held = surface.t() == 1.0;
                 match two {
                     Some((before, earlier, old)) if !is_held => {
                         let share = age / received.wrapping_sub(*earlier) as f32;
                         let share = if number == 1 { 1.0 + share.min(2.0) } else { share.min(1.0) };
-                        assert_eq!(surface.share(), share, "{epoch}");
+                        assert_eq!(surface.t(), share, "{epoch}");
                         assert_eq!(surface.before().epoch(), Some(*before));
                         let off = off(&rows, old, last, share);
                         assert!(off < 1e-4, "{epoch}: {off}");
@@ -212,10 +213,10 @@ fn a_surface_is_held_where_its_extrapolation_would_tear() {
         assert!(send(&mut bus, tree.mesh_id(), epoch, &longer(by), None, 20 * epoch, &mut rng));
         let frame = reader.latest(Millis(20 * epoch + 10)).of_any_age().expect("published");
         let surface = frame.extrapolated();
-        assert_eq!(surface.share(), if is_moving { 1.5 } else { 1.0 }, "{epoch}");
+        assert_eq!(surface.t(), if is_moving { 1.5 } else { 1.0 }, "{epoch}");
         assert!(surface.stretch().expect("measured").sigma() <= 1.5001);
         // It is between the frames at least.
-        assert_eq!(frame.interpolated().share(), if epoch == 1 { 1.0 } else { 0.5 });
+        assert_eq!(frame.interpolated().t(), if epoch == 1 { 1.0 } else { 0.5 });
     }
 }
 
@@ -228,7 +229,7 @@ fn a_surface_of_unknown_motion_is_held() {
     let is_held = |reader: &mut Reader, now| {
         let frame = reader.latest(Millis(now)).of_any_age().expect("published");
         let surfaces = [frame.interpolated(), frame.extrapolated()];
-        surfaces.map(|surface| surface.share() == 1.0 && surface.residual().is_none())
+        surfaces.map(|surface| surface.t() == 1.0 && surface.residual().is_none())
     };
     // By hand.
     let frames: &'static Continuous = Box::leak(Box::new(Frames::new()));
@@ -282,16 +283,16 @@ fn without_the_time_nothing_moves_on() {
     let surface = frame.extrapolated();
     assert!(off(&positions(&surface), &motion[3], &motion[3], 1.0) < 1e-4);
     assert_eq!(surface.motion(), frame.motion());
-    assert_eq!(frame.interpolated().share(), 0.0);
+    assert_eq!(frame.interpolated().t(), 0.0);
     drop(frame);
     // Two frames of one time have no velocity.
     assert!(send(&mut bus, tree.mesh_id(), 4, &motion[4], None, 60, &mut rng));
     let frame = reader.latest(Millis(70)).of_any_age().expect("published");
-    assert_eq!((frame.extrapolated().share(), frame.interpolated().share()), (1.0, 1.0));
+    assert_eq!((frame.extrapolated().t(), frame.interpolated().t()), (1.0, 1.0));
     drop(frame);
     // Nor have two in the wrong order, by a clock's jitter.
     assert!(send(&mut bus, tree.mesh_id(), 5, &motion[5], None, 55, &mut rng));
     let frame = reader.latest(Millis(70)).of_any_age().expect("published");
-    assert_eq!((frame.extrapolated().share(), frame.interpolated().share()), (1.0, 1.0));
+    assert_eq!((frame.extrapolated().t(), frame.interpolated().t()), (1.0, 1.0));
     assert!(off(&positions(&frame.interpolated()), &motion[5], &motion[5], 1.0) < 1e-4);
 }

@@ -117,7 +117,8 @@ fn a_missed_tick_does_not_damp_more() {
     assert!((100.0..=112.0).contains(&velocity.x), "{velocity}");
     // Without a pose nothing is known, and the next tick starts anew.
     let blind = world.ends.1.without_pose(Millis(world.now));
-    assert!(blind.velocity.is_nan() && blind.closest == Err(Unavailable::NotFinite));
+    assert!(blind.velocity.is_nan() && blind.closest == Err(Unavailable::NoPose));
+    assert_eq!((blind.trust.state, blind.trust.cause), (State::Safe, Some(Unavailable::NoPose)));
     assert_eq!(world.tick(at).velocity, Vec3::ZERO);
 }
 

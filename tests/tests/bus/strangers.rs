@@ -172,7 +172,7 @@ fn publications_do_not_hide_forgeries() {
             let frame = reader.latest(Millis(now)).frame();
             let link = link.read(Millis(now));
             let seen =
-                Observation { frame, lag: None, link, query_error: None, is_tree_corrupt: false };
+                Observation { frame, lag: None, link, no_answer: None, is_tree_corrupt: false };
             let before = machine.state();
             states.push(machine.step(&seen).state);
             changes += u32::from(machine.state() != before);
@@ -220,7 +220,7 @@ fn strangers_change_no_state() {
             link.set(&assembler.health());
             let (frame, link) = (reader.latest(Millis(now)).frame(), link.read(Millis(now)));
             let seen =
-                Observation { frame, lag: None, link, query_error: None, is_tree_corrupt: false };
+                Observation { frame, lag: None, link, no_answer: None, is_tree_corrupt: false };
             let before = machine.state();
             if machine.step(&seen).state != before {
                 changes.push((now, machine.state()));

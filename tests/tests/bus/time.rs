@@ -171,8 +171,8 @@ fn a_surface_frozen_for_an_hour_is_never_nominal_again() {
             link.set(&bus.assembler.health());
             let frame = bus.reader.latest(Millis(now)).frame();
             assert_eq!(frame.unwrap().age, Millis(time), "known all the time");
-            let (query_error, link) = (None, link.read(Millis(now)));
-            let seen = Observation { frame, lag: None, link, query_error, is_tree_corrupt: false };
+            let (no_answer, link) = (None, link.read(Millis(now)));
+            let seen = Observation { frame, lag: None, link, no_answer, is_tree_corrupt: false };
             let state = machine.step(&seen).state;
             assert!(time <= safe || state == State::Safe, "{time}");
             if state == State::Nominal {

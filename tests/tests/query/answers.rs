@@ -1,7 +1,7 @@
 //! The answers of every kind of query, to the bit: a restructuring may not change them.
 //!
-//! `answers.txt` has a line a kind: a hash of all answers, and the sums of node and triangle tests. A change of the answers
-//! on purpose is recorded with `DIBS_WRITE=1`, and its commit says why.
+//! `answers.txt` has a line a kind: a hash of all answers, and the sums of node and triangle tests. A change of the
+//! answers on purpose is recorded with `DIBS_WRITE=1`, and its commit says why.
 
 use std::fmt::Write;
 
@@ -296,11 +296,11 @@ fn tracked(script: &mut Script) {
             let [before, after] = [0, 1].map(|add| frames[(tick + add) % frames.len()].as_slice());
             let step = odometer.step(before, after);
             let next = chain.step()[0];
-            let way = Sweep { step: &step, shares: [0.0, 1.0], tools: [last, next] };
-            let swept = tracker.sweep(&way, 2.0, 8, &Options::new()).expect("an answer");
+            let sweep = Sweep { step: &step, t: [0.0, 1.0], tools: [last, next] };
+            let swept = tracker.sweep(&sweep, 2.0, 8, &Options::new()).expect("an answer");
             all.pair(&swept.at_end);
             all.floats([swept.clear_until, swept.contact.unwrap_or(-1.0)]);
-            all.word(swept.looks);
+            all.word(swept.samples);
             last = next;
         }
     });

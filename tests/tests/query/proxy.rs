@@ -13,7 +13,7 @@ use glam::{DMat3, DVec3, Vec3};
 const MARGIN: f32 = 3.0;
 /// The library's compliance.
 const COMPLIANCE: f64 = 1.0 / 16.0;
-/// A wall less deep than one in this many of the deepest one's depth has a smaller share.
+/// A wall less deep than one in this many of the deepest one's depth has a smaller activation.
 const SHALLOW: f64 = 16.0;
 /// Relative to the largest depth: f32 errors, which the compliance may multiply by 16.
 const TOLERANCE: f64 = 2e-4;
@@ -69,8 +69,8 @@ fn truth(walls: &[Wall]) -> ([DVec3; 2], Vec<f64>) {
     let wanted = |wall: &Wall| depth(wall) * (1.0 + COMPLIANCE);
     let deepest = walls.iter().map(depth).fold(0.0, f64::max);
     let weight = |wall: &Wall| {
-        let share = (SHALLOW * depth(wall) / deepest).min(1.0);
-        COMPLIANCE * share / (1.0 + COMPLIANCE - share)
+        let activation = (SHALLOW * depth(wall) / deepest).min(1.0);
+        COMPLIANCE * activation / (1.0 + COMPLIANCE - activation)
     };
     let walls: Vec<Wall> = walls.iter().copied().filter(|wall| depth(wall) > 0.0).collect();
     for set in 0..1_u32 << walls.len() {
@@ -143,7 +143,7 @@ fn the_force_is_that_of_the_best_of_all_active_sets() {
         assert!(off[0] < TOLERANCE && off[1] < TOLERANCE, "{off:?} {walls:?} {force} {moved}");
         worst = [worst[0].max(off[0]), worst[1].max(off[1])];
         several += usize::from(pushes.iter().filter(|&&push| push > 0.0).count() > 2);
-        // Where no two walls face each other, each that has its whole share is held by at least its own depth.
+        // Where no two walls face each other, each of activation 1 is held by at least its own depth.
         let face = |a: &Wall| walls.iter().any(|b| a.normal.dot(b.normal) < 0.0);
         if !walls.iter().any(face) {
             let is_whole = |wall: &&Wall| SHALLOW * f64::from(wall.depth) > 1.001 * deepest;
@@ -163,8 +163,8 @@ fn the_force_is_that_of_the_best_of_all_active_sets() {
 }
 
 /// A small change of the walls changes the force little. The compliance bounds the change: by `by_depths` times a
-/// change of the depths alone, and by `by_normals` times a change of the normals too. A shallow wall's share grows by 16
-/// over the deepest depth, and may move the proxy by three depths. A wall with a depth of 0 changes nothing.
+/// change of the depths alone, and by `by_normals` times a change of the normals too. A shallow wall's activation grows
+/// by 16 over the deepest depth, and may move the proxy by three depths. A wall with a depth of 0 changes nothing.
 #[test]
 fn the_force_is_continuous() {
     let template = contact();
@@ -222,8 +222,8 @@ struct Held {
     contacts: Vec<(f32, Vec3)>,
 }
 
-/// A capsule's ends, and their steps (mm), across which a contact of a brain ended with its whole share. There two low triangles
-/// in much the same direction lie beside each other, with a high edge between.
+/// A capsule's ends, and their steps (mm), across which a contact of a brain ended with activation 1. There two low
+/// triangles in much the same direction lie beside each other, with a high edge between.
 const ENDED: [[Vec3; 4]; 3] = [
     [
         Vec3::new(0.638_053_36, 59.497_116, 19.683_912),
@@ -299,7 +299,7 @@ fn no_force_jumps_where_a_wall_begins_or_ends() {
                 Some(&[from, to, at_from, at_to]) => (from, to - from, [at_from, at_to]),
                 None => (from, long, step),
             };
-            let tool = |share: f32| [from + step[0] * share, from + long + step[1] * share];
+            let tool = |t: f32| [from + step[0] * t, from + long + step[1] * t];
             let (mut low, mut high) = (0.0_f32, 1.0_f32);
             let (Some(mut one), Some(mut other)) = (hold(tool(low)), hold(tool(high))) else {
                 continue;

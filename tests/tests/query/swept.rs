@@ -20,8 +20,8 @@ fn ticks() -> usize {
 }
 
 /// Times of a tick at which f64 gives the truth.
-const SAMPLES: usize = 40;
-const LOOKS: u32 = 32;
+const INSTANTS: usize = 40;
+const SAMPLES: u32 = 32;
 const RADIUS: f32 = 1.0;
 
 type Follower<'t> = Tracker<'t, u16, MAX_STACK, 256>;
@@ -42,7 +42,7 @@ fn sheet(size: f32, cells: u32) -> Mesh {
 struct Way<'a> {
     frames: [&'a [Vec3]; 2],
     triangles: &'a [[u32; 3]],
-    shares: [f32; 2],
+    t: [f32; 2],
     ends: [Instrument; 2],
     margin: f32,
 }
@@ -50,7 +50,7 @@ struct Way<'a> {
 impl Way<'_> {
     /// The true separation at a time.
     fn separation(&self, time: f64) -> f64 {
-        let [first, last] = self.shares.map(f64::from);
+        let [first, last] = self.t.map(f64::from);
         let share = first + time * (last - first);
         let between = |from: Vec3, to: Vec3, share: f64| {
             from.as_dvec3() + (to.as_dvec3() - from.as_dvec3()) * share
@@ -76,19 +76,19 @@ impl Way<'_> {
         fn ask<T: Tool>(
             tracker: &mut Follower<'_>,
             step: &Step<'_, [Vec3], [Vec3]>,
-            (shares, tools): ([f32; 2], [T; 2]),
+            (t, tools): ([f32; 2], [T; 2]),
             margin: f32,
             options: &Options,
         ) -> Result<SweepAnswer, QueryError> {
-            tracker.sweep(&Sweep { step, shares, tools }, margin, LOOKS, options)
+            tracker.sweep(&Sweep { step, t, tools }, margin, SAMPLES, options)
         }
         if self.ends[0].start == self.ends[0].end {
             let tools = self.ends.map(|end| Sphere::new(end.start, RADIUS).expect("valid"));
-            ask(tracker, step, (self.shares, tools), self.margin, options)
+            ask(tracker, step, (self.t, tools), self.margin, options)
         } else {
             let tools = self.ends.map(|end| Capsule::new(end.start, end.end, RADIUS));
             let tools = tools.map(|tool| tool.expect("valid"));
-            ask(tracker, step, (self.shares, tools), self.margin, options)
+            ask(tracker, step, (self.t, tools), self.margin, options)
         }
     }
 }
@@ -98,7 +98,7 @@ struct Tally {
     clear: usize,
     contacts: usize,
     undecided: usize,
-    looks: usize,
+    samples: usize,
 }
 
 impl Tally {
@@ -110,8 +110,8 @@ impl Tally {
         let size = points.map(|p| f64::from(p.length())).fold(0.0, f64::max);
         let spare = 1.5 * f64::from(found.at_end.accuracy) + 2e-5 * size;
         let until = f64::from(found.clear_until);
-        for sample in 0..=SAMPLES {
-            let time = sample as f64 / SAMPLES as f64;
+        for instant in 0..=INSTANTS {
+            let time = instant as f64 / INSTANTS as f64;
             if time < until {
                 let apart = way.separation(time);
                 assert!(apart >= margin, "{time}: {apart} {margin} {found:?} {:?}", way.ends);
@@ -127,8 +127,8 @@ impl Tally {
         } else {
             self.undecided += 1;
         }
-        assert!((1..=LOOKS).contains(&found.looks), "{found:?}");
-        self.looks += found.looks as usize;
+        assert!((1..=SAMPLES).contains(&found.samples), "{found:?}");
+        self.samples += found.samples as usize;
     }
 }
 
@@ -182,7 +182,7 @@ fn nothing_is_jumped_over() {
             let way = Way {
                 frames: [&before, &after],
                 triangles: &triangles,
-                shares: [[0.0, 1.0], [0.25, 0.5], [0.5, 0.5]][rng.usize(..3)],
+                t: [[0.0, 1.0], [0.25, 0.5], [0.5, 0.5]][rng.usize(..3)],
                 ends: ends(&rest, size, margin, &mut rng),
                 margin,
             };
@@ -217,22 +217,22 @@ fn hostile_ways_are_refused_or_never_cleared() {
     let at = |z: f32| Sphere::new(Vec3::Z * z, RADIUS).expect("valid");
     let still = odometer.step(rest.as_slice(), rest.as_slice());
     let options = Options::cold();
-    let mut ask = |step: &Step<'_, [Vec3], [Vec3]>, shares, [from, to]: [f32; 2], margin| {
-        let way = Sweep { step, shares, tools: [at(from), at(to)] };
-        tracker.sweep(&way, margin, LOOKS, &options)
+    let mut ask = |step: &Step<'_, [Vec3], [Vec3]>, t, [from, to]: [f32; 2], margin| {
+        let sweep = Sweep { step, t, tools: [at(from), at(to)] };
+        tracker.sweep(&sweep, margin, SAMPLES, &options)
     };
     for margin in [f32::NAN, -1.0, f32::INFINITY] {
         let refused = QueryError::Margin { bits: margin.to_bits() };
         assert_eq!(ask(&still, [0.0, 1.0], [9.0, 8.0], margin), Err(refused));
     }
-    for share in [f32::NAN, -0.1, 1.1, f32::INFINITY] {
-        let refused = QueryError::Share { bits: share.to_bits() };
-        assert_eq!(ask(&still, [share, 1.0], [9.0, 8.0], 1.0), Err(refused));
-        assert_eq!(ask(&still, [0.0, share], [9.0, 8.0], 1.0), Err(refused));
+    for outside in [f32::NAN, -0.1, 1.1, f32::INFINITY] {
+        let refused = QueryError::BlendTime { bits: outside.to_bits() };
+        assert_eq!(ask(&still, [outside, 1.0], [9.0, 8.0], 1.0), Err(refused));
+        assert_eq!(ask(&still, [0.0, outside], [9.0, 8.0], 1.0), Err(refused));
     }
     // Nothing moves: one search decides.
     let found = ask(&still, [0.3, 0.3], [9.0, 9.0], 1.0).expect("an answer");
-    assert!(found.clear_until > 1.0 && found.contact.is_none() && found.looks == 1, "{found:?}");
+    assert!(found.clear_until > 1.0 && found.contact.is_none() && found.samples == 1, "{found:?}");
     let found = ask(&still, [0.3, 0.3], [1.5, 1.5], 1.0).expect("an answer");
     assert_eq!((found.clear_until, found.contact), (0.0, Some(0.0)), "{found:?}");
     // From one end of f32's range to the other, through a sheet.
@@ -266,10 +266,10 @@ fn a_sweep_at_rest_needs_no_budget() {
         let mut tracker = Follower::new(&tree).expect("deep enough");
         let tool = Sphere::new(unit(&mut rng) * 120.0, 0.0).expect("valid");
         let budget = Budget { node_tests: rng.u32(..60), triangle_tests: rng.u32(..10) };
-        let way = Sweep { step: &step, shares: [0.0, 0.0], tools: [tool, tool] };
-        let swept = tracker.sweep(&way, 1.0, 10, &Options::new().budget(budget));
+        let sweep = Sweep { step: &step, t: [0.0, 0.0], tools: [tool, tool] };
+        let swept = tracker.sweep(&sweep, 1.0, 10, &Options::new().budget(budget));
         let swept = swept.expect("a short budget is no error");
-        assert!(swept.clear_until.is_finite() && swept.looks <= 10, "{swept:?}");
+        assert!(swept.clear_until.is_finite() && swept.samples <= 10, "{swept:?}");
         cleared += usize::from(swept.clear_until >= 1.0);
         open += usize::from(swept.clear_until < 1.0);
     }

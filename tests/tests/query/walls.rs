@@ -315,7 +315,7 @@ fn ridges_that_an_axis_crosses_aslant_are_contacts() {
 }
 
 /// Between two walls of a groove that both face the tool, no step changes the force by more than the walls change, and
-/// their shares.
+/// their activations.
 #[test]
 fn the_force_between_two_walls_is_continuous() {
     const STEP: f32 = 1e-3;
@@ -359,9 +359,10 @@ fn the_force_between_two_walls_is_continuous() {
             }
             steepest = steepest.max(largest / STEP);
             let nearest = (at.y * angle.cos() - at.x.abs() * angle.sin()).max(0.1);
-            // `share` states 45 of the depth, over the distance, for flat walls. Shares are whole only outside their edges.
-            let by_shares = 45.0 * (RADIUS + MARGIN - nearest) / nearest;
-            let most = (20.0 + by_shares) * STEP;
+            // `activation.rs` states 45 of the depth, over the distance, for flat walls. Activations are 1 only outside
+            // their edges.
+            let by_activation = 45.0 * (RADIUS + MARGIN - nearest) / nearest;
+            let most = (20.0 + by_activation) * STEP;
             assert!(largest < most, "{angle}: {largest} N of {most} at {at} within {STEP} mm");
         }
     }

@@ -133,7 +133,7 @@ pub fn answers(built: &BuiltTree, events: &[Event]) -> Vec<String> {
             });
             let link = link.read(Millis(*now));
             let seen =
-                Observation { frame, lag: None, link, query_error: None, is_tree_corrupt: false };
+                Observation { frame, lag: None, link, no_answer: None, is_tree_corrupt: false };
             let verdict = machine.step(&seen);
             let admitted = found.and_then(|found| verdict.admit(found));
             let force = wall.force(&admitted, Vec3::new(10.0, -20.0, 5.0));

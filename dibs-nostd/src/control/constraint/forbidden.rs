@@ -13,8 +13,8 @@ use crate::unavailable::Unavailable;
 /// `F = min(max_force, max(0, K (margin - d) - B v))` for `d < margin`, else 0,
 ///
 /// where `v` is the tool's speed out of the surface, negative on approach. Inside, `d` is below zero, and the spring
-/// grows with the depth up to saturation. Without a side the output is the hold. For a query that asked for none ([`Options::unsigned`](crate::Options::unsigned)), the direction is that of
-/// the best pair found.
+/// grows with the depth up to saturation. Without a side the output is the hold. For a query that asked for none
+/// ([`Options::unsigned`](crate::Options::unsigned)), the direction is that of the best pair found.
 ///
 /// ```
 /// use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};

@@ -32,7 +32,7 @@
 //!
 //! - On entering a margin the damper acts at once: the force jumps by `B` times the approach speed.
 //! - Where two parts of the surface are equally near (the medial axis), the closest point jumps from one tick to the
-//!   next, and with it the force's direction, but not its size. A narrow gap whose margins overlap is such a place:
+//!   next, and with it the force's direction, but not its size. So it does in a narrow gap whose margins overlap:
 //!   choose the margin below half the gap.
 //! - A moving surface moves the wall: it does work on the tool, as a beating heart would.
 //! - Saturation: a hand that pushes harder than `max_force` gets through.

@@ -36,29 +36,30 @@ impl defmt::Format for Wrench {
 
 /// Keeps the tool out of a margin around the surface, by all its contacts.
 ///
-/// A proxy (god object: Zilles & Salisbury 1995; Ruspini et al. 1997) is the place nearest to the tool at which no
+/// A proxy (god object: Zilles & Salisbury 1995; Ruspini et al. 1997) is the position nearest to the tool at which no
 /// contact would be within the margin. A spring draws the tool there. With one contact this is a
 /// [`ForbiddenRegion`](super::ForbiddenRegion); in a corner it holds against both walls, and two contacts with one wall
 /// count as one, up to 6 %. The force of each contact acts at its point of the tool, which gives the torque.
 ///
-/// The displacement `t` has the least `|t|^2` under `n . t >= margin - d` for each of the eight deepest contacts with a
-/// share, each of which yields by a 16th. An active set finds it exactly but for rounding. If no two contacts face each
-/// other, `t` clears each contact that has its whole share by at least its depth.
+/// The displacement `t` has the least `|t|^2` under `n . t >= margin - d` for each of the eight deepest contacts that
+/// are active, each of which yields by a 16th. An active set finds it exactly but for rounding. If no two contacts face
+/// each other, `t` clears each contact of activation 1 by at least its depth.
 ///
-/// `t` is continuous in depths, normals and *shares*. A contact's share is what it would move the proxy by alone, of its
-/// depth. The deepest has all. Another has less where it is less than a 16th as deep, and 0 at the margin's edge, wherever
-/// it is; and less where it begins or ends beside a deeper one, at the edge of its wall: 0 within some 7 degrees of there,
-/// seen from the tool's axis, and all from 10 degrees on. So a contact begins and ends without force, and where two tie
-/// both have all. Beside a wall's edge the force changes by up to 45 K depth / distance of the axis a mm, for a stiffness K.
+/// `t` is continuous in depths, normals and *activations*. A contact's activation, from 0 to 1, is the part of its
+/// depth by which it would move the proxy alone. The deepest has 1. Another has less where it is less than a 16th as
+/// deep, and 0 at the margin's edge; and less where it begins or ends beside a deeper one, at the edge of its wall: 0
+/// within some 7 degrees of that edge, seen from the tool's axis, and 1 from 10 degrees on. So a contact begins and
+/// ends without force, and where two tie both have 1. Beside a wall's edge the force changes by up to 45 K depth /
+/// distance of the axis a mm, for a stiffness K.
 ///
 /// Steps remain where two walls are less than 15 degrees apart, which may be one contact: up to a quarter of the force,
-/// a twelfth in size, as measured outside hearts and brains with the axis at least 0.02 mm from the surface. Between walls
-/// that face each other they are larger, since both together hold the proxy sideways: up to 0.8 of the force in narrow
-/// gaps. So they are at an open rim, where a contact's side may end: up to half of it. Where the tool crosses or is inside,
-/// the deepest contact's direction jumps on the medial axis, and with it the force. Nearer than some 16 accuracies the
-/// direction is not known: there the force turned by up to 75 degrees, of the same size. Where places, list or budget end,
-/// shares are whole, and a ninth contact with a share does not act: there steps have no bound.
-/// The torque steps with a contact's point, where that slides along a wall. From a list that is not
+/// a twelfth in size, as measured outside hearts and brains with the axis at least 0.02 mm from the surface. Between
+/// walls that face each other they are larger, since both together hold the proxy sideways: up to 0.8 of the force in
+/// narrow gaps. So they are at an open rim, where a contact's side may end: up to half of it. Where the tool crosses or
+/// is inside, the deepest contact's direction jumps on the medial axis, and with it the force. Nearer than some 16
+/// accuracies the direction is not known: there the force turned by up to 75 degrees, of the same size. Where room,
+/// list or budget ends, activations are 1, and a ninth active contact does not act: there steps have no bound. The
+/// torque steps with a contact's point, where that slides along a wall. From a list that is not
 /// [complete](crate::ContactIter::is_complete) the force is at least that of the closest pair.
 ///
 /// The damper acts against the tool's speed into the surface, relative to the surface's velocity.
@@ -72,7 +73,7 @@ pub struct Proxy {
     margin: f32,
 }
 
-/// A wall that is this many times less deep than the deepest has a smaller share.
+/// A wall that is this many times less deep than the deepest has a smaller activation.
 const SHALLOW: f32 = 16.0;
 
 /// A contact within the margin.
@@ -82,7 +83,7 @@ struct Held {
     lever: Vec3,
     /// Speed of the tool out of the surface (mm/s).
     speed: f32,
-    /// Its share of the proxy's displacement (mm).
+    /// Its part of the proxy's displacement (mm).
     push: f32,
 }
 
@@ -137,18 +138,19 @@ impl Proxy {
             if !is_in {
                 (is_in, deepest) = (true, depth);
             }
-            // A contact without a share takes no place from one that has one.
-            if contact.share <= 0.0 {
+            // A contact without activation takes no slot from one that has some.
+            if contact.activation <= 0.0 {
                 continue;
             }
-            let Some(place) = free.next() else { break };
+            let Some(slot) = free.next() else { break };
             let part = SHALLOW * depth / deepest;
-            let share = if part < 1.0 { part * contact.share } else { contact.share };
+            let whole = contact.activation;
+            let activation = if part < 1.0 { part * whole } else { whole };
             let lever = contact.point_on_tool - origin;
             let relative = velocity + angular.cross(lever) - contact.velocity;
             let normal = contact.normal;
-            let wall = Wall::new(normal, depth, share);
-            *place = Held { wall, lever, speed: normal.dot(relative), push: 0.0 };
+            let wall = Wall::new(normal, depth, activation);
+            *slot = Held { wall, lever, speed: normal.dot(relative), push: 0.0 };
         }
         if !is_in {
             return Wrench::NONE;

@@ -12,13 +12,13 @@ use crate::query::Contact;
 /// contact's separation falls towards [`stand_off`](Self::stand_off) no faster than exponentially, at a rate of
 /// [`gain`](Self::gain); below the stand-off it must grow. Plain arrays, for any solver of quadratic programs.
 ///
-/// Where a tool crosses the surface or is inside, and its deepest point is inside the axis, two triangles bound the depth,
-/// one to each side. The row is then the mean of both triangles' rows, with the weights that cancel the motion along the axis:
-/// the rate of the separation. The deepest point is known within the depth's tolerance
+/// Where a tool crosses the surface or is inside, and its deepest point is inside the axis, two triangles bound the
+/// depth, one to each side. The row is then the mean of both triangles' rows, with the weights that cancel the motion
+/// along the axis: the rate of the separation. The deepest point is known within the depth's tolerance
 /// ([`Options::depth_tolerance`](crate::Options::depth_tolerance)); of triangles that tie within it, the row has two.
-/// Between opposite walls its factors are small, and 0 between parallel ones: no small motion makes the tool less deep, so a
-/// row below its stand-off has no solution unless the solver may relax it. Where the budget ended before the second triangle
-/// was found, the row is that of the closest triangle.
+/// Between opposite walls its factors are small, and 0 between parallel ones: no small motion makes the tool less deep,
+/// so a row below its stand-off has no solution unless the solver may relax it. Where the budget ended before the
+/// second triangle was found, the row is that of the closest triangle.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -71,10 +71,10 @@ impl VelocityRow {
         let (mut linear, mut point) = (contact.normal, contact.point_on_tool);
         let mut surface = linear.dot(contact.velocity);
         let across = &contact.across;
-        if across.share > 0.0 {
-            let own = 1.0 - across.share;
-            linear = linear * own + across.normal * across.share;
-            surface = surface * own + across.speed * across.share;
+        if across.weight > 0.0 {
+            let own = 1.0 - across.weight;
+            linear = linear * own + across.normal * across.weight;
+            surface = surface * own + across.speed * across.weight;
             point = across.on_axis;
         }
         Self {

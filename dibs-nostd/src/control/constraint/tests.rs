@@ -200,15 +200,15 @@ fn proxy_and_rows_count_from_the_lower_end() {
     assert!(!row(0.25).allows(Vec3::X * -15.1, Vec3::ZERO));
 }
 
-/// Contacts at the edges of walls, which have no share, are many along a fine surface.
+/// Contacts at the edges of walls, which have activation 0, are many along a fine surface.
 #[test]
-fn a_contact_without_a_share_takes_no_place() {
+fn a_contact_without_activation_takes_no_slot() {
     let proxy = Proxy::new(SpringDamper::stiffness(1.0).max_force(9.0), 3.0).unwrap();
     let force = |contacts: &[Contact]| {
         let held = proxy.wrench(Ok(contacts.iter()), 0.0, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
         held.force
     };
-    let (deepest, none) = (contact(1.0), Contact { share: 0.0, ..contact(1.5) });
+    let (deepest, none) = (contact(1.0), Contact { activation: 0.0, ..contact(1.5) });
     let side = Contact { normal: Vec3::Y, ..contact(2.0) };
     let mut all = [none; 12];
     (all[0], all[11]) = (deepest, side);

@@ -7,8 +7,8 @@
 //!
 //! of three unknowns. A wall *acts* where its term is not 0; while the same walls act, the function is quadratic. The
 //! search starts at `t = 0`, where every wall with a depth above 0 acts. A step leads towards the minimum of the
-//! present quadratic, up to the first place where a wall begins or ceases to act. One wall does not reverse the next
-//! step (Sherman & Morrison), so every step lowers the function, and a step that meets no such place ends at its
+//! present quadratic, up to the first point at which a wall begins or ceases to act. One wall does not reverse the next
+//! step (Sherman & Morrison), so every step lowers the function, and a step that meets no such point ends at its
 //! minimum.
 
 use glam::Vec3;
@@ -16,7 +16,7 @@ use glam::Vec3;
 /// Most walls.
 pub(super) const MOST: usize = 8;
 
-/// Share of its depth by which a wall yields under its force, so that two contacts with one wall share the force.
+/// Part of its depth by which a wall yields under its force, so that two contacts with one wall divide the force.
 pub(super) const COMPLIANCE: f32 = 1.0 / 16.0;
 
 /// Most steps.
@@ -38,13 +38,14 @@ impl Wall {
     /// None.
     pub const NONE: Self = Self { normal: Vec3::ZERO, wanted: 0.0, weight: 0.0, acts: false };
 
-    /// A wall with the tool `depth` mm in it, above 0. Alone, it would move the tool by `share` of that, from 0 to 1.
-    pub fn new(normal: Vec3, depth: f32, share: f32) -> Self {
-        let weight = COMPLIANCE * share / (1.0 + COMPLIANCE - share);
+    /// A wall with the tool `depth` mm in it, above 0. Alone, it would move the tool by `activation` times that, from 0
+    /// to 1.
+    pub fn new(normal: Vec3, depth: f32, activation: f32) -> Self {
+        let weight = COMPLIANCE * activation / (1.0 + COMPLIANCE - activation);
         Self { normal, wanted: depth * (1.0 + COMPLIANCE), weight, acts: true }
     }
 
-    /// Its share of the displacement (mm), along its normal.
+    /// Its part of the displacement (mm), along its normal.
     pub fn push(&self, moved: Vec3) -> f32 {
         let left = self.left(moved);
         // Written so that NaN stays.
@@ -62,17 +63,17 @@ pub(super) fn displacement(mut walls: [Wall; MOST]) -> Vec3 {
     let mut is_refined = false;
     for _ in 0..STEPS {
         let step = to_least(&walls, at);
-        let (mut share, mut first) = (1.0, None);
+        let (mut length, mut first) = (1.0, None);
         for wall in &mut walls {
             let rate = wall.normal.dot(step);
             let may_turn = if wall.acts { rate > 0.0 } else { rate < 0.0 };
-            let place = wall.left(at) / rate;
-            if may_turn && place < share {
-                share = if place > 0.0 { place } else { 0.0 };
+            let until = wall.left(at) / rate;
+            if may_turn && until < length {
+                length = if until > 0.0 { until } else { 0.0 };
                 first = Some(wall);
             }
         }
-        at += step * share;
+        at += step * length;
         match first {
             Some(wall) => wall.acts = !wall.acts,
             None if is_refined => break,

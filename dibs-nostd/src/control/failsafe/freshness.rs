@@ -1,10 +1,10 @@
-//! Limits on faults that the age alone does not show: delay on the way, a source that stands still, forgeries.
+//! Limits on faults that the age alone does not show: delay in transit, a source that stands still, forgeries.
 
 use super::{LimitError, Limits, Link, State, Watch};
 use crate::surface::Millis;
 use crate::unavailable::Unavailable;
 
-/// The limits. By default the way is watched, with the limits on age, and the rest is not.
+/// The limits. By default transit is watched, with the limits on age, and the rest is not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Freshness {
@@ -17,7 +17,7 @@ impl Freshness {
     pub const OFF: Self =
         Self { transit: Transit::AsAge, source_age: Watch::OFF, forgeries: Watch::OFF };
 
-    /// The time that a frame may have been on its way, as far as it counts.
+    /// The transit of a frame, as far as it counts.
     pub const fn transit(&self, link: &Link) -> Millis {
         match self.transit {
             Transit::LeftOut => Millis(0),
@@ -41,7 +41,7 @@ impl Freshness {
     }
 }
 
-/// What becomes of the time that a frame was on its way.
+/// What becomes of transit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum Transit {
@@ -57,16 +57,16 @@ enum Transit {
 const OLDEST: Millis = Millis(u16::MAX as u32 - 1);
 
 impl Limits {
-    /// Limits on the time that the published frame was on its way, measured from the status that it echoes: no clock of
-    /// the sender is needed. Normally it is the time between two statuses plus the way there and back. A frame without
-    /// an echo is beyond every limit. By default these are the limits on age. The margin includes this time.
+    /// Limits on the transit of the published frame, measured from the status that it echoes: no clock of the sender is
+    /// needed. Normally it is the time between two statuses plus the latency there and back. A frame without an echo is
+    /// beyond every limit. By default these are the limits on age. The margin includes this time.
     #[must_use]
     pub const fn transit(mut self, watch: Watch) -> Self {
         self.freshness.transit = Transit::Watched(watch);
         self
     }
 
-    /// Leaves the time that frames are on their way out of the margin and out of the limits: for a bus whose delay is
+    /// Leaves transit out of the margin and out of the limits: for a bus whose delay is
     /// short for reasons that this machine does not see. A delay is then not detected, and no margin covers it.
     #[must_use]
     pub const fn without_transit(mut self) -> Self {

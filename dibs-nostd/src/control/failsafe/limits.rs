@@ -106,7 +106,7 @@ const fn check(degraded: u32, safe: u32) -> Result<(), LimitError> {
 
 /// The machine's limits, and its conditions for recovery.
 ///
-/// Only the age must be watched. The time that frames are on their way has the same limits, unless they are given or
+/// Only the age must be watched. The transit of frames has the same limits, unless they are given or
 /// [left out](Self::without_transit); every other input is off by default. By default one good
 /// frame, 1,000 clear steps and an acknowledgement recover.
 #[derive(Clone, Copy, Debug, PartialEq)]

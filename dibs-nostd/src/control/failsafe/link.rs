@@ -14,7 +14,7 @@ pub struct Link {
     pub rejections: u32,
     /// Forged packets, less 10 for each second: [`BusHealth::forgeries`](crate::BusHealth::forgeries).
     pub forgeries: u32,
-    /// Time that the published frame was on its way, at most; [`Millis::MAX`] where it is unknown.
+    /// Transit of the published frame, at most; [`Millis::MAX`] where it is unknown.
     pub transit: Millis,
     /// Age of the published frame when it was sent; [`Millis::MAX`] before the first.
     pub source_age: Millis,

@@ -12,7 +12,7 @@
 //! | [`State::Safe`] | [`Unavailable`]: the constraint's hold | an input is beyond its second limit, or was: the surface is not acted on |
 //!
 //! The answer is widened in the nominal state too, so that the force does not jump where the state
-//! changes: the margin is one continuous function of the age. It covers the time that the frame was on its way, too,
+//! changes: the margin is one continuous function of the age. It covers the transit of the frame, too,
 //! which only [`Limits::without_transit`] leaves out.
 //!
 //! # Transitions
@@ -38,10 +38,10 @@
 //! # Time
 //!
 //! Times are [`Millis`] on the receiver's clock, which wraps; a count of control [`Ticks`](crate::Ticks) becomes one by
-//! its rate. With a surface received at `r` and nothing after it, the first safe step is one at `r + safe + 1` or later, where `safe` is the second limit on age: never
-//! later, and exactly then unless another input comes first. Ages of surface, packets and heartbeats follow one rule,
-//! that of [`FrameAge`]: a stamp up to 16 ms ahead of the clock is new, one farther ahead is old, and what was found
-//! old stays old when the clock comes around.
+//! its rate. With a surface received at `r` and nothing after it, the first safe step is one at `r + safe + 1` or
+//! later, where `safe` is the second limit on age: never later, and exactly then unless another input comes first. Ages
+//! of surface, packets and heartbeats follow one rule, that of [`FrameAge`]: a stamp up to 16 ms ahead of the clock is
+//! new, one farther ahead is old, and what was found old stays old when the clock comes around.
 
 mod freshness;
 mod limits;
@@ -55,7 +55,7 @@ use core::fmt;
 
 use crate::query::Proximity;
 use crate::surface::{FrameAge, Millis};
-use crate::unavailable::{QueryError, Unavailable};
+use crate::unavailable::Unavailable;
 
 pub use limits::{LimitError, Limits, Watch, Watched};
 pub use link::Link;
@@ -69,12 +69,13 @@ pub struct Observation {
     /// The published frame and its age: [`LatestSurface::frame`](crate::LatestSurface::frame); `None` before the first.
     pub frame: Option<FrameAge>,
     /// The time by which the surface that was searched is behind the present, as far as its own error does not cover
-    /// it: [`SurfaceBlend::lag`](crate::SurfaceBlend::lag). `None` for the frame as it was published, whose lag is its age.
+    /// it: [`SurfaceBlend::lag`](crate::SurfaceBlend::lag). `None` for the frame as it was published, whose lag is its
+    /// age.
     pub lag: Option<Millis>,
     /// The bus's health.
     pub link: Link,
-    /// The error of the query on that frame, if it returned one.
-    pub query_error: Option<QueryError>,
+    /// Why that frame gave no answer, if it gave none: the query's error, or a tool without a pose.
+    pub no_answer: Option<Unavailable>,
     /// Whether the tree's bytes were found changed: [`Scrub`](crate::Scrub). Leave it set for the rest of the run,
     /// unless the memory's defect is known and repaired.
     pub is_tree_corrupt: bool,
@@ -98,10 +99,10 @@ pub enum State {
 pub struct Verdict {
     /// The state after the step.
     pub state: State,
-    /// Why it is not nominal: the first input that requires the state, in the order missing surface, query, tree, age,
+    /// Why it is not nominal: the first input that requires the state, in the order missing surface, answer, tree, age,
     /// link. If none requires it any more, the last cause remains.
     pub cause: Option<Unavailable>,
-    /// Most that the tissue may have moved from the surface that was searched, in mm: its lag and its way, times the
+    /// Most that the tissue may have moved from the surface that was searched, in mm: its lag and transit, times the
     /// speed.
     pub margin: f32,
     /// Whether only an acknowledgement is missing to leave the safe state.
@@ -135,7 +136,7 @@ impl Verdict {
 /// let mut state = |now: u32, epoch, received: u32| {
 ///     let (age, received) = (Millis(now - received), Millis(received));
 ///     let frame = Some(FrameAge { epoch, received, age }); // from `LatestSurface::frame`
-///     let seen = Observation { frame, lag: None, link, query_error: None, is_tree_corrupt: false };
+///     let seen = Observation { frame, lag: None, link, no_answer: None, is_tree_corrupt: false };
 ///     machine.step(&seen).state
 /// };
 /// assert_eq!(state(1000, 1, 1000), State::Safe); // it starts safe
@@ -269,8 +270,8 @@ impl FailSafe {
         let silent = Unavailable::LinkLost { silence: link.silence };
         let heartbeat = Unavailable::HeartbeatLost { silence: link.heartbeat };
         let rejections = Unavailable::Rejections { streak: link.rejections };
-        if let Some(error) = seen.query_error {
-            worst = (State::Safe, Some(Unavailable::Query(error)));
+        if let Some(cause) = seen.no_answer {
+            worst = (State::Safe, Some(cause));
         }
         if seen.frame.is_none() {
             worst = (State::Safe, Some(Unavailable::NoSurface));

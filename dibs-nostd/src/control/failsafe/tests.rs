@@ -11,7 +11,7 @@ use crate::receive::BusHealth;
 use crate::surface::{Ageing, FrameAge, Millis};
 use crate::unavailable::{QueryError, Unavailable};
 
-const QUERY: QueryError = QueryError::Corrupt { row: 7 };
+const QUERY: Unavailable = Unavailable::Query(QueryError::Corrupt { row: 7 });
 
 const AGE: Watch = watch(50, 200);
 const SILENCE: Watch = watch(20, 100);
@@ -62,7 +62,7 @@ fn seen(now: u32, epoch: u32, age: u32) -> Observation {
         frame: Some(FrameAge { epoch, received: now.before(age), age }),
         lag: None,
         link: GOOD,
-        query_error: None,
+        no_answer: None,
         is_tree_corrupt: false,
     }
 }
@@ -89,11 +89,7 @@ fn requests() -> Vec<(State, Observation, Option<Unavailable>)> {
     let with = |link: Link| Observation { link, ..seen(2000, 100, 0) };
     let mut all = Vec::new();
     all.push((Safe, Observation { frame: None, ..seen(2000, 0, 0) }, Some(Unavailable::NoSurface)));
-    all.push((
-        Safe,
-        Observation { query_error: Some(QUERY), ..seen(2000, 100, 0) },
-        Some(Unavailable::Query(QUERY)),
-    ));
+    all.push((Safe, Observation { no_answer: Some(QUERY), ..seen(2000, 100, 0) }, Some(QUERY)));
     all.push((
         Safe,
         Observation { is_tree_corrupt: true, ..seen(2000, 100, 0) },
@@ -406,8 +402,8 @@ fn run(steps: &[Step], limits: Limits, start: u32) -> (Vec<Observation>, Vec<Ver
             FrameAge { epoch, received, age: ageing.oldest }
         });
         let Step { link, query_failed, is_tree_corrupt, .. } = *step;
-        let query_error = query_failed.then_some(QUERY);
-        let seen = Observation { frame, lag: None, link, query_error, is_tree_corrupt };
+        let no_answer = query_failed.then_some(QUERY);
+        let seen = Observation { frame, lag: None, link, no_answer, is_tree_corrupt };
         verdicts.push(machine.step(&seen));
         acknowledged.push(step.acknowledge && machine.acknowledge().is_ok());
         observations.push(seen);
@@ -420,7 +416,7 @@ fn is_beyond(seen: &Observation, second: bool) -> bool {
     let limit = |watch: Watch| if second { watch.safe() } else { watch.degraded() };
     let most = if second { REJECTIONS.safe() } else { REJECTIONS.degraded() };
     let Some(frame) = seen.frame else { return true };
-    seen.query_error.is_some()
+    seen.no_answer.is_some()
         || seen.is_tree_corrupt
         || frame.age > limit(AGE)
         || seen.link.silence > limit(SILENCE)

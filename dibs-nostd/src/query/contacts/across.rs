@@ -28,7 +28,7 @@ const LOOKS: u32 = 5;
 /// Node tests that take as long as the work for a point besides its search.
 const LOOK_COST: u32 = 16;
 
-/// Largest step along the axis, as a share of the depth.
+/// Largest step along the axis, as a part of the depth.
 const STEP: f32 = 0.75;
 
 /// The other triangle of a deepest point inside the axis.
@@ -36,7 +36,7 @@ const STEP: f32 = 0.75;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) struct Across {
     /// Its weight in the rate of the depth; 0 if there is none. The closest triangle has the rest.
-    pub share: f32,
+    pub weight: f32,
     /// Unit vector that leads out through it.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub normal: Vec3,
@@ -53,7 +53,7 @@ pub(crate) struct Across {
 
 impl Across {
     pub const NONE: Self = Self {
-        share: 0.0,
+        weight: 0.0,
         normal: Vec3::ZERO,
         on_axis: Vec3::ZERO,
         corners: [0; 3],
@@ -198,13 +198,13 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
         let outward = pair.on_surface - point;
         let normal = outward / sqrt(outward.length_squared());
         let fall = normal.dot(way);
-        let share = first.slope / (first.slope + fall);
-        if !(fall > 0.0 && share < 1.0) {
+        let weight = first.slope / (first.slope + fall);
+        if !(fall > 0.0 && weight < 1.0) {
             return Ok((Across::NONE, look.spent));
         }
         let barycentric = pair.barycentric;
         let (on_axis, corners) = (point, other.corners);
-        let across = Across { share, normal, on_axis, corners, barycentric, speed: 0.0 };
+        let across = Across { weight, normal, on_axis, corners, barycentric, speed: 0.0 };
         Ok((across, look.spent))
     }
 }

@@ -2,9 +2,9 @@
 
 use glam::Vec3;
 
+use super::activation::Looking;
 use super::basins::{Basins, Near, Place};
 use super::low::Found;
-use super::share::Looking;
 use super::{Contact, Contacts};
 use crate::math::sqrt::sqrt;
 use crate::query::search::Waiting;
@@ -14,7 +14,7 @@ use crate::tool::AxisPair;
 use crate::unavailable::QueryError;
 use crate::{Budget, Coverage, Index, Tool, Tree, TriangleRow, VertexTable};
 
-/// Ridges up to this part of the margin above a contact are looked at: the largest for a whole share.
+/// Ridges up to this part of the margin above a contact are looked at: the largest for an activation of 1.
 const RIDGE: f32 = 1.0 / 64.0;
 
 /// Accuracies within which two points are too close to give a direction.
@@ -155,7 +155,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             let is_own = (contact.surface, contact.tool) == (pair.surface, pair.number);
             if is_own && contact.separation > deepest {
                 let row = contact.triangle.0;
-                contact.share = basins.share(tree, row, ridges, is_left_out, &mut look)?;
+                contact.activation =
+                    basins.activation(tree, row, ridges, is_left_out, &mut look)?;
             }
         }
         made.triangle_tests = made.triangle_tests.saturating_add(left - look.left);

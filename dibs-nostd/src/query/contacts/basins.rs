@@ -1,20 +1,20 @@
 //! Selects the triangles near a tool that are closer than their surroundings.
 //!
 //! The distance from the tool is a height over the surface, and each valley of it is a contact. A flood from each low
-//! triangle, the lowest first, goes down to a place with nothing lower next to it. Then it rises over triangles in much the
-//! same direction by a ridge, as high as one beside which a contact has no share of a wall. So none ends while it has one.
-//! If it runs into the flood of a lower one in much the same direction, both are one valley: a flat wall along a capsule
-//! is one, however many triangles are equally far, and two walls are two, however low the ridge between.
+//! triangle, the lowest first, goes down to a triangle with nothing lower next to it. Then it rises over triangles in
+//! much the same direction by a ridge, as high as one beside which a contact has activation 0. So none ends while it
+//! acts. If it runs into the flood of a lower one in much the same direction, both are one valley: a flat wall along a
+//! capsule is one, however many triangles are equally far, and two walls are two, however low the ridge between.
 //!
-//! Over a triangle the height is convex. So the way from its lowest point to a neighbour leads over no ridge exactly if
+//! Over a triangle the height is convex. So the path from its lowest point to a neighbour leads over no ridge exactly if
 //! that point is on the edge between.
 //!
 //! Without room or budget a flood does not rise. Then one valley may be two, but none is lost, unless it cannot be seen
-//! whether anything lower is next to a place.
+//! whether anything lower is next to it.
 
 use glam::Vec3;
 
-use super::share::{self, Looking};
+use super::activation::{self, Looking};
 use crate::math::sqrt::sqrt;
 use crate::tool::AxisPair;
 use crate::unavailable::QueryError;
@@ -28,7 +28,8 @@ pub(super) struct Near {
     pub place: Place,
 }
 
-/// The closest point of a triangle: the direction to the tool, in 9 bits an axis, and the edges that it is on, a bit each.
+/// The closest point of a triangle: the direction to the tool, in 9 bits an axis, and the edges that it is on, a bit
+/// each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Place(u32);
 
@@ -117,8 +118,8 @@ pub(super) struct Basins<const N: usize> {
 
 /// The end of a flood.
 enum Flood {
-    /// It has reached all that is below its level; the lowest. If a ridge led to that, and it is in another direction, the
-    /// lowest before the ridge, too.
+    /// It has reached all that is below its level; the lowest. If a ridge led to that, and it is in another direction,
+    /// the lowest before the ridge, too.
     Ended(Near, Option<Near>),
     /// It has met the flood of a lower triangle in much the same direction.
     Joined,
@@ -162,9 +163,10 @@ impl<const N: usize> Basins<N> {
         low.first().map(|farthest| farthest.square())
     }
 
-    /// Finds the valleys: between those in much the same direction, ridges that give the higher one no share do not count
-    /// (`ridges`: see [`share::least_ridge`]). Calls back with the lowest triangle of each, nearest first. Points that differ by
-    /// the ridges' error may be equally far. Triangles that `is_left_out` are not looked at.
+    /// Finds the valleys: between those in much the same direction, ridges that leave the higher one without activation
+    /// do not count (`ridges`: see [`activation::least_ridge`]). Calls back with the lowest triangle of each, nearest
+    /// first. Points that differ by the ridges' error may be equally far. Triangles that `is_left_out` are not looked
+    /// at.
     ///
     /// Returns the square of the distance from which on valleys may be missing, if any.
     pub fn each_valley<I: Index, V: VertexTable + ?Sized, T: Tool>(
@@ -213,8 +215,9 @@ impl<const N: usize> Basins<N> {
             return Ok(Flood::Joined);
         };
         let mut height = sqrt(lowest.square());
-        let (ridge, error) = (share::least_ridge(height, ridges), ridges.1);
-        // The lowest before any ridge; the entry of the lowest; whether that is beyond a ridge, and leads to another flood.
+        let (ridge, error) = (activation::least_ridge(height, ridges), ridges.1);
+        // The lowest before any ridge; the entry of the lowest; whether that is beyond a ridge, and leads to another
+        // flood.
         let (mut own, mut at_lowest, mut has_crossed, mut leads_away) = (lowest, low, false, false);
         let mut count = 0;
         if !self.reach(low, low, &mut count) {

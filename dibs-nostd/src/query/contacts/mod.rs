@@ -1,11 +1,11 @@
 //! All locally closest pairs of a tool and a surface within a margin.
 
 mod across;
+mod activation;
 mod add;
 mod basins;
 mod list;
 mod low;
-mod share;
 
 use glam::Vec3;
 
@@ -52,8 +52,8 @@ pub struct Contact {
     pub velocity: Vec3,
     /// The other triangle that bounds the depth, where the tool crosses or is inside.
     pub(crate) across: Across,
-    /// How much of a wall of its own it is: 0 where it begins beside a nearer one, 1 beyond a ridge (see `share`).
-    pub(crate) share: f32,
+    /// 0 where it begins beside a nearer one, 1 beyond a ridge (see `activation`).
+    pub(crate) activation: f32,
 }
 
 impl Contact {
@@ -70,7 +70,7 @@ impl Contact {
         barycentric: [0.0; 3],
         velocity: Vec3::ZERO,
         across: Across::NONE,
-        share: 1.0,
+        activation: 1.0,
     };
 }
 
@@ -251,7 +251,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         for contact in &mut self.found.list {
             contact.velocity = velocity(contact.corners, contact.barycentric)?;
             let across = &mut contact.across;
-            if across.share > 0.0 {
+            if across.weight > 0.0 {
                 across.speed = across.normal.dot(velocity(across.corners, across.barycentric)?);
             }
         }

@@ -1,4 +1,4 @@
-//! The subtrees that wait, and the tests of a node's children.
+//! The stack of waiting subtrees, and the tests of a node's children.
 
 use super::{Search, Waiting};
 use crate::math::sqrt::sqrt;
@@ -10,11 +10,11 @@ use crate::{Index, Tool, VertexTable};
 pub(super) const CLOSEST: u8 = 0;
 /// For all that is within the cutoff.
 pub(super) const RANGE: u8 = 1;
-/// For the closest pair and the leaves that are a little farther; their planes are tested when their turn comes.
+/// For the closest pair and the leaves that are a little farther; their planes are tested when they are popped.
 pub(super) const AROUND: u8 = 2;
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// Takes the nearest subtree off the stack, which has a place for each that waits.
+    /// Removes the nearest subtree from the stack.
     #[inline(always)]
     pub(super) fn pop(&mut self) -> Option<Waiting> {
         let top = self.waiting.checked_sub(1)?;
@@ -77,7 +77,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             if KIND != RANGE {
                 self.lower_cutoff_to_pin(node.pin, distance);
             }
-            // The plane test needs the vector to the leaf's pin, which is at hand here. The plane goes through the pin:
+            // The plane test needs the vector to the leaf's pin, which is known here. The plane goes through the pin:
             // it rejects no leaf whose pin is within the range.
             if KIND != AROUND
                 && (KIND == CLOSEST || squared > self.cutoff_squared)

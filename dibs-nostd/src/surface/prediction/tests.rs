@@ -179,25 +179,22 @@ fn a_course_is_not_cut_to_the_numbers_that_fit() {
     let (mut known, mut unknown) = (0, 0);
     for _ in 0..100_000 {
         let (passed, off, units) = (any(&mut rng), any(&mut rng), any(&mut rng).max(1));
-        // Of all shares alike: a small one hardly ever makes a number that does not fit.
-        let share = rng.u32(..2_000) as f32 / 999.5;
+        // Of all `t` alike: a small one hardly ever makes a number that does not fit.
+        let t = rng.u32(..2_000) as f32 / 999.5;
         let ahead = PredictionCheck { passed, off, ..PredictionCheck::UNKNOWN };
-        let prediction = Prediction::new(units.into(), &ahead, share);
+        let prediction = Prediction::new(units.into(), &ahead, t);
         if prediction == Prediction::NONE {
-            let most = f64::from(passed.max(off)) * f64::from(1.0 + share);
-            assert!(most > f64::from(u32::MAX) / 2.0, "{passed} {off} {share}");
+            let most = f64::from(passed.max(off)) * f64::from(1.0 + t);
+            assert!(most > f64::from(u32::MAX) / 2.0, "{passed} {off} {t}");
             unknown += 1;
             continue;
         }
         let place = any(&mut rng);
         let stated = prediction.since(units.into(), place).unwrap();
-        let grown = f64::from(1.0 + share);
+        let grown = f64::from(1.0 + t);
         let farthest =
             (f64::from(passed) * grown - f64::from(place)).abs() + f64::from(off) * grown;
-        assert!(
-            stated as f64 >= farthest - 2.0,
-            "{passed} {off} {units} {share}: {stated} {farthest}"
-        );
+        assert!(stated as f64 >= farthest - 2.0, "{passed} {off} {units} {t}: {stated} {farthest}");
         known += 1;
     }
     assert!(known > 10_000 && unknown > 1_000, "{known} {unknown}");

@@ -17,8 +17,8 @@ use super::sender::Link;
 /// The steps in the force's size from the last tick of a frame to the first of the next.
 #[derive(Clone, Copy, Default, Serialize)]
 pub struct Steps {
-    /// New frames at which the output was not safe, and the instrument's axis outside the surface. Inside, the force is at
-    /// its largest.
+    /// New frames at which the output was not safe, and the instrument's axis outside the surface. Inside, the force is
+    /// at its largest.
     new_frames: usize,
     /// Of the controller's force, in N.
     force_step_continuous_mean_n: f64,
@@ -86,7 +86,7 @@ impl Steps {
         steps.force_step_continuous_mean_n /= frames;
         steps.force_step_held_mean_n /= frames;
         let answered = || ticks.iter().filter(|tick| tick.is_answered());
-        let moved = answered().filter(|tick| tick.share > 1.0).count();
+        let moved = answered().filter(|tick| tick.blend > 1.0).count();
         steps.moved_on = moved as f64 / answered().count().max(1) as f64;
         let errors = ticks.iter().map(|tick| tick.residual);
         steps.extrapolation_error_max_mm = errors.fold(0.0, f32::max);

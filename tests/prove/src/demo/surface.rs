@@ -13,6 +13,6 @@ pub fn positions(link: &Link, tick: &Tick) -> Result<Vec<Vec3>> {
             .with_context(|| format!("tick {} used frame {epoch}, never sent", tick.tick))
     };
     let (before, after) = (frame(tick.epoch_before)?, frame(tick.epoch)?);
-    let moved = |(&before, &after): (&Vec3, &Vec3)| before + (after - before) * tick.share;
+    let moved = |(&before, &after): (&Vec3, &Vec3)| before + (after - before) * tick.blend;
     Ok(before.iter().zip(after.iter()).map(moved).collect())
 }

@@ -1,13 +1,13 @@
-//! How much of a wall of its own a contact is, so that none begins or ends all at once.
+//! A contact's activation, which keeps it from beginning or ending at once with its whole force.
 //!
-//! A contact begins beside a lower one, where the way down to that one leads over no ridge. There its share is 0. It
-//! grows with the ridge, and is 1 once the ridge is a 64th of the contact's distance: some 10 degrees, seen from the
-//! axis. The closest contact has all. So has one that is equally near, whatever the ridge, so that nothing changes where
-//! two contacts change their order; with a difference in height the share falls.
+//! A contact begins beside a lower one, where the path down to that one leads over no ridge. There its activation is 0.
+//! It grows with the ridge, and is 1 once the ridge is a 64th of the contact's distance: some 10 degrees, seen from the
+//! axis. The closest contact has activation 1. So has one that is equally near, whatever the ridge, so that nothing
+//! changes where two contacts change their order; with a difference in height the activation falls.
 //!
 //! A change of all heights by `e` changes a ridge by at most `2 e` (persistence: Cohen-Steiner, Edelsbrunner & Harer
-//! 2007). So a share changes by at most `256 / distance` of the motion. Between flat walls it is at most 45 / distance,
-//! since a ridge there grows by the sine of the 10 degrees.
+//! 2007). So an activation changes by at most `256 / distance` of the motion. Between flat walls it is at most 45 /
+//! distance, since a ridge there grows by the sine of the 10 degrees.
 
 use super::add::Pair;
 use super::basins::{Basins, Near};
@@ -15,30 +15,30 @@ use crate::math::sqrt::sqrt;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
 
-/// Up to a ridge of this part of its distance a contact has no share, and all from twice that on.
+/// Up to a ridge of this part of its distance a contact has activation 0, and 1 from twice that on.
 const RIDGE: f32 = 1.0 / 128.0;
 
-/// Most ways at a time that lead out of the triangles passed.
-const WAYS: usize = 48;
+/// Most paths at a time that lead out of the triangles passed.
+const PATHS: usize = 48;
 
 /// Most triangles passed.
 const STEPS: usize = 128;
 
-/// The ridge (mm) up to which a place at this distance has no share.
+/// The ridge (mm) up to which a contact at this distance has activation 0.
 pub(super) fn least_ridge(distance: f32, (most, error): (f32, f32)) -> f32 {
     let ridge = distance * RIDGE;
     (if ridge < most { ridge } else { most }) + error
 }
 
-/// A way to a triangle.
+/// A path to a triangle.
 #[derive(Clone, Copy)]
-struct Way {
+struct Path {
     /// The largest height on it.
     height: f32,
     entry: u16,
 }
 
-/// Looks at triangles while tests are left.
+/// Tests triangles while tests are left.
 pub(super) struct Looking<'p, 'a, I, V: ?Sized, T> {
     pub pair: &'p Pair<'a, I, V, T>,
     /// No height beyond this counts.
@@ -68,11 +68,11 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Looking<'_, '_, I, V, T> {
 }
 
 impl<const N: usize> Basins<N> {
-    /// The share of the contact at a triangle, from 0 to 1. Without room or budget it is 1.
+    /// The activation of the contact at a triangle, from 0 to 1. Without room or budget it is 1.
     ///
-    /// Follows the ways out of its valley, the lowest first. `most` limits the ridge below which it has none, for an axis
+    /// Follows the paths out of its valley, the lowest first. `most` limits the ridge below which it is 0, for an axis
     /// far away; `error` is that of two heights. Triangles that `is_left_out` are not passed.
-    pub fn share<I: Index, V: VertexTable + ?Sized, T: Tool>(
+    pub fn activation<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         tree: &Tree<'_, I>,
         row: u32,
@@ -89,10 +89,10 @@ impl<const N: usize> Basins<N> {
         let none = least_ridge(own, ridges);
         let full = 2.0 * none;
         let mut least = full;
-        let mut ways = [Way { height: own, entry }; WAYS];
+        let mut paths = [Path { height: own, entry }; PATHS];
         let mut count = 1;
         for _ in 0..STEPS {
-            let Some(Way { height, entry }) = take_lowest(&mut ways, &mut count) else { break };
+            let Some(Path { height, entry }) = take_lowest(&mut paths, &mut count) else { break };
             let ridge = height - own;
             if !(ridge < least) {
                 break;
@@ -102,7 +102,7 @@ impl<const N: usize> Basins<N> {
             }
             self.mark(entry);
             let (Some(near), Some(())) = (self.at(entry), look.pay()) else { return Ok(1.0) };
-            // Beside a place that is hardly lower, the ridge does not count.
+            // Beside a point that is hardly lower, the ridge does not count.
             let tied = full - (own - sqrt(near.square));
             let parted = if tied > ridge { tied } else { ridge };
             if parted < least {
@@ -126,8 +126,8 @@ impl<const N: usize> Basins<N> {
                     over = if edge > over { edge } else { over };
                 }
                 if over - own < least {
-                    let Some(way) = ways.get_mut(count) else { return Ok(1.0) };
-                    *way = Way { height: over, entry: next };
+                    let Some(path) = paths.get_mut(count) else { return Ok(1.0) };
+                    *path = Path { height: over, entry: next };
                     count += 1;
                 }
             }
@@ -136,18 +136,18 @@ impl<const N: usize> Basins<N> {
     }
 }
 
-/// Takes out the lowest of the first `count` ways.
-fn take_lowest(ways: &mut [Way; WAYS], count: &mut usize) -> Option<Way> {
+/// Takes out the lowest of the first `count` paths.
+fn take_lowest(paths: &mut [Path; PATHS], count: &mut usize) -> Option<Path> {
     let last = count.checked_sub(1)?;
-    let (&lowest, _) = ways.split_first()?;
+    let (&lowest, _) = paths.split_first()?;
     let (mut at, mut lowest) = (0, lowest);
-    for (place, &way) in ways.iter().enumerate().take(*count) {
-        if way.height < lowest.height {
-            (at, lowest) = (place, way);
+    for (index, &path) in paths.iter().enumerate().take(*count) {
+        if path.height < lowest.height {
+            (at, lowest) = (index, path);
         }
     }
-    let moved = *ways.get(last)?;
-    *ways.get_mut(at)? = moved;
+    let moved = *paths.get(last)?;
+    *paths.get_mut(at)? = moved;
     *count = last;
     Some(lowest)
 }
