@@ -39,7 +39,7 @@ enum Task {
     /// Changes operators of the core one by one, and lists the changes that no test notices.
     #[command(disable_help_flag = true)]
     Mutants(Passed),
-    /// Builds the core crate for every row of docs/processors.md.
+    /// Checks the core crate for every row of docs/processors.md.
     #[command(disable_help_flag = true)]
     Processors(Passed),
     /// Runs the tests of frames, bus and format under the address and the thread sanitizer.

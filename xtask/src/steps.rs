@@ -68,6 +68,11 @@ impl Steps {
             .with_context(|| format!("cannot write {}", file.display()))
     }
 
+    /// Adds another thread's steps.
+    pub fn append(&mut self, mut other: Self) {
+        self.lines.append(&mut other.lines);
+    }
+
     /// Adds the steps in another program's file.
     ///
     /// # Errors

@@ -50,43 +50,48 @@ pub enum Job {
 pub fn test(options: &Options) -> Result<()> {
     let mut steps = Steps::default();
     let is_due = |job| options.job.is_none_or(|only| only == job);
+    let (seconds, is_whole) = (options.demo_seconds, options.whole);
     if is_due(Job::Lints) {
-        lints(&mut steps, options.whole);
+        lints(&mut steps, is_whole);
     }
+    if is_due(Job::Host) || is_due(Job::Promises) {
+        steps.run("build", || workspace::build().map(|()| Outcome::Passed));
+    }
+    // Found first, since all threads would install them.
+    let found = (is_due(Job::Board) || is_due(Job::Promises))
+        .then(|| Cross::find().and_then(|cross| qemu::find().map(|_| cross)));
+    // Threads, because tests, builds and emulators each leave a core idle now and then.
+    let checks = is_due(Job::Promises).then(|| thread::spawn(move || checks(seconds, is_whole)));
+    let board = found
+        .filter(|_| is_due(Job::Board))
+        .map(|found| thread::spawn(move || board(found, is_whole)));
     if is_due(Job::Host) {
         // This also runs the examples in the documentation.
         let tests = ["test", "--release", "--no-fail-fast"];
-        steps.cargo("tests", &[&tests, bench_too(options.whole)].concat(), &[]);
+        steps.cargo("tests", &[&tests, bench_too(is_whole)].concat(), &[]);
         steps.run("files of other programs", other_programs);
     }
     if is_due(Job::Docs) {
         documents(&mut steps);
     }
-    // A thread, because the board's builds take one core.
-    let (seconds, is_whole) = (options.demo_seconds, options.whole);
-    let found = (is_due(Job::Board) || is_due(Job::Promises)).then(|| {
-        // Found first, since both sides would install them.
-        (Cross::find(), qemu::find())
-    });
-    let checks = is_due(Job::Promises).then(|| thread::spawn(move || checks(seconds, is_whole)));
-    if let Some((cross, emulator)) = found.filter(|_| is_due(Job::Board)) {
-        match cross.and_then(|cross| emulator.map(|_| cross)) {
-            Ok(cross) => board(&mut steps, &cross, is_whole),
-            Err(error) => steps.run("toolchain for the board", || Err(error)),
-        }
-        steps.run("viewer for WebAssembly", viewer::compiles);
-        if is_whole {
-            steps.run("viewer in WebAssembly", viewer::same_bits);
+    if let Some(board) = board {
+        match board.join() {
+            Ok(board) => steps.append(board),
+            Err(_) => steps.run("board", || Err(panicked())),
         }
     }
     if let Some(checks) = checks {
-        let list = checks.join().unwrap_or_else(|_| Err(anyhow!("the thread panicked")));
+        let list = checks.join().unwrap_or_else(|_| Err(panicked()));
         if let Err(error) = list.and_then(|list| steps.read(&list)) {
             steps.run("checks of tests/prove", || Err(error));
         }
     }
     steps.finish();
     Ok(())
+}
+
+fn panicked() -> anyhow::Error {
+    anyhow!("the thread panicked")
 }
 
 /// The paper's experiments, which are no default member of the workspace, are compiled and run only with `--whole`.
@@ -121,15 +126,26 @@ fn documents(steps: &mut Steps) {
     steps.run("oldest compiler", oldest_compiler);
 }
 
-fn board(steps: &mut Steps, cross: &Cross, is_whole: bool) {
-    println!("\nboard: {}", cross.describe());
-    steps.run("core crate for the board", || core_crate(cross));
-    steps.run("lints of the firmware", || firmware_lints(cross, is_whole));
-    steps.run("C interface for the board", || c_interface::has_no_panic_path(cross));
-    if is_whole {
-        steps.run("a new user", || new_user(cross));
+fn board(found: Result<Cross>, is_whole: bool) -> Steps {
+    let mut steps = Steps::default();
+    match found {
+        Ok(cross) => {
+            println!("\nboard: {}", cross.describe());
+            steps.run("core crate for the board", || core_crate(&cross));
+            steps.run("lints of the firmware", || firmware_lints(&cross, is_whole));
+            steps.run("C interface for the board", || c_interface::has_no_panic_path(&cross));
+            if is_whole {
+                steps.run("a new user", || new_user(&cross));
+            }
+            steps.run("cycles, as far as an emulator has them", || cycles(&cross));
+        }
+        Err(error) => steps.run("toolchain for the board", || Err(error)),
     }
-    steps.run("cycles, as far as an emulator has them", || cycles(cross));
+    steps.run("viewer for WebAssembly", viewer::compiles);
+    if is_whole {
+        steps.run("viewer in WebAssembly", viewer::same_bits);
+    }
+    steps
 }
 
 /// Runs the checks of `tests/prove`. Returns the file with the list of its steps.
@@ -149,15 +165,16 @@ fn checks(demo_seconds: u32, is_whole: bool) -> Result<PathBuf> {
 /// Files that other programs write now, by those that are installed.
 fn other_programs() -> Result<Outcome> {
     let mut command = Command::new("cargo");
-    command.args(["test", "--release", "--quiet", "-p", "dibs-build", "--features", "formats"]);
+    // All packages, so that cargo reuses the tests' build.
     command.args([
+        "test",
+        "--release",
+        "--quiet",
         "--test",
         "readers",
         "written_by_other_programs",
-        "--",
-        "--ignored",
-        "--nocapture",
     ]);
+    command.args(["--", "--ignored", "--nocapture"]);
     let output = command.current_dir(workspace::root()).output()?;
     let said =
         [output.stdout, output.stderr].map(|said| String::from_utf8_lossy(&said).into_owned());

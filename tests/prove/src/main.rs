@@ -24,7 +24,7 @@ enum Task {
     /// Writes docs/evidence/performance.md: where a query's instructions go on the emulated board.
     Profile,
     Mutants(mutants::Options),
-    /// Builds the core crate for every row of docs/processors.md.
+    /// Checks the core crate for every row of docs/processors.md.
     Processors,
     /// Runs the checks of `cargo xtask test`.
     #[command(hide = true)]
