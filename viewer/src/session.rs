@@ -1,4 +1,6 @@
 //! A session: a tree, a motion and an instrument; ticks, and pictures of the last one.
+//!
+//! One file, because it is the page's whole interface.
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{

@@ -62,7 +62,16 @@ pub fn compiles() -> Result<Outcome> {
         return Ok(Outcome::Skipped(format!("{error:#}")));
     }
     let mut cargo = Command::new("cargo");
-    cargo.args(["check", "--quiet", "--package", "dibs-view", "--lib", "--target", TARGET]);
+    cargo.args([
+        "check",
+        "--quiet",
+        "--release",
+        "--package",
+        "dibs-view",
+        "--lib",
+        "--target",
+        TARGET,
+    ]);
     run(cargo.current_dir(workspace::root())).map(|()| Outcome::Passed)
 }
 

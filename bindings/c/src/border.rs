@@ -103,6 +103,13 @@ impl<T> Place<T> {
         unsafe { self.0.write(value) };
     }
 
+    /// Writes the value, unless the pointer was null.
+    pub fn set_if_any(place: Option<Self>, value: T) {
+        if let Some(place) = place {
+            place.set(value);
+        }
+    }
+
     /// The value there.
     pub fn get(&self) -> T
     where

@@ -6,7 +6,7 @@ use dibs_nostd::guard::Bus;
 use dibs_nostd::wire::{Event, NoMac};
 use dibs_nostd::{Millis, TreeBytes};
 
-use crate::border::{Handle, Input, Kind, Output, Storage};
+use crate::border::{Handle, Input, Kind, Output, Place, Storage};
 use crate::code::dibs_code;
 use crate::limits::dibs_guard_limits;
 use crate::receiver::{DIBS_EVENTS, DIBS_STATUS, dibs_advance, dibs_progress};
@@ -110,9 +110,7 @@ pub extern "C" fn dibs_bus_packet(
     dibs_code::of(|| {
         let (progress, mut bus) = (progress.check_if_any()?, bus.open()?);
         let outcome = bus.0.packet(packet.slice(length)?, Millis(now))?;
-        if let Some(progress) = progress {
-            progress.set(outcome.into());
-        }
+        Place::set_if_any(progress, outcome.into());
         Ok(())
     })
 }
@@ -135,9 +133,7 @@ pub extern "C" fn dibs_bus_work(
     dibs_code::of(|| {
         let (advance, mut bus) = (advance.check_if_any()?, bus.open()?);
         let outcome = bus.0.work(work)?;
-        if let Some(advance) = advance {
-            advance.set(outcome.into());
-        }
+        Place::set_if_any(advance, outcome.into());
         Ok(())
     })
 }

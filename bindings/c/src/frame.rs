@@ -5,7 +5,7 @@ use core::ffi::c_void;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{MeasuredStretch, VertexTable, measure_stretch};
 
-use crate::border::{Handle, Input, Kind, Output, Storage};
+use crate::border::{Handle, Input, Kind, Output, Place, Storage};
 use crate::code::dibs_code;
 use crate::surface::Held;
 use crate::tree::dibs_tree;
@@ -198,9 +198,7 @@ pub extern "C" fn dibs_frame_measure(
                 measured
             }
         };
-        if let Some(stretch) = stretch {
-            stretch.set(measured.sigma());
-        }
+        Place::set_if_any(stretch, measured.sigma());
         Ok(())
     })
 }

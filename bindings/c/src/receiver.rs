@@ -8,7 +8,7 @@ use dibs_nostd::{
     Advance, Assembler, Millis, Progress, StretchMonitor, SurfaceLimits, VertexTable,
 };
 
-use crate::border::{Handle, Input, Kind, Output, Storage};
+use crate::border::{Handle, Input, Kind, Output, Place, Storage};
 use crate::code::dibs_code;
 use crate::surface::dibs_surface;
 use crate::tool::dibs_vec3;
@@ -49,6 +49,17 @@ impl dibs_receiver {
     /// Tells the reader how the bus is.
     fn note(&self) {
         self.surface.notes.link.set(&self.assembler.health());
+    }
+
+    /// The end of a packet.
+    fn end(
+        &self,
+        outcome: Result<Progress, dibs_code>,
+        progress: Option<Place<dibs_progress>>,
+    ) -> Result<(), dibs_code> {
+        self.note();
+        Place::set_if_any(progress, outcome?.into());
+        Ok(())
     }
 }
 
@@ -175,12 +186,7 @@ pub extern "C" fn dibs_receiver_accept(
     dibs_code::of(|| {
         let (progress, mut receiver) = (progress.check_if_any()?, receiver.open()?);
         let outcome = receiver.assembler.accept(packet.slice(length)?, Millis(now));
-        receiver.note();
-        let outcome = outcome?.into();
-        if let Some(progress) = progress {
-            progress.set(outcome);
-        }
-        Ok(())
+        receiver.end(outcome.map_err(dibs_code::from), progress)
     })
 }
 
@@ -201,25 +207,18 @@ pub extern "C" fn dibs_receiver_byte(
     dibs_code::of(|| {
         let (progress, mut receiver) = (progress.check_if_any()?, receiver.open()?);
         let dibs_receiver { assembler, deframer, .. } = &mut *receiver;
-        let outcome: Result<_, dibs_code> = match deframer.push(byte) {
-            None => Ok(dibs_progress::None),
-            Some(Ok(packet)) => match assembler.accept(packet, Millis(now)) {
-                Ok(progress) => Ok(progress.into()),
-                Err(error) => Err(error.into()),
-            },
+        let outcome = match deframer.push(byte) {
+            None => {
+                Place::set_if_any(progress, dibs_progress::None);
+                return Ok(());
+            }
+            Some(Ok(packet)) => assembler.accept(packet, Millis(now)).map_err(dibs_code::from),
             Some(Err(error)) => {
                 assembler.count_framing(&error);
                 Err(error.into())
             }
         };
-        if outcome != Ok(dibs_progress::None) {
-            receiver.note();
-        }
-        let outcome = outcome?;
-        if let Some(progress) = progress {
-            progress.set(outcome);
-        }
-        Ok(())
+        receiver.end(outcome, progress)
     })
 }
 
@@ -271,9 +270,7 @@ pub extern "C" fn dibs_receiver_advance(
         if let Advance::Published { epoch } = outcome {
             receiver.published = Some(epoch);
         }
-        if let Some(advance) = advance {
-            advance.set(outcome.into());
-        }
+        Place::set_if_any(advance, outcome.into());
         Ok(())
     })
 }

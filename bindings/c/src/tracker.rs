@@ -1,15 +1,18 @@
 //! The tracker: the closest pair from tick to tick, at the cost of what has changed.
+//!
+//! One file, because half of it is the text of the header.
 
 use core::cell::Cell;
 use core::ffi::c_void;
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
-    Fallback, MeasuredStretch, MovingTable, Odometer, Tracker, TrackerAnswer, VertexTable,
+    Fallback, MeasuredStretch, MovingSurface, MovingTable, Odometer, Options, Tracker,
+    TrackerAnswer, VertexTable,
 };
 use heapless::Vec;
 
-use crate::border::{DIBS_ALIGNMENT, Handle, Handles, Input, Kind, Output, Storage};
+use crate::border::{DIBS_ALIGNMENT, Handle, Handles, Input, Kind, Output, Place, Storage};
 use crate::code::dibs_code;
 use crate::contacts::dibs_contacts;
 use crate::frame::{Table, dibs_frame};
@@ -33,12 +36,14 @@ pub const DIBS_OPENED: usize = 256;
 /// It keeps a copy of the surface, so that a frame is held for its copying alone, or it searches a reader's frame itself. One
 /// context at a time.
 pub struct dibs_tracker {
-    tracker: Tracker<'static, u16, STACK, DIBS_OPENED, DIBS_OPENED>,
+    tracker: TheTracker,
     odometer: Odometer,
     /// The copies: the surface's, and the one to be written next.
     copies: [&'static Copied; 2],
     surface: Option<MovingTable<'static, Copied>>,
 }
+
+type TheTracker = Tracker<'static, u16, STACK, DIBS_OPENED, DIBS_OPENED>;
 
 impl Kind for dibs_tracker {
     const MARK: u32 = 0x6462_6B14;
@@ -218,6 +223,37 @@ pub struct dibs_tracked {
     pub fallback: dibs_fallback,
 }
 
+/// Receives the facts about a tick besides the pair.
+struct Ticked {
+    fallback: Option<Place<dibs_fallback>>,
+    moved: Option<Place<f32>>,
+}
+
+impl Ticked {
+    fn check(fallback: *mut dibs_fallback, moved: *mut f32) -> Result<Self, dibs_code> {
+        Ok(Self { fallback: fallback.check_if_any()?, moved: moved.check_if_any()? })
+    }
+
+    /// Writes the facts, and returns the pair.
+    fn set(self, found: &TrackerAnswer) -> dibs_proximity {
+        Place::set_if_any(self.fallback, found.fallback.into());
+        Place::set_if_any(self.moved, found.moved.unwrap_or(-1.0));
+        found.closest.into()
+    }
+}
+
+fn closest<S: MovingSurface>(
+    tracker: &mut TheTracker,
+    surface: &S,
+    shape: &Shape,
+    options: &Options,
+) -> Result<TrackerAnswer, dibs_code> {
+    Ok(match shape {
+        Shape::Sphere(sphere) => tracker.closest(surface, sphere, options)?,
+        Shape::Capsule(capsule) => tracker.closest(surface, capsule, options)?,
+    })
+}
+
 /// The closest pair of the tool and the tracker's surface: the answer of `dibs_query_closest`, within its accuracy.
 ///
 /// Cost: the budget at most, and a number for each opened node.
@@ -240,23 +276,12 @@ pub extern "C" fn dibs_tracker_closest(
     moved: *mut f32,
 ) -> dibs_code {
     dibs_code::of(|| {
-        let (proximity, fallback) = (proximity.check()?, fallback.check_if_any()?);
-        let moved = moved.check_if_any()?;
+        let (proximity, ticked) = (proximity.check()?, Ticked::check(fallback, moved)?);
         let (shape, mut tracker) = (Shape::try_from(tool.get()?)?, tracker.open()?);
         let options = dibs_options::of(options)?;
         let dibs_tracker { tracker, surface, .. } = &mut *tracker;
         let surface = surface.as_ref().ok_or(dibs_code::NoSurface)?;
-        let found: TrackerAnswer = match &shape {
-            Shape::Sphere(sphere) => tracker.closest(surface, sphere, &options)?,
-            Shape::Capsule(capsule) => tracker.closest(surface, capsule, &options)?,
-        };
-        proximity.set(found.closest.into());
-        if let Some(fallback) = fallback {
-            fallback.set(found.fallback.into());
-        }
-        if let Some(moved) = moved {
-            moved.set(found.moved.unwrap_or(-1.0));
-        }
+        proximity.set(ticked.set(&closest(tracker, surface, &shape, &options)?));
         Ok(())
     })
 }
@@ -287,8 +312,7 @@ pub extern "C" fn dibs_tracker_closest_on(
     moved: *mut f32,
 ) -> dibs_code {
     dibs_code::of(|| {
-        let (proximity, fallback) = (proximity.check()?, fallback.check_if_any()?);
-        let moved = moved.check_if_any()?;
+        let (proximity, ticked) = (proximity.check()?, Ticked::check(fallback, moved)?);
         let (shape, mut tracker) = (Shape::try_from(tool.get()?)?, tracker.open()?);
         let (frame, options) = (frame.open()?, dibs_options::of(options)?);
         let surface = match &frame.table {
@@ -297,17 +321,7 @@ pub extern "C" fn dibs_tracker_closest_on(
             Table::Vertices(_) => return Err(dibs_code::Argument),
             Table::Held(held) => held.moving(),
         };
-        let found: TrackerAnswer = match &shape {
-            Shape::Sphere(sphere) => tracker.tracker.closest(surface, sphere, &options)?,
-            Shape::Capsule(capsule) => tracker.tracker.closest(surface, capsule, &options)?,
-        };
-        proximity.set(found.closest.into());
-        if let Some(fallback) = fallback {
-            fallback.set(found.fallback.into());
-        }
-        if let Some(moved) = moved {
-            moved.set(found.moved.unwrap_or(-1.0));
-        }
+        proximity.set(ticked.set(&closest(&mut tracker.tracker, &surface, &shape, &options)?));
         Ok(())
     })
 }
@@ -339,8 +353,7 @@ pub extern "C" fn dibs_tracker_contacts(
     moved: *mut f32,
 ) -> dibs_code {
     dibs_code::of(|| {
-        let (proximity, fallback) = (proximity.check_if_any()?, fallback.check_if_any()?);
-        let moved = moved.check_if_any()?;
+        let (proximity, ticked) = (proximity.check_if_any()?, Ticked::check(fallback, moved)?);
         let found: TrackerAnswer = contacts.open()?.fill(|list| {
             let (shape, mut tracker) = (Shape::try_from(tool.get()?)?, tracker.open()?);
             let options = dibs_options::of(options)?;
@@ -355,15 +368,7 @@ pub extern "C" fn dibs_tracker_contacts(
                 }
             })
         })?;
-        if let Some(proximity) = proximity {
-            proximity.set(found.closest.into());
-        }
-        if let Some(fallback) = fallback {
-            fallback.set(found.fallback.into());
-        }
-        if let Some(moved) = moved {
-            moved.set(found.moved.unwrap_or(-1.0));
-        }
+        Place::set_if_any(proximity, ticked.set(&found));
         Ok(())
     })
 }

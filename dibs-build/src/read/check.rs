@@ -1,4 +1,6 @@
 //! Makes a checked mesh of a file's elements: every check, in order.
+//!
+//! One file, because the order of the checks is their meaning.
 
 use super::place::{Place, check_nearness, rounding};
 use super::polygon::Triangulator;

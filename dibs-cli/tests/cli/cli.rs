@@ -1,4 +1,6 @@
 //! The `dibs` program, as a script would run it.
+//!
+//! One file, because each test is a few commands.
 
 use std::net::UdpSocket;
 use std::path::Path;

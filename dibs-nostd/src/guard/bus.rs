@@ -79,15 +79,15 @@ impl<'s, 't, I: Index, M: Mac> Bus<'s, 't, I, M> {
     /// was checked.
     pub fn receive(&mut self, bytes: &[u8], now: Millis) {
         for &byte in bytes {
-            match self.deframer.push(byte) {
+            let outcome = match self.deframer.push(byte) {
                 None => continue,
-                Some(Ok(packet)) => {
-                    let outcome = self.assembler.accept(packet, now);
-                    self.has_news |= outcome == Ok(Progress::Hello);
+                Some(Ok(packet)) => self.assembler.accept(packet, now).ok(),
+                Some(Err(error)) => {
+                    self.assembler.count_framing(&error);
+                    None
                 }
-                Some(Err(error)) => self.assembler.count_framing(&error),
-            }
-            self.notes.link.set(&self.assembler.health());
+            };
+            self.note(outcome);
         }
     }
 
@@ -99,9 +99,13 @@ impl<'s, 't, I: Index, M: Mac> Bus<'s, 't, I, M> {
     /// [`ReceiveError`] names why the packet or its frame was not taken; the event has been counted.
     pub fn packet(&mut self, packet: &[u8], now: Millis) -> Result<Progress, ReceiveError> {
         let outcome = self.assembler.accept(packet, now);
-        self.has_news |= outcome == Ok(Progress::Hello);
-        self.notes.link.set(&self.assembler.health());
+        self.note(outcome.ok());
         outcome
+    }
+
+    fn note(&mut self, outcome: Option<Progress>) {
+        self.has_news |= outcome == Some(Progress::Hello);
+        self.notes.link.set(&self.assembler.health());
     }
 
     /// Does a slice of the checks: at most `work` rows and triangles of the frame that arrives, and publishes it once

@@ -1,6 +1,8 @@
 //! The order of frames and packets: new or old, and the moment at which a frame is complete.
 //!
 //! It does not depend on a frame's content (vertices or weights) or its storage.
+//!
+//! One file, because the order of its checks is the protocol's.
 
 use super::ReceiveError;
 use super::arrivals::{Arrivals, Misplaced, Place};

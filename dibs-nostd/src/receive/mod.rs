@@ -1,4 +1,6 @@
 //! From packets to published frames: the gate between the bus and the surface that the controller acts on.
+//!
+//! One file, because it is the assembler's whole interface.
 
 mod arrivals;
 mod collector;

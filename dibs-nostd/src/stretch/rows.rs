@@ -3,6 +3,8 @@
 //! Corners shared with the triangle before are carried over ([`Join`]). So is an edge's slack under the largest square
 //! `L` so far: `L r - g`, with its squares `r` at rest and `g` now. Both triangles of the edge have the same `r`,
 //! unless each triangle has its own limit (a tree that is not `UNIFORM`).
+//!
+//! One file, because the compiler inlines the loop as a whole.
 
 mod wide;
 

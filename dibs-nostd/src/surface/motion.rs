@@ -3,6 +3,8 @@
 //! A bound on a distance holds until tool and surface have moved by more than its slack. An odometer is a number that
 //! grows, from frame to frame, by at least the distance that any vertex moved. Two readings of it, however many frames
 //! apart, bound the motion between them.
+//!
+//! One file, because reading, unit and odometer keep their fields private.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 

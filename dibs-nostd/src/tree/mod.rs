@@ -1,4 +1,6 @@
 //! The tree: a validated view of bytes that stay where they are, in flash or in a file.
+//!
+//! One file, because it is the view's whole interface.
 
 /// The operator `?`, for `const` functions.
 macro_rules! tri {

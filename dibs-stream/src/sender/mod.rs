@@ -1,4 +1,6 @@
 //! From positions to packets, and the statuses on the way back.
+//!
+//! One file, because packets and statuses have one state.
 
 mod clock;
 mod error;

@@ -1,4 +1,6 @@
 //! `docs/evidence/benchmarks.md`: every number in it is a record's.
+//!
+//! One file, because it is one page, table after table.
 
 use std::fmt::Write;
 

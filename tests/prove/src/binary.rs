@@ -140,14 +140,13 @@ impl Binary {
         self.below_but(root, |_| false)
     }
 
-    /// Functions below `root`, itself included, but for those that are left out, by name, and what they alone call.
-    pub fn below_but(&self, root: u32, is_left_out: impl Fn(&str) -> bool) -> BTreeSet<u32> {
+    /// Functions below `root`, itself included, but for those that are left out, by address, and what they alone call.
+    pub fn below_but(&self, root: u32, is_left_out: impl Fn(u32) -> bool) -> BTreeSet<u32> {
         let mut seen = BTreeSet::from([root]);
         let mut next = vec![root];
-        let is_in = |call: u32| !self.name(call).is_some_and(&is_left_out);
         while let Some(function) = next.pop().and_then(|address| self.functions.get(&address)) {
             let calls = function.calls.keys();
-            next.extend(calls.filter(|&&call| is_in(call) && seen.insert(call)));
+            next.extend(calls.filter(|&&call| !is_left_out(call) && seen.insert(call)));
         }
         seen
     }

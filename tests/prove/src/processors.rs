@@ -56,7 +56,15 @@ fn rows(page: &str) -> Result<Vec<(&str, bool)>> {
 /// Compiles where the row says that it works, and fails for want of compare-and-swap where it does not.
 fn row(target: &str, works: bool) -> Result<()> {
     let mut cargo = Command::new("cargo");
-    cargo.args(["check", "--message-format=short", "--package", "dibs-nostd", "--target", target]);
+    cargo.args([
+        "check",
+        "--release",
+        "--message-format=short",
+        "--package",
+        "dibs-nostd",
+        "--target",
+        target,
+    ]);
     cargo.arg("--target-dir").arg(workspace::target().join("processors"));
     cargo.current_dir(workspace::root());
     if works {

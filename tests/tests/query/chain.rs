@@ -1,4 +1,6 @@
 //! Several tools and several surfaces: the answers of queries one by one, for a fraction of their tests.
+//!
+//! One file, because all tests compare with the same queries one by one.
 
 use dibs_build::{Builder, BuiltTree, generate};
 use dibs_nostd::format::MAX_STACK;

@@ -1,4 +1,6 @@
 //! Contacts against an exhaustive list in f64, and their force and inequalities.
+//!
+//! One file, because all tests compare with the same list.
 
 use std::collections::{HashMap, HashSet};
 

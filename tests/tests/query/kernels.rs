@@ -1,5 +1,7 @@
 //! The tool kernels against the f64 oracle, within the core's stated accuracy: every shape of triangle with every kind
 //! of axis, at every scale.
+//!
+//! One file, because all tests draw from the same cases.
 
 use dibs_nostd::{ACCURACY, AxisPair, Capsule, Sphere, Tool, ToolError};
 use dibs_tests::oracle::{Instrument, closest_pair, exhaustive};

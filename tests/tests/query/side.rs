@@ -1,6 +1,8 @@
 //! Sides and signed separations against f64: generalised winding numbers, exhaustive search, dense sampling.
 //!
 //! `DIBS_POSES` sets the number of poses.
+//!
+//! One file, because all tests compare with the same oracle.
 
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;

@@ -1,6 +1,8 @@
 //! Sides where sheets tie, against winding numbers in f64: walls that touch or collapsed, blades, spikes, lattices.
 //!
 //! `DIBS_CLIMBS` sets the number of climbs to ties.
+//!
+//! One file, because all tests compare with the same oracle.
 
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, WindingError, check_winding, generate};
 use dibs_nostd::format::MAX_STACK;

@@ -1,5 +1,7 @@
 //! Every wall within the margin is in the list of contacts: climbing searches against f64 over thin, close, coarse and
 //! lattice-aligned closed meshes, few places, parts with labels, and the force between two walls.
+//!
+//! One file, because all tests compare with the same oracle.
 
 use dibs_build::{Builder, Mesh, generate};
 use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, Proxy, SpringDamper};

@@ -1,4 +1,6 @@
 //! Modal surfaces: their positions, their distance from the recorded motion, and their refusals.
+//!
+//! One file, because all tests need the same fit.
 
 use std::cell::RefCell;
 use std::collections::HashSet;

@@ -1,4 +1,6 @@
 //! The tree's bytes against their specification, `docs/format.md`, and against corruption.
+//!
+//! One file, because all tests damage the same trees.
 
 use dibs_build::{BuildError, Builder, BuiltTree, IndexWidth, Mesh, ReadOptions, Unit, generate};
 use dibs_nostd::format::{CRC, Link, MAX_STACK};

@@ -2,6 +2,8 @@
 //!
 //! Our own reader, although `gltf` exists: that panics on documents whose numbers of accessors, and on accessors whose
 //! bytes, are not there. With these checked first, nothing would be left for it to do.
+//!
+//! One file, because a document's parts refer to each other.
 
 mod accessor;
 mod buffers;

@@ -1,4 +1,6 @@
 //! glTF documents, each a small change of one.
+//!
+//! One file, because every test changes the same document.
 
 use serde_json::{Value, json};
 

@@ -1,5 +1,7 @@
 //! `dibs stream`, from the program over a socket to what a controller would act on: the packets go
 //! through the assembler and the stretch monitor, and what is published is compared with the motion.
+//!
+//! One file, because all tests receive by the same helpers.
 
 mod receiver;
 

@@ -1,4 +1,6 @@
 //! Compares the machine with its table, and with a second one that remembers all steps.
+//!
+//! One file, because table, second machine and comparison need each other.
 
 extern crate std;
 

@@ -11,6 +11,8 @@
 //!
 //! Without room or budget a flood does not rise. Then one valley may be two, but none is lost, unless it cannot be seen
 //! whether anything lower is next to it.
+//!
+//! One file, because floods and triangles keep their fields private.
 
 use glam::Vec3;
 

@@ -13,6 +13,8 @@
 //!
 //! A tracker keeps the bounds. Tool and surface change a depth by at most their motion, so the next tick looks only at
 //! the parts whose bounds have come above the deepest point by more than the tolerance.
+//!
+//! One file, because the search and its steps share one state.
 
 mod part;
 mod start;

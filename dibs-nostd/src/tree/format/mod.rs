@@ -2,6 +2,8 @@
 //!
 //! `docs/format.md` is the specification, this module its only reader, and [`field`] the table of the header. Most
 //! functions are `const`, so that a tree may be validated in a constant; a generated one is validated at start-up.
+//!
+//! One file, because no other reads the bytes.
 
 mod metric;
 #[cfg(feature = "wide")]

@@ -1,4 +1,6 @@
 //! The controller for boards that exist: it builds, and its parts are in the memories that docs/boards.md says.
+//!
+//! One file, because what is measured and its limits belong together.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -92,28 +94,6 @@ pub const CHECK: Check = Check {
 /// The crate.
 const FOLDER: &str = "examples/stm32h743";
 const PROGRAM: &str = "stm32h743";
-
-/// Functions below the tick that few ticks call. They and what they alone call are in flash.
-const RARE: [&str; 18] = [
-    "query::exact::",
-    "query::side::decided",
-    "query::side::of_many",
-    "query::side::is_crowded",
-    "query::side::outward",
-    "query::normal::Feature::pseudonormal",
-    "query::separation::Asked<I,V,T>::signed::{{closure}}",
-    "query::solids::signed",
-    "query::search::roots::Roots::with_others",
-    "query::search::ties::Ties::drop_farther",
-    "query::search::Search<I,V,T>>::not_finite",
-    "query::tracker::Tracker<I,_,_,_>::whole",
-    "query::tracker::kept::face_surface",
-    "query::tracker::Tracker<I,_,_,_>>::narrow",
-    "query::tracker::Tracker<I,_,_,_>>::without_side",
-    "query::tracker::Tracker<I,_,_,_>>::take_pair",
-    "tool::triangle::closest_of_all",
-    "tool::edge::nearly_parallel",
-];
 
 /// A memory of the part: RM0433, table 7.
 struct Memory {
@@ -237,10 +217,12 @@ struct Found {
 impl Found {
     fn add(&mut self, variant: &Variant, program: &Path) -> Result<()> {
         let binary = Binary::read(program)?;
-        self.add_tick(variant, &binary)?;
-        self.add_panics(variant, program, &binary)?;
         let bytes = fs::read(program)?;
         let file = object::File::parse(&*bytes)?;
+        // The linker's script selects them.
+        let rare = place(&file, "__rare_start")?.start..place(&file, "__rare_end")?.start;
+        self.add_tick(variant, &binary, &rare)?;
+        self.add_panics(variant, program, &binary)?;
         self.add_places(variant, &file)?;
         self.add_sizes(&file)?;
         let footprint = Footprint::read(program)?;
@@ -259,7 +241,7 @@ impl Found {
     }
 
     /// Every function below the vector of the control tick; the places of those that are not rare.
-    fn add_tick(&mut self, variant: &Variant, binary: &Binary) -> Result<()> {
+    fn add_tick(&mut self, variant: &Variant, binary: &Binary, rare: &Range<u64>) -> Result<()> {
         let tick = binary.handler(15)?;
         ensure!(binary.name(tick) == Some("SysTick"), "the tick's vector leads elsewhere");
         let (below, panicking) = (binary.below(tick), binary.panicking());
@@ -273,8 +255,7 @@ impl Found {
         let stack = binary.depth(1)? + interrupt + binary.depth(15)? + 2 * EXCEPTION_FRAME;
         self.largest("stack", u64::from(stack));
         self.largest("stack.room", u64::from(binary.stack_room));
-        let is_rare = |name: &str| RARE.iter().any(|rare| name.contains(rare));
-        let often = binary.below_but(tick, is_rare);
+        let often = binary.below_but(tick, |at| rare.contains(&u64::from(at)));
         let outside: Vec<u32> =
             often.iter().copied().filter(|&at| !ITCM.range.contains(&u64::from(at))).collect();
         let mut panics = binary.indirect(tick);

@@ -1,4 +1,6 @@
 //! The report: `report.json`, the readable summary, and the verdict.
+//!
+//! One file, because a figure and its line in the summary belong together.
 
 use std::collections::BTreeMap;
 use std::path::Path;

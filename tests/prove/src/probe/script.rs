@@ -1,4 +1,6 @@
 //! Scripts for the probe: surfaces, frames and queries, as words.
+//!
+//! One file, because a script and its words belong together.
 
 use dibs_build::modes::ModalFit;
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, Motion, generate};
