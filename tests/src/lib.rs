@@ -32,6 +32,12 @@ pub mod tree_bytes;
 #[cfg(feature = "builder")]
 pub mod wanderer;
 
+/// A sample of the cases of a slow test: a quarter. All of them where `DIBS_WHOLE` is set, as by `cargo xtask test --whole`.
+#[must_use]
+pub fn sample(whole: usize) -> usize {
+    if std::env::var_os("DIBS_WHOLE").is_some() { whole } else { whole.div_ceil(4) }
+}
+
 /// The README's code: it compiles, and its control loop runs.
 #[cfg(doctest)]
 #[doc = include_str!("../../README.md")]

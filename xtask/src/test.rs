@@ -23,7 +23,8 @@ pub struct Options {
     #[arg(long, default_value_t = 5)]
     pub demo_seconds: u32,
     /// Also the slow tests: an empty crate brought to an answer on the board by the guide alone, the viewer's query in
-    /// WebAssembly, the paper's experiments in small, and a few mutants of the lines that changed.
+    /// WebAssembly, the paper's experiments in small, a few mutants of the lines that changed, and all cases of tests that
+    /// else try a quarter.
     #[arg(long)]
     pub whole: bool,
     /// Only these steps, for machines that run side by side; by default all.
@@ -68,7 +69,8 @@ pub fn test(options: &Options) -> Result<()> {
     if is_due(Job::Host) {
         // This also runs the examples in the documentation.
         let tests = ["test", "--release", "--no-fail-fast"];
-        steps.cargo("tests", &[&tests, bench_too(is_whole)].concat(), &[]);
+        let variables: &[_] = if is_whole { &[("DIBS_WHOLE", "1")] } else { &[] };
+        steps.cargo("tests", &[&tests, bench_too(is_whole)].concat(), variables);
         steps.run("files of other programs", other_programs);
     }
     if is_due(Job::Docs) {

@@ -4,6 +4,7 @@ use dibs_build::{Builder, Mesh};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Capsule, Odometer, Options, Proximity, Query, Side, Tracker};
 use dibs_tests::deform::unit;
+use dibs_tests::sample;
 use dibs_tests::surfaces::ball;
 use fastrand::Rng;
 use glam::Vec3;
@@ -88,7 +89,7 @@ fn holds(part: &Proximity, whole: &Proximity) -> bool {
 #[test]
 fn a_search_that_ended_knows_not_where_the_axis_meets_the_surface() {
     let (mut cut, mut rng) = (0, Rng::with_seed(3));
-    for number in 0..if cfg!(debug_assertions) { 250 } else { 1_000 } {
+    for number in 0..sample(1_000) {
         let row = row_of_bodies(2 + number % 3, &mut rng);
         let built = Builder::new().stretch(1.1).build(&row).expect("a valid mesh");
         let tree = built.tree::<u16>().expect("16-bit indices");

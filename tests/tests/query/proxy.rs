@@ -6,6 +6,7 @@ use dibs_nostd::constraint::{Proxy, SpringDamper};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Capsule, Contact, Contacts, Options, Query, Side, Sphere};
 use dibs_tests::deform::unit;
+use dibs_tests::sample;
 use dibs_tests::surfaces::sheet;
 use fastrand::Rng;
 use glam::{DMat3, DVec3, Vec3};
@@ -289,7 +290,7 @@ fn no_force_jumps_where_a_wall_begins_or_ends() {
             is_clear.then_some(held)
         };
         let mut rng = Rng::with_seed(11);
-        for number in 0..if cfg!(debug_assertions) { 4_000 } else { 100_000 } {
+        for number in 0..if cfg!(debug_assertions) { 4_000 } else { sample(100_000) } {
             let from = rows[rng.usize(..rows.len())] + unit(&mut rng) * 5.5 * rng.f32();
             let long = if number % 4 == 0 { unit(&mut rng) * 60.0 } else { Vec3::ZERO };
             let step = [(); 2].map(|()| unit(&mut rng) * 0.3);

@@ -11,7 +11,7 @@ use dibs_nostd::{
 use dibs_tests::bus::give;
 use dibs_tests::deform::{Deformation, deformed, unit};
 use dibs_tests::oracle::{Instrument, exhaustive};
-use dibs_tests::stretch;
+use dibs_tests::{sample, stretch};
 use fastrand::Rng;
 
 /// The measured stretch is never below the truth, and above it by no more than the added rounding.
@@ -42,7 +42,7 @@ fn the_measured_stretch_is_the_true_one_rounded_up() {
 #[test]
 fn a_flat_triangle_does_not_spoil_its_neighbours() {
     let mut rng = Rng::with_seed(37);
-    for round in 0..60 {
+    for round in 0..sample(60) {
         let mut mesh = generate::heart(320).expect("a valid size").mesh;
         // One corner moves nearly onto the opposite edge.
         let [a, b, c] = mesh.triangles[rng.usize(..mesh.triangles.len())].map(|v| v as usize);
