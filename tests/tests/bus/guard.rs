@@ -116,6 +116,7 @@ fn a_missed_tick_does_not_damp_more() {
     let velocity = world.tick(at + Vec3::X * 1.1).velocity;
     assert!((100.0..=112.0).contains(&velocity.x), "{velocity}");
     // Without a pose nothing is known, and the next tick starts anew.
+    world.frame();
     let blind = world.ends.1.without_pose(Millis(world.now));
     assert!(blind.velocity.is_nan() && blind.closest == Err(Unavailable::NoPose));
     assert_eq!((blind.trust.state, blind.trust.cause), (State::Safe, Some(Unavailable::NoPose)));
