@@ -81,6 +81,9 @@ errors! {
     /// A constraint's gain is out of range.
     #[cfg(feature = "control")]
     Gain(crate::constraint::GainError),
+    /// A filter admits no motion.
+    #[cfg(feature = "control")]
+    Filter(crate::filter::FilterError),
     /// A fail-safe limit is out of range.
     #[cfg(feature = "control")]
     Limit(crate::failsafe::LimitError),

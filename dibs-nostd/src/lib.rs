@@ -20,6 +20,7 @@
 //! | the answer and its certainty | [`Proximity`] | control interrupt |
 //! | whether the surface may be trusted | [`failsafe`] | control interrupt |
 //! | the force | [`constraint`] | control interrupt |
+//! | or the motion that a command may make | [`filter`] | control interrupt |
 //!
 //! Lengths are in the mesh's own unit, mm in the examples. Trees come from the crate `dibs-build`.
 //!
@@ -46,7 +47,7 @@
 //!
 //! # Features
 //!
-//! - `bus`, `control`, `modes`, on by default: packets and the [`Assembler`]; [`constraint`] and [`failsafe`]; [`modes`].
+//! - `bus`, `control`, `modes`, on by default: packets and the [`Assembler`]; [`constraint`], [`filter`] and [`failsafe`]; [`modes`].
 //! - `wide`: `Query::closest_wide`, which tests several subtrees at once, for large processors.
 //! - `defmt`: `defmt::Format` for every public value and error.
 //! - `authenticity`: [`wire`]'s `AesCmac`, with which a receiver takes only packets with a genuine tag.
@@ -77,7 +78,7 @@ mod unavailable;
 pub mod wire;
 
 #[cfg(feature = "control")]
-pub use control::{constraint, failsafe};
+pub use control::{constraint, failsafe, filter};
 pub use error::Error;
 pub use query::{
     Budget, Closest, Contact, ContactIter, Contacts, Cost, Fallback, Interval, NoSide, Options,

@@ -128,6 +128,12 @@ impl Options {
         self
     }
 
+    /// Asks for the side, whatever was said before.
+    pub(crate) const fn signed(mut self) -> Self {
+        self.is_signed = true;
+        self
+    }
+
     /// Largest width (mm) of the certified interval where the tool's axis crosses the surface or is inside; by default a 512th of
     /// the axis' length, at least 32 times the accuracy. Less takes more tests. With more than the axis' length the side
     /// is found and no depth, at the cost of the closest pair.

@@ -27,6 +27,11 @@ impl sealed::Sealed for AxisPoint {
     fn towards(&self, to: &Self, t: f32) -> Self {
         Self(self.0 + (to.0 - self.0) * t)
     }
+
+    #[inline(always)]
+    fn with_axis(&self, [point, _]: [Vec3; 2]) -> Self {
+        Self(point)
+    }
 }
 
 impl Tool for AxisPoint {

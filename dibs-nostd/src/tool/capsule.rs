@@ -109,6 +109,11 @@ impl sealed::Sealed for Capsule {
         let (start, end) = (between(self.start(), to.start()), between(self.end(), to.end()));
         Self { axis: Axis::new(start, end), radius: larger(self.radius, to.radius) }
     }
+
+    #[inline(always)]
+    fn with_axis(&self, [start, end]: [Vec3; 2]) -> Self {
+        Self { axis: Axis::new(start, end), radius: self.radius }
+    }
 }
 
 impl Tool for Capsule {

@@ -128,6 +128,9 @@ mod sealed {
 
         /// The tool between this one (`t` = 0) and `to` (1), with the larger radius.
         fn towards(&self, to: &Self, t: f32) -> Self;
+
+        /// The same tool with its axis between other ends.
+        fn with_axis(&self, ends: [Vec3; 2]) -> Self;
     }
 }
 

@@ -55,6 +55,11 @@ impl sealed::Sealed for Sphere {
         let center = self.center + (to.center - self.center) * t;
         Self { center, radius: larger(self.radius, to.radius) }
     }
+
+    #[inline(always)]
+    fn with_axis(&self, [center, _]: [Vec3; 2]) -> Self {
+        Self { center, radius: self.radius }
+    }
 }
 
 impl Tool for Sphere {

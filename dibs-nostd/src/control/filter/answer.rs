@@ -1,0 +1,127 @@
+//! A filter's answers: the admitted motion and its reason, or an error.
+
+use core::fmt;
+
+use super::Motion;
+use crate::unavailable::QueryError;
+
+/// The motion that a filter admits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub struct Admitted {
+    /// The motion to execute.
+    pub motion: Motion,
+    /// No separation (mm) of any tool is less at any instant of the period, wherever the tissue is within its uncertainty.
+    pub least_separation: f32,
+    /// Why it is this motion.
+    pub reason: Reason,
+    /// Queries made.
+    pub queries: u32,
+    /// Instructions that the queries took, by the filter's [`Cost`](crate::Cost).
+    pub instructions: u32,
+}
+
+/// Why a motion was admitted. All but the last are safe.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Reason {
+    /// It is the command.
+    Commanded,
+    /// The nearest motion that walls, the caller's rows and the robot's speed allow.
+    Nearest,
+    /// A half of that, or less: no more could be verified.
+    Shortened,
+    /// Nothing but rest could be verified.
+    Stopped,
+    /// The surface comes closer: the least motion that keeps the stand-off.
+    Retreating,
+    /// No motion was found that certainly keeps the stand-off. The motion is the best one known: rest, or one that ends
+    /// farther from the tissue.
+    NoSafeMotion,
+}
+
+impl Reason {
+    /// Its words, as `dibs filter` prints them.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Commanded => "commanded",
+            Self::Nearest => "nearest",
+            Self::Shortened => "shortened",
+            Self::Stopped => "stopped",
+            Self::Retreating => "retreating",
+            Self::NoSafeMotion => "no safe motion",
+        }
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.words())
+    }
+}
+
+/// Why a filter admits nothing: the tool must stay at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum FilterError {
+    /// A parameter is out of its range.
+    Parameter {
+        /// Its name.
+        parameter: &'static str,
+        /// Its value.
+        value: f32,
+    },
+    /// The commanded motion is not finite.
+    Command,
+    /// A number of a caller's row is not finite.
+    Row {
+        /// The row's index.
+        row: usize,
+    },
+    /// More rows than there are places for a caller's.
+    Rows {
+        /// Rows given.
+        found: usize,
+        /// Places.
+        most: usize,
+    },
+    /// No pair of tool and surface, or more than there are places.
+    Pairs {
+        /// Pairs given.
+        found: usize,
+        /// Places.
+        most: usize,
+    },
+    /// A query gave no answer.
+    Query(QueryError),
+}
+
+impl From<QueryError> for FilterError {
+    fn from(error: QueryError) -> Self {
+        Self::Query(error)
+    }
+}
+
+impl fmt::Display for FilterError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Parameter { parameter, value } => write!(f, "{parameter} cannot be {value}"),
+            Self::Command => write!(f, "the commanded motion is not finite"),
+            Self::Row { row } => write!(f, "row {row} is not finite"),
+            Self::Rows { found, most } => {
+                write!(f, "{found} rows, but at most {most} have a place")
+            }
+            Self::Pairs { found: 0, .. } => write!(f, "no pair of a tool and a surface"),
+            Self::Pairs { found, most } => {
+                write!(f, "{found} pairs of tool and surface, but at most {most} have a place")
+            }
+            Self::Query(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for FilterError {}

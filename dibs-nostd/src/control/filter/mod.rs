@@ -1,0 +1,200 @@
+//! A filter of commands: the motion nearest to a commanded one that keeps an instrument out of the tissue, verified for
+//! every instant until the next tick.
+//!
+//! For robots that are commanded by position or velocity. A force pushes back after the fact; a filter does not let a
+//! command through.
+//!
+//! ```
+//! use dibs_build::{Builder, generate};
+//! use dibs_nostd::filter::{Filter, Motion, Reason, Uncertainty};
+//! use dibs_nostd::{Capsule, Odometer, Tracker, Tree, glam::Vec3};
+//!
+//! let heart = generate::heart(1_000)?.mesh;
+//! let built = Builder::new().build(&heart)?;
+//! let tree = Tree::<u16>::from_bytes(built.blob())?;
+//! let rows = built.to_rows(&heart.positions);
+//! let mut odometer = Odometer::new(&tree);
+//! let surface = odometer.start(rows.as_slice());
+//! let mut tracker = Tracker::<_, 64, 128>::new(&tree)?;
+//!
+//! let filter = Filter::new(1.0, 200.0)?; // a stand-off of 1 mm; the robot moves with at most 200 mm/s
+//! let period = 0.001; // s
+//! let push = Motion::translation(Vec3::new(0.1, 0.0, 0.0)); // mm, in a period
+//! let (mut tip, mut pushed) = (Vec3::new(-80.0, 0.0, 20.0), 0);
+//! for _ in 0..1_000 {
+//!     let tool = Capsule::new(tip, tip - Vec3::X * 60.0, 2.5)?;
+//!     let mut pairs = [(&mut tracker, &surface, &tool)];
+//!     let admitted = filter.admit(&mut pairs, &push, period, &Uncertainty::NONE, &[])?;
+//!     assert!(admitted.least_separation > 0.98 && admitted.reason != Reason::NoSafeMotion);
+//!     pushed += usize::from(admitted.reason == Reason::Commanded);
+//!     tip = admitted.motion.apply(tip);
+//! }
+//! assert!(pushed > 50 && pushed < 900);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Promise
+//!
+//! Unless the reason is [`Reason::NoSafeMotion`], no separation is below the stand-off less 0.01 mm at any instant of
+//! the period, and none is below [`Admitted::least_separation`]; to the accuracy of a query. This holds where
+//!
+//! - the robot executes the admitted motion: its points go straight, or turn about the reference point;
+//! - at the start the tissue is within the surface's position error and the [`Uncertainty`] of the surface that is
+//!   searched, and no point of it moves faster than the stated speed in the period;
+//! - the surface keeps to its stretch limit, as for every query.
+//!
+//! A surface that is *held* keeps the second point by its age and its speed limit, which a receiver checks: then a new
+//! frame never takes back what was certain, and a tool at rest on its stand-off stays admitted. One that is
+//! *extrapolated* needs less distance; its [residual](crate::SurfaceBlend::residual) is an estimate, so a new frame may be
+//! nearer than the last ones promised, and the reason then says so while the tool leaves.
+//!
+//! No safe motion exists for a tool that begins nearer than its stand-off, in a gap that closes, or where the surface
+//! comes faster than the robot leaves. Then the motion is the best one known, and the reason says it, in every such tick.
+//!
+//! # Method
+//!
+//! A query at the start gives each tool's distance. Where the command could use that up, its closest pair is a row, and the
+//! motion nearest to the command is computed. A query at that motion's end bounds the distance on the whole way;
+//! where it is too small, its pair is a further row, so that corners, gaps and folds show themselves as the motion comes to them. After four motions the next are shortened
+//! towards the least one that the rows allow, which is rest unless the surface comes.
+//!
+//! *Nearest* is by the sum of the squares of the translation and of the rotation times a [lever](Filter::lever).
+
+mod answer;
+mod motion;
+mod nearest;
+mod pair;
+mod row;
+mod session;
+mod uncertainty;
+mod way;
+
+use crate::math::sqrt::sqrt;
+use crate::{Cost, Index, MovingSurface, Options, Tool, Tracker};
+pub use answer::{Admitted, FilterError, Reason};
+pub use motion::Motion;
+pub use row::MotionRow;
+use session::Session;
+pub use uncertainty::Uncertainty;
+
+/// Most pairs of tool and surface.
+const MOST_PAIRS: usize = 8;
+
+/// By how much (mm) a verified separation may be below the stand-off.
+const EPSILON: f32 = 0.01;
+
+/// Least lever (mm).
+const LEAST_LEVER: f32 = 1.0;
+
+/// Instructions of a tick's queries by default.
+const INSTRUCTIONS: u32 = 200_000;
+
+/// A filter of commands. See the [module](self).
+#[derive(Clone, Copy, Debug)]
+pub struct Filter {
+    stand_off: f32,
+    /// mm/s.
+    speed: f32,
+    /// mm; `None` for the tools' size.
+    lever: Option<f32>,
+    instructions: u32,
+    cost: Cost,
+    options: Options,
+}
+
+impl Filter {
+    /// A filter that keeps every tool `stand_off` (mm, at least 0) from the tissue, for a robot that moves its reference
+    /// point with at most `speed` (mm/s, above 0) and turns no faster than moves the end of the [lever](Self::lever) with
+    /// that speed. Commands beyond are shortened.
+    ///
+    /// # Errors
+    /// [`FilterError::Parameter`] names the number that is out of range.
+    pub fn new(stand_off: f32, speed: f32) -> Result<Self, FilterError> {
+        Ok(Self {
+            stand_off: checked("stand_off", stand_off, stand_off >= 0.0)?,
+            speed: checked("speed", speed, speed > 0.0)?,
+            lever: None,
+            instructions: INSTRUCTIONS,
+            cost: Cost::M7_CAPSULE,
+            options: Options::new(),
+        })
+    }
+
+    /// The same with a lever (mm, at least 1): a rotation by one radian counts as much as a way of this length. By
+    /// default it is the distance from the reference point to the farthest end of a tool's axis.
+    ///
+    /// # Errors
+    /// [`FilterError::Parameter`] if it is less than 1, or not finite.
+    pub fn lever(self, lever: f32) -> Result<Self, FilterError> {
+        Ok(Self { lever: Some(checked("lever", lever, lever >= LEAST_LEVER)?), ..self })
+    }
+
+    /// The same with a budget: the instructions of all queries of a tick, by a [`Cost`]; 200,000 of a Cortex-M7 by default. Where it
+    /// ends, what is not verified is not admitted. The next tick's searches go on where they stopped.
+    #[must_use]
+    pub const fn budget(self, instructions: u32, cost: Cost) -> Self {
+        Self { instructions, cost, ..self }
+    }
+
+    /// The same with options for every query. Their budget is not used, and the side is always asked for.
+    #[must_use]
+    pub const fn options(self, options: Options) -> Self {
+        Self { options, ..self }
+    }
+
+    /// The motion nearest to `command` that keeps all tools out, for the next `period` (s).
+    ///
+    /// The pairs are the parts of one rigid instrument as they are now, each with a surface and a tracker of its own: a
+    /// chain of two tools in a scene of two surfaces has four. `rows` are up to 8 limits that hold besides.
+    ///
+    /// Cost: the budget at most, and for each motion that is tried a solution of up to 16 rows: 1,000 instructions as a rule,
+    /// 40,000 at most.
+    ///
+    /// # Errors
+    /// [`FilterError`]: an argument that is not finite or out of range, or a query without an answer. The tool must
+    /// then stay at rest.
+    pub fn admit<I, S, T, const STACK: usize, const OPENED: usize, const RANGE: usize>(
+        &self,
+        pairs: &mut [(&mut Tracker<'_, I, STACK, OPENED, RANGE>, &S, &T)],
+        command: &Motion,
+        period: f32,
+        uncertainty: &Uncertainty,
+        rows: &[MotionRow],
+    ) -> Result<Admitted, FilterError>
+    where
+        I: Index,
+        S: MovingSurface + ?Sized,
+        T: Tool,
+    {
+        checked("period", period, period > 0.0)?;
+        checked("uncertainty", uncertainty.now, uncertainty.now >= 0.0)?;
+        checked("tissue speed", uncertainty.speed, uncertainty.speed >= 0.0)?;
+        if !command.is_finite() {
+            return Err(FilterError::Command);
+        }
+        if pairs.is_empty() || pairs.len() > MOST_PAIRS {
+            return Err(FilterError::Pairs { found: pairs.len(), most: MOST_PAIRS });
+        }
+        let lever = self.lever.unwrap_or_else(|| {
+            let tools = pairs.iter().map(|(_, _, tool)| *tool);
+            let ends = tools.flat_map(|tool| [tool.axis_start(), tool.axis_point(1.0)]);
+            let mut longest = LEAST_LEVER;
+            for end in ends {
+                let arm = sqrt(end.distance_squared(command.about));
+                if arm > longest {
+                    longest = arm;
+                }
+            }
+            longest
+        });
+        Session::new(self, command, period, uncertainty, (rows, lever))?.run(pairs)
+    }
+}
+
+fn checked(parameter: &'static str, value: f32, is_in_range: bool) -> Result<f32, FilterError> {
+    if is_in_range && value.is_finite() {
+        Ok(value)
+    } else {
+        Err(FilterError::Parameter { parameter, value })
+    }
+}

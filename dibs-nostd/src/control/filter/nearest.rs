@@ -1,0 +1,242 @@
+//! The point nearest to another one within half-spaces: the projection onto a polyhedron.
+//!
+//! The dual active set method of Goldfarb & Idnani (1983) for a quadratic whose matrix is the identity. It starts at the
+//! wanted point, with no row active, and makes the most violated row active, step by step; a row whose multiplier would
+//! become negative on the way is dropped. Each active row keeps its dual vector, which is 1 with its own factors and 0 with
+//! those of other active rows. So a row enters or leaves by a few products, and no system is solved.
+
+use heapless::Vec;
+
+/// Unknowns: three of a translation, three of a rotation.
+pub(super) const UNKNOWNS: usize = 6;
+
+/// A point or a direction.
+pub(super) type Vector = [f32; UNKNOWNS];
+
+/// Most steps: of either kind, a row in or a row out.
+const STEPS: u32 = 64;
+
+/// Violation (mm) that counts as none.
+const TOLERANCE: f32 = 1e-5;
+
+/// Rows depend on each other below this square of the sine between one and the others.
+const DEPENDENT: f32 = 1e-7;
+
+/// The half-space `factors . x >= least`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct HalfSpace {
+    /// A unit vector, or zero.
+    pub factors: Vector,
+    pub least: f32,
+}
+
+impl HalfSpace {
+    /// By how much a point is outside; negative inside.
+    pub fn lacks(&self, point: &Vector) -> f32 {
+        self.least - dot(&self.factors, point)
+    }
+}
+
+/// The nearest point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Nearest {
+    pub point: Vector,
+    /// Whether it is in every half-space. If not, there is none that is.
+    pub is_inside: bool,
+}
+
+struct Active {
+    row: HalfSpace,
+    dual: Vector,
+    multiplier: f32,
+}
+
+/// The point nearest to `wanted` in all half-spaces.
+pub(super) fn nearest(
+    rows: &(impl Iterator<Item = HalfSpace> + Clone),
+    wanted: &Vector,
+) -> Nearest {
+    let mut active: Vec<Active, UNKNOWNS> = Vec::new();
+    let mut point = *wanted;
+    let mut steps = 0..STEPS;
+    while let Some(row) = most_violated(rows.clone(), &point) {
+        let mut multiplier = 0.0;
+        loop {
+            if steps.next().is_none() {
+                return Nearest { point, is_inside: false };
+            }
+            // The part of the row's factors that no active row has.
+            let mut free = row.factors;
+            for one in &active {
+                add(&mut free, &one.row.factors, -dot(&one.dual, &row.factors));
+            }
+            let squared = dot(&free, &free);
+            let is_free = squared > DEPENDENT && !active.is_full();
+            let whole = if is_free { row.lacks(&point) / squared } else { f32::INFINITY };
+            let (mut step, mut dropped) = (whole, None);
+            for (at, one) in active.iter().enumerate() {
+                let rate = dot(&one.dual, &row.factors);
+                if rate > 0.0 && one.multiplier / rate < step {
+                    (step, dropped) = (one.multiplier / rate, Some(at));
+                }
+            }
+            if !(step < f32::INFINITY) {
+                return Nearest { point, is_inside: false };
+            }
+            for one in &mut active {
+                one.multiplier -= step * dot(&one.dual, &row.factors);
+            }
+            multiplier += step;
+            if is_free {
+                add(&mut point, &free, step);
+            }
+            match dropped {
+                Some(at) => drop_row(&mut active, at),
+                None => {
+                    let mut dual = free;
+                    scale(&mut dual, 1.0 / squared);
+                    for one in &mut active {
+                        let rate = dot(&one.dual, &row.factors);
+                        add(&mut one.dual, &dual, -rate);
+                    }
+                    let _ = active.push(Active { row, dual, multiplier });
+                    break;
+                }
+            }
+        }
+    }
+    Nearest { point, is_inside: true }
+}
+
+/// The row that a point violates most; `None` where it violates none, or is not a number.
+fn most_violated(rows: impl Iterator<Item = HalfSpace>, point: &Vector) -> Option<HalfSpace> {
+    let (mut worst, mut found) = (TOLERANCE, None);
+    for row in rows {
+        let lacks = row.lacks(point);
+        if lacks > worst + TOLERANCE * row.least.abs() {
+            (worst, found) = (lacks, Some(row));
+        }
+    }
+    found
+}
+
+/// Takes an active row out, and its part out of the others' duals.
+fn drop_row(active: &mut Vec<Active, UNKNOWNS>, at: usize) {
+    let mut gone = None;
+    let mut kept: Vec<Active, UNKNOWNS> = Vec::new();
+    for (number, one) in core::mem::take(active).into_iter().enumerate() {
+        if number == at {
+            gone = Some(one.dual);
+        } else {
+            let _ = kept.push(one);
+        }
+    }
+    if let Some(dual) = gone {
+        let squared = dot(&dual, &dual);
+        for one in &mut kept {
+            let share = dot(&one.dual, &dual) / squared;
+            add(&mut one.dual, &dual, -share);
+        }
+    }
+    *active = kept;
+}
+
+/// The scalar product.
+pub(super) fn dot(a: &Vector, b: &Vector) -> f32 {
+    let mut sum = 0.0;
+    for (a, b) in a.iter().zip(b) {
+        sum += a * b;
+    }
+    sum
+}
+
+/// Adds `share` of `b`.
+pub(super) fn add(a: &mut Vector, b: &Vector, share: f32) {
+    for (a, b) in a.iter_mut().zip(b) {
+        *a += b * share;
+    }
+}
+
+fn scale(a: &mut Vector, by: f32) {
+    for a in a {
+        *a *= by;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn unit(factors: Vector) -> Option<Vector> {
+        let length = dot(&factors, &factors).sqrt();
+        (length > 0.1).then(|| factors.map(|x| x / length))
+    }
+
+    fn distance(a: &Vector, b: &Vector) -> f32 {
+        let mut apart = *a;
+        add(&mut apart, b, -1.0);
+        dot(&apart, &apart).sqrt()
+    }
+
+    #[test]
+    fn a_corner_holds_by_both_walls() {
+        let row = |x: f32, y: f32, least| HalfSpace { factors: [x, y, 0.0, 0.0, 0.0, 0.0], least };
+        let rows = [row(1.0, 0.0, 1.0), row(0.0, 1.0, 2.0), row(0.6, 0.8, -9.0)];
+        let found = nearest(&rows.into_iter(), &[-3.0, -4.0, 5.0, 0.0, 0.0, 0.0]);
+        assert!(found.is_inside);
+        assert!(distance(&found.point, &[1.0, 2.0, 5.0, 0.0, 0.0, 0.0]) < 1e-5, "{found:?}");
+    }
+
+    #[test]
+    fn opposite_walls_leave_no_point() {
+        let row = |x: f32, least| HalfSpace { factors: [x, 0.0, 0.0, 0.0, 0.0, 0.0], least };
+        assert!(!nearest(&[row(1.0, 1.0), row(-1.0, 0.5)].into_iter(), &[0.0; 6]).is_inside);
+        assert!(nearest(&[row(1.0, 1.0), row(-1.0, -1.5)].into_iter(), &[0.0; 6]).is_inside);
+        let none = HalfSpace { factors: [0.0; 6], least: 1.0 };
+        assert!(!nearest(&[none].into_iter(), &[0.0; 6]).is_inside);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 4_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// The point is in every half-space, and no nearer one is: a projection's residual makes no sharp angle with any
+        /// way to another point inside.
+        #[test]
+        fn it_is_the_projection(
+            factors in prop::collection::vec(prop::array::uniform6(-1.0_f32..1.0), 1..16),
+            wanted in prop::array::uniform6(-2.0_f32..2.0),
+            inside in prop::array::uniform6(-1.0_f32..1.0),
+            slack in prop::array::uniform16(0.0_f32..0.5),
+        ) {
+            // Every half-space holds `inside`.
+            let rows: Vec<HalfSpace, 16> = factors
+                .into_iter()
+                .filter_map(unit)
+                .zip(slack)
+                .map(|(factors, slack)| HalfSpace { factors, least: dot(&factors, &inside) - slack })
+                .collect();
+            let found = nearest(&rows.iter().copied(), &wanted);
+            prop_assert!(found.is_inside, "{rows:?}");
+            for row in &rows {
+                prop_assert!(row.lacks(&found.point) < 1e-4, "{row:?} {found:?}");
+            }
+            let mut residual = wanted;
+            add(&mut residual, &found.point, -1.0);
+            let others = (0..60_u8).map(|step| {
+                let mut other = inside;
+                let (axis, share) = (step % 6, f32::from(step / 6) * 0.2 - 1.0);
+                if let Some(x) = other.get_mut(usize::from(axis)) {
+                    *x += share;
+                }
+                other
+            });
+            for other in others.filter(|other| rows.iter().all(|row| row.lacks(other) <= 0.0)) {
+                let mut way = other;
+                add(&mut way, &found.point, -1.0);
+                prop_assert!(dot(&residual, &way) < 2e-3, "{found:?} {other:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! Inequalities on a motion: a caller's, and those of walls.
+
+use glam::Vec3;
+use heapless::Vec;
+
+use super::FilterError;
+use super::motion::Motion;
+use super::nearest::{HalfSpace, Nearest, Vector, dot, nearest};
+use crate::constraint::VelocityRow;
+use crate::math::sqrt::sqrt;
+
+/// Most rows of one solution.
+const MOST: usize = 16;
+
+/// Most of a caller's.
+pub(super) const MOST_OWN: usize = 8;
+
+/// Shortfall (mm) of a caller's row that counts as none.
+const SHORTFALL: f32 = 1e-4;
+
+/// One inequality on the motion of a period: `linear . translation + angular . rotation >= least`.
+///
+/// For limits that only the caller knows: joints, a remote centre (two rows each for directions across the shaft), a
+/// guide. They hold before the walls do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct MotionRow {
+    /// Factors of the translation.
+    pub linear: [f32; 3],
+    /// Factors of the rotation (mm).
+    pub angular: [f32; 3],
+    /// The least sum allowed (mm).
+    pub least: f32,
+}
+
+impl MotionRow {
+    /// The row that keeps the reference point's way along `direction` at `least` mm or more.
+    #[must_use]
+    pub fn along(direction: Vec3, least: f32) -> Self {
+        Self { linear: direction.to_array(), angular: [0.0; 3], least }
+    }
+
+    /// A row on velocities, for a period of so many seconds. Its origin is the motion's reference point.
+    #[must_use]
+    pub fn of_velocity(row: &VelocityRow, period: f32) -> Self {
+        Self { linear: row.linear, angular: row.angular, least: row.least * period }
+    }
+
+    pub(super) fn is_finite(&self) -> bool {
+        let factors = self.linear.iter().chain(&self.angular);
+        factors.chain([&self.least]).all(|x| x.is_finite())
+    }
+
+    /// The half-space, with rotations as lengths at the end of a lever, and the factors' length before.
+    fn scaled(&self, lever: f32) -> (HalfSpace, f32) {
+        let ([a, b, c], [d, e, f]) = (self.linear, self.angular);
+        let mut factors = [a, b, c, d / lever, e / lever, f / lever];
+        let length = sqrt(dot(&factors, &factors));
+        if !(length > 0.0) {
+            return (HalfSpace { factors: [0.0; 6], least: self.least }, 0.0);
+        }
+        factors.iter_mut().for_each(|x| *x /= length);
+        (HalfSpace { factors, least: self.least / length }, length)
+    }
+}
+
+/// The wall that a pair at one pose is for poses near it.
+#[derive(Clone, Copy)]
+struct Wall {
+    /// The pair's index.
+    pair: usize,
+    /// Unit factors.
+    factors: Vector,
+    /// The least sum that keeps the pair at a distance of 0, and the factors' length before.
+    zero: f32,
+    length: f32,
+}
+
+/// The rows of a period.
+pub(super) struct Rows {
+    own: Vec<HalfSpace, MOST_OWN>,
+    walls: Vec<Wall, MOST>,
+    lever: f32,
+}
+
+impl Rows {
+    pub fn new(own: &[MotionRow], lever: f32) -> Result<Self, FilterError> {
+        let mut rows = Self { own: Vec::new(), walls: Vec::new(), lever };
+        for (number, row) in own.iter().enumerate() {
+            if !row.is_finite() {
+                return Err(FilterError::Row { row: number });
+            }
+            if rows.own.push(row.scaled(lever).0).is_err() {
+                return Err(FilterError::Rows { found: own.len(), most: MOST_OWN });
+            }
+        }
+        Ok(rows)
+    }
+
+    /// Adds the wall of a pair whose point `on_axis` was `distance` from the surface, along `normal`, after the motion
+    /// `at`. Where there is no place, that of the wall farthest from `at` is taken.
+    pub fn add_wall(
+        &mut self,
+        pair: usize,
+        on_axis: Vec3,
+        normal: Vec3,
+        distance: f32,
+        at: &Motion,
+    ) {
+        let arm = on_axis - (at.about + at.translation);
+        let angular = arm.cross(normal);
+        let sum = normal.dot(at.translation) + angular.dot(at.rotation);
+        let least = sum - distance;
+        let row = MotionRow { linear: normal.to_array(), angular: angular.to_array(), least };
+        let (HalfSpace { factors, least: zero }, length) = row.scaled(self.lever);
+        // A normal of zero, or that is not a number, leads nowhere.
+        if !(length > 0.0 && zero.is_finite()) {
+            return;
+        }
+        let wall = Wall { pair, factors, zero, length };
+        if self.walls.len() + self.own.len() >= MOST {
+            let point = at.to_vector(self.lever);
+            let clear = |wall: &Wall| dot(&wall.factors, &point) - wall.zero;
+            let (mut farthest, mut place) = (f32::NEG_INFINITY, None);
+            for other in &mut self.walls {
+                if clear(other) > farthest {
+                    (farthest, place) = (clear(other), Some(other));
+                }
+            }
+            if let Some(place) = place {
+                *place = wall;
+            }
+        } else {
+            let _ = self.walls.push(wall);
+        }
+    }
+
+    /// The motion nearest to a wanted one, with every pair at least at its wanted distance.
+    pub fn nearest(&self, wanted: &Vector, distances: &[f32]) -> Nearest {
+        let walls = self.walls.iter().map(|wall| {
+            let distance = distances.get(wall.pair).copied().unwrap_or(0.0);
+            HalfSpace { factors: wall.factors, least: wall.zero + distance / wall.length }
+        });
+        nearest(&self.own.iter().copied().chain(walls), wanted)
+    }
+
+    /// Whether a motion keeps the caller's rows.
+    pub fn allow(&self, point: &Vector) -> bool {
+        self.own.iter().all(|row| row.lacks(point) <= SHORTFALL + row.least.abs() * 1e-5)
+    }
+}

@@ -1,0 +1,386 @@
+//! One tick of a filter: rows propose motions, queries verify them.
+
+use glam::Vec3;
+use heapless::Vec;
+
+use super::motion::{MOST_TURN, shortened};
+use super::nearest::{Vector, add};
+use super::pair::{Pair, distance};
+use super::row::Rows;
+use super::{
+    Admitted, EPSILON, Filter, FilterError, MOST_PAIRS, Motion, MotionRow, Reason, Uncertainty, way,
+};
+use crate::Budget;
+use crate::math::sqrt::sqrt;
+use crate::query::Proximity;
+
+/// Motions that are tried in whole, and shortened ones after that.
+const WHOLE: u32 = 4;
+const SHORTENED: u32 = 4;
+
+/// Rounding of a tool's pose and of a distance's parts, relative to the coordinates' size.
+const ROUNDING: f32 = 16.0 / 16_777_216.0;
+
+/// Node tests below which a query is not worth its base cost.
+const LEAST_TESTS: u32 = 32;
+
+/// A pair's distance at a pose.
+#[derive(Clone, Copy)]
+struct Known {
+    /// Ends of the axis.
+    ends: [Vec3; 2],
+    /// No point of the axis is nearer to the surface; negative inside.
+    distance: f32,
+}
+
+impl Known {
+    /// Most by which the axis moves to other ends, rounded up.
+    fn moved(&self, ends: &[Vec3; 2]) -> f32 {
+        let mut most = 0.0;
+        for (from, to) in self.ends.iter().zip(ends) {
+            let square = from.distance_squared(*to);
+            if square > most {
+                most = square;
+            }
+        }
+        sqrt(most) * (1.0 + 8.0 * f32::EPSILON)
+    }
+
+    /// A lower bound on the distance at other ends.
+    fn distance_at(&self, ends: &[Vec3; 2]) -> f32 {
+        self.distance - self.moved(ends)
+    }
+}
+
+/// A pair in this tick.
+struct State {
+    start: Known,
+    /// The last pose that was searched after the start.
+    end: Option<Known>,
+    /// The distance less this is the separation from the tissue as it may be at the start.
+    reach: f32,
+    /// The least distance allowed on the way.
+    least: f32,
+}
+
+/// A motion, and how near it leads.
+#[derive(Clone, Copy)]
+struct Candidate {
+    motion: Motion,
+    /// Least separation on the way, and at its end.
+    least: f32,
+    last: f32,
+    /// Most (mm) that a point of an axis moves.
+    moved: f32,
+    /// Whether it keeps every pair's least distance.
+    is_admissible: bool,
+}
+
+pub(super) struct Session<'f> {
+    filter: &'f Filter,
+    command: Vector,
+    /// The command was beyond the robot's speed.
+    is_cut: bool,
+    about: Vec3,
+    lever: f32,
+    rows: Rows,
+    states: Vec<State, MOST_PAIRS>,
+    /// Each pair's distance that rows ask for at the end.
+    wanted: Vec<f32, MOST_PAIRS>,
+    /// Most (mm) that the reference point moves, and the lever's end by a rotation.
+    most: f32,
+    /// How far (mm) the tissue may be from the surface at the start, and how much farther at the end.
+    margin: f32,
+    grow: f32,
+    queries: u32,
+    instructions: u32,
+}
+
+impl<'f> Session<'f> {
+    pub fn new(
+        filter: &'f Filter,
+        command: &Motion,
+        period: f32,
+        uncertainty: &Uncertainty,
+        (rows, lever): (&[MotionRow], f32),
+    ) -> Result<Self, FilterError> {
+        let most = filter.speed * period;
+        let within = Motion {
+            translation: shortened(command.translation, most),
+            rotation: shortened(command.rotation, most_turn(most, lever)),
+            ..*command
+        };
+        Ok(Self {
+            filter,
+            command: within.to_vector(lever),
+            is_cut: within != *command,
+            about: command.about,
+            lever,
+            rows: Rows::new(rows, lever)?,
+            states: Vec::new(),
+            wanted: Vec::new(),
+            most,
+            margin: uncertainty.now,
+            grow: uncertainty.grown(period),
+            queries: 0,
+            instructions: 0,
+        })
+    }
+
+    pub fn run<P: Pair>(mut self, pairs: &mut [P]) -> Result<Admitted, FilterError> {
+        let rest = Motion { about: self.about, ..Motion::translation(Vec3::ZERO) };
+        for pair in pairs.iter_mut() {
+            self.start(pair, &rest)?;
+        }
+        let stand_still = self.verify(pairs, &rest)?;
+        let mut best = stand_still;
+        let mut share = 1.0;
+        for attempt in 0..=WHOLE + SHORTENED {
+            if attempt >= WHOLE {
+                share = if attempt < WHOLE + SHORTENED { share * 0.5 } else { 0.0 };
+            }
+            let (point, is_command) = self.propose(share);
+            let motion = Motion::from_vector(self.about, &point, self.lever);
+            if !motion.is_finite() || !self.rows.allow(&point) {
+                continue;
+            }
+            let found = self.verify(pairs, &motion)?;
+            if found.is_admissible {
+                let is_rest = point == [0.0; 6];
+                let reason = if is_command {
+                    Reason::Commanded
+                } else if is_rest {
+                    Reason::Stopped
+                } else if share == 0.0 || self.command == [0.0; 6] {
+                    Reason::Retreating
+                } else if share < 1.0 {
+                    Reason::Shortened
+                } else {
+                    Reason::Nearest
+                };
+                return Ok(self.admitted(&found, reason));
+            }
+            // Farther at the end than any, and on the way no nearer than rest, unless it leads straight out.
+            let gained = found.last - stand_still.last;
+            let is_way_out = found.least >= stand_still.least || gained >= 0.5 * found.moved;
+            if is_way_out && found.last > best.last {
+                best = found;
+            }
+        }
+        let reason = if best.is_admissible { Reason::Stopped } else { Reason::NoSafeMotion };
+        Ok(self.admitted(&best, reason))
+    }
+
+    fn admitted(&self, found: &Candidate, reason: Reason) -> Admitted {
+        // A tool that begins nearer than the stand-off may leave, and has not kept it.
+        let is_kept = found.least >= self.filter.stand_off - EPSILON;
+        Admitted {
+            motion: found.motion,
+            least_separation: found.least,
+            reason: if is_kept { reason } else { Reason::NoSafeMotion },
+            queries: self.queries,
+            instructions: self.instructions,
+        }
+    }
+
+    /// Searches a pair where it is.
+    fn start<P: Pair>(&mut self, pair: &mut P, rest: &Motion) -> Result<(), FilterError> {
+        let (ends, radius) = (pair.ends(), pair.radius());
+        let mut size = radius;
+        for end in ends {
+            size += end.abs().max_element();
+        }
+        let reach = radius + self.margin + ROUNDING * (size + self.most);
+        let found = self.search(pair, ends)?;
+        let distance = found.map_or(f32::NEG_INFINITY, |found| distance(&found, radius, false));
+        let kept = reach + self.filter.stand_off;
+        // Where nothing is known, nothing is admitted.
+        let is_below = distance < kept && distance > f32::NEG_INFINITY;
+        let least = if is_below { distance } else { kept };
+        let farthest = distance + self.most;
+        let wanted = kept + self.grow;
+        let wanted = if is_below && farthest < wanted { farthest } else { wanted };
+        let number = self.states.len();
+        if let Some(found) = found
+            && distance < wanted + 4.0 * self.most
+        {
+            self.add_wall(number, &found, (ends, distance), rest);
+        }
+        // There are as many places as pairs.
+        let _ = self.wanted.push(wanted);
+        let start = Known { ends, distance };
+        let _ = self.states.push(State { start, end: None, reach, least });
+        Ok(())
+    }
+
+    fn add_wall(
+        &mut self,
+        number: usize,
+        found: &Proximity,
+        ([start, end], distance): ([Vec3; 2], f32),
+        at: &Motion,
+    ) {
+        let on_axis = start + (end - start) * found.axis_parameter;
+        self.rows.add_wall(number, on_axis, found.direction, distance, at);
+    }
+
+    /// The motion of a share of the way from the least motion that the rows allow to the nearest; and whether it is the
+    /// command.
+    fn propose(&self, share: f32) -> (Vector, bool) {
+        let least = self.rows.nearest(&[0.0; 6], &self.wanted).point;
+        let least = self.within_speed(&least);
+        if share == 0.0 {
+            return (least, false);
+        }
+        let nearest = self.rows.nearest(&self.command, &self.wanted);
+        if share == 1.0 && nearest.point == self.command {
+            return (self.command, !self.is_cut);
+        }
+        if !nearest.is_inside {
+            return (least, false);
+        }
+        let mut way = nearest.point;
+        add(&mut way, &least, -1.0);
+        let ([a, b, c, d, e, f], [u, v, w, x, y, z]) = (least, way);
+        let turn = most_turn(self.most, self.lever) * self.lever;
+        let straight = inside(Vec3::new(a, b, c), Vec3::new(u, v, w), self.most);
+        let turned = inside(Vec3::new(d, e, f), Vec3::new(x, y, z), turn);
+        let whole = if straight < turned { straight } else { turned };
+        let mut point = least;
+        add(&mut point, &way, share * whole);
+        (point, false)
+    }
+
+    /// The motion, no faster than the robot is.
+    fn within_speed(&self, point: &Vector) -> Vector {
+        let motion = Motion::from_vector(self.about, point, self.lever);
+        let (translation, rotation) = (motion.translation, motion.rotation);
+        let within = Motion {
+            translation: shortened(translation, self.most),
+            rotation: shortened(rotation, most_turn(self.most, self.lever)),
+            ..motion
+        };
+        if within == motion { *point } else { within.to_vector(self.lever) }
+    }
+
+    /// How near a motion leads. Searches where the known distances do not suffice; a pair that comes too near gives a row.
+    fn verify<P: Pair>(
+        &mut self,
+        pairs: &mut [P],
+        motion: &Motion,
+    ) -> Result<Candidate, FilterError> {
+        let mut found = Candidate {
+            motion: *motion,
+            least: f32::INFINITY,
+            last: f32::INFINITY,
+            moved: 0.0,
+            is_admissible: true,
+        };
+        for (number, pair) in pairs.iter_mut().enumerate() {
+            let Some(&State { start, end, reach, least }) = self.states.get(number) else {
+                continue;
+            };
+            let ends = start.ends.map(|end| motion.apply(end));
+            let moved = start.moved(&ends);
+            found.moved = larger(found.moved, moved);
+            let mut arc = 0.0;
+            for end in start.ends {
+                let height = motion.arc(sqrt(end.distance_squared(self.about)));
+                if height > arc {
+                    arc = height;
+                }
+            }
+            let mut last = start.distance_at(&ends);
+            if let Some(end) = end {
+                last = larger(last, end.distance_at(&ends));
+            }
+            let grow = self.grow;
+            let on_way = |last| way::least(start.distance, last, moved, grow) - arc;
+            let is_enough = |nearest: f32| nearest >= least - EPSILON;
+            let mut nearest = on_way(last);
+            // At rest the start is all.
+            if !is_enough(nearest)
+                && moved > 0.0
+                && let Some(found) = self.search(pair, ends)?
+            {
+                let searched = distance(&found, pair.radius(), start.distance > 0.0);
+                last = larger(last, searched);
+                nearest = on_way(last);
+                let known = Known { ends, distance: last };
+                if let Some(state) = self.states.get_mut(number) {
+                    state.end = Some(known);
+                }
+                if !is_enough(nearest)
+                    && let Some(wanted) = self.wanted.get_mut(number)
+                {
+                    // The end is far enough, and the middle is not.
+                    let lacks = least - nearest;
+                    if last >= *wanted - EPSILON && lacks < moved {
+                        *wanted += 2.0 * lacks;
+                    }
+                    self.add_wall(number, &found, (ends, searched), motion);
+                }
+            }
+            found.is_admissible &= is_enough(nearest);
+            found.least = smaller(found.least, nearest - reach);
+            found.last = smaller(found.last, last - grow - reach);
+        }
+        Ok(found)
+    }
+
+    /// The closest pair with the axis at these ends, by what is left of the budget; `None` where that is too little.
+    fn search<P: Pair>(
+        &mut self,
+        pair: &mut P,
+        ends: [Vec3; 2],
+    ) -> Result<Option<Proximity>, FilterError> {
+        let Filter { instructions, cost, options, .. } = self.filter;
+        let left = instructions.saturating_sub(self.instructions);
+        // Five eighths for node tests, of which a cold search makes many, and three for triangle tests.
+        let Budget { node_tests, .. } =
+            Budget::for_instructions(left.saturating_add(left / 4), cost);
+        let Budget { triangle_tests, .. } = Budget::for_instructions(left - left / 4, cost);
+        let budget = Budget { node_tests, triangle_tests };
+        if budget.node_tests < LEAST_TESTS {
+            return Ok(None);
+        }
+        let found = pair.closest(ends, &options.signed().budget(budget))?;
+        let Proximity { node_tests, triangle_tests, .. } = found;
+        let spent = cost.instructions(Budget { node_tests, triangle_tests });
+        let spent = u32::try_from(spent).unwrap_or(u32::MAX);
+        self.instructions = self.instructions.saturating_add(spent);
+        self.queries += 1;
+        Ok(Some(found))
+    }
+}
+
+/// Most angle (rad) of a period.
+fn most_turn(most: f32, lever: f32) -> f32 {
+    smaller(most / lever, MOST_TURN)
+}
+
+/// The largest share of a way, at most 1, after which a point that starts within `most` of the origin still is.
+fn inside(start: Vec3, way: Vec3, most: f32) -> f32 {
+    let (square, along) = (way.length_squared(), start.dot(way));
+    let room = most * most - start.length_squared();
+    if start.distance_squared(-way) <= most * most || !(square > 0.0) {
+        return 1.0;
+    }
+    let root = along * along + square * room;
+    // Written so that NaN gives 0.
+    if room > 0.0 && root > 0.0 {
+        smaller((sqrt(root) - along) / square * (1.0 - 8.0 * f32::EPSILON), 1.0)
+    } else {
+        0.0
+    }
+}
+
+/// The smaller number; NaN if `a` is.
+fn smaller(a: f32, b: f32) -> f32 {
+    if b < a { b } else { a }
+}
+
+/// The larger number; NaN if `a` is.
+fn larger(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
+}

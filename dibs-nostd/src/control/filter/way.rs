@@ -1,0 +1,87 @@
+//! The least distance of an axis from a surface on the way between two poses.
+
+use crate::math::sqrt::sqrt;
+
+/// Rounding of the sums below, relative to the distances.
+const ROUNDING: f32 = 16.0 / 16_777_216.0;
+
+/// A lower bound on the distance of an axis from a surface that stands still, less `grow * s`, at any share `s` of its way.
+///
+/// The axis is `start` from the surface at the start and `end` at the end; both are lower bounds, and negative for a signed
+/// distance inside. No point of it moves farther than `moved`, and each goes straight and evenly.
+///
+/// Of a surface's point `q` and a point of the axis on its way from `a` to `b`, Stewart's theorem says
+///
+/// `|q - p(s)|^2 = (1 - s) |q - a|^2 + s |q - b|^2 - s (1 - s) |a - b|^2`,
+///
+/// so the distance at `s` is at least the root of `(1 - s) start^2 + s end^2 - s (1 - s) moved^2`. Along a wall that
+/// loses `moved^2 / (8 start)`, where a bound by the motion alone loses half the motion.
+pub(super) fn least(start: f32, end: f32, moved: f32, grow: f32) -> f32 {
+    let last = end - grow;
+    // Written so that NaN stays.
+    let ends = if last > start { start } else { last };
+    let slack = ROUNDING * (start.abs() + end.abs() + moved);
+    let by_motion = (start + end - moved) * 0.5 - grow;
+    if !(start > 0.0 && end > 0.0) {
+        return (if by_motion < ends { by_motion } else { ends }) - slack;
+    }
+    // Nothing falls faster than the surface comes.
+    if !(moved > grow) {
+        return ends - slack;
+    }
+    // The distance's square is `lowest + (moved (s - place))^2`.
+    let place = (moved + (start - end) * (start + end) / moved) / (2.0 * moved);
+    let along = moved * place;
+    let lowest = start * start - along * along;
+    if !(lowest > 0.0) {
+        let is_between = place > 0.0 && place < 1.0;
+        return (if is_between && by_motion < ends { by_motion } else { ends }) - slack;
+    }
+    let s = place + grow * sqrt(lowest / (moved * moved - grow * grow)) / moved;
+    if !(s > 0.0 && s < 1.0) {
+        return ends - slack;
+    }
+    let squared = (1.0 - s) * start * start + s * end * end - s * (1.0 - s) * moved * moved;
+    let inside = if squared > 0.0 { sqrt(squared) - grow * s } else { by_motion };
+    (if inside < ends { inside } else { ends }) - slack
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::least;
+
+    /// Along a wall a straight way loses the square of its length.
+    #[test]
+    fn a_way_along_a_wall_loses_little() {
+        let lost = 3.0 - least(3.0, 3.0, 0.2, 0.0);
+        assert!((lost - 0.04 / 24.0).abs() < 2e-5, "{lost}");
+        // A surface that comes is nearest at the end.
+        assert!((least(3.0, 3.0, 0.2, 0.3) - 2.7).abs() < 2e-5);
+        assert!(least(f32::NAN, 3.0, 0.2, 0.0).is_nan() && least(3.0, f32::NAN, 0.2, 0.0).is_nan());
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// Of two balls that hold no point of a surface, any way between their centres keeps the bound from any point
+        /// outside of both.
+        #[test]
+        fn no_point_outside_of_both_balls_is_nearer(
+            start in 0.01_f32..10.0, end in 0.01_f32..10.0, moved in 0.0_f32..12.0, grow in 0.0_f32..2.0,
+            places in prop::collection::vec((0.0_f64..1.0, -12.0_f64..24.0, 0.0_f64..1.0), 20),
+        ) {
+            let bound = f64::from(least(start, end, moved, grow));
+            let (a, b, length) = (f64::from(start), f64::from(end), f64::from(moved));
+            for (s, z, more) in places {
+                // A point of the plane at `z` along the way and just outside of both balls, or a little farther.
+                let from_a = a * a - z * z;
+                let from_b = b * b - (z - length) * (z - length);
+                let across = from_a.max(from_b).max(0.0).sqrt() + more * more * more;
+                let apart = (z - s * length).hypot(across) - s * f64::from(grow);
+                prop_assert!(apart >= bound, "{apart} {bound} at {s}, {z}");
+            }
+        }
+    }
+}
