@@ -2,10 +2,11 @@
 
 use std::ops::ControlFlow;
 
-use dibs_build::{Builder, Mesh, Motion, generate};
-use dibs_nostd::constraint::{ForbiddenRegion, Proxy, SpringDamper};
+use dibs_build::{Builder, Mesh, Motion as Recorded, generate};
+use dibs_nostd::constraint::{ForbiddenRegion, Proxy, SpringDamper, VelocityRow};
+use dibs_nostd::filter::{Filter, Motion, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Contacts, Options, Query, Sphere, Unavailable};
+use dibs_nostd::{Contacts, Cost, Odometer, Options, Query, Sphere, Tracker, Unavailable};
 use glam::Vec3;
 
 use crate::surfaces::{ball, sheet};
@@ -28,12 +29,30 @@ const MASS: f32 = 2e-4;
 const DAMPER: f32 = 0.02;
 const RADIUS: f32 = 1.0;
 
+/// Gain (1/s) of velocity rows.
+const GAIN: f32 = 100.0;
+
+/// The velocity nearest to a wanted one under rows (Hildreth 1957).
+fn allowed(rows: &[VelocityRow], wanted: Vec3) -> Vec3 {
+    let (mut velocity, mut pushes) = (wanted, vec![0.0_f32; rows.len()]);
+    for _ in 0..200 {
+        for (row, push) in rows.iter().zip(&mut pushes) {
+            let linear = Vec3::from(row.linear);
+            let more = (row.least - linear.dot(velocity)) / linear.length_squared();
+            let next = (*push + more).max(0.0);
+            velocity += linear * (next - *push);
+            *push = next;
+        }
+    }
+    velocity
+}
+
 /// A surface, the hand's first position, and the direction of its push.
 pub struct Scene {
     /// Its name.
     pub name: &'static str,
     mesh: Mesh,
-    motion: Option<Motion>,
+    motion: Option<Recorded>,
     from: Vec3,
     push: Vec3,
 }
@@ -127,9 +146,71 @@ impl Scene {
         pushed
     }
 
+    /// Commands the instrument's motion, as fast as the hand pushes it in free space: filtered, or held by velocity rows
+    /// alone.
+    ///
+    /// # Panics
+    /// If a query fails.
+    #[must_use]
+    pub fn command(&self, is_filtered: bool) -> Pushed {
+        let built = Builder::new().stretch(2.0).build(&self.mesh).expect("a valid mesh");
+        let tree = built.tree::<u16>().expect("16-bit indices");
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        let mut tracker = Tracker::<u16, MAX_STACK, 512>::new(&tree).expect("deep enough");
+        let mut odometer = Odometer::new(&tree);
+        let mut contacts = Contacts::<8>::new();
+        let (speed, most) = (PUSH / DAMPER, 2.0 * PUSH / DAMPER);
+        // The gap's slivers take long to tell sides apart; other checks are about budgets.
+        let filter = Filter::new(0.0, most).expect("in range").budget(2_000_000, Cost::M7_SPHERE);
+        let uncertainty = Uncertainty::new(self.fastest());
+        let command = self.push * speed;
+        let mut at = self.from;
+        let mut pushed = Pushed { least: f32::INFINITY, step: 0.0 };
+        let mut before: Option<Vec<Vec3>> = None;
+        for now in 0..TICKS {
+            let (rows, velocities) = self.surface(now);
+            let (rows, velocities) = (built.to_rows(&rows), built.to_rows(&velocities));
+            let tool = Sphere::new(at, RADIUS).expect("a finite place");
+            let surface = match &before {
+                None => odometer.start(rows.as_slice()),
+                Some(before) => odometer.step(before.as_slice(), rows.as_slice()).after(),
+            };
+            let closest = query
+                .contacts(&surface, &tool, 2.0 * MARGIN, &Options::new(), &mut contacts)
+                .expect("an answer");
+            contacts.move_with(velocities.as_slice()).expect("a velocity each");
+            pushed.least = pushed.least.min(closest.separation);
+            if pushed.least < -10.0 {
+                break;
+            }
+            at += if is_filtered {
+                let motion = Motion::new(at, command * TICK, Vec3::ZERO);
+                let mut pairs = [(&mut tracker, &surface, &tool)];
+                let admitted = filter.admit(&mut pairs, &motion, TICK, &uncertainty, &[]);
+                admitted.expect("an answer").motion.translation
+            } else {
+                let rows: Vec<VelocityRow> = contacts
+                    .iter()
+                    .map(|contact| VelocityRow::new(contact, contacts.accuracy(), at).gain(GAIN))
+                    .collect();
+                allowed(&rows, command) * TICK
+            };
+            before = Some(rows);
+        }
+        pushed
+    }
+
+    /// The largest speed (mm/s) of a vertex.
+    fn fastest(&self) -> f32 {
+        let Some(Recorded { frames, rate, .. }) = &self.motion else { return 0.0 };
+        let pairs = frames.iter().zip(frames.iter().cycle().skip(1));
+        let steps = pairs.flat_map(|(a, b)| a.iter().zip(b));
+        steps.map(|(a, b)| a.distance(*b)).fold(0.0, f32::max) * rate * 1.001
+    }
+
     /// Positions and velocities of the vertices at a tick.
     fn surface(&self, tick: u32) -> (Vec<Vec3>, Vec<Vec3>) {
-        let Some(Motion { frames, rate, .. }) = &self.motion else {
+        let Some(Recorded { frames, rate, .. }) = &self.motion else {
             return (self.mesh.positions.clone(), vec![Vec3::ZERO; self.mesh.positions.len()]);
         };
         let time = tick as f32 * TICK * rate;

@@ -10,6 +10,7 @@ mod demo;
 mod demo_c;
 mod demo_faults;
 mod examples;
+mod filter;
 mod flood;
 mod fuzz;
 mod hand;
@@ -40,6 +41,7 @@ pub const CHECKS: &[Check] = &[
     anytime::CHECK,
     sides::CHECK,
     hand::CHECK,
+    filter::CHECK,
     cost::BOARD,
     cost::HOST,
     path::CHECK,

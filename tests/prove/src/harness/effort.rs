@@ -7,6 +7,8 @@ pub struct Effort {
     pub cases: usize,
     /// Poses whose side must be right.
     pub sides: usize,
+    /// Walks of 400 ticks against a filter of commands.
+    pub walks: u64,
     /// Queries that must give the same bits.
     pub bits: usize,
     /// Queries that must keep to their bound.
@@ -44,6 +46,7 @@ impl Effort {
     pub const FULL: Self = Self {
         cases: 1_000_000,
         sides: 1_000_000,
+        walks: 25_000,
         bits: 100_000,
         costs: 100_000,
         host_costs: 100_000,
@@ -64,6 +67,7 @@ impl Effort {
     pub const TEST: Self = Self {
         cases: 100_000,
         sides: 4_000,
+        walks: 100,
         bits: 10_000,
         costs: 10_000,
         host_costs: 5_000,
@@ -89,6 +93,7 @@ impl Effort {
         Self {
             cases: wide(self.cases, least.cases),
             sides: wide(self.sides, least.sides),
+            walks: (self.walks / u64::from(share)).max(least.walks),
             bits: wide(self.bits, least.bits),
             costs: wide(self.costs, least.costs),
             host_costs: wide(self.host_costs, least.host_costs),

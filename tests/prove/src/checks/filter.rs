@@ -1,0 +1,157 @@
+//! A filter of commands against adversarial walks, and beside other ways to hold an instrument.
+
+use anyhow::Result;
+use dibs_build::generate;
+use dibs_tests::filter::{Episode, Glided, Tally, glide, scenes, walk};
+use dibs_tests::hand::{self, Pushed};
+use fastrand::Rng;
+use rayon::prelude::*;
+use xtask::steps::Outcome;
+
+use crate::harness::figures::Figures;
+use crate::harness::promise::{
+    Bound, Promise,
+    criteria::{EDGES, FLOW, TIMING},
+    note,
+};
+use crate::harness::{Check, Effort};
+
+pub const CHECK: Check = Check {
+    name: "a filter on this computer",
+    run: check,
+    promises: &[
+        Promise {
+            id: "filter.violations",
+            says: "No admitted motion comes nearer than the stand-off less 0.02 mm at any instant, unless the reason says that none is safe",
+            criterion: EDGES,
+            bound: Bound::Is(0.0),
+            unit: "of {filter.ticks} ticks, {filter.near} of them within 5 mm; the worst was {filter.worst} mm below",
+            limits: "Two capsules, ten scenes: corner, groove, gaps, spike, plate of 0.2 mm, ball, heart, brain; tissue at its limit of \
+                     up to 300 mm/s, swinging, waving, drifting, closing; frames late and lost; periods of 0.5 to 4 ms; an eighth of the \
+                     walks take the worst of three commands. Truth by exhaustive search in f64 at six instants of a tick.",
+        },
+        Promise {
+            id: "filter.uncertain",
+            says: "No separation is less than was certified, with or without a safe motion",
+            criterion: EDGES,
+            bound: Bound::Is(0.0),
+            unit: "of {filter.ticks} ticks; {filter.unsafe} had no safe motion, and {filter.below} of these came below the stand-off",
+            limits: "The same walks. The tissue may be faster than the robot, and late frames may leave no room.",
+        },
+        Promise {
+            id: "filter.cries",
+            says: "Where there is a way out, a tool that keeps its stand-off goes on keeping it",
+            criterion: FLOW,
+            bound: Bound::Is(0.0),
+            unit: "ticks lost a safe motion",
+            limits: "Of those walks the ones about a spike, a plate or a ball, with every frame new, a robot twice as fast as the \
+                     tissue, and the whole budget.",
+        },
+        Promise {
+            id: "filter.most",
+            says: "A tick's queries take no more than their budget",
+            criterion: TIMING,
+            bound: Bound::AtMost(200_000.0),
+            unit: "instructions by the cost model, of 200,000 or less",
+            limits: "The same walks. The rows' solution comes on top.",
+        },
+        Promise {
+            id: "filter.mean",
+            says: "On a beating heart a tick of two capsules is cheap",
+            criterion: TIMING,
+            bound: Bound::AtMost(60_000.0),
+            unit: "instructions in the mean by the cost model, {filter.glide.most} at most, {filter.glide.queries} queries",
+            limits: "10,272 triangles, 1 kHz, 200 mm/s, in free space, against and along the wall; after the first 100 ticks.",
+        },
+        Promise {
+            id: "filter.along",
+            says: "Along a wall a filter does not brake",
+            criterion: FLOW,
+            bound: Bound::AtLeast(95.0),
+            unit: "% of the commanded speed along one wall, at the least of {filter.glide.along} ticks",
+            limits: "The same ticks.",
+        },
+        Promise {
+            id: "filter.free",
+            says: "In free space a command is admitted whole",
+            criterion: FLOW,
+            bound: Bound::Is(100.0),
+            unit: "% of {filter.glide.free} ticks",
+            limits: "The same ticks.",
+        },
+        Promise {
+            id: "filter.deepest",
+            says: "A hand's commands do not get in when they are filtered",
+            criterion: FLOW,
+            bound: Bound::AtMost(0.02),
+            unit: "mm of penetration at the deepest; {filter.rows} mm by velocity rows alone, {filter.proxy} mm by the force of all \
+                   contacts, {filter.force} mm or more by that of the closest pair",
+            limits: "An instrument of 1 mm radius, no stand-off, in the hand's six scenes; forces of at most 5 N against 4.5 N, commands of \
+                     225 mm/s, rows of a gain of 100/s with the surface's velocity. Beyond 10 mm a push ends.",
+        },
+        note("filter.ticks"),
+        note("filter.near"),
+        note("filter.worst"),
+        note("filter.unsafe"),
+        note("filter.below"),
+        note("filter.glide.most"),
+        note("filter.glide.queries"),
+        note("filter.glide.along"),
+        note("filter.glide.free"),
+        note("filter.rows"),
+        note("filter.proxy"),
+        note("filter.force"),
+    ],
+};
+
+fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
+    let scenes = scenes();
+    let tallies: Vec<Tally> = (0..effort.walks)
+        .into_par_iter()
+        .map(|seed| {
+            let scene = &scenes[seed as usize % scenes.len()];
+            walk(scene, &Episode::any(&mut Rng::with_seed(seed)), seed)
+        })
+        .collect();
+    let mut sum = Tally::default();
+    tallies.into_iter().for_each(|tally| sum += tally);
+    let thousandths = |x: f64| (x * 1e3).round() / 1e3;
+    figures.note("filter.violations", (sum.violations + sum.too_fast) as f64);
+    figures.note("filter.uncertain", sum.uncertain as f64);
+    figures.note("filter.cries", sum.cries as f64);
+    figures.note("filter.most", f64::from(sum.most_instructions));
+    figures.note("filter.ticks", sum.ticks as f64);
+    figures.note("filter.near", sum.near as f64);
+    figures.note("filter.worst", thousandths(sum.worst));
+    figures.note("filter.unsafe", sum.unsafe_ticks as f64);
+    figures.note("filter.below", sum.below as f64);
+
+    let generate::MovingMesh { mesh, motion } = generate::heart(10_272)?;
+    let glided: Vec<Glided> =
+        (1..4_u64).into_par_iter().map(|seed| glide(&mesh, &motion, 1.5, 3_000, seed)).collect();
+    let count = |of: fn(&Glided) -> f64| glided.iter().map(of).sum::<f64>();
+    let ticks = count(|one| f64::from(one.ticks));
+    let least = glided.iter().fold(f32::INFINITY, |least, one| least.min(one.least_along));
+    let most = glided.iter().map(|one| one.most).max().unwrap_or(0);
+    figures.note("filter.mean", (count(|one| one.instructions as f64) / ticks).round());
+    figures.note("filter.glide.most", f64::from(most));
+    figures.note("filter.glide.queries", thousandths(count(|one| one.queries as f64) / ticks));
+    figures.note("filter.along", (f64::from(least) * 1e3).round() / 10.0);
+    figures.note("filter.glide.along", count(|one| f64::from(one.along)));
+    let free = count(|one| f64::from(one.free));
+    figures.note("filter.free", count(|one| f64::from(one.whole)) / free * 100.0);
+    figures.note("filter.glide.free", free);
+
+    let scenes = hand::scenes();
+    let deepest = |pushed: Vec<Pushed>| {
+        thousandths(pushed.iter().map(|one| f64::from(-one.least)).fold(0.0, f64::max))
+    };
+    let commanded =
+        |is_filtered| scenes.par_iter().map(|scene| scene.command(is_filtered)).collect();
+    let pushed = |by_all| scenes.par_iter().map(|scene| scene.push(by_all)).collect();
+    figures.note("filter.deepest", deepest(commanded(true)));
+    figures.note("filter.rows", deepest(commanded(false)));
+    figures.note("filter.proxy", deepest(pushed(true)));
+    figures.note("filter.force", deepest(pushed(false)));
+    Ok(Outcome::Passed)
+}

@@ -1,0 +1,148 @@
+//! An instrument of two capsules that is commanded along and against a beating heart.
+
+use dibs_build::{Builder, Mesh, Motion as Recorded};
+use dibs_nostd::filter::{Filter, Motion, Reason, Uncertainty};
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{
+    Capsule, Contacts, MovingTable, Odometer, Options, Query, Tracker, measure_stretch,
+};
+use glam::Vec3;
+
+use crate::deform::unit;
+use fastrand::Rng;
+
+/// Seconds of a tick.
+const TICK: f32 = 0.001;
+/// mm.
+const STAND_OFF: f32 = 1.0;
+/// mm/s.
+const ROBOT: f32 = 200.0;
+
+/// What a glide took, and what it left of the commands.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Glided {
+    /// Ticks after the first hundred.
+    pub ticks: u32,
+    /// Instructions by the cost model: their sum and the most of a tick.
+    pub instructions: u64,
+    /// The most of a tick.
+    pub most: u32,
+    /// The same of the first hundred ticks, in which the trackers start.
+    pub most_at_start: u32,
+    /// Queries.
+    pub queries: u64,
+    /// Ticks in free space, and those whose command was admitted whole.
+    pub free: u32,
+    /// Of these, those whose command was admitted whole.
+    pub whole: u32,
+    /// Ticks along one wall, the least and the sum of their share of the commanded speed along it.
+    pub along: u32,
+    /// The least share of the commanded speed along the wall.
+    pub least_along: f32,
+    /// The sum of these shares.
+    pub sum_along: f64,
+    /// Ticks without a safe motion.
+    pub unsafe_ticks: u32,
+    /// Ticks against the wall.
+    pub against: u32,
+}
+
+/// Glides about a mesh that moves, for so many ticks.
+///
+/// # Panics
+/// If the tree cannot be built or a query fails.
+#[must_use]
+pub fn glide(mesh: &Mesh, motion: &Recorded, stretch: f32, ticks: u32, seed: u64) -> Glided {
+    let built = Builder::new().stretch(stretch).build(mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let frames: Vec<Vec<Vec3>> = motion.frames.iter().map(|frame| built.to_rows(frame)).collect();
+    let tissue = fastest(motion);
+    let filter = Filter::new(STAND_OFF, ROBOT).expect("in range");
+    let mut trackers =
+        [(); 2].map(|()| Tracker::<_, MAX_STACK, 1_024>::new(&tree).expect("deep enough"));
+    let mut query = Query::<_, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut contacts = Contacts::<4>::new();
+    let mut rng = Rng::with_seed(seed);
+    let middle = mesh.positions.iter().sum::<Vec3>() / mesh.positions.len() as f32;
+    let mut outward = unit(&mut rng);
+    let mut joints = [100.0, 112.0, 182.0].map(|far| middle + outward * far);
+    let mut glided = Glided { least_along: f32::INFINITY, ..Glided::default() };
+    let mut odometer = Odometer::new(&tree);
+    let mut before: Option<Vec<Vec3>> = None;
+    let mut goal = middle;
+    for tick in 0..ticks {
+        let time = tick as f32 * TICK * motion.rate;
+        let (at, share) = (time as usize, time.fract());
+        let [from, to] = [at, at + 1].map(|at| &frames[at % frames.len()]);
+        let rows: Vec<Vec3> = from.iter().zip(to).map(|(a, b)| a.lerp(*b, share)).collect();
+        let measured = measure_stretch(&tree, rows.as_slice()).expect("within the limit");
+        let surface: MovingTable<'_, [Vec3]> = match &before {
+            None => odometer.start(rows.as_slice()),
+            Some(before) => odometer.step(before.as_slice(), rows.as_slice()).after(),
+        };
+        let uncertainty = Uncertainty::new(tissue);
+        if tick % 700 == 0 {
+            // Into it, along it, away from it.
+            outward = (joints[0] - middle).normalize();
+            goal = match tick / 700 % 4 {
+                0 | 2 => middle,
+                1 => joints[0] + unit(&mut rng) * 400.0,
+                _ => joints[0] + outward * 60.0 + unit(&mut rng) * 30.0,
+            };
+        }
+        let way = (goal - joints[0]).clamp_length_max(ROBOT * TICK);
+        let turn = unit(&mut rng) * 0.0005;
+        let command = Motion::new(joints[0], way, turn);
+        let tools = [0, 1].map(|at| Capsule::new(joints[at], joints[at + 1], 2.5).expect("finite"));
+        let filter = filter.options(Options::new().stretch(measured));
+        let [one, other] = &mut trackers;
+        let near = |tracker: &Tracker<'_, _, MAX_STACK, 1_024>, tool| {
+            tracker.clone().closest(&surface, tool, &Options::new()).expect("an answer").closest
+        };
+        let (tip, shaft) = (near(one, &tools[0]), near(other, &tools[1]));
+        let is_shaft = shaft.separation < tip.separation;
+        let (near, far) = if is_shaft { (shaft, tip) } else { (tip, shaft) };
+        let mut pairs = [(one, &surface, &tools[0]), (other, &surface, &tools[1])];
+        let admitted =
+            filter.admit(&mut pairs, &command, TICK, &uncertainty, &[]).expect("an answer");
+        let moved = admitted.motion;
+        if tick < 100 {
+            glided.most_at_start = glided.most_at_start.max(admitted.instructions);
+        } else {
+            glided.ticks += 1;
+            glided.instructions += u64::from(admitted.instructions);
+            glided.most = glided.most.max(admitted.instructions);
+            glided.queries += u64::from(admitted.queries);
+            glided.unsafe_ticks += u32::from(admitted.reason == Reason::NoSafeMotion);
+            let free = STAND_OFF + uncertainty.stand_off(TICK) + 2.0 * ROBOT * TICK;
+            if near.separation > free {
+                glided.free += 1;
+                glided.whole += u32::from(admitted.reason == Reason::Commanded);
+            } else {
+                glided.against += u32::from(way.dot(near.direction) < 0.0);
+                let along = way - near.direction * way.dot(near.direction);
+                let nearer = if is_shaft { &tools[1] } else { &tools[0] };
+                query
+                    .contacts(&surface, nearer, free, &Options::new(), &mut contacts)
+                    .expect("an answer");
+                let is_one_wall = far.separation > free && contacts.len() == 1;
+                if along.length() > 0.3 * ROBOT * TICK && is_one_wall {
+                    let share = moved.translation.dot(along) / along.length_squared();
+                    glided.along += 1;
+                    glided.least_along = glided.least_along.min(share);
+                    glided.sum_along += f64::from(share);
+                }
+            }
+        }
+        joints = joints.map(|joint| moved.apply(joint));
+        before = Some(rows);
+    }
+    glided
+}
+
+/// The largest speed (mm/s) of a vertex from frame to frame.
+fn fastest(motion: &Recorded) -> f32 {
+    let next = motion.frames.iter().cycle().skip(1);
+    let steps = motion.frames.iter().zip(next).flat_map(|(a, b)| a.iter().zip(b));
+    steps.map(|(a, b)| a.distance(*b)).fold(0.0, f32::max) * motion.rate * 1.001
+}

@@ -1,0 +1,334 @@
+//! Walks of an instrument whose commands are filtered, towards and along a moving surface.
+
+use std::collections::VecDeque;
+use std::ops::AddAssign;
+
+use dibs_nostd::filter::{Admitted, Filter, Motion, MotionRow, Reason, Uncertainty};
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{Capsule, Cost, MovingSurface, Odometer, Tracker};
+use fastrand::Rng;
+use glam::{DQuat, DVec3, Vec3};
+
+use super::{Course, Scene};
+use crate::deform::unit;
+use crate::oracle::closest_pair;
+
+/// Times of a tick at which the truth is computed.
+const INSTANTS: u32 = 5;
+
+/// By how much (mm) a separation may be below the stand-off, besides the accuracy.
+pub const SLACK: f64 = 0.02;
+
+type Follower<'t> = Tracker<'t, u16, MAX_STACK, 128>;
+
+/// A walk's numbers.
+#[derive(Clone, Copy, Debug)]
+pub struct Episode {
+    /// Ticks.
+    pub ticks: u32,
+    /// s.
+    pub period: f64,
+    /// mm.
+    pub stand_off: f32,
+    /// Largest speeds of the robot and of the tissue (mm/s).
+    pub robot: f32,
+    /// Largest speed of the tissue (mm/s).
+    pub tissue: f32,
+    /// Ticks between frames, at most; frames are late by as many at most, and lost now and then.
+    pub frames: u32,
+    /// mm.
+    pub registration: f32,
+    /// Budget of a tick, in instructions of a Cortex-M7.
+    pub instructions: u32,
+    /// Whether each command is the worst of several.
+    pub climbs: bool,
+}
+
+impl Episode {
+    /// Any.
+    #[must_use]
+    pub fn any(rng: &mut Rng) -> Self {
+        Self {
+            ticks: 400,
+            period: rng.choice([0.0005, 0.001, 0.002, 0.004]).expect("four"),
+            stand_off: rng.choice([0.0, 0.2, 1.0, 3.0]).expect("four"),
+            robot: rng.choice([100.0, 300.0, 1_000.0]).expect("three"),
+            tissue: rng.choice([0.0, 30.0, 150.0, 300.0]).expect("four"),
+            frames: rng.choice([1, 1, 8, 33]).expect("four"),
+            registration: rng.choice([0.0, 0.0, 0.5]).expect("three"),
+            instructions: rng.choice([30_000, 60_000, 200_000, 200_000]).expect("four"),
+            climbs: rng.u32(..8) == 0,
+        }
+    }
+}
+
+/// What happened.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Tally {
+    /// Ticks.
+    pub ticks: u64,
+    /// Ticks with a separation below the stand-off and no word of it.
+    pub violations: u64,
+    /// Ticks with a separation below the least that was certified.
+    pub uncertain: u64,
+    /// Ticks without a safe motion, and of these those with a separation below the stand-off.
+    pub unsafe_ticks: u64,
+    /// Of these, those with a separation below the stand-off.
+    pub below: u64,
+    /// Ticks that began to say so, on a convex surface whose frames are new, with a robot that is faster than it.
+    pub cries: u64,
+    /// Ticks near the surface.
+    pub near: u64,
+    /// Largest instructions of a tick, and their sum.
+    pub most_instructions: u32,
+    /// Their sum.
+    pub instructions: u64,
+    /// Queries.
+    pub queries: u64,
+    /// Ticks in which the robot would have moved faster than it can.
+    pub too_fast: u64,
+    /// Ticks by reason: commanded, nearest, shortened, stopped, retreating.
+    pub reasons: [u64; 5],
+    /// Deepest shortfall (mm) of the stand-off where nothing was said.
+    pub worst: f64,
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.ticks += other.ticks;
+        self.violations += other.violations;
+        self.uncertain += other.uncertain;
+        self.unsafe_ticks += other.unsafe_ticks;
+        self.below += other.below;
+        self.near += other.near;
+        self.cries += other.cries;
+        self.most_instructions = self.most_instructions.max(other.most_instructions);
+        self.instructions += other.instructions;
+        self.queries += other.queries;
+        self.too_fast += other.too_fast;
+        for (one, more) in self.reasons.iter_mut().zip(other.reasons) {
+            *one += more;
+        }
+        self.worst = self.worst.max(other.worst);
+    }
+}
+
+/// The true surface in a tick, and the tools.
+struct Truth<'a> {
+    scene: &'a Scene,
+    course: Course,
+    start: f64,
+    period: f64,
+    radii: [f32; 2],
+}
+
+impl Truth<'_> {
+    /// The least separation of any tool at a share of the tick.
+    fn separation(&self, axes: &[[Vec3; 2]; 2], motion: &Motion, share: f64, by_arc: bool) -> f64 {
+        let time = self.start + share * self.period;
+        let rows: Vec<DVec3> = self.scene.rest.iter().map(|&p| self.course.at(p, time)).collect();
+        let about = motion.about.as_dvec3();
+        let turn = |share: f64| DQuat::from_scaled_axis(motion.rotation.as_dvec3() * share);
+        let at = |point: Vec3, share: f64| {
+            about + turn(share) * (point.as_dvec3() - about) + motion.translation.as_dvec3() * share
+        };
+        let place = |point: Vec3| {
+            if by_arc { at(point, share) } else { point.as_dvec3().lerp(at(point, 1.0), share) }
+        };
+        let mut least = f64::INFINITY;
+        for (axis, radius) in axes.iter().zip(self.radii) {
+            let [start, end] = axis.map(place);
+            for triangle in &self.scene.triangles {
+                let [a, b, c] = triangle.map(|v| rows[v as usize]);
+                // A triangle whose ball is farther cannot be nearest.
+                let middle = (a + b + c) / 3.0;
+                let reach = middle.distance(a).max(middle.distance(b)).max(middle.distance(c));
+                let span = end - start;
+                let length = span.length_squared();
+                let along = if length > 0.0 {
+                    ((middle - start).dot(span) / length).clamp(0.0, 1.0)
+                } else {
+                    0.0
+                };
+                let far = (start + span * along).distance(middle) - reach - f64::from(radius);
+                if far < least {
+                    let apart = closest_pair(start, end, [a, b, c]).distance - f64::from(radius);
+                    least = least.min(apart);
+                }
+            }
+        }
+        least
+    }
+}
+
+/// Walks.
+///
+/// # Panics
+/// If a query fails.
+#[must_use]
+pub fn walk(scene: &Scene, episode: &Episode, seed: u64) -> Tally {
+    let mut rng = Rng::with_seed(seed);
+    let tree = scene.tree.tree::<u16>().expect("16-bit indices");
+    let filter = Filter::new(episode.stand_off, episode.robot).expect("in range");
+    let filter = filter.budget(episode.instructions, Cost::M7_CAPSULE);
+    let mut trackers = [(); 2].map(|()| Follower::new(&tree).expect("deep enough"));
+    let course = Course::any(scene, f64::from(episode.tissue), &mut rng);
+    let radii = [0.5 + 2.0 * rng.f32(), 1.0];
+    // A tip of 10 mm on a shaft of 40 mm that turns away.
+    let outward = (scene.from - scene.middle).normalize();
+    let lean = (outward + 0.6 * unit(&mut rng)).normalize();
+    let from = scene.from + outward * (episode.stand_off + radii[0] + 2.0);
+    let mut joints = [from, from + lean * 10.0, from + lean * 10.0 + outward * 40.0];
+    let most = episode.robot * episode.period as f32;
+    let mut tally = Tally::default();
+    let mut frames: VecDeque<(u32, Vec<Vec3>)> = VecDeque::new();
+    let mut shown = (0_u32, Vec::new());
+    let mut next = 0;
+    let mut odometer = Odometer::new(&tree);
+    let registration = unit(&mut rng) * episode.registration * 0.999;
+    let is_easy = scene.is_convex
+        && episode.frames == 1
+        && episode.robot > 2.0 * episode.tissue
+        && episode.instructions >= 200_000;
+    let mut was_unsafe = true;
+    let (mut goal, mut spin, mut until) = (Vec3::ZERO, Vec3::ZERO, 0);
+    for tick in 0..episode.ticks {
+        let start = f64::from(tick) * episode.period;
+        // Frames are captured at every tick, and shown late.
+        let now: Vec<Vec3> =
+            scene.rest.iter().map(|&p| course.at(p, start).as_vec3() + registration).collect();
+        frames.push_front((tick, now));
+        frames.truncate(80);
+        let before = shown.1.clone();
+        if tick >= next {
+            let is_lost = tick > 0 && episode.frames > 1 && rng.u32(..5) == 0;
+            if !is_lost {
+                let late =
+                    if episode.frames > 1 { rng.usize(..episode.frames as usize) } else { 0 };
+                let frame = &frames[late.min(frames.len() - 1)];
+                if frame.0 >= shown.0 {
+                    shown = frame.clone();
+                }
+            }
+            next = tick + 1 + rng.u32(..episode.frames);
+        }
+        let surface = if before.is_empty() {
+            odometer.start(shown.1.as_slice())
+        } else {
+            odometer.step(before.as_slice(), shown.1.as_slice()).after()
+        };
+        let age = f64::from(tick - shown.0) * episode.period;
+        let uncertainty = Uncertainty::new(episode.tissue)
+            .error((f64::from(episode.tissue) * age * (1.0 + 1e-6)) as f32)
+            .error(episode.registration);
+        // A goal beyond the surface, a way along it, or anything.
+        if tick >= until {
+            until = tick + 1 + rng.u32(..60);
+            goal = match rng.u32(..4) {
+                0 | 1 => (scene.middle - joints[0]).normalize_or_zero() + 0.5 * unit(&mut rng),
+                2 => unit(&mut rng),
+                _ => -outward + unit(&mut rng),
+            };
+            spin = unit(&mut rng) * rng.f32() / 40.0;
+        }
+        let axes = [[joints[0], joints[1]], [joints[1], joints[2]]];
+        let tools =
+            [0, 1].map(|at| Capsule::new(axes[at][0], axes[at][1], radii[at]).expect("finite"));
+        let mut command = Motion::new(joints[0], goal.normalize_or_zero() * most, spin * most);
+        let truth = Truth { scene, course, start, period: episode.period, radii };
+        if episode.climbs {
+            // The worst of a few commands, by the separation that the admitted motion leads to.
+            let mut worst = f64::INFINITY;
+            for other in 0..3 {
+                let tried = if other == 0 {
+                    command
+                } else {
+                    Motion::new(joints[0], unit(&mut rng) * most, unit(&mut rng) * most / 40.0)
+                };
+                let mut trackers = trackers.clone();
+                let admitted =
+                    ask(&filter, &mut trackers, &surface, &tools, &tried, (episode, &uncertainty));
+                let apart = truth.separation(&axes, &admitted.motion, 1.0, true);
+                if apart < worst {
+                    (worst, command) = (apart, tried);
+                }
+            }
+        }
+        let admitted =
+            ask(&filter, &mut trackers, &surface, &tools, &command, (episode, &uncertainty));
+        tally.judge(&truth, &axes, &admitted, episode, rng.bool());
+        let is_unsafe = admitted.reason == Reason::NoSafeMotion;
+        tally.cries += u64::from(is_easy && is_unsafe && !was_unsafe);
+        was_unsafe = is_unsafe;
+        joints = joints.map(|joint| admitted.motion.apply(joint));
+    }
+    tally
+}
+
+fn ask(
+    filter: &Filter,
+    trackers: &mut [Follower<'_>; 2],
+    surface: &impl MovingSurface,
+    tools: &[Capsule; 2],
+    command: &Motion,
+    (episode, uncertainty): (&Episode, &Uncertainty),
+) -> Admitted {
+    let [one, other] = trackers;
+    let mut pairs = [(one, surface, &tools[0]), (other, surface, &tools[1])];
+    const NONE: [MotionRow; 0] = [];
+    filter.admit(&mut pairs, command, episode.period as f32, uncertainty, &NONE).expect("an answer")
+}
+
+impl Tally {
+    fn judge(
+        &mut self,
+        truth: &Truth<'_>,
+        axes: &[[Vec3; 2]; 2],
+        admitted: &Admitted,
+        episode: &Episode,
+        by_arc: bool,
+    ) {
+        self.ticks += 1;
+        self.instructions += u64::from(admitted.instructions);
+        self.most_instructions = self.most_instructions.max(admitted.instructions);
+        self.queries += u64::from(admitted.queries);
+        let most = episode.robot * episode.period as f32;
+        let motion = &admitted.motion;
+        self.too_fast += u64::from(!(motion.translation.length() <= most * 1.0001));
+        let says = admitted.reason == Reason::NoSafeMotion;
+        self.unsafe_ticks += u64::from(says);
+        let reason = match admitted.reason {
+            Reason::Commanded => Some(0),
+            Reason::Nearest => Some(1),
+            Reason::Shortened => Some(2),
+            Reason::Stopped => Some(3),
+            Reason::Retreating => Some(4),
+            _ => None,
+        };
+        if let Some(reason) = reason {
+            self.reasons[reason] += 1;
+        }
+        let certified = f64::from(admitted.least_separation);
+        let stand_off = f64::from(episode.stand_off);
+        // Where the separation is large, nothing can be wrong unless the tool came much nearer.
+        let end = truth.separation(axes, motion, 1.0, by_arc);
+        let moved = axes.iter().flatten().map(|&p| motion.apply(p).distance(p)).fold(0.0, f32::max);
+        let moved = f64::from(moved) + f64::from(episode.tissue) * episode.period;
+        let mut least = end;
+        self.near += u64::from(end < stand_off + 5.0);
+        if end - moved < stand_off.max(certified) {
+            for instant in 0..INSTANTS {
+                let share = f64::from(instant) / f64::from(INSTANTS);
+                least = least.min(truth.separation(axes, motion, share, by_arc));
+            }
+        }
+        // The accuracy of queries here is below a micrometre.
+        self.uncertain += u64::from(least < certified - 1e-3);
+        let lacks = stand_off - least;
+        self.below += u64::from(says && lacks > SLACK);
+        if !says {
+            self.worst = self.worst.max(lacks);
+            self.violations += u64::from(lacks > SLACK + 1e-3);
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! A filter of commands: no tick of adversarial walks comes nearer than the stand-off without saying so, and none brakes along
+//! a wall.
+
+use dibs_build::{Builder, BuiltTree, Mesh, generate};
+use dibs_nostd::filter::{Admitted, Filter, FilterError, Motion, MotionRow, Reason, Uncertainty};
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{Capsule, Cost, Millis, Odometer, Tracker};
+use dibs_tests::filter::{Episode, Tally, glide, scenes, walk};
+use dibs_tests::oracle::{Instrument, exhaustive};
+use dibs_tests::surfaces::{ball, sheet};
+use fastrand::Rng;
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Walks of 400 ticks: `DIBS_FILTER_WALKS`, if set.
+fn walks() -> u64 {
+    std::env::var("DIBS_FILTER_WALKS").map_or(200, |text| text.parse().expect("a number"))
+}
+
+#[test]
+fn no_walk_comes_nearer_than_the_stand_off() {
+    let scenes = scenes();
+    let tallies: Vec<(usize, Tally)> = (0..walks())
+        .into_par_iter()
+        .map(|seed| {
+            let scene = seed as usize % scenes.len();
+            let episode = Episode::any(&mut Rng::with_seed(seed));
+            let tally = walk(&scenes[scene], &episode, seed);
+            if tally.violations + tally.uncertain + tally.too_fast > 0 {
+                println!("{seed} {}: {episode:?} {tally:?}", scenes[scene].name);
+            }
+            (scene, tally)
+        })
+        .collect();
+    let mut all = Tally::default();
+    for (number, scene) in scenes.iter().enumerate() {
+        let mut sum = Tally::default();
+        tallies.iter().filter(|(scene, _)| *scene == number).for_each(|(_, one)| sum += *one);
+        println!("{:12} {sum:?}", scene.name);
+        all += sum;
+    }
+    println!("{all:?}");
+    assert_eq!((all.violations, all.uncertain, all.too_fast, all.cries), (0, 0, 0, 0));
+    assert!(all.most_instructions <= 200_000);
+    // The walks do reach the walls, and the filter does admit motions there.
+    let admitted: u64 = all.reasons.iter().sum();
+    assert!(all.near > all.ticks / 2 && all.reasons[1] > all.ticks / 5);
+    assert!(admitted > all.ticks / 2 && all.below > all.ticks / 100);
+}
+
+#[test]
+fn along_a_wall_it_does_not_brake() {
+    let generate::MovingMesh { mesh, motion } = generate::heart(10_272).expect("a valid size");
+    for seed in 1..4 {
+        let glided = glide(&mesh, &motion, 1.5, 4_000, seed);
+        println!("{glided:?}");
+        assert!(glided.free > 1_000 && glided.whole == glided.free);
+        assert!(glided.along > 40 && glided.least_along >= 0.95);
+        assert_eq!(glided.unsafe_ticks, 0);
+        assert!(glided.instructions <= 60_000 * u64::from(glided.ticks) && glided.most <= 200_000);
+    }
+}
+
+/// A surface at rest, and a tool that asks.
+struct Bench {
+    built: BuiltTree,
+    rows: Vec<Vec3>,
+    filter: Filter,
+    uncertainty: Uncertainty,
+    own: Vec<MotionRow>,
+    period: f32,
+}
+
+impl Bench {
+    fn new(mesh: &Mesh, stand_off: f32) -> Self {
+        let built = Builder::new().build(mesh).expect("a valid mesh");
+        let rows = built.to_rows(&mesh.positions);
+        let filter = Filter::new(stand_off, 200.0).expect("in range");
+        Self { built, rows, filter, uncertainty: Uncertainty::NONE, own: vec![], period: 0.001 }
+    }
+
+    fn ask(&self, tool: &Capsule, command: &Motion) -> Result<Admitted, FilterError> {
+        let tree = self.built.tree::<u16>().expect("16-bit indices");
+        let mut tracker = Tracker::<_, MAX_STACK, 256>::new(&tree).expect("deep enough");
+        let mut odometer = Odometer::new(&tree);
+        let surface = odometer.start(self.rows.as_slice());
+        let mut pairs = [(&mut tracker, &surface, tool)];
+        self.filter.admit(&mut pairs, command, self.period, &self.uncertainty, &self.own)
+    }
+}
+
+fn capsule(start: Vec3, end: Vec3) -> Capsule {
+    Capsule::new(start, end, 1.0).expect("finite")
+}
+
+#[test]
+fn bad_input_is_named() {
+    let mut bench = Bench::new(&ball(2), 1.0);
+    let tool = capsule(Vec3::Z * 45.0, Vec3::Z * 80.0);
+    let step = Motion::translation(Vec3::X * 0.1);
+    assert_eq!(bench.ask(&tool, &step).expect("an answer").reason, Reason::Commanded);
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        for axis in [Vec3::X, Vec3::Z] {
+            let commands = [
+                Motion { translation: axis * bad, ..step },
+                Motion { rotation: axis * bad, ..step },
+                Motion { about: axis * bad, ..step },
+            ];
+            for command in commands {
+                assert_eq!(bench.ask(&tool, &command), Err(FilterError::Command));
+            }
+        }
+        bench.own = vec![MotionRow::along(Vec3::X, 0.0), MotionRow::along(Vec3::X, bad)];
+        assert_eq!(bench.ask(&tool, &step), Err(FilterError::Row { row: 1 }));
+        bench.own.clear();
+    }
+    let named = |error| match error {
+        FilterError::Parameter { parameter, .. } => parameter,
+        other => panic!("{other:?}"),
+    };
+    for bad in [0.0, -0.001, f32::NAN, f32::INFINITY] {
+        bench.period = bad;
+        assert_eq!(named(bench.ask(&tool, &step).unwrap_err()), "period", "{bad}");
+        assert_eq!(named(Filter::new(1.0, bad).unwrap_err()), "speed", "{bad}");
+        assert_eq!(named(bench.filter.lever(bad).unwrap_err()), "lever", "{bad}");
+    }
+    bench.period = 0.001;
+    for bad in [-1.0, f32::NAN, f32::INFINITY] {
+        assert_eq!(named(Filter::new(bad, 200.0).unwrap_err()), "stand_off", "{bad}");
+        bench.uncertainty = Uncertainty::NONE.error(bad);
+        assert_eq!(named(bench.ask(&tool, &step).unwrap_err()), "uncertainty", "{bad}");
+        bench.uncertainty = Uncertainty::new(bad);
+        assert_eq!(named(bench.ask(&tool, &step).unwrap_err()), "tissue speed", "{bad}");
+    }
+    bench.uncertainty = Uncertainty::new(100.0).after(Millis(u32::MAX));
+    let lost = bench.ask(&tool, &step).expect("an answer");
+    assert_eq!(lost.reason, Reason::NoSafeMotion);
+    bench.uncertainty = Uncertainty::NONE;
+    bench.own = vec![MotionRow::along(Vec3::X, -9.0); 9];
+    assert_eq!(bench.ask(&tool, &step), Err(FilterError::Rows { found: 9, most: 8 }));
+    // A leap is shortened to the robot's speed.
+    bench.own.clear();
+    let leap = Motion::new(tool.start(), Vec3::splat(1e30), Vec3::splat(-1e9));
+    let admitted = bench.ask(&tool, &leap).expect("an answer");
+    assert!(admitted.motion.translation.length() < 0.2001, "{admitted:?}");
+    assert_ne!(admitted.reason, Reason::Commanded);
+}
+
+/// A tool that begins inside, crossing, or nearer than its stand-off leaves, and the reason says so until it is out.
+#[test]
+fn a_start_too_near_leads_out_and_is_no_pass() {
+    let mesh = ball(2);
+    let truth = |tool: &Capsule| {
+        let tool = Instrument::capsule(tool.start(), tool.end(), 1.0);
+        exhaustive(&mesh.positions, &mesh.triangles, &tool).expect("triangles").separation
+    };
+    let starts = [
+        (capsule(Vec3::Z * 39.9, Vec3::new(3.0, 1.0, 60.0)), 1.0),
+        (capsule(Vec3::Z * 36.0, Vec3::new(3.0, 1.0, 60.0)), 1.0),
+        (capsule(Vec3::Z * 20.0, Vec3::new(3.0, 1.0, 30.0)), 1.0),
+        (capsule(Vec3::Z * 41.5, Vec3::Z * 60.0), 1.0),
+        // A stand-off beyond what the start has.
+        (capsule(Vec3::Z * 45.0, Vec3::Z * 60.0), 9.0),
+    ];
+    for (number, (mut tool, stand_off)) in starts.into_iter().enumerate() {
+        let bench = Bench::new(&mesh, stand_off);
+        let (mut said, mut ticks) = (0, 0);
+        while truth(&tool) < f64::from(stand_off) - 0.011 || ticks == 0 || ticks < 20 {
+            let command = Motion::new(tool.start(), Vec3::NEG_Z * 0.2, Vec3::ZERO);
+            let admitted = bench.ask(&tool, &command).expect("an answer");
+            let is_near = truth(&tool) < f64::from(stand_off) - 0.02;
+            assert!(!is_near || admitted.reason == Reason::NoSafeMotion, "{number}: {admitted:?}");
+            said += u32::from(admitted.reason == Reason::NoSafeMotion);
+            let moved = admitted.motion;
+            tool = capsule(moved.apply(tool.start()), moved.apply(tool.end()));
+            ticks += 1;
+            assert!(ticks < 2_000, "{number}: it stays at {} {admitted:?}", truth(&tool));
+        }
+        assert!(said > 0, "{number}");
+    }
+}
+
+/// Between walls that close, nothing is safe in the end.
+#[test]
+fn a_gap_too_narrow_is_said() {
+    let gap = sheet(12, 40.0, |x, _| 30.0 * ((x.abs() - 3.5) / 3.0).clamp(0.0, 1.0));
+    let bench = Bench::new(&gap, 4.0);
+    let tool = capsule(Vec3::new(0.1, 0.0, 10.0), Vec3::new(0.0, 0.0, 60.0));
+    let admitted = bench.ask(&tool, &Motion::translation(Vec3::X * 0.1)).expect("an answer");
+    assert_eq!(admitted.reason, Reason::NoSafeMotion);
+}
+
+/// Rows of the caller hold whatever the command and the walls are.
+#[test]
+fn rows_of_the_caller_hold() {
+    let mut bench = Bench::new(&ball(2), 1.0);
+    // A remote centre on the shaft: no motion across it there.
+    let (tip, port) = (Vec3::new(0.3, 0.2, 42.02), Vec3::new(5.0, 2.0, 100.0));
+    let tool = capsule(tip, port);
+    let shaft = (port - tip).normalize();
+    let across = [shaft.any_orthonormal_pair().0, shaft.any_orthonormal_pair().1];
+    for direction in across.into_iter().flat_map(|across| [across, -across]) {
+        let arm = port - tip;
+        let angular = arm.cross(direction).to_array();
+        bench.own.push(MotionRow { linear: direction.to_array(), angular, least: 0.0 });
+    }
+    let mut rng = Rng::with_seed(3);
+    let (mut moved, mut walls) = (0, 0);
+    for _ in 0..200 {
+        let push = dibs_tests::deform::unit(&mut rng) * 0.2;
+        let command = Motion::new(tip, push, dibs_tests::deform::unit(&mut rng) * 0.003);
+        let admitted = bench.ask(&tool, &command).expect("an answer");
+        let motion = admitted.motion;
+        let at_port = motion.translation + motion.rotation.cross(port - tip);
+        for direction in across {
+            assert!(at_port.dot(direction).abs() < 1e-3, "{admitted:?}");
+        }
+        moved += usize::from(motion.rotation.length() > 1e-4);
+        let down = motion.translation.dot(Vec3::NEG_Z);
+        walls += usize::from(push.z < -0.1 && down < 0.8 * -push.z);
+    }
+    assert!(moved > 100 && walls > 20, "{moved} {walls}");
+}
+
+/// Without a budget nothing is admitted.
+#[test]
+fn nothing_unverified_is_admitted() {
+    let mut bench = Bench::new(&ball(3), 1.0);
+    let tool = capsule(Vec3::Z * 50.0, Vec3::Z * 90.0);
+    let mut admitted = 0;
+    for budget in [0, 2_000, 5_000, 10_000, 30_000, 100_000] {
+        bench.filter = bench.filter.budget(budget, Cost::M7_CAPSULE);
+        let found = bench.ask(&tool, &Motion::translation(Vec3::X * 0.1)).expect("an answer");
+        assert!(found.instructions <= budget, "{budget}: {found:?}");
+        let is_admitted = found.reason == Reason::Commanded;
+        assert!(is_admitted || found.motion.translation == Vec3::ZERO, "{found:?}");
+        admitted += usize::from(is_admitted);
+    }
+    assert!((1..5).contains(&admitted), "{admitted}");
+}
