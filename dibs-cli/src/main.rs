@@ -4,6 +4,7 @@
 mod output;
 
 mod build;
+mod filter;
 mod generate;
 mod inspect;
 mod manual;
@@ -11,6 +12,7 @@ mod mesh_file;
 mod modes;
 mod overwrite;
 mod query;
+mod recorded;
 mod stream;
 mod stretch;
 mod track;
@@ -40,6 +42,8 @@ enum Command {
     Query(query::Args),
     /// Follow a tool about a moving surface, tick by tick
     Track(track::Args),
+    /// Filter the commands of a tool about a moving surface, tick by tick
+    Filter(filter::Args),
     /// Write a page in which the surface moves and the query runs
     View(view::Args),
     /// Send a recorded motion to a controller, over a serial line or a socket
@@ -76,6 +80,7 @@ fn main() -> ExitCode {
         Command::Inspect(args) => inspect::run(&args),
         Command::Query(args) => query::run(&args),
         Command::Track(args) => track::run(&args),
+        Command::Filter(args) => filter::run(&args),
         Command::View(args) => view::run(&args),
         Command::Stream(args) => stream::run(&args),
         Command::Generate(args) => generate::run(&args),

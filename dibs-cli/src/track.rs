@@ -1,7 +1,8 @@
 //! `dibs track`: a tool on its path about a moving surface, tick by tick.
 
 use crate::mesh_file::Lengths;
-use crate::query::{LocalTool, STACK, ToolSpec, parse_tool, rows, side_name};
+use crate::query::{LocalTool, STACK, ToolSpec, parse_tool, side_name};
+use crate::recorded::{Recorded, checked_rate};
 use crate::tree_file::{self, AnyTree};
 use crate::{output, overwrite};
 use anyhow::{Context, Result, anyhow, bail};
@@ -94,34 +95,9 @@ pub fn tools<T>(path: &Path, each: impl Fn(ToolSpec) -> Result<T>) -> Result<Vec
 fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
     let origin = tree.origin().into();
     let tools = tools(&args.path, |tool| tool.local(origin))?;
-    let mut motion = args.lengths.motion_of(tree, &args.motion)?;
-    motion.rate = args.motion_rate.unwrap_or(motion.rate);
-    let name = args.motion.display();
-    if !(args.rate > 0.0 && args.rate.is_finite()) {
-        bail!("--rate is {}: give the ticks of a second", args.rate);
-    }
-    if !(motion.rate > 0.0) || motion.frames.is_empty() {
-        bail!(
-            "{name}: has {} frames at {} a second; give --motion-rate",
-            motion.frames.len(),
-            motion.rate
-        );
-    }
-    let frames: Vec<Vec<Vec3>> = (0..)
-        .zip(&motion.frames)
-        .map(|(number, frame)| rows(tree, &args.motion, number, frame))
-        .collect::<Result<_>>()?;
-    let stretches: Vec<MeasuredStretch> = (0..)
-        .zip(&frames)
-        .map(|(number, frame)| {
-            measure_stretch(tree, frame.as_slice()).map_err(|error| {
-                anyhow!(
-                    "{name}, frame {number}: {error}; build the tree with a larger --stretch, or with \
-                     --limits that allow it"
-                )
-            })
-        })
-        .collect::<Result<_>>()?;
+    let rate = checked_rate(args.rate)?;
+    let recorded = Recorded::read(tree, &args.motion, &args.lengths, args.motion_rate)?;
+    let Recorded { frames, stretches, .. } = &recorded;
     let mut session = Session {
         tree,
         query: Query::new(tree)?,
@@ -133,19 +109,18 @@ fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
         full: 0,
     };
     let mut odometer = Odometer::new(tree);
-    let frame_at = |tick: usize| tick as f64 / args.rate * f64::from(motion.rate);
+    let frame_at = |tick: usize| recorded.at(tick as f64 / rate);
     let mut ticks = (0..).zip(&tools).peekable();
     let mut last = 0;
     while let Some(&(first, _)) = ticks.peek() {
         // The ticks from one frame to the next.
-        let number = frame_at(first) as usize;
+        let (number, _) = frame_at(first);
         let current = number % frames.len();
         let step = odometer.step(frames[last].as_slice(), frames[current].as_slice());
         let both =
             stretches[last].or_larger(stretches[current]).context("measured with one tree")?;
-        while let Some((tick, tool)) = ticks.next_if(|&(tick, _)| frame_at(tick) as usize == number)
-        {
-            let share = (frame_at(tick) - number as f64) as f32;
+        while let Some((tick, tool)) = ticks.next_if(|&(tick, _)| frame_at(tick).0 == number) {
+            let share = frame_at(tick).1 as f32;
             let stretch =
                 if args.surface == Surface::Interpolated { both } else { stretches[current] };
             session.tick(tick, &step, args.surface, share, stretch, tool)?;

@@ -7,6 +7,7 @@ mod cli_motion;
 mod components;
 mod dialects;
 mod far;
+mod filter;
 mod formats;
 mod groups;
 mod labels;

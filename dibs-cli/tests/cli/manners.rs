@@ -4,12 +4,13 @@ use std::process::Command;
 
 use crate::program::{dibs, fails, json, succeeds};
 
-const COMMANDS: [&str; 10] = [
+const COMMANDS: [&str; 11] = [
     "build",
     "stretch",
     "inspect",
     "query",
     "track",
+    "filter",
     "view",
     "stream",
     "generate",

@@ -1,0 +1,137 @@
+//! `dibs filter`: admitted poses keep the stand-off, and bad input is named.
+
+use std::fs::write;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::program::{dibs, fails, succeeds};
+
+fn heart(folder: &Path) {
+    succeeds(folder, "generate heart --triangles 1000 -o heart.ply --motion heart.pc2");
+    succeeds(folder, "build heart.ply -o heart.dibs --stretch 1.5");
+}
+
+/// A shaft that is pushed at 100 mm/s into the side of the heart and out again.
+fn push(ticks: u32) -> String {
+    let far = |tick: u32| 0.1 * f64::from(tick.min(ticks - tick));
+    (0..ticks).map(|tick| format!("capsule:{0},3,60,{0},80,90,2.5\n", 95.0 - far(tick))).collect()
+}
+
+fn lines(folder: &Path, options: &str) -> Vec<Value> {
+    let line = format!(
+        "filter heart.dibs --motion heart.pc2 --path commands.csv --stand-off 1 --json {options}"
+    );
+    let text = succeeds(folder, &line);
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+#[test]
+fn admitted_poses_keep_the_stand_off() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    heart(folder);
+    write(folder.join("commands.csv"), push(1_600)).unwrap();
+    let commands: Vec<String> = push(1_600).lines().map(str::to_owned).collect();
+    let filtered = lines(folder, "");
+    assert_eq!(filtered.len(), commands.len());
+    let mut reasons = [0; 2];
+    for (tick, (line, command)) in filtered.iter().zip(&commands).enumerate() {
+        assert_eq!(line["tick"], tick);
+        assert!(line["least_separation"].as_f64().unwrap() > 0.98, "{line}");
+        assert!(line["instructions"].as_u64().unwrap() <= 200_000);
+        let is_commanded = line["reason"] == "commanded";
+        reasons[usize::from(is_commanded)] += 1;
+        assert!(
+            is_commanded || line["reason"] == "nearest" || line["reason"] == "retreating",
+            "{line}"
+        );
+        let is_whole = line["admitted"].as_str().unwrap() == command;
+        assert!(!is_commanded || is_whole, "{line} {command}");
+    }
+    assert!(reasons.into_iter().all(|count| count > 200), "{reasons:?}");
+    // The pose at the end of a tick begins the next: the tracker sees the tissue there.
+    let poses = |poses: &[String]| write(folder.join("poses.csv"), poses.join("\n")).unwrap();
+    let least = || {
+        let track = "track heart.dibs --motion heart.pc2 --path poses.csv --json --surface";
+        let surfaces = ["interpolated", "held"].map(|surface| {
+            let text = succeeds(folder, &format!("{track} {surface}"));
+            let lines = text.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+            lines.map(|line| line["lower"].as_f64().unwrap()).fold(f64::INFINITY, f64::min)
+        });
+        surfaces[0].min(surfaces[1])
+    };
+    let mut admitted = vec![commands[0].clone()];
+    admitted.extend(filtered.iter().map(|line| line["admitted"].as_str().unwrap().to_owned()));
+    poses(&commands);
+    assert!(least() < -5.0);
+    // A motion whose frames are ticks is the same however they are joined.
+    let quick = lines(folder, "--motion-rate 1000");
+    let mut admitted_quick = vec![commands[0].clone()];
+    admitted_quick.extend(quick.iter().map(|line| line["admitted"].as_str().unwrap().to_owned()));
+    poses(&admitted_quick);
+    let track = "track heart.dibs --motion heart.pc2 --motion-rate 1000 --path poses.csv --json";
+    for line in succeeds(folder, track).lines() {
+        let line: Value = serde_json::from_str(line).unwrap();
+        let tick = line["tick"].as_u64().unwrap() as usize;
+        let is_said =
+            |tick: usize| quick.get(tick).is_some_and(|line| line["reason"] == "no safe motion");
+        let was_said = tick > 0 && is_said(tick - 1) || is_said(tick);
+        assert!(was_said || line["lower"].as_f64().unwrap() > 0.97, "{line}");
+    }
+}
+
+#[test]
+fn a_start_inside_is_no_pass() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    heart(folder);
+    write(folder.join("commands.csv"), "sphere:56,3,60,2\n".repeat(50)).unwrap();
+    let inside = lines(folder, "");
+    let least = |line: &Value| line["least_separation"].as_f64().unwrap();
+    assert!(least(&inside[0]) < -1.0, "{}", inside[0]);
+    for line in &inside {
+        assert!(line["reason"] == "no safe motion" || least(line) > 0.98, "{line}");
+    }
+    // It leaves, and comes no nearer to its command.
+    assert!(least(&inside[49]) > 0.98 && inside[49]["reason"] == "nearest", "{}", inside[49]);
+}
+
+#[test]
+fn bad_input_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    heart(folder);
+    write(folder.join("commands.csv"), push(10)).unwrap();
+    let line = "filter heart.dibs --motion heart.pc2 --path commands.csv";
+    for (options, named) in [
+        ("--stand-off -1", "--stand-off is -1"),
+        ("--stand-off nan", "--stand-off is NaN"),
+        ("--stand-off 1 --rate 0", "--rate is 0"),
+        ("--stand-off 1 --rate nan", "--rate is NaN"),
+        ("--stand-off 1 --rate -5", "--rate is -5"),
+        ("--stand-off 1 --robot-speed 0", "--robot-speed is 0"),
+        ("--stand-off 1 --tissue-speed inf", "--tissue-speed is inf"),
+        ("--stand-off 1 --age -1", "--age is -1"),
+        ("--stand-off 1 --registration nan", "--registration is NaN"),
+    ] {
+        let error = fails(folder, &format!("{line} {options}"));
+        assert!(error.contains(named), "{options}: {error}");
+    }
+    for (second, named) in [
+        ("capsule:0,0,90,0,0,95,2", "tool 2: is another tool"),
+        ("sphere:95,3,60,2.5", "tool 2: is another tool"),
+        ("capsule:95,3,60,95,80,90,2", "tool 2: is another tool"),
+        ("capsule:nan,3,60,95,80,90,2.5", "commands.csv, line 2: "),
+    ] {
+        let text = format!("capsule:95,3,60,95,80,90,2.5\n{second}\n");
+        write(folder.join("commands.csv"), text).unwrap();
+        let error = fails(folder, &format!("{line} --stand-off 1"));
+        assert!(error.contains(named), "{second}: {error}");
+    }
+    // A stand-off that no place has: nothing passes.
+    write(folder.join("commands.csv"), push(10)).unwrap();
+    let output = dibs(folder, &format!("{line} --stand-off 1e6 --json"));
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.lines().count() == 10 && text.lines().all(|line| line.contains("no safe motion")));
+}
