@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use dibs_build::{Builder, Mesh, Motion as Recorded, generate};
-use dibs_nostd::constraint::{ForbiddenRegion, Proxy, SpringDamper, VelocityRow};
+use dibs_nostd::constraint::{EnergyAccount, ForbiddenRegion, Proxy, SpringDamper, VelocityRow};
 use dibs_nostd::filter::{Filter, Motion, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Contacts, Cost, Odometer, Options, Query, Sphere, Tracker, Unavailable};
@@ -20,6 +20,10 @@ const STIFFNESS: f32 = 1.0;
 const DAMPING: f32 = 0.002;
 const MOST: f32 = 5.0;
 const MARGIN: f32 = 5.0;
+
+/// The account's tank (mJ) and largest step (N).
+const TANK: f32 = 1.0;
+const STEP: f32 = 0.5;
 
 /// The hand's push (N): nine tenths of the saturation.
 pub const PUSH: f32 = 0.9 * MOST;
@@ -64,6 +68,9 @@ pub struct Pushed {
     pub least: f32,
     /// Largest change of the force from one tick to the next (N).
     pub step: f32,
+    /// The most energy (mJ) that the force had given to the hand at any time, beyond what the hand gave before, relative to
+    /// the wall.
+    pub given: f32,
 }
 
 impl Pushed {
@@ -100,7 +107,7 @@ pub fn scenes() -> Vec<Scene> {
 }
 
 impl Scene {
-    /// Pushes against the force of all contacts, or of the closest pair alone.
+    /// Pushes against the force of all contacts through an account of its energy, or of the closest pair alone.
     ///
     /// # Panics
     /// If a query fails.
@@ -113,8 +120,9 @@ impl Scene {
         let spring = SpringDamper::stiffness(STIFFNESS).damping(DAMPING).max_force(MOST);
         let proxy = Proxy::new(spring, MARGIN).expect("a valid margin");
         let alone = ForbiddenRegion::new(spring, MARGIN).expect("a valid margin");
-        let (mut at, mut velocity) = (self.from, Vec3::ZERO);
-        let mut pushed = Pushed { least: f32::INFINITY, step: 0.0 };
+        let mut account = EnergyAccount::new(TANK, STEP, STIFFNESS).expect("in range");
+        let (mut at, mut velocity, mut given) = (self.from, Vec3::ZERO, 0.0);
+        let mut pushed = Pushed { least: f32::INFINITY, step: 0.0, given: 0.0 };
         let mut before: Option<Vec3> = None;
         let mut tick = |now: u32| {
             let (rows, velocities) = self.surface(now);
@@ -125,13 +133,14 @@ impl Scene {
                 .expect("an answer");
             contacts.move_with(velocities.as_slice()).expect("a velocity each");
             pushed.least = pushed.least.min(closest.separation);
+            let corners = closest.corners.into_iter().zip(closest.barycentric);
+            let wall = corners.map(|(row, share)| velocities[row as usize] * share).sum::<Vec3>();
             let force = if by_all {
                 let within = contacts.within(2.0 * MARGIN);
-                proxy.wrench(within, contacts.accuracy(), at, velocity, Vec3::ZERO).force
+                let wanted =
+                    proxy.wrench(within, contacts.accuracy(), at, velocity, Vec3::ZERO).force;
+                account.pass(wanted, velocity - wall, TICK)
             } else {
-                let corners = closest.corners.into_iter().zip(closest.barycentric);
-                let wall =
-                    corners.map(|(row, share)| velocities[row as usize] * share).sum::<Vec3>();
                 alone.force(&Ok::<_, Unavailable>(closest), velocity - wall).force
             };
             if let Some(before) = before {
@@ -140,6 +149,8 @@ impl Scene {
             before = Some(force);
             velocity += (force + self.push * PUSH - velocity * DAMPER) * (TICK / MASS);
             at += velocity * TICK;
+            given += force.dot(velocity - wall) * TICK;
+            pushed.given = pushed.given.max(given);
             if pushed.least < -10.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let _ended = (0..TICKS).try_for_each(&mut tick);
@@ -165,7 +176,7 @@ impl Scene {
         let uncertainty = Uncertainty::new(self.fastest());
         let command = self.push * speed;
         let mut at = self.from;
-        let mut pushed = Pushed { least: f32::INFINITY, step: 0.0 };
+        let mut pushed = Pushed { least: f32::INFINITY, step: 0.0, given: 0.0 };
         let mut before: Option<Vec<Vec3>> = None;
         for now in 0..TICKS {
             let (rows, velocities) = self.surface(now);

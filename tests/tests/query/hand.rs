@@ -12,6 +12,7 @@ fn a_hand_does_not_get_through() {
             let pushed = scene.push(by_all);
             let which = if by_all { "all contacts" } else { "closest pair" };
             println!("{name:13} {which}: {pushed:?}");
+            assert!(!by_all || pushed.step <= 0.5 && pushed.given <= 1.0, "{name}: {pushed:?}");
             assert!(!by_all || !pushed.is_through(), "{name}: the centre went through, {pushed:?}");
             if !by_all && pushed.is_through() {
                 alone_failed.push(name);
@@ -19,4 +20,14 @@ fn a_hand_does_not_get_through() {
         }
     }
     assert_eq!(alone_failed, ["corner", "groove"]);
+}
+
+/// Commands that are filtered do not get in.
+#[test]
+fn a_hand_s_commands_do_not_get_through() {
+    for scene in scenes() {
+        let pushed = scene.command(true);
+        // The stand-off is 0; it comes near, and not in.
+        assert!((-0.011..0.1).contains(&pushed.least), "{}: {pushed:?}", scene.name);
+    }
 }

@@ -22,9 +22,10 @@
 //!   against the tool's velocity, saturated the same way, and the state gives the reason. For a velocity that is not
 //!   finite it is zero.
 //!
-//! # No promise: passivity
+//! # Passivity
 //!
-//! A sampled virtual wall generates energy. Colgate and Schenkel ("Passivity of a class of sampled-data systems", J.
+//! A sampled virtual wall generates energy; an [`EnergyAccount`] bounds what it gives, and the force's steps. Without one
+//! there is no promise. Colgate and Schenkel ("Passivity of a class of sampled-data systems", J.
 //! Robotic Systems 14, 1997; ACC 1994) show that with sampling period `T`, stiffness `K` and damping `B` it is passive
 //! exactly if the device's own physical damping `b` satisfies `b > K T / 2 + |B|`, for velocities by backward
 //! difference; a velocity filter and delays need more. [`SpringDamper::device_damping`] computes that figure. Beyond
@@ -47,6 +48,7 @@ macro_rules! tri {
     };
 }
 
+mod account;
 mod forbidden;
 mod guidance;
 mod proxy;
@@ -64,6 +66,7 @@ use crate::math::sqrt::sqrt;
 use crate::query::{NoSide, Proximity, Side};
 use crate::unavailable::Unavailable;
 
+pub use account::EnergyAccount;
 pub use forbidden::ForbiddenRegion;
 pub use guidance::Guidance;
 pub use proxy::{Proxy, Wrench};

@@ -34,12 +34,21 @@ pub const CHECK: Check = Check {
         note("hand.push"),
         Promise {
             id: "hand.step",
-            says: "The largest change of the force from one tick to the next",
+            says: "The force of all contacts through an account of its energy changes by at most 0.5 N from one tick to the next",
             criterion: FLOW,
-            bound: Bound::Informs,
-            unit: "N by all contacts; {hand.step.alone} N by the closest pair alone",
+            bound: Bound::AtMost(0.5),
+            unit: "N; {hand.step.alone} N by the closest pair alone, without an account",
             limits: "The same pushes, the first contact among them.",
         },
+        Promise {
+            id: "hand.given",
+            says: "It gives the hand no more energy than a tank of 1 mJ beyond what the hand gave",
+            criterion: FLOW,
+            bound: Bound::AtMost(1.0),
+            unit: "mJ; {hand.given.alone} mJ by the closest pair alone, without an account",
+            limits: "The same pushes, relative to the wall, at any time.",
+        },
+        note("hand.given.alone"),
         note("hand.step.alone"),
     ],
 };
@@ -56,6 +65,10 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     figures.note("hand.scenes", scenes.len() as f64);
     figures.note("hand.least", rounded(all.iter().fold(f32::INFINITY, |a, b| a.min(b.least))));
     figures.note("hand.push", rounded(PUSH));
+    let given =
+        |pushed: &[Pushed]| rounded(pushed.iter().fold(0.0, |most, one| one.given.max(most)));
+    figures.note("hand.given", given(&all));
+    figures.note("hand.given.alone", given(&alone));
     figures.note("hand.step", step(&all));
     figures.note("hand.step.alone", step(&alone));
     Ok(Outcome::Passed)
