@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 /// Walks of 400 ticks: `DIBS_FILTER_WALKS`, if set.
 fn walks() -> u64 {
-    std::env::var("DIBS_FILTER_WALKS").map_or(200, |text| text.parse().expect("a number"))
+    std::env::var("DIBS_FILTER_WALKS").map_or(100, |text| text.parse().expect("a number"))
 }
 
 #[test]

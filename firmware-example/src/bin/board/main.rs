@@ -81,6 +81,8 @@ fn idle(
     let mut status = [0; STATUS_MTU];
     #[cfg(feature = "wide")]
     core::hint::black_box(wide());
+    #[cfg(feature = "filter")]
+    core::hint::black_box(filtered());
     #[cfg(feature = "planted-panic")]
     core::hint::black_box([0; 4][core::hint::black_box(0_usize)]);
     loop {
@@ -141,6 +143,27 @@ fn wide() -> Option<f32> {
     let rows = core::hint::black_box([glam::Vec3::ZERO; 4]);
     let tool = controller::instrument(core::hint::black_box(0)).ok()?;
     Some(query.closest_wide(&rows[..], &tool, &dibs_nostd::Options::new()).ok()?.separation)
+}
+
+/// A tick of a filter of commands, to show that it has no panic path either.
+#[cfg(feature = "filter")]
+fn filtered() -> Option<f32> {
+    use core::hint::black_box;
+    use dibs_nostd::filter::{Filter, Motion, MotionRow, Uncertainty};
+
+    let tree = surface::TREE.validate().ok()?;
+    let mut tracker = surface::Tracker::<64>::new(&tree).ok()?;
+    let rows = black_box([glam::Vec3::ZERO; 4]);
+    let mut odometer = dibs_nostd::Odometer::new(&tree);
+    let table = odometer.start(&rows[..]);
+    let tool = controller::instrument(black_box(0)).ok()?;
+    let filter = Filter::new(black_box(1.0), black_box(200.0)).ok()?;
+    let command = black_box(Motion::translation(glam::Vec3::X));
+    let own = black_box([MotionRow::along(glam::Vec3::X, 0.0); 2]);
+    let mut pairs = [(&mut tracker, &table, &tool)];
+    let admitted =
+        filter.admit(&mut pairs, &command, black_box(1e-3), &Uncertainty::new(100.0), &own);
+    Some(admitted.ok()?.least_separation)
 }
 
 /// Sends a status over the serial bus.

@@ -51,8 +51,10 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     ensure!(!build.status.success(), "a planted panic path did not break the link");
     ensure!(said.contains("a_panic_path_survived"), "it broke something else:\n{said}");
 
-    let mut wide = firmware::command(&cross, &surface);
-    xtask::process::run(wide.args(["--features", "wide"]))
-        .context("wide queries have a panic path")?;
+    for (feature, what) in [("wide", "wide queries have"), ("filter", "a filter has")] {
+        let mut other = firmware::command(&cross, &surface);
+        xtask::process::run(other.args(["--features", feature]))
+            .with_context(|| format!("{what} a panic path"))?;
+    }
     Ok(Outcome::Passed)
 }
