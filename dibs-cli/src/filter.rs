@@ -39,7 +39,8 @@ Examples:
 The tool begins at the first line's pose. Each line is the pose that is commanded for the end of its tick; what is
 admitted is where the next tick begins. The motion is the tissue's, straight from frame to frame, played over and over.
 A filter sees it at the start of each tick, as old as --age allows. The reasons: commanded, nearest, shortened, stopped,
-retreating, and 'no safe motion', after which the stand-off is not kept.")]
+retreating, and 'no safe motion', after which the stand-off is not kept; least_separation is null where nothing is
+certain.")]
 pub struct Args {
     /// A tree file that `dibs build` wrote
     tree: PathBuf,

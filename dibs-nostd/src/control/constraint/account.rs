@@ -23,7 +23,7 @@ use crate::math::sqrt::sqrt;
 /// let mut account = EnergyAccount::new(1.0, 0.5, 1.0)?; // mJ, N a tick, N/mm
 /// // A new frame puts the wall 5 mm over the instrument: the force comes in steps.
 /// let force = account.pass(Vec3::X * 5.0, Vec3::ZERO, 0.001);
-/// assert_eq!(force, Vec3::X * 0.5);
+/// assert!((force.x - 0.5).abs() < 1e-6 && force.x <= 0.5);
 /// # Ok::<(), dibs_nostd::constraint::GainError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]

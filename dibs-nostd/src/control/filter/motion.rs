@@ -25,7 +25,8 @@ pub struct Motion {
 pub(super) const MOST_TURN: f32 = 0.5;
 
 impl Motion {
-    /// A translation.
+    /// A translation. Its reference point is the origin, about which a filter may turn the instrument:
+    /// [`new`](Self::new) takes one of the instrument's own.
     #[must_use]
     pub const fn translation(translation: Vec3) -> Self {
         Self { about: Vec3::ZERO, translation, rotation: Vec3::ZERO }

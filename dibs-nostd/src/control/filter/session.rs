@@ -375,9 +375,15 @@ fn inside(start: Vec3, way: Vec3, most: f32) -> f32 {
     }
 }
 
-/// The smaller number; NaN if `a` is.
+/// The smaller number; NaN if either is.
 fn smaller(a: f32, b: f32) -> f32 {
-    if b < a { b } else { a }
+    if a < b {
+        a
+    } else if b <= a {
+        b
+    } else {
+        f32::NAN
+    }
 }
 
 /// The larger number; NaN if `a` is.
