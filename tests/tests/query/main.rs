@@ -22,6 +22,7 @@ mod side;
 mod slack;
 mod solids;
 mod swept;
+mod thin_plates;
 mod ties;
 mod tracked_budget;
 mod tracked_chain;

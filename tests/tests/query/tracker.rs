@@ -357,3 +357,25 @@ fn a_full_front_does_not_stay_full() {
     println!("{full} full, {full_again} again, {stuck} stuck");
     assert!(full_again > 0 && stuck == 0);
 }
+
+/// A tick may pass over a triangle that is closer than its pair by less than a query's accuracy.
+#[test]
+fn a_tick_states_twice_the_accuracy_of_a_query() {
+    let mesh = generate::heart(1_000).expect("a valid size").mesh;
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut tracker = Tracker::<u16, MAX_STACK, 512>::new(&tree).expect("deep enough");
+    let mut odometer = Odometer::new(&tree);
+    let surface = odometer.start(rows.as_slice());
+    let (mut at, mut rng) = (Vec3::X * 60.0, Rng::with_seed(6));
+    for _ in 0..200 {
+        at += unit(&mut rng);
+        let tool = Capsule::new(at, at + Vec3::Y * 20.0, 1.0).expect("valid");
+        let whole = query.closest(rows.as_slice(), &tool, &Options::cold()).expect("an answer");
+        let found = tracker.closest(&surface, &tool, &Options::new()).expect("an answer");
+        let stated = found.closest.accuracy / whole.accuracy;
+        assert!((1.999..2.001).contains(&stated), "{stated}: {found:?} {whole:?}");
+    }
+}
