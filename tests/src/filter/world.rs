@@ -31,8 +31,8 @@ pub struct Scene {
 /// Stretch that the trees are built for.
 const STRETCH: f32 = 2.0;
 
-fn scene(name: &'static str, mesh: Mesh, from: Vec3, middle: Vec3) -> Scene {
-    let tree = Builder::new().stretch(STRETCH).build(&mesh).expect("a valid mesh");
+fn scene(name: &'static str, mesh: &Mesh, from: Vec3, middle: Vec3) -> Scene {
+    let tree = Builder::new().stretch(STRETCH).build(mesh).expect("a valid mesh");
     let rest = tree.to_rows(&mesh.positions);
     let triangles = surfaces::triangles(&tree.tree::<u16>().expect("16-bit indices"));
     Scene { name, tree, rest, triangles, from, middle, closes: false, is_convex: false }
@@ -64,16 +64,16 @@ pub fn scenes() -> Vec<Scene> {
     let up = |z: f32| Vec3::new(0.4, 0.3, z);
     let convex = |scene| Scene { is_convex: true, ..scene };
     vec![
-        scene("wall", sheet(6, 60.0, |_, _| 0.0), up(9.0), Vec3::ZERO),
-        scene("corner", sheet(10, 40.0, |x, y| x.abs() + y.abs()), up(14.0), Vec3::Z * 4.0),
-        scene("groove", sheet(10, 40.0, |x, _| 4.7 * x.abs()), up(40.0), Vec3::Z * 15.0),
-        scene("gap", gap(), up(14.0), Vec3::Z * 6.0),
-        Scene { closes: true, ..scene("closing gap", gap(), up(14.0), Vec3::Z * 6.0) },
-        convex(scene("spike", spike(), up(34.0), Vec3::Z * 22.0)),
-        convex(scene("plate", plate(), up(9.0), Vec3::ZERO)),
-        convex(scene("ball", ball(2), up(49.0), Vec3::Z * 38.0)),
-        scene("heart", heart, side - Vec3::X * 9.0, side),
-        scene("brain", brain, top + Vec3::Z * 9.0, top),
+        scene("wall", &sheet(6, 60.0, |_, _| 0.0), up(9.0), Vec3::ZERO),
+        scene("corner", &sheet(10, 40.0, |x, y| x.abs() + y.abs()), up(14.0), Vec3::Z * 4.0),
+        scene("groove", &sheet(10, 40.0, |x, _| 4.7 * x.abs()), up(40.0), Vec3::Z * 15.0),
+        scene("gap", &gap(), up(14.0), Vec3::Z * 6.0),
+        Scene { closes: true, ..scene("closing gap", &gap(), up(14.0), Vec3::Z * 6.0) },
+        convex(scene("spike", &spike(), up(34.0), Vec3::Z * 22.0)),
+        convex(scene("plate", &plate(), up(9.0), Vec3::ZERO)),
+        convex(scene("ball", &ball(2), up(49.0), Vec3::Z * 38.0)),
+        scene("heart", &heart, side - Vec3::X * 9.0, side),
+        scene("brain", &brain, top + Vec3::Z * 9.0, top),
     ]
 }
 
