@@ -216,8 +216,9 @@ fn filter<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
     let filter = Filter::new(args.stand_off, robot)
         .map_err(|_| anyhow!("--robot-speed is {robot}: give a speed above 0"))?
         .budget(args.budget, Cost::M7_CAPSULE);
-    let behind = (f64::from(tissue) * age / 1_000.0) as f32;
-    let uncertainty = Uncertainty::new(tissue).error(behind.next_up()).error(args.registration);
+    // Rounded up.
+    let behind = (f64::from(tissue) * age / 1_000.0 * (1.0 + 2e-7)) as f32;
+    let uncertainty = Uncertainty::new(tissue).error(behind).error(args.registration);
     let mut session = Session {
         tracker: Tracker::new(tree)?,
         filter,
