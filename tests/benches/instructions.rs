@@ -50,7 +50,7 @@ fn warm() -> Scene {
 }
 
 fn nodes_only() -> Scene {
-    scene(Options::cold().unsigned().budget(Budget { node_tests: 64, triangle_tests: 0 }))
+    scene(Options::cold().unsigned().budget(Budget::new(64)))
 }
 
 fn sphere() -> Sphere {

@@ -271,7 +271,7 @@ impl<I: Index> Running<I> {
 
     fn options(&self) -> Options {
         let Settings { budget, is_measured, search, .. } = self.settings;
-        let budget = Budget { node_tests: budget, triangle_tests: budget };
+        let budget = Budget::new(budget);
         let options = if search == Search::Cold { Options::cold() } else { Options::new() };
         let options = options.budget(budget);
         if is_measured { options.stretch(self.now.stretch) } else { options }

@@ -83,9 +83,14 @@
 #define DIBS_QUERY_SIZE 4864
 
 /**
- * As much as it takes, for either number of a budget.
+ * As much as it takes, for a budget; no limit, for a watch.
  */
 #define DIBS_UNLIMITED UINT32_MAX
+
+/**
+ * The node tests that an exact triangle test counts as in a budget.
+ */
+#define DIBS_TRIANGLE 8
 
 /**
  * A flag of options: neither answer nor cost depends on earlier queries.
@@ -908,27 +913,14 @@ typedef struct dibs_tree dibs_tree;
 typedef struct dibs_writer dibs_writer;
 
 /**
- * The most work that a query may do.
- */
-typedef struct {
-  /**
-   * Most sphere bounds evaluated.
-   */
-  uint32_t node_tests;
-  /**
-   * Most exact tests of a tool and a triangle.
-   */
-  uint32_t triangle_tests;
-} dibs_budget;
-
-/**
  * Options of a query. Null for none: no budget, a warm start, signed.
  */
 typedef struct {
   /**
-   * The most work. Zeros ask for next to nothing: set both.
+   * The most work, in tests of spheres and planes, of which an exact triangle test counts as `DIBS_TRIANGLE`. 0 asks for
+   * next to nothing: set it.
    */
-  dibs_budget budget;
+  uint32_t budget;
   /**
    * Largest length (mm) of the interval of a depth where the tool's axis crosses the surface; 0 for a 512th of the
    * axis' length.
@@ -2087,7 +2079,7 @@ dibs_code dibs_query_closest(dibs_query *query,
  * @param cost  A `dibs_cost`.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a number that is no `dibs_cost`, or a misuse.
  */
-dibs_code dibs_budget_for_instructions(uint32_t instructions, uint32_t cost, dibs_budget *budget);
+dibs_code dibs_budget_for_instructions(uint32_t instructions, uint32_t cost, uint32_t *budget);
 
 /**
  * Makes the reader of a surface, once.

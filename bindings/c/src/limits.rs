@@ -6,7 +6,7 @@ use dibs_nostd::guard::GuardLimits;
 use crate::border::{AnyBits, Input};
 use crate::code::dibs_code;
 use crate::failsafe::dibs_limits;
-use crate::query::{DIBS_UNLIMITED, dibs_budget, dibs_options};
+use crate::query::{DIBS_UNLIMITED, dibs_options};
 use crate::receiver::dibs_surface_limits;
 
 /// How far a surface is trusted, and how a tick asks. `dibs_guard_limits_of` makes one of two numbers.
@@ -68,7 +68,7 @@ impl dibs_guard_limits {
 /// @param age    Largest age (ms) of a surface.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_guard_limits_of(speed: f32, age: u32) -> dibs_guard_limits {
-    let budget = dibs_budget { node_tests: DIBS_UNLIMITED, triangle_tests: DIBS_UNLIMITED };
+    let budget = DIBS_UNLIMITED;
     dibs_guard_limits {
         speed,
         age,

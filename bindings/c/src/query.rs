@@ -30,20 +30,15 @@ impl Kind for dibs_query {
     const SIZE: usize = DIBS_QUERY_SIZE;
 }
 
-/// The most work that a query may do.
-#[derive(Clone, Copy, AnyBitPattern)]
-#[repr(C)]
-pub struct dibs_budget {
-    /// Most sphere bounds evaluated.
-    pub node_tests: u32,
-    /// Most exact tests of a tool and a triangle.
-    pub triangle_tests: u32,
-}
-
-/// As much as it takes, for either number of a budget.
+/// As much as it takes, for a budget; no limit, for a watch.
 pub const DIBS_UNLIMITED: u32 = u32::MAX;
 
-const _: () = assert!(Budget::UNLIMITED.node_tests == DIBS_UNLIMITED);
+const _: () = assert!(Budget::UNLIMITED.tests() == DIBS_UNLIMITED);
+
+/// The node tests that an exact triangle test counts as in a budget.
+pub const DIBS_TRIANGLE: u32 = 8;
+
+const _: () = assert!(Budget::TRIANGLE == DIBS_TRIANGLE);
 
 /// A flag of options: neither answer nor cost depends on earlier queries.
 pub const DIBS_COLD: u32 = 1;
@@ -58,8 +53,9 @@ pub const DIBS_CONTACTS_OF: u32 = 4;
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_options {
-    /// The most work. Zeros ask for next to nothing: set both.
-    pub budget: dibs_budget,
+    /// The most work, in tests of spheres and planes, of which an exact triangle test counts as `DIBS_TRIANGLE`. 0 asks for
+    /// next to nothing: set it.
+    pub budget: u32,
     /// Largest length (mm) of the interval of a depth where the tool's axis crosses the surface; 0 for a 512th of the
     /// axis' length.
     pub depth_tolerance: f32,
@@ -84,8 +80,7 @@ impl TryFrom<dibs_options> for Options {
         if given.flags & !known != 0 || !(given.depth_tolerance >= 0.0) {
             return Err(dibs_code::Argument);
         }
-        let dibs_budget { node_tests, triangle_tests } = given.budget;
-        let mut options = Self::new().budget(Budget { node_tests, triangle_tests });
+        let mut options = Self::new().budget(Budget::new(given.budget));
         if given.flags & DIBS_COLD != 0 {
             options = options.warm_start(None);
         }
@@ -354,7 +349,7 @@ pub enum dibs_cost {
 pub extern "C" fn dibs_budget_for_instructions(
     instructions: u32,
     cost: u32,
-    budget: *mut dibs_budget,
+    budget: *mut u32,
 ) -> dibs_code {
     const COSTS: [(dibs_cost, &Cost); 4] = [
         (dibs_cost::M7Sphere, &Cost::M7_SPHERE),
@@ -365,8 +360,7 @@ pub extern "C" fn dibs_budget_for_instructions(
     dibs_code::of(|| {
         let (_, cost) =
             COSTS.iter().find(|(number, _)| *number as u32 == cost).ok_or(dibs_code::Argument)?;
-        let Budget { node_tests, triangle_tests } = Budget::for_instructions(instructions, cost);
-        budget.check()?.set(dibs_budget { node_tests, triangle_tests });
+        budget.check()?.set(Budget::for_instructions(instructions, cost).tests());
         Ok(())
     })
 }

@@ -16,14 +16,13 @@ from ._mesh import Mesh, MeshWarning, build, generate, read
 from ._motion import Motion, MotionStretch, read_motion
 from ._stream import Sender, Sent, Totals
 from ._tools import capsules, spheres
-from ._tree import ANSWER, CONTACT, SIDE_REASONS, Budget, Contacts, Coverage, Scene, Side, Surface, Tree
+from ._tree import ANSWER, CONTACT, SIDE_REASONS, Contacts, Coverage, Scene, Side, Surface, Tree
 
 __all__ = [
     "ANSWER",
     "CONTACT",
     "SIDE_REASONS",
     "Answer",
-    "Budget",
     "Contacts",
     "Coverage",
     "ForbiddenRegion",

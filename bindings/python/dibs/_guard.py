@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _arrays, _dibs
-from ._tree import ANSWER, Budget, Tree, _tests
+from ._tree import ANSWER, Tree, _tests
 
 _WRAP = 1 << 32
 
@@ -123,7 +123,8 @@ class Guard:
     source and the time on the way. From three quarters of it on the state is degraded, beyond it safe. The state is safe at
     first, and leaves that once frames come in time and `acknowledge` was called; with `automatic` by itself.
     `without_transit` is for a line on which no `status` goes back: a delayed frame is then taken for a new one.
-    `ticks_a_second` is the rate of the calls of `closest`. `budget` bounds the tests of a tick.
+    `ticks_a_second` is the rate of the calls of `closest`. `budget` bounds the node tests of a tick; an exact triangle
+    test counts as 8.
 
     Times `now` are whole milliseconds of one clock, which may wrap at 2**32. Any thread may call; calls wait for each
     other.
@@ -138,7 +139,7 @@ class Guard:
         ticks_a_second: int = 1_000,
         automatic: bool = False,
         without_transit: bool = False,
-        budget: Optional[tuple[int, int]] = None,
+        budget: Optional[int] = None,
     ) -> None:
         if not isinstance(tree, Tree):
             raise TypeError(f"tree: a Tree is needed, not {type(tree).__name__}")
@@ -146,8 +147,7 @@ class Guard:
         age = _whole("age_ms", age_ms, 1, (1 << 31) - 1)
         ticks = _whole("ticks_a_second", ticks_a_second, 1, _WRAP - 1)
         choices = (bool(automatic), bool(without_transit))
-        tests = _tests(Budget() if budget is None else budget)
-        self._native = _dibs.Guard(tree._native, speed, age, ticks, choices, tests)
+        self._native = _dibs.Guard(tree._native, speed, age, ticks, choices, _tests(budget))
 
     def receive(self, data: bytes, now: int) -> None:
         """Takes bytes of a serial line or another stream. `counters` says what became of them, by cause."""

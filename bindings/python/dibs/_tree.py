@@ -60,24 +60,17 @@ class Contacts(NamedTuple):
     budget ended."""
 
 
-class Budget(NamedTuple):
-    """The most work of a pair of a tool and a surface; an answer that is cut short has a `lower` below its `separation`."""
-
-    node_tests: int = 0xFFFF_FFFF
-    """Most tests of spheres, and of leaves' and triangles' planes; the root's sphere comes on top."""
-    triangle_tests: int = 0xFFFF_FFFF
-    """Most exact tests of triangles."""
-
-
-def _tests(budget: tuple[int, int]) -> tuple[int, int]:
-    """The checked numbers of a budget."""
+def _tests(budget: Optional[int]) -> int:
+    """The checked number of a budget's tests."""
+    if budget is None:
+        return 0xFFFF_FFFF
     try:
-        nodes, triangles = (operator.index(tests) for tests in budget)
-    except (TypeError, ValueError):
-        raise TypeError(f"budget: give (node_tests, triangle_tests), not {budget!r}") from None
-    if min(nodes, triangles) < 0:
-        raise ValueError(f"budget: {min(nodes, triangles)} tests are below 0")
-    return min(nodes, Budget().node_tests), min(triangles, Budget().triangle_tests)
+        tests = operator.index(budget)
+    except TypeError:
+        raise TypeError(f"budget: give a number of tests, not {budget!r}") from None
+    if tests < 0:
+        raise ValueError(f"budget: {tests} tests are below 0")
+    return min(tests, 0xFFFF_FFFF)
 
 
 class Scene:
@@ -95,14 +88,14 @@ class Scene:
                 raise TypeError(f"surfaces: number {number} is no Surface and no Tree")
         self._natives = [surface._native for surface in self.surfaces]
 
-    def query(self, tools: npt.ArrayLike, *, budget: tuple[int, int] = Budget()) -> npt.NDArray[Any]:
+    def query(self, tools: npt.ArrayLike, *, budget: Optional[int] = None) -> npt.NDArray[Any]:
         """The closest pair of each pose and the scene: as `Tree.query`."""
         poses = _tools.poses(tools)
         answers = np.frombuffer(_dibs.query(self._natives, poses.native, _tests(budget)), ANSWER)
         return answers[0] if poses.is_single else answers
 
     def contacts(
-        self, tools: npt.ArrayLike, margin: float, *, budget: tuple[int, int] = Budget(), label: Optional[int] = None
+        self, tools: npt.ArrayLike, margin: float, *, budget: Optional[int] = None, label: Optional[int] = None
     ) -> Contacts:
         """All locally closest pairs of each pose and the scene: as `Tree.contacts`."""
         margin = _arrays.number("margin", margin)
@@ -131,12 +124,12 @@ class Surface:
         """The largest stretch of any triangle, against the rest shape; `None` where the tree cannot measure it."""
         return self._native.stretch()
 
-    def query(self, tools: npt.ArrayLike, *, budget: tuple[int, int] = Budget()) -> npt.NDArray[Any]:
+    def query(self, tools: npt.ArrayLike, *, budget: Optional[int] = None) -> npt.NDArray[Any]:
         """The closest pair of each pose and the surface: as `Tree.query`."""
         return Scene([self]).query(tools, budget=budget)
 
     def contacts(
-        self, tools: npt.ArrayLike, margin: float, *, budget: tuple[int, int] = Budget(), label: Optional[int] = None
+        self, tools: npt.ArrayLike, margin: float, *, budget: Optional[int] = None, label: Optional[int] = None
     ) -> Contacts:
         """All locally closest pairs of each pose and the surface: as `Tree.contacts`."""
         return Scene([self]).contacts(tools, margin, budget=budget, label=label)
@@ -225,14 +218,15 @@ class Tree:
         tools: npt.ArrayLike,
         surface: Union[Surface, npt.ArrayLike, None] = None,
         *,
-        budget: tuple[int, int] = Budget(),
+        budget: Optional[int] = None,
     ) -> npt.NDArray[Any]:
         """The closest pair of each pose and a surface: an array of `ANSWER`.
 
         `tools` has a row for each pose: x, y, z, radius of a sphere, or x1, y1, z1, x2, y2, z2, radius of a capsule. With
         three dimensions, (poses, tools, 4 or 7), each pose is a chain of tools, which field `tool` counts from 0: its
         answer is the closest pair of any, its interval that of all. `surface` is an array of positions, or a `Surface`,
-        which is measured once for several calls; by default the rest shape. `budget` bounds the tests of each tool. The
+        which is measured once for several calls; by default the rest shape. `budget` bounds the node tests of each
+        tool, of which an exact triangle test counts as 8. The
         poses are answered on all cores, without Python's lock.
         """
         return self._surface(surface).query(tools, budget=budget)
@@ -243,7 +237,7 @@ class Tree:
         margin: float,
         surface: Union[Surface, npt.ArrayLike, None] = None,
         *,
-        budget: tuple[int, int] = Budget(),
+        budget: Optional[int] = None,
         label: Optional[int] = None,
     ) -> Contacts:
         """All locally closest pairs of each pose and a surface whose separation is at most `margin`: up to 64 of each

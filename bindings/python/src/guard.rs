@@ -118,13 +118,11 @@ impl Guard {
         age: u32,
         ticks: u32,
         choices: (bool, bool),
-        budget: (u32, u32),
+        budget: u32,
     ) -> PyResult<Self> {
-        let (node_tests, triangle_tests) = budget;
         let (is_automatic, is_without_transit) = choices;
-        let limits = GuardLimits::new(speed, Millis(age))
-            .ticks_a_second(ticks)
-            .budget(Budget { node_tests, triangle_tests });
+        let limits =
+            GuardLimits::new(speed, Millis(age)).ticks_a_second(ticks).budget(Budget::new(budget));
         let limits = if is_automatic { limits.automatic() } else { limits };
         let limits = if is_without_transit { limits.without_transit() } else { limits };
         let both = Loop::try_new(Memory::new(Arc::clone(&tree.0)), |memory| {

@@ -21,16 +21,13 @@ const BLOCK: usize = 1 << 16;
 /// Bytes of tools, numbers of a tool, tools of a pose.
 type Tools<'a> = (&'a [u8], usize, usize);
 
-/// Node tests and triangle tests.
-type Tests = (u32, u32);
-
 /// The closest pair of each pose.
 #[pyfunction]
 pub fn query<'py>(
     py: Python<'py>,
     surfaces: Vec<Py<Surface>>,
     tools: Tools<'_>,
-    budget: Tests,
+    budget: u32,
 ) -> PyResult<Bound<'py, PyByteArray>> {
     let scene = Scene::new(surfaces, budget);
     let found = in_blocks(py, tools, |chunk| scene.answer(chunk))?;
@@ -44,7 +41,7 @@ pub fn contacts<'py>(
     surfaces: Vec<Py<Surface>>,
     tools: Tools<'_>,
     margin: f32,
-    budget: Tests,
+    budget: u32,
     label: Option<u8>,
 ) -> PyResult<[Bound<'py, PyByteArray>; 2]> {
     let scene = Scene::new(surfaces, budget);
@@ -86,8 +83,8 @@ struct Scene {
 }
 
 impl Scene {
-    fn new(surfaces: Vec<Py<Surface>>, (node_tests, triangle_tests): Tests) -> Self {
-        Self { surfaces, budget: Budget { node_tests, triangle_tests } }
+    fn new(surfaces: Vec<Py<Surface>>, tests: u32) -> Self {
+        Self { surfaces, budget: Budget::new(tests) }
     }
 
     /// The surfaces with their numbers.

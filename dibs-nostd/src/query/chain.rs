@@ -195,8 +195,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
                     let Query { tree, stack, .. } = query;
                     let pair = Pair { tree, vertices: *vertices, tool, closest, surface, number };
                     let made = contacts.add(&pair, stack, &scene.options)?;
-                    let left = scene.options.budget.less(made.node_tests, made.triangle_tests);
-                    scene.options.budget = left;
+                    scene.options = scene.options.after(made);
                     Ok(())
                 },
             )?;
@@ -353,7 +352,7 @@ impl Scene {
     /// Adds a pair, and keeps the surface's closest in `own`.
     fn add(&mut self, surface: usize, tool: usize, found: Proximity, own: &mut Option<Proximity>) {
         self.is_entered = true;
-        self.options.budget = self.options.budget.less(found.node_tests, found.triangle_tests);
+        self.options = self.options.after(found.tests());
         let side = found.side;
         if matches!(side, Side::Inside | Side::Crossing | Side::Undefined(NoSide::BelowAccuracy)) {
             self.is_outside = false;

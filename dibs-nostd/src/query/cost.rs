@@ -3,8 +3,8 @@
 use super::Budget;
 
 /// A fitted bound on a query's cost: `base + n * node_test + t * triangle_test`, in instructions, where `n`
-/// and `t` are the node and triangle tests that a [`Budget`] limits. The budget is exact; the instructions of a
-/// test are measured, not proved.
+/// and `t` are the node and triangle tests that an answer counts. Those that a [`Budget`] allows are exact; the
+/// instructions of a test are measured, not proved.
 ///
 /// The constants are the plane above some hundred thousand adversarial queries about four small surfaces, on an
 /// emulated Cortex-M7 and on x86-64, plus a margin of 20 %. They are checked on surfaces and poses that the fit has not
@@ -24,49 +24,52 @@ pub struct Cost {
 }
 
 impl Cost {
-    /// The most instructions, by the fit, of a query within `budget`.
+    /// The most instructions, by the fit, of a query that makes so many tests.
     ///
     /// ```
-    /// use dibs_nostd::{Budget, Cost};
+    /// use dibs_nostd::Cost;
     /// let cost = Cost { base: 500, node_test: 60, triangle_test: 400 };
-    /// let most = cost.instructions(Budget { node_tests: 100, triangle_tests: 10 });
-    /// assert_eq!(most, 10_500);
+    /// assert_eq!(cost.instructions(100, 10), 10_500);
     /// ```
     #[must_use]
-    pub const fn instructions(&self, budget: Budget) -> u64 {
-        let nodes = budget.node_tests as u64 * self.node_test as u64;
-        let triangles = budget.triangle_tests as u64 * self.triangle_test as u64;
+    pub const fn instructions(&self, node_tests: u32, triangle_tests: u32) -> u64 {
+        let nodes = node_tests as u64 * self.node_test as u64;
+        let triangles = triangle_tests as u64 * self.triangle_test as u64;
         nodes.saturating_add(triangles).saturating_add(self.base as u64)
+    }
+
+    /// The most instructions, by the fit, of a query within `budget`, however it divides the tests.
+    #[must_use]
+    pub const fn instructions_within(&self, budget: Budget) -> u64 {
+        let most = budget.tests() as u64 * self.unit() as u64;
+        most.saturating_add(self.base as u64)
+    }
+
+    /// The most instructions for each node test of a budget.
+    const fn unit(&self) -> u32 {
+        let triangle = self.triangle_test.div_ceil(Budget::TRIANGLE);
+        if self.node_test > triangle { self.node_test } else { triangle }
     }
 }
 
 impl Budget {
-    /// The budget of a query that ends within this many instructions, by the fit. Each kind of test gets half of them,
-    /// about as an ordinary query spends them. A deadline shorter than [`Cost::base`] gives an empty budget, which
-    /// still costs the base.
+    /// The budget of a query that ends within this many instructions, by the fit. A deadline shorter than [`Cost::base`]
+    /// gives an empty budget, which still costs the base.
     ///
     /// ```
     /// use dibs_nostd::{Budget, Cost, Options};
     /// // A quarter of a millisecond at 480 MHz, if an instruction takes a cycle and a half.
     /// let budget = Budget::for_instructions(80_000, &Cost::M7_CAPSULE);
-    /// assert!(Cost::M7_CAPSULE.instructions(budget) <= 80_000);
+    /// assert!(Cost::M7_CAPSULE.instructions_within(budget) <= 80_000);
     /// let options = Options::new().budget(budget);
     /// # let _ = options;
     /// ```
     #[must_use]
     pub const fn for_instructions(instructions: u32, cost: &Cost) -> Self {
-        let half = instructions.saturating_sub(cost.base) / 2;
-        Self {
-            node_tests: share(half, cost.node_test),
-            triangle_tests: share(half, cost.triangle_test),
+        match instructions.saturating_sub(cost.base).checked_div(cost.unit()) {
+            Some(tests) => Self::new(tests),
+            // Tests that cost nothing.
+            None => Self::UNLIMITED,
         }
-    }
-}
-
-/// `all / each`; no limit where `each` is 0.
-const fn share(all: u32, each: u32) -> u32 {
-    match all.checked_div(each) {
-        Some(number) => number,
-        None => u32::MAX,
     }
 }

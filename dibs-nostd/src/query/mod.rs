@@ -9,6 +9,7 @@ mod depth;
 #[cfg(test)]
 mod distances;
 mod exact;
+mod made;
 mod memory;
 mod normal;
 mod options;

@@ -1,9 +1,14 @@
 //! A query's options: prior knowledge and a budget.
 
+use super::made::Tests;
 use crate::{Coverage, MeasuredStretch, TriangleRow, VertexTable};
 
-/// The most work of one query. It bounds the query's time; an answer that was cut short is still valid, with a wider
-/// interval.
+/// The most work of one query, in node tests. It bounds the query's time; an answer that was cut short is still valid, with a
+/// wider interval.
+///
+/// A node test is one of a sphere, or of a leaf's or triangle's plane. An exact triangle test counts as
+/// [`TRIANGLE`](Self::TRIANGLE) of them. The roots' spheres are always tested and not counted. The depth of an axis that
+/// crosses or is inside counts its work besides the searches as the node tests that take as long.
 ///
 /// Every answer's interval holds the true separation. For the same query a larger budget never lowers the lower end,
 /// and raises the upper end by no more than the accuracy. From tick to tick that holds for the upper end alone, if the
@@ -13,29 +18,36 @@ use crate::{Coverage, MeasuredStretch, TriangleRow, VertexTable};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Budget {
-    /// Most tests of spheres, and of leaves' and triangles' planes. The roots' spheres are always tested and not counted.
-    /// The depth of a crossing axis counts its work besides the searches as the node tests that take as long.
-    pub node_tests: u32,
-    /// Most exact tool-triangle tests.
-    pub triangle_tests: u32,
+    tests: u32,
 }
 
 impl Budget {
     /// No limit.
-    pub const UNLIMITED: Self = Self { node_tests: u32::MAX, triangle_tests: u32::MAX };
+    pub const UNLIMITED: Self = Self { tests: u32::MAX };
 
-    /// The rest after so many tests.
-    pub(super) const fn less(self, node_tests: u32, triangle_tests: u32) -> Self {
-        Self {
-            node_tests: self.node_tests.saturating_sub(node_tests),
-            triangle_tests: self.triangle_tests.saturating_sub(triangle_tests),
-        }
+    /// The node tests that an exact triangle test counts as.
+    pub const TRIANGLE: u32 = 8;
+
+    /// As much work as this many node tests.
+    #[must_use]
+    pub const fn new(tests: u32) -> Self {
+        Self { tests }
     }
 
-    /// The same with no more than `most` node tests.
-    pub(super) const fn nodes_at_most(self, most: u32) -> Self {
-        let node_tests = if self.node_tests < most { self.node_tests } else { most };
-        Self { node_tests, ..self }
+    /// The node tests that it is worth.
+    #[must_use]
+    pub const fn tests(self) -> u32 {
+        self.tests
+    }
+
+    /// The same, but no more than `most`.
+    pub(super) const fn at_most(self, most: u32) -> Self {
+        if self.tests < most { self } else { Self { tests: most } }
+    }
+
+    /// What is left of it after work that takes as long as this many node tests.
+    pub(super) const fn less(self, tests: u32) -> Self {
+        Self { tests: self.tests.saturating_sub(tests) }
     }
 }
 
@@ -93,6 +105,11 @@ impl Options {
     pub const fn budget(mut self, budget: Budget) -> Self {
         self.budget = budget;
         self
+    }
+
+    /// The same options with what is left of the budget after these tests.
+    pub(super) const fn after(self, made: Tests) -> Self {
+        self.budget(self.budget.less(made.work()))
     }
 
     /// Starts from this triangle instead of the last answer's. A wrong or stale one costs one triangle test; `None`

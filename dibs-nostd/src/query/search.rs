@@ -26,7 +26,7 @@ use node::CLOSEST;
 use roots::Roots;
 use slack::{COORDINATES, FLOOR, SLACK, TILT};
 
-use super::Options;
+use super::{Budget, Options};
 use crate::math::sqrt::sqrt;
 use crate::tool::{AxisPair, Tool};
 use crate::tree::RootSet;
@@ -156,8 +156,10 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             return Err(QueryError::Position { vertex: root.pin });
         }
         // The closest pair in a sound tree takes one test of each node's sphere, two of each leaf's plane and one of each
-        // triangle. If corrupt bytes form a loop, this bound ends the search. Other kinds have bounds of their own.
-        let most = header.nodes.saturating_mul(3).saturating_add(header.triangles);
+        // triangle, its plane and exact. If corrupt bytes form a loop, this bound ends the search. Other kinds have bounds of
+        // their own.
+        let triangles = header.triangles.saturating_mul(1 + Budget::TRIANGLE);
+        let most = header.nodes.saturating_mul(3).saturating_add(triangles);
         ties = ties.filter(|_| options.is_signed && tree.has_adjacency());
         if let Some(ties) = &mut ties {
             ties.reset(scale, tree.is_closed() && tool.axis_length() > 0.0);
@@ -168,7 +170,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             tool,
             stack,
             waiting: all.waiting,
-            meter: Meter::new(options.budget.nodes_at_most(most)),
+            meter: Meter::new(options.budget.at_most(most)),
             radius_scale,
             scale,
             slack: SLACK * scale + FLOOR,

@@ -76,7 +76,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
                 .then(|| side::of_many(roots, tree, stack, vertices, found, on_axis, options))
                 .transpose()?;
             let point = OnAxis::new(tool, found.axis_parameter);
-            let left = options.budget.node_tests.saturating_sub(found.node_tests);
+            let left = options.after(found.tests()).budget.tests();
             let at = side::of_point(tree, vertices, found, &point, ties, many, left)?;
             found.node_tests = found.node_tests.saturating_add(at.work);
             found.side = at.side;

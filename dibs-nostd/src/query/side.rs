@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::exact::{Above, Exact};
 use super::normal::{Feature, NORMAL, NoNormal, corners};
 use super::search::{Search, Ties, Waiting};
-use super::{Budget, Options, Proximity};
+use super::{Options, Proximity};
 use crate::math::sqrt::sqrt;
 use crate::tool::AxisPoint;
 use crate::tree::RootSet;
@@ -205,13 +205,7 @@ pub(super) fn of_many<I: Index, V: VertexTable + ?Sized>(
 ) -> Result<Above, QueryError> {
     let (tool, first) = (AxisPoint(point), pair.triangle);
     let at = OnAxis::new(&tool, 0.0);
-    let rest = |pair: &Proximity| {
-        options.budget(options.budget.less(pair.node_tests, pair.triangle_tests))
-    };
-    let add = |pair: &mut Proximity, made: Budget| {
-        pair.node_tests = pair.node_tests.saturating_add(made.node_tests);
-        pair.triangle_tests = pair.triangle_tests.saturating_add(made.triangle_tests);
-    };
+    let rest = |pair: &Proximity| options.after(pair.tests());
     let rough = Exact::<_, _, f32>::new(tree, vertices, &at, 0);
     if tree.is_closed() {
         let search = Search::start(roots, tree, stack, vertices, &tool, &rest(pair), first, None)?;
@@ -220,7 +214,7 @@ pub(super) fn of_many<I: Index, V: VertexTable + ?Sized>(
             let this = rough.is_above_plane(row)?;
             Ok(this.is_some() && *side.get_or_insert(this) == this)
         })?;
-        add(pair, made);
+        pair.add_tests(made);
         if let Some(Some(is_above)) = side
             && is_clear
         {
@@ -228,12 +222,12 @@ pub(super) fn of_many<I: Index, V: VertexTable + ?Sized>(
         }
     }
     let options = rest(pair);
-    let left = options.budget.node_tests / 2;
+    let left = options.budget.tests() / 2;
     let mut exact = Exact::<_, _, f64>::new(tree, vertices, &at, left);
-    let options = options.budget(options.budget.less(left, 0));
+    let options = options.budget(options.budget.less(left));
     let search = Search::start(roots, tree, stack, vertices, &tool, &options, first, None)?;
     let (is_complete, made) = search.each_tie(|row| exact.add(row))?;
-    add(pair, made);
+    pair.add_tests(made);
     pair.node_tests = pair.node_tests.saturating_add(exact.work);
     Ok(if is_complete { exact.answer() } else { Err(NoSide::CutShort) })
 }

@@ -61,7 +61,7 @@ fn of_solid<I: Index, V: VertexTable + ?Sized, T: Tool>(
     roots: RootSet,
 ) -> Result<Proximity, QueryError> {
     let &Asked { tree, vertices, tool, options } = asked;
-    let rest = options.budget(options.budget.less(answer.node_tests, answer.triangle_tests));
+    let rest = options.after(answer.tests());
     let asked = Asked { options: &rest, ..*asked };
     let mut ties = Ties::new();
     let memory = Some(&mut ties);

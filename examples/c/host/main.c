@@ -90,12 +90,12 @@ static void answer(const dibs_tool *tool, const dibs_options *options) {
 }
 
 static bool take_options(char **text, dibs_options *options) {
-    uint32_t words[3];
-    if (!take_words(text, words, 3)) {
+    uint32_t words[2];
+    if (!take_words(text, words, 2)) {
         return false;
     }
-    options->budget = (dibs_budget){.node_tests = words[0], .triangle_tests = words[1]};
-    options->flags = words[2];
+    options->budget = words[0];
+    options->flags = words[1];
     return true;
 }
 

@@ -64,20 +64,20 @@ fn measure() -> Result<(), &'static str> {
         let centre = CENTRE + random.within() * REACH;
         let half = random.within().normalize_or(Vec3::X) * HALF_AXIS;
         let Ok(tool) = Capsule::new(centre - half, centre + half, RADIUS) else { continue };
-        let mut cycles = |node_tests, triangle_tests| {
+        let mut cycles = |tests| {
             // Every other pose finds both caches empty, the worst case.
             if pose % 2 == 1 {
                 core.SCB.clean_invalidate_dcache(&mut core.CPUID);
                 core.SCB.invalidate_icache();
             }
-            let budget = Budget { node_tests, triangle_tests };
+            let budget = Budget::new(tests);
             let start = counter.now();
             let answer = query.closest(&frame, &tool, &Options::cold().unsigned().budget(budget));
             let cycles = counter.since(start);
             answer.map(|answer| (cycles, answer)).map_err(|_| "the query failed")
         };
-        let most = u32::MAX;
-        let [none, nodes, all] = [cycles(0, 0)?, cycles(most, 0)?, cycles(most, most)?];
+        // With no more than a triangle counts as, none is tested.
+        let [none, nodes, all] = [cycles(0)?, cycles(Budget::TRIANGLE)?, cycles(u32::MAX)?];
         raise(&mut bound, none, nodes, all);
         sum += u64::from(all.0);
         largest = largest.max(all.0);
@@ -143,8 +143,8 @@ const SYSTICK_BITS: u32 = 0x00FF_FFFF;
 fn raise(bound: &mut Cost, none: (u32, Proximity), nodes: (u32, Proximity), all: (u32, Proximity)) {
     bound.base = bound.base.max(none.0);
     for (cycles, answer) in [nodes, all] {
-        let tests = Budget { node_tests: answer.node_tests, triangle_tests: 0 };
-        let beyond = u64::from(cycles).saturating_sub(bound.instructions(tests)) as u32;
+        let without = bound.instructions(answer.node_tests, 0);
+        let beyond = u64::from(cycles).saturating_sub(without) as u32;
         match answer.triangle_tests {
             0 => bound.node_test += beyond.div_ceil(answer.node_tests.max(1)),
             tests => bound.triangle_test = bound.triangle_test.max(beyond.div_ceil(tests)),

@@ -13,10 +13,8 @@ use dibs_nostd::{
 use dibs_tests::tree_bytes::reseal;
 use libfuzzer_sys::fuzz_target;
 
-/// Most points of an axis that a depth looks at (`LOOKS` in the core's `query/depth/mod.rs`), and the node tests that it may
-/// take in any tree (`LEAST_WORK`).
-const LOOKS: u32 = 27;
-const LEAST_WORK: u32 = 3_072;
+/// Node tests that a depth may take in any tree (`LEAST_WORK` in the core's `query/depth/mod.rs`).
+const LEAST_WORK: u32 = 4_608;
 
 /// Node tests that the order of ties in f32 and then in f64 takes for a triangle, and for one around a vertex
 /// (`query/precision.rs`).
@@ -70,7 +68,7 @@ fuzz_target!(init: LazyLock::force(&SOUND), |input: &[u8]| {
     }
     let mut options = Options::cold();
     let flags = words.next();
-    let budget = Budget { node_tests: words.next() % 1_000, triangle_tests: words.next() % 100 };
+    let budget = Budget::new(words.next() % 2_000);
     if flags & 1 != 0 {
         options = options.budget(budget);
     }
@@ -111,9 +109,9 @@ fn ask(
         query.closest_wide(rows, tool, &plain),
     ];
     for answer in answers.into_iter().flatten() {
-        let most = most(&tree, tool, answer.side);
-        assert!(answer.node_tests <= budget.node_tests.saturating_add(1).min(most.node_tests));
-        assert!(answer.triangle_tests <= budget.triangle_tests.min(most.triangle_tests));
+        let (nodes, triangles) = most(&tree, tool, answer.side);
+        assert!(answer.node_tests <= nodes && answer.triangle_tests <= triangles);
+        assert!(answer.work() <= budget.tests().saturating_add(1));
         assert!(answer.lower <= answer.separation);
         let is_signed = is_depth(tool, answer.side) || answer.side == Side::Inside;
         assert!(is_signed || answer.lower >= -tool.radius());
@@ -129,13 +127,13 @@ fn is_depth(tool: &impl Tool, side: Side) -> bool {
 }
 
 /// The most tests of an answer with this side, without a budget.
-fn most(tree: &Tree<'_, u16>, tool: &impl Tool, side: Side) -> Budget {
+fn most(tree: &Tree<'_, u16>, tool: &impl Tool, side: Side) -> (u32, u32) {
     let (nodes, triangles) = (tree.node_count(), tree.triangle_count());
     // The closest pair.
     let search = 3 * nodes + triangles;
-    let mut most = Budget { node_tests: search + 1, triangle_tests: triangles + 1 };
+    let (mut node_tests, mut triangle_tests) = (search + 1, triangles + 1);
     if matches!(side, Side::Undefined(NoSide::NotAsked | NoSide::NoAdjacency)) {
-        return most;
+        return (node_tests, triangle_tests);
     }
     // Too many ties to remember are searched again, once for f32 and once for f64. At most all triangles tie, each at a
     // vertex.
@@ -144,13 +142,12 @@ fn most(tree: &Tree<'_, u16>, tool: &impl Tool, side: Side) -> Budget {
     corners.iter().flatten().for_each(|&vertex| around[vertex as usize] += 1);
     let ring = |&row: &u32| around[row as usize];
     let rings: u32 = corners.iter().filter_map(|rows| rows.iter().map(ring).max()).sum();
-    most.node_tests += 2 * search + DISTANCE_COST * triangles + RING_COST * rings;
-    most.triangle_tests += 2 * triangles;
+    node_tests += 2 * search + DISTANCE_COST * triangles + RING_COST * rings;
+    triangle_tests += 2 * triangles;
     if is_depth(tool, side) {
-        // Each exact test beyond the first of a point comes with a node test.
-        let depth = nodes.max(LEAST_WORK);
-        most.node_tests += depth;
-        most.triangle_tests += depth + LOOKS;
+        let depth = (nodes + nodes / 2).max(LEAST_WORK);
+        node_tests += depth;
+        triangle_tests += depth / Budget::TRIANGLE;
     }
-    most
+    (node_tests, triangle_tests)
 }

@@ -218,7 +218,7 @@ fn ask(
     let is_capsule = word(machine)? != 0;
     let how = word(machine)?;
     let warm = word(machine)?;
-    let budget = Budget { node_tests: word(machine)?, triangle_tests: word(machine)? };
+    let budget = Budget::new(word(machine)?);
     let mut options = Options::cold().budget(budget);
     if how & how::SIGNED == 0 {
         options = options.unsigned();

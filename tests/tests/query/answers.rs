@@ -168,14 +168,14 @@ fn every_answer_is_the_recorded_one() {
 /// A single query's kinds.
 fn one_by_one(script: &mut Script) {
     let cold = Options::cold();
-    let few = Budget { node_tests: 60, triangle_tests: 5 };
+    let few = Budget::new(100);
     let one_by_one: [(&str, Options); 6] = [
         ("distance", cold.unsigned()),
         ("distance, warm", Options::new().unsigned()),
         ("distance, budget", cold.unsigned().budget(few)),
         ("side", cold.depth_tolerance(f32::INFINITY)),
         ("depth", cold),
-        ("depth, budget", cold.budget(Budget { node_tests: 400, ..few })),
+        ("depth, budget", cold.budget(Budget::new(440))),
     ];
     for (kind, options) in one_by_one {
         script.add(kind, |all| {
@@ -194,8 +194,7 @@ fn one_by_one(script: &mut Script) {
             all.pair(&query.closest_within(rows, tool, 4.0, &cold).expect("an answer"));
         });
     });
-    for (kind, options) in
-        [("contacts", cold), ("contacts, budget", cold.budget(Budget { node_tests: 400, ..few }))]
+    for (kind, options) in [("contacts", cold), ("contacts, budget", cold.budget(Budget::new(440)))]
     {
         script.add(kind, |all| {
             let mut list = Contacts::<8, 128>::new();
@@ -260,7 +259,7 @@ fn tracked(script: &mut Script) {
         script.add(kind, |all| {
             let mut tracker = new();
             walk(&built, &frames, is_ahead, |tick, surface, tools| {
-                let few = Budget { node_tests: 20 + tick as u32 % 60, triangle_tests: 9 };
+                let few = Budget::new(20 + tick as u32 % 60);
                 let options = if kind.ends_with("budget") { options.budget(few) } else { options };
                 let found = tracker.closest(surface, &tools[0], &options).expect("an answer");
                 all.pair(&found.closest);

@@ -90,11 +90,10 @@ fn a_budget_of_a_chain_is_kept_and_its_interval_holds() {
             let ask =
                 |tool| query.closest(&rows[..], tool, &unsigned).expect("an answer").separation;
             let least = chain.iter().map(ask).fold(f32::INFINITY, f32::min);
-            let budget = Budget { node_tests: rng.u32(..300), triangle_tests: rng.u32(..20) };
+            let budget = Budget::new(rng.u32(..460));
             let found = query.closest_of(&rows[..], &chain, &unsigned.budget(budget));
             let found = found.expect("a short budget is no error").expect("one").proximity;
-            assert!(found.node_tests <= budget.node_tests + chain.len() as u32, "{found:?}");
-            assert!(found.triangle_tests <= budget.triangle_tests, "{found:?}");
+            assert!(found.work() <= budget.tests() + chain.len() as u32, "{found:?}");
             assert!(found.lower <= least + 2.0 * found.accuracy, "{found:?} {least}");
             assert!(found.separation >= least - 2.0 * found.accuracy, "{found:?} {least}");
             cut_short += u32::from(found.lower < found.separation);
@@ -120,7 +119,7 @@ fn a_side_that_a_budget_left_open_is_not_stated() {
             let ask = |tool| query.closest(&rows[..], tool, &cold).expect("an answer").lower;
             let least = chain.iter().map(ask).fold(f32::INFINITY, f32::min);
             let longest = chain.iter().map(Tool::axis_length).fold(0.0, f32::max);
-            let budget = Budget { node_tests: rng.u32(..3_000), triangle_tests: rng.u32(..300) };
+            let budget = Budget::new(rng.u32(..5_400));
             let found = query.closest_of(&rows[..], &chain, &cold.budget(budget));
             let found = found.expect("a short budget is no error").expect("one").proximity;
             if found.side == Side::Undefined(NoSide::CutShort) {
@@ -185,7 +184,7 @@ fn a_warm_triangle_beyond_the_limit_is_not_tested() {
     let tree = built.tree::<u16>().expect("16-bit indices");
     let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
     let rows = built.to_rows(&frames[0]);
-    let budget = Budget { node_tests: 0, triangle_tests: 1 };
+    let budget = Budget::new(8);
     for _ in 0..1_000 {
         let row = TriangleRow(rng.u32(..tree.triangle_count()));
         let corner = rows[tree.corners(row).expect("a row")[0] as usize];
@@ -367,7 +366,7 @@ fn a_budget_of_a_scenes_contacts_is_kept_and_their_bound_holds() {
         let instrument = instrument(near + 20.0 * unit(&mut rng), unit(&mut rng), 25.0);
         let most = 1 << rng.u32(4..20);
         let tests = rng.u32(..most);
-        let budget = Budget { node_tests: tests, triangle_tests: tests };
+        let budget = Budget::new(tests);
         let mut scene: Vec<_> = queries.iter_mut().zip(surfaces.iter().copied()).collect();
         let mut ask = |options: &Options, contacts: &mut Contacts<256, 4096>| {
             Query::contacts_in_scene(&mut scene, &instrument, MARGIN, options, contacts)

@@ -379,7 +379,7 @@ fn a_short_list_and_a_short_budget_state_what_still_holds() {
     holds(&near.iter().map(|c| c.separation).collect::<Vec<_>>(), near.bound());
     let mut cut_short = 0;
     for node_tests in (0..4_000).step_by(23) {
-        let options = Options::cold().budget(Budget { node_tests, triangle_tests: node_tests / 4 });
+        let options = Options::cold().budget(Budget::new(node_tests));
         query.contacts(rows.as_slice(), &tool, MARGIN, &options, &mut near).expect("an answer");
         cut_short += usize::from(near.bound() < MARGIN);
         let refused = near.within(MARGIN).err();
@@ -401,7 +401,7 @@ fn no_budget_hides_a_contact_at_a_vertex() {
     let mut contacts = |y, node_tests| {
         let (start, end) = (Vec3::new(-15.0, y, 4.0), Vec3::new(15.0, y + 2.0, 4.5));
         let tool = Capsule::new(start, end, 1.0).expect("valid");
-        let options = Options::cold().budget(Budget { node_tests, triangle_tests: u32::MAX });
+        let options = Options::cold().budget(Budget::new(node_tests));
         let mut found = Contacts::<64>::new();
         query.contacts(rows.as_slice(), &tool, MARGIN, &options, &mut found).expect("an answer");
         (found.iter().map(|at| at.separation).collect::<Vec<_>>(), found.bound())
@@ -439,7 +439,7 @@ fn no_budget_turns_the_force_inwards() {
     for height in [-12.0, -3.0, -0.5, 0.5, 4.0] {
         let tool = Sphere::new(out * (40.0 + height), 1.0).expect("valid");
         for node_tests in 0..150 {
-            let budget = Budget { node_tests, triangle_tests: node_tests / 4 };
+            let budget = Budget::new(node_tests);
             let options = Options::cold().budget(budget);
             let closest = query.contacts(rows.as_slice(), &tool, 5.0, &options, &mut contacts);
             let closest = closest.expect("a short budget is no error");

@@ -36,10 +36,7 @@ fn an_axis_through_several_walls_is_as_deep_under_any_budget() {
             let (from, to) = (Vec3::X * -60.0 + lean, Vec3::X * 170.0 - 0.7 * lean);
             let tool = Capsule::new(from, to, 1.0).expect("a valid tool");
             let whole = query.closest(rows.as_slice(), &tool, &Options::cold()).expect("an answer");
-            let budgets = (0..200).map(|tests| (3 * tests, u32::MAX));
-            let budgets = budgets.chain((0..60).map(|tests| (u32::MAX, tests)));
-            for (node_tests, triangle_tests) in budgets {
-                let budget = Budget { node_tests, triangle_tests };
+            for budget in (0..300).map(|tests| Budget::new(3 * tests)) {
                 let options = Options::cold().budget(budget);
                 let found = query.closest(rows.as_slice(), &tool, &options).expect("an answer");
                 cut += usize::from(found.lower < whole.lower);
@@ -101,12 +98,11 @@ fn a_search_that_ended_knows_not_where_the_axis_meets_the_surface() {
             if whole.side != Side::Crossing {
                 continue;
             }
-            for triangle_tests in 0..80 {
-                let budget = Budget { node_tests: u32::MAX, triangle_tests };
+            for budget in (0..300).map(|tests| Budget::new(4 * tests)) {
                 let options = Options::cold().budget(budget);
                 let found = query.closest(rows.as_slice(), &tool, &options).expect("an answer");
                 cut += usize::from(found.lower < whole.lower);
-                assert!(holds(&found, &whole), "{triangle_tests}: {whole:?} {found:?}");
+                assert!(holds(&found, &whole), "{budget:?}: {whole:?} {found:?}");
             }
         }
     }
@@ -149,18 +145,18 @@ fn a_tick_that_ended_knows_not_where_the_axis_meets_the_surface() {
             if whole.side != Side::Crossing {
                 continue;
             }
-            for triangle_tests in 0..60 {
+            for tests in 0..200 {
                 let mut tracker = Tracker::<u16, MAX_STACK, 256>::new(&tree).expect("deep enough");
-                if triangle_tests % 2 == 0 {
+                if tests % 2 == 0 {
                     let aside = unit(&mut rng) * 3.0;
                     let beside = Capsule::new(from + aside, to + aside, 0.5).expect("a valid tool");
                     tracker.closest(&surface, &beside, &Options::new()).expect("an answer");
                 }
-                let budget = Budget { node_tests: u32::MAX, triangle_tests };
+                let budget = Budget::new(5 * tests);
                 let options = Options::new().budget(budget);
                 let found = tracker.closest(&surface, &tool, &options).expect("an answer").closest;
                 cut += usize::from(found.lower < whole.lower);
-                assert!(holds(&found, &whole), "{triangle_tests}: {whole:?} {found:?}");
+                assert!(holds(&found, &whole), "{budget:?}: {whole:?} {found:?}");
             }
         }
     }

@@ -81,7 +81,7 @@ fn run_with<I: Index>(case: &Case<'_>, tree: &Tree<'_, I>, seed: u64) -> Tally {
                         last = found.triangle;
                     }
                 }
-                let budget = Budget { node_tests: rng.u32(..200), triangle_tests: rng.u32(..20) };
+                let budget = Budget::new(rng.u32(..360));
                 let options = Options::cold().budget(budget);
                 let both = [
                     ask::closest(&mut query, rows.as_slice(), &tool, &options),
@@ -116,8 +116,7 @@ fn check(rows: &[Vec3], tool: &Instrument, truth: &OraclePair, found: &Proximity
 
 fn check_interval(truth: &OraclePair, cut: &Proximity, budget: Budget) {
     let accuracy = f64::from(cut.accuracy);
-    assert!(cut.node_tests <= budget.node_tests + 1, "{budget:?} {cut:?}");
-    assert!(cut.triangle_tests <= budget.triangle_tests, "{budget:?} {cut:?}");
+    assert!(cut.work() <= budget.tests() + 1, "{budget:?} {cut:?}");
     assert!(cut.lower <= cut.separation, "{budget:?} {cut:?}");
     let inside = f64::from(cut.lower) - accuracy <= truth.separation
         && truth.separation <= f64::from(cut.separation) + accuracy;

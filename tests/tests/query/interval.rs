@@ -62,7 +62,7 @@ fn both_ends_hold_the_truth_and_close_in_on_it_as_the_budget_grows() {
 
             // The same query with growing budgets.
             let mut before: Option<Proximity> = None;
-            let mut budget = Budget { node_tests: 0, triangle_tests: 0 };
+            let mut budget = Budget::new(0);
             for _ in 0..BUDGETS {
                 let found = ask(&options.budget(budget));
                 if let Some(before) = before {
@@ -71,8 +71,7 @@ fn both_ends_hold_the_truth_and_close_in_on_it_as_the_budget_grows() {
                     assert!(found.separation <= most, "{budget:?} {before:?} {found:?}");
                 }
                 before = Some(found);
-                budget.node_tests += rng.u32(..1 + budget.node_tests / 2 + 4);
-                budget.triangle_tests += rng.u32(..2 + budget.triangle_tests / 2);
+                budget = Budget::new(budget.tests() + rng.u32(..budget.tests() / 2 + 13));
             }
             let whole = ask(&options.budget(Budget::UNLIMITED));
             assert!(whole.lower == whole.separation, "{whole:?}");
@@ -80,7 +79,7 @@ fn both_ends_hold_the_truth_and_close_in_on_it_as_the_budget_grows() {
             assert!(last.lower <= whole.lower, "{last:?} {whole:?}");
 
             // The same pose, tick after tick.
-            let short = Budget { node_tests: rng.u32(..120), triangle_tests: rng.u32(..6) };
+            let short = Budget::new(rng.u32(..168));
             let mut options = options.budget(short);
             let mut before: Option<Proximity> = None;
             for _ in 0..TICKS {

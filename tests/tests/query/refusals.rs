@@ -84,8 +84,7 @@ fn a_budget_of_nothing_tests_no_triangle() {
         // Unsigned, because a query that was cut short has no side.
         let unsigned = Options::cold().unsigned();
         let whole = query.closest(rows.as_slice(), &sphere, &unsigned).expect("an answer");
-        for node_tests in [0, u32::MAX] {
-            let budget = Budget { node_tests, triangle_tests: 0 };
+        for budget in [Budget::new(0), Budget::new(Budget::TRIANGLE - 1)] {
             let options = unsigned.warm_start(whole.triangle).budget(budget);
             for found in [
                 query.closest(rows.as_slice(), &sphere, &options),

@@ -78,7 +78,7 @@ fn the_answer_is_that_of_exhaustive_search() {
             for _ in 0..50 {
                 let tool = pose(&rows, &triangles, &mut rng);
                 let truth = exhaustive(&rows, &triangles, &tool).expect("a triangle").separation;
-                let budget = Budget { node_tests: rng.u32(..90), triangle_tests: rng.u32(..9) };
+                let budget = Budget::new(rng.u32(..162));
                 let cold = Options::cold();
                 let answers = [
                     closest(&mut query, &rows[..], &tool, &cold),

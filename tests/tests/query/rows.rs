@@ -261,8 +261,8 @@ fn a_row_without_budget_is_that_of_the_contact() {
     let whole = query.closest(rows.as_slice(), &tool, &Options::cold()).expect("an answer");
     let mut kinds = [0; 2];
     for more in [0, 10, 100, 10_000] {
-        let node_tests = whole.node_tests + more;
-        let budget = Budget { node_tests, triangle_tests: u32::MAX };
+        let node_tests = whole.work() + more;
+        let budget = Budget::new(node_tests);
         let options = Options::cold().budget(budget);
         let found = query.contacts(rows.as_slice(), &tool, 5.0, &options, &mut contacts);
         assert_eq!(found.expect("an answer").side, Side::Crossing);

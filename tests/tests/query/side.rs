@@ -232,7 +232,7 @@ fn a_side_that_is_not_there_says_why() {
     is(ask(&bare, &round, at, Options::cold()), NoSide::NoAdjacency);
     let built = Builder::new().build(&round).expect("a valid mesh");
     is(ask(&built, &round, at, Options::cold().unsigned()), NoSide::NotAsked);
-    let short = Budget { node_tests: 9, triangle_tests: 1 };
+    let short = Budget::new(17);
     let cut = ask(&built, &round, at, Options::cold().budget(short));
     assert_eq!(cut.side, Side::Undefined(NoSide::CutShort));
     assert_eq!(ask(&built, &round, at, Options::cold()).side, Side::Inside);
@@ -257,11 +257,11 @@ fn a_depth_that_was_cut_short_is_certified() {
     let whole = query.closest(rows.as_slice(), &tool, &Options::cold()).expect("an answer");
     assert_eq!(whole.side, Side::Crossing);
     let mut cut_short = 0;
-    for node_tests in (0..whole.node_tests + 40).step_by(5) {
-        let budget = Budget { node_tests, triangle_tests: u32::MAX };
+    for node_tests in (0..whole.work() + 40).step_by(5) {
+        let budget = Budget::new(node_tests);
         let cut = query.closest(rows.as_slice(), &tool, &Options::cold().budget(budget));
         let cut = cut.expect("a short budget is no error");
-        assert!(cut.node_tests <= node_tests + 1, "{budget:?} {cut:?}");
+        assert!(cut.work() <= node_tests + 1, "{budget:?} {cut:?}");
         if cut.side == Side::Crossing {
             assert!(cut.lower <= whole.separation && cut.separation >= whole.lower, "{cut:?}");
             cut_short += usize::from(cut.separation > whole.separation + 1.0);

@@ -191,8 +191,7 @@ fn nothing_is_jumped_over() {
                 options = options.unsigned();
             }
             if rng.u32(..8) == 0 {
-                let (node_tests, triangle_tests) = (rng.u32(..60), rng.u32(..6));
-                options = options.budget(Budget { node_tests, triangle_tests });
+                options = options.budget(Budget::new(rng.u32(..108)));
             }
             let found = way.sweep(&mut tracker, &step, &options).expect("an answer");
             tally.check(&way, &found);
@@ -265,7 +264,7 @@ fn a_sweep_at_rest_needs_no_budget() {
     for _ in 0..2_000 {
         let mut tracker = Follower::new(&tree).expect("deep enough");
         let tool = Sphere::new(unit(&mut rng) * 120.0, 0.0).expect("valid");
-        let budget = Budget { node_tests: rng.u32(..60), triangle_tests: rng.u32(..10) };
+        let budget = Budget::new(rng.u32(..140));
         let sweep = Sweep { step: &step, t: [0.0, 0.0], tools: [tool, tool] };
         let swept = tracker.sweep(&sweep, 1.0, 10, &Options::new().budget(budget));
         let swept = swept.expect("a short budget is no error");

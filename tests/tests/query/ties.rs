@@ -387,17 +387,17 @@ fn many_ties_have_a_side() {
         let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
         let ask = |query: &mut Query<u16, MAX_STACK>, tests: u32| {
             let tool = Sphere::new(at, 1.0).expect("valid");
-            let budget = Budget { node_tests: tests, triangle_tests: u32::MAX };
+            let budget = Budget::new(tests);
             let options = Options::cold().budget(budget);
             query.closest(rows.as_slice(), &tool, &options).expect("an answer")
         };
         let found = ask(&mut query, u32::MAX);
         assert_eq!(found.side, side, "{at} {found:?}");
         // Whatever the budget, the side is right or not known, and the budget holds.
-        for tests in (0..found.node_tests + 10).step_by(7) {
+        for tests in (0..found.work() + 10).step_by(7) {
             let cut = ask(&mut query, tests);
             assert!(cut.side == side || cut.side == Side::Undefined(NoSide::CutShort), "{cut:?}");
-            assert!(cut.node_tests <= tests + 1, "{tests} {cut:?}");
+            assert!(cut.work() <= tests + 1, "{tests} {cut:?}");
         }
     }
     // The deepest point of a capsule is on the axis of the drum.

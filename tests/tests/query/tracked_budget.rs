@@ -36,7 +36,7 @@ impl Path {
 /// Any budget, from none to nearly enough.
 fn any_budget(rng: &mut Rng) -> Budget {
     let up_to = |most: u32, rng: &mut Rng| (most as f32 * rng.f32().powi(3)) as u32;
-    Budget { node_tests: up_to(4_000, rng), triangle_tests: up_to(300, rng) }
+    Budget::new(up_to(6_000, rng))
 }
 
 fn meet(one: Interval, other: Interval) -> bool {

@@ -54,7 +54,7 @@ fn the_closest_of_tracked_pairs_is_that_of_whole_queries() {
                 .enumerate()
                 .map(|(at, tracker)| (tracker, &surfaces[at / 8], &capsules[at % 8]))
                 .collect();
-            let budget = (tick % 11 == 10).then_some(Budget { node_tests: 90, triangle_tests: 9 });
+            let budget = (tick % 11 == 10).then_some(Budget::new(162));
             let asked = budget.map_or(options, |budget| options.budget(budget));
             let found = Tracker::closest_of(&mut pairs, &asked).expect("an answer");
             let found = found.expect("sixteen pairs");

@@ -152,8 +152,7 @@ fn contacts_survive_leaps_rests_budgets_and_other_trackers() {
             }
             let share = tick as f32 / 30.0;
             let options = match rng.u32(..8) {
-                0 => Options::new()
-                    .budget(Budget { node_tests: rng.u32(..800), triangle_tests: rng.u32(..100) }),
+                0 => Options::new().budget(Budget::new(rng.u32(..1_600))),
                 _ => Options::new(),
             };
             let (tracker, step) =
@@ -189,7 +188,7 @@ fn no_budget_hides_contacts_for_which_the_front_has_no_place() {
         let at = rows[row as usize] * 1.05;
         let tool = Sphere::new(at, 2.0).expect("a valid sphere");
         for node_tests in (0..600).step_by(3) {
-            let options = Options::new().budget(Budget { node_tests, triangle_tests: 1_000 });
+            let options = Options::new().budget(Budget::new(node_tests));
             compare(&mut tracker, &surface, &tool, &options, &mut list, &mut found);
         }
     }
@@ -217,7 +216,7 @@ fn a_search_that_was_cut_short_doubles_no_contact() {
         let tool = Sphere::new(rows[row as usize] * 1.05, 2.0).expect("a valid sphere");
         query.contacts(&surface, &tool, MARGIN, &Options::cold(), &mut whole).expect("an answer");
         for node_tests in (20..900).step_by(40) {
-            let budget = Budget { node_tests, triangle_tests: 1_000 };
+            let budget = Budget::new(node_tests);
             let options = Options::new().budget(budget);
             tracker.contacts(&surface, &tool, MARGIN, &options, &mut list).expect("an answer");
             tracker

@@ -70,9 +70,7 @@ fn the_depth_is_that_of_a_whole_query() {
         let surface = step.as_ref().expect("a step").at((tick % 30) as f32 / 30.0);
         let capsule = shaft.step();
         let budget = match shaft.rng.u32(..50) {
-            0 => {
-                Budget { node_tests: shaft.rng.u32(..1_000), triangle_tests: shaft.rng.u32(..100) }
-            }
+            0 => Budget::new(shaft.rng.u32(..1_800)),
             _ => Budget::UNLIMITED,
         };
         let options = Options::new().budget(budget);

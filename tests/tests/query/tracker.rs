@@ -102,11 +102,7 @@ impl<'t, const OPENED: usize> Subject<'t, OPENED> {
                 self.tally
             );
             // The root is not counted.
-            assert!(
-                found.node_tests <= budget.node_tests.saturating_add(1),
-                "{tracked:?} {budget:?}"
-            );
-            assert!(found.triangle_tests <= budget.triangle_tests, "{tracked:?} {budget:?}");
+            assert!(found.work() <= budget.tests().saturating_add(1), "{tracked:?} {budget:?}");
             self.tally.cut_short += usize::from(found.lower < found.separation);
         } else {
             let apart = (found.separation - whole.separation).abs() / accuracy;
@@ -184,8 +180,7 @@ fn wander<const OPENED: usize>(mesh: &Mesh, ticks: usize, seed: u64) -> Tally {
         let ticks_of_frame = rng.u32(..20);
         for tick in 0..ticks_of_frame {
             tool = next_tool(&tool, &after, &triangles, &mut rng);
-            let budget = (rng.u32(..10) == 0)
-                .then(|| Budget { node_tests: rng.u32(..60), triangle_tests: rng.u32(..6) });
+            let budget = (rng.u32(..10) == 0).then(|| Budget::new(rng.u32(..108)));
             let share = tick as f32 / ticks_of_frame as f32;
             let limit = Options::cold().unsigned();
             let is_known = rng.bool();
@@ -233,7 +228,7 @@ fn a_full_front_falls_back_on_whole_queries() {
     assert!(full > 0 && none > 0, "{tally:?}");
 }
 
-/// A tick that needs more triangle tests than its budget has makes as many as the budget has.
+/// A tick that needs more tests than its budget has makes as many as the budget has.
 #[test]
 fn a_tick_takes_all_of_its_budget_and_no_more() {
     let mesh = generate::heart(320).expect("a valid size").mesh;
@@ -244,25 +239,29 @@ fn a_tick_takes_all_of_its_budget_and_no_more() {
     let mut most = 0;
     for row in (0..rows.len()).step_by(7) {
         let sphere = Sphere::new(rows[row] * 1.2, 1.0).expect("valid");
-        let first = |triangle_tests| {
+        let first = |budget| {
             let mut tracker = Tracker::<u16, MAX_STACK, 64>::new(&tree).expect("enough");
-            let budget = Budget { node_tests: u32::MAX, triangle_tests };
             let options = Options::cold().unsigned().budget(budget);
             tracker.closest(&surface, &sphere, &options).expect("an answer").closest
         };
-        let whole = first(u32::MAX);
-        let enough = whole.triangle_tests;
-        // One test more than needed changes nothing.
-        assert_eq!(first(enough + 1), whole);
-        most = most.max(enough);
-        for too_few in 0..enough {
-            let found = first(too_few);
-            assert_eq!(found.triangle_tests, too_few, "of {enough}");
+        let whole = first(Budget::UNLIMITED);
+        // A plane's test needs an exact one to spare.
+        let enough = whole.work() + Budget::TRIANGLE;
+        assert_eq!(first(Budget::new(enough)), whole);
+        most = most.max(whole.triangle_tests);
+        for too_few in 0..whole.work() - 1 {
+            let found = first(Budget::new(too_few));
+            // No children are tested that do not all fit in.
+            let spare = 8.max(1 + Budget::TRIANGLE);
+            assert!(
+                found.work() <= too_few + 1 && found.work() + spare > too_few,
+                "{too_few} {found:?}"
+            );
             assert!(found.separation >= whole.separation, "{found:?} {whole:?}");
             assert!(found.lower <= whole.separation + whole.accuracy, "{found:?} {whole:?}");
         }
         // Without a test there is no closest triangle.
-        assert_eq!(first(0).triangle, None);
+        assert_eq!(first(Budget::new(0)).triangle, None);
     }
     assert!(most >= 3, "{most} tests at most");
 }
@@ -287,7 +286,7 @@ fn odometers_wrap() {
         let tool = Instrument::capsule(tip, tip + Vec3::ONE * size, 1.0);
         // For a long time no node is tested, so that bounds get as old as they can.
         let is_starved = tick / 8_000 % 3 == 1;
-        let budget = is_starved.then_some(Budget { node_tests: 0, triangle_tests: 1 });
+        let budget = is_starved.then_some(Budget::new(8));
         subject.tick(&surface, &tool, &Options::cold().unsigned(), budget);
     }
     println!("{:?}", subject.tally);

@@ -237,8 +237,7 @@ fn a_list_with_too_few_places_still_has_the_wall() {
         let tool = Capsule::new(Vec3::new(-30.0, -turn, z), Vec3::new(30.0, turn, z), RADIUS)
             .expect("valid");
         for node_tests in [u32::MAX, 2_500, 2_000] {
-            let options =
-                Options::cold().budget(Budget { node_tests, triangle_tests: node_tests / 8 });
+            let options = Options::cold().budget(Budget::new(node_tests));
             let closest = query.contacts(rows.as_slice(), &tool, 5.0, &options, &mut list);
             let closest = closest.expect("an answer");
             if closest.side != Side::Outside {

@@ -99,12 +99,11 @@ fn more_budget_tells_no_less() {
             query.closest(rows.as_slice(), &tool, &Options::cold().unsigned()).expect("an answer");
         let (mut lower, mut upper) = (f32::NEG_INFINITY, f32::INFINITY);
         for node_tests in (0..400).step_by(9) {
-            let budget = Budget { node_tests, triangle_tests: node_tests / 16 };
+            let budget = Budget::new(node_tests);
             let options = Options::cold().unsigned().budget(budget);
             let found = query.closest_wide(rows.as_slice(), &tool, &options);
             let found = found.expect("a short budget is no error");
-            assert!(found.node_tests <= node_tests + 1, "{budget:?} {found:?}");
-            assert!(found.triangle_tests <= budget.triangle_tests, "{budget:?} {found:?}");
+            assert!(found.work() <= budget.tests() + 1, "{budget:?} {found:?}");
             assert!(found.lower <= truth.separation + found.accuracy, "{found:?} {truth:?}");
             assert!(found.separation >= truth.separation - found.accuracy, "{found:?} {truth:?}");
             assert!(found.lower >= lower && found.separation <= upper + found.accuracy);

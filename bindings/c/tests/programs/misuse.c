@@ -95,13 +95,13 @@ static void values(const float *positions, uint32_t vertices) {
     dibs_force force;
     dibs_contact contact;
     dibs_row rows[1];
-    dibs_budget budget;
+    uint32_t budget;
     dibs_frame_facts facts;
     size_t count;
     const dibs_vec3 zero = {0.0f, 0.0f, 0.0f};
-    const dibs_options options = {{DIBS_UNLIMITED, DIBS_UNLIMITED}, 0.0f, 8, 0};
-    const dibs_options label = {{DIBS_UNLIMITED, DIBS_UNLIMITED}, 0.0f, DIBS_CONTACTS_OF, 256};
-    const dibs_options tolerance = {{DIBS_UNLIMITED, DIBS_UNLIMITED}, -1.0f, 0, 0};
+    const dibs_options options = {DIBS_UNLIMITED, 0.0f, 8, 0};
+    const dibs_options label = {DIBS_UNLIMITED, 0.0f, DIBS_CONTACTS_OF, 256};
+    const dibs_options tolerance = {DIBS_UNLIMITED, -1.0f, 0, 0};
     const dibs_tool no_radius = {tool.start, tool.end, -1.0f};
     const dibs_tool far_away = {{1e30f, 0.0f, 0.0f}, tool.end, 1.0f};
     const dibs_wall no_spring = {0.0f, 0.0f, 0.0f, 5.0f, 5.0f};

@@ -114,7 +114,7 @@ impl Pose {
         let start = rows[random.usize(..rows.len())] + near;
         let end = if random.u8(..3) == 0 { start } else { start + span };
         let budget = match random.u8(..5) {
-            0 => Budget { node_tests: random.u32(..200), triangle_tests: random.u32(..20) },
+            0 => Budget::new(random.u32(..360)),
             _ => Budget::UNLIMITED,
         };
         let radius = random.f32() * 3.0;
@@ -125,9 +125,8 @@ impl Pose {
         let Self { start, end, radius, budget, is_cold, .. } = self;
         let numbers = [start.x, start.y, start.z, end.x, end.y, end.z, *radius];
         let numbers = numbers.map(|number| number.to_string()).join(" ");
-        let Budget { node_tests, triangle_tests } = budget;
         let flags = u32::from(*is_cold);
-        writeln!(lines, "pose {numbers} {node_tests} {triangle_tests} {flags}").expect("a string");
+        writeln!(lines, "pose {numbers} {} {flags}", budget.tests()).expect("a string");
     }
 
     fn options(&self) -> Options {

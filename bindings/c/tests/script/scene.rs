@@ -31,15 +31,14 @@ impl Scene {
             joints.push(joints[joints.len() - 1] + span);
         }
         let budget = match random.u8(..4) {
-            0 => Budget { node_tests: random.u32(..400), triangle_tests: random.u32(..40) },
+            0 => Budget::new(random.u32(..720)),
             _ => Budget::UNLIMITED,
         };
         Self { other: random.usize(..FRAMES), joints, radius: random.f32() * 3.0, budget }
     }
 
     pub fn write(&self, lines: &mut String) {
-        let Budget { node_tests, triangle_tests } = self.budget;
-        write!(lines, "scene {} {node_tests} {triangle_tests} 0", self.other).expect("a string");
+        write!(lines, "scene {} {} 0", self.other, self.budget.tests()).expect("a string");
         for ends in self.joints.windows(2) {
             for number in ends.iter().flat_map(Vec3::to_array).chain([self.radius]) {
                 write!(lines, " {number}").expect("a string");

@@ -336,17 +336,13 @@ impl<'f> Session<'f> {
     ) -> Result<Option<Proximity>, FilterError> {
         let Filter { instructions, cost, options, .. } = self.filter;
         let left = instructions.saturating_sub(self.instructions);
-        // Five eighths for node tests, of which a cold search makes many, and three for triangle tests.
-        let Budget { node_tests, .. } =
-            Budget::for_instructions(left.saturating_add(left / 4), cost);
-        let Budget { triangle_tests, .. } = Budget::for_instructions(left - left / 4, cost);
-        let budget = Budget { node_tests, triangle_tests };
-        if budget.node_tests < LEAST_TESTS {
+        let budget = Budget::for_instructions(left, cost);
+        if budget.tests() < LEAST_TESTS {
             return Ok(None);
         }
         let found = pair.closest(ends, &options.signed().budget(budget))?;
         let Proximity { node_tests, triangle_tests, .. } = found;
-        let spent = cost.instructions(Budget { node_tests, triangle_tests });
+        let spent = cost.instructions(node_tests, triangle_tests);
         let spent = u32::try_from(spent).unwrap_or(u32::MAX);
         self.instructions = self.instructions.saturating_add(spent);
         self.queries += 1;

@@ -15,6 +15,7 @@ use glam::Vec3;
 use super::Contact;
 use super::add::{NO_DIRECTION, Pair};
 use crate::math::sqrt::sqrt;
+use crate::query::made::Tests;
 use crate::query::search::{Search, WHOLE, Waiting};
 use crate::query::{Options, Proximity};
 use crate::tool::AxisPoint;
@@ -89,7 +90,7 @@ struct Look<'a, 't, I, V: ?Sized> {
     vertices: &'a V,
     roots: RootSet,
     options: Options,
-    spent: Budget,
+    spent: Tests,
 }
 
 impl<I: Index, V: VertexTable + ?Sized> Look<'_, '_, I, V> {
@@ -98,15 +99,14 @@ impl<I: Index, V: VertexTable + ?Sized> Look<'_, '_, I, V> {
     #[inline(never)]
     fn at(&mut self, stack: &mut [Waiting], point: Vec3) -> Result<Option<Proximity>, QueryError> {
         let Self { tree, vertices, roots, options, spent } = self;
-        let Budget { node_tests, triangle_tests } =
-            options.budget.less(spent.node_tests, spent.triangle_tests);
-        let Some(node_tests) = node_tests.checked_sub(1 + LOOK_COST) else { return Ok(None) };
-        let options = options.budget(Budget { node_tests, triangle_tests });
+        let left = options.after(*spent).budget.tests().checked_sub(1 + LOOK_COST);
+        let Some(left) = left else { return Ok(None) };
+        let options = options.budget(Budget::new(left));
         let (point, first) = (AxisPoint(point), options.first(None));
         let search = Search::start(*roots, tree, stack, *vertices, &point, &options, first, None)?;
         let found = search.run::<WHOLE>(f32::INFINITY)?;
-        spent.node_tests = spent.node_tests.saturating_add(found.node_tests + LOOK_COST);
-        spent.triangle_tests = spent.triangle_tests.saturating_add(found.triangle_tests);
+        *spent = spent.and(found.tests());
+        spent.node_tests = spent.node_tests.saturating_add(LOOK_COST);
         Ok(Some(found).filter(|found| !found.is_cut_short()))
     }
 }
@@ -121,14 +121,14 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
         own: &Contact,
         stack: &mut [Waiting],
         options: &Options,
-    ) -> Result<(Across, Budget), QueryError> {
+    ) -> Result<(Across, Tests), QueryError> {
         let &Self { tree, vertices, tool, closest, .. } = self;
         let mut look = Look {
             tree,
             vertices,
             roots: tree.shells_of(tree.root_of(own.triangle.0)),
             options: options.warm_start(Some(own.triangle)),
-            spent: Budget { node_tests: 0, triangle_tests: 0 },
+            spent: Tests::NONE,
         };
         // The searches take the positions as exact.
         let accuracy = closest.accuracy - vertices.position_error();

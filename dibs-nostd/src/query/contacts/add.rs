@@ -7,6 +7,7 @@ use super::basins::{Basins, Near, Place};
 use super::low::Found;
 use super::{Contact, Contacts};
 use crate::math::sqrt::sqrt;
+use crate::query::made::Tests;
 use crate::query::search::Waiting;
 use crate::query::side::{self, OnAxis, Side};
 use crate::query::{NoSide, Options, Proximity};
@@ -84,7 +85,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             f32,
             f32,
         ) -> Result<Found, QueryError>,
-    ) -> Result<Budget, QueryError> {
+    ) -> Result<Tests, QueryError> {
         let Self { found, basins } = self;
         let &Pair { tree, vertices, tool, closest, .. } = pair;
         let margin = found.margin;
@@ -98,7 +99,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         let is_of = |row| options.part.is_none() || tree.label(row) == options.part;
         let mut own =
             pair.contact(closest).filter(|at| at.separation <= margin && is_of(at.triangle));
-        let mut spent = Budget { node_tests: 0, triangle_tests: 0 };
+        let mut spent = Tests::NONE;
         if matches!(closest.side, Side::Inside | Side::Crossing)
             && let Some(contact) = &mut own
         {
@@ -110,7 +111,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             }
             return Ok(spent);
         }
-        let options = &options.budget(options.budget.less(spent.node_tests, spent.triangle_tests));
+        let options = &options.after(spent);
         let ridge = (margin * RIDGE) + 2.0 * accuracy;
         let limit = tool.radius() + margin + ridge;
         let Found { complete, beyond, tests: mut made } =
@@ -120,7 +121,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         if let Some(contact) = own.filter(|_| is_crossing) {
             found.insert(contact);
         }
-        let left = options.budget.triangle_tests.saturating_sub(made.triangle_tests);
+        let left = options.after(made).budget.tests() / Budget::TRIANGLE;
         let mut look = Looking { pair, limit: limit + ridge, accuracy, left };
         let (mut least, mut meets) = (f32::INFINITY, 0_u32);
         let is_left_out = |row| !is_of(TriangleRow(row));
@@ -187,10 +188,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             // A valley's lowest triangle is less than a ridge below the low one that was visited.
             found.lower_bound(from - ridge - tool.radius());
         }
-        Ok(Budget {
-            node_tests: made.node_tests.saturating_add(spent.node_tests),
-            triangle_tests: made.triangle_tests.saturating_add(spent.triangle_tests),
-        })
+        Ok(made.and(spent))
     }
 }
 

@@ -5,12 +5,13 @@ use super::add::{Pair, near};
 use super::basins::Basins;
 use crate::math::sqrt::sqrt;
 use crate::query::Options;
+use crate::query::made::Tests;
 use crate::query::memory::range::RangeFrontMut;
 use crate::query::search::{Search, Waiting};
 use crate::tool::AxisPair;
 use crate::tree::RootSet;
 use crate::unavailable::QueryError;
-use crate::{Budget, Index, Tool, VertexTable};
+use crate::{Index, Tool, VertexTable};
 
 /// The end of a search for low triangles. All that are closer than both distances were entered.
 pub(super) struct Found {
@@ -18,7 +19,7 @@ pub(super) struct Found {
     pub complete: f32,
     /// Triangles that are farther were not visited.
     pub beyond: f32,
-    pub tests: Budget,
+    pub tests: Tests,
 }
 
 impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
@@ -28,7 +29,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         pair: &Pair<'_, I, V, T>,
         stack: &mut [Waiting],
         options: &Options,
-    ) -> Result<Budget, QueryError> {
+    ) -> Result<Tests, QueryError> {
         self.add_from(pair, stack, options, |basins, stack, options, limit, ridge| {
             let mut low = Low::new(basins, limit, pair);
             let search = over_range(pair, stack, options)?;
@@ -45,7 +46,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         stack: &mut [Waiting],
         options: &Options,
         mut front: RangeFrontMut<'_>,
-    ) -> Result<Budget, QueryError> {
+    ) -> Result<Tests, QueryError> {
         self.add_from(pair, stack, options, |basins, stack, options, limit, ridge| {
             let mut low = Low::new(basins, limit, pair);
             let search = over_range(pair, stack, options)?;

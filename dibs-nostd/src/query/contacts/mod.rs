@@ -306,8 +306,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         contacts: &mut Contacts<N, NEAR>,
     ) -> Result<Proximity, QueryError> {
         let closest = self.closest(vertices, tool, options)?;
-        let options =
-            options.budget(options.budget.less(closest.node_tests, closest.triangle_tests));
+        let options = options.after(closest.tests());
         let pair =
             Pair { tree: &self.tree, vertices, tool, closest: &closest, surface: 0, number: 0 };
         contacts.add(&pair, &mut self.stack, &options)?;

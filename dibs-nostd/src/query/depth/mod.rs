@@ -8,8 +8,8 @@
 //! Steps from the triangles of the two points beside it often find one that shows a point to be no deeper. Such a point is
 //! not searched.
 //!
-//! The work is bounded: it takes no more node tests than the tree has nodes, or 3,072 if that is more, and then ends with
-//! the interval so far.
+//! The work is bounded: it takes as long as 1.5 node tests for each of the tree's nodes at most, or as 4,608 if that is more,
+//! and then ends with the interval so far.
 //!
 //! A tracker keeps the bounds. Tool and surface change a depth by at most their motion, so the next tick looks only at
 //! the parts whose bounds have come above the deepest point by more than the tolerance.
@@ -27,7 +27,7 @@ use super::memory::depth::{Point, Points};
 use super::memory::leaves::Leaves;
 use super::search::{Search, Ties, UNTIL, Waiting};
 use super::side::{self, COORDINATES, NoSide, OnAxis, Side};
-use super::{Budget, Options, Proximity};
+use super::{Options, Proximity};
 use crate::tool::{AxisPoint, Tool};
 use crate::tree::RootSet;
 use crate::unavailable::QueryError;
@@ -48,7 +48,7 @@ const LEAST_TOLERANCE: f32 = 32.0;
 const LOOKS: u32 = 27;
 
 /// Node tests that any depth may take, however small the tree.
-const LEAST_WORK: u32 = 3_072;
+const LEAST_WORK: u32 = 4_608;
 
 /// Node tests that take as long as the work for a point of the axis besides its search. Without them a budget would not
 /// bound a tracker's tick, which may look at many points and triangles without a search.
@@ -103,10 +103,9 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     ) -> Self {
         let mut options = *options;
         options.stretch = options.stretch.or_else(|| vertices.stretch());
-        let Budget { node_tests, triangle_tests } = &mut options.budget;
-        let most = tree.header().nodes.max(LEAST_WORK);
-        *node_tests = node_tests.saturating_sub(closest.node_tests).min(most);
-        *triangle_tests = triangle_tests.saturating_sub(closest.triangle_tests);
+        let nodes = tree.header().nodes;
+        let most = nodes.saturating_add(nodes / 2).max(LEAST_WORK);
+        options.budget = options.after(closest.tests()).budget.at_most(most);
         let is_inside = closest.side == Side::Inside;
         let (deepest, deepest_at) = if is_inside {
             (closest.axis_distance, closest.axis_parameter)
@@ -241,14 +240,14 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
 
     /// Counts work that is no test as so many node tests.
     fn spend(&mut self, node_tests: u32) {
-        let rest = &mut self.options.budget.node_tests;
-        let spent = (*rest).min(node_tests);
-        *rest -= spent;
+        let rest = self.options.budget;
+        let spent = rest.tests().min(node_tests);
+        self.options.budget = rest.less(spent);
         self.answer.node_tests = self.answer.node_tests.saturating_add(spent);
     }
 
     const fn is_spent(&self) -> bool {
-        self.options.budget.node_tests == 0
+        self.options.budget.tests() == 0
     }
 
     /// Searches the point of a sample to the end; the leaves around it are remembered.
@@ -279,10 +278,11 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         self.looks += 1;
         self.spend(LOOK_COST);
         let Sample { parameter, on_axis, .. } = sample;
-        let Budget { node_tests, triangle_tests } = self.options.budget;
         // The root's test is one of them.
-        let Some(node_tests) = node_tests.checked_sub(1) else { return Ok(sample) };
-        let options = self.options.budget(Budget { node_tests, triangle_tests });
+        if self.is_spent() {
+            return Ok(sample);
+        }
+        let options = self.options.budget(self.options.budget.less(1));
         let (point, first) = (AxisPoint(on_axis), sample.triangle);
         let search = Search::start(
             self.roots,
@@ -310,18 +310,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
                 side::of_many(roots, tree, self.stack, vertices, &mut found, on_axis, &options)
             })
             .transpose()?;
-        self.options.budget = Budget {
-            node_tests: node_tests.saturating_sub(found.node_tests.saturating_sub(1)),
-            triangle_tests: triangle_tests.saturating_sub(found.triangle_tests),
-        };
-        let answer = &mut self.answer;
-        answer.node_tests = answer.node_tests.saturating_add(found.node_tests);
-        answer.triangle_tests = answer.triangle_tests.saturating_add(found.triangle_tests);
+        self.options = self.options.after(found.tests());
+        self.answer.add_tests(found.tests());
         let distance = found.axis_distance;
         let at = if found.is_cut_short() {
             None
         } else {
-            let (at, left) = (OnAxis::new(&point, 0.0), self.options.budget.node_tests);
+            let (at, left) = (OnAxis::new(&point, 0.0), self.options.budget.tests());
             Some(side::of_point(tree, vertices, &found, &at, self.ties, many, left)?)
         };
         self.spend(at.map_or(0, |at| at.work));

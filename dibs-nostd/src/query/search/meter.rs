@@ -1,22 +1,19 @@
 //! A search's budget, and what is left of it.
 
 use crate::Budget;
+use crate::query::made::Tests;
 
 /// Counts the tests of a search. A count that the budget does not cover is `None`, and counts nothing.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Meter {
-    all: Budget,
-    left: Budget,
+    all: u32,
+    left: u32,
+    triangle_tests: u32,
 }
 
 impl Meter {
-    pub const fn new(all: Budget) -> Self {
-        Self { all, left: all }
-    }
-
-    /// The same for another number of node tests, of which none was made.
-    pub const fn with_nodes(self, node_tests: u32) -> Self {
-        Self { all: Budget { node_tests, ..self.all }, left: Budget { node_tests, ..self.left } }
+    pub const fn new(budget: Budget) -> Self {
+        Self { all: budget.tests(), left: budget.tests(), triangle_tests: 0 }
     }
 
     /// A test of a sphere or plane.
@@ -27,33 +24,38 @@ impl Meter {
 
     #[inline(always)]
     pub fn nodes(&mut self, count: u32) -> Option<()> {
-        self.left.node_tests = self.left.node_tests.checked_sub(count)?;
+        self.left = self.left.checked_sub(count)?;
         Some(())
     }
 
     /// An exact test of a triangle.
     #[inline(always)]
     pub fn triangle(&mut self) -> Option<()> {
-        self.left.triangle_tests = self.left.triangle_tests.checked_sub(1)?;
+        self.nodes(Budget::TRIANGLE)?;
+        self.triangle_tests = self.triangle_tests.wrapping_add(1);
         Some(())
     }
 
     /// A test of a triangle's plane, with an exact test to spare that may follow.
     #[inline(always)]
     pub fn triangle_plane(&mut self) -> Option<()> {
-        self.left.triangle_tests.checked_sub(1)?;
+        self.left.checked_sub(1 + Budget::TRIANGLE)?;
         self.node()
     }
 
     /// The exact test that was to spare.
     #[inline(always)]
     pub fn spare_triangle(&mut self) {
-        self.left.triangle_tests = self.left.triangle_tests.wrapping_sub(1);
+        self.left = self.left.wrapping_sub(Budget::TRIANGLE);
+        self.triangle_tests = self.triangle_tests.wrapping_add(1);
     }
 
     /// The tests made.
     #[inline(always)]
-    pub const fn made(&self) -> Budget {
-        self.all.less(self.left.node_tests, self.left.triangle_tests)
+    pub const fn made(&self) -> Tests {
+        let Self { all, left, triangle_tests } = *self;
+        let node_tests =
+            all.wrapping_sub(left).wrapping_sub(triangle_tests.wrapping_mul(Budget::TRIANGLE));
+        Tests { node_tests, triangle_tests }
     }
 }

@@ -6,6 +6,7 @@ use super::meter::Meter;
 use super::node::RANGE;
 use super::{Search, Waiting};
 use crate::math::sqrt::sqrt;
+use crate::query::made::Tests;
 use crate::tool::{AxisPair, Tool};
 use crate::tree::format::Link;
 use crate::unavailable::QueryError;
@@ -15,12 +16,13 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// A search over a range, with the budget of `options`.
     ///
     /// In a sound tree it tests each node's sphere once. It looks at each triangle once, at the vertex beyond one edge of
-    /// it, and at its side. Each triangle stands for one vertex at most, and has it turned round once, past [`MAX_RING`]
+    /// it, and at its side, and tests it exactly twice at most. Each triangle stands for one vertex at most, and has it turned round once, past [`MAX_RING`]
     /// triangles at most. So this bound is never met; if corrupt bytes form a loop, it ends the search.
     pub fn over_range(mut self, options: &Options) -> Self {
         let header = self.tree.header();
-        let most = header.triangles.saturating_mul(3 + MAX_RING).saturating_add(header.nodes);
-        self.meter = Meter::new(options.budget.nodes_at_most(most));
+        let most = 3 + MAX_RING + 2 * Budget::TRIANGLE;
+        let most = header.triangles.saturating_mul(most).saturating_add(header.nodes);
+        self.meter = Meter::new(options.budget.at_most(most));
         self
     }
 
@@ -32,7 +34,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         limit: f32,
         (ridge, part): (f32, Option<u8>),
         mut visit: impl FnMut(u32, &AxisPair) -> f32,
-    ) -> Result<(f32, Budget), QueryError> {
+    ) -> Result<(f32, Tests), QueryError> {
         self.set_limit(limit);
         let mut heights = Heights::new(part);
         let least = match self.visit_waiting(ridge, &mut heights, &mut visit)? {

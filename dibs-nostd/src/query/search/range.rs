@@ -7,11 +7,12 @@ use super::heights::Heights;
 use super::near::least_standing;
 use super::{Search, Waiting};
 use crate::math::sqrt::sqrt;
+use crate::query::made::Tests;
 use crate::query::memory::range::{Opened, RangeFrontMut};
 use crate::tool::{AxisPair, Tool};
 use crate::tree::format::Link;
 use crate::unavailable::QueryError;
-use crate::{Budget, Index, VertexTable};
+use crate::{Index, VertexTable};
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// As [`each_low`](Self::each_low), from the front of the last search on. Nodes for which there is no place are searched
@@ -22,7 +23,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         limit: f32,
         (ridge, part): (f32, Option<u8>),
         mut visit: impl FnMut(u32, &AxisPair) -> f32,
-    ) -> Result<(f32, Budget), QueryError> {
+    ) -> Result<(f32, Tests), QueryError> {
         self.set_limit(limit);
         if front.is_empty() && front.start(self.tree.roots()).is_none() {
             return self.each_low(limit, (ridge, part), visit);

@@ -13,9 +13,11 @@ use glam::Vec3;
 
 use facing::Facing;
 
+use super::meter::Meter;
 use super::{Search, Step, Waiting};
 use crate::math::sqrt::sqrt;
 use crate::query::Budget;
+use crate::query::made::Tests;
 use crate::query::memory::clock::{Deadline, MotionClock};
 use crate::query::memory::front::{FrontMut, NOWHERE, Place, UNUSED};
 use crate::surface::motion::FAR;
@@ -32,7 +34,7 @@ pub(in crate::query) enum Outcome {
     /// whether the front started anew.
     Ended { lower: f32, is_complete: bool, restarted: bool },
     /// The front has no free place; the tests made until then.
-    Full { tests: Budget },
+    Full { tests: Tests },
 }
 
 /// One tick.
@@ -57,10 +59,11 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         budget: Budget,
         separation: f32,
     ) -> Self {
-        // A tick tests each node's sphere, each leaf's plane and each triangle's plane twice at most.
+        // A tick tests each node's sphere, each leaf's plane and each triangle twice at most.
         let header = search.tree.header();
-        let most = header.nodes.saturating_add(header.triangles).saturating_mul(4);
-        search.meter = search.meter.with_nodes(budget.nodes_at_most(most).node_tests);
+        let triangles = header.triangles.saturating_mul(1 + Budget::TRIANGLE);
+        let most = header.nodes.saturating_add(triangles).saturating_mul(4);
+        search.meter = Meter::new(budget.at_most(most));
         let margin = search.slack + search.coordinate_slack;
         let limit =
             if separation < f32::INFINITY { search.limit_to(separation) } else { f32::INFINITY };
@@ -90,9 +93,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 let nowhere = Place { node: NOWHERE, slot: 0 };
                 if self.front.open(root.link, nowhere, now).is_none() {
                     self.front.clear();
-                    return Ok(Outcome::Full {
-                        tests: Budget { node_tests: 0, triangle_tests: 0 },
-                    });
+                    return Ok(Outcome::Full { tests: Tests::NONE });
                 }
             }
         }

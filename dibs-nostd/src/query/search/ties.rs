@@ -10,10 +10,11 @@ use super::node::RANGE;
 use super::slack::{ACCURACY, FLOOR, TIE};
 use super::{Search, Waiting};
 use crate::math::sqrt::sqrt;
+use crate::query::made::Tests;
 use crate::tool::Tool;
 use crate::tree::format::Link;
 use crate::unavailable::QueryError;
-use crate::{Budget, Index, VertexTable};
+use crate::{Index, VertexTable};
 
 /// Most of them. Six or so share a vertex.
 const MOST: usize = 32;
@@ -151,7 +152,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     pub fn each_tie(
         mut self,
         mut visit: impl FnMut(u32) -> Result<bool, QueryError>,
-    ) -> Result<(bool, Budget), QueryError> {
+    ) -> Result<(bool, Tests), QueryError> {
         let limit = limit_of(sqrt(self.best_squared), self.scale);
         while let Some(Waiting { lower, link }) = self.pop() {
             if lower > self.cutoff {

@@ -13,7 +13,7 @@ use super::Tracker;
 use crate::math::round::{sum_down, sum_up};
 use crate::math::sqrt::sqrt;
 use crate::query::memory::separation::Certain;
-use crate::query::{NoSide, Options, Proximity, Side};
+use crate::query::{Budget, NoSide, Options, Proximity, Side};
 use crate::tool::AxisPoint;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, TriangleRow, VertexTable};
@@ -170,7 +170,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         found.axis_parameter = last.axis_parameter;
         found.direction = last.direction;
         if let Some(TriangleRow(row)) = last.triangle
-            && found.triangle_tests < options.budget.triangle_tests
+            && options.after(found.tests()).budget.tests() >= Budget::TRIANGLE
         {
             found.triangle_tests += 1;
             let rows = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;

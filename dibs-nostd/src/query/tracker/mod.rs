@@ -6,10 +6,11 @@ mod several;
 mod tests;
 
 use super::contacts::Pair;
+use super::made::Tests;
 use super::memory::clock::Reading;
 use super::memory::{Lost, Memory};
 use super::search::{Outcome, Search, Tick, Ties, WHOLE, Waiting};
-use super::{Budget, Contacts, NoSide, Options, Proximity, Side, signed};
+use super::{Contacts, NoSide, Options, Proximity, Side, signed};
 use crate::surface::motion::Unit;
 use crate::tree::RootSet;
 use crate::unavailable::QueryError;
@@ -298,7 +299,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let is_cut = tracked.is_kept || tracked.closest.side == Side::Undefined(NoSide::CutShort);
         let mut closest = tracked.closest;
         closest.add_position_error(surface);
-        let rest = options.budget(options.budget.less(closest.node_tests, closest.triangle_tests));
+        let rest = options.after(closest.tests());
         let (tree, closest) = (&self.tree, &closest);
         let pair = Pair { tree, vertices: surface, tool, closest, surface: 0, number: 0 };
         if tracked.is_kept {
@@ -331,15 +332,14 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         tool: &T,
         options: &Options,
         first: Option<TriangleRow>,
-        tests: Budget,
+        tests: Tests,
     ) -> Result<Proximity, QueryError> {
-        let options = options.budget(options.budget.less(tests.node_tests, tests.triangle_tests));
+        let options = options.after(tests);
         let (stack, ties) = (&mut self.stack, Some(&mut self.ties));
         let all = RootSet::ALL;
         let search = Search::start(all, &self.tree, stack, surface, tool, &options, first, ties)?;
         let mut closest = search.run::<WHOLE>(f32::INFINITY)?;
-        closest.node_tests = closest.node_tests.saturating_add(tests.node_tests);
-        closest.triangle_tests = closest.triangle_tests.saturating_add(tests.triangle_tests);
+        closest.add_tests(tests);
         Ok(closest)
     }
 }

@@ -1,12 +1,13 @@
 //! Several trackers: the closest of all pairs. A pair that is certain to be farther is not looked at.
 
 use super::{Last, Tracker, TrackerAnswer};
-use crate::query::{Budget, NoSide, Options, Proximity, Side};
+use crate::query::made::Tests;
+use crate::query::{Budget, NoSide, Options, Side};
 use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Tool};
 
 /// Most tests made ahead in a tick, less one.
-const AHEAD: Budget = Budget { node_tests: 64, triangle_tests: 16 };
+const AHEAD: Budget = Budget::new(96);
 
 /// How much farther than the closest pair others are shown to be, in units: an eighth to a sixteenth of the root sphere's
 /// radius.
@@ -89,21 +90,18 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
                 }
             }
             let tracked = tracker.closest(*surface, *tool, &rest)?;
-            let own = &tracked.closest;
-            rest = rest.budget(rest.budget.less(own.node_tests, own.triangle_tests));
+            rest = rest.after(tracked.closest.tests());
             let moved = if pairs.len() > 1 { None } else { tracked.moved };
             let own = TrackerAnswer { pair: at, moved, ..tracked };
             found = Some(found.map_or(own, |found| found.and(own)));
         }
         if let (Some(found), Some(at)) = (&mut found, ahead)
-            && rest.budget.node_tests > 0
-            && found.closest.node_tests < 2 * AHEAD.node_tests
+            && rest.budget.tests() > 0
+            && found.closest.tests().work() < 2 * AHEAD.tests()
             && let Some((tracker, surface, tool)) = pairs.get_mut(at)
         {
             let tests = tracker.look_ahead(*surface, *tool, found.closest.separation, &rest)?;
-            let Proximity { node_tests, triangle_tests, .. } = &mut found.closest;
-            *node_tests = node_tests.saturating_add(tests.node_tests);
-            *triangle_tests = triangle_tests.saturating_add(tests.triangle_tests);
+            found.closest.add_tests(tests);
         }
         Ok(found)
     }
@@ -116,10 +114,10 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         tool: &T,
         closest: f32,
         options: &Options,
-    ) -> Result<Budget, QueryError> {
+    ) -> Result<Tests, QueryError> {
         let moved = self.memory.moved(tool, surface.motion());
         let (Some(before), Ok(moved)) = (self.last, moved) else {
-            return Ok(Budget { node_tests: 0, triangle_tests: 0 });
+            return Ok(Tests::NONE);
         };
         let clear = before.clear_after(self.memory.clock.length(moved));
         // A tool that has not touched a closed surface since is on the same side.
@@ -129,11 +127,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         } else {
             (options.unsigned(), closest + self.memory.clock.length(LEAD))
         };
-        let Budget { node_tests, triangle_tests } = options.budget;
-        let options = options.budget(Budget {
-            node_tests: node_tests.min(AHEAD.node_tests),
-            triangle_tests: triangle_tests.min(AHEAD.triangle_tests),
-        });
+        let options = options.budget(options.budget.at_most(AHEAD.tests()));
         let found = self.within(surface, tool, &options, separation, true)?.closest;
         if let Some(last) = &mut self.last {
             last.is_signed |= keeps_side;
@@ -141,7 +135,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
                 *last = Last { clear, ..before };
             }
         }
-        Ok(Budget { node_tests: found.node_tests, triangle_tests: found.triangle_tests })
+        Ok(found.tests())
     }
 
     /// Index of the pair that may be closest.

@@ -92,7 +92,7 @@ fn no_bound_exceeds_the_distance() {
             let tool = Capsule::new(tip, tip + span, 2.0).expect("a valid capsule");
             let mut options = Options::cold().unsigned();
             if tick % 3 == 2 {
-                options = options.budget(Budget { node_tests: 12, triangle_tests: 2 });
+                options = options.budget(Budget::new(28));
             }
             let share = tick as f32 / 8.0;
             tracker.closest(&step.at(share), &tool, &options).expect("an answer");
@@ -284,7 +284,7 @@ fn an_error_that_grows_widens_what_is_kept() {
         tracker.closest(&surface, &tool, &options).unwrap().closest
     };
     let known = tick(0.5, Budget::UNLIMITED);
-    let none = Budget { node_tests: 0, triangle_tests: 0 };
+    let none = Budget::new(0);
     for error in [2.0, 0.25, 0.0] {
         let kept = tick(error, none);
         assert_eq!(kept.side, known.side);

@@ -174,7 +174,7 @@ fn on_one_frame(surface: &Surface, deformation: Deformation, rng: &mut Rng) -> T
             tally.unfinished += u64::from(unlimited && answer.lower != answer.separation);
             before = Some(answer);
         }
-        let short = Budget { node_tests: rng.u32(..40), triangle_tests: rng.u32(..6) };
+        let short = Budget::new(rng.u32(..88));
         let mut options = options.budget(short);
         let mut before: Option<Proximity> = None;
         for _ in 0..TICKS {
@@ -192,16 +192,13 @@ fn on_one_frame(surface: &Surface, deformation: Deformation, rng: &mut Rng) -> T
     tally
 }
 
-/// Budgets that grow in both counts, from zero to unlimited.
+/// Budgets that grow from zero to unlimited.
 fn ladder(triangles: u32, rng: &mut Rng) -> [Budget; BUDGETS] {
-    let mut budgets = [Budget { node_tests: 0, triangle_tests: 0 }; BUDGETS];
+    let mut budgets = [Budget::new(0); BUDGETS];
     for i in 1..BUDGETS {
         let most = triangles >> (BUDGETS - i).min(7);
         let before = budgets[i - 1];
-        budgets[i] = Budget {
-            node_tests: before.node_tests + rng.u32(..=2 * most),
-            triangle_tests: before.triangle_tests + rng.u32(..=most / 4 + 1),
-        };
+        budgets[i] = Budget::new(before.tests() + rng.u32(..=4 * most + 8));
     }
     budgets[BUDGETS - 1] = Budget::UNLIMITED;
     budgets

@@ -268,8 +268,7 @@ fn check(machine: &Machine<'_>, queries: usize, figures: &mut Figures) -> Result
         for answer in answers.iter() {
             let Record::Query { is_capsule, deadline } = answer.record else { continue };
             let [node_tests, triangle_tests] = answer.tests();
-            let bound = costs[usize::from(is_capsule)]
-                .instructions(dibs_nostd::Budget { node_tests, triangle_tests });
+            let bound = costs[usize::from(is_capsule)].instructions(node_tests, triangle_tests);
             let took = answer.instructions;
             checked += 1;
             beyond += u32::from(u64::from(took) > bound);

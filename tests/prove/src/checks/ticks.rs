@@ -100,8 +100,9 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
             // The clock counts 1.6 to an instruction.
             let instructions = f64::from(took) * 0.625;
             (sum, longest) = (sum + instructions, longest.max(instructions));
-            let is_spent = nodes > BUDGET.node_tests || triangles >= BUDGET.triangle_tests;
-            cut_short += u32::from(is_spent);
+            let work = nodes + triangles * Budget::TRIANGLE;
+            // No more than a triangle's test and its plane's, or a node's children, can be left over.
+            cut_short += u32::from(work + 2 * Budget::TRIANGLE > BUDGET.tests());
         }
     }
     let unlimited = frames.iter().map(|frame| frame.cost).max().unwrap_or_default();
@@ -158,8 +159,7 @@ fn dearest(mesh: &Mesh, built: &BuiltTree, number: usize, rng: &mut Rng) -> Resu
         let measured = admitted(&rows)?;
         let tool = instrument(base + placed.tick).ok()?;
         let found = query.closest(&rows[..], &tool, &Options::cold().stretch(measured)).ok()?;
-        let tests = Budget { node_tests: found.node_tests, triangle_tests: found.triangle_tests };
-        Some((rows, Cost::M7_CAPSULE.instructions(tests)))
+        Some((rows, Cost::M7_CAPSULE.instructions(found.node_tests, found.triangle_tests)))
     };
     let mut best: Option<(Placed, Frame)> = None;
     for step in 0..TRIES + STEPS {

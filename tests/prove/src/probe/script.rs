@@ -326,10 +326,8 @@ impl Script {
             let measured = rng.bool();
             let mut deadline = None;
             let budget = match draw {
-                Draw::Any | Draw::EitherWay if rng.bool() => {
-                    Budget { node_tests: rng.u32(..300), triangle_tests: rng.u32(..60) }
-                }
-                Draw::Short => Budget { node_tests: rng.u32(..24), triangle_tests: rng.u32(..6) },
+                Draw::Any | Draw::EitherWay if rng.bool() => Budget::new(rng.u32(..780)),
+                Draw::Short => Budget::new(rng.u32(..72)),
                 Draw::Deadline(costs) => {
                     let cost = costs[usize::from(is_capsule)];
                     let instructions = cost.base + rng.u32(..100_000);
@@ -382,8 +380,7 @@ impl Script {
         self.words.extend(points.as_flattened());
         self.words.push(tool.radius.to_bits());
         let how = self.how | if measured { how::MEASURED } else { 0 };
-        self.words.extend([u32::from(is_capsule), how, warm]);
-        self.words.extend([budget.node_tests, budget.triangle_tests]);
+        self.words.extend([u32::from(is_capsule), how, warm, budget.tests()]);
         self.records.push(Record::Query { is_capsule, deadline });
     }
 }

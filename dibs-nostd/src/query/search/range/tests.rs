@@ -118,8 +118,7 @@ fn no_bound_of_a_range_exceeds_the_distance() {
             // Budgets that end anywhere, until one is enough.
             let budgets = if tick == 4 { 0..2_000 } else { 2_000..2_001 };
             let is_whole = budgets.into_iter().any(|node_tests| {
-                let budget = Budget { node_tests, triangle_tests: 999 };
-                search(&Options::cold().budget(budget)).expect("an answer")
+                search(&Options::cold().budget(Budget::new(node_tests))).expect("an answer")
             });
             assert!(is_whole);
             let at = |row: u32| {
@@ -151,10 +150,9 @@ fn a_node_that_no_search_reaches_stays_due() {
     for tick in 0..=6_000 {
         memory.begin(Ok(1 << 19));
         let tool = if tick < 6_000 { first } else { last };
-        let options = Options::cold().budget(Budget {
-            node_tests: if tick == 0 || tick == 6_000 { u32::MAX } else { 0 },
-            triangle_tests: u32::MAX,
-        });
+        let is_whole = tick == 0 || tick == 6_000;
+        let budget = if is_whole { Budget::UNLIMITED } else { Budget::new(0) };
+        let options = Options::cold().budget(budget);
         let search = Search::start(
             RootSet::ALL,
             &tree,
