@@ -165,7 +165,7 @@
 /**
  * Bytes of a tracker's storage besides its vertices.
  */
-#define DIBS_TRACKER_BASE 20288
+#define DIBS_TRACKER_BASE 24896
 
 /**
  * Bytes of a tracker's storage for each vertex: the surface as it is, and as it was.

@@ -21,7 +21,7 @@ use crate::tool::{DIBS_TOOLS, Shape, chain, dibs_tool};
 use crate::tree::dibs_tree;
 
 /// Bytes of a tracker's storage besides its vertices.
-pub const DIBS_TRACKER_BASE: usize = 20_288;
+pub const DIBS_TRACKER_BASE: usize = 24_896;
 
 /// Bytes of a tracker's storage for each vertex: the surface as it is, and as it was.
 pub const DIBS_TRACKER_VERTEX: usize = 24;

@@ -262,6 +262,7 @@ fn cause(cause: Unavailable) -> u32 {
         Unavailable::Stale { .. } => 301,
         Unavailable::Delayed { .. } => 305,
         Unavailable::NotFinite => 310,
+        Unavailable::NoPose => 317,
         Unavailable::Query(QueryError::Uncovered { .. }) => 206,
         other => panic!("{other:?}"),
     }

@@ -146,6 +146,7 @@ impl Options {
     }
 
     /// Asks for the side, whatever was said before.
+    #[cfg(feature = "control")]
     pub(crate) const fn signed(mut self) -> Self {
         self.is_signed = true;
         self

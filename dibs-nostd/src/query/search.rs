@@ -16,6 +16,7 @@ mod ties;
 #[cfg(feature = "wide")]
 mod wide;
 
+pub(super) use super::memory::waiting::Waiting;
 pub(super) use tick::{Outcome, Tick};
 pub(super) use ties::Ties;
 #[cfg(feature = "wide")]
@@ -33,15 +34,6 @@ use crate::tree::RootSet;
 use crate::tree::format::Link;
 use crate::unavailable::QueryError;
 use crate::{Index, MeasuredStretch, Proximity, Tree, TriangleRow, VertexTable};
-
-/// A subtree that waits for its turn.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Waiting {
-    /// Lower bound on its distance from the tool's axis.
-    pub lower: f32,
-    /// Link of its node.
-    pub link: u32,
-}
 
 /// A search with its limit at infinity.
 pub(super) const WHOLE: u8 = 0;
@@ -156,9 +148,9 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             return Err(QueryError::Position { vertex: root.pin });
         }
         // The closest pair in a sound tree takes one test of each node's sphere, two of each leaf's plane and one of each
-        // triangle, its plane and exact. If corrupt bytes form a loop, this bound ends the search. Other kinds have bounds of
-        // their own.
-        let triangles = header.triangles.saturating_mul(1 + Budget::TRIANGLE);
+        // triangle, its plane and exact, besides the warm one. If corrupt bytes form a loop, this bound ends the search. Other
+        // kinds have bounds of their own.
+        let triangles = header.triangles.saturating_add(1).saturating_mul(1 + Budget::TRIANGLE);
         let most = header.nodes.saturating_mul(3).saturating_add(triangles);
         ties = ties.filter(|_| options.is_signed && tree.has_adjacency());
         if let Some(ties) = &mut ties {

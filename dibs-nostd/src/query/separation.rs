@@ -59,17 +59,21 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
         roots: RootSet,
     ) -> Result<(), QueryError> {
         let &Self { tree, vertices, tool, options } = self;
+        let has_length = tool.axis_length() > 0.0;
         // No triangle is closer than one that is touched, so its side is certain without the rest of the budget.
         let is_touching = found.triangle.is_some() && found.axis_distance <= found.accuracy;
-        if found.is_cut_short() && !is_touching {
+        let is_open = found.is_cut_short() && !is_touching;
+        if is_open {
             found.side = Side::Undefined(NoSide::CutShort);
-            return Ok(());
+            // Where nothing says that the axis may be inside, its depth is nobody's concern.
+            if !(has_length && known.as_ref().is_some_and(KnownDepthMut::may_be_inside)) {
+                return Ok(());
+            }
         }
         if roots != RootSet::ALL {
             ties.keep(|row| roots.contains(tree.root_of(row)));
         }
-        let has_length = tool.axis_length() > 0.0;
-        if !(is_touching && has_length) {
+        if !(is_open || is_touching && has_length) {
             let on_axis = tool.axis_point(found.axis_parameter);
             let is_many = ties.are_lost() && !is_touching;
             let many = is_many
@@ -99,10 +103,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
                 return Ok(());
             }
         }
-        let (known, leaves) = known.map(|known| known.now(roots)).unzip();
-        let mut depth =
-            Depth::new(tree, stack, vertices, tool, options, found, leaves, roots, ties);
-        let answer = depth.run(known)?;
+        let known = known.map(|known| known.now(roots));
+        let mut depth = Depth::new(tree, stack, vertices, tool, options, found, known, roots, ties);
+        let answer = depth.run()?;
         *found = answer;
         Ok(())
     }

@@ -86,7 +86,7 @@ type Follower = Tracker<'static, u16, STACK, OPENED, OPENED>;
 #[cfg(target_pointer_width = "32")]
 const _: () = {
     assert!(size_of::<Contacts<8>>() == 148 * 8 + 20 * 512 + 60);
-    assert!(size_of::<Follower>() <= 8 * STACK + 56 * OPENED + 1_392);
+    assert!(size_of::<Follower>() <= 16 * STACK + 56 * OPENED + 1_944);
 };
 
 impl Trackers {

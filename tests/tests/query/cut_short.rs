@@ -176,10 +176,10 @@ fn a_depth_takes_no_more_work_than_it_states() {
     let options = Options::cold().depth_tolerance(0.0);
     let closest = query.closest(rows.as_slice(), &tool, &options.unsigned()).expect("an answer");
     let found = query.closest(rows.as_slice(), &tool, &options).expect("an answer");
-    let most = tree.node_count().max(3_072);
-    println!("{} of {most}, beside {}", found.node_tests, closest.node_tests);
+    let most = (tree.node_count() * 3 / 2).max(4_608);
+    println!("{} of {most}, beside {}", found.work(), closest.work());
     assert_eq!(found.side, Side::Inside);
     // The side's own work comes first.
-    assert!(found.node_tests <= closest.node_tests + most + 512, "{found:?} {closest:?} {most}");
-    assert!(found.node_tests > closest.node_tests + most / 2, "the limit was not met");
+    assert!(found.work() <= closest.work() + most + 512, "{found:?} {closest:?} {most}");
+    assert!(found.work() > closest.work() + most / 2, "the limit was not met");
 }

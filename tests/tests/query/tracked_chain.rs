@@ -54,7 +54,7 @@ fn the_closest_of_tracked_pairs_is_that_of_whole_queries() {
                 .enumerate()
                 .map(|(at, tracker)| (tracker, &surfaces[at / 8], &capsules[at % 8]))
                 .collect();
-            let budget = (tick % 11 == 10).then_some(Budget::new(162));
+            let budget = (tick % 11 == 10).then_some(Budget::new(100));
             let asked = budget.map_or(options, |budget| options.budget(budget));
             let found = Tracker::closest_of(&mut pairs, &asked).expect("an answer");
             let found = found.expect("sixteen pairs");
@@ -76,7 +76,7 @@ fn the_closest_of_tracked_pairs_is_that_of_whole_queries() {
                 assert!(found.closest.lower <= least + off, "{tick}: {least} {found:?}");
                 let upper = found.closest.separation;
                 assert!(least <= upper + off, "{tick}: {least} {found:?}");
-                assert!(found.closest.node_tests <= 90 + 16, "{found:?}");
+                assert!(found.closest.work() <= 100 + 16, "{found:?}");
                 cut_short += usize::from(found.closest.lower < found.closest.separation);
                 continue;
             }

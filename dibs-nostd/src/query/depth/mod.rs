@@ -16,6 +16,7 @@
 //!
 //! One file, because the search and its steps share one state.
 
+mod look;
 mod part;
 mod start;
 mod touches;
@@ -23,16 +24,15 @@ mod walk;
 
 use glam::Vec3;
 
-use super::memory::depth::{Point, Points};
-use super::memory::leaves::Leaves;
-use super::search::{Search, Ties, UNTIL, Waiting};
-use super::side::{self, COORDINATES, NoSide, OnAxis, Side};
+use super::memory::depth::{Point, Points, Remembered};
+use super::search::{Ties, Waiting};
+use super::side::{self, NoSide, Side};
 use super::{Options, Proximity};
-use crate::tool::{AxisPoint, Tool};
+use crate::tool::Tool;
 use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, Tree, TriangleRow, VertexTable};
-use part::{Bound, Fit, Part, Parts, Sample, larger};
+use part::{Bound, Fit, Part, Parts, Sample, larger, smaller};
 use touches::Touches;
 
 /// A limit that no search reaches before its end.
@@ -49,10 +49,6 @@ const LOOKS: u32 = 27;
 
 /// Node tests that any depth may take, however small the tree.
 const LEAST_WORK: u32 = 4_608;
-
-/// Node tests that take as long as the work for a point of the axis besides its search. Without them a budget would not
-/// bound a tracker's tick, which may look at many points and triangles without a search.
-const LOOK_COST: u32 = 16;
 
 /// Node tests that take as long as a point's distance to one triangle.
 const DISTANCE_COST: u32 = 3;
@@ -78,8 +74,8 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
     deepest_at: f32,
     /// Points searched.
     looks: u32,
-    /// The leaves around the deepest point of the last tick.
-    leaves: Option<&'s mut Leaves>,
+    /// A tracker's memory.
+    remembered: Option<Remembered<'s>>,
     /// Roots of the shells that decide.
     roots: RootSet,
     /// The triangles that the axis may meet; then those that may be the closest to the point searched last.
@@ -97,7 +93,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         tool: &'s T,
         options: &Options,
         closest: &'s Proximity,
-        leaves: Option<&'s mut Leaves>,
+        remembered: Option<Remembered<'s>>,
         roots: RootSet,
         ties: &'s mut Ties,
     ) -> Self {
@@ -125,54 +121,62 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             deepest,
             deepest_at,
             looks: 0,
-            leaves,
+            remembered,
             roots,
             ties,
         }
     }
 
-    /// The answer with side, signed separation, and the deepest point's pair. `known` is the last tick's search, and
-    /// then this one.
-    pub fn run(&mut self, known: Option<&mut Points>) -> Result<Proximity, QueryError> {
+    /// The answer with side, signed separation, and the deepest point's pair.
+    pub fn run(&mut self) -> Result<Proximity, QueryError> {
         let least = LEAST_TOLERANCE * self.closest.accuracy;
         let default = larger(self.tool.axis_length() * TOLERANCE, least);
         let tolerance = self.options.depth_tolerance.unwrap_or(default);
         let reach = self.reach();
-        if reach <= self.deepest + tolerance {
-            if let Some(known) = known {
-                known.forget();
+        if reach <= self.enough(tolerance) {
+            if let Some(Remembered { points, .. }) = &mut self.remembered {
+                points.forget();
             }
             return self.finish(reach);
         }
         self.find_touches()?;
         let mut parts = Parts::new();
-        let last = match known.as_deref().and_then(|known| known.below(reach)) {
-            Some((points, deepest)) => {
-                self.resume(&mut parts, points);
-                Some(deepest)
-            }
-            None => {
-                self.begin(&mut parts, reach, tolerance)?;
-                None
-            }
-        };
-        let bound = self.divide(&mut parts, tolerance, last)?;
-        if let Some(known) = known {
-            while parts.count() > Points::MOST && parts.join(self.deepest_at, f32::INFINITY) {}
-            let point = |Part { from, bound, .. }: Part| {
-                let Sample { parameter, depth, triangle, .. } = from;
-                Some(Point { parameter, depth, bound, triangle: triangle? })
-            };
-            known.keep(parts.in_order().map(point), self.deepest_at);
+        let last = self.resume(&mut parts, reach);
+        if last.is_none() {
+            self.begin(&mut parts, reach, tolerance)?;
         }
+        let bound = self.divide(&mut parts, tolerance, last)?;
+        // Where no point was searched to the end, the last tick's deepest one is looked at first again.
+        let deepest = if self.deepest_at.is_nan() { last } else { Some(self.deepest_at) };
+        self.keep(&mut parts, deepest.unwrap_or(f32::NAN));
         self.finish(bound)
+    }
+
+    /// Remembers the parts.
+    fn keep(&mut self, parts: &mut Parts, deepest: f32) {
+        let Some(searched) = self.searched() else { return };
+        while parts.count() > Points::MOST && parts.join([deepest, searched], f32::INFINITY) {}
+        let point = |Part { from, bound, .. }: Part| {
+            let Sample { parameter, depth, triangle, .. } = from;
+            Some(Point { parameter, depth, bound, triangle: triangle? })
+        };
+        if let Some(Remembered { points, .. }) = &mut self.remembered {
+            points.keep(parts.in_order().map(point), deepest);
+        }
+    }
+
+    /// The point that a tracker is about to search; not a number if there is none.
+    fn searched(&self) -> Option<f32> {
+        let Remembered { leaves: [_, other], .. } = self.remembered.as_ref()?;
+        Some(other.parameter())
     }
 
     /// The most that any point of the axis can be deep, by its distance from the closest point.
     fn reach(&self) -> f32 {
         let (length, closest) = (self.tool.axis_length(), self.closest);
         let along = closest.axis_parameter * length;
-        larger(along, length - along) + closest.axis_distance + closest.accuracy
+        let reach = larger(along, length - along) + closest.axis_distance + closest.accuracy;
+        self.remembered.as_ref().map_or(reach, |known| smaller(reach, known.between[1]))
     }
 
     /// Looks at the last tick's deepest point, then divides the part with the highest bound until none is above the
@@ -183,18 +187,17 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         tolerance: f32,
         last: Option<f32>,
     ) -> Result<f32, QueryError> {
-        if let Some(row) = last.and_then(|at| parts.row_of(at)) {
-            self.look_again(parts, row)?;
-        }
+        self.look_again(parts, last)?;
+        self.go_on(parts)?;
         loop {
-            let enough = self.deepest + tolerance;
+            let enough = self.enough(tolerance);
             let row = parts.highest();
             let (next, bound, split) = parts.state(row);
             if !(bound > enough) {
                 return Ok(bound);
             }
             let ends = [row, next];
-            let is_closest = ends.iter().all(|&row| parts.sample(row).fit == Fit::Closest);
+            let is_closest = ends.iter().all(|&row| parts.sample(row).fit >= Fit::Closest);
             let Some(split) = split.filter(|_| is_closest) else {
                 if self.is_spent() {
                     return Ok(bound);
@@ -209,6 +212,18 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
                 self.renew(parts, row, enough);
                 continue;
             };
+            let is_open = |sample: &Sample| sample.fit == Fit::Closest && sample.depth > enough;
+            if self.remembered.is_some()
+                && let Some(end) = ends.into_iter().find(|&row| is_open(&parts.sample(row)))
+            {
+                if self.looks >= LOOKS || self.is_spent() {
+                    return Ok(bound);
+                }
+                let sample = self.look(parts.sample(end), enough)?;
+                parts.set_sample(end, sample);
+                self.renew(parts, row, enough);
+                continue;
+            }
             let Some(place) = self.room(parts, enough) else { return Ok(bound) };
             let (from, to) = (parts.sample(row), parts.sample(next));
             let is_nearer = split - from.along < to.along - split;
@@ -217,12 +232,18 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             if middle.depth > enough {
                 middle = self.look(middle, enough)?;
             }
-            let enough = self.deepest + tolerance;
+            let enough = self.enough(tolerance);
             let before = self.bound(&from, &middle, enough);
             let after = self.bound(&middle, &to, enough);
             parts.set(row, Part::new(from, place, &before, bound));
             parts.push(Part::new(middle, next, &after, bound));
         }
+    }
+
+    /// A part whose bound is no higher is not looked at.
+    fn enough(&self, tolerance: f32) -> f32 {
+        let least = self.remembered.as_ref().map_or(0.0, |known| known.between[0]);
+        larger(self.deepest, least) + tolerance
     }
 
     /// The bound between two samples.
@@ -250,105 +271,15 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         self.options.budget.tests() == 0
     }
 
-    /// Searches the point of a sample to the end; the leaves around it are remembered.
-    fn look_again(&mut self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
-        let sample = parts.sample(row);
-        if let Some(leaves) = &mut self.leaves {
-            leaves.move_to(sample.parameter, self.tool.axis_length());
-        }
-        let sample = self.look(sample, EXACT)?;
-        parts.set_sample(row, sample);
-        Ok(())
-    }
-
     /// The row of another part, if one may be divided.
     fn room(&self, parts: &mut Parts, enough: f32) -> Option<usize> {
         if self.looks >= LOOKS || self.is_spent() {
             return None;
         }
         if parts.free().is_none() {
-            parts.join(self.deepest_at, enough);
+            parts.join([self.deepest_at, self.searched().unwrap_or(f32::NAN)], enough);
         }
         parts.free()
-    }
-
-    /// Searches a point of the axis. Out of budget, returns the sample as it is. Only a tracker searches a point to the
-    /// end that is no deeper than `enough`.
-    fn look(&mut self, sample: Sample, enough: f32) -> Result<Sample, QueryError> {
-        self.looks += 1;
-        self.spend(LOOK_COST);
-        let Sample { parameter, on_axis, .. } = sample;
-        // The root's test is one of them.
-        if self.is_spent() {
-            return Ok(sample);
-        }
-        let options = self.options.budget(self.options.budget.less(1));
-        let (point, first) = (AxisPoint(on_axis), sample.triangle);
-        let search = Search::start(
-            self.roots,
-            self.tree,
-            self.stack,
-            self.vertices,
-            &point,
-            &options,
-            first,
-            Some(&mut *self.ties),
-        )?;
-        // A bound that is just low enough would not be so at the next tick.
-        let enough = if self.leaves.is_some() { EXACT } else { enough };
-        let length = self.tool.axis_length();
-        let leaves = self.leaves.as_deref_mut();
-        let mut found = match leaves.map(|leaves| (leaves.way_to(parameter, length), leaves)) {
-            Some((way, leaves)) if search.is_among(leaves, way) => search.among(leaves, way)?,
-            Some((way, leaves)) if way <= 0.0 => search.gather(leaves)?,
-            _ => search.run::<UNTIL>(enough)?,
-        };
-        let (tree, vertices, roots) = (self.tree, self.vertices, self.roots);
-        let is_many = self.ties.are_lost() && !found.is_cut_short();
-        let many = is_many
-            .then(|| {
-                side::of_many(roots, tree, self.stack, vertices, &mut found, on_axis, &options)
-            })
-            .transpose()?;
-        self.options = self.options.after(found.tests());
-        self.answer.add_tests(found.tests());
-        let distance = found.axis_distance;
-        let at = if found.is_cut_short() {
-            None
-        } else {
-            let (at, left) = (OnAxis::new(&point, 0.0), self.options.budget.tests());
-            Some(side::of_point(tree, vertices, &found, &at, self.ties, many, left)?)
-        };
-        self.spend(at.map_or(0, |at| at.work));
-        let answer = &mut self.answer;
-        let depth = match at {
-            Some(at) if at.side == Side::Outside => {
-                self.touches.add_outside(parameter * self.tool.axis_length());
-                -distance
-            }
-            Some(at) if at.side == Side::Inside && distance > self.deepest => {
-                (self.deepest, self.deepest_at) = (distance, parameter);
-                *answer = Proximity {
-                    point_on_surface: found.point_on_surface,
-                    point_on_tool: on_axis - at.outward * self.tool.radius(),
-                    direction: at.outward,
-                    axis_parameter: parameter,
-                    triangle: found.triangle,
-                    corners: found.corners,
-                    barycentric: found.barycentric,
-                    ..*answer
-                };
-                distance
-            }
-            _ => distance,
-        };
-        let accuracy = found.accuracy + COORDINATES * on_axis.abs().max_element();
-        if accuracy > answer.accuracy {
-            answer.accuracy = accuracy;
-        }
-        // Without a triangle of its own, its corners are a pin.
-        let triangle = found.triangle.or(sample.triangle);
-        self.sample(parameter, depth, triangle, found.corners)
     }
 
     /// The sample of the axis' point at a parameter, which is no deeper than `depth`, with the triangle of another one.
@@ -380,7 +311,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     /// The answer, where no point of the axis is deeper than `bound`.
     fn finish(&self, bound: f32) -> Result<Proximity, QueryError> {
         let Self { mut answer, closest, is_inside, .. } = *self;
-        if !is_inside {
+        let is_open = closest.side == Side::Undefined(NoSide::CutShort);
+        if !(is_inside || is_open) {
             if self.deepest <= 0.0 {
                 let on_axis = self.tool.axis_point(closest.axis_parameter);
                 let outward = side::outward(self.tree, self.vertices, closest)?.unwrap_or_default();

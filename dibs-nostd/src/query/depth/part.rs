@@ -32,7 +32,7 @@ pub(super) struct Sample {
 }
 
 /// A sample's triangle.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, PartialEq, PartialOrd)]
 pub(super) enum Fit {
     /// An earlier tick's; its corners were not read.
     Remembered,
@@ -40,6 +40,8 @@ pub(super) enum Fit {
     Near,
     /// The closest one found at this tick.
     Closest,
+    /// The closest one: the point was searched to the end at this tick.
+    Searched,
 }
 
 impl Sample {
@@ -230,8 +232,8 @@ impl Parts {
     }
 
     /// Joins the two neighbouring parts that are shortest together, of those that are no deeper than `enough`, but not at
-    /// the parameter `deepest`. Returns whether there are any.
-    pub fn join(&mut self, deepest: f32, enough: f32) -> bool {
+    /// one of the parameters `kept`. Returns whether there are any.
+    pub fn join(&mut self, kept: [f32; 2], enough: f32) -> bool {
         let (mut least, mut joined) = (f32::INFINITY, None);
         let mut row = 0;
         for _ in 0..self.count {
@@ -242,7 +244,7 @@ impl Parts {
             }
             let length = self.sample(right.next).along - left.from.along;
             let bound = larger(left.bound, right.bound);
-            if length < least && bound <= enough && right.from.parameter != deepest {
+            if length < least && bound <= enough && !kept.contains(&right.from.parameter) {
                 (least, joined) = (length, Some((row, Part { next: right.next, bound, ..left })));
             }
             row = left.next;

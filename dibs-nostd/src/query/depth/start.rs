@@ -1,6 +1,6 @@
 //! The parts of the axis that a search begins with: between the places where it meets the surface, or the last tick's.
 
-use super::part::{Part, Parts, Sample};
+use super::part::{Part, Parts, Sample, smaller};
 use super::touches::Touches;
 use super::{DISTANCE_COST, Depth};
 use crate::query::Proximity;
@@ -69,7 +69,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             let touch = self.sample(place.parameter, depth, Some(place.triangle), corners)?;
             parts.push(Part::remembered(touch, parts.count() + 1, reach));
         }
-        let is_end = self.is_searched(0.0) || self.is_searched(1.0);
+        let is_end = axis_parameter <= 0.0 || axis_parameter >= 1.0;
         if parts.count() < 2 && !is_end {
             parts.push(Part::remembered(closest, 2, reach));
         }
@@ -95,11 +95,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             return Ok(self.at(parameter, 0.0, near));
         }
         let most = near.depth + (along - near.along).abs();
-        self.look(self.at(parameter, most, near), self.deepest + tolerance)
+        self.look(self.at(parameter, most, near), self.enough(tolerance))
     }
 
-    /// The parts of the last tick.
-    pub(super) fn resume(&mut self, parts: &mut Parts, points: &[Point]) {
+    /// The parts of the last tick, none deeper than `reach`. Returns the parameter of its deepest point, if there are any.
+    pub(super) fn resume(&mut self, parts: &mut Parts, reach: f32) -> Option<f32> {
+        let (points, deepest) = self.remembered.as_ref()?.points.known()?;
         for point in points {
             let Point { parameter, depth, bound, triangle } = *point;
             let triangle = Some(triangle);
@@ -107,8 +108,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             if depth < 0.0 {
                 self.touches.add_outside(from.along);
             }
-            parts.push(Part::remembered(from, parts.count() + 1, bound));
+            parts.push(Part::remembered(from, parts.count() + 1, smaller(bound, reach)));
         }
         parts.end();
+        Some(deepest)
     }
 }

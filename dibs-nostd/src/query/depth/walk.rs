@@ -26,7 +26,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
     /// Moves a remembered sample's triangle to neighbours that are closer now.
     pub(super) fn walk(&mut self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
         let mut sample = parts.sample(row);
-        if sample.fit != Fit::Closest {
+        if sample.fit < Fit::Closest {
             self.descend(&mut sample, 0.0)?;
             parts.set_sample(row, sample);
         }

@@ -3,10 +3,12 @@
 //! A depth changes by at most the motion of tool and surface. So every bound of the last tick still holds, plus that
 //! motion: only parts of the axis whose bounds have come above the deepest point are looked at again.
 
-use heapless::Vec;
+use heapless::{Vec, VecView};
 
 use super::clock::{MotionClock, Reading};
 use super::leaves::Leaves;
+use super::separation::Certain;
+use super::waiting::Waiting;
 use crate::TriangleRow;
 use crate::tree::RootSet;
 
@@ -28,9 +30,17 @@ pub(in crate::query) struct Point {
 
 /// The last depth.
 #[derive(Clone, Debug)]
-pub(in crate::query) struct KnownDepth {
+pub(in crate::query) struct KnownDepth<const STACK: usize> {
+    state: State,
+    /// Subtrees still to be searched for the leaves around one of the two points.
+    waiting: Vec<Waiting, STACK>,
+}
+
+#[derive(Clone, Debug)]
+struct State {
     points: Points,
-    leaves: Leaves,
+    /// Those around the deepest point, and around one that may be deeper.
+    leaves: [Leaves; 2],
     /// The key of the shells that decided.
     shells: u32,
     /// The reading as of which the bounds hold.
@@ -39,8 +49,21 @@ pub(in crate::query) struct KnownDepth {
 
 /// The last depth, in a tick.
 pub(in crate::query) struct KnownDepthMut<'m> {
-    known: &'m mut KnownDepth,
+    state: &'m mut State,
+    waiting: &'m mut VecView<Waiting>,
     clock: MotionClock,
+    past: Option<Certain>,
+}
+
+/// What is remembered of a depth, as of now.
+pub(in crate::query) struct Remembered<'m> {
+    pub points: &'m mut Points,
+    /// Those around the deepest point, and around one that may be deeper.
+    pub leaves: &'m mut [Leaves; 2],
+    /// Subtrees still to be searched for the leaves around one of the two.
+    pub waiting: &'m mut VecView<Waiting>,
+    /// The deepest point is at least as deep as the first of these, and no deeper than the second.
+    pub between: [f32; 2],
 }
 
 /// The points of the last depth.
@@ -51,47 +74,67 @@ pub(in crate::query) struct Points {
     deepest: f32,
 }
 
-impl KnownDepth {
+impl<const STACK: usize> KnownDepth<STACK> {
     #[inline(always)]
     pub const fn new() -> Self {
         let points = Points { points: Vec::new(), deepest: f32::NAN };
-        let shells = RootSet::ALL.key();
-        Self { points, leaves: Leaves::new(), shells, at: Reading::START }
+        let leaves = [Leaves::new(), Leaves::new()];
+        let state = State { points, leaves, shells: RootSet::ALL.key(), at: Reading::START };
+        Self { state, waiting: Vec::new() }
     }
 
     pub fn forget(&mut self) {
-        self.points.forget();
-        self.leaves.forget();
+        self.state.forget();
+        self.waiting.clear();
     }
 
-    pub const fn at(&mut self, clock: MotionClock) -> KnownDepthMut<'_> {
-        KnownDepthMut { known: self, clock }
+    /// The same at a reading, with what is certain of the separation then.
+    pub fn at(&mut self, clock: MotionClock, past: Option<Certain>) -> KnownDepthMut<'_> {
+        KnownDepthMut { state: &mut self.state, waiting: &mut self.waiting, clock, past }
+    }
+}
+
+impl State {
+    fn forget(&mut self) {
+        self.points.forget();
+        self.leaves.iter_mut().for_each(Leaves::forget);
     }
 }
 
 impl<'m> KnownDepthMut<'m> {
     pub fn forget(self) {
-        self.known.forget();
+        self.state.forget();
+        self.waiting.clear();
     }
 
-    /// The points with their bounds as of now, and the leaves around the deepest one, if the same shells decide.
-    pub fn now(self, roots: RootSet) -> (&'m mut Points, &'m mut Leaves) {
-        let Self { known, clock } = self;
-        if known.shells != roots.key() {
-            known.forget();
-            known.shells = roots.key();
+    /// The axis may be inside, by what was certain of it.
+    pub fn may_be_inside(&self) -> bool {
+        self.past.is_some_and(|past| past.lower < 0.0)
+    }
+
+    /// What holds now, if the same shells decide.
+    pub fn now(self, roots: RootSet) -> Remembered<'m> {
+        let Self { state, waiting, clock, past } = self;
+        if state.shells != roots.key() {
+            state.forget();
+            waiting.clear();
+            state.shells = roots.key();
         }
-        let moved = clock.since(known.at);
+        let State { points, leaves, at, .. } = state;
+        let moved = clock.since(*at);
         if moved > 0 {
             let moved = clock.length(moved) * (1.0 + 4.0 * f32::EPSILON);
-            for point in &mut known.points.points {
+            for point in &mut points.points {
                 point.depth = raised(point.depth, moved);
                 point.bound = raised(point.bound, moved);
             }
-            known.leaves.add_motion(moved);
-            known.at = clock.now();
+            leaves.iter_mut().for_each(|leaves| leaves.add_motion(moved));
+            *at = clock.now();
         }
-        (&mut known.points, &mut known.leaves)
+        // Of several solids another one may be the deepest.
+        let least = past.filter(|_| roots == RootSet::ALL).map_or(0.0, |past| -past.upper);
+        let between = [least, past.map_or(f32::INFINITY, |past| -past.lower)];
+        Remembered { points, leaves, waiting, between }
     }
 }
 
@@ -100,12 +143,9 @@ impl Points {
         self.points.clear();
     }
 
-    /// The points from the axis' start to its end, and the deepest one's parameter, if a bound is still below `reach`.
-    pub fn below(&self, reach: f32) -> Option<(&[Point], f32)> {
-        let points = self.points.as_slice();
-        let (_end, parts) = points.split_last()?;
-        let is_known = parts.iter().any(|part| part.bound < reach);
-        is_known.then_some((points, self.deepest))
+    /// The points from the axis' start to its end, and the deepest one's parameter, if there are any.
+    pub fn known(&self) -> Option<(&[Point], f32)> {
+        (self.points.len() > 1).then_some((&self.points, self.deepest))
     }
 
     /// Most points that it keeps.
@@ -141,13 +181,13 @@ mod tests {
         let built = dibs_build::Builder::new().build(&mesh).unwrap();
         let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
         let mut clock = MotionClock::new(Unit::of(&tree));
-        let mut known = KnownDepth::new();
+        let mut known = KnownDepth::<8>::new();
         for _ in 0..5 {
             clock.advance(u32::MAX / 3);
             known.forget();
         }
         clock.advance(1 << 31);
-        let (points, _) = known.at(clock).now(RootSet::ALL);
-        assert!(points.below(f32::INFINITY).is_none());
+        let Remembered { points, .. } = known.at(clock, None).now(RootSet::ALL);
+        assert!(points.known().is_none());
     }
 }

@@ -2,7 +2,9 @@
 //!
 //! Until tool and surface have moved too far, the closest triangle to the point is in one of them.
 
-use heapless::Vec;
+use heapless::{Vec, VecView};
+
+use super::waiting::Waiting;
 
 /// Most leaves.
 pub(in crate::query) const MOST: usize = 48;
@@ -17,6 +19,10 @@ pub(in crate::query) struct Leaves {
     moved: f32,
     /// All other leaves were at least as far (mm) as this; 0 if that is not known.
     beyond: f32,
+    /// The same of those that were passed over while the leaves are gathered.
+    passed: f32,
+    /// A search for them has begun and not ended.
+    are_gathered: bool,
     /// Where the point is on its axis: 0 at the start, 1 at the end.
     parameter: f32,
     /// The motion (mm) of the last tick.
@@ -34,13 +40,57 @@ pub(in crate::query) struct Leaf {
 impl Leaves {
     #[inline(always)]
     pub const fn new() -> Self {
-        let leaves = Vec::new();
-        Self { leaves, is_over: false, moved: 0.0, beyond: 0.0, parameter: 0.0, step: 0.0 }
+        Self {
+            leaves: Vec::new(),
+            is_over: false,
+            moved: 0.0,
+            beyond: 0.0,
+            passed: f32::INFINITY,
+            are_gathered: false,
+            parameter: f32::NAN,
+            step: 0.0,
+        }
     }
 
     pub fn forget(&mut self) {
         self.leaves.clear();
-        (self.is_over, self.moved, self.beyond) = (false, 0.0, 0.0);
+        (self.is_over, self.moved, self.beyond, self.passed) = (false, 0.0, 0.0, f32::INFINITY);
+        self.are_gathered = false;
+    }
+
+    /// Forgets them, and begins to gather them anew.
+    pub fn begin(&mut self) {
+        self.forget();
+        self.are_gathered = true;
+    }
+
+    /// Whether a search for them has begun and not ended.
+    pub const fn are_gathered(&self) -> bool {
+        self.are_gathered
+    }
+
+    /// Forgets them for the leaves around another point of the axis.
+    pub fn forget_for(&mut self, parameter: f32) {
+        self.forget();
+        self.parameter = parameter;
+    }
+
+    /// Forgets them and their point, and the subtrees that wait for them.
+    pub fn end(&mut self, waiting: &mut VecView<Waiting>) {
+        if self.are_gathered {
+            waiting.clear();
+        }
+        self.forget_for(f32::NAN);
+    }
+
+    /// Whether they are those around this point of the axis.
+    pub fn are_around(&self, parameter: f32) -> bool {
+        self.parameter == parameter
+    }
+
+    /// The point that they are around.
+    pub const fn parameter(&self) -> f32 {
+        self.parameter
     }
 
     /// Tool and surface have moved.
@@ -75,6 +125,11 @@ impl Leaves {
         (&mut self.leaves, self.moved)
     }
 
+    /// Whether they were gathered, and hold for some motion.
+    pub fn are_complete(&self) -> bool {
+        self.beyond > 0.0
+    }
+
     /// Whether all leaves within `distance` of a point that has moved by so much are among these.
     pub fn has_all(&self, distance: f32, moved: f32) -> bool {
         distance + moved <= self.beyond
@@ -84,11 +139,26 @@ impl Leaves {
         self.leaves.is_full()
     }
 
-    /// All other leaves are at least as far as this, unless there was no room for one.
-    pub fn close(&mut self, beyond: f32) {
-        if !self.is_over {
-            self.beyond = beyond;
+    /// Leaves that are now farther than this are passed over.
+    pub fn pass(&mut self, distance: f32) {
+        let passed = self.then(distance);
+        if passed < self.passed {
+            self.passed = passed;
         }
+    }
+
+    /// All leaves are gathered that were not passed over, unless there was no room for one. `slack` is the rounding.
+    pub fn close(&mut self, slack: f32) {
+        self.are_gathered = false;
+        if !self.is_over {
+            self.beyond = self.passed - slack;
+        }
+    }
+
+    /// The bound at the start of the gathering that is this one now.
+    pub fn then(&self, bound: f32) -> f32 {
+        let sum = bound + self.moved;
+        sum - sum.abs() * f32::EPSILON
     }
 
     pub fn push(&mut self, leaf: Leaf) {

@@ -17,6 +17,7 @@ pub mod front;
 pub mod leaves;
 pub mod range;
 pub mod separation;
+pub mod waiting;
 
 use crate::surface::motion::Unit;
 use crate::{MotionReading, Tool};
@@ -32,7 +33,7 @@ const FARTHEST: u32 = 1 << 29;
 
 /// A tracker's memory.
 #[derive(Clone, Debug)]
-pub(super) struct Memory<const OPENED: usize, const RANGE: usize> {
+pub(super) struct Memory<const STACK: usize, const OPENED: usize, const RANGE: usize> {
     pub clock: MotionClock,
     /// Tool and surface at the last tick; none if its motion was not measured, or it ended in an error.
     last: Option<(Axis, MotionReading)>,
@@ -40,7 +41,7 @@ pub(super) struct Memory<const OPENED: usize, const RANGE: usize> {
     complete: Reading,
     pub front: Front<OPENED>,
     pub range: RangeFront<RANGE>,
-    pub depth: KnownDepth,
+    pub depth: KnownDepth<STACK>,
     pub separation: KnownSeparation,
 }
 
@@ -55,7 +56,7 @@ pub(super) enum Lost {
     Jump,
 }
 
-impl<const OPENED: usize, const RANGE: usize> Memory<OPENED, RANGE> {
+impl<const STACK: usize, const OPENED: usize, const RANGE: usize> Memory<STACK, OPENED, RANGE> {
     #[inline(always)]
     pub const fn new(unit: Unit) -> Self {
         Self {

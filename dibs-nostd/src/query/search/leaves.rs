@@ -6,6 +6,8 @@
 //! Rounding. A bound is stored less the slack of its own search, and compared with the cutoff, which has the slack of this
 //! one.
 
+use heapless::VecView;
+
 use super::node::AROUND;
 use super::{Search, Waiting};
 use crate::math::sqrt::sqrt;
@@ -46,9 +48,19 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         self.finish(f32::INFINITY)
     }
 
-    /// Searches the tree, and gathers the leaves around the point.
-    pub fn gather(mut self, leaves: &mut Leaves) -> Result<Proximity, QueryError> {
-        leaves.forget();
+    /// Searches the tree, and gathers the leaves around the point; where the budget ended, the subtrees left wait for the next
+    /// call. What was found in several calls is no answer, but leaves that have one.
+    pub fn gather(
+        mut self,
+        leaves: &mut Leaves,
+        waiting: &mut VecView<Waiting>,
+    ) -> Result<Proximity, QueryError> {
+        let is_first = waiting.is_empty();
+        if is_first {
+            leaves.begin();
+        } else {
+            self.resume(leaves, waiting)?;
+        }
         let slack = self.slack + self.coordinate_slack;
         let mut wider = TICKS * leaves.step();
         if wider > self.cutoff {
@@ -62,25 +74,65 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 Link::Leaf { first, count } => (first, count),
                 Link::Children { first, count } => {
                     if self.meter.nodes(count).is_none() {
-                        return self.finish(0.0);
+                        return self.leave(Waiting { lower, link }, wider, leaves, waiting);
                     }
                     self.expand::<AROUND>(lower, first, count, wider)?;
                     continue;
                 }
             };
-            let Some(own) = self.leaf_bound(first, count)? else { return self.finish(0.0) };
+            let Some(own) = self.leaf_bound(first, count)? else {
+                return self.leave(Waiting { lower, link }, wider, leaves, waiting);
+            };
             let bound = (if own > lower { own } else { lower }) - slack;
             if leaves.is_full() {
                 wider *= 0.5;
-                leaves.keep_within(self.cutoff + wider - slack);
+                leaves.keep_within(leaves.then(self.cutoff + wider - slack));
             }
             if !(bound > self.cutoff + wider - slack) {
-                leaves.push(Leaf { link, bound });
+                leaves.push(Leaf { link, bound: leaves.then(bound) });
             }
         }
-        let found = self.finish(f32::INFINITY)?;
-        leaves.close(found.axis_distance + wider - 2.0 * slack);
+        let found = self.finish(if is_first { f32::INFINITY } else { 0.0 })?;
+        leaves.pass(found.axis_distance + wider);
+        leaves.close(2.0 * slack);
         Ok(found)
+    }
+
+    /// Goes on with the subtrees that wait.
+    #[cold]
+    fn resume(
+        &mut self,
+        leaves: &Leaves,
+        waiting: &mut VecView<Waiting>,
+    ) -> Result<(), QueryError> {
+        let moved = leaves.moved(0.0);
+        self.waiting = 0;
+        for &Waiting { lower, link } in waiting.iter() {
+            let lower = lower - moved;
+            let lower = lower - lower.abs() * f32::EPSILON;
+            self.push(self.waiting, Waiting { lower, link })
+                .ok_or(QueryError::Corrupt { row: 0 })?;
+        }
+        waiting.clear();
+        Ok(())
+    }
+
+    /// Leaves the rest for another call.
+    #[cold]
+    fn leave(
+        &mut self,
+        unfinished: Waiting,
+        wider: f32,
+        leaves: &mut Leaves,
+        waiting: &mut VecView<Waiting>,
+    ) -> Result<Proximity, QueryError> {
+        leaves.pass(self.cutoff - self.slack + wider);
+        let rest = self.stack.iter().take(self.waiting).chain([&unfinished]);
+        for &Waiting { lower, link } in rest {
+            // There is as much room as on the stack.
+            let _ = waiting.push(Waiting { lower: leaves.then(lower), link });
+        }
+        self.finish(0.0)
     }
 
     /// Tests a leaf; a lower bound on its distance, or `None` out of budget.

@@ -16,6 +16,12 @@ impl Meter {
         Self { all: budget.tests(), left: budget.tests(), triangle_tests: 0 }
     }
 
+    /// The same within another budget, less the tests made, which both must cover.
+    pub const fn within(self, budget: Budget) -> Self {
+        let left = budget.less(self.made().work()).tests();
+        Self { all: budget.tests(), left, ..self }
+    }
+
     /// A test of a sphere or plane.
     #[inline(always)]
     pub fn node(&mut self) -> Option<()> {

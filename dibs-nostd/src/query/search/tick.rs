@@ -13,7 +13,6 @@ use glam::Vec3;
 
 use facing::Facing;
 
-use super::meter::Meter;
 use super::{Search, Step, Waiting};
 use crate::math::sqrt::sqrt;
 use crate::query::Budget;
@@ -63,7 +62,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         let header = search.tree.header();
         let triangles = header.triangles.saturating_mul(1 + Budget::TRIANGLE);
         let most = header.nodes.saturating_add(triangles).saturating_mul(4);
-        search.meter = Meter::new(budget.at_most(most));
+        search.meter = search.meter.within(budget.at_most(most));
         let margin = search.slack + search.coordinate_slack;
         let limit =
             if separation < f32::INFINITY { search.limit_to(separation) } else { f32::INFINITY };

@@ -34,6 +34,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         tool: &T,
         options: &Options,
         found: &mut Proximity,
+        nearest: f32,
     ) -> Result<bool, QueryError> {
         let clock = self.memory.clock;
         let last = self.memory.separation.now(clock);
@@ -41,7 +42,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let own = match found.side {
             Side::Undefined(NoSide::NotAsked | NoSide::NoAdjacency) => return Ok(false),
             Side::Undefined(_) => match last {
-                Some(last) => self.without_side(vertices, tool, options, found, last)?,
+                Some(last) => self.without_side(vertices, tool, options, found, last, nearest)?,
                 None => None,
             },
             _ => {
@@ -108,15 +109,19 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         options: &Options,
         found: &mut Proximity,
         last: Certain,
+        nearest: f32,
     ) -> Result<Option<Certain>, QueryError> {
-        let unsigned = Certain::of(found, tool.radius());
+        let own = Certain::of(found, tool.radius());
+        let has_depth = found.lower < nearest;
+        let unsigned = Certain::of(&Proximity { lower: nearest, ..*found }, tool.radius());
         let nearest = if unsigned.lower > 0.0 { unsigned.lower } else { 0.0 };
         let mut both = last;
-        if unsigned.upper < both.upper {
-            both.upper = unsigned.upper;
+        if own.upper < both.upper {
+            both.upper = own.upper;
         }
         // No point of the axis is deeper than its way to the pair.
-        let deepest = -(unsigned.upper + tool.axis_length()) * (1.0 + SUMS);
+        let deepest = -(found.axis_distance + found.accuracy + tool.axis_length()) * (1.0 + SUMS);
+        let deepest = if has_depth && own.lower > deepest { own.lower } else { deepest };
         if deepest > both.lower {
             both.lower = deepest;
         }

@@ -8,9 +8,10 @@ mod tests;
 use super::contacts::Pair;
 use super::made::Tests;
 use super::memory::clock::Reading;
+use super::memory::separation::Certain;
 use super::memory::{Lost, Memory};
 use super::search::{Outcome, Search, Tick, Ties, WHOLE, Waiting};
-use super::{Contacts, NoSide, Options, Proximity, Side, signed};
+use super::{Budget, Contacts, NoSide, Options, Proximity, Side, signed};
 use crate::surface::motion::Unit;
 use crate::tree::RootSet;
 use crate::unavailable::QueryError;
@@ -36,9 +37,10 @@ use crate::{Index, MovingSurface, Tool, Tree, TriangleRow};
 /// ticks are whole queries. Keep it in a `static`: it can be larger than a controller's stack.
 ///
 /// Where the axis crosses the surface, it remembers which parts of the axis cannot be deepest, and searches those points
-/// that may have become so.
+/// that may have become so. A budget is divided: three eighths at most go to the closest pair of an axis that is inside or
+/// crosses, half of one that may be, the rest to the depth. A point's search that the budget ends goes on in the next tick.
 ///
-/// RAM: 8 bytes for each entry of the stack, 44 for each of the `OPENED`, 12 for each of the `RANGE`, and 1,392.
+/// RAM: 16 bytes for each entry of the stack, 44 for each of the `OPENED`, 12 for each of the `RANGE`, and 1,944.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -65,7 +67,7 @@ use crate::{Index, MovingSurface, Tool, Tree, TriangleRow};
 pub struct Tracker<'t, I, const STACK: usize, const OPENED: usize, const RANGE: usize = 0> {
     tree: Tree<'t, I>,
     stack: [Waiting; STACK],
-    memory: Memory<OPENED, RANGE>,
+    memory: Memory<STACK, OPENED, RANGE>,
     last: Option<Last>,
     ties: Ties,
     triangle: Option<TriangleRow>,
@@ -80,6 +82,18 @@ struct Last {
     is_signed: bool,
     /// When a search of several pairs last came to its end.
     searched: Reading,
+}
+
+/// What a tick's closest pair is for.
+#[derive(Clone, Copy, PartialEq)]
+enum Purpose {
+    /// It is the tick's answer.
+    Answer,
+    /// Contacts are looked for next: unless the budget ended, the last tick's interval comes after them, and the position
+    /// error.
+    Contacts,
+    /// A later tick has less to do. The whole budget is the pair's.
+    Ahead,
 }
 
 /// The answer of a tick.
@@ -196,18 +210,17 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         tool: &T,
         options: &Options,
     ) -> Result<TrackerAnswer, QueryError> {
-        self.within(surface, tool, options, f32::INFINITY, true)
+        self.within(surface, tool, options, f32::INFINITY, Purpose::Answer)
     }
 
-    /// The closest pair; of pairs that are farther than `separation` (mm), only that they are. Unless it is the tick's answer,
-    /// the last tick's is in it only where the budget ended, and no position error.
+    /// The closest pair; of pairs that are farther than `separation` (mm), only that they are.
     fn within<S: MovingSurface + ?Sized, T: Tool>(
         &mut self,
         surface: &S,
         tool: &T,
         options: &Options,
         separation: f32,
-        is_answer: bool,
+        purpose: Purpose,
     ) -> Result<TrackerAnswer, QueryError> {
         let motion = surface.motion();
         let memory = &mut self.memory;
@@ -222,12 +235,18 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             Err(lost) => Some(lost.into()),
         };
         let moved = moved.unwrap_or(0);
+        let past = memory.separation.now(memory.clock).filter(|_| self.tree.is_closed());
+        let pair_options = match purpose {
+            Purpose::Ahead => *options,
+            _ => options.budget(share_of_pair(options.budget, past, tool.axis_length())),
+        };
         let first = self.triangle.or(options.first(None));
         let (stack, ties) = (&mut self.stack, Some(&mut self.ties));
         let all = RootSet::ALL;
-        let search = Search::start(all, &self.tree, stack, surface, tool, options, first, ties)?;
+        let search =
+            Search::start(all, &self.tree, stack, surface, tool, &pair_options, first, ties)?;
         let front = memory.front.borrow();
-        let mut tick = Tick::new(search, front, memory.clock, options.budget, separation);
+        let mut tick = Tick::new(search, front, memory.clock, pair_options.budget, separation);
         let outcome = tick.run(moved)?;
         let best = tick.triangle();
         self.triangle = best.or(self.triangle);
@@ -240,17 +259,18 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             }
             Outcome::Full { tests } => {
                 fallback = Some(Fallback::Full);
-                (self.whole(surface, tool, options, best, tests)?, true)
+                (self.whole(surface, tool, &pair_options, best, tests)?, true)
             }
         };
         let memory = &mut self.memory;
-        let known = (&mut self.ties, Some(memory.depth.at(memory.clock)));
+        let nearest = closest.lower;
+        let known = (&mut self.ties, Some(memory.depth.at(memory.clock, past)));
         signed(&self.tree, &mut self.stack, surface, tool, options, &mut closest, known)?;
         let is_cut = closest.side == Side::Undefined(NoSide::CutShort);
         let is_kept = separation == f32::INFINITY
-            && (is_answer || is_cut)
-            && self.keep_certain(surface, tool, options, &mut closest)?;
-        if is_answer {
+            && (purpose != Purpose::Contacts || is_cut)
+            && self.keep_certain(surface, tool, options, &mut closest, nearest)?;
+        if purpose != Purpose::Contacts {
             closest.add_position_error(surface);
         }
         let memory = &mut self.memory;
@@ -295,7 +315,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         options: &Options,
         contacts: &mut Contacts<N, NEAR>,
     ) -> Result<TrackerAnswer, QueryError> {
-        let mut tracked = self.within(surface, tool, options, f32::INFINITY, false)?;
+        let mut tracked = self.within(surface, tool, options, f32::INFINITY, Purpose::Contacts)?;
         let is_cut = tracked.is_kept || tracked.closest.side == Side::Undefined(NoSide::CutShort);
         let mut closest = tracked.closest;
         closest.add_position_error(surface);
@@ -315,7 +335,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         // A search that found all but the side has found all contacts: the last tick's side comes after them.
         if !is_cut {
             let TrackerAnswer { closest, is_kept, .. } = &mut tracked;
-            *is_kept = self.keep_certain(surface, tool, options, closest)?;
+            let nearest = closest.lower;
+            *is_kept = self.keep_certain(surface, tool, options, closest, nearest)?;
         }
         tracked.closest.add_position_error(surface);
         if tracked.is_kept && !is_cut {
@@ -341,6 +362,15 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let mut closest = search.run::<WHOLE>(f32::INFINITY)?;
         closest.add_tests(tests);
         Ok(closest)
+    }
+}
+
+/// The part of a tick's budget that the closest pair may take: what is left goes to the depth, of an axis that may be inside.
+fn share_of_pair(budget: Budget, past: Option<Certain>, length: f32) -> Budget {
+    match past {
+        Some(past) if length > 0.0 && past.upper < 0.0 => Budget::new(budget.tests() / 8 * 3),
+        Some(past) if length > 0.0 && past.lower < 0.0 => Budget::new(budget.tests() / 2),
+        _ => budget,
     }
 }
 

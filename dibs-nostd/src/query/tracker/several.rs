@@ -1,13 +1,13 @@
 //! Several trackers: the closest of all pairs. A pair that is certain to be farther is not looked at.
 
-use super::{Last, Tracker, TrackerAnswer};
+use super::{Last, Purpose, Tracker, TrackerAnswer};
 use crate::query::made::Tests;
 use crate::query::{Budget, NoSide, Options, Side};
 use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Tool};
 
 /// Most tests made ahead in a tick, less one.
-const AHEAD: Budget = Budget::new(96);
+const AHEAD: Budget = Budget::new(128);
 
 /// How much farther than the closest pair others are shown to be, in units: an eighth to a sixteenth of the root sphere's
 /// radius.
@@ -128,7 +128,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             (options.unsigned(), closest + self.memory.clock.length(LEAD))
         };
         let options = options.budget(options.budget.at_most(AHEAD.tests()));
-        let found = self.within(surface, tool, &options, separation, true)?.closest;
+        let found = self.within(surface, tool, &options, separation, Purpose::Ahead)?.closest;
         if let Some(last) = &mut self.last {
             last.is_signed |= keeps_side;
             if last.clear < clear {

@@ -4,6 +4,7 @@ mod anytime;
 pub mod bits;
 mod board_faults;
 pub mod boards;
+mod bounded;
 mod corruption;
 pub mod cost;
 mod demo;
@@ -39,6 +40,7 @@ use crate::harness::Check;
 /// All checks, in the order of the document.
 pub const CHECKS: &[Check] = &[
     anytime::CHECK,
+    bounded::CHECK,
     sides::CHECK,
     hand::CHECK,
     filter::CHECK,

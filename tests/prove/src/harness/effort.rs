@@ -9,6 +9,8 @@ pub struct Effort {
     pub sides: usize,
     /// Walks of 400 ticks against a filter of commands.
     pub walks: u64,
+    /// Ticks of a path, with each of some budgets.
+    pub bounded_ticks: usize,
     /// Queries that must give the same bits.
     pub bits: usize,
     /// Queries that must keep to their bound.
@@ -47,6 +49,7 @@ impl Effort {
         cases: 1_000_000,
         sides: 1_000_000,
         walks: 25_000,
+        bounded_ticks: 30_000,
         bits: 100_000,
         costs: 100_000,
         host_costs: 100_000,
@@ -68,6 +71,7 @@ impl Effort {
         cases: 100_000,
         sides: 4_000,
         walks: 100,
+        bounded_ticks: 10_000,
         bits: 10_000,
         costs: 10_000,
         host_costs: 5_000,
@@ -94,6 +98,7 @@ impl Effort {
             cases: wide(self.cases, least.cases),
             sides: wide(self.sides, least.sides),
             walks: (self.walks / u64::from(share)).max(least.walks),
+            bounded_ticks: wide(self.bounded_ticks, least.bounded_ticks),
             bits: wide(self.bits, least.bits),
             costs: wide(self.costs, least.costs),
             host_costs: wide(self.host_costs, least.host_costs),

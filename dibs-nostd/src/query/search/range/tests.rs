@@ -26,7 +26,7 @@ const RIDGE: f32 = 0.1;
 /// is less than the limit, but for rounding. All triangles are below one of them, or in a leaf within the range, and no
 /// triangle twice.
 fn bounds<const M: usize>(
-    memory: &mut Memory<1, M>,
+    memory: &mut Memory<1, 1, M>,
     tree: &Tree<'_, u16>,
     far: &impl Fn(u32) -> f64,
 ) -> Vec<f64> {
@@ -74,7 +74,7 @@ fn no_bound_of_a_range_exceeds_the_distance() {
     let mut rng = Rng::with_seed(16);
     let mut vector = |size: f32| Vec3::from([(); 3].map(|()| (rng.f32() - 0.5) * size));
     let mut stack = [Waiting { lower: 0.0, link: 0 }; 128];
-    let mut memory = Memory::<1, 256>::new(Unit::of(&tree));
+    let mut memory = Memory::<1, 1, 256>::new(Unit::of(&tree));
     // Deadlines wrap soon.
     memory.clock = MotionClock::wrapping_after(Unit::of(&tree), 1 << 22);
     let (mut tip, mut span) = (Vec3::new(50.0, 0.0, 20.0), Vec3::new(30.0, 20.0, 40.0));
@@ -145,7 +145,7 @@ fn a_node_that_no_search_reaches_stays_due() {
     let first = at(by_x[by_x.len() - 1], Vec3::X).expect("a valid capsule");
     let last = at(by_x[0], -Vec3::X).expect("a valid capsule");
     let mut stack = [Waiting { lower: 0.0, link: 0 }; 128];
-    let mut memory = Memory::<1, 256>::new(Unit::of(&tree));
+    let mut memory = Memory::<1, 1, 256>::new(Unit::of(&tree));
     let mut visited = 0;
     for tick in 0..=6_000 {
         memory.begin(Ok(1 << 19));

@@ -1,0 +1,217 @@
+//! The search of one point of the axis.
+//!
+//! A tracker remembers the leaves around the deepest point, so that the next ticks need only these. Where a budget ends the
+//! search of a point, the next tick goes on with it: subtrees and leaves keep their bounds, less the motion.
+
+use super::part::{Fit, Parts, Sample, smaller};
+use super::{Depth, EXACT};
+use crate::query::memory::depth::Remembered;
+use crate::query::search::{Search, UNTIL};
+use crate::query::side::{self, COORDINATES, NoSide, OnAxis, Side};
+use crate::query::{Options, Proximity};
+use crate::tool::{AxisPoint, Tool};
+use crate::unavailable::QueryError;
+use crate::{Index, VertexTable};
+
+/// Node tests that take as long as the work for a point of the axis besides its search. Without them a budget would not
+/// bound a tracker's tick, which may look at many points and triangles without a search.
+const LOOK_COST: u32 = 16;
+
+/// With this many node tests left, a search is expected to come to its end within a tick.
+const ONE_TICK: u32 = 768;
+
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
+    /// Searches the last tick's deepest point to the end; the leaves around it are remembered.
+    pub(super) fn look_again(
+        &mut self,
+        parts: &mut Parts,
+        last: Option<f32>,
+    ) -> Result<(), QueryError> {
+        let row = last.and_then(|at| parts.row_of(at));
+        let length = self.tool.axis_length();
+        if let Some(Remembered { leaves: [best, _], waiting, .. }) = &mut self.remembered {
+            match row {
+                Some(row) => best.move_to(parts.sample(row).parameter, length),
+                None => best.end(waiting),
+            }
+        }
+        if let Some(row) = row {
+            let sample = self.look(parts.sample(row), EXACT)?;
+            parts.set_sample(row, sample);
+        }
+        Ok(())
+    }
+
+    /// Goes on with the point whose search the last tick's budget ended.
+    pub(super) fn go_on(&mut self, parts: &mut Parts) -> Result<(), QueryError> {
+        let Some(searched) = self.searched() else { return Ok(()) };
+        match parts.row_of(searched) {
+            Some(row) => {
+                let sample = self.look(parts.sample(row), EXACT)?;
+                parts.set_sample(row, sample);
+            }
+            None => self.end_search(),
+        }
+        Ok(())
+    }
+
+    /// No search goes on in the next tick.
+    fn end_search(&mut self) {
+        if let Some(Remembered { leaves: [_, other], waiting, .. }) = &mut self.remembered {
+            other.end(waiting);
+        }
+    }
+
+    /// The closest pair of a sample's point, or what was found of it until the budget ended; `None` where another search is
+    /// to go on first.
+    fn search(
+        &mut self,
+        sample: &Sample,
+        options: &Options,
+        enough: f32,
+    ) -> Result<Option<Proximity>, QueryError> {
+        let &Sample { parameter, triangle, .. } = sample;
+        let point = AxisPoint(sample.on_axis);
+        let length = self.tool.axis_length();
+        let Self { roots, tree, stack, vertices, ties, remembered, .. } = self;
+        let search = Search::start(
+            *roots,
+            tree,
+            stack,
+            *vertices,
+            &point,
+            options,
+            triangle,
+            Some(&mut **ties),
+        )?;
+        let Some(Remembered { leaves: [best, other], waiting, .. }) = remembered else {
+            return search.run::<UNTIL>(enough).map(Some);
+        };
+        for leaves in [&mut *best, &mut *other] {
+            let way = leaves.way_to(parameter, length);
+            if search.is_among(leaves, way) {
+                return search.among(leaves, way).map(Some);
+            }
+        }
+        let gathered = match (best.are_around(parameter), other.are_around(parameter)) {
+            (true, _) => best,
+            (false, true) => other,
+            (false, false) if !waiting.is_empty() || !other.parameter().is_nan() => {
+                return Ok(None);
+            }
+            (false, false) if options.budget.tests() >= ONE_TICK => {
+                // A bound that is just low enough would not be so at the next tick.
+                let found = search.run::<UNTIL>(EXACT)?;
+                if found.is_cut_short() {
+                    other.forget_for(parameter);
+                }
+                return Ok(Some(found));
+            }
+            (false, false) => {
+                other.forget_for(parameter);
+                other
+            }
+        };
+        if !waiting.is_empty() && !gathered.are_gathered() {
+            return Ok(None);
+        }
+        search.gather(gathered, waiting).map(Some)
+    }
+
+    /// Searches a point of the axis. Out of budget, returns the sample as it is. Only a tracker searches a point to the
+    /// end that is no deeper than `enough`.
+    pub(super) fn look(&mut self, sample: Sample, enough: f32) -> Result<Sample, QueryError> {
+        self.looks += 1;
+        self.spend(LOOK_COST);
+        let Sample { parameter, on_axis, .. } = sample;
+        // The root's test is one of them.
+        if self.is_spent() {
+            return Ok(sample);
+        }
+        let options = self.options.budget(self.options.budget.less(1));
+        let point = AxisPoint(on_axis);
+        let Some(mut found) = self.search(&sample, &options, enough)? else { return Ok(sample) };
+        if found.is_cut_short() && self.has_leaves(parameter) {
+            // They were gathered in several ticks.
+            let (first, rest) = (found.tests(), options.after(found.tests()));
+            if let Some(again) = self.search(&sample, &rest, enough)? {
+                found = again;
+                found.add_tests(first);
+            }
+        }
+        let (tree, vertices, roots) = (self.tree, self.vertices, self.roots);
+        let is_many = self.ties.are_lost() && !found.is_cut_short();
+        let many = is_many
+            .then(|| {
+                side::of_many(roots, tree, self.stack, vertices, &mut found, on_axis, &options)
+            })
+            .transpose()?;
+        self.options = self.options.after(found.tests());
+        self.answer.add_tests(found.tests());
+        let distance = found.axis_distance;
+        let at = if found.is_cut_short() {
+            None
+        } else {
+            let (at, left) = (OnAxis::new(&point, 0.0), self.options.budget.tests());
+            Some(side::of_point(tree, vertices, &found, &at, self.ties, many, left)?)
+        };
+        self.spend(at.map_or(0, |at| at.work));
+        let mut is_deepest = false;
+        let answer = &mut self.answer;
+        let depth = match at {
+            Some(at) if at.side == Side::Outside => {
+                self.touches.add_outside(parameter * self.tool.axis_length());
+                -distance
+            }
+            Some(at) if at.side == Side::Inside && distance > self.deepest => {
+                (self.deepest, self.deepest_at) = (distance, parameter);
+                *answer = Proximity {
+                    point_on_surface: found.point_on_surface,
+                    point_on_tool: on_axis - at.outward * self.tool.radius(),
+                    direction: at.outward,
+                    axis_parameter: parameter,
+                    triangle: found.triangle,
+                    corners: found.corners,
+                    barycentric: found.barycentric,
+                    ..*answer
+                };
+                is_deepest = true;
+                distance
+            }
+            Some(_) => distance,
+            None => smaller(sample.depth, distance),
+        };
+        let accuracy = found.accuracy + COORDINATES * on_axis.abs().max_element();
+        if accuracy > answer.accuracy {
+            answer.accuracy = accuracy;
+        }
+        // Without its side it is searched again, among its leaves.
+        if at.is_some_and(|at| at.side != Side::Undefined(NoSide::CutShort)) {
+            self.end_search_of(parameter, is_deepest);
+        }
+        // Without a triangle of its own, its corners are a pin.
+        let triangle = found.triangle.or(sample.triangle);
+        let sample = self.sample(parameter, depth, triangle, found.corners)?;
+        let fit = if at.is_some() { Fit::Searched } else { sample.fit };
+        Ok(Sample { fit, ..sample })
+    }
+
+    /// Whether the leaves around a point are gathered.
+    fn has_leaves(&self, parameter: f32) -> bool {
+        let leaves = self.remembered.as_ref().map(|known| known.leaves.iter());
+        leaves.is_some_and(|mut leaves| {
+            leaves.any(|leaves| leaves.are_around(parameter) && leaves.are_complete())
+        })
+    }
+
+    /// A point was searched to the end. If it is the deepest, its leaves are kept.
+    fn end_search_of(&mut self, parameter: f32, is_deepest: bool) {
+        let Some(Remembered { leaves: [best, other], .. }) = &mut self.remembered else { return };
+        if other.are_around(parameter) {
+            if is_deepest {
+                core::mem::swap(best, other);
+            }
+            self.end_search();
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! A subtree that is still to be searched: on a search's stack, or from tick to tick.
+
+/// A subtree that waits for its turn.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::query) struct Waiting {
+    /// Lower bound on its distance from the tool's axis.
+    pub lower: f32,
+    /// Link of its node.
+    pub link: u32,
+}
