@@ -70,7 +70,7 @@
 /**
  * Bytes of a guard's storage.
  */
-#define DIBS_GUARD_SIZE 17664
+#define DIBS_GUARD_SIZE 22272
 
 /**
  * Bytes of the memory of a loop's objects, besides the surface.

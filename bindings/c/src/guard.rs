@@ -21,7 +21,7 @@ use crate::tracker::DIBS_OPENED;
 use crate::tree::{DIBS_TREE_SIZE, dibs_tree, dibs_tree_init};
 
 /// Bytes of a guard's storage.
-pub const DIBS_GUARD_SIZE: usize = 17_664;
+pub const DIBS_GUARD_SIZE: usize = 22_272;
 
 /// The control tick's end of a guarded surface: the closest pair of one tool on the surface as it is now, and the trust in
 /// it.
