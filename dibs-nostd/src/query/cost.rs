@@ -41,7 +41,8 @@ impl Cost {
     /// The most instructions, by the fit, of a query within `budget`, however it divides the tests.
     #[must_use]
     pub const fn instructions_within(&self, budget: Budget) -> u64 {
-        let most = budget.tests() as u64 * self.unit() as u64;
+        // With the triangle of a warm start.
+        let most = (budget.tests() as u64 + Budget::TRIANGLE as u64) * self.unit() as u64;
         most.saturating_add(self.base as u64)
     }
 
@@ -67,7 +68,8 @@ impl Budget {
     #[must_use]
     pub const fn for_instructions(instructions: u32, cost: &Cost) -> Self {
         match instructions.saturating_sub(cost.base).checked_div(cost.unit()) {
-            Some(tests) => Self::new(tests),
+            // The triangle of a warm start comes on top.
+            Some(tests) => Self::new(tests.saturating_sub(Self::TRIANGLE)),
             // Tests that cost nothing.
             None => Self::UNLIMITED,
         }

@@ -34,7 +34,8 @@ impl Proximity {
     }
 
     /// The node tests that take as long as its tests did, which a [`Budget`] bounds: a triangle test counts as
-    /// [`Budget::TRIANGLE`]. The first root's test is one of them, and comes on top of the budget.
+    /// [`Budget::TRIANGLE`]. The first root's test is one of them; it comes on top of the budget, as does
+    /// the triangle of a warm start.
     #[must_use]
     pub const fn work(&self) -> u32 {
         self.tests().work()

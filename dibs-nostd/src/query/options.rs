@@ -7,7 +7,8 @@ use crate::{Coverage, MeasuredStretch, TriangleRow, VertexTable};
 /// wider interval.
 ///
 /// A node test is one of a sphere, or of a leaf's or triangle's plane. An exact triangle test counts as
-/// [`TRIANGLE`](Self::TRIANGLE) of them. The roots' spheres are always tested and not counted. The depth of an axis that
+/// [`TRIANGLE`](Self::TRIANGLE) of them. The roots' spheres are always tested and not counted, and the triangle of a warm
+/// start comes on top. The depth of an axis that
 /// crosses or is inside counts its work besides the searches as the node tests that take as long.
 ///
 /// Every answer's interval holds the true separation. For the same query a larger budget never lowers the lower end,

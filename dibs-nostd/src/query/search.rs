@@ -180,7 +180,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         search.lower_cutoff_to_pin(all.nearest.row, all.nearest.distance);
         if let Some(TriangleRow(triangle)) = first
             && triangle < header.triangles
-            && search.meter.triangle().is_some()
+            && search.meter.warm_triangle().is_some()
         {
             let corners = search.corners(triangle)?;
             search.test_triangle(triangle, &corners);

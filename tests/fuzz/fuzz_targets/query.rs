@@ -111,7 +111,7 @@ fn ask(
     for answer in answers.into_iter().flatten() {
         let (nodes, triangles) = most(&tree, tool, answer.side);
         assert!(answer.node_tests <= nodes && answer.triangle_tests <= triangles);
-        assert!(answer.work() <= budget.tests().saturating_add(1));
+        assert!(answer.work() <= budget.tests().saturating_add(1 + Budget::TRIANGLE));
         assert!(answer.lower <= answer.separation);
         let is_signed = is_depth(tool, answer.side) || answer.side == Side::Inside;
         assert!(is_signed || answer.lower >= -tool.radius());

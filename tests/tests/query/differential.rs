@@ -116,7 +116,7 @@ fn check(rows: &[Vec3], tool: &Instrument, truth: &OraclePair, found: &Proximity
 
 fn check_interval(truth: &OraclePair, cut: &Proximity, budget: Budget) {
     let accuracy = f64::from(cut.accuracy);
-    assert!(cut.work() <= budget.tests() + 1, "{budget:?} {cut:?}");
+    assert!(cut.work() <= budget.tests() + 1 + Budget::TRIANGLE, "{budget:?} {cut:?}");
     assert!(cut.lower <= cut.separation, "{budget:?} {cut:?}");
     let inside = f64::from(cut.lower) - accuracy <= truth.separation
         && truth.separation <= f64::from(cut.separation) + accuracy;

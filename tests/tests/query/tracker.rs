@@ -101,8 +101,9 @@ impl<'t, const OPENED: usize> Subject<'t, OPENED> {
                 "{:?}: {tracked:?}\n{whole:?}",
                 self.tally
             );
-            // The root is not counted.
-            assert!(found.work() <= budget.tests().saturating_add(1), "{tracked:?} {budget:?}");
+            // The root is not counted, nor a warm triangle.
+            let most = budget.tests().saturating_add(1 + Budget::TRIANGLE);
+            assert!(found.work() <= most, "{tracked:?} {budget:?}");
             self.tally.cut_short += usize::from(found.lower < found.separation);
         } else {
             let apart = (found.separation - whole.separation).abs() / accuracy;

@@ -246,7 +246,9 @@ fn a_query_on_damaged_bytes_ends() {
             match result {
                 Ok(found) => {
                     answers += 1;
-                    assert!(found.node_tests <= 3 * tree.node_count() + tree.triangle_count() + 1);
+                    assert!(
+                        found.work() <= 3 * tree.node_count() + 9 * (tree.triangle_count() + 1) + 9
+                    );
                 }
                 Err(QueryError::Corrupt { .. } | QueryError::Uncovered { .. }) => errors += 1,
                 Err(other) => panic!("{other}"),

@@ -342,7 +342,8 @@ impl<'f> Session<'f> {
         }
         let found = pair.closest(ends, &options.signed().budget(budget))?;
         let Proximity { node_tests, triangle_tests, .. } = found;
-        let spent = cost.instructions(node_tests, triangle_tests);
+        // The root's test is in the base.
+        let spent = cost.instructions(node_tests.saturating_sub(1), triangle_tests);
         let spent = u32::try_from(spent).unwrap_or(u32::MAX);
         self.instructions = self.instructions.saturating_add(spent);
         self.queries += 1;

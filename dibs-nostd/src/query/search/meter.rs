@@ -16,10 +16,20 @@ impl Meter {
         Self { all: budget.tests(), left: budget.tests(), triangle_tests: 0 }
     }
 
-    /// The same within another budget, less the tests made, which both must cover.
+    /// The same within another budget, before any test but that of a warm triangle.
     pub const fn within(self, budget: Budget) -> Self {
-        let left = budget.less(self.made().work()).tests();
-        Self { all: budget.tests(), left, ..self }
+        let warm = self.triangle_tests.wrapping_mul(Budget::TRIANGLE);
+        Self { all: budget.tests().wrapping_add(warm), left: budget.tests(), ..self }
+    }
+
+    /// The exact test of a warm triangle, on top of a budget that could cover it: so a larger one never leaves less for the
+    /// rest.
+    #[inline(always)]
+    pub fn warm_triangle(&mut self) -> Option<()> {
+        self.left.checked_sub(Budget::TRIANGLE)?;
+        self.all = self.all.wrapping_add(Budget::TRIANGLE);
+        self.triangle_tests = self.triangle_tests.wrapping_add(1);
+        Some(())
     }
 
     /// A test of a sphere or plane.

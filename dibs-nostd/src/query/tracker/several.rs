@@ -7,7 +7,7 @@ use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Tool};
 
 /// Most tests made ahead in a tick, less one.
-const AHEAD: Budget = Budget::new(128);
+const AHEAD: Budget = Budget::new(120);
 
 /// How much farther than the closest pair others are shown to be, in units: an eighth to a sixteenth of the root sphere's
 /// radius.
