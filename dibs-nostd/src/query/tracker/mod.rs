@@ -235,18 +235,18 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             Err(lost) => Some(lost.into()),
         };
         let moved = moved.unwrap_or(0);
-        let past = memory.separation.now(memory.clock).filter(|_| self.tree.is_closed());
-        let pair_options = match purpose {
-            Purpose::Ahead => *options,
-            _ => options.budget(share_of_pair(options.budget, past, tool.axis_length())),
+        let has_depth = options.is_signed && tool.axis_length() > 0.0 && self.tree.is_closed();
+        let past = if has_depth { memory.separation.now(memory.clock) } else { None };
+        let budget = match past {
+            Some(past) if purpose != Purpose::Ahead => share_of_pair(options.budget, &past),
+            _ => options.budget,
         };
         let first = self.triangle.or(options.first(None));
         let (stack, ties) = (&mut self.stack, Some(&mut self.ties));
         let all = RootSet::ALL;
-        let search =
-            Search::start(all, &self.tree, stack, surface, tool, &pair_options, first, ties)?;
+        let search = Search::start(all, &self.tree, stack, surface, tool, options, first, ties)?;
         let front = memory.front.borrow();
-        let mut tick = Tick::new(search, front, memory.clock, pair_options.budget, separation);
+        let mut tick = Tick::new(search, front, memory.clock, budget, separation);
         let outcome = tick.run(moved)?;
         let best = tick.triangle();
         self.triangle = best.or(self.triangle);
@@ -259,7 +259,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             }
             Outcome::Full { tests } => {
                 fallback = Some(Fallback::Full);
-                (self.whole(surface, tool, &pair_options, best, tests)?, true)
+                (self.whole(surface, tool, &options.budget(budget), best, tests)?, true)
             }
         };
         let memory = &mut self.memory;
@@ -366,11 +366,13 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
 }
 
 /// The part of a tick's budget that the closest pair may take: what is left goes to the depth, of an axis that may be inside.
-fn share_of_pair(budget: Budget, past: Option<Certain>, length: f32) -> Budget {
-    match past {
-        Some(past) if length > 0.0 && past.upper < 0.0 => Budget::new(budget.tests() / 8 * 3),
-        Some(past) if length > 0.0 && past.lower < 0.0 => Budget::new(budget.tests() / 2),
-        _ => budget,
+fn share_of_pair(budget: Budget, past: &Certain) -> Budget {
+    if past.upper < 0.0 {
+        Budget::new(budget.tests() / 8 * 3)
+    } else if past.lower < 0.0 {
+        Budget::new(budget.tests() / 2)
+    } else {
+        budget
     }
 }
 
