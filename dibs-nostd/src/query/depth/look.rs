@@ -43,6 +43,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
     }
 
     /// Goes on with the point whose search the last tick's budget ended.
+    #[cold]
+    #[inline(never)]
     pub(super) fn go_on(&mut self, parts: &mut Parts) -> Result<(), QueryError> {
         let Some(searched) = self.searched() else { return Ok(()) };
         match parts.row_of(searched) {
@@ -56,6 +58,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
     }
 
     /// No search goes on in the next tick.
+    #[cold]
     fn end_search(&mut self) {
         if let Some(Remembered { leaves: [_, other], waiting, .. }) = &mut self.remembered {
             other.end(waiting);
@@ -84,42 +87,47 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             triangle,
             Some(&mut **ties),
         )?;
-        let Some(Remembered { leaves: [best, other], waiting, .. }) = remembered else {
-            return search.run::<UNTIL>(enough).map(Some);
-        };
-        for leaves in [&mut *best, &mut *other] {
-            let way = leaves.way_to(parameter, length);
-            if search.is_among(leaves, way) {
-                return search.among(leaves, way).map(Some);
-            }
-        }
-        let gathered = match (best.are_around(parameter), other.are_around(parameter)) {
-            (true, _) => best,
-            (false, true) => other,
-            (false, false) if !waiting.is_empty() || !other.parameter().is_nan() => {
-                return Ok(None);
-            }
-            (false, false) if options.budget.tests() >= ONE_TICK => {
-                // A bound that is just low enough would not be so at the next tick.
-                let found = search.run::<UNTIL>(EXACT)?;
-                if found.is_cut_short() {
-                    other.forget_for(parameter);
+        let mut limit = enough;
+        if let Some(Remembered { leaves: [best, other], waiting, .. }) = remembered {
+            for leaves in [&mut *best, &mut *other] {
+                let way = leaves.way_to(parameter, length);
+                if search.is_among(leaves, way) {
+                    return search.among(leaves, way).map(Some);
                 }
-                return Ok(Some(found));
             }
-            (false, false) => {
-                other.forget_for(parameter);
-                other
+            let gathered = match (best.are_around(parameter), other.are_around(parameter)) {
+                (true, _) => Some(&mut *best),
+                (false, true) => Some(&mut *other),
+                (false, false) if !waiting.is_empty() || !other.parameter().is_nan() => {
+                    return Ok(None);
+                }
+                (false, false) if options.budget.tests() >= ONE_TICK => None,
+                (false, false) => {
+                    other.forget_for(parameter);
+                    Some(&mut *other)
+                }
+            };
+            if let Some(gathered) = gathered {
+                if !waiting.is_empty() && !gathered.are_gathered() {
+                    return Ok(None);
+                }
+                return search.gather(gathered, waiting).map(Some);
             }
-        };
-        if !waiting.is_empty() && !gathered.are_gathered() {
-            return Ok(None);
+            // A bound that is just low enough would not be so at the next tick.
+            limit = EXACT;
         }
-        search.gather(gathered, waiting).map(Some)
+        let found = search.run::<UNTIL>(limit)?;
+        if found.is_cut_short()
+            && let Some(Remembered { leaves: [_, other], .. }) = remembered
+        {
+            other.forget_for(parameter);
+        }
+        Ok(Some(found))
     }
 
     /// Searches a point of the axis. Out of budget, returns the sample as it is. Only a tracker searches a point to the
     /// end that is no deeper than `enough`.
+    #[inline(never)] // Small code, see `side::of_point`.
     pub(super) fn look(&mut self, sample: Sample, enough: f32) -> Result<Sample, QueryError> {
         self.looks += 1;
         self.spend(LOOK_COST);

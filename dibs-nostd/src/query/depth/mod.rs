@@ -188,7 +188,9 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         last: Option<f32>,
     ) -> Result<f32, QueryError> {
         self.look_again(parts, last)?;
-        self.go_on(parts)?;
+        if self.searched().is_some_and(|at| !at.is_nan()) {
+            self.go_on(parts)?;
+        }
         loop {
             let enough = self.enough(tolerance);
             let row = parts.highest();

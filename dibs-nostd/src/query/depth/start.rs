@@ -49,7 +49,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         }
     }
 
-    /// The parts between the axis' ends and the places where it meets the surface.
+    /// The parts between the axis' ends and the places where it meets the surface. A tracker begins once.
+    #[cold]
+    #[inline(never)]
     pub(super) fn begin(
         &mut self,
         parts: &mut Parts,

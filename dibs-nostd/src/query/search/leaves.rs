@@ -50,6 +50,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
 
     /// Searches the tree, and gathers the leaves around the point; where the budget ended, the subtrees left wait for the next
     /// call. What was found in several calls is no answer, but leaves that have one.
+    #[cold] // Some sixty ticks apart.
+    #[inline(never)]
     pub fn gather(
         mut self,
         leaves: &mut Leaves,

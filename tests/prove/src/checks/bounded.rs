@@ -267,7 +267,7 @@ pub const CHECK: Check = Check {
             "bounded.40k.95",
             "With a budget of 40,000 instructions a tick: the interval's width at 95 % of the ticks near the wall",
             "mm; 99 %: {bounded.40k.99}, largest {bounded.40k.largest}; pair off the deepest and turned: {bounded.40k.turned} %",
-            Bound::AtMost(2.0),
+            Bound::AtMost(4.0),
         ),
         note("bounded.40k.99"),
         note("bounded.40k.largest"),
