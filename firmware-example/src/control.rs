@@ -11,7 +11,7 @@ use crate::{BusStatus, Receiver, TICK_RATE, Trust, instrument, time_of};
 
 /// The budget of a query: more than the closest pair on the heart needs, and within a tick on every admitted surface. It
 /// is less than [`Cost`] would allow, because a position of a moving surface is a sum of two.
-pub const BUDGET: Budget = Budget::new(2_460);
+pub const BUDGET: Budget = Budget::new(1_750);
 
 /// How exactly the depth of a crossing axis is found, in mm: the spring tells a quarter of a newton apart, and few depths
 /// take more than the budget.

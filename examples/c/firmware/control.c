@@ -14,7 +14,7 @@
 #define TICK_RATE 1000u
 /* More than the closest pair on the heart needs, and within a tick on every admitted surface. The spring tells depths
    of a quarter of a millimetre apart. */
-static const dibs_options options = {.budget = 3000,
+static const dibs_options options = {.budget = 2000,
                                      .depth_tolerance = 0.25f};
 
 /* Limits in ms, the first degraded and the second safe. The emulated line takes one to three seconds for a frame; those
