@@ -49,7 +49,7 @@ fn warm() -> Scene {
     scene
 }
 
-fn nodes_only() -> Scene {
+fn few_tests() -> Scene {
     scene(Options::cold().unsigned().budget(Budget::new(64)))
 }
 
@@ -69,7 +69,7 @@ fn capsule_query(scene: &mut Scene) -> Proximity {
 
 #[library_benchmark]
 #[bench::whole(setup = cold)]
-#[bench::nodes(setup = nodes_only)]
+#[bench::few(setup = few_tests)]
 fn sphere_closest(mut scene: Scene) -> Proximity {
     let Scene { query, rows, options } = &mut scene;
     black_box(query.closest(rows.as_slice(), &sphere(), options).expect("a sound tree"))
@@ -78,7 +78,7 @@ fn sphere_closest(mut scene: Scene) -> Proximity {
 #[library_benchmark]
 #[bench::whole(setup = cold)]
 #[bench::warm(setup = warm)]
-#[bench::nodes(setup = nodes_only)]
+#[bench::few(setup = few_tests)]
 fn capsule_closest(mut scene: Scene) -> Proximity {
     black_box(capsule_query(&mut scene))
 }

@@ -247,7 +247,7 @@ fn a_query_on_damaged_bytes_ends() {
                 Ok(found) => {
                     answers += 1;
                     assert!(
-                        found.work() <= 3 * tree.node_count() + 9 * (tree.triangle_count() + 1) + 9
+                        found.work() <= 3 * tree.node_count() + 9 * (tree.triangle_count() + 1) + 1
                     );
                 }
                 Err(QueryError::Corrupt { .. } | QueryError::Uncovered { .. }) => errors += 1,

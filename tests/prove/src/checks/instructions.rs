@@ -17,10 +17,10 @@ pub const CHECK: Check = Check {
     run: check,
     promises: &[
         golden("host.sphere_closest.whole"),
-        golden("host.sphere_closest.nodes"),
+        golden("host.sphere_closest.few"),
         golden("host.capsule_closest.whole"),
         golden("host.capsule_closest.warm"),
-        golden("host.capsule_closest.nodes"),
+        golden("host.capsule_closest.few"),
         golden("host.sphere_closest_wide.whole"),
         golden("host.capsule_closest_wide.whole"),
         golden("host.sphere_triangle.ordinary"),
