@@ -5,14 +5,14 @@ use glam::Vec3;
 use super::{GainError, positive};
 use crate::math::sqrt::sqrt;
 
-/// Keeps the account of the energy that a wall's force gives to the hand, relative to the wall, and makes up the force so
-/// that this is never more than a tank beyond what the hand gave before.
+/// Keeps the account of the energy that a wall's force gives to the hand, relative to the wall, and reduces the force where
+/// the energy given would exceed the energy received by more than a stated tank.
 ///
-/// A wall that is a spring in continuous time gives back what it took. Sampling, a frame that moves the wall in one tick,
+/// A spring in continuous time gives back the energy that it received. Sampling, a frame that moves the wall in one tick,
 /// a hold that ends and a saturation that yields give more. The account counts force times relative velocity (a passivity
 /// observer: Hannaford & Ryu, IEEE T-RA 2002) and takes from the force the part along an outward motion that the
-/// account does not cover. A force against an inward motion is never made less. What the hand gave counts up to the
-/// spring's own energy, so that a damper fills no account.
+/// account does not cover. A force against an inward motion is never made less. The hand's energy counts up to the
+/// spring's own, so that a damper fills no account.
 ///
 /// Between two ticks the force changes by a largest step, unless the account or its end needs more.
 ///
@@ -58,7 +58,7 @@ impl EnergyAccount {
         Ok(Self { tank, step, stiffness, balance: tank, force: Vec3::ZERO })
     }
 
-    /// The energy (mJ) that may still be given. Below 0 by what a tick gave unforeseen.
+    /// The energy (mJ) that may still be given. It is below 0 after a tick whose motion took more than the last one foretold.
     #[must_use]
     pub const fn balance(&self) -> f32 {
         self.balance

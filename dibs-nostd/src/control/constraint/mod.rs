@@ -24,7 +24,7 @@
 //!
 //! # Passivity
 //!
-//! A sampled virtual wall generates energy; an [`EnergyAccount`] bounds what it gives, and the force's steps. Without one
+//! A sampled virtual wall generates energy; an [`EnergyAccount`] bounds that energy, and the force's steps. Without one
 //! there is no promise. Colgate and Schenkel ("Passivity of a class of sampled-data systems", J.
 //! Robotic Systems 14, 1997; ACC 1994) show that with sampling period `T`, stiffness `K` and damping `B` it is passive
 //! exactly if the device's own physical damping `b` satisfies `b > K T / 2 + |B|`, for velocities by backward

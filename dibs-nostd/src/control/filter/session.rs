@@ -59,7 +59,7 @@ struct State {
     end: Option<Known>,
     /// The distance less this is the separation from the tissue as it may be at the start.
     reach: f32,
-    /// The least distance allowed on the way.
+    /// The least distance allowed during the motion.
     least: f32,
 }
 
@@ -67,7 +67,7 @@ struct State {
 #[derive(Clone, Copy)]
 struct Candidate {
     motion: Motion,
-    /// Least separation on the way, and at its end.
+    /// Least separation during the motion, and at its end.
     least: f32,
     last: f32,
     /// Most (mm) that a point of an axis moves.
@@ -160,7 +160,7 @@ impl<'f> Session<'f> {
                 };
                 return Ok(self.admitted(&found, reason));
             }
-            // Farther at the end than any, and on the way no nearer than rest, unless it leads straight out.
+            // Farther at the end than any, and during the motion no nearer than rest, unless it leads straight out.
             let gained = found.last - stand_still.last;
             let is_way_out = found.least >= stand_still.least || gained >= 0.5 * found.moved;
             if is_way_out && found.last > best.last {

@@ -1,4 +1,4 @@
-//! The least distance of an axis from a surface on the way between two poses.
+//! The least distance of an axis from a surface during a motion between two poses.
 
 use crate::math::sqrt::sqrt;
 

@@ -4,7 +4,8 @@
 //! |---|---|
 //! | [`front`] | the subtrees and triangles that the closest pair's search passed over |
 //! | [`range`] | the children of opened nodes that are farther than a range search went |
-//! | [`leaves`] | the leaves around the deepest point of an axis |
+//! | [`leaves`] | the leaves around the deepest point of an axis, and around one that may be deeper |
+//! | [`waiting`] | the subtrees still to be searched for these leaves |
 //! | [`depth`] | the depth of an axis' parts |
 //! | [`separation`] | the signed separation |
 //!
