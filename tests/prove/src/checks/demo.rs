@@ -1,6 +1,7 @@
 //! The demo on the emulated board: deadlines, answers, and every published frame read back.
 
 use std::fs;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use serde_json::Value;
@@ -159,7 +160,7 @@ pub fn report_of(Run { seconds, faults, c }: Run) -> Result<Value> {
         (false, true) => "demo-c",
         (true, true) => "demo-c-faults",
     };
-    let output = workspace::target().join("guarantees").join(name);
+    let output = folder(name);
     demo::run(&demo::Options {
         seconds,
         faults,
@@ -169,7 +170,17 @@ pub fn report_of(Run { seconds, faults, c }: Run) -> Result<Value> {
         output: Some(output.clone()),
         ..demo::Options::default()
     })?;
-    let text = fs::read_to_string(output.join("report.json"))?;
+    written(&output)
+}
+
+/// The folder of a demo's report.
+pub fn folder(name: &str) -> PathBuf {
+    workspace::target().join("guarantees").join(name)
+}
+
+/// The report in a folder.
+pub fn written(folder: &Path) -> Result<Value> {
+    let text = fs::read_to_string(folder.join("report.json"))?;
     Ok(serde_json::from_str(&text)?)
 }
 

@@ -4,7 +4,7 @@ use anyhow::Result;
 use xtask::c_firmware;
 use xtask::steps::Outcome;
 
-use super::demo::{Run, number, report_of};
+use super::demo::{Run, folder, number, report_of, written};
 use crate::harness::figures::Figures;
 use crate::harness::promise::{
     Bound, Promise,
@@ -47,16 +47,29 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Seconds of the controller's time in a run of the tests: a frame takes one of them.
-const SHORT: u32 = 2;
+/// Seconds of the controller's time in a run of the tests: a frame takes one of them. That time does not wait for a busy
+/// computer to send, so a run without a frame is repeated with more.
+const SHORT: [u32; 3] = [2, 4, 8];
 
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     // Its compiler is of Debian's alone, which not every machine has.
     if let Err(error) = c_firmware::find() {
         return Ok(Outcome::Skipped(format!("{error:#}")));
     }
-    let seconds = if effort.is_record { effort.demo_seconds } else { SHORT };
-    let report = report_of(Run { seconds, c: true, ..Run::default() })?;
+    let run = |seconds| report_of(Run { seconds, c: true, ..Run::default() });
+    let report = if effort.is_record {
+        run(effort.demo_seconds)?
+    } else {
+        let mut report = run(SHORT[0]);
+        for seconds in SHORT.into_iter().skip(1) {
+            if report.is_ok() || !is_without_frames() {
+                break;
+            }
+            println!("no frame came in time on a busy computer: again, for {seconds} s");
+            report = run(seconds);
+        }
+        report?
+    };
     for (name, field) in [
         ("demo.c.ticks", "ticks"),
         ("demo.c.answers", "queries"),
@@ -68,4 +81,9 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
         figures.note(name, number(&report[field], field)?);
     }
     Ok(Outcome::Passed)
+}
+
+/// Whether the last run published nothing.
+fn is_without_frames() -> bool {
+    written(&folder("demo-c")).is_ok_and(|report| report["frames_published"] == 0)
 }

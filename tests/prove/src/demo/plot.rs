@@ -29,9 +29,9 @@ const ORANGE_INK: RGBColor = RGBColor(230, 140, 0);
 /// `instructions.svg`.
 pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
     let answered: Vec<&Tick> = outcome.ticks.iter().filter(|tick| tick.is_answered()).collect();
-    if answered.is_empty() {
-        return Ok(());
-    }
+    let (Some(first), Some(last)) = (answered.first(), answered.last()) else { return Ok(()) };
+    // Longer than nothing, and the same for curves without a point: a chart of no length is never done.
+    let time = at(first.tick, 0.0).0..at(last.tick + 1, 0.0).0;
     let picture = folder.join("separation.svg");
     let root = SVGBackend::new(&picture, (900, 760)).into_drawing_area();
     root.fill(&WHITE).map_err(failed)?;
@@ -46,11 +46,11 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
             at(tick.tick, tick.lower.into())
         }),
     ];
-    curves(&upper, "separation (mm)", &interval)?;
+    curves(&upper, &time, "separation (mm)", &interval)?;
     let touches: Vec<&Touch> = outcome.touches.all.iter().collect();
     let contacts =
         Curve::new("", GREEN_INK, &touches, |touch| at(touch.tick, touch.contacts as f64));
-    curves(&middle, "contacts", &[contacts])?;
+    curves(&middle, &time, "contacts", &[contacts])?;
     let forces = [
         Curve::new("of all contacts, by the proxy", ORANGE_INK, &touches, |touch| {
             at(touch.tick, touch.force.into())
@@ -59,7 +59,7 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
             at(tick.tick, force(tick).into())
         }),
     ];
-    curves(&lower, "force (N)", &forces)?;
+    curves(&lower, &time, "force (N)", &forces)?;
     root.present().map_err(failed)?;
 
     let instructions = |tick: &Tick| f64::from(tick.query_counts * qemu::INSTRUCTIONS_A_COUNT);
@@ -69,7 +69,7 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
         root.fill(&WHITE).map_err(failed)?;
         let (upper, lower) = root.split_vertically(280);
         let curve = Curve::new("", BLUE_INK, &answered, |tick| at(tick.tick, instructions(tick)));
-        curves(&upper, "instructions a query", &[curve])?;
+        curves(&upper, &time, "instructions a query", &[curve])?;
         let values: Vec<f64> = answered.iter().map(|tick| instructions(tick)).collect();
         histogram(&lower, "instructions a query", &values)?;
         root.present().map_err(failed)?;
@@ -117,12 +117,12 @@ impl Curve {
 /// Curves over the same time.
 fn curves(
     area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    time: &Range<f64>,
     name: &str,
     curves: &[Curve],
 ) -> Result<()> {
-    let points = || curves.iter().flat_map(|curve| &curve.points);
-    let time = range(points().map(|point| point.0));
-    let Range { start: low, end: top } = range(points().map(|point| point.1).chain([0.0]));
+    let values = curves.iter().flat_map(|curve| &curve.points).map(|point| point.1);
+    let (low, top) = values.fold((0.0, 0.0), |(low, top): (f64, f64), v| (low.min(v), top.max(v)));
     let room = if top > low { (top - low) * 0.05 } else { 1.0 };
     let low = if low < 0.0 { low - room } else { 0.0 };
     let mut chart = ChartBuilder::on(area)
@@ -203,12 +203,6 @@ fn histogram(
     let text = Text::new(format!("worst {worst:.0}"), (worst, most * 1.01), font);
     chart.draw_series([text]).map_err(failed)?;
     Ok(())
-}
-
-fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
-    let (low, high) =
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-    low..high
 }
 
 fn failed(error: impl std::fmt::Display) -> anyhow::Error {

@@ -5,6 +5,8 @@ use std::env;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
@@ -22,6 +24,9 @@ const EFFORT: &str = "effort.json";
 const FOUND: &str = "found.json";
 const STEPS: &str = "steps.txt";
 const LOG: &str = "log.txt";
+
+/// How long the second process may take after the first.
+const PATIENCE: Duration = Duration::from_mins(12);
 
 /// The results of the second process.
 #[derive(Serialize, Deserialize)]
@@ -54,9 +59,20 @@ impl Beside {
 
     /// Waits for it, and adds its figures and steps.
     pub fn join(mut self, measured: &mut Measured, steps: &mut Steps) -> Result<()> {
-        let status = self.process.wait()?;
+        let end = Instant::now() + PATIENCE;
+        let status = loop {
+            let status = self.process.try_wait()?;
+            if status.is_some() || Instant::now() > end {
+                break status;
+            }
+            thread::sleep(Duration::from_millis(100));
+        };
+        if status.is_none() {
+            self.process.kill()?;
+        }
         let log = fs::read(self.folder.join(LOG))?;
         print!("{}", String::from_utf8_lossy(&log));
+        let status = status.context("the last check above does not end")?;
         ensure!(status.success(), "the process ended with {status}");
         steps.read(&self.folder.join(STEPS))?;
         let found: Found = read(&self.folder.join(FOUND))?;
