@@ -88,11 +88,6 @@
 #define DIBS_UNLIMITED UINT32_MAX
 
 /**
- * The node tests that an exact triangle test counts as in a budget.
- */
-#define DIBS_TRIANGLE 8
-
-/**
  * A flag of options: neither answer nor cost depends on earlier queries.
  */
 #define DIBS_COLD 1
@@ -629,43 +624,6 @@ typedef uint32_t dibs_force_state;
 #endif // __cplusplus
 
 /**
- * The reason for a whole query.
- */
-enum dibs_fallback
-#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
-  : uint32_t
-#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
- {
-  /**
-   * It was none.
-   */
-  DIBS_FALLBACK_NONE = 0,
-  /**
-   * The first tick, or the one after an error.
-   */
-  DIBS_FALLBACK_START = 1,
-  /**
-   * The surface's motion was not measured all the way.
-   */
-  DIBS_FALLBACK_SURFACE = 2,
-  /**
-   * Tool or surface moved too far.
-   */
-  DIBS_FALLBACK_JUMP = 3,
-  /**
-   * More nodes had to be opened than there are places.
-   */
-  DIBS_FALLBACK_FULL = 4,
-};
-#ifndef __cplusplus
-#if __STDC_VERSION__ >= 202311L
-typedef enum dibs_fallback dibs_fallback;
-#else
-typedef uint32_t dibs_fallback;
-#endif // __STDC_VERSION__ >= 202311L
-#endif // __cplusplus
-
-/**
  * On which side of the surface a tool's axis is.
  */
 enum dibs_side
@@ -815,6 +773,43 @@ typedef uint32_t dibs_cost;
 #endif // __cplusplus
 
 /**
+ * The reason for a whole query.
+ */
+enum dibs_fallback
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * It was none.
+   */
+  DIBS_FALLBACK_NONE = 0,
+  /**
+   * The first tick, or the one after an error.
+   */
+  DIBS_FALLBACK_START = 1,
+  /**
+   * The surface's motion was not measured all the way.
+   */
+  DIBS_FALLBACK_SURFACE = 2,
+  /**
+   * Tool or surface moved too far.
+   */
+  DIBS_FALLBACK_JUMP = 3,
+  /**
+   * More nodes had to be opened than there are places.
+   */
+  DIBS_FALLBACK_FULL = 4,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_fallback dibs_fallback;
+#else
+typedef uint32_t dibs_fallback;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * The bus's end of a guarded surface: it takes packets, checks complete frames in slices, publishes them, watches the
  * tree's bytes, and makes the statuses that go back.
  *
@@ -917,8 +912,8 @@ typedef struct dibs_writer dibs_writer;
  */
 typedef struct {
   /**
-   * The most work, in tests of spheres and planes, of which an exact triangle test counts as `DIBS_TRIANGLE`. 0 asks for
-   * next to nothing: set it.
+   * The most work, in tests of spheres and planes, of which an exact triangle test counts as 8:
+   * `dibs_budget_for_instructions`. 0 asks for next to nothing: set it.
    */
   uint32_t budget;
   /**
@@ -1070,6 +1065,42 @@ typedef struct {
 } dibs_guard_limits;
 
 /**
+ * Facts about a bus.
+ */
+typedef struct {
+  /**
+   * 0 before the first frame; then the epoch is 0, too.
+   */
+  uint32_t is_published;
+  /**
+   * Number of the frame published last; wraps.
+   */
+  uint32_t epoch;
+  /**
+   * Whole rounds of the check of the tree's bytes; wraps.
+   */
+  uint32_t rounds;
+} dibs_bus_facts;
+
+/**
+ * A point, a direction, a force or a velocity.
+ */
+typedef struct {
+  /**
+   * Along x.
+   */
+  float x;
+  /**
+   * Along y.
+   */
+  float y;
+  /**
+   * Along z.
+   */
+  float z;
+} dibs_vec3;
+
+/**
  * A wall: a margin around the surface, with a spring and a damper.
  *
  * A sampled wall is passive only if the device's own damping is above `stiffness * tick / 2 + damping`.
@@ -1096,24 +1127,6 @@ typedef struct {
    */
   float margin;
 } dibs_wall;
-
-/**
- * A point, a direction, a force or a velocity.
- */
-typedef struct {
-  /**
-   * Along x.
-   */
-  float x;
-  /**
-   * Along y.
-   */
-  float y;
-  /**
-   * Along z.
-   */
-  float z;
-} dibs_vec3;
 
 /**
  * The closest pair. `dibs_proximity_interval` gives the interval that holds its separation.
@@ -1445,6 +1458,79 @@ typedef struct {
 } dibs_interval;
 
 /**
+ * The answer of a tick, of one tracker or of several.
+ */
+typedef struct {
+  /**
+   * The closest pair; its counts of tests are this tick's. Of several pairs its interval begins at the least lower end of
+   * all, its accuracy is the worst, its tests are those of all, and its side is `DIBS_SIDE_CUT_SHORT` if the budget left
+   * that of any pair open.
+   */
+  dibs_proximity proximity;
+  /**
+   * Other than 0 where this tick's search found no side, because its budget ended or the side is undefined: it is the last
+   * tick's, as far as the motion since leaves it possible. The pair may not be the closest then; the interval holds.
+   */
+  uint32_t is_kept;
+  /**
+   * A `dibs_fallback`: the first reason for a whole query, of the pairs that were searched.
+   */
+  uint32_t fallback;
+  /**
+   * The most (mm) that tool and surface together have moved since the last tick; -1 where it is not known, and of several
+   * pairs.
+   */
+  float moved;
+  /**
+   * Opened nodes that the tracker remembers, of `DIBS_OPENED`.
+   */
+  uint32_t opened;
+  /**
+   * That pair's number, of several; else 0.
+   */
+  uint32_t pair;
+  /**
+   * Pairs that were searched; the others were certain to be farther.
+   */
+  uint32_t searched;
+} dibs_tracked;
+
+/**
+ * The surface that a tick searched.
+ */
+typedef struct {
+  /**
+   * A `dibs_code`: `DIBS_CODE_OK` where there is a pair; otherwise why there is none. Before the first surface the rest is
+   * 0, and the residual -1.
+   */
+  uint32_t outcome;
+  /**
+   * The pair; no numbers where there is none. Its accuracy covers the frame's error and the extrapolation's.
+   */
+  dibs_tracked tracked;
+  /**
+   * Number of the frame before that of the answer's age; the same for a surface that is held.
+   */
+  uint32_t before;
+  /**
+   * Its time in steps: 0 is the frame before, 1 the last frame, 3 the end of the extrapolation.
+   */
+  float t;
+  /**
+   * Error (mm) of each position, that of the extrapolation included.
+   */
+  float position_error;
+  /**
+   * The distance (mm) of the last frames from their extrapolation; -1 for a surface that is held.
+   */
+  float residual;
+  /**
+   * Its velocity (mm/s) at the pair: from one frame to the next, zero for a surface that is held.
+   */
+  dibs_vec3 velocity;
+} dibs_searched;
+
+/**
  * The answer of a tick: what a wall may act on, and how it came about.
  */
 typedef struct {
@@ -1484,6 +1570,10 @@ typedef struct {
    * The health of the bus.
    */
   dibs_link link;
+  /**
+   * The surface that was searched, and the pair on it, whatever it is trusted: for records.
+   */
+  dibs_searched searched;
 } dibs_answer;
 
 /**
@@ -1530,29 +1620,6 @@ typedef struct {
    */
   dibs_proximity proximity;
 } dibs_closest;
-
-/**
- * The answer of several trackers.
- */
-typedef struct {
-  /**
-   * The closest pair. Its interval begins at the least lower end of all pairs, its accuracy is the worst, its tests are
-   * those of all. Its side is `DIBS_SIDE_CUT_SHORT` if the budget left that of any pair open.
-   */
-  dibs_proximity proximity;
-  /**
-   * That pair's number.
-   */
-  uint32_t pair;
-  /**
-   * Pairs that were searched; the others were certain to be farther.
-   */
-  uint32_t searched;
-  /**
-   * The first reason for a whole query, of those that were searched.
-   */
-  dibs_fallback fallback;
-} dibs_tracked;
 
 /**
  * Facts about a tree.
@@ -1718,6 +1785,24 @@ dibs_code dibs_bus_status(dibs_bus *bus,
  * @param counters  Room for `DIBS_EVENTS` numbers.
  */
 dibs_code dibs_bus_counters(dibs_bus *bus, uint32_t *counters);
+
+/**
+ * Reads the facts about a bus.
+ *
+ * @param bus    The bus.
+ * @param facts  Receives the facts.
+ */
+dibs_code dibs_bus_get_facts(dibs_bus *bus, dibs_bus_facts *facts);
+
+/**
+ * Position (mm) of a vertex in the frame published last, for a checksum of the published rows, or a log.
+ *
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` beyond the last vertex, or a
+ *         misuse.
+ */
+dibs_code dibs_bus_position(dibs_bus *bus,
+                            uint32_t vertex,
+                            dibs_vec3 *position);
 
 /**
  * Registers the surface anew, as `dibs_receiver_register` does: only an operator decides that.
@@ -2326,21 +2411,16 @@ dibs_code dibs_tracker_set_frame(dibs_tracker *tracker,
  *
  * Cost: the budget at most, and a number for each opened node.
  *
- * @param tracker    The tracker.
- * @param tool       The tool.
- * @param options    Options, or null.
- * @param proximity  Receives the answer; its counts of tests are this tick's.
- * @param fallback   Receives the reason for a whole query; or null.
- * @param moved      Receives the most (mm) that tool and surface together have moved since the tracker's last search;
- *                   -1 where it is not known; or null.
+ * @param tracker   The tracker.
+ * @param tool      The tool.
+ * @param options   Options, or null.
+ * @param tracked   Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
  * @return As `dibs_query_closest`.
  */
 dibs_code dibs_tracker_closest(dibs_tracker *tracker,
                                const dibs_tool *tool,
                                const dibs_options *options,
-                               dibs_proximity *proximity,
-                               dibs_fallback *fallback,
-                               float *moved);
+                               dibs_tracked *tracked);
 
 /**
  * The closest pair of the tool and the frame that a reader holds: the answer of `dibs_tracker_closest`, without a copy of the
@@ -2349,23 +2429,18 @@ dibs_code dibs_tracker_closest(dibs_tracker *tracker,
  *
  * Cost: the budget at most, and a number for each opened node.
  *
- * @param tracker    The tracker.
- * @param frame      A reader's frame.
- * @param tool       The tool.
- * @param options    Options, or null.
- * @param proximity  Receives the answer; its counts of tests are this tick's.
- * @param fallback   Receives the reason for a whole query; or null.
- * @param moved      Receives the most (mm) that tool and surface together have moved since the tracker's last search;
- *                   -1 where it is not known; or null.
+ * @param tracker   The tracker.
+ * @param frame     A reader's frame.
+ * @param tool      The tool.
+ * @param options   Options, or null.
+ * @param tracked   Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
  * @return As `dibs_query_closest`; `DIBS_CODE_ARGUMENT` of a frame of the caller's vertices.
  */
 dibs_code dibs_tracker_closest_on(dibs_tracker *tracker,
                                   dibs_frame *frame,
                                   const dibs_tool *tool,
                                   const dibs_options *options,
-                                  dibs_proximity *proximity,
-                                  dibs_fallback *fallback,
-                                  float *moved);
+                                  dibs_tracked *tracked);
 
 /**
  * Fills the list with all locally closest pairs whose separation is at most `margin`, deepest first: that of
@@ -2374,14 +2449,12 @@ dibs_code dibs_tracker_closest_on(dibs_tracker *tracker,
  * Cost: that of `dibs_tracker_closest`, and where the surface is within the margin a range search, which has no memory of
  * the last tick.
  *
- * @param tracker    The tracker.
- * @param tool       The tool.
- * @param margin     In mm, at least 0.
- * @param options    Options, or null. A budget that runs out shows in the list's bound.
- * @param contacts   The list; empty after an error.
- * @param proximity  Receives the closest pair, or null.
- * @param fallback   Receives the reason for a whole query; or null.
- * @param moved      As of `dibs_tracker_closest`.
+ * @param tracker   The tracker.
+ * @param tool      The tool.
+ * @param margin    In mm, at least 0.
+ * @param options   Options, or null. A budget that runs out shows in the list's bound.
+ * @param contacts  The list; empty after an error.
+ * @param tracked   Receives the closest pair, or null.
  * @return As `dibs_query_contacts`.
  */
 dibs_code dibs_tracker_contacts(dibs_tracker *tracker,
@@ -2389,9 +2462,7 @@ dibs_code dibs_tracker_contacts(dibs_tracker *tracker,
                                 float margin,
                                 const dibs_options *options,
                                 dibs_contacts *contacts,
-                                dibs_proximity *proximity,
-                                dibs_fallback *fallback,
-                                float *moved);
+                                dibs_tracked *tracked);
 
 /**
  * The closest pair of several, each a tracker, on its surface, with a tool: of a chain of tools, of several surfaces, or of

@@ -72,11 +72,15 @@ struct Scene : dibs_scene {
 /** The closest pair and the contacts from tick to tick, on a copy of a surface of at most so many vertices. */
 template <uint32_t Vertices> struct Tracker : Object<dibs_tracker, DIBS_TRACKER_SIZE(Vertices), dibs_tracker_init> {
     Code set(dibs_frame *frame) { return dibs_tracker_set_frame(*this, frame); }
-    Code closest(const dibs_tool &tool, dibs_proximity &found, Options options = {}) {
-        return dibs_tracker_closest(*this, &tool, options, &found, nullptr, nullptr);
+    Code closest(const dibs_tool &tool, dibs_tracked &found, Options options = {}) {
+        return dibs_tracker_closest(*this, &tool, options, &found);
+    }
+    /** On a reader's frame, without a copy of it. */
+    Code closest_on(dibs_frame *frame, const dibs_tool &tool, dibs_tracked &found, Options options = {}) {
+        return dibs_tracker_closest_on(*this, frame, &tool, options, &found);
     }
     Code contacts(const dibs_tool &tool, float margin, dibs_contacts *list, Options options = {}) {
-        return dibs_tracker_contacts(*this, &tool, margin, options, list, nullptr, nullptr, nullptr);
+        return dibs_tracker_contacts(*this, &tool, margin, options, list, nullptr);
     }
 };
 /** The closest pair of several trackers, each with a tool. */

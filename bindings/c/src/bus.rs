@@ -4,13 +4,14 @@ use core::ffi::c_void;
 
 use dibs_nostd::guard::Bus;
 use dibs_nostd::wire::{Event, NoMac};
-use dibs_nostd::{Millis, TreeBytes};
+use dibs_nostd::{Millis, TreeBytes, VertexTable};
 
 use crate::border::{Handle, Input, Kind, Output, Place, Storage};
 use crate::code::dibs_code;
 use crate::limits::dibs_guard_limits;
 use crate::receiver::{DIBS_EVENTS, DIBS_STATUS, dibs_advance, dibs_progress};
 use crate::surface::dibs_surface;
+use crate::tool::dibs_vec3;
 use crate::tree::dibs_tree;
 
 /// Bytes of a bus's storage.
@@ -185,6 +186,54 @@ pub extern "C" fn dibs_bus_counters(bus: *mut dibs_bus, counters: *mut u32) -> d
         let (out, bus) = (counters.places(DIBS_EVENTS)?, bus.open()?);
         let all = bus.0.counters();
         out.fill(&Event::ALL.map(|event| all.of(event))).map(|_| ())
+    })
+}
+
+/// Facts about a bus.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct dibs_bus_facts {
+    /// 0 before the first frame; then the epoch is 0, too.
+    pub is_published: u32,
+    /// Number of the frame published last; wraps.
+    pub epoch: u32,
+    /// Whole rounds of the check of the tree's bytes; wraps.
+    pub rounds: u32,
+}
+
+/// Reads the facts about a bus.
+///
+/// @param bus    The bus.
+/// @param facts  Receives the facts.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_bus_get_facts(bus: *mut dibs_bus, facts: *mut dibs_bus_facts) -> dibs_code {
+    dibs_code::of(|| {
+        let (facts, bus) = (facts.check()?, bus.open()?);
+        let epoch = bus.0.surface().and_then(|surface| surface.epoch());
+        facts.set(dibs_bus_facts {
+            is_published: epoch.is_some().into(),
+            epoch: epoch.unwrap_or(0),
+            rounds: bus.0.rounds(),
+        });
+        Ok(())
+    })
+}
+
+/// Position (mm) of a vertex in the frame published last, for a checksum of the published rows, or a log.
+///
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` beyond the last vertex, or a
+///         misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_bus_position(
+    bus: *mut dibs_bus,
+    vertex: u32,
+    position: *mut dibs_vec3,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (place, bus) = (position.check()?, bus.open()?);
+        let surface = bus.0.surface().ok_or(dibs_code::NoSurface)?;
+        place.set(surface.position(vertex).ok_or(dibs_code::Argument)?.into());
+        Ok(())
     })
 }
 

@@ -4,6 +4,7 @@ use core::ffi::c_void;
 use core::ptr;
 
 use bytemuck::AnyBitPattern;
+use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{Answer, Guard};
 use dibs_nostd::{Interval, Millis, Proximity, TreeBytes};
 
@@ -17,7 +18,7 @@ use crate::query::{STACK, dibs_interval, dibs_proximity};
 use crate::reader::{dibs_age, dibs_link};
 use crate::surface::{dibs_surface, dibs_surface_init};
 use crate::tool::{Shape, dibs_tool, dibs_vec3};
-use crate::tracker::DIBS_OPENED;
+use crate::tracker::{DIBS_OPENED, dibs_tracked};
 use crate::tree::{DIBS_TREE_SIZE, dibs_tree, dibs_tree_init};
 
 /// Bytes of a guard's storage.
@@ -92,6 +93,45 @@ pub struct dibs_answer {
     pub lag: u32,
     /// The health of the bus.
     pub link: dibs_link,
+    /// The surface that was searched, and the pair on it, whatever it is trusted: for records.
+    pub searched: dibs_searched,
+}
+
+/// The surface that a tick searched.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_searched {
+    /// A `dibs_code`: `DIBS_CODE_OK` where there is a pair; otherwise why there is none. Before the first surface the rest is
+    /// 0, and the residual -1.
+    pub outcome: u32,
+    /// The pair; no numbers where there is none. Its accuracy covers the frame's error and the extrapolation's.
+    pub tracked: dibs_tracked,
+    /// Number of the frame before that of the answer's age; the same for a surface that is held.
+    pub before: u32,
+    /// Its time in steps: 0 is the frame before, 1 the last frame, 3 the end of the extrapolation.
+    pub t: f32,
+    /// Error (mm) of each position, that of the extrapolation included.
+    pub position_error: f32,
+    /// The distance (mm) of the last frames from their extrapolation; -1 for a surface that is held.
+    pub residual: f32,
+    /// Its velocity (mm/s) at the pair: from one frame to the next, zero for a surface that is held.
+    pub velocity: dibs_vec3,
+}
+
+impl From<&Answer> for dibs_searched {
+    fn from(answer: &Answer) -> Self {
+        let searched = answer.searched.as_ref();
+        let tracked = answer.tracked.map_or_else(|_| dibs_tracked::nowhere(), dibs_tracked::from);
+        Self {
+            outcome: answer.tracked.err().map_or(dibs_code::Ok, dibs_code::from) as u32,
+            tracked,
+            before: searched.map_or(0, |searched| searched.before),
+            t: searched.map_or(0.0, |searched| searched.t),
+            position_error: searched.map_or(0.0, |searched| searched.position_error),
+            residual: searched.and_then(|searched| searched.residual).unwrap_or(-1.0),
+            velocity: searched.map_or(Vec3::ZERO, |searched| searched.velocity).into(),
+        }
+    }
 }
 
 impl From<Answer> for dibs_answer {
@@ -109,6 +149,7 @@ impl From<Answer> for dibs_answer {
             age: answer.searched.map(|searched| searched.frame).into(),
             lag: lag.map_or(u32::MAX, |lag| lag.0),
             link: answer.link.into(),
+            searched: (&answer).into(),
         }
     }
 }

@@ -35,10 +35,8 @@ pub const DIBS_UNLIMITED: u32 = u32::MAX;
 
 const _: () = assert!(Budget::UNLIMITED.tests() == DIBS_UNLIMITED);
 
-/// The node tests that an exact triangle test counts as in a budget.
-pub const DIBS_TRIANGLE: u32 = 8;
-
-const _: () = assert!(Budget::TRIANGLE == DIBS_TRIANGLE);
+// The text of the options' budget.
+const _: () = assert!(Budget::TRIANGLE == 8);
 
 /// A flag of options: neither answer nor cost depends on earlier queries.
 pub const DIBS_COLD: u32 = 1;
@@ -53,8 +51,8 @@ pub const DIBS_CONTACTS_OF: u32 = 4;
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_options {
-    /// The most work, in tests of spheres and planes, of which an exact triangle test counts as `DIBS_TRIANGLE`. 0 asks for
-    /// next to nothing: set it.
+    /// The most work, in tests of spheres and planes, of which an exact triangle test counts as 8:
+    /// `dibs_budget_for_instructions`. 0 asks for next to nothing: set it.
     pub budget: u32,
     /// Largest length (mm) of the interval of a depth where the tool's axis crosses the surface; 0 for a 512th of the
     /// axis' length.

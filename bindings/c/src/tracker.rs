@@ -5,9 +5,10 @@
 use core::cell::Cell;
 use core::ffi::c_void;
 
+use bytemuck::AnyBitPattern;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
-    Fallback, MeasuredStretch, MovingSurface, MovingTable, Odometer, Options, Tracker,
+    Fallback, MeasuredStretch, MovingSurface, MovingTable, Odometer, Options, Proximity, Tracker,
     TrackerAnswer, VertexTable,
 };
 use heapless::Vec;
@@ -208,37 +209,56 @@ impl From<Option<Fallback>> for dibs_fallback {
     }
 }
 
-/// The answer of several trackers.
-#[derive(Clone, Copy)]
+/// The answer of a tick, of one tracker or of several.
+#[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_tracked {
-    /// The closest pair. Its interval begins at the least lower end of all pairs, its accuracy is the worst, its tests are
-    /// those of all. Its side is `DIBS_SIDE_CUT_SHORT` if the budget left that of any pair open.
+    /// The closest pair; its counts of tests are this tick's. Of several pairs its interval begins at the least lower end of
+    /// all, its accuracy is the worst, its tests are those of all, and its side is `DIBS_SIDE_CUT_SHORT` if the budget left
+    /// that of any pair open.
     pub proximity: dibs_proximity,
-    /// That pair's number.
+    /// Other than 0 where this tick's search found no side, because its budget ended or the side is undefined: it is the last
+    /// tick's, as far as the motion since leaves it possible. The pair may not be the closest then; the interval holds.
+    pub is_kept: u32,
+    /// A `dibs_fallback`: the first reason for a whole query, of the pairs that were searched.
+    pub fallback: u32,
+    /// The most (mm) that tool and surface together have moved since the last tick; -1 where it is not known, and of several
+    /// pairs.
+    pub moved: f32,
+    /// Opened nodes that the tracker remembers, of `DIBS_OPENED`.
+    pub opened: u32,
+    /// That pair's number, of several; else 0.
     pub pair: u32,
     /// Pairs that were searched; the others were certain to be farther.
     pub searched: u32,
-    /// The first reason for a whole query, of those that were searched.
-    pub fallback: dibs_fallback,
 }
 
-/// Receives the facts about a tick besides the pair.
-struct Ticked {
-    fallback: Option<Place<dibs_fallback>>,
-    moved: Option<Place<f32>>,
-}
-
-impl Ticked {
-    fn check(fallback: *mut dibs_fallback, moved: *mut f32) -> Result<Self, dibs_code> {
-        Ok(Self { fallback: fallback.check_if_any()?, moved: moved.check_if_any()? })
+impl dibs_tracked {
+    /// No pair.
+    pub(crate) fn nowhere() -> Self {
+        Self {
+            proximity: Proximity::NOWHERE.into(),
+            is_kept: 0,
+            fallback: dibs_fallback::None as u32,
+            moved: -1.0,
+            opened: 0,
+            pair: 0,
+            searched: 0,
+        }
     }
+}
 
-    /// Writes the facts, and returns the pair.
-    fn set(self, found: &TrackerAnswer) -> dibs_proximity {
-        Place::set_if_any(self.fallback, found.fallback.into());
-        Place::set_if_any(self.moved, found.moved.unwrap_or(-1.0));
-        found.closest.into()
+impl From<TrackerAnswer> for dibs_tracked {
+    fn from(found: TrackerAnswer) -> Self {
+        Self {
+            proximity: found.closest.into(),
+            is_kept: found.is_kept.into(),
+            fallback: dibs_fallback::from(found.fallback) as u32,
+            moved: found.moved.unwrap_or(-1.0),
+            opened: found.opened,
+            pair: found.pair as u32,
+            searched: found.searched,
+        }
     }
 }
 
@@ -258,30 +278,25 @@ fn closest<S: MovingSurface>(
 ///
 /// Cost: the budget at most, and a number for each opened node.
 ///
-/// @param tracker    The tracker.
-/// @param tool       The tool.
-/// @param options    Options, or null.
-/// @param proximity  Receives the answer; its counts of tests are this tick's.
-/// @param fallback   Receives the reason for a whole query; or null.
-/// @param moved      Receives the most (mm) that tool and surface together have moved since the tracker's last search;
-///                   -1 where it is not known; or null.
+/// @param tracker   The tracker.
+/// @param tool      The tool.
+/// @param options   Options, or null.
+/// @param tracked   Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
 /// @return As `dibs_query_closest`.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tracker_closest(
     tracker: *mut dibs_tracker,
     tool: *const dibs_tool,
     options: *const dibs_options,
-    proximity: *mut dibs_proximity,
-    fallback: *mut dibs_fallback,
-    moved: *mut f32,
+    tracked: *mut dibs_tracked,
 ) -> dibs_code {
     dibs_code::of(|| {
-        let (proximity, ticked) = (proximity.check()?, Ticked::check(fallback, moved)?);
+        let tracked = tracked.check()?;
         let (shape, mut tracker) = (Shape::try_from(tool.get()?)?, tracker.open()?);
         let options = dibs_options::of(options)?;
         let dibs_tracker { tracker, surface, .. } = &mut *tracker;
         let surface = surface.as_ref().ok_or(dibs_code::NoSurface)?;
-        proximity.set(ticked.set(&closest(tracker, surface, &shape, &options)?));
+        tracked.set(closest(tracker, surface, &shape, &options)?.into());
         Ok(())
     })
 }
@@ -292,14 +307,11 @@ pub extern "C" fn dibs_tracker_closest(
 ///
 /// Cost: the budget at most, and a number for each opened node.
 ///
-/// @param tracker    The tracker.
-/// @param frame      A reader's frame.
-/// @param tool       The tool.
-/// @param options    Options, or null.
-/// @param proximity  Receives the answer; its counts of tests are this tick's.
-/// @param fallback   Receives the reason for a whole query; or null.
-/// @param moved      Receives the most (mm) that tool and surface together have moved since the tracker's last search;
-///                   -1 where it is not known; or null.
+/// @param tracker   The tracker.
+/// @param frame     A reader's frame.
+/// @param tool      The tool.
+/// @param options   Options, or null.
+/// @param tracked   Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
 /// @return As `dibs_query_closest`; `DIBS_CODE_ARGUMENT` of a frame of the caller's vertices.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tracker_closest_on(
@@ -307,12 +319,10 @@ pub extern "C" fn dibs_tracker_closest_on(
     frame: *mut dibs_frame,
     tool: *const dibs_tool,
     options: *const dibs_options,
-    proximity: *mut dibs_proximity,
-    fallback: *mut dibs_fallback,
-    moved: *mut f32,
+    tracked: *mut dibs_tracked,
 ) -> dibs_code {
     dibs_code::of(|| {
-        let (proximity, ticked) = (proximity.check()?, Ticked::check(fallback, moved)?);
+        let tracked = tracked.check()?;
         let (shape, mut tracker) = (Shape::try_from(tool.get()?)?, tracker.open()?);
         let (frame, options) = (frame.open()?, dibs_options::of(options)?);
         let surface = match &frame.table {
@@ -321,7 +331,7 @@ pub extern "C" fn dibs_tracker_closest_on(
             Table::Vertices(_) => return Err(dibs_code::Argument),
             Table::Held(held) => held.moving(),
         };
-        proximity.set(ticked.set(&closest(&mut tracker.tracker, &surface, &shape, &options)?));
+        tracked.set(closest(&mut tracker.tracker, &surface, &shape, &options)?.into());
         Ok(())
     })
 }
@@ -332,14 +342,12 @@ pub extern "C" fn dibs_tracker_closest_on(
 /// Cost: that of `dibs_tracker_closest`, and where the surface is within the margin a range search, which has no memory of
 /// the last tick.
 ///
-/// @param tracker    The tracker.
-/// @param tool       The tool.
-/// @param margin     In mm, at least 0.
-/// @param options    Options, or null. A budget that runs out shows in the list's bound.
-/// @param contacts   The list; empty after an error.
-/// @param proximity  Receives the closest pair, or null.
-/// @param fallback   Receives the reason for a whole query; or null.
-/// @param moved      As of `dibs_tracker_closest`.
+/// @param tracker   The tracker.
+/// @param tool      The tool.
+/// @param margin    In mm, at least 0.
+/// @param options   Options, or null. A budget that runs out shows in the list's bound.
+/// @param contacts  The list; empty after an error.
+/// @param tracked   Receives the closest pair, or null.
 /// @return As `dibs_query_contacts`.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tracker_contacts(
@@ -348,12 +356,10 @@ pub extern "C" fn dibs_tracker_contacts(
     margin: f32,
     options: *const dibs_options,
     contacts: *mut dibs_contacts,
-    proximity: *mut dibs_proximity,
-    fallback: *mut dibs_fallback,
-    moved: *mut f32,
+    tracked: *mut dibs_tracked,
 ) -> dibs_code {
     dibs_code::of(|| {
-        let (proximity, ticked) = (proximity.check_if_any()?, Ticked::check(fallback, moved)?);
+        let tracked = tracked.check_if_any()?;
         let found: TrackerAnswer = contacts.open()?.fill(|list| {
             let (shape, mut tracker) = (Shape::try_from(tool.get()?)?, tracker.open()?);
             let options = dibs_options::of(options)?;
@@ -368,7 +374,7 @@ pub extern "C" fn dibs_tracker_contacts(
                 }
             })
         })?;
-        Place::set_if_any(proximity, ticked.set(&found));
+        Place::set_if_any(tracked, found.into());
         Ok(())
     })
 }
@@ -402,12 +408,7 @@ pub extern "C" fn dibs_tracker_closest_of(
             pairs.push((tracker, surface, tool)).map_err(|_| dibs_code::Argument)?;
         }
         let found = Tracker::closest_of(&mut pairs, &options)?.ok_or(dibs_code::Argument)?;
-        tracked.set(dibs_tracked {
-            proximity: found.closest.into(),
-            pair: found.pair as u32,
-            searched: found.searched,
-            fallback: found.fallback.into(),
-        });
+        tracked.set(found.into());
         Ok(())
     })
 }

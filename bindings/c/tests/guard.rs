@@ -14,10 +14,11 @@ use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Surface};
 use dibs_nostd::wire::{Encoding, Event, FrameEncoder, FrameId, Freshness, enframe, framed_bytes};
 use dibs_nostd::{
-    Advance, Capsule, Coverage, Interval, Millis, NoSide, Progress, Proximity, QueryError,
-    ReceiveError, Side, Sphere, StretchError, TreeBytes, Unavailable,
+    Advance, Capsule, Coverage, Fallback, Interval, Millis, NoSide, Progress, Proximity,
+    QueryError, ReceiveError, Side, Sphere, StretchError, TreeBytes, Unavailable,
 };
 use programs::{include, library, run, tool, tree_and_stream};
+use xtask::workspace;
 
 /// Vertices of the generated heart of 1,000 triangles.
 const VERTICES: usize = 502;
@@ -222,6 +223,27 @@ fn tick(code: u32, answer: &Answer) -> String {
     };
     words(&mut line, &[state]);
     floats(&mut line, &force.force.to_array());
+    // The surface that was searched, and the pair on it.
+    let tracked = answer.tracked.ok();
+    let pair = tracked.map_or(Proximity::NOWHERE, |tracked| tracked.closest);
+    words(&mut line, &[answer.tracked.err().map_or(0, cause)]);
+    floats(&mut line, &[pair.separation, pair.lower, pair.accuracy]);
+    let reason =
+        tracked.and_then(|tracked| tracked.fallback).map_or(0, |fallback| match fallback {
+            Fallback::Start => 1,
+            Fallback::Surface => 2,
+            Fallback::Jump => 3,
+            _ => 4,
+        });
+    words(&mut line, &[tracked.is_some_and(|tracked| tracked.is_kept).into(), reason]);
+    floats(&mut line, &[tracked.and_then(|tracked| tracked.moved).unwrap_or(-1.0)]);
+    words(&mut line, &tracked.map_or([0; 3], |found| [found.opened, 0, found.searched]));
+    let searched = answer.searched;
+    words(&mut line, &[searched.map_or(0, |searched| searched.before)]);
+    let residual = searched.and_then(|searched| searched.residual).unwrap_or(-1.0);
+    let at = searched.map_or([0.0; 2], |searched| [searched.t, searched.position_error]);
+    floats(&mut line, &[at[0], at[1], residual]);
+    floats(&mut line, &searched.map_or([0.0; 3], |searched| searched.velocity.to_array()));
     line
 }
 
@@ -279,6 +301,18 @@ fn side(side: Side) -> u32 {
     }
 }
 
+/// Builds `examples/c/host` with the library.
+fn example(folder: &Path) -> PathBuf {
+    let build = folder.join("build");
+    let mut configure = tool("cmake", "cmake");
+    configure.arg("-S").arg(workspace::root().join("examples/c/host")).arg("-B").arg(&build);
+    configure.arg("-DCMAKE_C_FLAGS=-g -fsanitize=address,undefined -fno-sanitize-recover=all");
+    configure.arg(format!("-DDIBS_LIBRARY={}", library().display()));
+    run(&mut configure);
+    run(Command::new("cmake").arg("--build").arg(&build));
+    build.join("dibs-host")
+}
+
 /// Compiles a program of `tests/programs` with the library.
 fn compile(name: &str, folder: &Path) -> PathBuf {
     let program = folder.join(name);
@@ -303,7 +337,7 @@ fn the_loop_in_c_answers_with_the_same_bits() {
     let [tree, script] = ["tree", "script"].map(|name| folder.path().join(name));
     fs::write(&tree, built.blob()).expect("writable");
     fs::write(&script, lines(&steps)).expect("writable");
-    let said = run(Command::new(compile("loop", folder.path())).arg(tree).arg(script));
+    let said = run(Command::new(example(folder.path())).arg(tree).arg(script));
     for (number, (c, rust)) in said.lines().zip(&expected).enumerate() {
         assert_eq!(c, rust, "answer {number}");
     }

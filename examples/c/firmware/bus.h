@@ -8,7 +8,6 @@
 #define BUS_H
 
 #include <dibs.h>
-#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -22,13 +21,13 @@ typedef struct {
     uint32_t read_digest;
 } bus_counts;
 
-/* Makes the receiver. */
+/* Makes the bus. */
 void bus_init(void);
 
 /* Takes one byte at this control tick. */
 void bus_byte(uint8_t byte, uint32_t tick);
 
-/* Does one slice of checking, copying and publishing. */
+/* Does one slice of checking, copying and publishing; without a frame, of the check of the tree in flash. */
 void bus_work(void);
 
 /* Writes the status for the sender, if one is due at this tick; its length, or 0. */
@@ -37,10 +36,10 @@ size_t bus_report(uint32_t tick, uint8_t out[DIBS_STATUS]);
 /* The counters of every event, in the order of docs/wire.md. */
 void bus_events(uint32_t events[DIBS_EVENTS]);
 
+/* Whole rounds of the check of the tree. */
+uint32_t bus_rounds(void);
+
 /* What the control tick reads. */
 bus_counts bus_seen(void);
-
-/* Tells the sender the controller's state, by its next status: a `dibs_state`. */
-void bus_set_state(uint32_t state);
 
 #endif

@@ -1,10 +1,10 @@
-/* The control tick: pose, query, force, record. */
+/* The control tick: pose, answer, force, record. */
 #ifndef CONTROL_H
 #define CONTROL_H
 
 #include "telemetry.h"
 
-/* Makes tracker, reader and fail-safe machine. */
+/* Makes the guard. */
 void control_init(void);
 
 /* Runs one tick. */

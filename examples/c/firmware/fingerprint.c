@@ -17,19 +17,21 @@ static uint32_t next = SURFACE_VERTICES;
 /* The frame last read in full. */
 static atomic_uint_least32_t last_epoch, last_digest;
 
-void fingerprint_begin(dibs_receiver *receiver) {
-    must(dibs_receiver_epoch(receiver, &reading));
+void fingerprint_begin(dibs_bus *bus) {
+    dibs_bus_facts facts;
+    must(dibs_bus_get_facts(bus, &facts));
+    reading = facts.epoch;
     crc = CRC_START;
     next = 0;
 }
 
-void fingerprint_step(dibs_receiver *receiver) {
+void fingerprint_step(dibs_bus *bus) {
     if (next >= SURFACE_VERTICES) {
         return;
     }
     for (uint32_t row = 0; row < ROWS && next < SURFACE_VERTICES; row++, next++) {
         dibs_vec3 at;
-        must(dibs_receiver_position(receiver, next, &at));
+        must(dibs_bus_position(bus, next, &at));
         crc = crc_take(crc, &at, sizeof at);
     }
     if (next >= SURFACE_VERTICES) {

@@ -16,7 +16,6 @@
 #include "stack.h"
 #include "surface.h"
 #include "uart.h"
-#include "upkeep.h"
 
 _Noreturn static void send_summary(void) {
     /* Nothing disables all interrupts: `masked_counts` is 0. */
@@ -24,7 +23,7 @@ _Noreturn static void send_summary(void) {
     schedule_sum_up(&summary);
     summary.bus_overrun = uart_has_overrun(UART_BUS);
     summary.stack_bytes = stack_used();
-    summary.scrub_rounds = upkeep_rounds();
+    summary.scrub_rounds = bus_rounds();
     bus_events(summary.events);
     telemetry_send(&summary, sizeof summary);
     semihosting_exit(summary.deadline_misses == 0);
@@ -38,7 +37,6 @@ void run(void) {
     surface_init();
     bus_init();
     control_init();
-    upkeep_init();
     uart_start_sending(UART_TELEMETRY);
     schedule_start();
     for (;;) {
@@ -48,7 +46,6 @@ void run(void) {
             break;
         }
         /* There is always work, so the loop does not sleep: an emulated processor that sleeps loses its exact time. */
-        upkeep_step();
         uart_write(UART_BUS, status, schedule_background(status));
     }
     schedule_stop();

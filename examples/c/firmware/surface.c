@@ -5,11 +5,42 @@
 
 #include "must.h"
 
+/* Ticks of the control loop a second: a tick is a millisecond. */
+#define TICK_RATE 1000u
+
 /* Of tree.S. */
 extern const uint8_t tree_bytes[], tree_end[];
 
+/* Limits in ms, the first degraded and the second safe. The emulated line takes one to three seconds for a frame; those
+   of a real bus, which brings tens of frames a second, are some tens of milliseconds. */
+static const dibs_limits trust = {
+    .age = {4000, 6000},
+    .silence = {1000, 2000},
+    .heartbeat = {1000, 3000},
+    .rejections = {10, 30},
+    .transit = {500, 1000},
+    .source_age = {1000, 2000},
+    .forgeries = {0, 100},
+    .tissue_speed = 0.001f,
+    .recovery_frames = 1,
+    .dwell = TICK_RATE / 5,
+};
+
+static const dibs_guard_limits limits = {
+    /* Twice the generated heart's. */
+    .speed = 100.0f,
+    .age = 6000,
+    .ticks_a_second = TICK_RATE,
+    /* More than the closest pair on the heart needs, and within a tick on every admitted surface. The spring tells depths
+       of a quarter of a millimetre apart. */
+    .options = {.budget = 1750, .depth_tolerance = 0.25f},
+    /* Nobody acknowledges here; a real robot leaves this out. */
+    .automatic = 1,
+    .trust = &trust,
+};
+
 static alignas(DIBS_ALIGNMENT) uint8_t tree_memory[DIBS_TREE_SIZE];
-static alignas(DIBS_ALIGNMENT) uint8_t surface_memory[DIBS_SURFACE_SIZE(SURFACE_VERTICES)];
+static alignas(DIBS_ALIGNMENT) uint8_t surface_memory[DIBS_GUARDED_SIZE(SURFACE_VERTICES)];
 
 static dibs_tree *tree;
 static dibs_surface *surface;
@@ -42,7 +73,8 @@ static void measure(uint32_t vertices) {
 
 void surface_init(void) {
     dibs_tree_facts facts;
-    must(dibs_tree_init(tree_memory, sizeof tree_memory, tree_bytes, surface_bytes(), &tree));
+    const size_t bytes = (uintptr_t)tree_end - (uintptr_t)tree_bytes;
+    must(dibs_tree_init(tree_memory, sizeof tree_memory, tree_bytes, bytes, &tree));
     must(dibs_tree_get_facts(tree, &facts));
     must(facts.vertices == SURFACE_VERTICES ? DIBS_CODE_OK : DIBS_CODE_VERTEX_COUNT);
     measure(facts.vertices);
@@ -53,12 +85,12 @@ dibs_tree *surface_tree(void) {
     return tree;
 }
 
-uint32_t surface_bytes(void) {
-    return (uint32_t)((uintptr_t)tree_end - (uintptr_t)tree_bytes);
-}
-
 dibs_surface *surface_buffers(void) {
     return surface;
+}
+
+const dibs_guard_limits *surface_limits(void) {
+    return &limits;
 }
 
 dibs_vec3 surface_centre(void) {

@@ -1,4 +1,4 @@
-/* The surface: its tree in flash and its buffers. */
+/* The surface: its tree in flash, its buffers and its limits. */
 #ifndef SURFACE_H
 #define SURFACE_H
 
@@ -15,11 +15,11 @@ void surface_init(void);
 /* The tree. */
 dibs_tree *surface_tree(void);
 
-/* Bytes of the tree. */
-uint32_t surface_bytes(void);
-
-/* The buffers: the receiver fills one, the control tick reads the other. */
+/* The buffers: the bus fills one, the control tick reads the other two. */
 dibs_surface *surface_buffers(void);
+
+/* How far the surface is trusted: for both of its ends. */
+const dibs_guard_limits *surface_limits(void);
 
 /* Centre of the rest shape's bounding box, in mm. */
 dibs_vec3 surface_centre(void);

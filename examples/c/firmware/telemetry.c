@@ -8,7 +8,7 @@
 #define FRAMED (LARGEST + sizeof(uint32_t) + 2)
 _Static_assert(LARGEST + sizeof(uint32_t) < 254, "one block of COBS");
 
-uint32_t telemetry_cause(dibs_code cause, bool is_tree_corrupt) {
+uint32_t telemetry_cause(dibs_code cause) {
     switch (cause) {
     case DIBS_CODE_OK:
         return 0;
@@ -23,7 +23,7 @@ uint32_t telemetry_cause(dibs_code cause, bool is_tree_corrupt) {
     case DIBS_CODE_REJECTIONS:
         return 6;
     case DIBS_CODE_TREE_CORRUPT:
-        return is_tree_corrupt ? 7 : 3;
+        return 7;
     case DIBS_CODE_DELAYED:
         return 9;
     case DIBS_CODE_SOURCE_STALE:

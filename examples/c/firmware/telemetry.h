@@ -8,7 +8,6 @@
 #define TELEMETRY_H
 
 #include <dibs.h>
-#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -41,10 +40,8 @@ typedef struct {
     uint32_t rejected;
     uint32_t read_epoch;
     uint32_t read_digest;
-    /* Nodes that the tracker has opened, of which the C interface says nothing; and its `dibs_fallback`. */
     uint32_t front;
     uint32_t fallback;
-    /* The C interface holds the surface from frame to frame. */
     uint32_t epoch_before;
     float blend;
     float residual;
@@ -71,9 +68,8 @@ typedef struct {
 
 #define SUMMARY_KIND 2u
 
-/* A cause of the fail-safe machine's as a number of the record's. A tree found changed counts as that only if the tree was
-   checked: a query that stumbles over one has failed. */
-uint32_t telemetry_cause(dibs_code cause, bool is_tree_corrupt);
+/* A cause of the fail-safe machine's as a number of the record's. */
+uint32_t telemetry_cause(dibs_code cause);
 
 /* Sends a record, whichever it is. */
 void telemetry_send(const void *record, size_t size);

@@ -1,20 +1,20 @@
 /*
- * Answers a script of surfaces, poses, packets and control ticks. Floats are printed by their bits:
+ * The control loop on this computer: answers a script of events. Floats are printed by their bits.
  *
- *     dibs-host TREE FRAMES SCRIPT
+ *     dibs-host TREE SCRIPT
  *
- * TREE    a tree, as `dibs build` writes it
- * FRAMES  x, y, z of each vertex, 32-bit floats, in the tree's order of rows, frame after frame
- * SCRIPT  lines:
- *     frame NUMBER                       the surface is this frame of FRAMES
- *     pose START END RADIUS NODES TRIANGLES FLAGS
- *                                        a capsule, a budget, the options' flags
- *     scene NUMBER NODES TRIANGLES FLAGS TOOL...
- *                                        a chain of capsules, this surface and that of another frame
- *     packet NOW BYTES                   a packet from the bus, in hexadecimal
- *     tick NOW START END RADIUS          a control tick, with the surface from the bus
+ * TREE    a tree of at most 10,000 vertices, as `dibs build` writes it
+ * SCRIPT  lines, with the receiver's clock in ms:
+ *     receive NOW BYTES            bytes of a serial line, in hexadecimal
+ *     packet NOW BYTES             a packet
+ *     work ROWS                    a slice of the checks
+ *     status NOW FRAMED            the status for the sender
+ *     tick NOW START END RADIUS    a control tick: a capsule, or a sphere where both ends are one
+ *     blind NOW                    a control tick without a pose
+ *     acknowledge 0                an operator's acknowledgement
+ *     counters 0                   the bus's events
  *
- * bindings/c/tests/host.rs answers the same script in Rust, and compares the bits.
+ * bindings/c/tests/guard.rs answers the same script in Rust, and compares the bits.
  */
 #include <dibs.h>
 
@@ -23,183 +23,167 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bus.h"
-#include "print.h"
-#include "script.h"
+/* Vertices of the largest tree. */
+#define VERTICES 10000
 
-#define MARGIN 8.0f
-
-/* Memory of the objects: the library allocates nothing. */
-static alignas(DIBS_ALIGNMENT) uint8_t tree_memory[DIBS_TREE_SIZE];
-static alignas(DIBS_ALIGNMENT) uint8_t frame_memory[DIBS_FRAME_SIZE];
-static alignas(DIBS_ALIGNMENT) uint8_t query_memory[DIBS_QUERY_SIZE];
-static alignas(DIBS_ALIGNMENT) uint8_t other_frame_memory[DIBS_FRAME_SIZE];
-static alignas(DIBS_ALIGNMENT) uint8_t other_query_memory[DIBS_QUERY_SIZE];
-static alignas(DIBS_ALIGNMENT) uint8_t contacts_memory[DIBS_CONTACTS_SIZE];
-
-static dibs_tree *tree;
-/* The surface, and the second one of a scene. */
-static dibs_frame *frame, *other_frame;
-static dibs_query *query, *other_query;
-static dibs_contacts *contacts;
+static alignas(DIBS_ALIGNMENT) uint8_t memory[DIBS_START_SIZE(VERTICES)];
 
 static const dibs_wall wall = {
-    .stiffness = 1.0f, .damping = 0.002f, .hold_damping = 0.002f, .max_force = 5.0f, .margin = MARGIN};
+    .stiffness = 1.0f, .damping = 0.002f, .hold_damping = 0.001f, .max_force = 5.0f, .margin = 5.0f};
 
-void must(dibs_code code) {
+static void must(dibs_code code) {
     if (code != DIBS_CODE_OK) {
         fprintf(stderr, "%s\n", dibs_code_text(code));
         exit(EXIT_FAILURE);
     }
 }
 
-/* All contacts, their rows, and their joint force on the tool. */
-static void print_touch(dibs_code code, const dibs_tool *tool, dibs_vec3 velocity) {
-    print_contacts(contacts);
-    dibs_row rows[DIBS_CONTACTS];
-    size_t count;
-    must(dibs_contacts_rows(contacts, tool->start, 1.0f, 20.0f, DIBS_CONTACTS, rows, &count));
-    for (size_t number = 0; number < count; number++) {
-        print_floats(rows[number].linear, 3);
-        print_floats(rows[number].angular, 3);
-        print_floats(&rows[number].least, 1);
+static void print_floats(const float *values, size_t count) {
+    for (size_t at = 0; at < count; at++) {
+        uint32_t bits;
+        memcpy(&bits, &values[at], sizeof bits);
+        printf(" %08x", bits);
     }
+}
+
+static void print_words(const uint32_t *words, size_t count) {
+    for (size_t at = 0; at < count; at++) {
+        printf(" %u", words[at]);
+    }
+}
+
+static void print_searched(const dibs_searched *searched) {
+    const dibs_tracked *tracked = &searched->tracked;
+    print_words(&searched->outcome, 1);
+    print_floats(&tracked->proximity.separation, 3);
+    print_words(&tracked->is_kept, 2);
+    print_floats(&tracked->moved, 1);
+    print_words(&tracked->opened, 3);
+    print_words(&searched->before, 1);
+    print_floats(&searched->t, 3);
+    print_floats(&searched->velocity.x, 3);
+}
+
+static void print_answer(const dibs_answer *answer) {
+    const dibs_proximity *pair = &answer->closest;
     dibs_force force;
-    const dibs_vec3 angular = {0.0f, 0.1f, 0.0f};
-    must(dibs_wall_proxy_force(&wall, code, contacts, tool->start, velocity, angular, &force));
-    print_force(&force);
+    must(dibs_answer_force(answer, &wall, &force));
+    print_words(&answer->outcome, 1);
+    print_floats(&pair->separation, 3);
+    print_words(&pair->side, 2);
+    print_floats(&pair->axis_distance, 1);
+    print_floats(&pair->point_on_surface.x, 3);
+    print_floats(&pair->point_on_tool.x, 3);
+    print_floats(&pair->direction.x, 3);
+    print_floats(&pair->axis_parameter, 1);
+    print_words(&pair->triangle, 1);
+    print_words(pair->corners, 3);
+    print_floats(pair->barycentric, 3);
+    print_words(&pair->node_tests, 2);
+    print_floats(&answer->interval.lower, 2);
+    print_floats(&answer->velocity.x, 3);
+    print_words(&answer->trust.state, 2);
+    print_floats(&answer->trust.margin, 1);
+    print_words(&answer->trust.waits_for_acknowledgement, 1);
+    print_words(&answer->age.is_published, 4);
+    print_words(&answer->lag, 1);
+    print_words(&answer->link.silence, 6);
+    print_words(&(uint32_t){force.state}, 1);
+    print_floats(&force.force.x, 3);
+    print_searched(&answer->searched);
 }
 
-static void answer(const dibs_tool *tool, const dibs_options *options) {
-    const dibs_vec3 velocity = {10.0f, -20.0f, 5.0f};
-    dibs_proximity found;
-    dibs_force force;
-    dibs_code code = dibs_query_closest(query, frame, tool, options, &found);
-    printf("closest %u", code);
-    if (code == DIBS_CODE_OK) {
-        print_proximity(&found);
+/* A whole file, and a zero. */
+static uint8_t *file_read(const char *path, size_t *length) {
+    FILE *file = fopen(path, "rb");
+    long size = -1;
+    uint8_t *bytes = NULL;
+    if (file != NULL && fseek(file, 0, SEEK_END) == 0 && (size = ftell(file)) >= 0) {
+        rewind(file);
+        bytes = calloc((size_t)size + 1, 1);
     }
-    /* After an error the force is the hold, so there is always a force. */
-    must(dibs_wall_force(&wall, code, &found, velocity, &force));
-    print_force(&force);
+    if (bytes == NULL || fread(bytes, 1, (size_t)size, file) != (size_t)size) {
+        fprintf(stderr, "cannot read %s\n", path);
+        exit(EXIT_FAILURE);
+    }
+    fclose(file);
+    *length = (size_t)size;
+    return bytes;
+}
 
-    code = dibs_query_contacts(query, frame, tool, MARGIN, options, contacts, NULL);
-    printf(" contacts %u", code);
-    print_touch(code, tool, velocity);
+static uint8_t from_hex(const char *text) {
+    const char pair[3] = {text[0], text[1], '\0'};
+    return (uint8_t)strtoul(pair, NULL, 16);
+}
+
+static void answer_event(dibs_bus *bus, dibs_guard *guard, const char *name, uint32_t now, char *rest) {
+    static uint8_t bytes[1 << 16];
+    size_t length = 0;
+    if (strcmp(name, "tick") == 0) {
+        dibs_tool tool;
+        dibs_answer answer;
+        float *numbers = &tool.start.x;
+        for (size_t at = 0; at < 7; at++) {
+            numbers[at] = strtof(rest, &rest);
+        }
+        printf("tick %u", dibs_guard_closest(guard, &tool, now, &answer));
+        print_answer(&answer);
+    } else if (strcmp(name, "blind") == 0) {
+        dibs_answer answer;
+        printf("tick %u", dibs_guard_closest(guard, NULL, now, &answer));
+        print_answer(&answer);
+    } else if (strcmp(name, "acknowledge") == 0) {
+        printf("acknowledge %u", dibs_guard_acknowledge(guard));
+    } else if (strcmp(name, "work") == 0) {
+        dibs_advance advance = DIBS_ADVANCE_IDLE;
+        const dibs_code code = dibs_bus_work(bus, now, &advance);
+        printf("work %u %u", code, advance);
+    } else if (strcmp(name, "status") == 0) {
+        const uint32_t framed = (uint32_t)strtoul(rest, NULL, 10);
+        must(dibs_bus_status(bus, now, framed, bytes, DIBS_STATUS, &length));
+        printf("status ");
+        for (size_t at = 0; at < length; at++) {
+            printf("%02x", bytes[at]);
+        }
+    } else if (strcmp(name, "counters") == 0) {
+        uint32_t counters[DIBS_EVENTS];
+        must(dibs_bus_counters(bus, counters));
+        printf("counters");
+        print_words(counters, DIBS_EVENTS);
+    } else {
+        for (rest += strspn(rest, " "); rest[0] > ' ' && rest[1] > ' '; rest += 2) {
+            bytes[length++] = from_hex(rest);
+        }
+        if (strcmp(name, "packet") == 0) {
+            dibs_progress progress = DIBS_PROGRESS_NONE;
+            const dibs_code code = dibs_bus_packet(bus, bytes, length, now, &progress);
+            printf("packet %u %u", code, progress);
+        } else {
+            printf("receive %u", dibs_bus_receive(bus, bytes, length, now));
+        }
+    }
     printf("\n");
-}
-
-static bool take_options(char **text, dibs_options *options) {
-    uint32_t words[2];
-    if (!take_words(text, words, 2)) {
-        return false;
-    }
-    options->budget = words[0];
-    options->flags = words[1];
-    return true;
-}
-
-static bool pose(char *text) {
-    dibs_tool tool;
-    dibs_options options = {.depth_tolerance = 0.0f};
-    if (!take_tool(&text, &tool) || !take_options(&text, &options)) {
-        return false;
-    }
-    answer(&tool, &options);
-    return true;
-}
-
-/* Makes a frame of the file the surface in `into`. */
-static bool surface(char **text, dibs_frame *into, const float *frames, size_t length, uint32_t vertices) {
-    uint32_t number;
-    const size_t floats = 3 * (size_t)vertices;
-    if (!take_words(text, &number, 1) || (number + 1) * floats * sizeof(float) > length) {
-        return false;
-    }
-    must(dibs_frame_set_vertices(into, frames + number * floats, vertices, 0.0f));
-    must(dibs_frame_measure(into, tree, NULL));
-    return true;
-}
-
-/* The closest pair and the contacts of a chain, this surface and that of another frame. */
-static bool scene(char *text, const float *frames, size_t length, uint32_t vertices) {
-    dibs_query *queries[] = {query, other_query};
-    dibs_frame *surfaces[] = {frame, other_frame};
-    dibs_tool tools[DIBS_TOOLS];
-    dibs_scene scene = {.queries = queries, .frames = surfaces, .surface_count = 2, .tools = tools};
-    dibs_options options = {.depth_tolerance = 0.0f};
-    if (!surface(&text, other_frame, frames, length, vertices) || !take_options(&text, &options)) {
-        return false;
-    }
-    while (scene.tool_count < DIBS_TOOLS && take_tool(&text, &tools[scene.tool_count])) {
-        scene.tool_count++;
-    }
-    dibs_closest closest;
-    const dibs_code code = dibs_scene_closest(&scene, &options, &closest);
-    printf("scene %u %u %u", code, closest.surface, closest.tool);
-    print_proximity(&closest.proximity);
-    printf(" contacts %u", dibs_scene_contacts(&scene, MARGIN, &options, contacts, &closest));
-    printf(" %u %u", closest.surface, closest.tool);
-    print_proximity(&closest.proximity);
-    print_contacts(contacts);
-    printf("\n");
-    return true;
-}
-
-static bool packet(char *text) {
-    static uint8_t bytes[DIBS_MTU];
-    uint32_t now;
-    if (!take_words(&text, &now, 1)) {
-        return false;
-    }
-    bus_packet(bytes, take_bytes(&text, bytes, sizeof bytes), now);
-    return true;
-}
-
-static bool tick(char *text) {
-    dibs_tool tool;
-    uint32_t now;
-    if (!take_words(&text, &now, 1) || !take_tool(&text, &tool)) {
-        return false;
-    }
-    bus_tick(frame, query, &tool, now);
-    return true;
 }
 
 int main(int argc, char **argv) {
-    if (argc != 4) {
-        fprintf(stderr, "dibs-host TREE FRAMES SCRIPT\n");
+    if (argc != 3) {
+        fprintf(stderr, "dibs-host TREE SCRIPT\n");
         return EXIT_FAILURE;
     }
-    size_t tree_length, frames_length, script_length;
-    const uint8_t *bytes = file_read(argv[1], &tree_length);
-    const float *frames = (const float *)(const void *)file_read(argv[2], &frames_length);
-    char *script = (char *)file_read(argv[3], &script_length);
-
-    dibs_tree_facts facts;
-    must(dibs_tree_init(tree_memory, sizeof tree_memory, bytes, tree_length, &tree));
-    must(dibs_tree_get_facts(tree, &facts));
-    must(dibs_frame_init(frame_memory, sizeof frame_memory, &frame));
-    must(dibs_query_init(query_memory, sizeof query_memory, tree, &query));
-    must(dibs_frame_init(other_frame_memory, sizeof other_frame_memory, &other_frame));
-    must(dibs_query_init(other_query_memory, sizeof other_query_memory, tree, &other_query));
-    must(dibs_contacts_init(contacts_memory, sizeof contacts_memory, &contacts));
-
-    bus_init(tree, facts.vertices);
-
+    size_t length, script_length;
+    dibs_bus *bus;
+    dibs_guard *guard;
+    const uint8_t *tree = file_read(argv[1], &length);
+    char *script = (char *)file_read(argv[2], &script_length);
+    const dibs_guard_limits limits = dibs_guard_limits_of(300.0f, 80);
+    must(dibs_start(memory, sizeof memory, tree, length, &limits, &bus, &guard));
     for (char *line = strtok(script, "\n"); line != NULL; line = strtok(NULL, "\n")) {
-        const size_t word = strcspn(line, " ");
-        char *rest = line + word;
-        bool is_known = (strncmp(line, "frame", word) == 0
-                         && surface(&rest, frame, frames, frames_length, facts.vertices))
-            || (strncmp(line, "pose", word) == 0 && pose(rest))
-            || (strncmp(line, "scene", word) == 0 && scene(rest, frames, frames_length, facts.vertices))
-            || (strncmp(line, "packet", word) == 0 && packet(rest))
-            || (strncmp(line, "tick", word) == 0 && tick(rest));
-        if (!is_known) {
-            fprintf(stderr, "not a line of a script: %.40s\n", line);
-            return EXIT_FAILURE;
+        char *rest = line + strcspn(line, " ");
+        if (*rest != '\0') {
+            *rest++ = '\0';
         }
+        const uint32_t now = (uint32_t)strtoul(rest, &rest, 10);
+        answer_event(bus, guard, line, now, rest);
     }
     return EXIT_SUCCESS;
 }

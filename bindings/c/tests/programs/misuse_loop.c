@@ -66,6 +66,8 @@ static void start(const unsigned char *bytes, size_t length) {
     EXPECT(OK, dibs_guard_closest(guard, &tool, 0, &answer));
     EXPECT(NO_SURFACE, answer.outcome);
     EXPECT_THAT(answer.trust.state == DIBS_STATE_SAFE && answer.age.is_published == 0 && answer.lag == UINT32_MAX);
+    EXPECT(NO_SURFACE, answer.searched.outcome);
+    EXPECT_THAT(answer.searched.before == 0 && answer.searched.residual == -1.0f);
     EXPECT_THAT(answer.interval.lower == -INFINITY && answer.interval.upper == INFINITY);
     EXPECT(NULL, dibs_answer_force(NULL, &wall, &force));
     EXPECT(NULL, dibs_answer_force(&answer, NULL, &force));
@@ -85,6 +87,14 @@ static void start(const unsigned char *bytes, size_t length) {
     EXPECT(NOT_INITIALISED, dibs_bus_register((dibs_bus *)(void *)unmade));
     EXPECT(OK, dibs_bus_register(bus));
     EXPECT(NULL, dibs_bus_counters(bus, NULL));
+    dibs_bus_facts facts;
+    dibs_vec3 at;
+    EXPECT(NULL, dibs_bus_get_facts(bus, NULL));
+    EXPECT(NULL, dibs_bus_get_facts(NULL, &facts));
+    EXPECT(OK, dibs_bus_get_facts(bus, &facts));
+    EXPECT_THAT(facts.is_published == 0 && facts.epoch == 0 && facts.rounds == 0);
+    EXPECT(NULL, dibs_bus_position(bus, 0, NULL));
+    EXPECT(NO_SURFACE, dibs_bus_position(bus, 0, &at));
     EXPECT(NULL, dibs_bus_status(bus, 500, 0, NULL, DIBS_STATUS, &count));
     EXPECT(NULL, dibs_bus_status(bus, 500, 0, status, sizeof status, NULL));
     EXPECT(CAPACITY, dibs_bus_status(bus, 500, 0, status, DIBS_STATUS - 1, &count));

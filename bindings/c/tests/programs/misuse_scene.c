@@ -83,7 +83,6 @@ static void scenes(const float *positions, uint32_t vertices) {
 static void trackers(const float *positions, uint32_t vertices) {
     dibs_tracker *tracker, *other;
     dibs_frame *frame;
-    dibs_proximity found;
     dibs_tracked tracked;
     dibs_contacts_facts facts;
     const dibs_tool tools[] = {tool, tool};
@@ -92,29 +91,29 @@ static void trackers(const float *positions, uint32_t vertices) {
     EXPECT(OK, dibs_frame_init(frame_memory, sizeof frame_memory, &frame));
     EXPECT(OK, dibs_tracker_init(other_tracker_memory, sizeof other_tracker_memory, tree, &other));
     dibs_tracker *both[] = {tracker, other};
-    EXPECT(NO_SURFACE, dibs_tracker_closest(tracker, &tool, NULL, &found, NULL, NULL));
-    EXPECT(NO_SURFACE, dibs_tracker_contacts(tracker, &tool, 60.0f, NULL, contacts, NULL, NULL, NULL));
+    EXPECT(NO_SURFACE, dibs_tracker_closest(tracker, &tool, NULL, &tracked));
+    EXPECT(NO_SURFACE, dibs_tracker_contacts(tracker, &tool, 60.0f, NULL, contacts, NULL));
     EXPECT(NO_SURFACE, dibs_tracker_set_frame(tracker, frame));
-    EXPECT(NO_SURFACE, dibs_tracker_closest_on(tracker, frame, &tool, NULL, &found, NULL, NULL));
+    EXPECT(NO_SURFACE, dibs_tracker_closest_on(tracker, frame, &tool, NULL, &tracked));
     EXPECT(OK, dibs_frame_set_vertices(frame, positions, vertices - 1, 0.0f));
     EXPECT(VERTEX_COUNT, dibs_tracker_set_frame(tracker, frame));
     EXPECT(OK, dibs_frame_set_vertices(frame, positions, vertices, 0.5f));
     EXPECT(OK, dibs_tracker_set_frame(tracker, frame));
-    EXPECT(OK, dibs_tracker_closest(tracker, &tool, NULL, &found, NULL, NULL));
-    EXPECT(ARGUMENT, dibs_tracker_closest_on(tracker, frame, &tool, NULL, &found, NULL, NULL));
-    EXPECT(NULL, dibs_tracker_closest_on(tracker, NULL, &tool, NULL, &found, NULL, NULL));
-    EXPECT(NULL, dibs_tracker_closest_on(NULL, frame, &tool, NULL, &found, NULL, NULL));
+    EXPECT(OK, dibs_tracker_closest(tracker, &tool, NULL, &tracked));
+    EXPECT(ARGUMENT, dibs_tracker_closest_on(tracker, frame, &tool, NULL, &tracked));
+    EXPECT(NULL, dibs_tracker_closest_on(tracker, NULL, &tool, NULL, &tracked));
+    EXPECT(NULL, dibs_tracker_closest_on(NULL, frame, &tool, NULL, &tracked));
     /* The frame's error is part of the accuracy. */
-    EXPECT_THAT(found.accuracy > 0.5f && found.accuracy < 0.6f);
+    EXPECT_THAT(tracked.proximity.accuracy > 0.5f && tracked.proximity.accuracy < 0.6f);
 
-    EXPECT(OK, dibs_tracker_contacts(tracker, &tool, 60.0f, NULL, contacts, NULL, NULL, NULL));
+    EXPECT(OK, dibs_tracker_contacts(tracker, &tool, 60.0f, NULL, contacts, NULL));
     EXPECT(OK, dibs_contacts_get_facts(contacts, &facts));
     EXPECT_THAT(facts.count > 0 && facts.accuracy > 0.5f && facts.accuracy < 0.6f);
-    EXPECT(NULL, dibs_tracker_contacts(tracker, &tool, 60.0f, NULL, NULL, NULL, NULL, NULL));
-    EXPECT(NULL, dibs_tracker_contacts(NULL, &tool, 60.0f, NULL, contacts, NULL, NULL, NULL));
+    EXPECT(NULL, dibs_tracker_contacts(tracker, &tool, 60.0f, NULL, NULL, NULL));
+    EXPECT(NULL, dibs_tracker_contacts(NULL, &tool, 60.0f, NULL, contacts, NULL));
     EXPECT(OK, dibs_contacts_get_facts(contacts, &facts));
     EXPECT_THAT(facts.count == 0);
-    EXPECT(MARGIN, dibs_tracker_contacts(tracker, &tool, -1.0f, NULL, contacts, NULL, NULL, NULL));
+    EXPECT(MARGIN, dibs_tracker_contacts(tracker, &tool, -1.0f, NULL, contacts, NULL));
 
     EXPECT(NO_SURFACE, dibs_tracker_closest_of(both, tools, 2, NULL, &tracked));
     EXPECT(OK, dibs_tracker_set_frame(other, frame));

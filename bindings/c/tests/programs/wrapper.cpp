@@ -82,20 +82,17 @@ int main(int argc, char **argv) {
 
         /* A tracker on the bus' frame itself, in storage without room for a copy. */
         static dibs::Tracker<0> tracker;
-        dibs_proximity tracked;
-        dibs_fallback fallback = DIBS_FALLBACK_NONE;
+        dibs_tracked tracked;
         MUST(tracker.init(tree));
         EXPECT(DIBS_CODE_VERTEX_COUNT, tracker.set(frame));
-        float moved = 1.0f;
-        MUST(dibs_tracker_closest_on(tracker, frame, &tool, nullptr, &tracked, &fallback, &moved));
-        EXPECT(true, moved == -1.0f);
-        EXPECT(true, fallback == DIBS_FALLBACK_START && tracked.separation == on_bus.separation);
-        MUST(dibs_tracker_closest_on(tracker, frame, &tool, nullptr, &tracked, &fallback, &moved));
-        EXPECT(true, moved == 0.0f);
-        EXPECT(true, fallback == DIBS_FALLBACK_NONE && tracked.separation == on_bus.separation);
-        EXPECT(true, tracked.node_tests < on_bus.node_tests);
-        EXPECT(true, tracked.coverage == DIBS_COVERAGE_MEASURED);
-
+        MUST(tracker.closest_on(frame, tool, tracked));
+        EXPECT(true, tracked.moved == -1.0f);
+        EXPECT(true, tracked.fallback == DIBS_FALLBACK_START && tracked.proximity.separation == on_bus.separation);
+        MUST(tracker.closest_on(frame, tool, tracked));
+        EXPECT(true, tracked.moved == 0.0f);
+        EXPECT(true, tracked.fallback == DIBS_FALLBACK_NONE && tracked.proximity.separation == on_bus.separation);
+        EXPECT(true, tracked.proximity.node_tests < on_bus.node_tests);
+        EXPECT(true, tracked.proximity.coverage == DIBS_COVERAGE_MEASURED);
     }
     dibs::Frame frame;
     MUST(frame.init());
@@ -143,13 +140,12 @@ int main(int argc, char **argv) {
     EXPECT(DIBS_CODE_ARGUMENT, dibs::Scene(queries, frames, {}).closest(of_scene));
 
     /* The same by trackers, on the first surface. */
-    dibs_proximity tracked;
-    dibs_tracked of_chain;
+    dibs_tracked tracked, of_chain;
     for (auto &tracker : trackers) {
         MUST(tracker.init(tree));
         MUST(tracker.set(frame));
         MUST(tracker.closest(tool, tracked));
-        EXPECT(true, tracked.separation == at_rest.separation);
+        EXPECT(true, tracked.proximity.separation == at_rest.separation && tracked.is_kept == 0);
     }
     MUST(trackers[0].contacts(tool, 60.0f, contacts));
     dibs_tracker *both[] = {trackers[0], trackers[1]};
@@ -176,6 +172,14 @@ int main(int argc, char **argv) {
     EXPECT(DIBS_CODE_PACKET_DAMAGED, bus.packet(std::span(packets).first(8), 0));
     MUST(guard.closest(tool, 1, answer));
     EXPECT(true, answer.age.is_published == 1 && answer.age.epoch == 2);
+    EXPECT(true, answer.searched.outcome == DIBS_CODE_OK && answer.searched.tracked.opened > 0);
+    dibs_bus_facts of_bus;
+    dibs_vec3 at;
+    MUST(dibs_bus_get_facts(bus, &of_bus));
+    EXPECT(true, of_bus.is_published == 1 && of_bus.epoch == 2);
+    MUST(dibs_bus_position(bus, 501, &at));
+    EXPECT(true, at.x == positions[3 * 501]);
+    EXPECT(DIBS_CODE_ARGUMENT, dibs_bus_position(bus, 502, &at));
     EXPECT(true, answer.trust.state == DIBS_STATE_SAFE && answer.outcome != DIBS_CODE_OK);
     EXPECT(DIBS_CODE_ACKNOWLEDGE, guard.acknowledge());
 

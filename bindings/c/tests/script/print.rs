@@ -1,4 +1,4 @@
-//! A line of an answer, in the format of the program in `examples/c/host`.
+//! A line of an answer, in the format of the program in `tests/programs/layers`.
 
 use std::fmt::Write;
 

@@ -28,14 +28,13 @@ void track_init(dibs_tree *tree) {
 
 /* Contacts of the tool, and at times of a sphere. */
 static void touch(dibs_tool tool, uint32_t number) {
-    dibs_proximity found;
-    dibs_fallback fallback;
+    dibs_tracked found;
     if (number / 8 % 2 == 1) {
         tool.end = tool.start;
     }
-    must(dibs_tracker_contacts(trackers[TOUCH], &tool, MARGIN, NULL, contacts, &found, &fallback, NULL));
-    printf("touch %u", fallback);
-    print_proximity(&found);
+    must(dibs_tracker_contacts(trackers[TOUCH], &tool, MARGIN, NULL, contacts, &found));
+    printf("touch %u", found.fallback);
+    print_proximity(&found.proximity);
     print_contacts(contacts);
     printf("\n");
 }
@@ -53,17 +52,16 @@ static void chain(dibs_tool tool) {
 
 void track(dibs_frame *frame, const dibs_age *age, const dibs_tool *tool) {
     static uint32_t ticks;
-    dibs_proximity found;
-    dibs_fallback fallback;
+    dibs_tracked found;
     if (tracked != age->epoch) {
         for (size_t at = 0; at < TRACKERS; at++) {
             must(dibs_tracker_set_frame(trackers[at], frame));
         }
         tracked = age->epoch;
     }
-    must(dibs_tracker_closest(trackers[CLOSEST], tool, NULL, &found, &fallback, NULL));
-    printf("track %u", fallback);
-    print_proximity(&found);
+    must(dibs_tracker_closest(trackers[CLOSEST], tool, NULL, &found));
+    printf("track %u", found.fallback);
+    print_proximity(&found.proximity);
     printf("\n");
     touch(*tool, ticks++);
     chain(*tool);

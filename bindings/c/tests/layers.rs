@@ -1,27 +1,29 @@
-//! `examples/c/host` answers a script with the same bits as the Rust library.
+//! The layers below bus and guard answer a script with the same bits as the Rust library.
 
 mod programs;
 mod script;
 
 use std::fs;
+use std::path::Path;
 use std::process::Command;
 
-use programs::{library, run, tool};
+use programs::{include, library, run, tool};
 use script::Script;
-use xtask::workspace;
 
 #[test]
 fn c_and_rust_answer_a_script_with_the_same_bits() {
     let folder = tempfile::tempdir().expect("a folder");
-    let build = folder.path().join("build");
-    let mut configure = tool("cmake", "cmake");
-    configure.arg("-S").arg(workspace::root().join("examples/c/host")).arg("-B").arg(&build);
-    configure.arg(format!("-DDIBS_LIBRARY={}", library().display()));
-    run(&mut configure);
-    run(Command::new("cmake").arg("--build").arg(&build));
+    let program = folder.path().join("layers");
+    let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs/layers");
+    let mut gcc = tool("gcc", "gcc");
+    gcc.args(["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-I"]).arg(include());
+    gcc.args(
+        ["bus", "main", "print", "script", "track"].map(|name| sources.join(format!("{name}.c"))),
+    );
+    run(gcc.arg(library()).args(["-lpthread", "-ldl", "-lm", "-o"]).arg(&program));
 
     let script = Script::new();
-    let mut program = Command::new(build.join("dibs-host"));
+    let mut program = Command::new(program);
     for (name, bytes) in [
         ("tree", &script.tree),
         ("frames", &script.frames),
