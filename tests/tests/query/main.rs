@@ -6,6 +6,7 @@ mod chain;
 mod contacts;
 mod cut_short;
 mod differential;
+mod few_places;
 mod filter;
 mod flat;
 mod hand;

@@ -218,22 +218,33 @@ impl<const N: usize> Basins<N> {
         };
         let mut height = sqrt(lowest.square());
         let (ridge, error) = (activation::least_ridge(height, ridges), ridges.1);
-        // The lowest before any ridge; the entry of the lowest; whether that is beyond a ridge, and leads to another
-        // flood.
-        let (mut own, mut at_lowest, mut has_crossed, mut leads_away) = (lowest, low, false, false);
+        // The lowest before any ridge; the entry of the lowest; whether that is beyond a ridge; the lowest met there of
+        // another flood.
+        let (mut own, mut at_lowest, mut has_crossed, mut other_lowest) =
+            (lowest, low, false, None);
         let mut count = 0;
         if !self.reach(low, low, &mut count) {
             return Ok(Flood::Joined);
         }
-        for at in 0..N {
-            let Some(&entry) = self.reached.get(at).filter(|_| at < count) else { break };
+        // Entries whose way down has been taken, and over whose edges the flood has risen. It rises only where none is left
+        // that leads down, or it takes a place on the way for a valley.
+        let (mut descended, mut risen) = (0, 0);
+        for _ in 0..2 * N {
+            let rises = descended == count;
+            let at = if rises { &mut risen } else { &mut descended };
+            let Some(&entry) = self.reached.get(*at).filter(|_| *at < count) else { break };
+            *at += 1;
             let Some(&from) = self.near.get(usize::from(entry)) else { break };
             for edge in 0..3 {
+                let is_over = from.place.is_on(edge);
+                let is_level = is_over && sqrt(from.square()) <= height + error;
+                if !(rises || is_level) {
+                    continue;
+                }
                 let Some(across) = tree.row_across(from.row, edge) else { continue };
                 if is_left_out(across) {
                     continue;
                 }
-                let is_level = from.place.is_on(edge) && sqrt(from.square()) <= height + error;
                 let Some(next) = self.entry(across, &mut |row| look.triangle(row))? else {
                     if is_level {
                         return Ok(Flood::CutShort);
@@ -250,7 +261,6 @@ impl<const N: usize> Basins<N> {
                     continue;
                 }
                 // Both may be low with a high edge between them. Without budget the flood does not rise.
-                let is_over = from.place.is_on(edge);
                 if !is_over && !look.edge(from.row, edge)?.is_some_and(|over| over <= top) {
                     continue;
                 }
@@ -258,13 +268,15 @@ impl<const N: usize> Basins<N> {
                     let other = self.near.get(usize::from(by));
                     let is_other = other.is_some_and(|other| !other.place.is_like(own.place));
                     if (has_crossed || !is_level) && is_other {
-                        leads_away |= key < lowest;
+                        if other_lowest.is_none_or(|met| key < met) {
+                            other_lowest = Some(key);
+                        }
                         continue;
                     }
                     return Ok(Flood::Joined);
                 }
                 if key < lowest {
-                    (lowest, at_lowest, leads_away) = (key, next, false);
+                    (lowest, at_lowest) = (key, next);
                     height = sqrt(lowest.square());
                     has_crossed |= !is_level;
                     if !has_crossed {
@@ -279,6 +291,7 @@ impl<const N: usize> Basins<N> {
                 *by = at_lowest;
             }
         }
+        let leads_away = other_lowest.is_some_and(|met| met < lowest);
         if !has_crossed || !leads_away && lowest.place.is_like(own.place) {
             return Ok(Flood::Ended(lowest.near(), None));
         }

@@ -267,7 +267,8 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     ///
     /// Two valleys of the distance in much the same direction, within 7 degrees, are one contact unless a ridge parts
     /// them of more than a 128th of the axis' distance there, at most of the margin. So a flat wall along a capsule is one;
-    /// so may be two within 15 degrees. Walls in other directions are contacts of their own. Pairs with the inner side of a
+    /// so may be two within 15 degrees. Walls in other directions are contacts of their own, if a ridge of more than a 512th of
+    /// that distance and a 128th of the margin parts them; lower ones may be. Pairs with the inner side of a
     /// sheet, say the far side of an organ, are not contacts. Where the side is undefined the tool is taken to be outside.
     /// If that is because the budget ended, contacts may be missing at any distance: see [`Contacts::within`].
     ///

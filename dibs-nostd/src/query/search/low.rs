@@ -3,8 +3,8 @@
 //! The square of the distance from the axis is convex in space, and twice the vector from the axis is its gradient. So
 //! over a triangle it is at least the value at the lowest corner plus the least rise towards the other two. Where that
 //! is no more than `ridge / 2` below the corner's distance, and no more than a 512th of it, and a vertex next to that corner is lower, the triangle is
-//! not the lowest: the triangles around the corner lead down, over no ridge of that height. Where the triangle may dip
-//! across one edge, and the vertex beyond it is lower than the dip, neither is it. All others may be.
+//! not the lowest: the triangles around the corner lead down, over no ridge of that height. Where the triangle's lowest
+//! point is on an edge, and the vertex beyond it is lower, neither is it. All others may be.
 //!
 //! Each step down leads to a triangle with a lower lowest corner, so it ends at a triangle that is kept, `ridge / 2`
 //! above the first one at most.
@@ -250,7 +250,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(Some(true))
     }
 
-    /// Whether the vertex beyond an edge is not lower than the triangle. `None` without budget.
+    /// Whether the vertex beyond an edge is not lower than the triangle, or the way there leads over a ridge. `None` without
+    /// budget.
     fn dips(
         &mut self,
         triangle: u32,
@@ -265,11 +266,28 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 return Ok(None);
             }
             let (_, beyond) = self.corner(row, before(other), heights)?;
-            if beyond < low {
+            if beyond < low && self.is_lowest_on(edge, &self.corners(triangle)?) {
                 return Ok(Some(false));
             }
         }
         self.is_outside(triangle, heights)
+    }
+
+    /// Whether a triangle's lowest point is on an edge, as far as is clear: from the whole edge it rises towards the third
+    /// corner. Half the gradient is a point less the axis' point closest to it, and along the edge both move one way.
+    #[inline(never)]
+    fn is_lowest_on(&self, edge: u32, &[a, b, c]: &[Vec3; 3]) -> bool {
+        let (from, to, third) = match edge {
+            0 => (a, b, c),
+            1 => (b, c, a),
+            _ => (c, a, b),
+        };
+        let inward = third - from;
+        let rises = |(point, by): (Vec3, Vec3)| {
+            let on_axis = by - self.tool.axis_to(by);
+            inward.dot(point - on_axis) >= self.tilt_slack
+        };
+        [(from, from), (from, to), (to, from), (to, to)].into_iter().all(rises)
     }
 
     /// The row and the height of a triangle's corner.
