@@ -8,10 +8,8 @@ use dibs_build::glam::DVec3;
 use dibs_nostd::filter::{Admitted, Filter, Motion, Reason, Uncertainty};
 use dibs_nostd::{Capsule, Cost, Index, MovingSurface, Odometer, Options, Tracker, Tree};
 
-use crate::mesh_file::Lengths;
 use crate::query::{STACK, ToolSpec};
-use crate::recorded::{Recorded, checked_rate};
-use crate::track::tools;
+use crate::recorded::{Moving, Recorded, tools};
 use crate::tree_file::{self, AnyTree};
 use crate::{output, overwrite};
 
@@ -42,17 +40,8 @@ A filter sees it at the start of each tick, as old as --age allows. The reasons:
 retreating, and 'no safe motion', after which the stand-off is not kept; least_separation is null where nothing is
 certain.")]
 pub struct Args {
-    /// A tree file that `dibs build` wrote
-    tree: PathBuf,
-    /// The surface's motion: .pc2, .npy or a series (heart_%03d.vtp) of the built mesh
-    #[arg(long)]
-    motion: PathBuf,
-    /// Frames a second of the motion; by default the number in its file
-    #[arg(long, value_name = "HZ")]
-    motion_rate: Option<f32>,
-    /// Ticks a second
-    #[arg(long, default_value_t = 1_000.0, allow_negative_numbers = true)]
-    rate: f64,
+    #[command(flatten)]
+    moving: Moving,
     /// The tool's pose commanded for the end of each tick: a line is what `dibs query --tool` takes
     #[arg(long)]
     path: PathBuf,
@@ -74,17 +63,16 @@ pub struct Args {
     /// Instructions of a Cortex-M7 that the queries of a tick may take
     #[arg(long, value_name = "N", default_value_t = 200_000)]
     budget: u32,
-    #[command(flatten)]
-    lengths: Lengths,
     /// Print a JSON object a line, and another one of the sums on standard error
     #[arg(long)]
     json: bool,
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    overwrite::check([&args.tree, &args.motion, &args.path], [])?;
-    let bytes = tree_file::load(&args.tree)?;
-    match tree_file::validate(&bytes, &args.tree)? {
+    let Moving { tree, motion, .. } = &args.moving;
+    overwrite::check([tree, motion, &args.path], [])?;
+    let bytes = tree_file::load(tree)?;
+    match tree_file::validate(&bytes, tree)? {
         AnyTree::Narrow(tree) => filter(args, &tree),
         AnyTree::Wide(tree) => filter(args, &tree),
     }
@@ -196,9 +184,9 @@ fn fastest(recorded: &Recorded) -> f32 {
 
 fn filter<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
     let origin: DVec3 = tree.origin().into();
-    let rate = checked_rate(args.rate)?;
+    let rate = args.moving.rate()?;
     let commands = Commands::read(args, origin)?;
-    let recorded = Recorded::read(tree, &args.motion, &args.lengths, args.motion_rate)?;
+    let recorded = args.moving.read(tree)?;
     let period = (1.0 / rate) as f32;
     let robot = args.robot_speed.unwrap_or(commands.speed(rate).max(ROBOT) as f32 * 1.001);
     let tissue = args.tissue_speed.unwrap_or_else(|| fastest(&recorded));

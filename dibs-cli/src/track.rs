@@ -1,18 +1,18 @@
 //! `dibs track`: a tool on its path about a moving surface, tick by tick.
 
-use crate::mesh_file::Lengths;
-use crate::query::{LocalTool, STACK, ToolSpec, parse_tool, side_name};
-use crate::recorded::{Recorded, checked_rate};
+use crate::query::{ContactRecord, LocalTool, STACK, Touch, side_name, vector};
+use crate::recorded::{Moving, Recorded, tools};
 use crate::tree_file::{self, AnyTree};
 use crate::{output, overwrite};
-use anyhow::{Context, Result, anyhow, bail};
-use dibs_build::glam::Vec3;
+use anyhow::{Context, Result, bail};
+use dibs_build::glam::{DVec3, Vec3};
 use dibs_nostd::{
-    Fallback, Index, MeasuredStretch, MovingSurface, Odometer, Options, Proximity, Query, Step,
-    Tool, Tracker, Tree, measure_stretch,
+    Budget, Contacts, Cost, Fallback, Index, MeasuredStretch, MovingSurface, NoSide, Odometer,
+    Options, Proximity, Query, Side, Step, Tool, Tracker, Tree, measure_stretch,
 };
+use serde::Serialize;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Opened nodes that are remembered: more than any tool needs.
 const OPENED: usize = 4_096;
@@ -25,22 +25,18 @@ const BUFFER: usize = 1 << 16;
 Examples:
   dibs track heart.dibs --motion heart.pc2 --path tools.csv --json
   dibs track heart.dibs --motion heart.pc2 --path tools.csv --surface extrapolated --full
+  dibs track heart.dibs --motion heart.pc2 --path tools.csv --budget 60000 --contacts 5 --json
 
 A frame arrives when its time has come; the motion is played over and over. SurfaceBlend frames the surface is that
 of the last frame (held), on its way there from the one before (interpolated: late by a frame), or beyond it as
-it moved before (extrapolated). One line a tick on standard output, and what it took on standard error.")]
+it moved before (extrapolated). One line a tick on standard output, and what it took on standard error.
+
+Where a budget ends, is_cut is true and the certified interval is wider: it is that of the last ticks, less what has moved
+since. is_kept says that the side is the last tick's. contacts_bound says how far the list of contacts is complete; it is
+null where nothing is certain.")]
 pub struct Args {
-    /// A tree file that `dibs build` wrote
-    tree: PathBuf,
-    /// The surface's motion: .pc2, .npy or a series (heart_%03d.vtp) of the built mesh
-    #[arg(long)]
-    motion: PathBuf,
-    /// Frames a second of the motion; by default the number in its file
-    #[arg(long, value_name = "HZ")]
-    motion_rate: Option<f32>,
-    /// Ticks a second
-    #[arg(long, default_value_t = 1_000.0)]
-    rate: f64,
+    #[command(flatten)]
+    moving: Moving,
     /// The tool at each tick: a line is what `dibs query --tool` takes
     #[arg(long)]
     path: PathBuf,
@@ -50,8 +46,12 @@ pub struct Args {
     /// Ask every tick anew, remembering nothing
     #[arg(long)]
     full: bool,
-    #[command(flatten)]
-    lengths: Lengths,
+    /// Instructions of a Cortex-M7 that a tick may take; by default as many as it needs
+    #[arg(long, value_name = "N")]
+    budget: Option<u32>,
+    /// List all locally closest pairs whose separation is at most this, too: at most 64
+    #[arg(long, value_name = "MARGIN", allow_negative_numbers = true)]
+    contacts: Option<f32>,
     /// Print a JSON object a line, and another one of the means on standard error
     #[arg(long)]
     json: bool,
@@ -65,43 +65,34 @@ enum Surface {
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    overwrite::check([&args.tree, &args.motion, &args.path], [])?;
-    let bytes = tree_file::load(&args.tree)?;
-    match tree_file::validate(&bytes, &args.tree)? {
+    let Moving { tree, motion, .. } = &args.moving;
+    overwrite::check([tree, motion, &args.path], [])?;
+    if let Some(margin) = args.contacts
+        && !(margin >= 0.0 && margin.is_finite())
+    {
+        bail!("--contacts is {margin}: give a margin of at least 0");
+    }
+    let bytes = tree_file::load(tree)?;
+    match tree_file::validate(&bytes, tree)? {
         AnyTree::Narrow(tree) => track(args, &tree),
         AnyTree::Wide(tree) => track(args, &tree),
     }
 }
 
-/// The tool at each tick, as `each` has it.
-pub fn tools<T>(path: &Path, each: impl Fn(ToolSpec) -> Result<T>) -> Result<Vec<T>> {
-    let name = path.display();
-    let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot be read"))?;
-    let tools: Vec<T> = (1..)
-        .zip(text.lines())
-        .filter(|(_, line)| !line.trim().is_empty())
-        .map(|(number, line)| {
-            parse_tool(line.trim())
-                .and_then(&each)
-                .map_err(|error| anyhow!("{name}, line {number}: {error}"))
-        })
-        .collect::<Result<_>>()?;
-    if tools.is_empty() {
-        bail!("{name}: no line, and so no tick; give a tool for each tick");
-    }
-    Ok(tools)
-}
-
 fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
-    let origin = tree.origin().into();
+    let origin: DVec3 = tree.origin().into();
     let tools = tools(&args.path, |tool| tool.local(origin))?;
-    let rate = checked_rate(args.rate)?;
-    let recorded = Recorded::read(tree, &args.motion, &args.lengths, args.motion_rate)?;
+    let rate = args.moving.rate()?;
+    let recorded = args.moving.read(tree)?;
     let Recorded { frames, stretches, .. } = &recorded;
     let mut session = Session {
         tree,
         query: Query::new(tree)?,
-        tracker: (!args.full).then(|| Tracker::new(tree)).transpose()?,
+        tracker: (!args.full).then(|| Tracker::with_range(tree)).transpose()?,
+        near: args.contacts.map(|margin| (margin, Box::default())),
+        budget: args.budget,
+        origin,
+        name: args.moving.tree.display().to_string(),
         out: Vec::new(),
         json: args.json,
         sums: [0; 2],
@@ -133,11 +124,25 @@ fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
     session.finish(tools.len())
 }
 
+/// The answer of a tick, tracked or not.
+struct Answer {
+    closest: Proximity,
+    is_kept: bool,
+    fallback: Option<Fallback>,
+}
+
 struct Session<'t, I> {
     tree: &'t Tree<'t, I>,
     query: Query<'t, I, STACK>,
     /// `None` with `--full`.
-    tracker: Option<Tracker<'t, I, STACK, OPENED>>,
+    tracker: Option<Tracker<'t, I, STACK, OPENED, OPENED>>,
+    /// With `--contacts`: the margin and the list.
+    near: Option<(f32, Box<Contacts<64>>)>,
+    /// Instructions.
+    budget: Option<u32>,
+    origin: DVec3,
+    /// The tree's file.
+    name: String,
     /// Lines that are not printed yet.
     out: Vec<u8>,
     json: bool,
@@ -146,6 +151,28 @@ struct Session<'t, I> {
     fallbacks: usize,
     /// Of these, those for want of places.
     full: usize,
+}
+
+/// A tick in JSON.
+#[derive(Serialize)]
+struct Line<'a> {
+    tick: usize,
+    separation: f64,
+    lower: f64,
+    /// Certified: the ends include the accuracy. The first is null where the tool may be inside at any depth.
+    interval: [f64; 2],
+    side: &'static str,
+    direction: [f64; 3],
+    is_cut: bool,
+    is_kept: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    contacts: Option<Vec<ContactRecord<'a>>>,
+    /// Every contact whose separation is below is listed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    contacts_bound: Option<f64>,
+    node_tests: u32,
+    triangle_tests: u32,
+    fallback: Option<&'static str>,
 }
 
 impl<I: Index> Session<'_, I> {
@@ -158,7 +185,7 @@ impl<I: Index> Session<'_, I> {
         stretch: MeasuredStretch,
         tool: &LocalTool,
     ) -> Result<()> {
-        let (proximity, fallback) = match surface {
+        let answer = match surface {
             Surface::Held => self.ask(&step.after(), stretch, tool)?,
             Surface::Interpolated => self.ask(&step.at(share), stretch, tool)?,
             // An extrapolated surface beyond the tree's stretch limit is not searched: the last frame is held.
@@ -167,32 +194,62 @@ impl<I: Index> Session<'_, I> {
                 Err(_) => self.ask(&step.after(), stretch, tool)?,
             },
         };
-        self.sums[0] += u64::from(proximity.node_tests);
-        self.sums[1] += u64::from(proximity.triangle_tests);
+        let Answer { closest, is_kept, fallback } = answer;
+        self.sums[0] += u64::from(closest.node_tests);
+        self.sums[1] += u64::from(closest.triangle_tests);
         self.fallbacks += usize::from(fallback.is_some());
         self.full += usize::from(fallback == Some(Fallback::Full));
-        let (separation, lower) = (proximity.separation, proximity.lower);
-        let (nodes, triangles) = (proximity.node_tests, proximity.triangle_tests);
-        let (side, _) = side_name(proximity.side);
+        let (side, _) = side_name(closest.side);
+        let Proximity { separation, node_tests, triangle_tests, .. } = closest;
         if self.json {
-            let line = serde_json::json!({
-                "tick": tick,
-                "separation": separation,
-                "lower": lower,
-                "side": side,
-                "node_tests": nodes,
-                "triangle_tests": triangles,
-                "fallback": fallback.map(word),
-            });
+            let interval = closest.interval();
+            let line = Line {
+                tick,
+                separation: separation.into(),
+                lower: closest.lower.into(),
+                interval: [interval.lower.into(), interval.upper.into()],
+                side,
+                direction: vector(closest.direction),
+                is_cut: self.budget.is_some() && is_cut(&closest, tool),
+                is_kept,
+                contacts: self.touches(),
+                contacts_bound: self.near.as_ref().map(|(_, contacts)| contacts.bound().into()),
+                node_tests,
+                triangle_tests,
+                fallback: fallback.map(word),
+            };
+            let line = serde_json::to_string(&line)?;
             writeln!(self.out, "{line}")?;
         } else {
+            let contacts = match &self.near {
+                Some((_, contacts)) => format!("{:3} contacts ", contacts.len()),
+                None => String::new(),
+            };
             let fallback = fallback.map_or("", word);
             writeln!(
                 self.out,
-                "{tick:6} {separation:12.5} {side:9} {nodes:6} {triangles:5} {fallback}"
+                "{tick:6} {separation:12.5} {side:9} {node_tests:6} {triangle_tests:5} {contacts}{fallback}"
             )?;
         }
         Ok(())
+    }
+
+    /// The contacts of the tick, with `--contacts`.
+    fn touches(&self) -> Option<Vec<ContactRecord<'_>>> {
+        let vertex = |row| self.tree.vertex_number(row).map_or(row, |vertex| vertex.0);
+        let (_, contacts) = self.near.as_ref()?;
+        let touches = contacts.iter().map(|&contact| {
+            Touch {
+                contact,
+                triangle: contact.corners.map(vertex),
+                label: self.tree.label(contact.triangle),
+                origin: self.origin,
+                tree: &self.name,
+                tool: 0,
+            }
+            .record()
+        });
+        Some(touches.collect())
     }
 
     fn ask(
@@ -200,10 +257,12 @@ impl<I: Index> Session<'_, I> {
         surface: &impl MovingSurface,
         stretch: MeasuredStretch,
         tool: &LocalTool,
-    ) -> Result<(Proximity, Option<Fallback>)> {
+    ) -> Result<Answer> {
         match tool {
-            LocalTool::Sphere(sphere) => self.closest(surface, sphere, stretch),
-            LocalTool::Capsule(capsule) => self.closest(surface, capsule, stretch),
+            LocalTool::Sphere(sphere) => self.closest(surface, sphere, stretch, &Cost::M7_SPHERE),
+            LocalTool::Capsule(capsule) => {
+                self.closest(surface, capsule, stretch, &Cost::M7_CAPSULE)
+            }
         }
     }
 
@@ -212,15 +271,26 @@ impl<I: Index> Session<'_, I> {
         surface: &impl MovingSurface,
         tool: &impl Tool,
         stretch: MeasuredStretch,
-    ) -> Result<(Proximity, Option<Fallback>)> {
-        let options = Options::cold().stretch(stretch);
-        Ok(match &mut self.tracker {
-            Some(tracker) => {
-                let found = tracker.closest(surface, tool, &options)?;
-                (found.closest, found.fallback)
-            }
-            None => (self.query.closest(surface, tool, &options)?, None),
-        })
+        cost: &Cost,
+    ) -> Result<Answer> {
+        let mut options = Options::cold().stretch(stretch);
+        if let Some(instructions) = self.budget {
+            options = options.budget(Budget::for_instructions(instructions, cost));
+        }
+        let Some(tracker) = &mut self.tracker else {
+            let closest = match &mut self.near {
+                Some((margin, list)) => {
+                    self.query.contacts(surface, tool, *margin, &options, list)?
+                }
+                None => self.query.closest(surface, tool, &options)?,
+            };
+            return Ok(Answer { closest, is_kept: false, fallback: None });
+        };
+        let found = match &mut self.near {
+            Some((margin, list)) => tracker.contacts(surface, tool, *margin, &options, list)?,
+            None => tracker.closest(surface, tool, &options)?,
+        };
+        Ok(Answer { closest: found.closest, is_kept: found.is_kept, fallback: found.fallback })
     }
 
     /// Prints the lines that wait. Returns whether more are wanted.
@@ -254,6 +324,21 @@ impl<I: Index> Session<'_, I> {
             );
         }
         Ok(())
+    }
+}
+
+/// Whether a budget ended before the answer was as certain as without one.
+fn is_cut(closest: &Proximity, tool: &LocalTool) -> bool {
+    let length = match tool {
+        LocalTool::Sphere(_) => 0.0,
+        LocalTool::Capsule(capsule) => capsule.axis_length(),
+    };
+    let width = closest.separation - closest.lower;
+    match closest.side {
+        Side::Undefined(NoSide::CutShort) => true,
+        // As exact as a depth is by default.
+        Side::Inside | Side::Crossing => width > (length / 512.0).max(33.0 * closest.accuracy),
+        _ => !(width <= 0.0),
     }
 }
 

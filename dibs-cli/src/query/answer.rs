@@ -94,8 +94,9 @@ pub struct Record<'a> {
     contacts_bound: Option<f64>,
 }
 
+/// A contact in JSON.
 #[derive(Serialize)]
-struct ContactRecord<'a> {
+pub struct ContactRecord<'a> {
     separation: f64,
     point_on_surface: [f64; 3],
     point_on_tool: [f64; 3],
@@ -107,7 +108,8 @@ struct ContactRecord<'a> {
     tool: usize,
 }
 
-fn vector(vector: Vec3) -> [f64; 3] {
+/// A vector in JSON.
+pub fn vector(vector: Vec3) -> [f64; 3] {
     vector.as_dvec3().to_array()
 }
 
@@ -193,7 +195,7 @@ impl<'a> Answer<'a> {
 }
 
 impl<'a> Touch<'a> {
-    fn record(&self) -> ContactRecord<'a> {
+    pub fn record(&self) -> ContactRecord<'a> {
         ContactRecord {
             separation: self.contact.separation.into(),
             point_on_surface: point(self.contact.point_on_surface, self.origin),

@@ -6,7 +6,7 @@ mod pose;
 mod scene;
 mod tool;
 
-pub use answer::side_name;
+pub use answer::{ContactRecord, Touch, side_name, vector};
 pub use scene::{STACK, rows};
 pub use tool::{LocalTool, ToolSpec, parse_tool};
 

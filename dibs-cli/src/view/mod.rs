@@ -5,7 +5,7 @@ mod pack;
 use crate::mesh_file::Lengths;
 use crate::query::rows;
 use crate::tree_file::{self, AnyTree};
-use crate::{overwrite, track};
+use crate::{overwrite, recorded::tools};
 use anyhow::{Context, Result, bail, ensure};
 use dibs_build::glam::Vec3;
 use dibs_build::write_atomically;
@@ -105,7 +105,7 @@ fn data<I: Index>(args: &Args, tree: &Tree<'_, I>, bytes: &[u8]) -> Result<Strin
     }
     let origin = tree.origin().into();
     let path = match &args.path {
-        Some(path) => track::tools(path, |tool| tool.numbers(origin))?,
+        Some(path) => tools(path, |tool| tool.numbers(origin))?,
         None => Vec::new(),
     };
     let facts = json!({

@@ -16,4 +16,5 @@ mod overwrite;
 mod pace;
 mod program;
 mod stream;
+mod track;
 mod view;
