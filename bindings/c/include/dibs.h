@@ -63,6 +63,16 @@
 #define DIBS_FAILSAFE_SIZE 192
 
 /**
+ * Most tools of a filter's chain.
+ */
+#define DIBS_FILTER_TOOLS 8
+
+/**
+ * Most rows of a caller's.
+ */
+#define DIBS_FILTER_ROWS 8
+
+/**
  * Bytes of a frame's storage.
  */
 #define DIBS_FRAME_SIZE 192
@@ -503,6 +513,10 @@ enum dibs_code
    * A limit is so high that its input never exceeds it.
    */
   DIBS_CODE_LIMIT_UNTRIPPABLE = 506,
+  /**
+   * A stand-off, speed, lever, period or uncertainty of a filter is out of range.
+   */
+  DIBS_CODE_FILTER = 507,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -620,6 +634,47 @@ enum dibs_force_state
 typedef enum dibs_force_state dibs_force_state;
 #else
 typedef uint32_t dibs_force_state;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Why a motion was admitted. All but the last are safe.
+ */
+enum dibs_reason
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * It is the command.
+   */
+  DIBS_REASON_COMMANDED = 0,
+  /**
+   * The nearest motion that walls, the caller's rows and the robot's speed allow.
+   */
+  DIBS_REASON_NEAREST = 1,
+  /**
+   * A half of that, or less: no more could be verified.
+   */
+  DIBS_REASON_SHORTENED = 2,
+  /**
+   * Nothing but rest could be verified.
+   */
+  DIBS_REASON_STOPPED = 3,
+  /**
+   * The surface comes closer: the least motion that keeps the stand-off.
+   */
+  DIBS_REASON_RETREATING = 4,
+  /**
+   * No motion was found that certainly keeps the stand-off. The motion is the best one known.
+   */
+  DIBS_REASON_NO_SAFE_MOTION = 5,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum dibs_reason dibs_reason;
+#else
+typedef uint32_t dibs_reason;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -1426,6 +1481,114 @@ typedef struct {
 } dibs_verdict;
 
 /**
+ * A filter of commands. `dibs_filter_of` makes one of two numbers.
+ */
+typedef struct {
+  /**
+   * Least separation (mm) of every tool from the tissue, at least 0.
+   */
+  float stand_off;
+  /**
+   * Most speed (mm/s) of the robot's reference point, and of the lever's end by a rotation; above 0.
+   */
+  float speed;
+  /**
+   * A rotation by one radian counts as much as a translation by this length (mm), at least 1; 0 for the distance from the
+   * reference point to the farthest end of a tool's axis.
+   */
+  float lever;
+  /**
+   * Most instructions of all queries of a tick, by `cost`.
+   */
+  uint32_t instructions;
+  /**
+   * A `dibs_cost`.
+   */
+  uint32_t cost;
+  /**
+   * As of `dibs_options`.
+   */
+  float depth_tolerance;
+} dibs_filter;
+
+/**
+ * The motion of a rigid instrument in a period: its reference point goes straight, and the instrument turns about it.
+ */
+typedef struct {
+  /**
+   * The reference point before the motion (mm).
+   */
+  dibs_vec3 about;
+  /**
+   * The reference point's displacement (mm).
+   */
+  dibs_vec3 translation;
+  /**
+   * The rotation vector: the axis, times the angle in radians. A filter admits half a radian at most.
+   */
+  dibs_vec3 rotation;
+} dibs_motion;
+
+/**
+ * How far the tissue may be from the surface that is searched, besides that surface's own position error.
+ */
+typedef struct {
+  /**
+   * At the start of the period (mm, at least 0): the speed times age and transit, and the error of registration.
+   */
+  float now;
+  /**
+   * Most speed (mm/s, at least 0) of the tissue in the period.
+   */
+  float speed;
+} dibs_uncertainty;
+
+/**
+ * An inequality on the motion: `linear . translation + angular . rotation >= least`. For limits that only the caller
+ * knows: joints, a remote centre, a guide. They hold before the walls do.
+ */
+typedef struct {
+  /**
+   * Factors of the translation.
+   */
+  float linear[3];
+  /**
+   * Factors (mm) of the rotation.
+   */
+  float angular[3];
+  /**
+   * The least sum allowed (mm).
+   */
+  float least;
+} dibs_motion_row;
+
+/**
+ * The motion that a filter admits.
+ */
+typedef struct {
+  /**
+   * The motion to execute.
+   */
+  dibs_motion motion;
+  /**
+   * No separation (mm) of any tool is less at any instant of the period, wherever the tissue is within its uncertainty.
+   */
+  float least_separation;
+  /**
+   * Why it is this motion.
+   */
+  dibs_reason reason;
+  /**
+   * Queries made.
+   */
+  uint32_t queries;
+  /**
+   * Instructions that the queries took, by the filter's cost.
+   */
+  uint32_t instructions;
+} dibs_admitted;
+
+/**
  * Facts about a frame.
  */
 typedef struct {
@@ -1976,6 +2139,77 @@ dibs_code dibs_failsafe_acknowledge(dibs_failsafe *failsafe);
  */
 dibs_code dibs_verdict_admit(const dibs_verdict *verdict,
                              dibs_proximity *proximity);
+
+/**
+ * A filter with 200,000 instructions of a Cortex-M7 a tick.
+ *
+ * @param stand_off  Least separation (mm) from the tissue.
+ * @param speed      Most speed (mm/s) of the robot.
+ */
+dibs_filter dibs_filter_of(float stand_off, float speed);
+
+/**
+ * The motion nearest to a commanded one that keeps every tool of a rigid chain out of the tissue at every instant of the
+ * period. After an error nothing is admitted: the tool stays at rest.
+ *
+ * The promise is that of the core's module `filter`: the robot executes the motion, the tissue is within its uncertainty and
+ * no faster than stated, the surface within its stretch. A tick does not end because a search was cut: its tracker goes on
+ * in the next one.
+ *
+ * Cost: the filter's instructions at most for the queries, and for each motion that is tried 1,000 as a rule, 40,000 at
+ * most.
+ *
+ * @param filter       The filter.
+ * @param trackers     Addresses of the trackers, one for each tool. No tracker is there twice.
+ * @param frame        A reader's frame, for all tools, without a copy of it; null for the trackers' own surfaces.
+ * @param tools        The tools as they are now, in the same order.
+ * @param count        Tools: 1 to `DIBS_FILTER_TOOLS`.
+ * @param command      The commanded motion.
+ * @param period       The period, in s: above 0.
+ * @param uncertainty  That of the tissue.
+ * @param rows         The caller's rows; null for none.
+ * @param row_count    Their number: at most `DIBS_FILTER_ROWS`.
+ * @param admitted     Receives the motion to execute, and why it is that; nothing is written after an error.
+ * @return `DIBS_CODE_OK`, whatever the reason; `DIBS_CODE_FILTER` for a number out of its range; `DIBS_CODE_NOT_FINITE` for a
+ *         command or a row that is not finite; `DIBS_CODE_ARGUMENT` for no tool or too many, too many rows, or a frame of the
+ *         caller's vertices; those of `dibs_tracker_closest`; or a misuse.
+ */
+dibs_code dibs_filter_admit(const dibs_filter *filter,
+                            dibs_tracker *const *trackers,
+                            dibs_frame *frame,
+                            const dibs_tool *tools,
+                            uint32_t count,
+                            const dibs_motion *command,
+                            float period,
+                            const dibs_uncertainty *uncertainty,
+                            const dibs_motion_row *rows,
+                            uint32_t row_count,
+                            dibs_admitted *admitted);
+
+/**
+ * A tool after a motion of up to half a radian: a point of the axis is where the rotation and the displacement lead it.
+ *
+ * @param motion  The motion.
+ * @param tool    The tool before.
+ * @param moved   Receives the tool after; may be the same.
+ * @return `DIBS_CODE_OK`, or a misuse.
+ */
+dibs_code dibs_motion_apply(const dibs_motion *motion,
+                            const dibs_tool *tool,
+                            dibs_tool *moved);
+
+/**
+ * The distance (mm) between tool and searched surface at which a period begins without a risk of contact: the uncertainty
+ * at its end. A filter keeps its stand-off beyond that.
+ *
+ * @param uncertainty  The uncertainty at the start.
+ * @param period       The period, in s.
+ * @param distance     Receives the distance.
+ * @return `DIBS_CODE_OK`, or a misuse.
+ */
+dibs_code dibs_uncertainty_stand_off(const dibs_uncertainty *uncertainty,
+                                     float period,
+                                     float *distance);
 
 /**
  * Makes an empty frame. Storage of a frame that a reader holds is released before it is used anew.

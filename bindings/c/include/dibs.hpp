@@ -87,6 +87,17 @@ template <uint32_t Vertices> struct Tracker : Object<dibs_tracker, DIBS_TRACKER_
 inline Code closest_of(std::span<dibs_tracker *const> trackers, Tools tools, dibs_tracked &pair, Options options = {}) {
     return dibs_tracker_closest_of(trackers.data(), tools.data(), common(trackers, tools), options, &pair);
 }
+/** A filter of commands: the motion nearest to a commanded one that keeps a chain of tools out of the tissue. */
+struct Filter : dibs_filter {
+    Filter(float stand_off, float speed) : dibs_filter(dibs_filter_of(stand_off, speed)) {}
+    /** On the trackers' own surfaces, or on a reader's `frame`. */
+    Code admit(std::span<dibs_tracker *const> trackers, Tools tools, const dibs_motion &command, float period,
+               const dibs_uncertainty &uncertainty, dibs_admitted &admitted, std::span<const dibs_motion_row> rows = {},
+               dibs_frame *frame = nullptr) const {
+        return dibs_filter_admit(this, trackers.data(), frame, tools.data(), common(trackers, tools), &command, period,
+                                 &uncertainty, rows.data(), uint32_t(rows.size()), &admitted);
+    }
+};
 /** Buffers for so many vertices. */
 template <uint32_t Vertices> using Surface = Object<dibs_surface, DIBS_SURFACE_SIZE(Vertices), dibs_surface_init, Vertices>;
 /** Buffers for so many vertices, with the frame before, for a bus and a guard. */

@@ -2,6 +2,7 @@
 
 use dibs_nostd::constraint::GainError;
 use dibs_nostd::failsafe::{AcknowledgeError, LimitError};
+use dibs_nostd::filter::FilterError;
 use dibs_nostd::wire::{Event, PacketError, StreamError};
 use dibs_nostd::{
     CorruptTreeError, Error, FormatError, QueryError, ReceiveError, StretchError, ToolError,
@@ -167,6 +168,17 @@ impl From<LimitError> for dibs_code {
             LimitError::NoReach => Self::TreeNoRestShape,
             LimitError::Rate => Self::Argument,
             _ => Self::LimitTooLong,
+        }
+    }
+}
+
+impl From<FilterError> for dibs_code {
+    fn from(error: FilterError) -> Self {
+        match error {
+            FilterError::Parameter { .. } => Self::Filter,
+            FilterError::Command | FilterError::Row { .. } => Self::NotFinite,
+            FilterError::Query(error) => error.into(),
+            _ => Self::Argument,
         }
     }
 }

@@ -160,6 +160,8 @@ pub enum dibs_code {
     Acknowledge = 505,
     /// A limit is so high that its input never exceeds it.
     LimitUntrippable = 506,
+    /// A stand-off, speed, lever, period or uncertainty of a filter is out of range.
+    Filter = 507,
 }
 
 impl dibs_code {
@@ -255,6 +257,7 @@ impl dibs_code {
         Self::LimitRecovery,
         Self::Acknowledge,
         Self::LimitUntrippable,
+        Self::Filter,
     ];
 
     /// The code of a number from C.
@@ -341,6 +344,7 @@ impl dibs_code {
             Self::LimitRecovery => c"recovery needs at least one frame",
             Self::Acknowledge => c"the acknowledgement came too early",
             Self::LimitUntrippable => c"a limit can never be exceeded",
+            Self::Filter => c"a number of the filter is out of range",
         }
     }
 }

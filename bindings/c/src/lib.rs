@@ -22,6 +22,7 @@ mod code;
 mod constraint;
 mod contacts;
 mod failsafe;
+mod filter;
 mod frame;
 mod guard;
 mod limits;

@@ -349,16 +349,21 @@ pub extern "C" fn dibs_budget_for_instructions(
     cost: u32,
     budget: *mut u32,
 ) -> dibs_code {
+    dibs_code::of(|| {
+        let cost = cost_of(cost)?;
+        budget.check()?.set(Budget::for_instructions(instructions, cost).tests());
+        Ok(())
+    })
+}
+
+/// The cost of a number from C.
+pub(crate) fn cost_of(cost: u32) -> Result<&'static Cost, dibs_code> {
     const COSTS: [(dibs_cost, &Cost); 4] = [
         (dibs_cost::M7Sphere, &Cost::M7_SPHERE),
         (dibs_cost::M7Capsule, &Cost::M7_CAPSULE),
         (dibs_cost::X86Sphere, &Cost::X86_64_SPHERE),
         (dibs_cost::X86Capsule, &Cost::X86_64_CAPSULE),
     ];
-    dibs_code::of(|| {
-        let (_, cost) =
-            COSTS.iter().find(|(number, _)| *number as u32 == cost).ok_or(dibs_code::Argument)?;
-        budget.check()?.set(Budget::for_instructions(instructions, cost).tests());
-        Ok(())
-    })
+    let found = COSTS.iter().find(|(number, _)| *number as u32 == cost);
+    found.map(|(_, cost)| *cost).ok_or(dibs_code::Argument)
 }

@@ -44,7 +44,7 @@ pub struct dibs_tracker {
     surface: Option<MovingTable<'static, Copied>>,
 }
 
-type TheTracker = Tracker<'static, u16, STACK, DIBS_OPENED, DIBS_OPENED>;
+pub(crate) type TheTracker = Tracker<'static, u16, STACK, DIBS_OPENED, DIBS_OPENED>;
 
 impl Kind for dibs_tracker {
     const MARK: u32 = 0x6462_6B14;
@@ -57,7 +57,7 @@ const HEADS: usize = (DIBS_TRACKER_BASE - 2 * size_of::<Copied>()) & !(DIBS_ALIG
 const _: () = assert!(size_of::<dibs_tracker>() + DIBS_ALIGNMENT <= HEADS);
 
 /// A copy of a frame.
-struct Copied {
+pub(crate) struct Copied {
     /// Bits of x, y and z of each vertex.
     words: &'static [Cell<u32>],
     stretch: Cell<Option<MeasuredStretch>>,
@@ -169,6 +169,18 @@ pub extern "C" fn dibs_tracker_set_frame(
 }
 
 impl dibs_tracker {
+    /// The core's tracker, and the surface of its own.
+    pub(crate) fn parts(
+        &mut self,
+    ) -> Result<(&mut TheTracker, &MovingTable<'static, Copied>), dibs_code> {
+        Ok((&mut self.tracker, self.surface.as_ref().ok_or(dibs_code::NoSurface)?))
+    }
+
+    /// The core's tracker, for another surface.
+    pub(crate) const fn core(&mut self) -> &mut TheTracker {
+        &mut self.tracker
+    }
+
     fn set<V: VertexTable>(&mut self, from: &V) -> Result<(), dibs_code> {
         let [now, next] = self.copies;
         next.copy(from)?;
@@ -294,8 +306,7 @@ pub extern "C" fn dibs_tracker_closest(
         let tracked = tracked.check()?;
         let (shape, mut tracker) = (Shape::try_from(tool.get()?)?, tracker.open()?);
         let options = dibs_options::of(options)?;
-        let dibs_tracker { tracker, surface, .. } = &mut *tracker;
-        let surface = surface.as_ref().ok_or(dibs_code::NoSurface)?;
+        let (tracker, surface) = tracker.parts()?;
         tracked.set(closest(tracker, surface, &shape, &options)?.into());
         Ok(())
     })
@@ -363,8 +374,7 @@ pub extern "C" fn dibs_tracker_contacts(
         let found: TrackerAnswer = contacts.open()?.fill(|list| {
             let (shape, mut tracker) = (Shape::try_from(tool.get()?)?, tracker.open()?);
             let options = dibs_options::of(options)?;
-            let dibs_tracker { tracker, surface, .. } = &mut *tracker;
-            let surface = surface.as_ref().ok_or(dibs_code::NoSurface)?;
+            let (tracker, surface) = tracker.parts()?;
             Ok(match &shape {
                 Shape::Sphere(sphere) => {
                     tracker.contacts(surface, sphere, margin, &options, list)?
@@ -403,8 +413,7 @@ pub extern "C" fn dibs_tracker_closest_of(
         let (tools, mut trackers) = (chain(tools, count)?, trackers.open_all::<DIBS_TOOLS>(count)?);
         let mut pairs = Vec::<_, DIBS_TOOLS>::new();
         for (tracker, tool) in trackers.iter_mut().zip(&tools) {
-            let dibs_tracker { tracker, surface, .. } = &mut **tracker;
-            let surface = surface.as_ref().ok_or(dibs_code::NoSurface)?;
+            let (tracker, surface) = tracker.parts()?;
             pairs.push((tracker, surface, tool)).map_err(|_| dibs_code::Argument)?;
         }
         let found = Tracker::closest_of(&mut pairs, &options)?.ok_or(dibs_code::Argument)?;

@@ -11,6 +11,7 @@ Lengths are in millimetres, in the coordinates of the mesh's file. Wrong values 
 `TypeError`, each with one sentence; files and lines that fail raise `OSError`.
 """
 
+from ._filter import Admitted, Filter, RigidMotion, Tracked, Tracker
 from ._guard import Answer, ForbiddenRegion, Force, ForceState, Guard, State
 from ._mesh import Mesh, MeshWarning, build, generate, read
 from ._motion import Motion, MotionStretch, read_motion
@@ -22,9 +23,11 @@ __all__ = [
     "ANSWER",
     "CONTACT",
     "SIDE_REASONS",
+    "Admitted",
     "Answer",
     "Contacts",
     "Coverage",
+    "Filter",
     "ForbiddenRegion",
     "Force",
     "ForceState",
@@ -33,6 +36,7 @@ __all__ = [
     "MeshWarning",
     "Motion",
     "MotionStretch",
+    "RigidMotion",
     "Scene",
     "Sender",
     "Sent",
@@ -40,6 +44,8 @@ __all__ = [
     "State",
     "Surface",
     "Totals",
+    "Tracked",
+    "Tracker",
     "Tree",
     "build",
     "capsules",

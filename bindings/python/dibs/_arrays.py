@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from typing import Any
 
 import numpy as np
@@ -74,3 +75,14 @@ def number(name: str, value: float) -> float:
     if not np.isfinite(array):
         raise ValueError(f"{name}: {array} is not a finite number")
     return float(array)
+
+
+def whole(name: str, value: Any, least: int, most: int) -> int:
+    """A whole number of a range."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name}: a whole number is needed, not {value!r}") from None
+    if not least <= number <= most:
+        raise ValueError(f"{name}: {number} is not from {least} to {most}")
+    return number

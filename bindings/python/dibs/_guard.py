@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import operator
 from enum import IntEnum
-from typing import Any, Literal, NamedTuple, Optional
+from typing import Any, Literal, NamedTuple, Optional, Union
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _arrays, _dibs
+from ._filter import Tracked
 from ._tree import ANSWER, Tree, _tests
 
 _WRAP = 1 << 32
@@ -66,6 +67,8 @@ class Answer:
     """Number of the frame that was searched; `None` before the first."""
     age: Optional[int]
     """Its age in ms."""
+    is_kept: bool
+    """Whether the pair's side is the last tick's, because the budget ended or the side is undefined."""
     lag: Optional[int]
     """Time in ms by which the surface that was searched is behind the present, as far as its error does not cover it."""
 
@@ -77,6 +80,7 @@ class Answer:
         self.velocity = np.array(native.velocity(), dtype=np.float32)
         state, self.cause, self.margin, self.waits_for_acknowledgement = native.trust()
         self.state = State(state)
+        self.is_kept = native.is_kept()
         self.epoch, self.age, self.lag = native.searched() or (None, None, None)
 
     def __repr__(self) -> str:
@@ -108,11 +112,18 @@ class ForbiddenRegion:
         values = [stiffness, damping, hold_damping, max_force, margin]
         self._native = _dibs.ForbiddenRegion(*map(_arrays.number, names, values))
 
-    def force(self, answer: Answer) -> Force:
-        """The force on the tool, at every tick."""
-        if not isinstance(answer, Answer):
+    def force(self, answer: Union[Answer, Tracked], velocity: Optional[npt.ArrayLike] = None) -> Force:
+        """The force on the tool, at every tick. A guard's answer has its velocity; a tracker's is given one, in mm/s, that of
+        the tool's point of the pair relative to the surface's."""
+        if isinstance(answer, Tracked):
+            flow = _arrays.finite("velocity", _arrays.numbers("velocity", (0, 0, 0) if velocity is None else velocity))
+            if flow.shape != (3,):
+                raise ValueError(f"velocity: the shape is {flow.shape}; give 3 numbers")
+            force, state, cause = self._native.force_of(answer._native, flow.tolist())
+        elif isinstance(answer, Answer):
+            force, state, cause = self._native.force(answer._native)
+        else:
             raise TypeError(f"answer: an Answer of Guard.closest is needed, not {type(answer).__name__}")
-        force, state, cause = self._native.force(answer._native)
         return Force(np.array(force, dtype=np.float32), ForceState(state), cause)
 
 
@@ -144,8 +155,8 @@ class Guard:
         if not isinstance(tree, Tree):
             raise TypeError(f"tree: a Tree is needed, not {type(tree).__name__}")
         speed = _arrays.number("speed_mm_per_s", speed_mm_per_s)
-        age = _whole("age_ms", age_ms, 1, (1 << 31) - 1)
-        ticks = _whole("ticks_a_second", ticks_a_second, 1, _WRAP - 1)
+        age = _arrays.whole("age_ms", age_ms, 1, (1 << 31) - 1)
+        ticks = _arrays.whole("ticks_a_second", ticks_a_second, 1, _WRAP - 1)
         choices = (bool(automatic), bool(without_transit))
         self._native = _dibs.Guard(tree._native, speed, age, ticks, choices, _tests(budget))
 
@@ -160,7 +171,7 @@ class Guard:
     def work(self, most: int = 1_000) -> Advance:
         """Looks at most at so many rows and triangles of the frame that arrives, and publishes it once it is complete and
         admitted. "pending" if more is due at once. Raises `ValueError` with the reason where a frame is refused."""
-        return self._native.work(_whole("most", most, 1, _WRAP - 1))
+        return self._native.work(_arrays.whole("most", most, 1, _WRAP - 1))
 
     def status(self, now: int, *, framed: bool = False) -> Optional[bytes]:
         """The status that is due for the sender, a packet, or `framed` for a byte stream; `None` unless there is news, or
@@ -196,16 +207,6 @@ class Guard:
     def counters(self) -> dict[str, int]:
         """The count of each event since the start, by name: published frames, and rejections by cause."""
         return dict(self._native.counters())
-
-
-def _whole(name: str, value: Any, least: int, most: int) -> int:
-    try:
-        number = operator.index(value)
-    except TypeError:
-        raise TypeError(f"{name}: a whole number is needed, not {value!r}") from None
-    if not least <= number <= most:
-        raise ValueError(f"{name}: {number} is not from {least} to {most}")
-    return number
 
 
 def _now(value: Any) -> int:

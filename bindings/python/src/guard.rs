@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicU32;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use dibs_nostd::constraint::{ConstraintState, SpringDamper};
+use dibs_nostd::constraint::{ConstraintForce, ConstraintState, SpringDamper};
 use dibs_nostd::failsafe::LimitError;
 use dibs_nostd::guard::{Bus, GuardLimits, Notes};
 use dibs_nostd::wire::{Event, NoMac};
@@ -16,6 +16,7 @@ use pyo3::types::{PyByteArray, PyBytes};
 
 use crate::record::push_answer;
 use crate::tool::AnyTool;
+use crate::tracker::Tracked;
 use crate::tree::{Owned, Tree, View};
 use crate::{bytes, error, invalid};
 
@@ -256,6 +257,11 @@ impl Answer {
         (trust.state as u8, cause, trust.margin, trust.waits_for_acknowledgement)
     }
 
+    /// Whether the pair's side is the last tick's.
+    fn is_kept(&self) -> bool {
+        self.answer.tracked.is_ok_and(|tracked| tracked.is_kept)
+    }
+
     /// Number, age (ms) and lag (ms) of the surface that was searched.
     fn searched(&self) -> Option<(u32, u32, Option<u32>)> {
         let searched = self.answer.searched?;
@@ -277,15 +283,26 @@ impl ForbiddenRegion {
     }
 
     /// Force (N), state, and the cause of a hold.
-    fn force(&self, answer: &Answer) -> ([f32; 3], u8, Option<String>) {
-        let force = answer.answer.force(&self.0);
-        let (state, cause) = match force.state {
-            ConstraintState::Inactive => (0, None),
-            ConstraintState::Active => (1, None),
-            ConstraintState::Saturated => (2, None),
-            ConstraintState::Safe(cause) => (3, Some(error::sentence(cause))),
-            _ => (3, None),
-        };
-        (force.force.to_array(), state, cause)
+    fn force(&self, answer: &Answer) -> Force {
+        force(answer.answer.force(&self.0))
     }
+
+    /// The same of a tracker's pair, for a velocity (mm/s) of the tool relative to the surface.
+    fn force_of(&self, tracked: &Tracked, velocity: [f32; 3]) -> Force {
+        force(self.0.force(&Ok(tracked.closest()), velocity.into()))
+    }
+}
+
+/// Force (N), state, and the cause of a hold.
+type Force = ([f32; 3], u8, Option<String>);
+
+fn force(force: ConstraintForce) -> Force {
+    let (state, cause) = match force.state {
+        ConstraintState::Inactive => (0, None),
+        ConstraintState::Active => (1, None),
+        ConstraintState::Saturated => (2, None),
+        ConstraintState::Safe(cause) => (3, Some(error::sentence(cause))),
+        _ => (3, None),
+    };
+    (force.force.to_array(), state, cause)
 }

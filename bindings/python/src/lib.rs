@@ -11,6 +11,7 @@ mod scene;
 mod sender;
 mod surface;
 mod tool;
+mod tracker;
 mod tree;
 
 use pyo3::prelude::*;
@@ -32,6 +33,8 @@ mod _dibs {
     use crate::sender::Sender;
     #[pymodule_export]
     use crate::surface::Surface;
+    #[pymodule_export]
+    use crate::tracker::{Filter, Tracked, Tracker};
     #[pymodule_export]
     use crate::tree::Tree;
 

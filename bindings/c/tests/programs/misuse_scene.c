@@ -6,6 +6,8 @@
  */
 #include "expect.h"
 
+#include <math.h>
+
 MEMORY(tree_memory, DIBS_TREE_SIZE);
 MEMORY(frame_memory, DIBS_FRAME_SIZE);
 MEMORY(other_frame_memory, DIBS_FRAME_SIZE);
@@ -125,6 +127,66 @@ static void trackers(const float *positions, uint32_t vertices) {
     EXPECT(ARGUMENT, dibs_tracker_closest_of(both, tools, 0, NULL, &tracked));
     EXPECT(ARGUMENT, dibs_tracker_closest_of(both, tools, DIBS_TOOLS + 1, NULL, &tracked));
     EXPECT(IN_USE, dibs_tracker_closest_of((dibs_tracker *[]){tracker, tracker}, tools, 2, NULL, &tracked));
+
+    /* The filter: bad input is a code, and nothing is admitted. */
+    dibs_filter filter = dibs_filter_of(1.0f, 200.0f);
+    dibs_motion command = {.about = tool.start, .translation = {0.1f, 0.0f, 0.0f}};
+    dibs_uncertainty still = {0.0f, 0.0f};
+    dibs_motion_row rows[DIBS_FILTER_ROWS + 1] = {0};
+    dibs_admitted admitted = {.queries = 77};
+#define ADMIT(code, trackers, frame, tools, count, period, row, row_count)                                                 \
+    expect(DIBS_CODE_##code,                                                                                               \
+           dibs_filter_admit(&filter, trackers, frame, tools, count, &command, period, &still, row, row_count, &admitted), \
+           "admit", __LINE__)
+    EXPECT(NULL, dibs_filter_admit(NULL, both, NULL, tools, 2, &command, 0.001f, &still, NULL, 0, &admitted));
+    EXPECT(NULL, dibs_filter_admit(&filter, both, NULL, tools, 2, NULL, 0.001f, &still, NULL, 0, &admitted));
+    EXPECT(NULL, dibs_filter_admit(&filter, both, NULL, tools, 2, &command, 0.001f, NULL, NULL, 0, &admitted));
+    EXPECT(NULL, dibs_filter_admit(&filter, both, NULL, tools, 2, &command, 0.001f, &still, NULL, 0, NULL));
+    ADMIT(NULL, NULL, NULL, tools, 2, 0.001f, NULL, 0);
+    ADMIT(NULL, both, NULL, NULL, 2, 0.001f, NULL, 0);
+    ADMIT(NULL, both, NULL, tools, 2, 0.001f, NULL, 1);
+    ADMIT(ARGUMENT, both, NULL, tools, 0, 0.001f, NULL, 0);
+    ADMIT(ARGUMENT, both, NULL, tools, DIBS_FILTER_TOOLS + 1, 0.001f, NULL, 0);
+    ADMIT(ARGUMENT, both, NULL, tools, 2, 0.001f, rows, DIBS_FILTER_ROWS + 1);
+    ADMIT(ARGUMENT, both, frame, tools, 2, 0.001f, NULL, 0);
+    ADMIT(IN_USE, ((dibs_tracker *[]){tracker, tracker}), NULL, tools, 2, 0.001f, NULL, 0);
+    ADMIT(FILTER, both, NULL, tools, 2, 0.0f, NULL, 0);
+    ADMIT(FILTER, both, NULL, tools, 2, NAN, NULL, 0);
+    rows[0].least = NAN;
+    ADMIT(NOT_FINITE, both, NULL, tools, 2, 0.001f, rows, 1);
+    const struct { dibs_filter filter; dibs_motion command; dibs_uncertainty still; dibs_code code; } wrong[] = {
+        {dibs_filter_of(-1.0f, 200.0f), command, still, DIBS_CODE_FILTER},
+        {dibs_filter_of(NAN, 200.0f), command, still, DIBS_CODE_FILTER},
+        {dibs_filter_of(1.0f, 0.0f), command, still, DIBS_CODE_FILTER},
+        {{1.0f, 200.0f, 0.5f, 200000, DIBS_COST_M7_CAPSULE, 0.0f}, command, still, DIBS_CODE_FILTER},
+        {{1.0f, 200.0f, NAN, 200000, DIBS_COST_M7_CAPSULE, 0.0f}, command, still, DIBS_CODE_FILTER},
+        {{1.0f, 200.0f, 0.0f, 200000, 4, 0.0f}, command, still, DIBS_CODE_ARGUMENT},
+        {{1.0f, 200.0f, 0.0f, 200000, 1, -1.0f}, command, still, DIBS_CODE_ARGUMENT},
+        {filter, {.translation = {NAN, 0.0f, 0.0f}}, still, DIBS_CODE_NOT_FINITE},
+        {filter, {.rotation = {0.0f, INFINITY, 0.0f}}, still, DIBS_CODE_NOT_FINITE},
+        {filter, command, {-0.1f, 0.0f}, DIBS_CODE_FILTER},
+        {filter, command, {0.0f, NAN}, DIBS_CODE_FILTER},
+    };
+    for (size_t at = 0; at < sizeof wrong / sizeof wrong[0]; at++) {
+        expect(wrong[at].code, dibs_filter_admit(&wrong[at].filter, both, NULL, tools, 2, &wrong[at].command, 0.001f,
+                                                 &wrong[at].still, NULL, 0, &admitted), "wrong", (int)at);
+    }
+    EXPECT_THAT(admitted.queries == 77);
+    ADMIT(OK, both, NULL, tools, 2, 0.001f, NULL, 0);
+    EXPECT_THAT(admitted.queries >= 2 && admitted.instructions <= 200000);
+    /* No budget: what is not verified is not admitted. */
+    filter.instructions = 0;
+    ADMIT(OK, both, NULL, tools, 2, 0.001f, NULL, 0);
+    EXPECT_THAT(admitted.reason == DIBS_REASON_NO_SAFE_MOTION && admitted.motion.translation.x == 0.0f);
+    float distance;
+    still = (dibs_uncertainty){0.5f, 100.0f};
+    EXPECT(NULL, dibs_uncertainty_stand_off(&still, 0.001f, NULL));
+    EXPECT(OK, dibs_uncertainty_stand_off(&still, 0.001f, &distance));
+    EXPECT_THAT(distance >= 0.6f && distance < 0.6001f);
+    dibs_tool moved;
+    EXPECT(NULL, dibs_motion_apply(NULL, &tool, &moved));
+    EXPECT(OK, dibs_motion_apply(&command, &tool, &moved));
+    EXPECT_THAT(moved.start.x == tool.start.x + 0.1f && moved.radius == tool.radius);
 }
 
 int main(int argc, char **argv) {

@@ -93,6 +93,25 @@ int main(int argc, char **argv) {
         EXPECT(true, tracked.fallback == DIBS_FALLBACK_NONE && tracked.proximity.separation == on_bus.separation);
         EXPECT(true, tracked.proximity.node_tests < on_bus.node_tests);
         EXPECT(true, tracked.proximity.coverage == DIBS_COVERAGE_MEASURED);
+
+        /* Commands towards the surface, filtered on the bus' frame itself. */
+        const dibs::Filter filter(1.0f, 1000.0f);
+        const dibs_uncertainty still = {0.0f, 0.0f};
+        dibs_tracker *one[] = {tracker};
+        dibs_tool at = tool;
+        dibs_admitted admitted;
+        for (int tick = 0; tick < 200; tick++) {
+            const dibs_motion command = {at.start, {-0.5f, 0.0f, 0.0f}, {}};
+            MUST(filter.admit(one, std::span(&at, 1), command, 0.001f, still, admitted, {}, frame));
+            EXPECT(true, admitted.least_separation > 0.98f && admitted.reason != DIBS_REASON_NO_SAFE_MOTION);
+            MUST(dibs_motion_apply(&admitted.motion, &at, &at));
+        }
+        EXPECT(true, admitted.reason != DIBS_REASON_COMMANDED && at.start.x < 99.0f);
+        MUST(query.closest(frame, at, on_bus));
+        EXPECT(true, on_bus.separation > 0.98f && on_bus.separation < 1.1f);
+        MUST(query.closest(frame, tool, on_bus));
+        EXPECT(DIBS_CODE_ARGUMENT, filter.admit(one, {}, {}, 0.001f, still, admitted));
+        EXPECT(DIBS_CODE_NO_SURFACE, filter.admit(one, std::span(&at, 1), {}, 0.001f, still, admitted));
     }
     dibs::Frame frame;
     MUST(frame.init());

@@ -1,0 +1,329 @@
+//! The filter of commands: the motion nearest to a commanded one that keeps a chain of tools out of the tissue.
+
+use core::slice::Iter;
+
+use bytemuck::AnyBitPattern;
+use dibs_nostd::filter::{Admitted, Filter, Motion, MotionRow, Reason, Uncertainty};
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::{Capsule, MovingSurface, Options};
+use heapless::Vec;
+
+use crate::border::{Handle, Handles, Input, Open, Output, some_of};
+use crate::code::dibs_code;
+use crate::frame::{Table, dibs_frame};
+use crate::query::{cost_of, dibs_cost};
+use crate::tool::{chain, dibs_tool, dibs_vec3};
+use crate::tracker::{TheTracker, dibs_tracker};
+
+/// Most tools of a filter's chain.
+pub const DIBS_FILTER_TOOLS: usize = 8;
+
+/// Most rows of a caller's.
+pub const DIBS_FILTER_ROWS: usize = 8;
+
+/// A filter of commands. `dibs_filter_of` makes one of two numbers.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_filter {
+    /// Least separation (mm) of every tool from the tissue, at least 0.
+    pub stand_off: f32,
+    /// Most speed (mm/s) of the robot's reference point, and of the lever's end by a rotation; above 0.
+    pub speed: f32,
+    /// A rotation by one radian counts as much as a translation by this length (mm), at least 1; 0 for the distance from the
+    /// reference point to the farthest end of a tool's axis.
+    pub lever: f32,
+    /// Most instructions of all queries of a tick, by `cost`.
+    pub instructions: u32,
+    /// A `dibs_cost`.
+    pub cost: u32,
+    /// As of `dibs_options`.
+    pub depth_tolerance: f32,
+}
+
+impl dibs_filter {
+    fn read(self) -> Result<Filter, dibs_code> {
+        if !(self.depth_tolerance >= 0.0) {
+            return Err(dibs_code::Argument);
+        }
+        let options = if self.depth_tolerance > 0.0 {
+            Options::new().depth_tolerance(self.depth_tolerance)
+        } else {
+            Options::new()
+        };
+        let filter = Filter::new(self.stand_off, self.speed)?;
+        let filter = if self.lever == 0.0 { filter } else { filter.lever(self.lever)? };
+        Ok(filter.budget(self.instructions, *cost_of(self.cost)?).options(options))
+    }
+}
+
+/// A filter with 200,000 instructions of a Cortex-M7 a tick.
+///
+/// @param stand_off  Least separation (mm) from the tissue.
+/// @param speed      Most speed (mm/s) of the robot.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_filter_of(stand_off: f32, speed: f32) -> dibs_filter {
+    let (instructions, cost) = (200_000, dibs_cost::M7Capsule as u32);
+    dibs_filter { stand_off, speed, lever: 0.0, instructions, cost, depth_tolerance: 0.0 }
+}
+
+/// The motion of a rigid instrument in a period: its reference point goes straight, and the instrument turns about it.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_motion {
+    /// The reference point before the motion (mm).
+    pub about: dibs_vec3,
+    /// The reference point's displacement (mm).
+    pub translation: dibs_vec3,
+    /// The rotation vector: the axis, times the angle in radians. A filter admits half a radian at most.
+    pub rotation: dibs_vec3,
+}
+
+impl From<dibs_motion> for Motion {
+    fn from(dibs_motion { about, translation, rotation }: dibs_motion) -> Self {
+        Self::new(about.into(), translation.into(), rotation.into())
+    }
+}
+
+impl From<Motion> for dibs_motion {
+    fn from(Motion { about, translation, rotation }: Motion) -> Self {
+        Self { about: about.into(), translation: translation.into(), rotation: rotation.into() }
+    }
+}
+
+/// How far the tissue may be from the surface that is searched, besides that surface's own position error.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_uncertainty {
+    /// At the start of the period (mm, at least 0): the speed times age and transit, and the error of registration.
+    pub now: f32,
+    /// Most speed (mm/s, at least 0) of the tissue in the period.
+    pub speed: f32,
+}
+
+/// An inequality on the motion: `linear . translation + angular . rotation >= least`. For limits that only the caller
+/// knows: joints, a remote centre, a guide. They hold before the walls do.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_motion_row {
+    /// Factors of the translation.
+    pub linear: [f32; 3],
+    /// Factors (mm) of the rotation.
+    pub angular: [f32; 3],
+    /// The least sum allowed (mm).
+    pub least: f32,
+}
+
+/// Why a motion was admitted. All but the last are safe.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum dibs_reason {
+    /// It is the command.
+    Commanded = 0,
+    /// The nearest motion that walls, the caller's rows and the robot's speed allow.
+    Nearest = 1,
+    /// A half of that, or less: no more could be verified.
+    Shortened = 2,
+    /// Nothing but rest could be verified.
+    Stopped = 3,
+    /// The surface comes closer: the least motion that keeps the stand-off.
+    Retreating = 4,
+    /// No motion was found that certainly keeps the stand-off. The motion is the best one known.
+    NoSafeMotion = 5,
+}
+
+impl From<Reason> for dibs_reason {
+    fn from(reason: Reason) -> Self {
+        match reason {
+            Reason::Commanded => Self::Commanded,
+            Reason::Nearest => Self::Nearest,
+            Reason::Shortened => Self::Shortened,
+            Reason::Stopped => Self::Stopped,
+            Reason::Retreating => Self::Retreating,
+            _ => Self::NoSafeMotion,
+        }
+    }
+}
+
+/// The motion that a filter admits.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct dibs_admitted {
+    /// The motion to execute.
+    pub motion: dibs_motion,
+    /// No separation (mm) of any tool is less at any instant of the period, wherever the tissue is within its uncertainty.
+    pub least_separation: f32,
+    /// Why it is this motion.
+    pub reason: dibs_reason,
+    /// Queries made.
+    pub queries: u32,
+    /// Instructions that the queries took, by the filter's cost.
+    pub instructions: u32,
+}
+
+impl From<Admitted> for dibs_admitted {
+    fn from(admitted: Admitted) -> Self {
+        Self {
+            motion: admitted.motion.into(),
+            least_separation: admitted.least_separation,
+            reason: admitted.reason.into(),
+            queries: admitted.queries,
+            instructions: admitted.instructions,
+        }
+    }
+}
+
+/// A tick of a filter, but for its tools.
+struct Command<'r> {
+    filter: Filter,
+    motion: Motion,
+    period: f32,
+    uncertainty: Uncertainty,
+    rows: &'r [MotionRow],
+}
+
+impl Command<'_> {
+    fn admit<'p, S: MovingSurface + 'p>(
+        &self,
+        pairs: impl Iterator<Item = (&'p mut TheTracker, &'p S)>,
+        tools: Iter<'p, Capsule>,
+    ) -> Result<Admitted, dibs_code> {
+        let mut all = Vec::<_, DIBS_FILTER_TOOLS>::new();
+        for ((tracker, surface), tool) in pairs.zip(tools) {
+            all.push((tracker, surface, tool)).map_err(|_| dibs_code::Argument)?;
+        }
+        let Self { filter, motion, period, uncertainty, rows } = self;
+        Ok(filter.admit(&mut all, motion, *period, uncertainty, rows)?)
+    }
+}
+
+/// The motion nearest to a commanded one that keeps every tool of a rigid chain out of the tissue at every instant of the
+/// period. After an error nothing is admitted: the tool stays at rest.
+///
+/// The promise is that of the core's module `filter`: the robot executes the motion, the tissue is within its uncertainty and
+/// no faster than stated, the surface within its stretch. A tick does not end because a search was cut: its tracker goes on
+/// in the next one.
+///
+/// Cost: the filter's instructions at most for the queries, and for each motion that is tried 1,000 as a rule, 40,000 at
+/// most.
+///
+/// @param filter       The filter.
+/// @param trackers     Addresses of the trackers, one for each tool. No tracker is there twice.
+/// @param frame        A reader's frame, for all tools, without a copy of it; null for the trackers' own surfaces.
+/// @param tools        The tools as they are now, in the same order.
+/// @param count        Tools: 1 to `DIBS_FILTER_TOOLS`.
+/// @param command      The commanded motion.
+/// @param period       The period, in s: above 0.
+/// @param uncertainty  That of the tissue.
+/// @param rows         The caller's rows; null for none.
+/// @param row_count    Their number: at most `DIBS_FILTER_ROWS`.
+/// @param admitted     Receives the motion to execute, and why it is that; nothing is written after an error.
+/// @return `DIBS_CODE_OK`, whatever the reason; `DIBS_CODE_FILTER` for a number out of its range; `DIBS_CODE_NOT_FINITE` for a
+///         command or a row that is not finite; `DIBS_CODE_ARGUMENT` for no tool or too many, too many rows, or a frame of the
+///         caller's vertices; those of `dibs_tracker_closest`; or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_filter_admit(
+    filter: *const dibs_filter,
+    trackers: *const *mut dibs_tracker,
+    frame: *mut dibs_frame,
+    tools: *const dibs_tool,
+    count: u32,
+    command: *const dibs_motion,
+    period: f32,
+    uncertainty: *const dibs_uncertainty,
+    rows: *const dibs_motion_row,
+    row_count: u32,
+    admitted: *mut dibs_admitted,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let admitted = admitted.check()?;
+        let rows = read_rows(rows, row_count)?;
+        some_of::<DIBS_FILTER_TOOLS>(count)?;
+        let dibs_uncertainty { now, speed } = uncertainty.get()?;
+        let command = Command {
+            filter: filter.get()?.read()?,
+            motion: command.get()?.into(),
+            period,
+            uncertainty: Uncertainty::new(speed).error(now),
+            rows: &rows,
+        };
+        let tools = chain(tools, count)?;
+        let mut trackers = trackers.open_all::<DIBS_FILTER_TOOLS>(count)?;
+        let found = if frame.is_null() {
+            let mut pairs = Vec::<_, DIBS_FILTER_TOOLS>::new();
+            for tracker in &mut trackers {
+                pairs.push(tracker.parts()?).map_err(|_| dibs_code::Argument)?;
+            }
+            command.admit(pairs.into_iter(), tools.iter())
+        } else {
+            let frame = frame.open()?;
+            let surface = match &frame.table {
+                Table::Empty => return Err(dibs_code::NoSurface),
+                // Their motion is not measured.
+                Table::Vertices(_) => return Err(dibs_code::Argument),
+                Table::Held(held) => held.moving(),
+            };
+            let pairs = trackers.iter_mut().map(|tracker: &mut Open<_>| (tracker.core(), surface));
+            command.admit(pairs, tools.iter())
+        };
+        admitted.set(found?.into());
+        Ok(())
+    })
+}
+
+fn read_rows(
+    rows: *const dibs_motion_row,
+    count: u32,
+) -> Result<Vec<MotionRow, DIBS_FILTER_ROWS>, dibs_code> {
+    let mut all = Vec::new();
+    if count == 0 {
+        return Ok(all);
+    }
+    if count as usize > DIBS_FILTER_ROWS {
+        return Err(dibs_code::Argument);
+    }
+    for &dibs_motion_row { linear, angular, least } in rows.slice(count as usize)? {
+        all.push(MotionRow { linear, angular, least }).map_err(|_| dibs_code::Argument)?;
+    }
+    Ok(all)
+}
+
+/// A tool after a motion of up to half a radian: a point of the axis is where the rotation and the displacement lead it.
+///
+/// @param motion  The motion.
+/// @param tool    The tool before.
+/// @param moved   Receives the tool after; may be the same.
+/// @return `DIBS_CODE_OK`, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_motion_apply(
+    motion: *const dibs_motion,
+    tool: *const dibs_tool,
+    moved: *mut dibs_tool,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (place, motion) = (moved.check()?, Motion::from(motion.get()?));
+        let dibs_tool { start, end, radius } = tool.get()?;
+        let [start, end] = [start, end].map(|end| motion.apply(Vec3::from(end)).into());
+        place.set(dibs_tool { start, end, radius });
+        Ok(())
+    })
+}
+
+/// The distance (mm) between tool and searched surface at which a period begins without a risk of contact: the uncertainty
+/// at its end. A filter keeps its stand-off beyond that.
+///
+/// @param uncertainty  The uncertainty at the start.
+/// @param period       The period, in s.
+/// @param distance     Receives the distance.
+/// @return `DIBS_CODE_OK`, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_uncertainty_stand_off(
+    uncertainty: *const dibs_uncertainty,
+    period: f32,
+    distance: *mut f32,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (place, dibs_uncertainty { now, speed }) = (distance.check()?, uncertainty.get()?);
+        place.set(Uncertainty::new(speed).error(now).stand_off(period));
+        Ok(())
+    })
+}

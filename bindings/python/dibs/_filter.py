@@ -1,0 +1,226 @@
+"""Ticks on a moving surface: the closest pair within a budget, and commands that a filter admits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, Literal, NamedTuple, Optional, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _arrays, _dibs
+from ._arrays import Floats
+from ._tree import ANSWER, CONTACT, Contacts, Surface, Tree
+
+Fallback = Literal["start", "surface", "jump", "full"]
+"""Why a tick was a whole query."""
+Reason = Literal["commanded", "nearest", "shortened", "stopped", "retreating", "no safe motion"]
+"""Why a motion was admitted. All but the last are safe."""
+
+_MOST = 0xFFFF_FFFF
+_TOOLS = 8
+_ROWS = 8
+
+
+class Tracked:
+    """The answer of a tracker's tick."""
+
+    closest: np.void
+    """The pair, a record of `ANSWER`: act on the first of its `interval`."""
+    is_kept: bool
+    """Whether the side is the last tick's, because this tick's search found none: its budget ended, or the side is
+    undefined. The pair may not be the closest then; the interval holds."""
+    fallback: Optional[Fallback]
+    """The reason, if this tick was a whole query."""
+    moved: Optional[float]
+    """Most (mm) that tool and surface together have moved since the last tick; `None` where it is not known."""
+    contacts: Optional[Contacts]
+    """All locally closest pairs within the margin, deepest first, and how far they are complete, where they were asked for."""
+
+    def __init__(self, native: _dibs.Tracked, contacts: Optional[tuple[bytearray, float]]) -> None:
+        self._native = native
+        self.closest = np.frombuffer(native.record(), ANSWER)[0]
+        self.is_kept, self.fallback, self.moved = native.facts()
+        self.contacts = None
+        if contacts is not None:
+            found, bound = contacts
+            self.contacts = Contacts(np.frombuffer(found, CONTACT), np.array([bound], dtype=np.float32))
+
+    def __repr__(self) -> str:
+        return f"Tracked({self.closest['separation']} mm)"
+
+
+class Tracker:
+    """The closest pair from tick to tick, at the cost of what has changed: it remembers its last answer's proof."""
+
+    def __init__(self, tree: Tree) -> None:
+        self._native = _dibs.Tracker(_tree(tree)._native)
+
+    def closest(
+        self,
+        tool: npt.ArrayLike,
+        surface: Union[Surface, Tree],
+        *,
+        instructions: Optional[int] = None,
+        margin: Optional[float] = None,
+    ) -> Tracked:
+        """The closest pair of this tick, on the surface as it is now.
+
+        `tool` is x, y, z, radius of a sphere, or x1, y1, z1, x2, y2, z2, radius of a capsule. `instructions` bounds the tick's
+        work, of a Cortex-M7 by the fitted cost: pair, side, depth and contacts together. Where it ends, the interval is
+        that of the last tick, less what moved since, and the next tick goes on. With a `margin` (mm) the contacts are listed.
+        """
+        array = _arrays.numbers("tool", tool)
+        if array.shape not in ((4,), (7,)):
+            raise ValueError(f"tool: the shape is {array.shape}; give 4 numbers of a sphere, or 7 of a capsule")
+        numbers = _arrays.finite("tool", array).tobytes()
+        margin = None if margin is None else _at_least("margin", margin, 0)
+        budget = None if instructions is None else _whole("instructions", instructions)
+        return Tracked(*self._native.tick(_surface(surface)._native, numbers, budget, margin))
+
+
+class RigidMotion(NamedTuple):
+    """The motion of a rigid instrument in a period: its reference point goes straight, and the instrument turns about it."""
+
+    about: npt.ArrayLike
+    """The reference point before the motion, in mm."""
+    translation: npt.ArrayLike = (0.0, 0.0, 0.0)
+    """Its displacement in mm."""
+    rotation: npt.ArrayLike = (0.0, 0.0, 0.0)
+    """The rotation vector: the axis, times the angle in radians. A filter admits half a radian at most."""
+
+    def apply(self, tools: npt.ArrayLike) -> Floats:
+        """The tools after the motion: spheres of 4 numbers, or capsules of 7."""
+        moved = _arrays.finite("tools", _arrays.numbers("tools", tools)).copy()
+        if moved.shape[-1:] not in ((4,), (7,)):
+            raise ValueError(f"tools: the shape is {moved.shape}; give 4 numbers of a sphere, or 7 of a capsule")
+        about, translation, rotation = (_vector(name, each) for name, each in zip(self._fields, self))
+        angle = float(np.linalg.norm(rotation))
+        sine, cosine = np.sinc(angle / np.pi), 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+        for place in range(0, moved.shape[-1] - 1, 3):
+            arm = moved[..., place : place + 3] - about
+            across = np.cross(rotation, arm)
+            turned = arm + across * sine + np.cross(rotation, across) * cosine
+            moved[..., place : place + 3] = about + turned + translation
+        return moved
+
+
+class Admitted(NamedTuple):
+    """The motion that a filter admits."""
+
+    motion: RigidMotion
+    """The motion to execute."""
+    least_separation: float
+    """No separation (mm) of any tool is less at any instant of the period, wherever the tissue is within its uncertainty."""
+    reason: Reason
+    """Why it is this motion."""
+    queries: int
+    """Queries made."""
+    instructions: int
+    """Instructions of a Cortex-M7 that they take, by the fitted cost."""
+
+
+class Filter:
+    """A filter of commands: the motion nearest to a commanded one that keeps a rigid chain of tools out of the tissue.
+
+    It keeps every tool `stand_off` (mm) from the tissue, for a robot that moves its reference point with at most `speed`
+    (mm/s). A rotation by one radian counts as much as a translation by the `lever` (mm), by default the distance from the
+    reference point to the farthest end of a tool's axis. `instructions` bounds the queries of a tick, of a Cortex-M7 by the
+    fitted cost: what is not verified then is not admitted.
+    """
+
+    def __init__(
+        self, tree: Tree, stand_off: float, speed: float, *, lever: Optional[float] = None, instructions: int = 200_000
+    ) -> None:
+        stand_off = _at_least("stand_off", stand_off, 0)
+        speed = _arrays.number("speed", speed)
+        if speed <= 0:
+            raise ValueError(f"speed: {speed} is not above 0")
+        lever = None if lever is None else _at_least("lever", lever, 1)
+        budget = _whole("instructions", instructions)
+        self._native = _dibs.Filter(_tree(tree)._native, stand_off, speed, lever, budget)
+
+    def admit(
+        self,
+        tools: npt.ArrayLike,
+        command: RigidMotion,
+        period: float,
+        surface: Union[Surface, Tree],
+        *,
+        tissue_speed: float = 0.0,
+        error: float = 0.0,
+        rows: Iterable[npt.ArrayLike] = (),
+    ) -> Admitted:
+        """The motion to execute in the next `period` (s).
+
+        `tools` are the capsules of one rigid instrument as they are now, up to 8, or one of them; a sphere is a capsule whose
+        ends are one. `surface` is the surface as it is known now: the tissue is within `error` (mm) of it, its speed times age
+        and transit and the error of registration, and no point of it is faster than `tissue_speed` (mm/s). `rows` are up to
+        8 limits of the caller's, seven numbers each: factors of the translation, of the rotation (mm), and the least sum
+        allowed (mm).
+
+        Raises `ValueError` for a number out of its range; nothing is admitted then, and the tool stays at rest. "no safe
+        motion" is a reason: the stand-off is not kept, and the motion is the best one known.
+        """
+        array = _arrays.numbers("tools", tools)
+        chain = array[np.newaxis] if array.ndim == 1 else array
+        if chain.ndim != 2 or chain.shape[1] != 7 or not 1 <= len(chain) <= _TOOLS:
+            raise ValueError(f"tools: the shape is {array.shape}; give (tools, 7), of 1 to {_TOOLS} capsules")
+        chain = _arrays.finite("tools", chain)
+        if not isinstance(command, RigidMotion):
+            raise TypeError(f"command: a RigidMotion is needed, not {type(command).__name__}")
+        names = ("command.about", "command.translation", "command.rotation")
+        vectors = [_vector(name, each).tolist() for name, each in zip(names, command)]
+        period = _arrays.number("period", period)
+        if period <= 0:
+            raise ValueError(f"period: {period} is not above 0")
+        tissue = (_at_least("tissue_speed", tissue_speed, 0), _at_least("error", error, 0))
+        limits = [_row(number, row) for number, row in enumerate(rows)]
+        if len(limits) > _ROWS:
+            raise ValueError(f"rows: {len(limits)} rows, and {_ROWS} have a place")
+        translation, rotation, least, reason, queries, instructions = self._native.admit(
+            _surface(surface)._native, chain.tobytes(), vectors, period, tissue, limits
+        )
+        motion = RigidMotion(np.array(vectors[0]), np.array(translation), np.array(rotation))
+        return Admitted(motion, least, reason, queries, instructions)
+
+
+def _tree(tree: Any) -> Tree:
+    if not isinstance(tree, Tree):
+        raise TypeError(f"tree: a Tree is needed, not {type(tree).__name__}")
+    return tree
+
+
+def _surface(surface: Any) -> Surface:
+    if isinstance(surface, Tree):
+        return surface.rest
+    if not isinstance(surface, Surface):
+        raise TypeError(f"surface: a Surface is needed, of Tree.surface, not {type(surface).__name__}")
+    return surface
+
+
+def _vector(name: str, value: npt.ArrayLike) -> Floats:
+    array = _arrays.numbers(name, value)
+    if array.shape != (3,):
+        raise ValueError(f"{name}: the shape is {array.shape}; give 3 numbers")
+    return _arrays.finite(name, array)
+
+
+def _row(number: int, value: npt.ArrayLike) -> list[float]:
+    name = f"rows: row {number}"
+    array = _arrays.numbers(name, value)
+    if array.shape != (7,):
+        raise ValueError(f"{name}: the shape is {array.shape}; give 7 numbers")
+    numbers: list[float] = _arrays.finite(name, array).tolist()
+    return numbers
+
+
+def _at_least(name: str, value: float, least: float) -> float:
+    number = _arrays.number(name, value)
+    if number < least:
+        raise ValueError(f"{name}: {number} is below {least}")
+    return number
+
+
+def _whole(name: str, value: Any) -> int:
+    return _arrays.whole(name, value, 0, _MOST)

@@ -1,0 +1,322 @@
+//! Ticks on a moving surface: the closest pair and the contacts within a budget, and commands that a filter admits.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use dibs_build::glam::{DVec3, Vec3};
+use dibs_nostd::filter::{self, FilterError, Motion, MotionRow, Uncertainty};
+use dibs_nostd::{
+    Budget, Capsule, Contacts, Cost, Fallback, Index, MovingTable, Odometer, Options, Proximity,
+    TrackerAnswer,
+};
+use pyo3::prelude::*;
+use pyo3::types::PyByteArray;
+
+use crate::record::{push_answer, push_contact};
+use crate::surface::{MOST_CONTACTS, Surface};
+use crate::tool::AnyTool;
+use crate::tree::{Owned, Tree, View};
+use crate::{bytes, invalid};
+
+/// As much as any tree needs.
+const STACK: usize = dibs_nostd::format::MAX_STACK;
+
+/// Places for opened nodes.
+const OPENED: usize = 4_096;
+
+type TheTracker<'t, I> = dibs_nostd::Tracker<'t, I, STACK, OPENED, OPENED>;
+
+/// A tracker for each tool, and the surface of the last tick.
+struct Ticks<'t, I> {
+    tree: &'t dibs_nostd::Tree<'t, I>,
+    trackers: Vec<Box<TheTracker<'t, I>>>,
+    odometer: Odometer,
+    last: Option<Py<Surface>>,
+}
+
+impl<'t, I: Index> Ticks<'t, I> {
+    fn new(tree: &'t dibs_nostd::Tree<'t, I>) -> Self {
+        Self { tree, trackers: Vec::new(), odometer: Odometer::new(tree), last: None }
+    }
+
+    /// Makes the trackers of so many tools, and measures how far the surface has moved since the last tick.
+    fn begin<'s>(
+        &mut self,
+        now: &'s Py<Surface>,
+        last: Option<&'s Py<Surface>>,
+        tools: usize,
+    ) -> Result<MovingTable<'s, [Vec3]>, String> {
+        if self.trackers.len() != tools {
+            let tracker = |_| TheTracker::with_range(self.tree).map(Box::new);
+            let trackers = (0..tools).map(tracker).collect::<Result<_, _>>();
+            self.trackers = trackers.map_err(|error| error.to_string())?;
+        }
+        let rows = now.get().rows.as_slice();
+        Ok(match last {
+            None => self.odometer.start(rows),
+            Some(last) => self.odometer.step(last.get().rows.as_slice(), rows).after(),
+        })
+    }
+}
+
+/// The ticks of either width.
+enum OfWidth<'t> {
+    Narrow(Ticks<'t, u16>),
+    Wide(Ticks<'t, u32>),
+}
+
+self_cell::self_cell!(
+    struct OnTree {
+        owner: Arc<Owned>,
+        #[not_covariant]
+        dependent: OfWidth,
+    }
+);
+
+/// `$body` with the ticks of either width.
+macro_rules! with_ticks {
+    ($ticks:expr, $of_width:ident => $body:expr) => {
+        lock($ticks).with_dependent_mut(|_, ticks| match ticks {
+            OfWidth::Narrow($of_width) => $body,
+            OfWidth::Wide($of_width) => $body,
+        })
+    };
+}
+
+fn on(tree: &Tree) -> Mutex<OnTree> {
+    Mutex::new(OnTree::new(Arc::clone(&tree.0), |tree| match tree.view() {
+        View::Narrow(tree) => OfWidth::Narrow(Ticks::new(tree)),
+        View::Wide(tree) => OfWidth::Wide(Ticks::new(tree)),
+    }))
+}
+
+fn lock(ticks: &Mutex<OnTree>) -> MutexGuard<'_, OnTree> {
+    ticks.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Refuses the surface of another tree.
+fn check(surface: &Surface, tree: &Arc<Owned>) -> PyResult<()> {
+    if Arc::ptr_eq(&surface.tree, tree) || surface.tree.bytes() == tree.bytes() {
+        Ok(())
+    } else {
+        Err(invalid("surface: it is of another tree"))
+    }
+}
+
+fn options(surface: &Surface) -> Options {
+    match surface.stretch {
+        Some(measured) => Options::new().stretch(measured),
+        None => Options::new(),
+    }
+}
+
+/// A tracker of one tool.
+#[pyclass(frozen, module = "dibs._dibs")]
+pub struct Tracker {
+    ticks: Mutex<OnTree>,
+    contacts: Mutex<Box<Contacts<MOST_CONTACTS, 16_384>>>,
+    tree: Arc<Owned>,
+}
+
+/// A contact list's records and bound.
+type Listed<'py> = (Bound<'py, PyByteArray>, f32);
+
+#[pymethods]
+impl Tracker {
+    #[new]
+    fn new(tree: &Tree) -> Self {
+        let contacts = Mutex::new(Box::new(Contacts::new()));
+        Self { ticks: on(tree), contacts, tree: Arc::clone(&tree.0) }
+    }
+
+    /// The closest pair of a tick, and with a margin the contacts.
+    fn tick<'py>(
+        &self,
+        py: Python<'py>,
+        surface: Py<Surface>,
+        tool: &[u8],
+        instructions: Option<u32>,
+        margin: Option<f32>,
+    ) -> PyResult<(Tracked, Option<Listed<'py>>)> {
+        check(surface.get(), &self.tree)?;
+        let tool = AnyTool::of(&bytes::doubles(tool), self.tree.origin);
+        let tool = tool.map_err(|error| invalid(format!("tool: {error}")))?;
+        let cost = match tool {
+            AnyTool::Sphere(_) => &Cost::M7_SPHERE,
+            AnyTool::Capsule(_) => &Cost::M7_CAPSULE,
+        };
+        let mut options = options(surface.get());
+        if let Some(instructions) = instructions {
+            options = options.budget(Budget::for_instructions(instructions, cost));
+        }
+        let mut list = self.contacts.lock().unwrap_or_else(PoisonError::into_inner);
+        let contacts = &mut **list;
+        let found = py.detach(|| {
+            with_ticks!(&self.ticks, ticks => {
+                let last = ticks.last.take();
+                let moving = ticks.begin(&surface, last.as_ref(), 1)?;
+                let [tracker] = ticks.trackers.as_mut_slice() else { return Err(String::new()) };
+                let found = match (&tool, margin) {
+                    (AnyTool::Sphere(tool), None) => tracker.closest(&moving, tool, &options),
+                    (AnyTool::Capsule(tool), None) => tracker.closest(&moving, tool, &options),
+                    (AnyTool::Sphere(tool), Some(margin)) => {
+                        tracker.contacts(&moving, tool, margin, &options, contacts)
+                    }
+                    (AnyTool::Capsule(tool), Some(margin)) => {
+                        tracker.contacts(&moving, tool, margin, &options, contacts)
+                    }
+                };
+                ticks.last = Some(surface);
+                found.map_err(|error| error.to_string())
+            })
+        });
+        let found = found.map_err(invalid)?;
+        let listed = margin.map(|_| {
+            let mut records = Vec::new();
+            contacts.iter().for_each(|found| push_contact(&mut records, 0, found, &self.tree));
+            (PyByteArray::new(py, &records), contacts.bound())
+        });
+        Ok((Tracked { found, tree: Arc::clone(&self.tree) }, listed))
+    }
+}
+
+/// A tick's closest pair.
+#[pyclass(frozen, module = "dibs._dibs")]
+pub struct Tracked {
+    found: TrackerAnswer,
+    tree: Arc<Owned>,
+}
+
+impl Tracked {
+    pub const fn closest(&self) -> Proximity {
+        self.found.closest
+    }
+}
+
+#[pymethods]
+impl Tracked {
+    fn record<'py>(&self, py: Python<'py>) -> Bound<'py, PyByteArray> {
+        let mut record = Vec::new();
+        push_answer(&mut record, &self.found.closest, &self.tree, [0, 0]);
+        PyByteArray::new(py, &record)
+    }
+
+    /// Whether the side is the last tick's, the reason for a whole query, and the motion (mm) since the last tick.
+    fn facts(&self) -> (bool, Option<&'static str>, Option<f32>) {
+        let reason = self.found.fallback.map(|fallback| match fallback {
+            Fallback::Start => "start",
+            Fallback::Surface => "surface",
+            Fallback::Jump => "jump",
+            _ => "full",
+        });
+        (self.found.is_kept, reason, self.found.moved)
+    }
+}
+
+/// Translation and rotation, least separation, reason, queries, instructions.
+type Admitted = ([f32; 3], [f32; 3], f32, &'static str, u32, u32);
+
+/// A filter of commands.
+#[pyclass(frozen, module = "dibs._dibs")]
+pub struct Filter {
+    ticks: Mutex<OnTree>,
+    filter: filter::Filter,
+    tree: Arc<Owned>,
+}
+
+#[pymethods]
+impl Filter {
+    #[new]
+    fn new(
+        tree: &Tree,
+        stand_off: f32,
+        speed: f32,
+        lever: Option<f32>,
+        instructions: u32,
+    ) -> PyResult<Self> {
+        let filter = filter::Filter::new(stand_off, speed).map_err(named)?;
+        let filter = match lever {
+            Some(lever) => filter.lever(lever).map_err(named)?,
+            None => filter,
+        };
+        let filter = filter.budget(instructions, Cost::M7_CAPSULE);
+        Ok(Self { ticks: on(tree), filter, tree: Arc::clone(&tree.0) })
+    }
+
+    /// `tools`: seven numbers each. `command`: reference point, translation, rotation. `tissue`: speed, error.
+    /// `rows`: seven numbers each.
+    fn admit(
+        &self,
+        py: Python<'_>,
+        surface: Py<Surface>,
+        tools: &[u8],
+        command: [[f64; 3]; 3],
+        period: f32,
+        tissue: (f32, f32),
+        rows: Vec<[f32; 7]>,
+    ) -> PyResult<Admitted> {
+        check(surface.get(), &self.tree)?;
+        let origin = self.tree.origin;
+        let numbers = bytes::doubles(tools);
+        let tools = numbers.chunks_exact(7).enumerate().map(|(number, tool)| {
+            let local = |at: usize| (DVec3::from_slice(&tool[at..]) - origin).as_vec3();
+            Capsule::new(local(0), local(3), tool[6] as f32)
+                .map_err(|error| invalid(format!("tools: row {number}: {error}")))
+        });
+        let tools = tools.collect::<PyResult<Vec<_>>>()?;
+        let [about, translation, rotation] = command.map(DVec3::from);
+        let about = (about - origin).as_vec3();
+        let command = Motion::new(about, translation.as_vec3(), rotation.as_vec3());
+        let rows = rows.into_iter().map(|[a, b, c, d, e, f, least]| MotionRow {
+            linear: [a, b, c],
+            angular: [d, e, f],
+            least,
+        });
+        let rows: Vec<_> = rows.collect();
+        let (speed, error) = tissue;
+        let uncertainty = Uncertainty::new(speed).error(error);
+        let filter = self.filter.options(options(surface.get()));
+        let admitted = py.detach(|| {
+            with_ticks!(&self.ticks, ticks => {
+                let last = ticks.last.take();
+                let moving = ticks.begin(&surface, last.as_ref(), tools.len())?;
+                let mut pairs: Vec<_> = ticks
+                    .trackers
+                    .iter_mut()
+                    .zip(&tools)
+                    .map(|(tracker, tool)| (&mut **tracker, &moving, tool))
+                    .collect();
+                let admitted = filter.admit(&mut pairs, &command, period, &uncertainty, &rows);
+                drop(pairs);
+                ticks.last = Some(surface);
+                Ok(admitted)
+            })
+        });
+        let admitted = admitted.map_err(|error: String| invalid(error))?.map_err(named)?;
+        Ok((
+            admitted.motion.translation.to_array(),
+            admitted.motion.rotation.to_array(),
+            admitted.least_separation,
+            admitted.reason.words(),
+            admitted.queries,
+            admitted.instructions,
+        ))
+    }
+}
+
+/// A sentence with the names of Python's arguments.
+fn named(error: FilterError) -> PyErr {
+    match error {
+        FilterError::Parameter { parameter, value } => {
+            let name = match parameter {
+                "uncertainty" => "error",
+                "tissue speed" => "tissue_speed",
+                other => other,
+            };
+            invalid(format!("{name}: it cannot be {value}"))
+        }
+        FilterError::Command => invalid("command: it is too large"),
+        FilterError::Row { row } => invalid(format!("rows: row {row} is not finite")),
+        FilterError::Rows { .. } => invalid(format!("rows: {error}")),
+        _ => invalid(error),
+    }
+}
