@@ -10,7 +10,7 @@ use crate::{Budget, Index, Millis, Options, SurfaceLimits, Tree};
 #[derive(Clone, Copy, Debug)]
 pub struct GuardLimits {
     /// mm a millisecond.
-    speed: f32,
+    pub(super) speed: f32,
     age: Millis,
     trust: Option<Limits>,
     surface: Option<SurfaceLimits>,

@@ -4,10 +4,12 @@ use glam::Vec3;
 
 use super::surface::Notes;
 use super::{Answer, GuardLimits, Searched};
-use crate::failsafe::{AcknowledgeError, FailSafe, Observation};
+use crate::failsafe::{AcknowledgeError, FailSafe, Observation, State, Verdict};
+use crate::filter::{Admitted, Filter, FilterError, Motion, Uncertainty};
+use crate::surface::FrameView;
 use crate::{
-    Error, FrameAge, FrameReader, Index, Millis, Options, Tool, Tracker, TrackerAnswer, Tree,
-    TreeBytes, Unavailable, VertexTable,
+    Error, FrameAge, FrameReader, Index, Millis, Options, SurfaceBlend, Tool, Tracker,
+    TrackerAnswer, Tree, TreeBytes, Unavailable, VertexTable,
 };
 
 /// The control tick's end of a [`Surface`](super::Surface): the closest pair of one tool on the surface as it is now,
@@ -24,8 +26,13 @@ pub struct Guard<'s, 't, I, const STACK: usize, const OPENED: usize> {
     options: Options,
     /// Ticks a second.
     rate: f32,
+    /// The tissue's largest speed, in mm a millisecond.
+    speed: f32,
     before: Option<Pose>,
 }
+
+/// A surface between its last two frames, or beyond.
+type Blend<'f> = SurfaceBlend<'f, FrameView<'f>, FrameView<'f>>;
 
 /// The tool's axis at a tick.
 #[derive(Clone, Copy, Debug)]
@@ -72,6 +79,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
             failsafe: FailSafe::new(limits.failsafe()?),
             options: limits.options,
             rate: limits.rate,
+            speed: limits.speed,
             before: None,
         })
     }
@@ -84,13 +92,53 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
     ///
     /// Cost: the budget at most, and about a thousand instructions.
     pub fn closest<T: Tool>(&mut self, tool: &T, now: Millis) -> Answer {
-        let latest = self.reader.latest(now);
+        self.on_latest(tool, now, |_, _, _| ()).0
+    }
+
+    /// The answer of this tick, and the motion nearest to `command` that keeps the tool out of the tissue until the next one.
+    /// After an error nothing is admitted: the tool stays at rest.
+    ///
+    /// The filter states the stand-off and the robot's speed; the period, the tissue's speed, and the uncertainty by lag and
+    /// transit are known here. The surface is extrapolated: its residual is an estimate, and the [filter](crate::filter)
+    /// says what that means. Nothing is admitted in the safe state.
+    ///
+    /// Cost: that of [`closest`](Self::closest) and of [`Filter::admit`].
+    pub fn admit<T: Tool>(
+        &mut self,
+        filter: &Filter,
+        tool: &T,
+        command: &Motion,
+        now: Millis,
+    ) -> (Answer, Result<Admitted, FilterError>) {
+        let (period, speed) = (1.0 / self.rate, self.speed * 1_000.0);
+        let (answer, admitted) = self.on_latest(tool, now, |tracker, surface, trust| {
+            if let Verdict { state: State::Safe, cause: Some(cause), .. } = *trust {
+                return Err(FilterError::Untrusted(cause));
+            }
+            let tissue = Uncertainty::new(speed).error(trust.margin);
+            filter.admit(&mut [(tracker, surface, tool)], command, period, &tissue, &[])
+        });
+        let none = Err(FilterError::Untrusted(Unavailable::NoSurface));
+        (answer, admitted.unwrap_or(none))
+    }
+
+    /// The answer of this tick, and what `then` makes of the surface that was searched and of the trust in it.
+    #[inline(always)]
+    fn on_latest<T: Tool, R>(
+        &mut self,
+        tool: &T,
+        now: Millis,
+        then: impl FnOnce(&mut Tracker<'t, I, STACK, OPENED>, &Blend<'_>, &Verdict) -> R,
+    ) -> (Answer, Option<R>) {
+        let Self { notes, reader, tree, tracker, failsafe, options, rate, before, .. } = self;
+        let latest = reader.latest(now);
         let frame = latest.frame();
+        let published = latest.of_any_age();
+        let surface = published.as_ref().map(|published| published.extrapolated());
         // The fail-safe machine decides how old a surface may be.
-        let (searched, tracked) = match (frame, latest.of_any_age()) {
-            (Some(frame), Ok(published)) => {
-                let surface = published.extrapolated();
-                let tracked = self.tracker.closest(&surface, tool, &self.options);
+        let (searched, tracked) = match (frame, &surface) {
+            (Some(frame), Ok(surface)) => {
+                let tracked = tracker.closest(surface, tool, options);
                 let searched = Searched {
                     frame,
                     before: surface.before().epoch().unwrap_or(frame.epoch),
@@ -104,17 +152,23 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
                 };
                 (Some(searched), tracked.map_err(Unavailable::Query))
             }
-            (_, Err(unavailable)) => (None, Err(unavailable)),
+            (_, Err(unavailable)) => (None, Err(**unavailable)),
             (None, Ok(_)) => (None, Err(Unavailable::NoSurface)),
         };
         let pose = Pose::of(tool, now);
         let along = tracked.map_or(0.5, |tracked| tracked.closest.axis_parameter);
-        let surface = searched.map_or(Vec3::ZERO, |searched| searched.velocity);
-        let velocity = match self.before.replace(pose) {
-            Some(before) => pose.velocity(&before, self.rate, along) - surface,
+        let flow = searched.map_or(Vec3::ZERO, |searched| searched.velocity);
+        let velocity = match before.replace(pose) {
+            Some(before) => pose.velocity(&before, *rate, along) - flow,
             None => Vec3::ZERO,
         };
-        self.judge(frame, searched, tracked, velocity, now)
+        let is_corrupt = notes.is_tree_corrupt() || tracker.tree().check(tree.bytes()).is_err();
+        let answer = judge(notes, failsafe, is_corrupt, (frame, searched, tracked), velocity, now);
+        let after = match &surface {
+            Ok(surface) if searched.is_some() => Some(then(tracker, surface, &answer.trust)),
+            _ => None,
+        };
+        (answer, after)
     }
 
     /// The answer of a tick whose tool has no pose: the state is safe, with [`Unavailable::NoPose`] as its cause while
@@ -122,30 +176,11 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
     /// next tick's velocity starts anew.
     pub fn without_pose(&mut self, now: Millis) -> Answer {
         self.before = None;
-        let frame = self.reader.latest(now).frame();
-        self.judge(frame, None, Err(Unavailable::NoPose), Vec3::NAN, now)
-    }
-
-    fn judge(
-        &mut self,
-        frame: Option<FrameAge>,
-        searched: Option<Searched>,
-        tracked: Result<TrackerAnswer, Unavailable>,
-        velocity: Vec3,
-        now: Millis,
-    ) -> Answer {
-        let link = self.notes.link.read(now);
-        let trust = self.failsafe.step(&Observation {
-            frame,
-            lag: searched.and_then(|searched| searched.lag),
-            link,
-            no_answer: tracked.err(),
-            is_tree_corrupt: self.notes.is_tree_corrupt()
-                || self.tracker.tree().check(self.tree.bytes()).is_err(),
-        });
-        self.notes.set_state(trust.state);
-        let closest = tracked.and_then(|tracked| trust.admit(tracked.closest));
-        Answer { closest, velocity, trust, link, searched, tracked }
+        let Self { notes, reader, tree, tracker, failsafe, .. } = self;
+        let frame = reader.latest(now).frame();
+        let is_corrupt = notes.is_tree_corrupt() || tracker.tree().check(tree.bytes()).is_err();
+        let found = (frame, None, Err(Unavailable::NoPose));
+        judge(notes, failsafe, is_corrupt, found, Vec3::NAN, now)
     }
 
     /// An operator's acknowledgement, which ends the safe state once every input is good again.
@@ -161,4 +196,29 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
     pub const fn tracker(&self) -> &Tracker<'t, I, STACK, OPENED> {
         &self.tracker
     }
+}
+
+/// A frame, the surface that was searched, and the pair on it.
+type Found = (Option<FrameAge>, Option<Searched>, Result<TrackerAnswer, Unavailable>);
+
+/// The tick's answer, by the trust in what was found.
+fn judge(
+    notes: &Notes,
+    failsafe: &mut FailSafe,
+    is_tree_corrupt: bool,
+    (frame, searched, tracked): Found,
+    velocity: Vec3,
+    now: Millis,
+) -> Answer {
+    let link = notes.link.read(now);
+    let trust = failsafe.step(&Observation {
+        frame,
+        lag: searched.and_then(|searched| searched.lag),
+        link,
+        no_answer: tracked.err(),
+        is_tree_corrupt,
+    });
+    notes.set_state(trust.state);
+    let closest = tracked.and_then(|tracked| trust.admit(tracked.closest));
+    Answer { closest, velocity, trust, link, searched, tracked }
 }

@@ -3,11 +3,13 @@
 use dibs_build::{Builder, generate};
 use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
 use dibs_nostd::failsafe::{LimitError, Limits, State, Watch};
+use dibs_nostd::filter::{Filter, FilterError, Motion, Reason};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Surface};
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, Freshness, enframe};
 use dibs_nostd::{
-    Advance, Capsule, Error, Millis, QueryError, SurfaceLimits, TreeBytes, Unavailable,
+    Advance, Capsule, Error, Millis, Options, Query, QueryError, SurfaceLimits, Tree, TreeBytes,
+    Unavailable,
 };
 use dibs_tests::bus::collect;
 
@@ -213,4 +215,70 @@ fn a_start_names_what_is_wrong() {
     let twice = || once.start::<u16, 64, 96>(TreeBytes::new(built.blob()), limits).err();
     assert_eq!(twice(), None);
     assert!(matches!(twice(), Some(Error::Split(_))));
+}
+
+/// A command and a stand-off are all that is stated: speed, age and transit of the tissue are the guard's.
+#[test]
+fn an_admitted_motion_keeps_off_the_tissue_as_it_is() {
+    let heart = generate::heart(320).expect("a valid size").mesh;
+    let built = Builder::new().stretch(1.5).build(&heart).expect("a valid mesh");
+    let tree = Tree::<u16>::from_bytes(built.blob()).expect("a valid tree");
+    let mut query = Query::<_, 64>::new(&tree).expect("a stack");
+    let limits = GuardLimits::new(40.0, Millis(200)).automatic();
+    let mut world = World::new(&built, &heart.positions, limits);
+    let filter = Filter::new(1.0, 400.0).expect("in range");
+    let middle = world.rest.iter().sum::<Vec3>() / ROWS as f32;
+    let (mut at, mut end) = (Vec3::new(95.0, 3.0, 20.0), Vec3::new(125.0, 7.0, 30.0));
+    let (mut reasons, mut refused, mut least) = ([0; 3], 0, f32::INFINITY);
+    for tick in 0..3_000 {
+        // The frames stop at last.
+        if tick % PERIOD == 0 && tick < 2_500 {
+            world.frame();
+        }
+        world.now += 1;
+        let towards = (middle + world.shift() - at).normalize_or_zero() * 0.1;
+        let push = Motion::new(at, towards, Vec3::new(0.0, 2e-4, 0.0));
+        let tool = Capsule::new(at, end, 2.0).expect("valid");
+        let (answer, admitted) = world.ends.1.admit(&filter, &tool, &push, Millis(world.now));
+        match admitted {
+            Ok(admitted) => {
+                let truth: Vec<Vec3> =
+                    world.rest.iter().map(|&row| row + world.shift() + FLOW * 1e-3).collect();
+                (at, end) = (admitted.motion.apply(at), admitted.motion.apply(end));
+                let tool = Capsule::new(at, end, 2.0).expect("valid");
+                let found = query.closest(truth.as_slice(), &tool, &Options::new()).expect("one");
+                let is_said = admitted.reason == Reason::NoSafeMotion;
+                assert!(is_said || found.lower > 0.98, "tick {tick}: {} {admitted:?}", found.lower);
+                assert!(found.lower >= admitted.least_separation - 0.02, "{admitted:?}");
+                least = least.min(found.lower);
+                reasons[match admitted.reason {
+                    Reason::Commanded => 0,
+                    Reason::NoSafeMotion => 1,
+                    _ => 2,
+                }] += 1;
+            }
+            Err(FilterError::Untrusted(cause)) => {
+                assert_eq!(answer.trust.cause, Some(cause));
+                refused += 1;
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
+    // Commanded, without a safe motion, and shortened or turned aside.
+    assert!(reasons[0] > 100 && reasons[2] > 500 && least < 4.0, "{reasons:?} {least}");
+    assert!(refused > 200, "{refused}");
+    // Without a frame there is nothing to trust.
+    let mut world = World::new(&built, &heart.positions, limits);
+    world.now += 1;
+    let tool = Capsule::new(at, end, 2.0).expect("valid");
+    let push = Motion::translation(Vec3::X);
+    let (_, admitted) = world.ends.1.admit(&filter, &tool, &push, Millis(1_001));
+    assert_eq!(admitted, Err(FilterError::Untrusted(Unavailable::NoSurface)));
+    // A command that is none is an error, and no motion.
+    world.frame();
+    let none = Motion::translation(Vec3::NAN);
+    assert_eq!(
+        world.ends.1.admit(&filter, &tool, &none, Millis(1_030)).1,
+        Err(FilterError::Command)
+    );
 }

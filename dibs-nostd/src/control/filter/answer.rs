@@ -3,7 +3,7 @@
 use core::fmt;
 
 use super::Motion;
-use crate::unavailable::QueryError;
+use crate::unavailable::{QueryError, Unavailable};
 
 /// The motion that a filter admits.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,6 +98,8 @@ pub enum FilterError {
     },
     /// A query gave no answer.
     Query(QueryError),
+    /// There is no surface that is trusted: a [guard](crate::guard::Guard::admit) is in its safe state.
+    Untrusted(Unavailable),
 }
 
 impl From<QueryError> for FilterError {
@@ -120,6 +122,7 @@ impl fmt::Display for FilterError {
                 write!(f, "{found} pairs of tool and surface, but at most {most} have a place")
             }
             Self::Query(error) => error.fmt(f),
+            Self::Untrusted(cause) => write!(f, "no surface to trust: {cause}"),
         }
     }
 }
