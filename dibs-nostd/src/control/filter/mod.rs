@@ -54,7 +54,7 @@
 //! # Method
 //!
 //! A query at the start gives each tool's distance. Where the command could use that up, its closest pair is a row, and the
-//! motion nearest to the command is computed. A query at that motion's end bounds the distance on the whole way;
+//! motion nearest to the command is computed. A query at that motion's end bounds the distance on the whole path;
 //! where it is too small, its pair is a further row, so that corners, gaps and folds show themselves as the motion comes to them. After four motions the next are shortened
 //! towards the least one that the rows allow, which is rest unless the surface comes.
 //!
@@ -64,10 +64,10 @@ mod answer;
 mod motion;
 mod nearest;
 mod pair;
+mod path;
 mod row;
 mod session;
 mod uncertainty;
-mod way;
 
 use crate::math::sqrt::sqrt;
 use crate::{Cost, Index, MovingSurface, Options, Tool, Tracker};
@@ -120,7 +120,7 @@ impl Filter {
         })
     }
 
-    /// The same with a lever (mm, at least 1): a rotation by one radian counts as much as a way of this length. By
+    /// The same with a lever (mm, at least 1): a rotation by one radian counts as much as a translation by this length. By
     /// default it is the distance from the reference point to the farthest end of a tool's axis.
     ///
     /// # Errors

@@ -13,7 +13,7 @@ pub struct Motion {
     /// The reference point before the motion (mm).
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub about: Vec3,
-    /// The reference point's way (mm).
+    /// The reference point's displacement (mm).
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub translation: Vec3,
     /// The rotation vector: the axis, times the angle in radians. A filter admits half a radian at most.
@@ -53,7 +53,7 @@ impl Motion {
         point + moved
     }
 
-    /// Most (mm) by which a point of the instrument, `arm` mm from the reference point, leaves its straight way:
+    /// Most (mm) by which a point of the instrument, `arm` mm from the reference point, leaves its straight path:
     /// an arc's height.
     pub(super) fn arc(&self, arm: f32) -> f32 {
         arm * self.rotation.length_squared() * (1.0 / 8.0 + 1e-3)
@@ -94,14 +94,14 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Against f64, and on its whole way no farther from the straight line than the arc's height.
+        /// Against f64, and on its whole path no farther from the straight line than the arc's height.
         #[test]
         fn a_motion_turns_about_its_point(
-            about in prop::array::uniform3(-50.0_f32..50.0), way in prop::array::uniform3(-2.0_f32..2.0),
+            about in prop::array::uniform3(-50.0_f32..50.0), by in prop::array::uniform3(-2.0_f32..2.0),
             axis in prop::array::uniform3(-1.0_f32..1.0), angle in 0.0_f32..0.5, point in prop::array::uniform3(-90.0_f32..90.0),
         ) {
             let axis = Vec3::from(axis).normalize_or_zero();
-            let motion = Motion::new(about.into(), way.into(), axis * angle);
+            let motion = Motion::new(about.into(), by.into(), axis * angle);
             let point = Vec3::from(point);
             let at = |s: f64| {
                 let turn = DQuat::from_scaled_axis(motion.rotation.as_dvec3() * s);

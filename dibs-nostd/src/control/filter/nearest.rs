@@ -2,7 +2,7 @@
 //!
 //! The dual active set method of Goldfarb & Idnani (1983) for a quadratic whose matrix is the identity. It starts at the
 //! wanted point, with no row active, and makes the most violated row active, step by step; a row whose multiplier would
-//! become negative on the way is dropped. Each active row keeps its dual vector, which is 1 with its own factors and 0 with
+//! become negative on the path is dropped. Each active row keeps its dual vector, which is 1 with its own factors and 0 with
 //! those of other active rows. So a row enters or leaves by a few products, and no system is solved.
 
 use heapless::Vec;
@@ -134,8 +134,8 @@ fn drop_row(active: &mut Vec<Active, UNKNOWNS>, at: usize) {
     if let Some(dual) = gone {
         let squared = dot(&dual, &dual);
         for one in &mut kept {
-            let share = dot(&one.dual, &dual) / squared;
-            add(&mut one.dual, &dual, -share);
+            let along = dot(&one.dual, &dual) / squared;
+            add(&mut one.dual, &dual, -along);
         }
     }
     *active = kept;
@@ -150,10 +150,10 @@ pub(super) fn dot(a: &Vector, b: &Vector) -> f32 {
     sum
 }
 
-/// Adds `share` of `b`.
-pub(super) fn add(a: &mut Vector, b: &Vector, share: f32) {
+/// Adds a multiple of `b`.
+pub(super) fn add(a: &mut Vector, b: &Vector, factor: f32) {
     for (a, b) in a.iter_mut().zip(b) {
-        *a += b * share;
+        *a += b * factor;
     }
 }
 
@@ -202,7 +202,7 @@ mod tests {
         #![proptest_config(ProptestConfig { cases: 4_000, failure_persistence: None, ..ProptestConfig::default() })]
 
         /// The point is in every half-space, and no nearer one is: a projection's residual makes no sharp angle with any
-        /// way to another point inside.
+        /// step to another point inside.
         #[test]
         fn it_is_the_projection(
             factors in prop::collection::vec(prop::array::uniform6(-1.0_f32..1.0), 1..16),
@@ -233,9 +233,9 @@ mod tests {
                 other
             });
             for other in others.filter(|other| rows.iter().all(|row| row.lacks(other) <= 0.0)) {
-                let mut way = other;
-                add(&mut way, &found.point, -1.0);
-                prop_assert!(dot(&residual, &way) < 2e-3, "{found:?} {other:?}");
+                let mut step = other;
+                add(&mut step, &found.point, -1.0);
+                prop_assert!(dot(&residual, &step) < 2e-3, "{found:?} {other:?}");
             }
         }
     }

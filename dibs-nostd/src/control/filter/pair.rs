@@ -39,7 +39,7 @@ where
 }
 
 /// A lower bound on the axis' distance; negative inside, and negative infinity where nothing is certain. A tool that
-/// `is_outside` at the start of its way needs no side later: it would have to touch the surface before.
+/// `is_outside` at the start of its path needs no side later: it would have to touch the surface before.
 pub(super) fn distance(found: &Proximity, radius: f32, is_outside: bool) -> f32 {
     let lower = match found.side {
         Side::Outside | Side::Inside | Side::Crossing => found.lower,

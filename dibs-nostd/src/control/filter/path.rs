@@ -5,12 +5,12 @@ use crate::math::sqrt::sqrt;
 /// Rounding of the sums below, relative to the distances.
 const ROUNDING: f32 = 16.0 / 16_777_216.0;
 
-/// A lower bound on the distance of an axis from a surface that stands still, less `grow * s`, at any share `s` of its way.
+/// A lower bound on the distance of an axis from a surface that stands still, less `grow * s`, at any fraction `s` of its path.
 ///
 /// The axis is `start` from the surface at the start and `end` at the end; both are lower bounds, and negative for a signed
 /// distance inside. No point of it moves farther than `moved`, and each goes straight and evenly.
 ///
-/// Of a surface's point `q` and a point of the axis on its way from `a` to `b`, Stewart's theorem says
+/// Of a surface's point `q` and a point of the axis on its path from `a` to `b`, Stewart's theorem says
 ///
 /// `|q - p(s)|^2 = (1 - s) |q - a|^2 + s |q - b|^2 - s (1 - s) |a - b|^2`,
 ///
@@ -52,9 +52,9 @@ mod tests {
 
     use super::least;
 
-    /// Along a wall a straight way loses the square of its length.
+    /// Along a wall a straight path loses the square of its length.
     #[test]
-    fn a_way_along_a_wall_loses_little() {
+    fn a_path_along_a_wall_loses_little() {
         let lost = 3.0 - least(3.0, 3.0, 0.2, 0.0);
         assert!((lost - 0.04 / 24.0).abs() < 2e-5, "{lost}");
         // A surface that comes is nearest at the end.
@@ -65,7 +65,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
 
-        /// Of two balls that hold no point of a surface, any way between their centres keeps the bound from any point
+        /// Of two balls that hold no point of a surface, any path between their centres keeps the bound from any point
         /// outside of both.
         #[test]
         fn no_point_outside_of_both_balls_is_nearer(
@@ -75,7 +75,7 @@ mod tests {
             let bound = f64::from(least(start, end, moved, grow));
             let (a, b, length) = (f64::from(start), f64::from(end), f64::from(moved));
             for (s, z, more) in places {
-                // A point of the plane at `z` along the way and just outside of both balls, or a little farther.
+                // A point of the plane at `z` along the path and just outside of both balls, or a little farther.
                 let from_a = a * a - z * z;
                 let from_b = b * b - (z - length) * (z - length);
                 let across = from_a.max(from_b).max(0.0).sqrt() + more * more * more;

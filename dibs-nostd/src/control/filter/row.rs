@@ -34,7 +34,7 @@ pub struct MotionRow {
 }
 
 impl MotionRow {
-    /// The row that keeps the reference point's way along `direction` at `least` mm or more.
+    /// The row that keeps the reference point's displacement along `direction` at `least` mm or more.
     #[must_use]
     pub fn along(direction: Vec3, least: f32) -> Self {
         Self { linear: direction.to_array(), angular: [0.0; 3], least }

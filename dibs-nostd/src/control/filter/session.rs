@@ -8,7 +8,8 @@ use super::nearest::{Vector, add};
 use super::pair::{Pair, distance};
 use super::row::Rows;
 use super::{
-    Admitted, EPSILON, Filter, FilterError, MOST_PAIRS, Motion, MotionRow, Reason, Uncertainty, way,
+    Admitted, EPSILON, Filter, FilterError, MOST_PAIRS, Motion, MotionRow, Reason, Uncertainty,
+    path,
 };
 use crate::Budget;
 use crate::math::sqrt::sqrt;
@@ -134,12 +135,12 @@ impl<'f> Session<'f> {
         }
         let stand_still = self.verify(pairs, &rest)?;
         let mut best = stand_still;
-        let mut share = 1.0;
+        let mut fraction = 1.0;
         for attempt in 0..=WHOLE + SHORTENED {
             if attempt >= WHOLE {
-                share = if attempt < WHOLE + SHORTENED { share * 0.5 } else { 0.0 };
+                fraction = if attempt < WHOLE + SHORTENED { fraction * 0.5 } else { 0.0 };
             }
-            let (point, is_command) = self.propose(share);
+            let (point, is_command) = self.propose(fraction);
             let motion = Motion::from_vector(self.about, &point, self.lever);
             if !motion.is_finite() || !self.rows.allow(&point) {
                 continue;
@@ -151,9 +152,9 @@ impl<'f> Session<'f> {
                     Reason::Commanded
                 } else if is_rest {
                     Reason::Stopped
-                } else if share == 0.0 || self.command == [0.0; 6] {
+                } else if fraction == 0.0 || self.command == [0.0; 6] {
                     Reason::Retreating
-                } else if share < 1.0 {
+                } else if fraction < 1.0 {
                     Reason::Shortened
                 } else {
                     Reason::Nearest
@@ -162,8 +163,8 @@ impl<'f> Session<'f> {
             }
             // Farther at the end than any, and during the motion no nearer than rest, unless it leads straight out.
             let gained = found.last - stand_still.last;
-            let is_way_out = found.least >= stand_still.least || gained >= 0.5 * found.moved;
-            if is_way_out && found.last > best.last {
+            let is_retreat = found.least >= stand_still.least || gained >= 0.5 * found.moved;
+            if is_retreat && found.last > best.last {
                 best = found;
             }
         }
@@ -224,30 +225,30 @@ impl<'f> Session<'f> {
         self.rows.add_wall(number, on_axis, found.direction, distance, at);
     }
 
-    /// The motion of a share of the way from the least motion that the rows allow to the nearest; and whether it is the
+    /// The motion at a fraction of the path from the least motion that the rows allow to the nearest; and whether it is the
     /// command.
-    fn propose(&self, share: f32) -> (Vector, bool) {
+    fn propose(&self, fraction: f32) -> (Vector, bool) {
         let least = self.rows.nearest(&[0.0; 6], &self.wanted).point;
         let least = self.within_speed(&least);
-        if share == 0.0 {
+        if fraction == 0.0 {
             return (least, false);
         }
         let nearest = self.rows.nearest(&self.command, &self.wanted);
-        if share == 1.0 && nearest.point == self.command {
+        if fraction == 1.0 && nearest.point == self.command {
             return (self.command, !self.is_cut);
         }
         if !nearest.is_inside {
             return (least, false);
         }
-        let mut way = nearest.point;
-        add(&mut way, &least, -1.0);
-        let ([a, b, c, d, e, f], [u, v, w, x, y, z]) = (least, way);
+        let mut step = nearest.point;
+        add(&mut step, &least, -1.0);
+        let ([a, b, c, d, e, f], [u, v, w, x, y, z]) = (least, step);
         let turn = most_turn(self.most, self.lever) * self.lever;
         let straight = inside(Vec3::new(a, b, c), Vec3::new(u, v, w), self.most);
         let turned = inside(Vec3::new(d, e, f), Vec3::new(x, y, z), turn);
         let whole = if straight < turned { straight } else { turned };
         let mut point = least;
-        add(&mut point, &way, share * whole);
+        add(&mut point, &step, fraction * whole);
         (point, false)
     }
 
@@ -295,9 +296,9 @@ impl<'f> Session<'f> {
                 last = larger(last, end.distance_at(&ends));
             }
             let grow = self.grow;
-            let on_way = |last| way::least(start.distance, last, moved, grow) - arc;
+            let on_path = |last| path::least(start.distance, last, moved, grow) - arc;
             let is_enough = |nearest: f32| nearest >= least - EPSILON;
-            let mut nearest = on_way(last);
+            let mut nearest = on_path(last);
             // At rest the start is all.
             if !is_enough(nearest)
                 && moved > 0.0
@@ -305,7 +306,7 @@ impl<'f> Session<'f> {
             {
                 let searched = distance(&found, pair.radius(), start.distance > 0.0);
                 last = larger(last, searched);
-                nearest = on_way(last);
+                nearest = on_path(last);
                 let known = Known { ends, distance: last };
                 if let Some(state) = self.states.get_mut(number) {
                     state.end = Some(known);
@@ -356,11 +357,11 @@ fn most_turn(most: f32, lever: f32) -> f32 {
     smaller(most / lever, MOST_TURN)
 }
 
-/// The largest share of a way, at most 1, after which a point that starts within `most` of the origin still is.
-fn inside(start: Vec3, way: Vec3, most: f32) -> f32 {
-    let (square, along) = (way.length_squared(), start.dot(way));
+/// The largest fraction of a step, at most 1, after which a point that starts within `most` of the origin still is.
+fn inside(start: Vec3, step: Vec3, most: f32) -> f32 {
+    let (square, along) = (step.length_squared(), start.dot(step));
     let room = most * most - start.length_squared();
-    if start.distance_squared(-way) <= most * most || !(square > 0.0) {
+    if start.distance_squared(-step) <= most * most || !(square > 0.0) {
         return 1.0;
     }
     let root = along * along + square * room;

@@ -10,7 +10,7 @@ use crate::math::round::sum_up;
 /// use dibs_nostd::Millis;
 /// use dibs_nostd::filter::Uncertainty;
 ///
-/// // Tissue of at most 100 mm/s; a frame held for 12 ms that was 4 ms on its way; registered to within 0.5 mm.
+/// // Tissue of at most 100 mm/s; a frame held for 12 ms after a transit of 4 ms; registered to within 0.5 mm.
 /// let tissue = Uncertainty::new(100.0).after(Millis(12)).after(Millis(4)).error(0.5);
 /// assert!((tissue.stand_off(0.001) - 2.2).abs() < 1e-5); // at a tick of 1 ms
 /// ```
