@@ -215,7 +215,7 @@ fn histogram(race: &Race<'_>, cell: &Cell, tool: usize, records: &mut Records) {
             let low = bin as f64 * width;
             let mut record =
                 Record::number(&cell, method, "node_tests", low + width / 2.0, "tests");
-            (record.max, record.n) = (low + width, count);
+            (record.summary.max, record.summary.n) = (low + width, count);
             records.push(record);
         }
     }

@@ -58,10 +58,16 @@ pub fn run(plan: &Plan, options: &plan::Options, records: &mut Records) -> Resul
         let built = Builder::new().stretch(STRETCH).build(&subject.mesh)?;
         for path in PATHS {
             let cell = Cell::new(EXPERIMENT, &subject.name, subject.mesh.triangles.len(), path);
-            let ticks = plan.contact_ticks;
-            match built.index_bits() {
-                16 => follow(&cell, &subject.mesh, &built, &built.tree::<u16>()?, ticks, records)?,
-                _ => follow(&cell, &subject.mesh, &built, &built.tree::<u32>()?, ticks, records)?,
+            let (mesh, ticks) = (&subject.mesh, plan.contact_ticks);
+            for (method, _) in METHODS {
+                match built.index_bits() {
+                    16 => {
+                        follow(method, &cell, mesh, &built, &built.tree::<u16>()?, ticks, records)?
+                    }
+                    _ => {
+                        follow(method, &cell, mesh, &built, &built.tree::<u32>()?, ticks, records)?
+                    }
+                }
             }
         }
         progress.finish();
@@ -69,22 +75,8 @@ pub fn run(plan: &Plan, options: &plan::Options, records: &mut Records) -> Resul
     Ok(())
 }
 
-/// Follows a path with each method, and records it.
+/// Follows a path with a method, and records it.
 fn follow<I: Index>(
-    cell: &Cell,
-    mesh: &Mesh,
-    built: &BuiltTree,
-    tree: &Tree<'_, I>,
-    ticks: u32,
-    records: &mut Records,
-) -> Result<()> {
-    for (method, _) in METHODS {
-        follow_with(method, cell, mesh, built, tree, ticks, records)?;
-    }
-    Ok(())
-}
-
-fn follow_with<I: Index>(
     method: &str,
     cell: &Cell,
     mesh: &Mesh,

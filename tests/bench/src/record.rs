@@ -1,5 +1,6 @@
 //! The flat list of records, from which all documents are made.
 
+use std::ops::Deref;
 use std::path::Path;
 
 use anyhow::{Context, Result};
@@ -19,19 +20,20 @@ pub struct Record {
     pub tool: String,
     pub method: String,
     pub metric: String,
-    pub mean: f64,
-    pub sd: f64,
-    pub median: f64,
-    /// 95 % confidence interval of the median.
-    pub median_low: f64,
-    pub median_high: f64,
-    pub p99: f64,
-    pub max: f64,
-    pub n: u64,
+    #[serde(flatten)]
+    pub summary: Summary,
     pub unit: String,
     /// The text of a fact, which is not a number.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub note: String,
+}
+
+impl Deref for Record {
+    type Target = Summary;
+
+    fn deref(&self) -> &Summary {
+        &self.summary
+    }
 }
 
 impl Record {
@@ -49,14 +51,7 @@ impl Record {
             tool: cell.tool.clone(),
             method: method.to_owned(),
             metric: metric.to_owned(),
-            mean: short(s.mean),
-            sd: short(s.sd),
-            median: short(s.median),
-            median_low: short(s.median_low),
-            median_high: short(s.median_high),
-            p99: short(s.p99),
-            max: short(s.max),
-            n: s.n,
+            summary: s.map(short),
             unit: unit.to_owned(),
             note: String::new(),
         }

@@ -8,15 +8,17 @@
 //! for many comparisons after Holm. With thousands of queries every difference is significant: the ratio and its
 //! interval matter.
 
+use serde::{Deserialize, Serialize};
 use statrs::distribution::{Binomial, DiscreteCDF};
 
 /// The summary of a sample.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     pub mean: f64,
     /// Standard deviation, with `n - 1`.
     pub sd: f64,
     pub median: f64,
+    /// 95 % confidence interval of the median.
     pub median_low: f64,
     pub median_high: f64,
     pub p99: f64,
@@ -53,6 +55,14 @@ impl Summary {
         let (median_low, median_high) = (value, value);
         let (mean, median, p99, max) = (value, value, value, value);
         Self { mean, sd: 0.0, median, median_low, median_high, p99, max, n: 1 }
+    }
+
+    /// The same of other numbers.
+    pub fn map(&self, each: impl Fn(f64) -> f64) -> Self {
+        let Self { mean, sd, median, median_low, median_high, p99, max, n } = *self;
+        let [mean, sd, median, median_low] = [mean, sd, median, median_low].map(&each);
+        let [median_high, p99, max] = [median_high, p99, max].map(each);
+        Self { mean, sd, median, median_low, median_high, p99, max, n }
     }
 }
 

@@ -6,7 +6,7 @@ use dibs_build::Mesh;
 use glam::{Vec3, Vec3A};
 
 use super::bounds::Axis;
-use crate::method::Found;
+use crate::method::{Found, Probe};
 
 /// A node of a tree of boxes, whose children are adjacent.
 #[derive(Clone, Debug)]
@@ -37,6 +37,20 @@ pub enum Start {
     Cold,
     /// A warm start from the last answer's triangle, if there is one.
     Last(Option<usize>),
+}
+
+/// The closest pair of a tool of either kind, and the next search's start.
+#[inline(always)]
+pub fn closest_to<T: BoxTree, const STACK: usize>(
+    tree: &mut T,
+    tool: &Probe,
+    mut start: Start,
+) -> (Found, Start) {
+    let found = match tool {
+        Probe::Sphere(sphere) => closest::<_, _, STACK>(tree, sphere, &mut start),
+        Probe::Capsule(capsule) => closest::<_, _, STACK>(tree, capsule, &mut start),
+    };
+    (found, start)
 }
 
 /// The closest pair. `STACK` must be at least the tree's depth.

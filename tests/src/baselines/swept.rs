@@ -6,7 +6,7 @@
 use glam::{Vec3, Vec3A};
 
 use super::aabb_tree::{AabbTree, Bounds, Link, STACK};
-use super::boxes::{BoxTree, Node, Start, closest};
+use super::boxes::{BoxTree, Node, Start, closest_to};
 use crate::method::{Found, Probe};
 
 /// A tree of boxes over two frames.
@@ -39,12 +39,8 @@ impl Swept {
     /// The closest pair between the tool and the surface at `share` of the way between the two frames.
     pub fn find(&mut self, tool: &Probe, share: f32) -> Found {
         self.share = share;
-        let mut start = self.start;
-        let found = match tool {
-            Probe::Sphere(sphere) => closest::<_, _, STACK>(self, sphere, &mut start),
-            Probe::Capsule(capsule) => closest::<_, _, STACK>(self, capsule, &mut start),
-        };
-        self.start = start;
+        let found;
+        (found, self.start) = closest_to::<_, STACK>(self, tool, self.start);
         found
     }
 }

@@ -27,7 +27,7 @@ use super::record::{Cell, Record, Records};
 use super::statistics::{Paired, Summary};
 use super::subjects::{self, Heart};
 use controller::{Held, Interpolated, Tick};
-use ours::{Surface, Tracking, Warm};
+use ours::{Frames, Surface, Tracking, Warm};
 use race::{Contender, Period, Race};
 
 /// The experiment on brains; the heart's is [`HEART`], and its facts are those of [`RUN`].
@@ -151,16 +151,17 @@ impl Scene<'_> {
         let size = self.mesh.triangles.len();
         let mut contenders = Vec::new();
         for surface in SURFACES {
+            let frames = |is_measured| Frames::new(built, tree, is_measured);
             let hybrid = || Hybrid::new(boxes.clone(), levels[surface as usize]).warm();
             contenders.extend([
-                Contender::new(TRACKER, surface, Tracking::new(built, tree, surface, true)),
+                Contender::new(TRACKER, surface, Tracking::new(tree, frames(true), surface)),
                 Contender::new(
                     TRACKER_AT_LIMIT,
                     surface,
-                    Tracking::new(built, tree, surface, false),
+                    Tracking::new(tree, frames(false), surface),
                 ),
-                Contender::new(MEASURED_WARM, surface, Warm::new(built, tree, surface, true)),
-                Contender::new(WARM, surface, Warm::new(built, tree, surface, false)),
+                Contender::new(MEASURED_WARM, surface, Warm::new(tree, frames(true), surface)),
+                Contender::new(WARM, surface, Warm::new(tree, frames(false), surface)),
                 of_boxes(REFIT, surface, Refit::new(boxes.clone()).warm()),
                 of_boxes(HYBRID, surface, hybrid()),
                 of_boxes(OBVHS, surface, Obvhs::new(self.mesh).warm()),

@@ -46,7 +46,7 @@ impl VertexTable for Frame {
 }
 
 /// The last two frames, as they come from imaging.
-struct Frames<'t, I> {
+pub struct Frames<'t, I> {
     order: &'t [u32],
     monitor: Option<StretchMonitor<'t, I>>,
     before: Frame,
@@ -54,7 +54,7 @@ struct Frames<'t, I> {
 }
 
 impl<'t, I: Index> Frames<'t, I> {
-    fn new(built: &'t BuiltTree, tree: &'t Tree<'t, I>, is_measured: bool) -> Self {
+    pub fn new(built: &'t BuiltTree, tree: &'t Tree<'t, I>, is_measured: bool) -> Self {
         let monitor = is_measured.then(|| StretchMonitor::new(tree).expect("has a metric"));
         let order = built.vertex_order();
         Self { order, monitor, before: Frame::default(), after: Frame::default() }
@@ -90,16 +90,11 @@ pub struct Tracking<'t, I> {
 }
 
 impl<'t, I: Index> Tracking<'t, I> {
-    pub fn new(
-        built: &'t BuiltTree,
-        tree: &'t Tree<'t, I>,
-        surface: Surface,
-        is_measured: bool,
-    ) -> Self {
+    pub fn new(tree: &'t Tree<'t, I>, frames: Frames<'t, I>, surface: Surface) -> Self {
         Self {
             tracker: Box::new(Tracker::new(tree).expect("enough for any tree")),
             odometer: Odometer::new(tree),
-            frames: Frames::new(built, tree, is_measured),
+            frames,
             surface,
         }
     }
@@ -150,14 +145,9 @@ pub struct Warm<'t, I> {
 }
 
 impl<'t, I: Index> Warm<'t, I> {
-    pub fn new(
-        built: &'t BuiltTree,
-        tree: &'t Tree<'t, I>,
-        surface: Surface,
-        is_measured: bool,
-    ) -> Self {
+    pub fn new(tree: &'t Tree<'t, I>, frames: Frames<'t, I>, surface: Surface) -> Self {
         let query = Query::new(tree).expect("enough for any tree");
-        Self { query, frames: Frames::new(built, tree, is_measured), surface }
+        Self { query, frames, surface }
     }
 }
 

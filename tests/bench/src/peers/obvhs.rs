@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use dibs_build::Mesh;
-use dibs_tests::baselines::boxes::{BoxTree, Node, Rows, Start, closest};
+use dibs_tests::baselines::boxes::{BoxTree, Node, Rows, Start, closest_to};
 use dibs_tests::method::{Found, Layout, Method, Probe};
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
@@ -104,12 +104,8 @@ impl Method for Obvhs {
     }
 
     fn find(&mut self, tool: &Probe) -> Found {
-        let mut start = self.start;
-        let found = match tool {
-            Probe::Sphere(sphere) => closest::<_, _, STACK>(self, sphere, &mut start),
-            Probe::Capsule(capsule) => closest::<_, _, STACK>(self, capsule, &mut start),
-        };
-        self.start = start;
+        let found;
+        (found, self.start) = closest_to::<_, STACK>(self, tool, self.start);
         found
     }
 }
