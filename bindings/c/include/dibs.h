@@ -2301,6 +2301,32 @@ dibs_code dibs_guard_closest(dibs_guard *guard,
                              dibs_answer *answer);
 
 /**
+ * The answer of this tick, and the motion nearest to a commanded one that keeps the tool out of the tissue until the next tick.
+ * The period, the tissue's speed, lag and transit are the guard's. The surface is extrapolated, whose residual is an
+ * estimate.
+ *
+ * Call it in place of `dibs_guard_closest`. After an error nothing is admitted: the tool stays at rest.
+ *
+ * Cost: that of `dibs_guard_closest` and of `dibs_filter_admit`.
+ *
+ * @param guard     The guard.
+ * @param filter    The filter.
+ * @param tool      The tool as it is now.
+ * @param command   The commanded motion.
+ * @param now       The receiver's clock, in ms; wraps.
+ * @param answer    Receives the answer, also where nothing is admitted; or null.
+ * @param admitted  Receives the motion to execute.
+ * @return As `dibs_filter_admit`; in the safe state its cause.
+ */
+dibs_code dibs_guard_admit(dibs_guard *guard,
+                           const dibs_filter *filter,
+                           const dibs_tool *tool,
+                           const dibs_motion *command,
+                           uint32_t now,
+                           dibs_answer *answer,
+                           dibs_admitted *admitted);
+
+/**
  * An operator's acknowledgement, which ends the safe state once every input is good again.
  *
  * @return `DIBS_CODE_OK`, `DIBS_CODE_ACKNOWLEDGE` unless the last tick waited for it, or a misuse.

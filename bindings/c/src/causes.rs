@@ -178,6 +178,7 @@ impl From<FilterError> for dibs_code {
             FilterError::Parameter { .. } => Self::Filter,
             FilterError::Command | FilterError::Row { .. } => Self::NotFinite,
             FilterError::Query(error) => error.into(),
+            FilterError::Untrusted(cause) => cause.into(),
             _ => Self::Argument,
         }
     }

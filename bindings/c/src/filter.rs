@@ -41,7 +41,8 @@ pub struct dibs_filter {
 }
 
 impl dibs_filter {
-    fn read(self) -> Result<Filter, dibs_code> {
+    /// The core's filter.
+    pub(crate) fn read(self) -> Result<Filter, dibs_code> {
         if !(self.depth_tolerance >= 0.0) {
             return Err(dibs_code::Argument);
         }

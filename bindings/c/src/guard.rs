@@ -4,15 +4,17 @@ use core::ffi::c_void;
 use core::ptr;
 
 use bytemuck::AnyBitPattern;
+use dibs_nostd::filter::{FilterError, Motion};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{Answer, Guard};
-use dibs_nostd::{Interval, Millis, Proximity, TreeBytes};
+use dibs_nostd::{Interval, Millis, Proximity, TreeBytes, Unavailable};
 
-use crate::border::{Handle, Input, Kind, Output, Storage};
+use crate::border::{Handle, Input, Kind, Output, Place, Storage};
 use crate::bus::{DIBS_BUS_SIZE, dibs_bus, dibs_bus_init};
 use crate::code::dibs_code;
 use crate::constraint::{dibs_force, dibs_wall, dibs_wall_force};
 use crate::failsafe::dibs_verdict;
+use crate::filter::{dibs_admitted, dibs_filter, dibs_motion};
 use crate::limits::dibs_guard_limits;
 use crate::query::{STACK, dibs_interval, dibs_proximity};
 use crate::reader::{dibs_age, dibs_link};
@@ -188,6 +190,57 @@ pub extern "C" fn dibs_guard_closest(
         }
         answer.set(found);
         shape.map(|_| ())
+    })
+}
+
+/// The answer of this tick, and the motion nearest to a commanded one that keeps the tool out of the tissue until the next tick.
+/// The period, the tissue's speed, lag and transit are the guard's. The surface is extrapolated, whose residual is an
+/// estimate.
+///
+/// Call it in place of `dibs_guard_closest`. After an error nothing is admitted: the tool stays at rest.
+///
+/// Cost: that of `dibs_guard_closest` and of `dibs_filter_admit`.
+///
+/// @param guard     The guard.
+/// @param filter    The filter.
+/// @param tool      The tool as it is now.
+/// @param command   The commanded motion.
+/// @param now       The receiver's clock, in ms; wraps.
+/// @param answer    Receives the answer, also where nothing is admitted; or null.
+/// @param admitted  Receives the motion to execute.
+/// @return As `dibs_filter_admit`; in the safe state its cause.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_guard_admit(
+    guard: *mut dibs_guard,
+    filter: *const dibs_filter,
+    tool: *const dibs_tool,
+    command: *const dibs_motion,
+    now: u32,
+    answer: *mut dibs_answer,
+    admitted: *mut dibs_admitted,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (answer, place) = (answer.check_if_any()?, admitted.check()?);
+        let (filter, command) = (filter.get()?.read()?, Motion::from(command.get()?));
+        let (tool, mut guard, now) = (tool.get()?, guard.open()?, Millis(now));
+        let shape = Shape::try_from(tool);
+        let (found, admitted) = match &shape {
+            Ok(Shape::Sphere(sphere)) => guard.0.admit(&filter, sphere, &command, now),
+            Ok(Shape::Capsule(capsule)) => guard.0.admit(&filter, capsule, &command, now),
+            // Without a pose the machine takes its step all the same.
+            Err(_) => {
+                let no_pose = FilterError::Untrusted(Unavailable::NoPose);
+                (guard.0.without_pose(now), Err(no_pose))
+            }
+        };
+        let mut found = dibs_answer::from(found);
+        if let Err(code) = shape {
+            found.outcome = code as u32;
+        }
+        Place::set_if_any(answer, found);
+        shape?;
+        place.set(admitted?.into());
+        Ok(())
     })
 }
 

@@ -10,6 +10,7 @@ use std::process::Command;
 use dibs_build::{Builder, BuiltTree, generate};
 use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
 use dibs_nostd::failsafe::State;
+use dibs_nostd::filter::{Admitted, Filter, FilterError, Motion, Reason};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Surface};
 use dibs_nostd::wire::{Encoding, Event, FrameEncoder, FrameId, Freshness, enframe, framed_bytes};
@@ -34,6 +35,8 @@ enum Step {
     Status(u32, bool),
     /// Both ends of the axis, and the radius.
     Tick(u32, [f32; 7]),
+    /// The same, with a command.
+    Admit(u32, [f32; 7]),
     Blind(u32),
     Acknowledge,
     Counters,
@@ -82,6 +85,9 @@ fn script() -> (BuiltTree, Vec<Step>) {
             // No tool at all, and one without a radius.
             1_334 => Step::Tick(now, [f32::NAN, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
             1_335 => Step::Tick(now, [a[0], a[1], a[2], b[0], b[1], b[2], -1.0]),
+            _ if now % 3 == 1 && start != end => {
+                Step::Admit(now, [a[0], a[1], a[2], b[0], b[1], b[2], 2.5])
+            }
             _ => Step::Tick(now, [a[0], a[1], a[2], b[0], b[1], b[2], 2.5]),
         });
         if now % 100 == 99 {
@@ -102,6 +108,9 @@ fn lines(steps: &[Step]) -> String {
             Step::Status(now, is_framed) => writeln!(text, "status {now} {}", u8::from(*is_framed)),
             Step::Tick(now, tool) => {
                 writeln!(text, "tick {now} {}", tool.map(|number| number.to_string()).join(" "))
+            }
+            Step::Admit(now, tool) => {
+                writeln!(text, "admit {now} {}", tool.map(|number| number.to_string()).join(" "))
             }
             Step::Blind(now) => writeln!(text, "blind {now}"),
             Step::Acknowledge => writeln!(text, "acknowledge 0"),
@@ -156,6 +165,14 @@ fn answer((bus, guard): &mut Ends<'_>, step: &Step) -> String {
                     }
                 }
             }
+        }
+        Step::Admit(now, [a, b, c, d, e, f, radius]) => {
+            let (start, end) = (Vec3::new(*a, *b, *c), Vec3::new(*d, *e, *f));
+            let tool = Capsule::new(start, end, *radius).expect("a tool");
+            let filter = Filter::new(1.0, 200.0).expect("a filter");
+            let command = Motion::new(start, Vec3::new(-0.1, 0.0, 0.0), Vec3::ZERO);
+            let (answer, admitted) = guard.admit(&filter, &tool, &command, Millis(*now));
+            tick(0, &answer) + &motion(admitted)
         }
         Step::Blind(now) => tick(0, &guard.without_pose(Millis(*now))),
         Step::Acknowledge => {
@@ -245,6 +262,32 @@ fn tick(code: u32, answer: &Answer) -> String {
     floats(&mut line, &[at[0], at[1], residual]);
     floats(&mut line, &searched.map_or([0.0; 3], |searched| searched.velocity.to_array()));
     line
+}
+
+/// The code, and the motion where there is one.
+fn motion(admitted: Result<Admitted, FilterError>) -> String {
+    match admitted {
+        Ok(Admitted { motion, least_separation, reason, queries, instructions, .. }) => {
+            let reasons = [
+                Reason::Commanded,
+                Reason::Nearest,
+                Reason::Shortened,
+                Reason::Stopped,
+                Reason::Retreating,
+                Reason::NoSafeMotion,
+            ];
+            let reason = reasons.iter().position(|other| *other == reason).expect("a reason");
+            let mut line = format!(" 0 {reason} {queries} {instructions}");
+            let vectors =
+                [motion.about, motion.translation, motion.rotation].map(|of| of.to_array());
+            for value in [least_separation].iter().chain(vectors.as_flattened()) {
+                write!(line, " {:08x}", value.to_bits()).expect("a string");
+            }
+            line
+        }
+        Err(FilterError::Untrusted(because)) => format!(" {}", cause(because)),
+        Err(error) => panic!("{error}"),
+    }
 }
 
 fn number(progress: Progress) -> u32 {
@@ -359,6 +402,10 @@ fn the_loop_in_c_answers_with_the_same_bits() {
     {
         assert!(count(place, word) > 10, "{} of {word} at {place}", count(place, word));
     }
+    let width = ticks.iter().map(Vec::len).min().expect("ticks");
+    let admitted = ticks.iter().filter_map(|tick| tick.get(width).copied());
+    let (admitted, refused): (Vec<_>, Vec<_>) = admitted.partition(|&code| code == "0");
+    assert!(admitted.len() > 100 && refused.len() > 100, "{} admitted", admitted.len());
     assert!(ticks.iter().any(|tick| tick[30] != tick[31] && tick[2] == "0"), "no velocity");
     for start in ["work 0 3", "work 313", "packet 400", "acknowledge 0", "acknowledge 505"] {
         assert!(expected.iter().any(|line| line.starts_with(start)), "nothing is {start}");

@@ -3,6 +3,14 @@ from typing import Literal, Optional
 _Reading = tuple[Optional[str], Optional[float], bool, bool, Optional[list[float]], bool, bool]
 _Tools = tuple[bytes, int, int]
 _Frames = tuple[bytearray, int, float]
+_Admitted = tuple[
+    list[float],
+    list[float],
+    float,
+    Literal["commanded", "nearest", "shortened", "stopped", "retreating", "no safe motion"],
+    int,
+    int,
+]
 
 ANSWER: list[tuple[str, str, int]]
 CONTACT: list[tuple[str, str, int]]
@@ -28,6 +36,9 @@ class Guard:
     def counters(self) -> list[tuple[str, int]]: ...
     def register(self) -> None: ...
     def closest(self, tool: Optional[bytes], now: int) -> Answer: ...
+    def admit(
+        self, filter: Filter, tool: bytes, command: list[list[float]], now: int
+    ) -> tuple[Answer, Optional[_Admitted]]: ...
     def acknowledge(self) -> None: ...
 
 class Answer:
@@ -65,14 +76,7 @@ class Filter:
         period: float,
         tissue: tuple[float, float],
         rows: list[list[float]],
-    ) -> tuple[
-        list[float],
-        list[float],
-        float,
-        Literal["commanded", "nearest", "shortened", "stopped", "retreating", "no safe motion"],
-        int,
-        int,
-    ]: ...
+    ) -> _Admitted: ...
 
 class Mesh:
     @staticmethod

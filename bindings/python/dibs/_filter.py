@@ -70,10 +70,7 @@ class Tracker:
         work, of a Cortex-M7 by the fitted cost: pair, side, depth and contacts together. Where it ends, the interval is
         that of the last tick, less what moved since, and the next tick goes on. With a `margin` (mm) the contacts are listed.
         """
-        array = _arrays.numbers("tool", tool)
-        if array.shape not in ((4,), (7,)):
-            raise ValueError(f"tool: the shape is {array.shape}; give 4 numbers of a sphere, or 7 of a capsule")
-        numbers = _arrays.finite("tool", array).tobytes()
+        numbers = tool_of(tool)
         margin = None if margin is None else _at_least("margin", margin, 0)
         budget = None if instructions is None else _whole("instructions", instructions)
         return Tracked(*self._native.tick(_surface(surface)._native, numbers, budget, margin))
@@ -167,10 +164,7 @@ class Filter:
         if chain.ndim != 2 or chain.shape[1] != 7 or not 1 <= len(chain) <= _TOOLS:
             raise ValueError(f"tools: the shape is {array.shape}; give (tools, 7), of 1 to {_TOOLS} capsules")
         chain = _arrays.finite("tools", chain)
-        if not isinstance(command, RigidMotion):
-            raise TypeError(f"command: a RigidMotion is needed, not {type(command).__name__}")
-        names = ("command.about", "command.translation", "command.rotation")
-        vectors = [_vector(name, each).tolist() for name, each in zip(names, command)]
+        vectors = motion_of(command)
         period = _arrays.number("period", period)
         if period <= 0:
             raise ValueError(f"period: {period} is not above 0")
@@ -178,11 +172,33 @@ class Filter:
         limits = [_row(number, row) for number, row in enumerate(rows)]
         if len(limits) > _ROWS:
             raise ValueError(f"rows: {len(limits)} rows, and {_ROWS} have a place")
-        translation, rotation, least, reason, queries, instructions = self._native.admit(
-            _surface(surface)._native, chain.tobytes(), vectors, period, tissue, limits
+        native = self._native.admit(_surface(surface)._native, chain.tobytes(), vectors, period, tissue, limits)
+        return admitted_of(vectors, native)
+
+
+def tool_of(tool: npt.ArrayLike) -> bytes:
+    """The checked numbers of one tool."""
+    array = _arrays.numbers("tool", tool)
+    if array.shape not in ((4,), (7,)):
+        raise ValueError(
+            f"tool: the shape is {array.shape}; give 4 numbers of a sphere (x, y, z, radius), or 7 of a capsule "
+            "(x1, y1, z1, x2, y2, z2, radius)"
         )
-        motion = RigidMotion(np.array(vectors[0]), np.array(translation), np.array(rotation))
-        return Admitted(motion, least, reason, queries, instructions)
+    return _arrays.finite("tool", array).tobytes()
+
+
+def motion_of(command: Any) -> list[list[float]]:
+    """The checked vectors of a command."""
+    if not isinstance(command, RigidMotion):
+        raise TypeError(f"command: a RigidMotion is needed, not {type(command).__name__}")
+    names = ("command.about", "command.translation", "command.rotation")
+    return [_vector(name, each).tolist() for name, each in zip(names, command)]
+
+
+def admitted_of(command: list[list[float]], native: tuple[list[float], list[float], float, Reason, int, int]) -> Admitted:
+    translation, rotation, least, reason, queries, instructions = native
+    motion = RigidMotion(np.array(command[0]), np.array(translation), np.array(rotation))
+    return Admitted(motion, least, reason, queries, instructions)
 
 
 def _tree(tree: Any) -> Tree:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _arrays, _dibs
-from ._filter import Tracked
+from ._filter import Admitted, Filter, RigidMotion, Tracked, admitted_of, motion_of, tool_of
 from ._tree import ANSWER, Tree, _tests
 
 _WRAP = 1 << 32
@@ -185,13 +185,21 @@ class Guard:
         """
         if tool is None:
             return Answer(self._native.closest(None, _now(now)))
-        array = _arrays.numbers("tool", tool)
-        if array.shape not in ((4,), (7,)):
-            raise ValueError(
-                f"tool: the shape is {array.shape}; give 4 numbers of a sphere (x, y, z, radius), or 7 of a capsule "
-                "(x1, y1, z1, x2, y2, z2, radius)"
-            )
-        return Answer(self._native.closest(_arrays.finite("tool", array).tobytes(), _now(now)))
+        return Answer(self._native.closest(tool_of(tool), _now(now)))
+
+    def admit(
+        self, filter: Filter, tool: npt.ArrayLike, command: RigidMotion, now: int
+    ) -> tuple[Answer, Optional[Admitted]]:
+        """The answer of this tick, and the motion nearest to `command` that keeps the tool out of the tissue until the next.
+
+        Stand-off and the robot's speed are the filter's; the period, the tissue's speed, age and transit are the guard's. The
+        motion is `None` in the safe state: the tool stays at rest, and the answer has the cause.
+        """
+        if not isinstance(filter, Filter):
+            raise TypeError(f"filter: a Filter is needed, not {type(filter).__name__}")
+        vectors = motion_of(command)
+        answer, admitted = self._native.admit(filter._native, tool_of(tool), vectors, _now(now))
+        return Answer(answer), None if admitted is None else admitted_of(vectors, admitted)
 
     def acknowledge(self) -> None:
         """An operator's acknowledgement, which ends the safe state once every input is good again. Raises `ValueError`

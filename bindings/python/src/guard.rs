@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use dibs_nostd::constraint::{ConstraintForce, ConstraintState, SpringDamper};
 use dibs_nostd::failsafe::LimitError;
+use dibs_nostd::filter::FilterError;
 use dibs_nostd::guard::{Bus, GuardLimits, Notes};
 use dibs_nostd::wire::{Event, NoMac};
 use dibs_nostd::{
@@ -16,7 +17,7 @@ use pyo3::types::{PyByteArray, PyBytes};
 
 use crate::record::push_answer;
 use crate::tool::AnyTool;
-use crate::tracker::Tracked;
+use crate::tracker::{Admitted, Filter, Tracked, motion, named, record};
 use crate::tree::{Owned, Tree, View};
 use crate::{bytes, error, invalid};
 
@@ -202,6 +203,33 @@ impl Guard {
             })
         });
         Ok(Answer { answer, tree: Arc::clone(&self.tree) })
+    }
+
+    /// The answer, and the motion that a filter admits of a command; none where no surface is trusted.
+    fn admit(
+        &self,
+        py: Python<'_>,
+        filter: &Filter,
+        tool: &[u8],
+        command: [[f64; 3]; 3],
+        now: u32,
+    ) -> PyResult<(Answer, Option<Admitted>)> {
+        let (origin, now) = (self.tree.origin, Millis(now));
+        let tool = AnyTool::of(&bytes::doubles(tool), origin);
+        let tool = tool.map_err(|error| invalid(format!("tool: {error}")))?;
+        let (filter, command) = (filter.filter(), motion(command, origin));
+        let (answer, admitted) = py.detach(|| {
+            with_ends!(self, pair => match &tool {
+                AnyTool::Sphere(sphere) => pair.guard.admit(filter, sphere, &command, now),
+                AnyTool::Capsule(capsule) => pair.guard.admit(filter, capsule, &command, now),
+            })
+        });
+        let admitted = match admitted {
+            Ok(admitted) => Some(record(admitted)),
+            Err(FilterError::Untrusted(_)) => None,
+            Err(error) => return Err(named(error)),
+        };
+        Ok((Answer { answer, tree: Arc::clone(&self.tree) }, admitted))
     }
 
     fn acknowledge(&self) -> PyResult<()> {

@@ -213,7 +213,7 @@ impl Tracked {
 }
 
 /// Translation and rotation, least separation, reason, queries, instructions.
-type Admitted = ([f32; 3], [f32; 3], f32, &'static str, u32, u32);
+pub type Admitted = ([f32; 3], [f32; 3], f32, &'static str, u32, u32);
 
 /// A filter of commands.
 #[pyclass(frozen, module = "dibs._dibs")]
@@ -263,9 +263,7 @@ impl Filter {
                 .map_err(|error| invalid(format!("tools: row {number}: {error}")))
         });
         let tools = tools.collect::<PyResult<Vec<_>>>()?;
-        let [about, translation, rotation] = command.map(DVec3::from);
-        let about = (about - origin).as_vec3();
-        let command = Motion::new(about, translation.as_vec3(), rotation.as_vec3());
+        let command = motion(command, origin);
         let rows = rows.into_iter().map(|[a, b, c, d, e, f, least]| MotionRow {
             linear: [a, b, c],
             angular: [d, e, f],
@@ -291,20 +289,37 @@ impl Filter {
                 Ok(admitted)
             })
         });
-        let admitted = admitted.map_err(|error: String| invalid(error))?.map_err(named)?;
-        Ok((
-            admitted.motion.translation.to_array(),
-            admitted.motion.rotation.to_array(),
-            admitted.least_separation,
-            admitted.reason.words(),
-            admitted.queries,
-            admitted.instructions,
-        ))
+        let admitted = admitted.map_err(|error: String| invalid(error))?;
+        admitted.map(record).map_err(named)
     }
 }
 
+impl Filter {
+    pub const fn filter(&self) -> &filter::Filter {
+        &self.filter
+    }
+}
+
+/// The motion of a reference point, a translation and a rotation.
+pub fn motion(command: [[f64; 3]; 3], origin: DVec3) -> Motion {
+    let [about, translation, rotation] = command.map(DVec3::from);
+    Motion::new((about - origin).as_vec3(), translation.as_vec3(), rotation.as_vec3())
+}
+
+/// An admitted motion for Python.
+pub fn record(admitted: filter::Admitted) -> Admitted {
+    (
+        admitted.motion.translation.to_array(),
+        admitted.motion.rotation.to_array(),
+        admitted.least_separation,
+        admitted.reason.words(),
+        admitted.queries,
+        admitted.instructions,
+    )
+}
+
 /// A sentence with the names of Python's arguments.
-fn named(error: FilterError) -> PyErr {
+pub fn named(error: FilterError) -> PyErr {
     match error {
         FilterError::Parameter { parameter, value } => {
             let name = match parameter {

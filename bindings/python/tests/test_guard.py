@@ -125,6 +125,27 @@ class Guards(unittest.TestCase):
         self.assertTrue(np.isnan(blind.velocity).all())
         self.assertEqual(WALL.force(blind).state, dibs.ForceState.SAFE)
 
+    def test_a_command_is_admitted_by_the_guards_own_limits(self):
+        loop, guard = Loop(), dibs.Filter(TREE, 1.0, 300.0)
+        tool = np.array([110.0, 3.0, 60.0, 140.0, 10.0, 80.0, 2.5])
+        answer, admitted = loop.guard.admit(guard, tool, dibs.RigidMotion(tool[:3]), loop.now)
+        self.assertIsNone(admitted)
+        self.assertIn("no surface", answer.reason)
+        loop.run(1_200, tool)
+        reasons = set()
+        for tick in range(800):
+            if tick % PERIOD == 0:
+                loop.send()
+            loop.now += 1
+            push = dibs.RigidMotion(tool[:3], [-0.1, 0.0, 0.0])
+            answer, admitted = loop.guard.admit(guard, tool, push, loop.now)
+            self.assertGreater(admitted.least_separation, 0.98)
+            tool = admitted.motion.apply(tool)
+            reasons.add(admitted.reason)
+        self.assertIn("commanded", reasons)
+        self.assertGreater(len(reasons), 1)
+        self.assertGreater(TREE.query(tool, surface=loop.frame)["lower"], 0.98)
+
     def test_a_status_goes_back_when_it_is_due(self):
         loop = Loop()
         loop.run(1)
@@ -179,6 +200,9 @@ class Guards(unittest.TestCase):
             ("tool", ValueError, lambda: guard.closest([0, 0, 0, -1], 0)),
             ("tool", ValueError, lambda: guard.closest([0, 0, float("nan"), 1], 0)),
             ("answer", TypeError, lambda: WALL.force(None)),
+            ("filter", TypeError, lambda: guard.admit(None, SPHERE, dibs.RigidMotion([0, 0, 0]), 0)),
+            ("command", TypeError, lambda: guard.admit(dibs.Filter(TREE, 1, 2), SPHERE, None, 0)),
+            ("tool", ValueError, lambda: guard.admit(dibs.Filter(TREE, 1, 2), [1, 2], dibs.RigidMotion([0, 0, 0]), 0)),
             ("stiffness", ValueError, lambda: dibs.ForbiddenRegion(float("inf"), 0, 5, 5)),
             ("", ValueError, lambda: dibs.ForbiddenRegion(0, 0, 5, 5)),
             ("", ValueError, lambda: dibs.ForbiddenRegion(1, 0, 5, -5)),

@@ -10,6 +10,7 @@
  *     work ROWS                    a slice of the checks
  *     status NOW FRAMED            the status for the sender
  *     tick NOW START END RADIUS    a control tick: a capsule, or a sphere where both ends are one
+ *     admit NOW START END RADIUS   a control tick whose command, a tenth of a millimetre along -x, is filtered
  *     blind NOW                    a control tick without a pose
  *     acknowledge 0                an operator's acknowledgement
  *     counters 0                   the bus's events
@@ -93,6 +94,15 @@ static void print_answer(const dibs_answer *answer) {
     print_searched(&answer->searched);
 }
 
+static dibs_tool take_tool(char *text) {
+    dibs_tool tool;
+    float *numbers = &tool.start.x;
+    for (size_t at = 0; at < 7; at++) {
+        numbers[at] = strtof(text, &text);
+    }
+    return tool;
+}
+
 /* A whole file, and a zero. */
 static uint8_t *file_read(const char *path, size_t *length) {
     FILE *file = fopen(path, "rb");
@@ -120,14 +130,26 @@ static void answer_event(dibs_bus *bus, dibs_guard *guard, const char *name, uin
     static uint8_t bytes[1 << 16];
     size_t length = 0;
     if (strcmp(name, "tick") == 0) {
-        dibs_tool tool;
+        const dibs_tool tool = take_tool(rest);
         dibs_answer answer;
-        float *numbers = &tool.start.x;
-        for (size_t at = 0; at < 7; at++) {
-            numbers[at] = strtof(rest, &rest);
-        }
         printf("tick %u", dibs_guard_closest(guard, &tool, now, &answer));
         print_answer(&answer);
+    } else if (strcmp(name, "admit") == 0) {
+        const dibs_tool tool = take_tool(rest);
+        const dibs_filter filter = dibs_filter_of(1.0f, 200.0f);
+        const dibs_motion command = {.about = tool.start, .translation = {-0.1f, 0.0f, 0.0f}};
+        dibs_answer answer;
+        dibs_admitted admitted;
+        const dibs_code code = dibs_guard_admit(guard, &filter, &tool, &command, now, &answer, &admitted);
+        printf("tick 0");
+        print_answer(&answer);
+        printf(" %u", code);
+        if (code == DIBS_CODE_OK) {
+            print_words(&(uint32_t){admitted.reason}, 1);
+            print_words(&admitted.queries, 2);
+            print_floats(&admitted.least_separation, 1);
+            print_floats(&admitted.motion.about.x, 9);
+        }
     } else if (strcmp(name, "blind") == 0) {
         dibs_answer answer;
         printf("tick %u", dibs_guard_closest(guard, NULL, now, &answer));

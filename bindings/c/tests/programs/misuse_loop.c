@@ -77,6 +77,24 @@ static void start(const unsigned char *bytes, size_t length) {
     EXPECT(ACKNOWLEDGE, dibs_guard_acknowledge(guard));
     EXPECT(NULL, dibs_guard_acknowledge(NULL));
 
+    const dibs_filter filter = dibs_filter_of(1.0f, 200.0f);
+    const dibs_filter none = dibs_filter_of(-1.0f, 200.0f);
+    const dibs_motion command = {.about = tool.start};
+    dibs_tool bad = tool;
+    dibs_admitted admitted = {.queries = 77};
+    bad.radius = -1.0f;
+    EXPECT(NULL, dibs_guard_admit(NULL, &filter, &tool, &command, 1, NULL, &admitted));
+    EXPECT(NULL, dibs_guard_admit(guard, NULL, &tool, &command, 1, NULL, &admitted));
+    EXPECT(NULL, dibs_guard_admit(guard, &filter, NULL, &command, 1, NULL, &admitted));
+    EXPECT(NULL, dibs_guard_admit(guard, &filter, &tool, NULL, 1, NULL, &admitted));
+    EXPECT(NULL, dibs_guard_admit(guard, &filter, &tool, &command, 1, NULL, NULL));
+    EXPECT(FILTER, dibs_guard_admit(guard, &none, &tool, &command, 1, NULL, &admitted));
+    EXPECT(NO_SURFACE, dibs_guard_admit(guard, &filter, &tool, &command, 1, &answer, &admitted));
+    EXPECT(NO_SURFACE, answer.outcome);
+    EXPECT(TOOL_RADIUS, dibs_guard_admit(guard, &filter, &bad, &command, 2, &answer, &admitted));
+    EXPECT(TOOL_RADIUS, answer.outcome);
+    EXPECT_THAT(admitted.queries == 77);
+
     unsigned char status[DIBS_STATUS];
     size_t count = 7;
     EXPECT(NULL, dibs_bus_receive(bus, NULL, 1, 0));

@@ -200,6 +200,9 @@ int main(int argc, char **argv) {
     EXPECT(true, at.x == positions[3 * 501]);
     EXPECT(DIBS_CODE_ARGUMENT, dibs_bus_position(bus, 502, &at));
     EXPECT(true, answer.trust.state == DIBS_STATE_SAFE && answer.outcome != DIBS_CODE_OK);
+    dibs_admitted admitted;
+    const auto cause = guard.admit(dibs::Filter(1.0f, 200.0f), tool, {tool.start, {}, {}}, 2, admitted, &answer);
+    EXPECT(true, cause != DIBS_CODE_OK && cause == answer.trust.cause && answer.age.epoch == 2);
     EXPECT(DIBS_CODE_ACKNOWLEDGE, guard.acknowledge());
 
     /* Positions of the caller's, published. */
