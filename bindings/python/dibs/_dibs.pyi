@@ -73,8 +73,7 @@ class Filter:
         surface: Surface,
         tools: bytes,
         command: list[list[float]],
-        period: float,
-        tissue: tuple[float, float],
+        tissue: tuple[float, float, float],
         rows: list[list[float]],
     ) -> _Admitted: ...
 

@@ -168,11 +168,11 @@ class Filter:
         period = _arrays.number("period", period)
         if period <= 0:
             raise ValueError(f"period: {period} is not above 0")
-        tissue = (_at_least("tissue_speed", tissue_speed, 0), _at_least("error", error, 0))
+        tissue = (period, _at_least("tissue_speed", tissue_speed, 0), _at_least("error", error, 0))
         limits = [_row(number, row) for number, row in enumerate(rows)]
         if len(limits) > _ROWS:
             raise ValueError(f"rows: {len(limits)} rows, and {_ROWS} have a place")
-        native = self._native.admit(_surface(surface)._native, chain.tobytes(), vectors, period, tissue, limits)
+        native = self._native.admit(_surface(surface)._native, chain.tobytes(), vectors, tissue, limits)
         return admitted_of(vectors, native)
 
 

@@ -242,7 +242,7 @@ impl Filter {
         Ok(Self { ticks: on(tree), filter, tree: Arc::clone(&tree.0) })
     }
 
-    /// `tools`: seven numbers each. `command`: reference point, translation, rotation. `tissue`: speed, error.
+    /// `tools`: seven numbers each. `command`: reference point, translation, rotation. `tissue`: period, speed, error.
     /// `rows`: seven numbers each.
     fn admit(
         &self,
@@ -250,8 +250,7 @@ impl Filter {
         surface: Py<Surface>,
         tools: &[u8],
         command: [[f64; 3]; 3],
-        period: f32,
-        tissue: (f32, f32),
+        tissue: (f32, f32, f32),
         rows: Vec<[f32; 7]>,
     ) -> PyResult<Admitted> {
         check(surface.get(), &self.tree)?;
@@ -270,7 +269,7 @@ impl Filter {
             least,
         });
         let rows: Vec<_> = rows.collect();
-        let (speed, error) = tissue;
+        let (period, speed, error) = tissue;
         let uncertainty = Uncertainty::new(speed).error(error);
         let filter = self.filter.options(options(surface.get()));
         let admitted = py.detach(|| {

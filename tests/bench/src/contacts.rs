@@ -60,13 +60,12 @@ pub fn run(plan: &Plan, options: &plan::Options, records: &mut Records) -> Resul
             let cell = Cell::new(EXPERIMENT, &subject.name, subject.mesh.triangles.len(), path);
             let (mesh, ticks) = (&subject.mesh, plan.contact_ticks);
             for (method, _) in METHODS {
-                match built.index_bits() {
-                    16 => {
-                        follow(method, &cell, mesh, &built, &built.tree::<u16>()?, ticks, records)?
-                    }
-                    _ => {
-                        follow(method, &cell, mesh, &built, &built.tree::<u32>()?, ticks, records)?
-                    }
+                if built.index_bits() == 16 {
+                    let tree = built.tree::<u16>()?;
+                    follow(method, &cell, mesh, &built, &tree, ticks, records)?;
+                } else {
+                    let tree = built.tree::<u32>()?;
+                    follow(method, &cell, mesh, &built, &tree, ticks, records)?;
                 }
             }
         }
