@@ -8,38 +8,67 @@ use dibs_tests::streams::{Beat, TICK_RATE};
 use glam::{Quat, Vec3};
 use probe::track::{ANSWER_WORDS, JOINTS, command, tick};
 
+/// A script: a tree, then frames and ticks.
+pub struct Script {
+    bytes: Vec<u8>,
+}
+
+impl Script {
+    /// With the surface before the first tick.
+    pub fn new(built: &BuiltTree, rows: &[Vec3]) -> Self {
+        let mut bytes = (built.blob().len() as u32).to_le_bytes().to_vec();
+        bytes.extend(built.blob());
+        bytes.resize(bytes.len().next_multiple_of(4), 0);
+        let mut script = Self { bytes };
+        script.frame(rows);
+        script
+    }
+
+    fn put(&mut self, words: &[u32]) {
+        self.bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
+    }
+
+    fn put_points(&mut self, points: &[Vec3]) {
+        self.bytes.extend(points.iter().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes));
+    }
+
+    /// The next frame.
+    pub fn frame(&mut self, rows: &[Vec3]) {
+        self.put(&[command::FRAME]);
+        self.put_points(rows);
+    }
+
+    /// A tick so far on the way to the last frame. `bits` is what the probe asks.
+    pub fn tick(&mut self, bits: u32, share: f32, tool: &Capsule) {
+        self.put(&[command::TICK, bits, share.to_bits()]);
+        let joints = joints(tool);
+        self.put_points(if bits & tick::CHAIN == 0 { &joints[..2] } else { &joints });
+        self.put(&[tool.radius().to_bits()]);
+    }
+
+    /// All of it.
+    pub fn end(mut self) -> Vec<u8> {
+        self.put(&[command::END]);
+        self.bytes
+    }
+}
+
 /// The script of so many ticks. `bits` is what the probe asks at each.
 pub fn script(built: &BuiltTree, motion: &Motion, bits: u32, ticks: u32) -> Result<Vec<u8>> {
-    let mut bytes = (built.blob().len() as u32).to_le_bytes().to_vec();
-    bytes.extend(built.blob());
-    bytes.resize(bytes.len().next_multiple_of(4), 0);
-    let put = |bytes: &mut Vec<u8>, words: &[u32]| {
-        bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
-    };
-    let put_points = |bytes: &mut Vec<u8>, points: &[Vec3]| {
-        bytes.extend(points.iter().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes));
-    };
-    let put_frame = |bytes: &mut Vec<u8>, number: usize| {
-        put(bytes, &[command::FRAME]);
-        put_points(bytes, &built.to_rows(&motion.frames[number % motion.frames.len()]));
-    };
+    let rows = |number: usize| built.to_rows(&motion.frames[number % motion.frames.len()]);
     let beat = Beat::new(motion);
-    put_frame(&mut bytes, 0);
+    let mut script = Script::new(built, &rows(0));
     let mut last = None;
     for tick in 0..ticks {
         let time = tick as f32 / TICK_RATE * motion.rate;
         let frame = time as usize;
         if last.replace(frame) != Some(frame) {
-            put_frame(&mut bytes, frame + 1);
+            script.frame(&rows(frame + 1));
         }
         let Probe::Capsule(tool) = beat.tool(tick) else { bail!("no capsule") };
-        put(&mut bytes, &[command::TICK, bits, time.fract().to_bits()]);
-        let joints = joints(&tool);
-        put_points(&mut bytes, if bits & tick::CHAIN == 0 { &joints[..2] } else { &joints });
-        put(&mut bytes, &[tool.radius().to_bits()]);
+        script.tick(bits, time.fract(), &tool);
     }
-    put(&mut bytes, &[command::END]);
-    Ok(bytes)
+    Ok(script.end())
 }
 
 /// The ends of a chain whose first link is the tool, each link turned by a tenth of a radian against the one before.
